@@ -1,0 +1,44 @@
+"""One terrain of a mix: which, how much of it, and with what parameters."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from terrainkit import registry
+from terrainkit.errors import ConfigError
+from terrainkit.parameter import Range, Value
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class TerrainChoice:
+    """A terrain as a mix holds it.
+
+    Raises:
+        ConfigError: if there is no such terrain, or it has no such parameter or value.
+    """
+
+    terrain: str
+    """Which terrain: one of those that `terrainkit list` prints."""
+
+    proportion: float = 1.0
+    """Its share of the columns, relative to the sum over the mix."""
+
+    name: str = ""
+    """What to call it in the map; the terrain's own name unless given."""
+
+    parameters: Mapping[str, Value | Range] = field(default_factory=dict)
+    """Parameters to use instead of the defaults: a value, or a range (easy, hard)."""
+
+    def __post_init__(self) -> None:
+        if not self.name:
+            object.__setattr__(self, "name", self.terrain)
+        if not 0 <= self.proportion < float("inf"):
+            raise ConfigError(
+                f"{self.name}: proportion is {self.proportion:g}; wanted a finite number, 0 or more"
+            )
+        for end in (0.0, 1.0):
+            self.at(end)
+
+    def at(self, difficulty: float) -> Terrain:
+        """Return the terrain at `difficulty`, 0 to 1."""
+        return registry.find(self.terrain).at(difficulty, self.parameters)

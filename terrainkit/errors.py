@@ -1,0 +1,35 @@
+"""Every error that terrainkit raises on purpose.
+
+A message is one line: what was given, what was wanted, what exists.
+"""
+
+from collections.abc import Iterable
+
+
+class TerrainkitError(Exception):
+    """The one class to catch; the command line turns it into a line on stderr and exit code 2."""
+
+
+class ConfigError(TerrainkitError, ValueError):
+    """A number, name or combination that no map can be made from."""
+
+
+class MapFileError(TerrainkitError):
+    """A file that is not a map, or not a whole one."""
+
+
+class ExportError(TerrainkitError):
+    """A map that the wanted format cannot hold, or a target that cannot be written."""
+
+
+class CapacityError(TerrainkitError, MemoryError):
+    """Work that would not fit in this machine's memory; raised before anything is allocated."""
+
+
+class TerrainkitWarning(UserWarning):
+    """Something was left out or changed, and the result is still sound."""
+
+
+def listing(names: Iterable[str]) -> str:
+    """Return `names` as a sentence fragment, for the "what exists" part of a message."""
+    return ", ".join(names) or "nothing"

@@ -1,0 +1,68 @@
+"""Generate: from a MapConfig to a TerrainMap."""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from terrainkit.capacity import require_memory
+from terrainkit.config import MapConfig
+from terrainkit.layout import assign_patch, terrain_columns
+from terrainkit.patch import build_patch
+from terrainkit.terrain_map import Parameters, TerrainMap
+
+Progress = Callable[[Iterator[tuple[int, int]], int], Iterator[tuple[int, int]]]
+"""Wraps the walk over the patches, of that many, to show how far it has come."""
+
+
+def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainMap:
+    """Return the map that `config` describes.
+
+    Args:
+        config: What to make. The same config gives the same bytes on every machine.
+        progress: Wraps the walk over the patches, for a progress bar.
+
+    Warns:
+        TerrainkitWarning: if a terrain of a preset gets no column.
+
+    Raises:
+        ConfigError: if a terrain does not fit in a patch, or leaves no room to spawn.
+        CapacityError: if the map would not fit in memory; nothing was allocated.
+    """
+    grid, mix = config.grid, config.mix
+    size = (config.rows, config.cols)
+    require_memory(_bytes_needed(config), f"a map of {grid.shape[0]} x {grid.shape[1]} samples")
+    columns = terrain_columns(config)
+    heights = np.zeros(grid.shape, dtype=np.float32)
+    origins = np.empty((*size, 3), dtype=np.float32)
+    kinds = np.empty(size, dtype=np.int32)
+    difficulty = np.empty(size, dtype=np.float32)
+    parameters = np.empty(size, dtype=object)
+    walk: Iterator[tuple[int, int]] = iter(np.ndindex(size))  # type: ignore[assignment]
+    for row, col in progress(walk, config.rows * config.cols) if progress else walk:
+        kind, level = assign_patch(config, columns, row, col)
+        patch = build_patch(config, mix[kind], level, row, col)
+        i, j = config.patch_start(row, col)
+        heights[i : i + patch.grid.shape[0], j : j + patch.grid.shape[1]] = patch.heights
+        origins[row, col] = patch.origin
+        kinds[row, col] = kind
+        difficulty[row, col] = level
+        parameters[row, col] = Parameters(requested=patch.requested, realized=patch.realized)
+    return TerrainMap(
+        config=config,
+        grid=grid,
+        heights=heights,
+        env_origins=origins,
+        terrain_types=kinds,
+        terrain_names=tuple(choice.name for choice in mix),
+        difficulty=difficulty,
+        parameters=parameters,
+    )
+
+
+def _bytes_needed(config: MapConfig) -> int:
+    samples = config.grid.shape[0] * config.grid.shape[1]
+    return samples * 4 + config.rows * config.cols * _BYTES_PER_PATCH
+
+
+_BYTES_PER_PATCH = 2000
+"""The record of a patch: its parameters, origin and difficulty."""

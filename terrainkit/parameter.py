@@ -1,0 +1,114 @@
+"""The parameters of a terrain: what each field of its dataclass may be, and how it snaps to cells.
+
+A terrain's fields are declared with the functions below. Each takes the value at difficulty 0
+and the value at difficulty 1; one value alone holds at every difficulty.
+"""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+
+Snap = Literal["none", "cells", "centred"]
+Value = float | int | bool
+Range = tuple[float, float]
+Realized = float | int | bool | tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """What is known of one field of a terrain beside its type and docstring."""
+
+    easy: Value
+    """Default at difficulty 0."""
+
+    hard: Value
+    """Default at difficulty 1."""
+
+    snap: Snap = "none"
+    """How it meets the cells: as it is, as whole cells, or as a block centred in the patch."""
+
+    zero: bool = True
+    """Whether 0 is allowed; below 0 nothing is."""
+
+    ramps: bool = True
+    """Whether it may be given as a range (easy, hard)."""
+
+    def at(self, difficulty: float) -> Value:
+        """Return the default at `difficulty`, 0 to 1."""
+        return at_difficulty((self.easy, self.hard), difficulty) if self.ramps else self.easy
+
+    def realized(self, value: Value, plot: Grid) -> Realized:
+        """Return what the cells of `plot` make of `value`: a pair (x, y) where the axes differ."""
+        if self.snap == "cells":
+            return plot.length(plot.cells(value))
+        if self.snap == "centred":
+            x, y = (plot.length(count) for count in plot.centred(value))
+            return x if x == y else (x, y)
+        return value
+
+
+def at_difficulty(value: Value | Range, difficulty: float) -> Value:
+    """Return `value` at `difficulty` 0 to 1: linear from easy to hard, exact at both ends.
+
+    Every range of every terrain is interpolated here and nowhere else.
+    """
+    if not isinstance(value, tuple):
+        return value
+    easy, hard = value
+    return easy * (1.0 - difficulty) + hard * difficulty
+
+
+def height(easy: float, hard: float | None = None) -> Any:
+    """Declare a vertical length [m]; heights are floats, so it is met as it is."""
+    return _field(easy, hard)
+
+
+def length(easy: float, hard: float | None = None, *, zero: bool = False) -> Any:
+    """Declare a horizontal length [m]; it snaps to whole cells, at least one unless `zero`."""
+    return _field(easy, hard, snap="cells", zero=zero)
+
+
+def platform(side: float) -> Any:
+    """Declare the side of a square in the middle of the patch [m], kept centred on the cells."""
+    return _field(side, snap="centred", zero=False)
+
+
+def scalar(easy: float, hard: float | None = None) -> Any:
+    """Declare a number without a length: a grade, a ratio."""
+    return _field(easy, hard)
+
+
+def count(number: int) -> Any:
+    """Declare a whole number above 0, the same at every difficulty."""
+    return _field(number, zero=False, ramps=False)
+
+
+def switch(*, default: bool = False) -> Any:
+    """Declare a yes or no, the same at every difficulty."""
+    return _field(default, ramps=False)
+
+
+def _field(easy: Value, hard: Value | None = None, **rest: Any) -> Any:
+    hard = easy if hard is None else hard
+    parameter = Parameter(easy=easy, hard=hard, **rest)
+    return dataclasses.field(default=hard, metadata={"parameter": parameter})
+
+
+def parameters_of(terrain: Any) -> dict[str, Parameter]:
+    """Return the parameters of a terrain (or its class) by name, in the order of its fields."""
+    return {f.name: f.metadata["parameter"] for f in dataclasses.fields(terrain)}
+
+
+def check_value(owner: str, name: str, value: object, parameter: Parameter) -> None:
+    """Raise the ConfigError that says why `value` cannot be `owner`'s parameter `name`."""
+    kind = type(parameter.easy)
+    wanted = {bool: "true or false", int: "a whole number"}.get(kind, "a number")
+    if isinstance(value, bool) != (kind is bool) or not isinstance(value, kind | int):
+        raise ConfigError(f"{owner}: {name} is {value!r}; wanted {wanted}")
+    if not math.isfinite(value) or value < 0 or (value == 0 and not parameter.zero):
+        least = "0 or more" if parameter.zero else "above 0"
+        raise ConfigError(f"{owner}: {name} is {value:g}; wanted a finite number, {least}")

@@ -1,0 +1,88 @@
+"""One patch: a terrain, built."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.choice import TerrainChoice
+from terrainkit.config import MapConfig
+from terrainkit.grid import Grid
+from terrainkit.layout import assign_patch, terrain_columns
+from terrainkit.parameter import Realized, Value
+from terrainkit.spawn import find_spawn, room_error
+
+
+@dataclass(frozen=True, kw_only=True)
+class Patch:
+    """One patch of a map, in the frame of the map."""
+
+    terrain: str
+    """Name of the terrain in the mix."""
+
+    difficulty: float
+    """Difficulty, 0 to 1."""
+
+    requested: Mapping[str, Value]
+    """Parameters at this difficulty, as asked."""
+
+    realized: Mapping[str, Realized]
+    """Parameters as the cells hold them; (x, y) where the two axes differ."""
+
+    grid: Grid
+    """Where the samples stand."""
+
+    heights: NDArray[np.float32]
+    """Heights [m], shape `grid.shape`."""
+
+    origin: NDArray[np.float32]
+    """Spawn origin (x, y, z) [m], shape (3,)."""
+
+
+def tile(config: MapConfig, row: int, col: int) -> Patch:
+    """Return patch (row, col) of the map of `config`, without making the rest.
+
+    Raises:
+        IndexError: if there is no such patch.
+        ConfigError: if the terrain does not fit in the patch, or leaves no room to spawn.
+    """
+    if not (0 <= row < config.rows and 0 <= col < config.cols):
+        raise IndexError(
+            f"no patch ({row}, {col}) in a map of {config.rows} rows and {config.cols} columns"
+        )
+    kind, difficulty = assign_patch(config, terrain_columns(config), row, col)
+    return build_patch(config, config.mix[kind], difficulty, row, col)
+
+
+def build_patch(
+    config: MapConfig, choice: TerrainChoice, difficulty: float, row: int, col: int
+) -> Patch:
+    """Return `choice` at `difficulty`, built at (row, col).
+
+    The draws come from the seed, the row and the column alone, so the patch has the same bytes in
+    whatever order, process or company it is built.
+    """
+    terrain = choice.at(difficulty)
+    grid = config.patch_grid(row, col)
+    rng = np.random.default_rng(np.random.SeedSequence([config.seed, row, col]))
+    heights = terrain.build(grid, rng)
+    origin = find_spawn(
+        heights,
+        grid,
+        terrain.spawn(grid),
+        radius=config.spawn_radius,
+        tolerance=config.spawn_tolerance,
+        threshold=config.wall_height,
+    )
+    if origin is None:
+        raise room_error(choice.name, grid, config.spawn_radius, config.spawn_tolerance)
+    return Patch(
+        terrain=choice.name,
+        difficulty=difficulty,
+        requested=terrain.requested(),
+        realized=terrain.realized(grid),
+        grid=grid,
+        heights=heights,
+        origin=np.array(origin, dtype=np.float32),
+    )

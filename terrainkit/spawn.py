@@ -1,0 +1,100 @@
+"""Spawn origins: where a robot can start, on the ground and clear of everything."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+from terrainkit.surface import surface_at
+
+
+def find_spawn(
+    heights: NDArray[np.float32],
+    plot: Grid,
+    wanted: tuple[float, float],
+    *,
+    radius: float,
+    tolerance: float,
+    threshold: float,
+) -> tuple[float, float, float] | None:
+    """Return the spawn origin (x, y, z) [m] nearest to `wanted`, or None if there is no room.
+
+    Every sample that has a say in the surface within `radius` of the origin differs from the
+    others by `tolerance` at most, so the disc is level and no wall or step reaches into it.
+
+    Args:
+        heights: Heights on `plot` [m], shape `plot.shape`.
+        plot: Grid of the patch; the disc stays inside it.
+        wanted: Where the terrain would like the origin, x and y [m].
+        radius: Radius of the disc [m].
+        tolerance: Largest difference in height within it [m].
+        threshold: Difference between neighbours above which there is a wall [m].
+    """
+    reach = radius / plot.cell + 1  # a point is ruled by samples less than a cell away on each axis
+    place = tuple((w - low) / plot.cell - 0.5 for w, low in zip(wanted, plot.lower, strict=True))
+    if _inside(wanted, plot, radius):
+        low, high = _extremes(heights, place, reach)
+        if low == high:
+            return *wanted, high
+        if high - low <= tolerance:
+            # Level within the tolerance is not level to the millimetre: ask the surface itself.
+            ground = surface_at(heights, np.array([place]), threshold=threshold)
+            return *wanted, float(ground.height[0])
+    candidates = _level_cells(heights, reach, tolerance)
+    if not len(candidates):
+        return None
+    i, j = candidates[np.argmin(((candidates - place) ** 2).sum(axis=1))]
+    return float(plot.axis(0)[i]), float(plot.axis(1)[j]), float(heights[i, j])
+
+
+def room_error(terrain: str, plot: Grid, radius: float, tolerance: float) -> ConfigError:
+    """Return the error for a terrain that leaves no room to start."""
+    return ConfigError(
+        f"{terrain}: no level disc of radius {radius:g} m (within {tolerance:g} m) in a patch of "
+        f"{plot.size[0]:g} m x {plot.size[1]:g} m; wanted a larger platform or a smaller "
+        "spawn_radius"
+    )
+
+
+def _inside(point: tuple[float, float], plot: Grid, radius: float) -> bool:
+    margin = radius + plot.cell / 2  # the last half cell leans towards the next patch
+    sides = zip(point, plot.lower, plot.upper, strict=True)
+    return all(low + margin <= p <= high - margin for p, low, high in sides)
+
+
+def _extremes(
+    heights: NDArray[np.float32], place: tuple[float, ...], reach: float
+) -> tuple[float, float]:
+    """Return the lowest and the highest sample within `reach` samples of `place`."""
+    spans = [
+        (max(0, math.ceil(p - reach)), min(n, math.floor(p + reach) + 1))
+        for p, n in zip(place, heights.shape, strict=True)
+    ]
+    square = heights[slice(*spans[0]), slice(*spans[1])]
+    if square.min() != square.max():
+        x, y = (np.arange(*span) - p for span, p in zip(spans, place, strict=True))
+        square = square[np.add.outer(x**2, y**2) <= reach**2]
+    return float(square.min()), float(square.max())
+
+
+def _level_cells(
+    heights: NDArray[np.float32], reach: float, tolerance: float
+) -> NDArray[np.int64]:
+    """Return the cells whose whole disc is in the patch and level, shape (n, 2)."""
+    margin = int(np.ceil(reach))
+    inner = tuple(n - 2 * margin for n in heights.shape)
+    if min(inner) <= 0:
+        return np.empty((0, 2), dtype=np.int64)
+    low = np.full(inner, np.inf, dtype=np.float32)
+    high = np.full(inner, -np.inf, dtype=np.float32)
+    for di in range(-margin, margin + 1):
+        for dj in range(-margin, margin + 1):
+            if di**2 + dj**2 <= reach**2:
+                shifted = heights[
+                    margin + di : margin + di + inner[0], margin + dj : margin + dj + inner[1]
+                ]
+                np.minimum(low, shifted, out=low)
+                np.maximum(high, shifted, out=high)
+    return np.argwhere(high - low <= tolerance) + margin

@@ -1,0 +1,91 @@
+"""The surface: height and slope of the ground at any point."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.walls import centre_heights
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurfacePoints:
+    """The ground at n points."""
+
+    height: NDArray[np.float64]
+    """Height [m], shape (n,)."""
+
+    gradient: NDArray[np.float64]
+    """Rise per cell along x and y [m], shape (n, 2)."""
+
+
+def surface_at(
+    heights: NDArray[np.float32], place: NDArray[np.float64], *, threshold: float
+) -> SurfacePoints:
+    """Return the ground at `place`.
+
+    Between four samples without a wall the ground is two triangles that share the diagonal from
+    (i, j) to (i + 1, j + 1), the one along which MuJoCo splits a cell. A quad with a wall is a fan
+    of triangles around its centre; see :mod:`terrainkit.walls`. Beyond the outermost samples the
+    ground goes on level.
+
+    Args:
+        heights: Samples [m], shape (nx, ny).
+        place: Points in units of samples: (0, 0) is at `heights[0, 0]`; shape (n, 2), finite.
+        threshold: Difference between neighbours above which there is a wall [m].
+    """
+    limit = np.array(heights.shape) - 1
+    place = np.clip(place, 0, limit)
+    low = np.minimum(place.astype(np.int64), np.maximum(limit - 1, 0))
+    i, j = low.T
+    i1, j1 = np.minimum(low + 1, limit).T
+    corners = np.stack(
+        [heights[i, j], heights[i1, j], heights[i1, j1], heights[i, j1]], axis=1
+    ).astype(np.float64)
+    u, v = (place - low).T
+    height, gradient = _two_triangles(corners, u, v)
+    walls = np.abs(np.roll(corners, -1, axis=1) - corners) > threshold
+    cut = walls.any(axis=1)
+    if cut.any():
+        height[cut], gradient[cut] = _fan(corners[cut], walls[cut], u[cut], v[cut])
+    return SurfacePoints(height=height, gradient=gradient)
+
+
+def _two_triangles(
+    corners: NDArray[np.float64], u: NDArray[np.float64], v: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    a, b, c, d = corners.T
+    below = u >= v
+    gradient = np.stack(
+        [np.where(below, b - a, c - d), np.where(below, c - b, d - a)],
+        axis=1,
+    )
+    return a + gradient[:, 0] * u + gradient[:, 1] * v, gradient
+
+
+_ALONG = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]], dtype=float)
+"""Direction of each edge; the quad lies to its left."""
+
+
+def _fan(
+    corners: NDArray[np.float64],
+    walls: NDArray[np.bool_],
+    u: NDArray[np.float64],
+    v: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    n = np.arange(len(u))
+    edge = np.argmin(np.stack([v, 1 - u, 1 - v, u]), axis=0)  # the triangle of which edge
+    s = np.choose(edge, [u, v, 1 - u, 1 - v])  # along the edge, 0 to 1
+    t = np.choose(edge, [v, 1 - u, 1 - v, u])  # away from it, 0 to 1/2
+    start, end = corners[n, edge], corners[n, (edge + 1) % 4]
+    centre = centre_heights(corners, walls)
+    wall = walls[n, edge]
+    near = np.where(s < 0.5, start, end)
+    own = centre[n, np.where(s < 0.5, edge, (edge + 1) % 4)]
+    # On a wall's triangle the ground is level along the edge; on another it joins both ends.
+    along = np.where(wall, 0.0, end - start)
+    away = np.where(wall, 2 * (own - near), 2 * centre[n, edge] - start - end)
+    height = np.where(wall, near, start) + along * s + away * t
+    direction = _ALONG[edge]
+    normal = np.stack([-direction[:, 1], direction[:, 0]], axis=1)
+    return height, along[:, None] * direction + away[:, None] * normal

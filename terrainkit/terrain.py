@@ -1,0 +1,136 @@
+"""The contract of a terrain: one kind of ground with its numbers fixed, ready to be built."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.errors import ConfigError, listing
+from terrainkit.grid import Grid
+from terrainkit.parameter import (
+    Parameter,
+    Range,
+    Realized,
+    Value,
+    at_difficulty,
+    check_value,
+    parameters_of,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Terrain(ABC):
+    r"""All terrains derive from this class: a frozen dataclass of parameters and one method.
+
+    A terrain never sees a difficulty. :meth:`at` interpolates every range once,
+
+    .. math:: p(d) = (1 - d)\\, p_\\text{easy} + d\\, p_\\text{hard},
+
+    and the terrain that results is plain numbers. Its fields are declared with the functions of
+    :mod:`terrainkit.parameter`; a field's docstring is its help on the command line and in the docs.
+    Built directly, a terrain takes the hard end of each range that is not given.
+    """
+
+    def __post_init__(self) -> None:
+        for name, parameter in parameters_of(self).items():
+            check_value(self.kind(), name, getattr(self, name), parameter)
+
+    @classmethod
+    def kind(cls) -> str:
+        """Return the name this terrain goes by: that of the file it is written in."""
+        return cls.__module__.rpartition(".")[2]
+
+    @classmethod
+    def at(cls, difficulty: float, given: Mapping[str, Value | Range] | None = None) -> Self:
+        """Return the terrain at `difficulty`, 0 to 1.
+
+        Args:
+            difficulty: 0 is the easy end of every range, 1 the hard end.
+            given: Parameters to use instead of the defaults: a value, or a range (easy, hard).
+
+        Raises:
+            ConfigError: if `given` names an unknown parameter or holds a value that it cannot take.
+        """
+        given = given or {}
+        known = parameters_of(cls)
+        for name in given:
+            if name not in known:
+                raise ConfigError(
+                    f"{cls.kind()} has no parameter {name!r}; it has: {listing(known)}"
+                )
+        return cls(**{name: cls._value(name, p, given, difficulty) for name, p in known.items()})
+
+    @classmethod
+    def _value(
+        cls, name: str, parameter: Parameter, given: Mapping[str, Value | Range], difficulty: float
+    ) -> Value:
+        if name not in given:
+            return parameter.at(difficulty)
+        value = given[name]
+        if isinstance(value, tuple):
+            if not parameter.ramps or len(value) != 2:
+                wanted = "one value or a pair (easy, hard)" if parameter.ramps else "one value"
+                raise ConfigError(f"{cls.kind()}: {name} is {value}; wanted {wanted}")
+            for end in value:
+                check_value(cls.kind(), name, end, parameter)
+        return at_difficulty(value, difficulty)
+
+    def requested(self) -> dict[str, Value]:
+        """Return the parameters by name, as asked."""
+        return {name: getattr(self, name) for name in parameters_of(self)}
+
+    def realized(self, plot: Grid) -> dict[str, Realized]:
+        """Return the parameters by name, as the cells of `plot` hold them."""
+        parameters = parameters_of(self).items()
+        return {name: p.realized(getattr(self, name), plot) for name, p in parameters}
+
+    def build(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.float32]:
+        """Return the heights of the patch on `plot` [m], float32, shape `plot.shape`.
+
+        The same terrain, plot and state of `rng` give the same bytes on every machine.
+
+        Raises:
+            ConfigError: if the plot is too small, or its cells too large, to hold the terrain.
+        """
+        self.check_fit(plot)
+        # Adding 0 turns -0.0 into 0.0: equal heights must be equal bytes.
+        return np.asarray(self.heights(plot, rng), dtype=np.float32) + np.float32(0)
+
+    def check_fit(self, plot: Grid) -> None:
+        """Raise ConfigError if `plot` cannot hold a length of this terrain."""
+        for name, parameter in parameters_of(self).items():
+            value = getattr(self, name)
+            if parameter.snap == "cells" and not parameter.zero and plot.cells(value) == 0:
+                raise ConfigError(
+                    f"{self.kind()}: {name} {value:g} m is less than half a cell of {plot.cell:g} m"
+                )
+            if parameter.snap == "centred":
+                self._check_centred(name, value, plot)
+
+    def _check_centred(self, name: str, value: float, plot: Grid) -> None:
+        counts = plot.centred(value)
+        if value > min(plot.size) + plot.cell / 2:
+            x, y = plot.size
+            raise ConfigError(
+                f"{self.kind()}: {name} {value:g} m does not fit in a patch of {x:g} m x {y:g} m"
+            )
+        if min(counts) == 0:
+            raise ConfigError(
+                f"{self.kind()}: {name} {value:g} m cannot be held by cells of {plot.cell:g} m; "
+                f"wanted {plot.cell:g} m or more"
+            )
+
+    def spawn(self, plot: Grid) -> tuple[float, float]:
+        """Return where a robot should start, x and y [m]: the middle, unless the terrain differs."""
+        return plot.centre
+
+    @abstractmethod
+    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the heights on `plot` [m], shape `plot.shape`, drawing nothing but from `rng`.
+
+        Draw first and scale after: the pattern then stays the same as the difficulty rises.
+        Somewhere there must be room for a robot to start; see :mod:`terrainkit.spawn`.
+        """

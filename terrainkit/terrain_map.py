@@ -1,0 +1,201 @@
+"""TerrainMap: the ground that everything else is a view of."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from terrainkit.config import MapConfig
+from terrainkit.curriculum import Assignment, assign_levels
+from terrainkit.errors import ConfigError, ExportError
+from terrainkit.grid import Grid
+from terrainkit.parameter import Realized, Value
+from terrainkit.patch import Patch
+from terrainkit.surface import SurfacePoints, surface_at
+
+if TYPE_CHECKING:
+    from terrainkit.boxes import BoxCover
+    from terrainkit.mesh import TriMesh
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters:
+    """The numbers a patch was built from."""
+
+    requested: Mapping[str, Value]
+    """As asked, at the difficulty of the patch."""
+
+    realized: Mapping[str, Realized]
+    """As the cells hold them; (x, y) where the two axes differ."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TerrainMap:
+    """A map of rows x cols patches with a border, and the views of its surface."""
+
+    config: MapConfig
+    """What the map was made from."""
+
+    grid: Grid
+    """Where the samples stand."""
+
+    heights: NDArray[np.float32]
+    """Heights [m], shape `grid.shape`: first index x, second y."""
+
+    env_origins: NDArray[np.float32]
+    """Spawn origin of each patch [m], shape (rows, cols, 3)."""
+
+    terrain_types: NDArray[np.int32]
+    """Terrain of each patch, as an index into `terrain_names`, shape (rows, cols)."""
+
+    terrain_names: tuple[str, ...]
+    """Names of the terrains in the mix."""
+
+    difficulty: NDArray[np.float32]
+    """Difficulty of each patch, 0 to 1, shape (rows, cols)."""
+
+    parameters: NDArray[np.object_]
+    """:class:`Parameters` of each patch, shape (rows, cols)."""
+
+    def height(self, xy: ArrayLike) -> NDArray[np.float64]:
+        """Return the height of the ground [m] at `xy`.
+
+        Args:
+            xy: Points [m], shape (..., 2). Beyond the map the ground goes on level.
+
+        Returns:
+            Heights [m], shape (...). On a wall, that of one of its sides.
+        """
+        points, shape = _points(xy)
+        return self._at(points).height.reshape(shape)
+
+    def normal(self, xy: ArrayLike) -> NDArray[np.float64]:
+        """Return the upward unit normal of the ground at `xy`.
+
+        Args:
+            xy: Points [m], shape (..., 2).
+
+        Returns:
+            Unit vectors, shape (..., 3). On a wall, that of the ground at one of its sides.
+        """
+        points, shape = _points(xy)
+        slope = self._at(points).gradient / self.grid.cell
+        normal = np.column_stack([-slope, np.ones(len(slope))])
+        return (normal / np.linalg.norm(normal, axis=1, keepdims=True)).reshape(*shape, 3)
+
+    def mesh(self, *, merged: bool = True, closed: bool = False) -> "TriMesh":
+        """Return the surface as triangles; see :mod:`terrainkit.mesh`.
+
+        Args:
+            merged: Join coplanar faces where nothing is lost; else two triangles for each cell.
+            closed: Add a skirt and a bottom, for a watertight solid.
+        """
+        from terrainkit.mesh import closed_mesh, full_mesh, merged_mesh
+
+        threshold = self.config.wall_height
+        mesh = (merged_mesh if merged else full_mesh)(self.heights, self.grid, threshold)
+        return closed_mesh(mesh) if closed else mesh
+
+    def boxes(self) -> "BoxCover":
+        """Return the level parts of the ground as boxes; see :mod:`terrainkit.boxes`."""
+        from terrainkit.boxes import box_cover
+
+        return box_cover(self)
+
+    def height_field_raw(self, vertical_scale: float = 0.005) -> NDArray[np.int16]:
+        """Return the heights as Isaac Gym's `add_heightfield` wants them.
+
+        Args:
+            vertical_scale: Height of one unit [m].
+
+        Returns:
+            Heights in units of `vertical_scale`, int16, shape (ny, nx): Isaac Gym's rows lie along
+            y and its columns along x. `nbRows` is `shape[0]`, `nbColumns` is `shape[1]`, and the
+            transform's x and y are `first_sample`. legged_gym's own `height_samples` is `.T` of it.
+
+        Raises:
+            ConfigError: if `vertical_scale` is not above 0.
+            ExportError: if a height does not fit in 16 bits at this scale.
+        """
+        if not 0 < vertical_scale < np.inf:
+            raise ConfigError(f"vertical_scale is {vertical_scale:g}; wanted above 0")
+        units = np.rint(self.heights.T / vertical_scale)
+        limit = np.iinfo(np.int16)
+        low, high = float(units.min()), float(units.max())
+        if not (limit.min <= low and high <= limit.max):
+            least = max(high / limit.max, low / limit.min) * vertical_scale
+            raise ExportError(
+                f"heights from {self.heights.min():g} to {self.heights.max():g} m do not fit in "
+                f"int16 at vertical_scale {vertical_scale:g}; wanted {least:.3g} or more"
+            )
+        return np.ascontiguousarray(units, dtype=np.int16)
+
+    @property
+    def first_sample(self) -> tuple[float, float]:
+        """Where `heights[0, 0]` stands, x and y [m]: half a cell inside the corner of the map."""
+        return self.grid.lower[0] + self.grid.cell / 2, self.grid.lower[1] + self.grid.cell / 2
+
+    def tile(self, row: int, col: int) -> Patch:
+        """Return patch (row, col) of this map; :func:`terrainkit.tile` makes one without a map.
+
+        Raises:
+            IndexError: if there is no such patch.
+        """
+        rows, cols = self.difficulty.shape
+        if not (0 <= row < rows and 0 <= col < cols):
+            raise IndexError(f"no patch ({row}, {col}) in a map of {rows} rows and {cols} columns")
+        grid = self.config.patch_grid(row, col)
+        i, j = self.config.patch_start(row, col)
+        return Patch(
+            terrain=self.terrain_names[self.terrain_types[row, col]],
+            difficulty=float(self.difficulty[row, col]),
+            requested=self.parameters[row, col].requested,
+            realized=self.parameters[row, col].realized,
+            grid=grid,
+            heights=self.heights[i : i + grid.shape[0], j : j + grid.shape[1]],
+            origin=self.env_origins[row, col],
+        )
+
+    def assign(
+        self, num_envs: int, max_init_level: int | None = None, seed: int = 0
+    ) -> Assignment:
+        """Return where `num_envs` environments start; see :func:`curriculum.assign_levels`."""
+        rows, cols = self.difficulty.shape
+        levels, columns = assign_levels(num_envs, rows, cols, max_init_level, seed)
+        return Assignment(
+            levels=levels,
+            columns=columns,
+            terrain_types=self.terrain_types[levels, columns],
+            env_origins=self.env_origins[levels, columns],
+        )
+
+    def save(self, path: str | Path, *, overwrite: bool = False, **options: Any) -> Path:
+        """Write the map in the format that the suffix of `path` names; see :mod:`export`."""
+        from terrainkit.export import export
+
+        return export(self, path, overwrite=overwrite, **options)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a map from a .npz file.
+
+        Raises:
+            MapFileError: if the file is missing, foreign, truncated, or not a whole map.
+        """
+        from terrainkit.export.npz import read_map
+
+        return read_map(cls, Path(path))
+
+    def _at(self, points: NDArray[np.float64]) -> SurfacePoints:
+        place = (points - self.first_sample) / self.grid.cell
+        return surface_at(self.heights, place, threshold=self.config.wall_height)
+
+
+def _points(xy: ArrayLike) -> tuple[NDArray[np.float64], tuple[int, ...]]:
+    points = np.asarray(xy, dtype=np.float64)
+    if points.shape[-1:] != (2,) or not np.isfinite(points).all():
+        raise ConfigError(f"xy has shape {points.shape}; wanted (..., 2), every number finite")
+    return points.reshape(-1, 2), points.shape[:-1]

@@ -1,0 +1,18 @@
+"""Flat ground."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.grid import Grid
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flat(Terrain):
+    """Level ground at height 0, the same at every difficulty."""
+
+    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return zeros."""
+        return np.zeros(plot.shape)

@@ -1,0 +1,27 @@
+"""A square pit."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.grid import Grid
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pit(Terrain):
+    """A square pit with vertical walls; the robot starts at the bottom and climbs out."""
+
+    depth: float = parameter.height(0.0, 1.0)
+    """Depth of the pit [m]."""
+
+    side: float = parameter.platform(4.0)
+    """Side of the pit [m]."""
+
+    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return 0, and `-depth` inside the pit."""
+        ground = np.zeros(plot.shape)
+        ground[plot.middle(plot.centred(self.side))] = -self.depth
+        return ground

@@ -1,0 +1,33 @@
+"""A square pyramid with a level top."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.grid import Grid
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class PyramidSlope(Terrain):
+    """Four even slopes around a central platform, of one grade everywhere off it.
+
+    The lowest part of the rim is at height 0 (the highest, if inverted).
+    """
+
+    grade: float = parameter.scalar(0.0, 0.4)
+    """Rise over run of the sides."""
+
+    platform: float = parameter.platform(3.0)
+    """Side of the level square in the middle [m]."""
+
+    inverted: bool = parameter.switch()
+    """Turn it upside down: the platform is the bottom, and the robot climbs to leave it."""
+
+    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the sides, falling by `grade` times a cell from ring to ring."""
+        rings = plot.rings(plot.centred(self.platform))
+        rise = self.grade * plot.cell * (rings.max() - rings)
+        return -rise if self.inverted else rise

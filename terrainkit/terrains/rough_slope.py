@@ -1,0 +1,42 @@
+"""A pyramid slope with rough sides."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.grid import Grid
+from terrainkit.noise import lattice_noise
+from terrainkit.terrain import Terrain
+from terrainkit.terrains.pyramid_slope import PyramidSlope
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoughSlope(Terrain):
+    """A pyramid slope whose sides carry uniform noise; the platform stays level."""
+
+    grade: float = parameter.scalar(0.0, 0.4)
+    """Rise over run of the sides, before the noise."""
+
+    amplitude: float = parameter.height(0.05)
+    """Largest height of the noise above or below the slope [m]."""
+
+    step: float = parameter.height(0.005)
+    """Noise is drawn as multiples of this [m]."""
+
+    spacing: float = parameter.length(0.2)
+    """Distance between two draws [m]; heights in between are interpolated."""
+
+    platform: float = parameter.platform(3.0)
+    """Side of the level square in the middle [m]."""
+
+    inverted: bool = parameter.switch()
+    """Turn it upside down: the platform is the bottom, and the robot climbs to leave it."""
+
+    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the slope plus the noise, which fades out towards the platform."""
+        slope = PyramidSlope(grade=self.grade, platform=self.platform, inverted=self.inverted)
+        noise = lattice_noise(plot, self.spacing, self.amplitude, self.step, rng)
+        fade = plot.fade(plot.centred(self.platform), self.spacing)
+        return slope.heights(plot, rng) + noise * fade

@@ -1,0 +1,45 @@
+"""A straight slope."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slope(Terrain):
+    """One even slope along x, from a level start to a level landing of the same length.
+
+    The robot starts at low x; both ends span the patch's whole width.
+    """
+
+    grade: float = parameter.scalar(0.0, 0.4)
+    """Rise over run of the slope."""
+
+    landing: float = parameter.length(2.0)
+    """Length along x of the level strip at either end [m]."""
+
+    inverted: bool = parameter.switch()
+    """Fall along x instead of rising."""
+
+    def spawn(self, plot: Grid) -> tuple[float, float]:
+        """Return the middle of the level start."""
+        return plot.lower[0] + plot.length(plot.cells(self.landing)) / 2, plot.centre[1]
+
+    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return a clipped ramp, the same for every y."""
+        landing = plot.cells(self.landing)
+        run = plot.shape[0] - 2 * landing
+        if run < 1:
+            raise ConfigError(
+                f"slope: two landings of {self.landing:g} m leave no slope in a patch "
+                f"{plot.size[0]:g} m long"
+            )
+        steps = np.clip(np.arange(plot.shape[0]) - landing + 1, 0, run)
+        rise = self.grade * plot.cell * steps
+        return np.broadcast_to((-rise if self.inverted else rise)[:, None], plot.shape)

@@ -1,0 +1,45 @@
+"""Stepping stones over deep holes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.grid import Grid
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class SteppingStones(Terrain):
+    """Square stones in rows across x, each row shifted at random, around a platform.
+
+    Stones that meet the edge of the patch are cut by it.
+    """
+
+    stone: float = parameter.length(1.575, 0.075)
+    """Side of a stone [m]."""
+
+    distance: float = parameter.length(0.05, 0.1)
+    """Gap between two stones [m]."""
+
+    variation: float = parameter.height(0.0)
+    """Largest height of a stone above or below 0 [m]."""
+
+    depth: float = parameter.height(10.0)
+    """Depth of the holes [m]."""
+
+    platform: float = parameter.platform(4.0)
+    """Side of the level square in the middle [m]."""
+
+    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the stones: a row is `stone` cells deep, and `distance` cells from the next."""
+        stone, distance = plot.cells(self.stone), plot.cells(self.distance)
+        pitch = stone + distance
+        shifts = (rng.random(plot.shape[0]) * pitch).astype(np.int64)
+        tops = (2 * rng.random(plot.shape) - 1) * self.variation
+        row, x = np.divmod(np.arange(plot.shape[0])[:, None], pitch)
+        column, y = np.divmod(np.arange(plot.shape[1])[None, :] + shifts[row], pitch)
+        ground = np.where((x < stone) & (y < stone), tops[row, column % plot.shape[1]], -self.depth)
+        ground[plot.middle(plot.centred(self.platform))] = 0.0
+        return ground

@@ -1,0 +1,40 @@
+"""Waves."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wave(Terrain):
+    """Sine waves along x and y, multiplied, with a level platform to start from.
+
+    A whole number of waves spans the patch, so its rim is at height 0.
+    """
+
+    amplitude: float = parameter.height(0.0, 0.2)
+    """Height of a crest above 0, and depth of a trough below [m]."""
+
+    number: int = parameter.count(4)
+    """Waves along each side of the patch."""
+
+    platform: float = parameter.platform(1.5)
+    """Side of the level square in the middle [m]."""
+
+    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the waves, fading out over a quarter of one towards the platform."""
+        if 4 * self.number > min(plot.shape):
+            raise ConfigError(
+                f"wave: {self.number} waves need {4 * self.number} cells a side, four for each; "
+                f"the patch has {plot.shape[0]} x {plot.shape[1]}"
+            )
+        x, y = (np.sin(2 * np.pi * self.number * (np.arange(n) + 0.5) / n) for n in plot.shape)
+        quarter = min(plot.size) / (4 * self.number)
+        fade = plot.fade(plot.centred(self.platform), quarter)
+        return self.amplitude * np.outer(x, y) * fade

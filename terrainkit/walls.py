@@ -1,0 +1,71 @@
+"""Walls: where the ground between two samples is vertical, and what that does to a quad.
+
+A quad lies between four neighbouring samples. Its corners are counted anticlockwise from the one
+with the smallest x and y, and edge k runs from corner k to corner k + 1:
+
+.. code-block:: text
+
+    y   3 --2-- 2
+    ^   |       |
+    |   3       1
+    |   |       |
+    |   0 --0-- 1
+    +-----------> x
+
+An edge whose ends differ by more than a threshold is a wall: the ground stays level from either end
+to the middle of the edge and is vertical there. A quad with a wall is cut along its midlines, and
+what its corners have in common at its centre follows from the edges that are not walls.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def wall_edges(
+    heights: NDArray[np.float32], threshold: float
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return which edges along x, shape (nx - 1, ny), and along y, (nx, ny - 1), are walls.
+
+    Args:
+        heights: Samples [m], shape (nx, ny).
+        threshold: Smallest difference that is no wall any more [m]; infinite for no walls.
+    """
+    x, y = (np.diff(heights, axis=axis) for axis in (0, 1))
+    return np.abs(x, out=x) > threshold, np.abs(y, out=y) > threshold
+
+
+def centre_heights(
+    corners: NDArray[np.floating], walls: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """Return the height that each corner of a quad brings to the quad's centre, shape (n, 4).
+
+    Corners that are joined by edges without a wall bring the same height, so that no crack opens;
+    corners with only walls between them bring different ones, and the walls meet there.
+
+    Args:
+        corners: Heights of the corners [m], shape (n, 4).
+        walls: Whether each edge is a wall, shape (n, 4).
+    """
+    case = walls @ np.array([1, 2, 4, 8])
+    return np.einsum("nij,nj->ni", _CENTRE_WEIGHTS[case], corners)
+
+
+def _centre_weights(walls: NDArray[np.bool_]) -> NDArray[np.float64]:
+    joined = np.eye(4, dtype=bool)
+    for _ in range(3):
+        for k in range(4):
+            if not walls[k]:
+                either = joined[k] | joined[(k + 1) % 4]
+                joined[k] = joined[(k + 1) % 4] = either
+    weights = joined.astype(float)
+    for k in range(4):
+        if joined[k].sum() == 3:
+            # Three corners lie in one plane; at the centre it is midway between the outer two.
+            missing = int(np.flatnonzero(~joined[k])[0])
+            weights[k, (missing + 2) % 4] = 0.0
+    return weights / weights.sum(axis=1, keepdims=True)
+
+
+_CENTRE_WEIGHTS = np.array(
+    [_centre_weights(np.array([bool(case >> k & 1) for k in range(4)])) for case in range(16)]
+)
