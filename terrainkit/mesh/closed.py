@@ -1,0 +1,81 @@
+"""The closed mesh: a surface with a skirt and a bottom, a watertight solid."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.mesh.tri_mesh import TriMesh
+
+THICKNESS = 1.0
+"""Ground below the lowest point of the surface [m]."""
+
+
+def closed_mesh(surface: TriMesh) -> TriMesh:
+    """Return `surface` with vertical sides down to a level bottom, `THICKNESS` below its lowest.
+
+    Args:
+        surface: A mesh of a whole rectangular map, from this package.
+
+    Returns:
+        A mesh in which every edge is shared by two faces, once in each direction.
+    """
+    vertices, triangles = surface.vertices, surface.triangles
+    start, end = _boundary(triangles).T
+    vertical = (vertices[start, :2] == vertices[end, :2]).all(axis=1)
+    # Walls that meet the edge of the map bring vertical edges: the ends of a wall, one above the
+    # other. The panel beside the upper end runs through the lower one.
+    below = np.arange(len(vertices))
+    for a, b in ((start[vertical], end[vertical]), (end[vertical], start[vertical])):
+        falls = vertices[a, 2] > vertices[b, 2]
+        below[a[falls]] = b[falls]
+    start, end = start[~vertical], end[~vertical]
+
+    rim, foot = np.unique(
+        vertices[np.concatenate([start, end]), :2], axis=0, return_inverse=True
+    )
+    foot = foot.reshape(-1) + len(vertices)
+    start_foot, end_foot = foot[: len(start)], foot[len(start) :]
+    middle = np.full(len(start), len(vertices) + len(rim))
+    sides = [
+        *_panels(start, end, start_foot, end_foot, below),
+        np.column_stack([start_foot, end_foot, middle])[:, ::-1],
+    ]
+    bottom = float(vertices[:, 2].min()) - THICKNESS
+    centre = (rim.min(axis=0) + rim.max(axis=0)) / 2
+    added = np.column_stack([np.vstack([rim, centre]), np.full(len(rim) + 1, bottom)])
+    return TriMesh(
+        vertices=np.concatenate([vertices, added.astype(np.float32)]),
+        triangles=np.concatenate([triangles, *sides]).astype(np.int32),
+    )
+
+
+def _boundary(triangles: NDArray[np.int32]) -> NDArray[np.int64]:
+    """Return the edges that only one face has, as that face runs along them, shape (n, 2)."""
+    edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    count = int(edges.max()) + 1
+    forward = edges[:, 0] * count + edges[:, 1]
+    backward = edges[:, 1] * count + edges[:, 0]
+    return edges[~np.isin(forward, backward)]
+
+
+def _panels(
+    start: NDArray[np.int64],
+    end: NDArray[np.int64],
+    start_foot: NDArray[np.int64],
+    end_foot: NDArray[np.int64],
+    below: NDArray[np.int64],
+) -> list[NDArray[np.int64]]:
+    """Return the faces from the edges start -> end of the surface down to their feet."""
+    # An edge has a wall at one end at most: the other end is a sample. The fan starts there.
+    bent = below[start] != start
+    straight = ~bent
+    at_end = straight & (below[end] != end)
+    plain_end = np.where(at_end, below[end], end)
+    plain_start = np.where(bent, below[start], start)
+    return [
+        np.column_stack([start, plain_start, end])[bent],
+        np.column_stack([plain_start, start_foot, end])[bent],
+        np.column_stack([end, start_foot, end_foot])[bent],
+        np.column_stack([start, plain_end, end])[at_end],
+        np.column_stack([start, end_foot, plain_end])[straight],
+        np.column_stack([start, start_foot, end_foot])[straight],
+    ]

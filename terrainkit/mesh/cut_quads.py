@@ -1,0 +1,218 @@
+"""The quads that a wall cuts, one by one: level or sloping pieces, and the walls between them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.mesh.lattice import Lattice
+from terrainkit.walls import centre_heights
+
+Ids = NDArray[np.int64]
+
+_PINCH = 1 / 128
+"""How far towards their corners the walls of two high corners that meet in a point are pulled.
+
+Four walls meet where two opposite corners are higher than the other two. Left so, their common edge
+would be shared by four faces; pulled apart, by less than a millimetre in a cell of 0.1 m, each pair
+has an edge of its own.
+"""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Quads:
+    """K cut quads: numbers of their vertices, corner by corner and edge by edge."""
+
+    corners: Ids
+    """Node at each corner, shape (K, 4)."""
+
+    z: NDArray[np.float32]
+    """Height of each corner [m], shape (K, 4)."""
+
+    walls: NDArray[np.bool_]
+    """Whether each edge is a wall, shape (K, 4)."""
+
+    middles: Ids
+    """Middle of each wall on the side of its first and its second corner, shape (K, 4, 2)."""
+
+    xy: NDArray[np.float64]
+    """Position of each corner, x and y [m], shape (K, 4, 2)."""
+
+    @property
+    def centre(self) -> NDArray[np.float64]:
+        """Position of the centre, x and y [m], shape (K, 2)."""
+        return (self.xy[:, 0] + self.xy[:, 2]) / 2
+
+    def __getitem__(self, which: NDArray[np.bool_]) -> "_Quads":
+        return _Quads(**{name: value[which] for name, value in vars(self).items()})
+
+    def rolled(self) -> "_Quads":
+        """Return the quads with corner 1 as corner 0."""
+        return _Quads(**{name: np.roll(value, -1, axis=1) for name, value in vars(self).items()})
+
+
+def cut_quads(lattice: Lattice, numbers: Ids, first: int) -> tuple[Ids, NDArray[np.float32]]:
+    """Return the triangles of the cut quads `numbers`, and the vertices that they add.
+
+    Args:
+        lattice: What the quads are part of.
+        numbers: Flat index of each quad, shape (K,).
+        first: Number that the first added vertex takes.
+
+    Returns:
+        Triangles, shape (T, 3), and positions of the added vertices [m], shape (V, 3).
+    """
+    quads = _gather(lattice, numbers)
+    z0, z1, z2, z3 = quads.z.T
+    all_walls = quads.walls.all(axis=1)
+    even_high = all_walls & (np.minimum(z0, z2) > np.maximum(z1, z3))
+    odd_high = all_walls & (np.minimum(z1, z3) > np.maximum(z0, z2))
+    triangles, vertices = [], []
+    for build, part in (
+        (_fans, quads[~(even_high | odd_high)]),
+        (_saddles, quads[even_high]),
+        (_saddles, quads[odd_high].rolled()),
+    ):
+        faces, added = build(part, first)
+        first += len(added)
+        triangles.append(faces)
+        vertices.append(added)
+    return np.concatenate(triangles), np.concatenate(vertices)
+
+
+def _gather(lattice: Lattice, numbers: Ids) -> _Quads:
+    ny = lattice.z.shape[1]
+    i, j = np.divmod(numbers, ny - 1)
+    corners = np.stack([i * ny + j, (i + 1) * ny + j, (i + 1) * ny + j + 1, i * ny + j + 1], axis=1)
+    walls = np.stack(
+        [
+            lattice.walls_x[i, j],
+            lattice.walls_y[i + 1, j],
+            lattice.walls_x[i, j + 1],
+            lattice.walls_y[i, j],
+        ],
+        axis=1,
+    )
+    low_side = np.stack(
+        [
+            lattice.middle_x(i, j),
+            lattice.middle_y(i + 1, j),
+            lattice.middle_x(i, j + 1),
+            lattice.middle_y(i, j),
+        ],
+        axis=1,
+    )
+    # Edges 0 and 1 run along x and y, edges 2 and 3 against them.
+    backwards = np.array([0, 0, 1, 1])
+    x, y = lattice.x, lattice.y
+    return _Quads(
+        corners=corners,
+        z=lattice.z.ravel()[corners],
+        walls=walls,
+        middles=np.stack([low_side + backwards, low_side + 1 - backwards], axis=2),
+        xy=np.stack(
+            [
+                np.stack([x[i], x[i + 1], x[i + 1], x[i]], axis=1),
+                np.stack([y[j], y[j], y[j + 1], y[j + 1]], axis=1),
+            ],
+            axis=2,
+        ),
+    )
+
+
+def _fans(quads: _Quads, first: int) -> tuple[Ids, NDArray[np.float32]]:
+    """Return a fan around the centre of each quad, which has one vertex for each height there."""
+    heights = centre_heights(quads.z, quads.walls).astype(np.float32)
+    column = _Column.of(heights, quads.centre, first)
+    triangles = []
+    for k in range(4):
+        after = (k + 1) % 4
+        wall = quads.walls[:, k]
+        joined = [column.vertex(k), quads.corners[:, k], quads.corners[:, after]]
+        triangles.append(np.column_stack(joined)[~wall])
+        a, b = quads.middles[:, k].T
+        near = [column.vertex(k), quads.corners[:, k], a]
+        far = [column.vertex(after), b, quads.corners[:, after]]
+        triangles += [np.column_stack(near)[wall], np.column_stack(far)[wall]]
+        triangles += column.wall(a, b, k, after, wall)
+    return np.concatenate(triangles), column.positions
+
+
+def _saddles(quads: _Quads, first: int) -> tuple[Ids, NDArray[np.float32]]:
+    """Return the quads whose corners 0 and 2 stand above 1 and 3, with two centres each."""
+    pull = (quads.xy[:, 0] - quads.centre) * _PINCH
+    west = _Column.of(quads.z[:, [0, 1, 3]], quads.centre + pull, first)
+    east = _Column.of(quads.z[:, [2, 1, 3]], quads.centre - pull, first + len(west.positions))
+    c0, c1, c2, c3 = quads.corners.T
+    (m0, n0), (m1, n1), (m2, n2), (m3, n3) = (quads.middles[:, k].T for k in range(4))
+    every = np.ones(len(c0), dtype=bool)
+    floor = quads.z[:, 1] != quads.z[:, 3]
+    triangles = [
+        *_rows((west.vertex(0), n3, c0), (west.vertex(0), c0, m0)),
+        *_rows((east.vertex(0), n1, c2), (east.vertex(0), c2, m2)),
+        *_rows((c1, m1, east.vertex(1)), (c1, east.vertex(1), west.vertex(1))),
+        *_rows((c1, west.vertex(1), n0), (c3, m3, west.vertex(2))),
+        *_rows((c3, west.vertex(2), east.vertex(2)), (c3, east.vertex(2), n2)),
+        *west.wall(m0, n0, 0, 1, every),
+        *east.wall(m1, n1, 1, 0, every),
+        *east.wall(m2, n2, 0, 2, every),
+        *west.wall(m3, n3, 2, 0, every),
+    ]
+    for row in _rows(
+        (west.vertex(1), east.vertex(1), east.vertex(2)),
+        (west.vertex(1), east.vertex(2), west.vertex(2)),
+    ):
+        triangles.append(row[floor])
+    return np.concatenate(triangles), np.concatenate([west.positions, east.positions])
+
+
+def _rows(*faces: tuple[Ids, Ids, Ids]) -> list[Ids]:
+    return [np.column_stack(face) for face in faces]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Column:
+    """The vertices on one vertical line in each of K quads, one for each different height."""
+
+    positions: NDArray[np.float32]
+    """Positions of all vertices [m], quad by quad and upwards, shape (V, 3)."""
+
+    lowest: Ids
+    """Number of each quad's lowest vertex, shape (K,)."""
+
+    rank: Ids
+    """Which vertex, counted upwards, each of the h heights given is, shape (K, h)."""
+
+    @classmethod
+    def of(
+        cls, heights: NDArray[np.float32], xy: NDArray[np.float64], first: int
+    ) -> "_Column":
+        order = np.argsort(heights, axis=1, kind="stable")
+        upwards = np.take_along_axis(heights, order, axis=1)
+        new = np.ones(heights.shape, dtype=bool)
+        new[:, 1:] = upwards[:, 1:] != upwards[:, :-1]
+        rank = np.empty(heights.shape, dtype=np.int64)
+        np.put_along_axis(rank, order, np.cumsum(new, axis=1) - 1, axis=1)
+        counts = new.sum(axis=1)
+        positions = np.column_stack([np.repeat(xy, counts, axis=0), upwards[new]])
+        lowest = first + np.cumsum(counts) - counts
+        return cls(positions=positions.astype(np.float32), lowest=lowest, rank=rank)
+
+    def vertex(self, k: int) -> Ids:
+        """Return the vertex of the k-th height in each quad."""
+        return self.lowest + self.rank[:, k]
+
+    def wall(self, a: Ids, b: Ids, k: int, after: int, where: NDArray[np.bool_]) -> list[Ids]:
+        """Return the wall between the vertices `a` and `b` of an edge and this line.
+
+        It spans heights `k` (below or above `a`) to `after` (of `b`) here, and takes every vertex
+        in between, so that the walls that meet on the line meet vertex by vertex.
+        """
+        end, start = self.rank[:, k], self.rank[:, after]
+        triangles = [np.column_stack([a, b, self.lowest + start])[where]]
+        step = np.sign(end - start)
+        for n in range(self.rank.shape[1] - 1):
+            more = where & (np.abs(end - start) > n)
+            at = self.lowest + start + n * step
+            triangles.append(np.column_stack([a, at, at + step])[more])
+        return triangles

@@ -1,0 +1,51 @@
+"""The full mesh: two triangles for every quad, and the pieces of those that are cut."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.grid import Grid
+from terrainkit.mesh.cut_quads import cut_quads
+from terrainkit.mesh.lattice import Lattice
+from terrainkit.mesh.tri_mesh import TriMesh
+
+
+def full_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> TriMesh:
+    """Return the surface at full resolution.
+
+    Args:
+        heights: Samples [m], shape `grid.shape`.
+        grid: Where they stand.
+        threshold: Difference between neighbours above which there is a wall [m].
+
+    Raises:
+        CapacityError: if the mesh would not fit in memory; nothing was allocated.
+    """
+    lattice = Lattice.of(heights, grid, threshold)
+    fans, centres = cut_quads(lattice, np.flatnonzero(lattice.cut), lattice.vertex_count)
+    plain = np.flatnonzero(~lattice.cut)
+    triangles = np.empty((2 * len(plain) + len(fans), 3), dtype=np.int32)
+    split_quads(lattice, plain, out=triangles[: 2 * len(plain)])
+    triangles[2 * len(plain) :] = fans
+
+    n = lattice.z.size
+    vertices = np.empty((lattice.vertex_count + len(centres), 3), dtype=np.float32)
+    nodes = vertices[:n].reshape(*lattice.z.shape, 3)
+    nodes[..., 0], nodes[..., 1], nodes[..., 2] = lattice.x[:, None], lattice.y, lattice.z
+    vertices[n : lattice.vertex_count] = lattice.middles()
+    vertices[lattice.vertex_count :] = centres
+    return TriMesh(vertices=vertices, triangles=triangles)
+
+
+def split_quads(lattice: Lattice, numbers: NDArray[np.int64], out: NDArray[np.int32]) -> None:
+    """Write two triangles for each quad in `numbers` to `out`, shape (2 n, 3).
+
+    The diagonal runs from (i, j) to (i + 1, j + 1), as MuJoCo's heightfields have it.
+    """
+    ny = lattice.z.shape[1]
+    # A row has one quad less than nodes, so a quad's first node is its own number plus its row.
+    corner = (numbers + numbers // (ny - 1)).astype(np.int32)
+    pairs = out.reshape(-1, 2, 3)
+    pairs[:, 0, 0] = pairs[:, 1, 0] = corner
+    pairs[:, 0, 2] = pairs[:, 1, 1] = corner + (ny + 1)
+    pairs[:, 0, 1] = corner + ny
+    pairs[:, 1, 2] = corner + 1

@@ -1,0 +1,110 @@
+"""The lattice that a mesh is built on: nodes, the quads between them, and which of those are cut.
+
+The nodes are the samples, plus a rim at the edge of the map that repeats the outermost samples, so
+that the mesh covers the map and not only the samples' centres. Node (i, j) has the number
+`i * ny + j`; the vertices in the middle of walls follow, two for each.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.capacity import require_memory
+from terrainkit.grid import Grid
+from terrainkit.walls import wall_edges
+
+_BYTES_PER_NODE = 120
+"""Most that building a mesh holds for each node: its faces, and what they are made from."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Lattice:
+    """Nodes of shape (nx, ny) and the quads between them, of shape (nx - 1, ny - 1)."""
+
+    x: NDArray[np.float64]
+    """Coordinate of each node along x [m], shape (nx,)."""
+
+    y: NDArray[np.float64]
+    """Coordinate of each node along y [m], shape (ny,)."""
+
+    z: NDArray[np.float32]
+    """Height of each node [m], shape (nx, ny)."""
+
+    walls_x: NDArray[np.bool_]
+    """Whether the edge from (i, j) to (i + 1, j) is a wall, shape (nx - 1, ny)."""
+
+    walls_y: NDArray[np.bool_]
+    """Whether the edge from (i, j) to (i, j + 1) is a wall, shape (nx, ny - 1)."""
+
+    @classmethod
+    def of(cls, heights: NDArray[np.float32], grid: Grid, threshold: float) -> "Lattice":
+        """Return the lattice of a heightfield; a step above `threshold` [m] is a wall."""
+        require_memory(heights.size * _BYTES_PER_NODE, f"a mesh of {heights.size} samples")
+        z = np.pad(heights, 1, mode="edge")
+        walls_x, walls_y = wall_edges(z, threshold)
+        x, y = (
+            np.concatenate([[grid.lower[k]], grid.axis(k), [grid.upper[k]]]) for k in (0, 1)
+        )
+        return cls(x=x, y=y, z=z, walls_x=walls_x, walls_y=walls_y)
+
+    @cached_property
+    def cut(self) -> NDArray[np.bool_]:
+        """Whether each quad has a wall."""
+        either = self.walls_x[:, :-1] | self.walls_x[:, 1:]
+        either |= self.walls_y[:-1]
+        either |= self.walls_y[1:]
+        return either
+
+    @cached_property
+    def edges_x(self) -> NDArray[np.int64]:
+        """Flat index into `walls_x` of each wall, in order."""
+        return np.flatnonzero(self.walls_x)
+
+    @cached_property
+    def edges_y(self) -> NDArray[np.int64]:
+        """Flat index into `walls_y` of each wall, in order."""
+        return np.flatnonzero(self.walls_y)
+
+    @property
+    def vertex_count(self) -> int:
+        """How many numbers the nodes and the middles of the walls take."""
+        return int(self.z.size + 2 * (self.edges_x.size + self.edges_y.size))
+
+    def middle_x(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the vertex in the middle of each wall (i, j)-(i + 1, j), on the side of (i, j).
+
+        The vertex on the other side has the next number. Where there is no wall, it is any number.
+        """
+        return self.z.size + 2 * np.searchsorted(self.edges_x, i * self.walls_x.shape[1] + j)
+
+    def middle_y(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the same for the walls (i, j)-(i, j + 1)."""
+        behind = self.z.size + 2 * self.edges_x.size
+        return behind + 2 * np.searchsorted(self.edges_y, i * self.walls_y.shape[1] + j)
+
+    def nodes(self, numbers: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Return the positions of the nodes with these numbers [m], shape (n, 3)."""
+        i, j = np.divmod(numbers, self.z.shape[1])
+        return _positions(self.x[i], self.y[j], self.z.ravel()[numbers])
+
+    def middles(self) -> NDArray[np.float32]:
+        """Return the positions of all vertices in the middle of walls [m], in their order."""
+        i, j = np.divmod(self.edges_x, self.walls_x.shape[1])
+        x = (self.x[i] + self.x[i + 1]) / 2
+        along_x = [_positions(x, self.y[j], self.z[i + side, j]) for side in (0, 1)]
+        i, j = np.divmod(self.edges_y, self.walls_y.shape[1])
+        y = (self.y[j] + self.y[j + 1]) / 2
+        along_y = [_positions(self.x[i], y, self.z[i, j + side]) for side in (0, 1)]
+        return np.concatenate(
+            [np.stack(sides, axis=1).reshape(-1, 3) for sides in (along_x, along_y)]
+        )
+
+
+def _positions(
+    x: NDArray[np.float64], y: NDArray[np.float64], z: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    positions = np.empty((len(z), 3), dtype=np.float32)
+    positions[:, 0], positions[:, 1], positions[:, 2] = x, y, z
+    return positions

@@ -1,0 +1,101 @@
+"""The merged mesh: what is level becomes a few large faces, what is not stays as it is.
+
+Level quads are joined to rectangles, quads that are level along one axis to rows, and straight
+walls of one height to panels with a level strip on either side. Each of these keeps the vertices of
+its rim that a neighbour needs, so large and small faces meet vertex by vertex. Nothing moves: the
+merged surface is the full one.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.grid import Grid
+from terrainkit.mesh.cut_quads import cut_quads
+from terrainkit.mesh.full import split_quads
+from terrainkit.mesh.lattice import Lattice
+from terrainkit.mesh.loops import Ids, Loops, Mask
+from terrainkit.mesh.rectangles import Rectangles
+from terrainkit.mesh.tri_mesh import TriMesh
+from terrainkit.mesh.wall_runs import WallRuns
+
+
+def merged_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> TriMesh:
+    """Return the surface with level faces merged.
+
+    Args:
+        heights: Samples [m], shape `grid.shape`.
+        grid: Where they stand.
+        threshold: Difference between neighbours above which there is a wall [m].
+
+    Raises:
+        CapacityError: if the mesh would not fit in memory; nothing was allocated.
+    """
+    lattice = Lattice.of(heights, grid, threshold)
+    same_x = lattice.z[:-1] == lattice.z[1:]
+    same_y = lattice.z[:, :-1] == lattice.z[:, 1:]
+    even_x = same_x[:, :-1] & same_x[:, 1:]  # the quad is level along x
+    even_y = same_y[:-1] & same_y[1:]
+    level = even_x & even_y
+    # Where the ground is level along y, walls on both edges across it make one straight wall.
+    walls_x = even_y & lattice.walls_x[:, :-1] & lattice.walls_x[:, 1:]
+    walls_y = even_x & lattice.walls_y[:-1] & lattice.walls_y[1:]
+    rows_y = even_y & ~(level | lattice.cut)
+    rows_x = even_x & ~(level | lattice.cut)
+
+    rectangles = [Rectangles.level(level), Rectangles.along_y(rows_y), Rectangles.along_x(rows_x)]
+    runs = [WallRuns.across_x(lattice, walls_x), WallRuns.across_y(lattice, walls_y)]
+    single = ~(level | rows_x | rows_y | walls_x | walls_y)
+    kept = _corners(single)
+    for rectangle in rectangles:
+        rectangle.keep_corners(kept)
+    for run in runs:
+        run.keep_ends(kept)
+    loops = [rectangle.loops(lattice, kept) for rectangle in rectangles]
+    loops += [loop for run in runs for loop in run.strips(kept)]
+    return _assemble(lattice, single, loops, [run.panels() for run in runs])
+
+
+def _corners(quads: Mask) -> Mask:
+    """Return the nodes at the corners of `quads`."""
+    nodes = np.zeros((quads.shape[0] + 1, quads.shape[1] + 1), dtype=bool)
+    for i in (slice(None, -1), slice(1, None)):
+        for j in (slice(None, -1), slice(1, None)):
+            nodes[i, j] |= quads
+    return nodes
+
+
+def _assemble(
+    lattice: Lattice, single: Mask, loops: list[Loops], panels: list[Ids]
+) -> TriMesh:
+    """Return the mesh of the quads that stand alone, the loops and the panels between them."""
+    plain = np.flatnonzero(single & ~lattice.cut)
+    pairs = np.empty((2 * len(plain), 3), dtype=np.int32)
+    split_quads(lattice, plain, out=pairs)
+    count = lattice.vertex_count
+    faces, added = cut_quads(lattice, np.flatnonzero(single & lattice.cut), count)
+    triangles, extra = [pairs, faces, *panels], [lattice.middles(), added]
+    count += len(added)
+    for loop in loops:
+        faces, added = loop.triangles(count)
+        triangles.append(faces)
+        extra.append(added)
+        count += len(added)
+    return _compact(lattice, np.concatenate(triangles), np.concatenate(extra))
+
+
+def _compact(lattice: Lattice, triangles: Ids, extra: NDArray[np.float32]) -> TriMesh:
+    """Return the mesh without the vertices that no triangle uses.
+
+    Args:
+        lattice: Whose nodes are the first vertices.
+        triangles: Faces, shape (nf, 3).
+        extra: Positions of the vertices after the nodes [m], shape (n, 3).
+    """
+    used = np.zeros(lattice.z.size + len(extra), dtype=bool)
+    used[triangles.ravel()] = True
+    number = np.cumsum(used, dtype=np.int32) - 1
+    nodes = np.flatnonzero(used[: lattice.z.size])
+    return TriMesh(
+        vertices=np.concatenate([lattice.nodes(nodes), extra[used[lattice.z.size :]]]),
+        triangles=number[triangles],
+    )

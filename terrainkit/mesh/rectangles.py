@@ -1,0 +1,71 @@
+"""Rectangles of quads in one plane."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from terrainkit.mesh.lattice import Lattice
+from terrainkit.mesh.loops import Ids, Loops, Mask, laid_out, runs
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Rectangles:
+    """Rectangles between the nodes (i0, j0) and (i1, j1), each of shape (n,)."""
+
+    i0: Ids
+    i1: Ids
+    j0: Ids
+    j1: Ids
+
+    @classmethod
+    def level(cls, level: Mask) -> Self:
+        """Return rectangles of level quads; quads not worth one are struck from the mask."""
+        row, start, stop = runs(level)
+        # Runs over the same columns in consecutive rows are one rectangle.
+        order = np.lexsort((row, stop, start))
+        row, start, stop = row[order], start[order], stop[order]
+        first = np.ones(len(row), dtype=bool)
+        first[1:] = (np.diff(start) != 0) | (np.diff(stop) != 0) | (np.diff(row) != 1)
+        last = np.roll(first, -1)
+        i0, i1, j0, j1 = row[first], row[last] + 1, start[first], stop[first]
+        small = (i1 - i0) * (j1 - j0) < 3
+        level[i0[small], j0[small]] = level[i1[small] - 1, j1[small] - 1] = False
+        return cls(i0=i0[~small], i1=i1[~small], j0=j0[~small], j1=j1[~small])
+
+    @classmethod
+    def along_y(cls, tilted: Mask) -> Self:
+        """Return rows of quads that rise along x alone; those not worth one are struck."""
+        row, start, stop = runs(tilted)
+        small = stop - start < 3
+        tilted[row[small], start[small]] = tilted[row[small], stop[small] - 1] = False
+        row, start, stop = row[~small], start[~small], stop[~small]
+        return cls(i0=row, i1=row + 1, j0=start, j1=stop)
+
+    @classmethod
+    def along_x(cls, tilted: Mask) -> Self:
+        """Return the same for quads that rise along y alone."""
+        turned = cls.along_y(tilted.T)
+        return cls(i0=turned.j0, i1=turned.j1, j0=turned.i0, j1=turned.i1)
+
+    def keep_corners(self, kept: Mask) -> None:
+        """Mark the nodes at the corners in `kept`."""
+        for i in (self.i0, self.i1):
+            kept[i, self.j0] = kept[i, self.j1] = True
+
+    def loops(self, lattice: Lattice, kept: Mask) -> Loops:
+        """Return the rims, of those nodes that are `kept`."""
+        owner, k = laid_out(2 * (self.i1 - self.i0 + self.j1 - self.j0))
+        a, b = (self.i1 - self.i0)[owner], (self.j1 - self.j0)[owner]
+        # Along the bottom for a steps, up for b, back for a, down for b.
+        i = self.i0[owner] + np.clip(k, 0, a) - np.clip(k - a - b, 0, a)
+        j = self.j0[owner] + np.clip(k - a, 0, b) - np.clip(k - 2 * a - b, 0, b)
+        keep = kept[i, j]
+        x = (lattice.x[self.i0] + lattice.x[self.i1]) / 2
+        y = (lattice.y[self.j0] + lattice.y[self.j1]) / 2
+        z = (lattice.z[self.i0, self.j0] + lattice.z[self.i1, self.j1]) / 2
+        return Loops(
+            vertices=(i * lattice.z.shape[1] + j)[keep],
+            owner=owner[keep],
+            centres=np.column_stack([x, y, z]).astype(np.float32),
+        )
