@@ -8,7 +8,7 @@ from terrainkit.capacity import require_memory
 from terrainkit.config import MapConfig
 from terrainkit.layout import assign_patch, terrain_columns
 from terrainkit.patch import build_patch
-from terrainkit.terrain_map import Parameters, TerrainMap
+from terrainkit.terrain_map import TerrainMap
 
 Progress = Callable[[Iterator[tuple[int, int]], int], Iterator[tuple[int, int]]]
 """Wraps the walk over the patches, of that many, to show how far it has come."""
@@ -46,7 +46,7 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
         origins[row, col] = patch.origin
         kinds[row, col] = kind
         difficulty[row, col] = level
-        parameters[row, col] = Parameters(requested=patch.requested, realized=patch.realized)
+        parameters[row, col] = patch.parameters
     return TerrainMap(
         config=config,
         grid=grid,

@@ -15,6 +15,17 @@ from terrainkit.spawn import find_spawn, room_error
 
 
 @dataclass(frozen=True, kw_only=True)
+class Parameters:
+    """The numbers a patch was built from."""
+
+    requested: Mapping[str, Value]
+    """As asked, at the difficulty of the patch."""
+
+    realized: Mapping[str, Realized]
+    """As the cells hold them; (x, y) where the two axes differ."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Patch:
     """One patch of a map, in the frame of the map."""
 
@@ -24,11 +35,8 @@ class Patch:
     difficulty: float
     """Difficulty, 0 to 1."""
 
-    requested: Mapping[str, Value]
-    """Parameters at this difficulty, as asked."""
-
-    realized: Mapping[str, Realized]
-    """Parameters as the cells hold them; (x, y) where the two axes differ."""
+    parameters: Parameters
+    """What it was built from."""
 
     grid: Grid
     """Where the samples stand."""
@@ -80,8 +88,7 @@ def build_patch(
     return Patch(
         terrain=choice.name,
         difficulty=difficulty,
-        requested=terrain.requested(),
-        realized=terrain.realized(grid),
+        parameters=Parameters(requested=terrain.requested(), realized=terrain.realized(grid)),
         grid=grid,
         heights=heights,
         origin=np.array(origin, dtype=np.float32),

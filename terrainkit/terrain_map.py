@@ -1,6 +1,5 @@
 """TerrainMap: the ground that everything else is a view of."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -12,24 +11,12 @@ from terrainkit.config import MapConfig
 from terrainkit.curriculum import Assignment, assign_levels
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit.grid import Grid
-from terrainkit.parameter import Realized, Value
 from terrainkit.patch import Patch
 from terrainkit.surface import SurfacePoints, surface_at
 
 if TYPE_CHECKING:
     from terrainkit.boxes import BoxCover
     from terrainkit.mesh import TriMesh
-
-
-@dataclass(frozen=True, kw_only=True)
-class Parameters:
-    """The numbers a patch was built from."""
-
-    requested: Mapping[str, Value]
-    """As asked, at the difficulty of the patch."""
-
-    realized: Mapping[str, Realized]
-    """As the cells hold them; (x, y) where the two axes differ."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,7 +45,7 @@ class TerrainMap:
     """Difficulty of each patch, 0 to 1, shape (rows, cols)."""
 
     parameters: NDArray[np.object_]
-    """:class:`Parameters` of each patch, shape (rows, cols)."""
+    """:class:`~terrainkit.patch.Parameters` of each patch, shape (rows, cols)."""
 
     def height(self, xy: ArrayLike) -> NDArray[np.float64]:
         """Return the height of the ground [m] at `xy`.
@@ -82,8 +69,8 @@ class TerrainMap:
             Unit vectors, shape (..., 3). On a wall, that of the ground at one of its sides.
         """
         points, shape = _points(xy)
-        slope = self._at(points).gradient / self.grid.cell
-        normal = np.column_stack([-slope, np.ones(len(slope))])
+        downhill = 0.0 - self._at(points).gradient / self.grid.cell
+        normal = np.column_stack([downhill, np.ones(len(downhill))])
         return (normal / np.linalg.norm(normal, axis=1, keepdims=True)).reshape(*shape, 3)
 
     def mesh(self, *, merged: bool = True, closed: bool = False) -> "TriMesh":
@@ -103,7 +90,8 @@ class TerrainMap:
         """Return the level parts of the ground as boxes; see :mod:`terrainkit.boxes`."""
         from terrainkit.boxes import box_cover
 
-        return box_cover(self)
+        config = self.config
+        return box_cover(self.heights, self.grid, config.wall_height, self._seams())
 
     def height_field_raw(self, vertical_scale: float = 0.005) -> NDArray[np.int16]:
         """Return the heights as Isaac Gym's `add_heightfield` wants them.
@@ -152,8 +140,7 @@ class TerrainMap:
         return Patch(
             terrain=self.terrain_names[self.terrain_types[row, col]],
             difficulty=float(self.difficulty[row, col]),
-            requested=self.parameters[row, col].requested,
-            realized=self.parameters[row, col].realized,
+            parameters=self.parameters[row, col],
             grid=grid,
             heights=self.heights[i : i + grid.shape[0], j : j + grid.shape[1]],
             origin=self.env_origins[row, col],
@@ -188,6 +175,12 @@ class TerrainMap:
         from terrainkit.export.npz import read_map
 
         return read_map(cls, Path(path))
+
+    def _seams(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the first cell of each patch along x and y, and the end of the last."""
+        (rows, cols), border = self.difficulty.shape, self.config.border_cells
+        x, y = self.config.patch_shape
+        return border + x * np.arange(rows + 1), border + y * np.arange(cols + 1)
 
     def _at(self, points: NDArray[np.float64]) -> SurfacePoints:
         place = (points - self.first_sample) / self.grid.cell

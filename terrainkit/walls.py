@@ -34,29 +34,40 @@ def wall_edges(
     return np.abs(x, out=x) > threshold, np.abs(y, out=y) > threshold
 
 
+def joined_corners(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which corners of a quad are joined by edges without a wall, shape (n, 4, 4).
+
+    Args:
+        walls: Whether each edge is a wall, shape (n, 4).
+    """
+    return _JOINED[walls @ _CASE]
+
+
 def centre_heights(
     corners: NDArray[np.floating], walls: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
     """Return the height that each corner of a quad brings to the quad's centre, shape (n, 4).
 
-    Corners that are joined by edges without a wall bring the same height, so that no crack opens;
-    corners with only walls between them bring different ones, and the walls meet there.
+    Corners that are joined bring the same height, so that no crack opens; corners with only walls
+    between them bring different ones, and the walls meet there.
 
     Args:
         corners: Heights of the corners [m], shape (n, 4).
         walls: Whether each edge is a wall, shape (n, 4).
     """
-    case = walls @ np.array([1, 2, 4, 8])
-    return np.einsum("nij,nj->ni", _CENTRE_WEIGHTS[case], corners)
+    return np.einsum("nij,nj->ni", _CENTRE_WEIGHTS[walls @ _CASE], corners)
 
 
-def _centre_weights(walls: NDArray[np.bool_]) -> NDArray[np.float64]:
+def _joined(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
     joined = np.eye(4, dtype=bool)
     for _ in range(3):
         for k in range(4):
             if not walls[k]:
-                either = joined[k] | joined[(k + 1) % 4]
-                joined[k] = joined[(k + 1) % 4] = either
+                joined[k] = joined[(k + 1) % 4] = joined[k] | joined[(k + 1) % 4]
+    return joined
+
+
+def _centre_weights(joined: NDArray[np.bool_]) -> NDArray[np.float64]:
     weights = joined.astype(float)
     for k in range(4):
         if joined[k].sum() == 3:
@@ -66,6 +77,7 @@ def _centre_weights(walls: NDArray[np.bool_]) -> NDArray[np.float64]:
     return weights / weights.sum(axis=1, keepdims=True)
 
 
-_CENTRE_WEIGHTS = np.array(
-    [_centre_weights(np.array([bool(case >> k & 1) for k in range(4)])) for case in range(16)]
-)
+# There are 16 ways to put walls on four edges; each is a row of these tables.
+_CASE = np.array([1, 2, 4, 8])
+_JOINED = np.array([_joined((case & _CASE) > 0) for case in range(16)])
+_CENTRE_WEIGHTS = np.array([_centre_weights(joined) for joined in _JOINED])

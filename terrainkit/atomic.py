@@ -1,0 +1,50 @@
+"""Atomic writes: what is written is there whole, or not at all."""
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from terrainkit.errors import ExportError
+
+
+@contextmanager
+def atomic_write(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
+    """Yield a path of the same name to write to, and move it to `path` once the block is through.
+
+    Files that the block writes beside it, such as a sidecar, move along. If the block raises,
+    nothing has changed.
+
+    Raises:
+        ExportError: if a target exists and `overwrite` is not set, or cannot be written.
+    """
+    _refuse(path, overwrite=overwrite)
+    try:
+        # Beside the target, so that moving there is a rename on the same disk.
+        folder = Path(tempfile.mkdtemp(prefix=".terrainkit-", dir=path.parent))
+    except OSError as error:
+        raise ExportError(f"cannot write {path}: {error.strerror or error}") from error
+    try:
+        yield folder / path.name
+        written = sorted(folder.iterdir())
+        for file in written:
+            _refuse(path.with_name(file.name), overwrite=overwrite)
+        for file in written:
+            os.replace(file, path.with_name(file.name))
+    except OSError as error:
+        raise ExportError(f"cannot write {path}: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _refuse(path: Path, *, overwrite: bool) -> None:
+    if path.is_dir():
+        raise ExportError(f"cannot write {path}: it is a folder")
+    if os.path.lexists(path) and not path.is_file():
+        raise ExportError(f"cannot write {path}: it is there, and not a plain file")
+    if path.exists() and not overwrite:
+        raise ExportError(f"{path} exists; choose another name, or allow it to be overwritten")
+    if not path.parent.is_dir():
+        raise ExportError(f"cannot write {path}: there is no folder {path.parent}")

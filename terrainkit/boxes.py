@@ -1,0 +1,154 @@
+"""Boxes: the level parts of the ground as a few axis-aligned solids with exact vertical walls."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.grid import Grid
+from terrainkit.rectangle_cover import rectangle_cover
+from terrainkit.walls import joined_corners, wall_edges
+
+THICKNESS = 1.0
+"""Ground below the lowest point of the map, which every box reaches down to [m]."""
+
+_Span = tuple[int, int, int, int]
+"""Cells i0 to i1 along x and j0 to j1 along y, ends not included."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BoxCover:
+    """Boxes under the level parts of the ground.
+
+    Boxes may overlap below the ground: a pyramid of stairs is a stack of them, one for each step.
+    """
+
+    centres: NDArray[np.float64]
+    """Middle of each box [m], shape (n, 3)."""
+
+    half_sizes: NDArray[np.float64]
+    """Half of its size along x, y and z [m], shape (n, 3)."""
+
+    covered: NDArray[np.bool_]
+    """Cells whose whole ground is the top of a box, shape (nx, ny). The others are not level, and
+    are left to a heightfield."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether the boxes hold all of the ground."""
+        return bool(self.covered.all())
+
+
+def box_cover(
+    heights: NDArray[np.float32],
+    grid: Grid,
+    threshold: float,
+    seams: tuple[NDArray[np.int64], NDArray[np.int64]],
+) -> BoxCover:
+    """Return the level parts of the ground as boxes.
+
+    A cell is level if its whole square is: then its top is exactly that of a box. Within a patch
+    the boxes of each height come from :func:`~terrainkit.rectangle_cover.rectangle_cover`, which
+    may run them under higher ground; those that share a whole side are joined across patches.
+
+    Args:
+        heights: Samples [m], shape `grid.shape`.
+        grid: Where they stand.
+        threshold: Difference between neighbours above which there is a wall [m].
+        seams: Cells along x and along y where patches meet; no box is searched across them.
+    """
+    level = level_cells(heights, threshold)
+    low = _lowest(heights, level)
+    edges = [
+        np.unique(np.concatenate([[0], lines, [n]]))
+        for lines, n in zip(seams, heights.shape, strict=True)
+    ]
+    spans: dict[float, list[_Span]] = {}
+    for i0, i1 in zip(edges[0], edges[0][1:], strict=False):
+        for j0, j1 in zip(edges[1], edges[1][1:], strict=False):
+            block = (slice(i0, i1), slice(j0, j1))
+            for height, (a, b, c, d) in _cover_block(heights[block], level[block], low[block]):
+                span = (int(i0 + a), int(i0 + b), int(j0 + c), int(j0 + d))
+                spans.setdefault(height, []).append(span)
+    joined = [(span, height) for height in sorted(spans) for span in _joined(spans[height])]
+    return _solids(joined, grid, float(heights.min()) - THICKNESS, level)
+
+
+def level_cells(heights: NDArray[np.float32], threshold: float) -> NDArray[np.bool_]:
+    """Return which cells are level all over, shape of `heights`.
+
+    A cell takes a quarter of each of the four quads around its sample, and is level if the corner
+    that it has in each is joined, without a wall between, to none but corners of its own height.
+    """
+    z = np.pad(heights, 1, mode="edge")
+    walls_x, walls_y = wall_edges(z, threshold)
+    same_x, same_y = z[:-1] == z[1:], z[:, :-1] == z[:, 1:]
+    even_x, even_y = same_x[:, :-1] & same_x[:, 1:], same_y[:-1] & same_y[1:]
+    cut = walls_x[:, :-1] | walls_x[:, 1:] | walls_y[:-1] | walls_y[1:]
+    i, j = np.nonzero(cut)
+    corners = np.stack([z[i, j], z[i + 1, j], z[i + 1, j + 1], z[i, j + 1]], axis=1)
+    walls = np.stack([walls_x[i, j], walls_y[i + 1, j], walls_x[i, j + 1], walls_y[i, j]], axis=1)
+    same = corners[:, :, None] == corners[:, None, :]
+    at_cut = (same | ~joined_corners(walls)).all(axis=2)
+
+    level = np.ones(z.shape, dtype=bool)
+    quads = (slice(None, -1), slice(1, None))
+    for k, (a, b) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1))):
+        corner = even_x & even_y
+        corner[i, j] = at_cut[:, k]
+        level[quads[a], quads[b]] &= corner
+    return level[1:-1, 1:-1]
+
+
+def _lowest(
+    heights: NDArray[np.float32], level: NDArray[np.bool_]
+) -> NDArray[np.float32]:
+    """Return a height that the ground of each cell is nowhere below [m]."""
+    z = np.pad(heights, 1, mode="edge")
+    nx, ny = heights.shape
+    around = [z[i : i + nx, j : j + ny] for i in range(3) for j in range(3)]
+    return np.where(level, heights, np.minimum.reduce(around))
+
+
+def _cover_block(
+    heights: NDArray[np.float32], level: NDArray[np.bool_], low: NDArray[np.float32]
+) -> Iterator[tuple[float, _Span]]:
+    for height in np.unique(heights[level]):
+        for span in rectangle_cover(level & (heights == height), low >= height):
+            yield float(height), span
+
+
+def _joined(spans: list[_Span]) -> list[_Span]:
+    """Return the spans with those that share a whole side made one."""
+    before = -1
+    while len(spans) != before:
+        before = len(spans)
+        for along, across in ((slice(0, 2), slice(2, 4)), (slice(2, 4), slice(0, 2))):
+            spans = _joined_along(spans, along, across)
+    return spans
+
+
+def _joined_along(spans: list[_Span], along: slice, across: slice) -> list[_Span]:
+    result: list[_Span] = []
+    for span in sorted(spans, key=lambda s: (s[across], s[along])):
+        last = result[-1] if result else None
+        if last and last[across] == span[across] and span[along][0] <= last[along][1]:
+            reach = (last[along][0], max(last[along][1], span[along][1]))
+            pair = (reach, span[across]) if along.start == 0 else (span[across], reach)
+            result[-1] = (*pair[0], *pair[1])
+        else:
+            result.append(span)
+    return result
+
+
+def _solids(
+    boxes: list[tuple[_Span, float]], grid: Grid, bottom: float, level: NDArray[np.bool_]
+) -> BoxCover:
+    spans = np.array([span for span, _ in boxes], dtype=np.float64).reshape(-1, 4)
+    tops = np.array([height for _, height in boxes], dtype=np.float64)
+    lower = np.column_stack([spans[:, [0, 2]] * grid.cell + grid.lower, np.full(len(tops), bottom)])
+    upper = np.column_stack([spans[:, [1, 3]] * grid.cell + grid.lower, tops])
+    return BoxCover(
+        centres=(lower + upper) / 2, half_sizes=(upper - lower) / 2, covered=level
+    )

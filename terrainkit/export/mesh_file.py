@@ -1,0 +1,43 @@
+"""The trimesh as a file of triangles; trimesh writes it."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from terrainkit.terrain_map import TerrainMap
+
+SUFFIXES = (".stl", ".ply", ".obj", ".glb")
+
+
+def export(
+    terrain_map: "TerrainMap",
+    path: Path,
+    *,
+    merged: bool = True,
+    closed: bool = False,
+    y_up: bool = False,
+) -> None:
+    """Write the surface as triangles. A .glb also carries friction and restitution, as extras.
+
+    Args:
+        terrain_map: The map.
+        path: Where to.
+        merged: Join coplanar faces; else two triangles for each cell.
+        closed: Add a skirt and a bottom, for a watertight solid.
+        y_up: Turn the map so that y is up, as glTF viewers and game engines expect; else z is.
+    """
+    import trimesh
+
+    surface = terrain_map.mesh(merged=merged, closed=closed)
+    vertices = surface.vertices
+    if y_up:
+        vertices = vertices[:, [0, 2, 1]] * [1, 1, -1]
+    mesh = trimesh.Trimesh(
+        vertices=vertices, faces=surface.triangles, process=False, metadata=_contact(terrain_map)
+    )
+    mesh.export(path)
+
+
+def _contact(terrain_map: "TerrainMap") -> dict[str, float]:
+    names = ("static_friction", "dynamic_friction", "restitution")
+    return {name: getattr(terrain_map.config, name) for name in names}
