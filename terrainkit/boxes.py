@@ -101,9 +101,7 @@ def level_cells(heights: NDArray[np.float32], threshold: float) -> NDArray[np.bo
     return level[1:-1, 1:-1]
 
 
-def _lowest(
-    heights: NDArray[np.float32], level: NDArray[np.bool_]
-) -> NDArray[np.float32]:
+def _lowest(heights: NDArray[np.float32], level: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Return a height that the ground of each cell is nowhere below [m]."""
     z = np.pad(heights, 1, mode="edge")
     nx, ny = heights.shape
@@ -149,6 +147,4 @@ def _solids(
     tops = np.array([height for _, height in boxes], dtype=np.float64)
     lower = np.column_stack([spans[:, [0, 2]] * grid.cell + grid.lower, np.full(len(tops), bottom)])
     upper = np.column_stack([spans[:, [1, 3]] * grid.cell + grid.lower, tops])
-    return BoxCover(
-        centres=(lower + upper) / 2, half_sizes=(upper - lower) / 2, covered=level
-    )
+    return BoxCover(centres=(lower + upper) / 2, half_sizes=(upper - lower) / 2, covered=level)

@@ -19,4 +19,6 @@ def require_memory(needed: int, what: str) -> None:
 
     free = psutil.virtual_memory().available
     if needed > free:
-        raise CapacityError(f"{what} needs {needed / 1e9:.1f} GB of memory; {free / 1e9:.1f} GB free")
+        raise CapacityError(
+            f"{what} needs {needed / 1e9:.1f} GB of memory; {free / 1e9:.1f} GB free"
+        )

@@ -89,7 +89,9 @@ def update_levels(
     if top_levels < 1:
         raise ConfigError(f"top_levels is {top_levels}; wanted 1 or more")
     if before.size and not (0 <= before.min() and before.max() < rows):
-        raise ConfigError(f"levels go from {before.min()} to {before.max()}; wanted 0 to {rows - 1}")
+        raise ConfigError(
+            f"levels go from {before.min()} to {before.max()}; wanted 0 to {rows - 1}"
+        )
     up = walked > patch_length / 2
     down = ~up & (walked < np.asarray(commanded, dtype=np.float64) / 2)
     after = np.maximum(before + up - down, 0)

@@ -48,9 +48,7 @@ def terrain_columns(config: MapConfig) -> list[int]:
     return [k for k, n in enumerate(counts) for _ in range(n)]
 
 
-def assign_patch(
-    config: MapConfig, columns: list[int], row: int, col: int
-) -> tuple[int, float]:
+def assign_patch(config: MapConfig, columns: list[int], row: int, col: int) -> tuple[int, float]:
     """Return the terrain of patch (row, col), as an index into `config.mix`, and its difficulty.
 
     Args:

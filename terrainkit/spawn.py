@@ -79,9 +79,7 @@ def _extremes(
     return float(square.min()), float(square.max())
 
 
-def _level_cells(
-    heights: NDArray[np.float32], reach: float, tolerance: float
-) -> NDArray[np.int64]:
+def _level_cells(heights: NDArray[np.float32], reach: float, tolerance: float) -> NDArray[np.int64]:
     """Return the cells whose whole disc is in the patch and level, shape (n, 2)."""
     margin = int(np.ceil(reach))
     inner = tuple(n - 2 * margin for n in heights.shape)

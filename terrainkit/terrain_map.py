@@ -146,9 +146,7 @@ class TerrainMap:
             origin=self.env_origins[row, col],
         )
 
-    def assign(
-        self, num_envs: int, max_init_level: int | None = None, seed: int = 0
-    ) -> Assignment:
+    def assign(self, num_envs: int, max_init_level: int | None = None, seed: int = 0) -> Assignment:
         """Return where `num_envs` environments start; see :func:`curriculum.assign_levels`."""
         rows, cols = self.difficulty.shape
         levels, columns = assign_levels(num_envs, rows, cols, max_init_level, seed)

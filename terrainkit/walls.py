@@ -43,9 +43,7 @@ def joined_corners(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return _JOINED[walls @ _CASE]
 
 
-def centre_heights(
-    corners: NDArray[np.floating], walls: NDArray[np.bool_]
-) -> NDArray[np.float64]:
+def centre_heights(corners: NDArray[np.floating], walls: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return the height that each corner of a quad brings to the quad's centre, shape (n, 4).
 
     Corners that are joined bring the same height, so that no crack opens; corners with only walls

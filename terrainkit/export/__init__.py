@@ -40,9 +40,7 @@ def export(
     known = options_of(path)
     for name in options:
         if name not in known:
-            raise ExportError(
-                f"{path.suffix} has no option {name!r}; it has: {listing(known)}"
-            )
+            raise ExportError(f"{path.suffix} has no option {name!r}; it has: {listing(known)}")
     with atomic_write(path, overwrite=overwrite) as temporary:
         write(terrain_map, temporary, **options)
     return path

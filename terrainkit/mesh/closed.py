@@ -29,9 +29,7 @@ def closed_mesh(surface: TriMesh) -> TriMesh:
         below[a[falls]] = b[falls]
     start, end = start[~vertical], end[~vertical]
 
-    rim, foot = np.unique(
-        vertices[np.concatenate([start, end]), :2], axis=0, return_inverse=True
-    )
+    rim, foot = np.unique(vertices[np.concatenate([start, end]), :2], axis=0, return_inverse=True)
     foot = foot.reshape(-1) + len(vertices)
     start_foot, end_foot = foot[: len(start)], foot[len(start) :]
     middle = np.full(len(start), len(vertices) + len(rim))

@@ -184,9 +184,7 @@ class _Column:
     """Which vertex, counted upwards, each of the h heights given is, shape (K, h)."""
 
     @classmethod
-    def of(
-        cls, heights: NDArray[np.float32], xy: NDArray[np.float64], first: int
-    ) -> "_Column":
+    def of(cls, heights: NDArray[np.float32], xy: NDArray[np.float64], first: int) -> "_Column":
         order = np.argsort(heights, axis=1, kind="stable")
         upwards = np.take_along_axis(heights, order, axis=1)
         new = np.ones(heights.shape, dtype=bool)

@@ -44,9 +44,7 @@ class Lattice:
         require_memory(heights.size * _BYTES_PER_NODE, f"a mesh of {heights.size} samples")
         z = np.pad(heights, 1, mode="edge")
         walls_x, walls_y = wall_edges(z, threshold)
-        x, y = (
-            np.concatenate([[grid.lower[k]], grid.axis(k), [grid.upper[k]]]) for k in (0, 1)
-        )
+        x, y = (np.concatenate([[grid.lower[k]], grid.axis(k), [grid.upper[k]]]) for k in (0, 1))
         return cls(x=x, y=y, z=z, walls_x=walls_x, walls_y=walls_y)
 
     @cached_property

@@ -64,9 +64,7 @@ def _corners(quads: Mask) -> Mask:
     return nodes
 
 
-def _assemble(
-    lattice: Lattice, single: Mask, loops: list[Loops], panels: list[Ids]
-) -> TriMesh:
+def _assemble(lattice: Lattice, single: Mask, loops: list[Loops], panels: list[Ids]) -> TriMesh:
     """Return the mesh of the quads that stand alone, the loops and the panels between them."""
     plain = np.flatnonzero(single & ~lattice.cut)
     pairs = np.empty((2 * len(plain), 3), dtype=np.int32)

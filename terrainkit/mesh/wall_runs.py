@@ -25,7 +25,9 @@ class _View:
         """Return the number of node (i, j)."""
         return i * self.node_step[0] + j * self.node_step[1]
 
-    def positions(self, across: NDArray[np.float64], along: NDArray[np.float64], z: NDArray[np.float32]) -> NDArray[np.float32]:
+    def positions(
+        self, across: NDArray[np.float64], along: NDArray[np.float64], z: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
         """Return positions [m], shape (n, 3), x before y again."""
         xy = (along, across) if self.mirrored else (across, along)
         return np.column_stack([*xy, z]).astype(np.float32)
