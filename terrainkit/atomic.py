@@ -32,7 +32,7 @@ def atomic_write(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
         for file in written:
             _refuse(path.with_name(file.name), overwrite=overwrite)
         for file in written:
-            os.replace(file, path.with_name(file.name))
+            file.replace(path.with_name(file.name))
     except OSError as error:
         raise ExportError(f"cannot write {path}: {error.strerror or error}") from error
     finally:

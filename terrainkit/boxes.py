@@ -122,22 +122,25 @@ def _joined(spans: list[_Span]) -> list[_Span]:
     before = -1
     while len(spans) != before:
         before = len(spans)
-        for along, across in ((slice(0, 2), slice(2, 4)), (slice(2, 4), slice(0, 2))):
-            spans = _joined_along(spans, along, across)
+        for turned in (False, True):
+            spans = _joined_along(spans, turned=turned)
     return spans
 
 
-def _joined_along(spans: list[_Span], along: slice, across: slice) -> list[_Span]:
+def _joined_along(spans: list[_Span], *, turned: bool) -> list[_Span]:
+    """Return the spans with those of the same j0 and j1 joined (of the same i0, i1 if `turned`)."""
     result: list[_Span] = []
-    for span in sorted(spans, key=lambda s: (s[across], s[along])):
-        last = result[-1] if result else None
-        if last and last[across] == span[across] and span[along][0] <= last[along][1]:
-            reach = (last[along][0], max(last[along][1], span[along][1]))
-            pair = (reach, span[across]) if along.start == 0 else (span[across], reach)
-            result[-1] = (*pair[0], *pair[1])
+    for i0, i1, j0, j1 in sorted(map(_turn, spans) if turned else spans, key=lambda s: (s[2:], s)):
+        if result and result[-1][2:] == (j0, j1) and i0 <= result[-1][1]:
+            result[-1] = (result[-1][0], max(result[-1][1], i1), j0, j1)
         else:
-            result.append(span)
-    return result
+            result.append((i0, i1, j0, j1))
+    return [_turn(span) for span in result] if turned else result
+
+
+def _turn(span: _Span) -> _Span:
+    i0, i1, j0, j1 = span
+    return j0, j1, i0, i1
 
 
 def _solids(

@@ -36,7 +36,7 @@ class MapConfig:
     """Width of the level ground around the patches [m]."""
 
     preset: str = "legged_gym"
-    """Mix of terrains by name, where no mix of one's own is given: legged_gym, rough, stairs, all."""
+    """Mix of terrains by name: legged_gym, rough, stairs or all."""
 
     terrains: tuple[TerrainChoice, ...] = ()
     """A mix of one's own, used instead of the preset."""
@@ -99,8 +99,16 @@ class MapConfig:
 
     @property
     def wall_height(self) -> float:
-        """Difference between two samples above which there is a wall [m]; infinite for no walls."""
-        return float("inf") if self.slope_threshold is None else self.slope_threshold * self.cell
+        """Difference between two samples above which there is a wall [m]; infinite for no walls.
+
+        A micrometre of grace keeps a step of just the threshold from being a wall here and a slope
+        there: 0.05 - (-0.025) is not 0.075 in floats.
+        """
+        return (
+            float("inf")
+            if self.slope_threshold is None
+            else self.slope_threshold * self.cell + 1e-6
+        )
 
     @property
     def patch_shape(self) -> tuple[int, int]:
@@ -136,7 +144,7 @@ class MapConfig:
 
     def _check_sizes(self) -> None:
         for name in ("rows", "cols"):
-            _require(name, getattr(self, name), 1 <= getattr(self, name), "1 or more")
+            _require(name, getattr(self, name), getattr(self, name) >= 1, "1 or more")
         for name in ("cell", "spawn_radius"):
             _require(name, getattr(self, name), getattr(self, name) > 0, "above 0")
         for size in self.patch_size:

@@ -88,7 +88,7 @@ def update_levels(
     walked = np.asarray(distance, dtype=np.float64)
     if top_levels < 1:
         raise ConfigError(f"top_levels is {top_levels}; wanted 1 or more")
-    if before.size and not (0 <= before.min() and before.max() < rows):
+    if before.size and not (before.min() >= 0 and before.max() < rows):
         raise ConfigError(
             f"levels go from {before.min()} to {before.max()}; wanted 0 to {rows - 1}"
         )

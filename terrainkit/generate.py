@@ -37,7 +37,7 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
     kinds = np.empty(size, dtype=np.int32)
     difficulty = np.empty(size, dtype=np.float32)
     parameters = np.empty(size, dtype=object)
-    walk: Iterator[tuple[int, int]] = iter(np.ndindex(size))  # type: ignore[assignment]
+    walk: Iterator[tuple[int, int]] = iter(np.ndindex(size))
     for row, col in progress(walk, config.rows * config.cols) if progress else walk:
         kind, level = assign_patch(config, columns, row, col)
         patch = build_patch(config, mix[kind], level, row, col)

@@ -46,7 +46,8 @@ class Grid:
 
     def axis(self, k: int) -> NDArray[np.float64]:
         """Return the coordinate of each sample along axis `k` (0 is x, 1 is y) [m], shape (n,)."""
-        return self.lower[k] + (np.arange(self.shape[k]) + 0.5) * self.cell
+        centres = np.arange(self.shape[k], dtype=np.float64) + 0.5
+        return self.lower[k] + centres * self.cell
 
     def block(self, start: tuple[int, int], shape: tuple[int, int]) -> "Grid":
         """Return the grid of the `shape` cells from cell `start` on."""
@@ -91,13 +92,14 @@ class Grid:
 
     def fade(self, inner: tuple[int, int], distance: float) -> NDArray[np.float64]:
         """Return a weight that is 0 on the centred block `inner` and 1 from `distance` [m] on."""
-        return np.minimum(self.rings(inner) * (self.cell / distance), 1.0)
+        return np.clip(self.rings(inner) * (self.cell / distance), None, 1.0)
 
 
 def _beyond(n: int, block: int) -> NDArray[np.int64]:
     first = (n - block) // 2
     index = np.arange(n)
-    return np.maximum(0, np.maximum(first - index, index - (first + block - 1)))
+    outside = np.maximum(first - index, index - (first + block - 1))
+    return np.clip(outside, 0, None)
 
 
 def whole_cells(name: str, length: float, cell: float) -> int:

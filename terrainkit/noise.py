@@ -42,5 +42,6 @@ def _interpolate(nodes: NDArray[np.float64], n: int, axis: int) -> NDArray[np.fl
     below = position.astype(np.int64)
     weight = position - below
     weight = weight[:, None] if axis == 0 else weight
-    low = np.take(nodes, below, axis)
-    return low + weight * (np.take(nodes, below + 1, axis) - low)
+    low, high = np.take(nodes, below, axis), np.take(nodes, below + 1, axis)
+    between: NDArray[np.float64] = low + weight * (high - low)
+    return between

@@ -86,7 +86,8 @@ def _sums(values: NDArray[np.int64], spans: NDArray[np.int64]) -> NDArray[np.int
     table = np.zeros((values.shape[0] + 1, values.shape[1] + 1), dtype=np.int64)
     table[1:, 1:] = values.cumsum(axis=0).cumsum(axis=1)
     i0, i1, j0, j1 = spans.T
-    return table[i1, j1] - table[i0, j1] - table[i1, j0] + table[i0, j0]
+    sums: NDArray[np.int64] = table[i1, j1] - table[i0, j1] - table[i1, j0] + table[i0, j0]
+    return sums
 
 
 def _needed(spans: NDArray[np.int64], wanted: Mask) -> NDArray[np.int64]:

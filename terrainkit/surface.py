@@ -39,12 +39,12 @@ def surface_at(
     low = np.minimum(place.astype(np.int64), np.maximum(limit - 1, 0))
     i, j = low.T
     i1, j1 = np.minimum(low + 1, limit).T
-    corners = np.stack(
-        [heights[i, j], heights[i1, j], heights[i1, j1], heights[i, j1]], axis=1
-    ).astype(np.float64)
+    samples = np.stack([heights[i, j], heights[i1, j], heights[i1, j1], heights[i, j1]], axis=1)
+    # Compared as float32, as everywhere: a step that is just a wall must be one in every view.
+    walls = np.abs(np.roll(samples, -1, axis=1) - samples) > threshold
+    corners = samples.astype(np.float64)
     u, v = (place - low).T
     height, gradient = _two_triangles(corners, u, v)
-    walls = np.abs(np.roll(corners, -1, axis=1) - corners) > threshold
     cut = walls.any(axis=1)
     if cut.any():
         height[cut], gradient[cut] = _fan(corners[cut], walls[cut], u[cut], v[cut])

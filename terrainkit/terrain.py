@@ -30,7 +30,7 @@ class Terrain(ABC):
     .. math:: p(d) = (1 - d)\\, p_\\text{easy} + d\\, p_\\text{hard},
 
     and the terrain that results is plain numbers. Its fields are declared with the functions of
-    :mod:`terrainkit.parameter`; a field's docstring is its help on the command line and in the docs.
+    :mod:`terrainkit.parameter`; a field's docstring is its help wherever it is shown.
     Built directly, a terrain takes the hard end of each range that is not given.
     """
 
@@ -124,7 +124,7 @@ class Terrain(ABC):
             )
 
     def spawn(self, plot: Grid) -> tuple[float, float]:
-        """Return where a robot should start, x and y [m]: the middle, unless the terrain differs."""
+        """Return where a robot should start, x and y [m]: in the middle, by default."""
         return plot.centre
 
     @abstractmethod

@@ -71,7 +71,8 @@ class TerrainMap:
         points, shape = _points(xy)
         downhill = 0.0 - self._at(points).gradient / self.grid.cell
         normal = np.column_stack([downhill, np.ones(len(downhill))])
-        return (normal / np.linalg.norm(normal, axis=1, keepdims=True)).reshape(*shape, 3)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        return normal.reshape(*shape, 3)
 
     def mesh(self, *, merged: bool = True, closed: bool = False) -> "TriMesh":
         """Return the surface as triangles; see :mod:`terrainkit.mesh`.

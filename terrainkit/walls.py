@@ -40,7 +40,8 @@ def joined_corners(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
     Args:
         walls: Whether each edge is a wall, shape (n, 4).
     """
-    return _JOINED[walls @ _CASE]
+    joined: NDArray[np.bool_] = _JOINED[walls @ _CASE]
+    return joined
 
 
 def centre_heights(corners: NDArray[np.floating], walls: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -53,7 +54,8 @@ def centre_heights(corners: NDArray[np.floating], walls: NDArray[np.bool_]) -> N
         corners: Heights of the corners [m], shape (n, 4).
         walls: Whether each edge is a wall, shape (n, 4).
     """
-    return np.einsum("nij,nj->ni", _CENTRE_WEIGHTS[walls @ _CASE], corners)
+    centres: NDArray[np.float64] = np.einsum("nij,nj->ni", _CENTRE_WEIGHTS[walls @ _CASE], corners)
+    return centres
 
 
 def _joined(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -72,7 +74,8 @@ def _centre_weights(joined: NDArray[np.bool_]) -> NDArray[np.float64]:
             # Three corners lie in one plane; at the centre it is midway between the outer two.
             missing = int(np.flatnonzero(~joined[k])[0])
             weights[k, (missing + 2) % 4] = 0.0
-    return weights / weights.sum(axis=1, keepdims=True)
+    weights /= weights.sum(axis=1, keepdims=True)
+    return weights
 
 
 # There are 16 ways to put walls on four edges; each is a row of these tables.

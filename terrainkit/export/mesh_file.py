@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     from terrainkit.terrain_map import TerrainMap
 
@@ -31,7 +33,7 @@ def export(
     surface = terrain_map.mesh(merged=merged, closed=closed)
     vertices = surface.vertices
     if y_up:
-        vertices = vertices[:, [0, 2, 1]] * [1, 1, -1]
+        vertices = vertices[:, [0, 2, 1]] * np.array([1, 1, -1], dtype=np.float32)
     mesh = trimesh.Trimesh(
         vertices=vertices, faces=surface.triangles, process=False, metadata=_contact(terrain_map)
     )

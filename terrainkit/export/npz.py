@@ -106,7 +106,7 @@ def read_mesh(path: Path) -> TriMesh:
         limit = _MOST_FACES * 12 * math.prod(n + 2 for n in archive.config().grid.shape)
         vertices = archive.array("vertices", "f", (None, 3), limit=limit)
         triangles = archive.array("triangles", "i", (None, 3), limit=limit)
-    if triangles.size and not (0 <= triangles.min() and triangles.max() < len(vertices)):
+    if triangles.size and not (triangles.min() >= 0 and triangles.max() < len(vertices)):
         raise MapFileError(f"{path}: triangles points beyond the {len(vertices)} vertices")
     return TriMesh(vertices=vertices, triangles=triangles)
 
@@ -239,7 +239,7 @@ class _Archive:
         count = len(self.array("boxes", "f", (None, 10), limit=_LONGEST_TEXT))
         if count:
             raise MapFileError(
-                f"{self._path} has {count} solids beside its heightfield; this terrainkit reads none"
+                f"{self._path} has {count} solids beside its heights; this terrainkit reads none"
             )
 
 

@@ -19,7 +19,7 @@ def closed_mesh(surface: TriMesh) -> TriMesh:
         A mesh in which every edge is shared by two faces, once in each direction.
     """
     vertices, triangles = surface.vertices, surface.triangles
-    start, end = _boundary(triangles).T
+    start, end = surface.boundary().T
     vertical = (vertices[start, :2] == vertices[end, :2]).all(axis=1)
     # Walls that meet the edge of the map bring vertical edges: the ends of a wall, one above the
     # other. The panel beside the upper end runs through the lower one.
@@ -44,15 +44,6 @@ def closed_mesh(surface: TriMesh) -> TriMesh:
         vertices=np.concatenate([vertices, added.astype(np.float32)]),
         triangles=np.concatenate([triangles, *sides]).astype(np.int32),
     )
-
-
-def _boundary(triangles: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Return the edges that only one face has, as that face runs along them, shape (n, 2)."""
-    edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
-    count = int(edges.max()) + 1
-    forward = edges[:, 0] * count + edges[:, 1]
-    backward = edges[:, 1] * count + edges[:, 0]
-    return edges[~np.isin(forward, backward)]
 
 
 def _panels(

@@ -158,11 +158,11 @@ def _saddles(quads: _Quads, first: int) -> tuple[Ids, NDArray[np.float32]]:
         *east.wall(m2, n2, 0, 2, every),
         *west.wall(m3, n3, 2, 0, every),
     ]
-    for row in _rows(
+    between = _rows(
         (west.vertex(1), east.vertex(1), east.vertex(2)),
         (west.vertex(1), east.vertex(2), west.vertex(2)),
-    ):
-        triangles.append(row[floor])
+    )
+    triangles += [faces[floor] for faces in between]
     return np.concatenate(triangles), np.concatenate([west.positions, east.positions])
 
 

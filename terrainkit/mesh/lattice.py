@@ -75,12 +75,15 @@ class Lattice:
 
         The vertex on the other side has the next number. Where there is no wall, it is any number.
         """
-        return self.z.size + 2 * np.searchsorted(self.edges_x, i * self.walls_x.shape[1] + j)
+        place = np.searchsorted(self.edges_x, i * self.walls_x.shape[1] + j)
+        vertex: NDArray[np.int64] = self.z.size + 2 * place
+        return vertex
 
     def middle_y(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the same for the walls (i, j)-(i, j + 1)."""
-        behind = self.z.size + 2 * self.edges_x.size
-        return behind + 2 * np.searchsorted(self.edges_y, i * self.walls_y.shape[1] + j)
+        place = self.edges_x.size + np.searchsorted(self.edges_y, i * self.walls_y.shape[1] + j)
+        vertex: NDArray[np.int64] = self.z.size + 2 * place
+        return vertex
 
     def nodes(self, numbers: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return the positions of the nodes with these numbers [m], shape (n, 3)."""

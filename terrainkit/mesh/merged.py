@@ -67,11 +67,12 @@ def _corners(quads: Mask) -> Mask:
 def _assemble(lattice: Lattice, single: Mask, loops: list[Loops], panels: list[Ids]) -> TriMesh:
     """Return the mesh of the quads that stand alone, the loops and the panels between them."""
     plain = np.flatnonzero(single & ~lattice.cut)
-    pairs = np.empty((2 * len(plain), 3), dtype=np.int32)
+    pairs = np.empty((2 * len(plain), 3), dtype=np.int64)
     split_quads(lattice, plain, out=pairs)
     count = lattice.vertex_count
     faces, added = cut_quads(lattice, np.flatnonzero(single & lattice.cut), count)
-    triangles, extra = [pairs, faces, *panels], [lattice.middles(), added]
+    triangles: list[Ids] = [pairs, faces, *panels]
+    extra = [lattice.middles(), added]
     count += len(added)
     for loop in loops:
         faces, added = loop.triangles(count)

@@ -15,3 +15,16 @@ class TriMesh:
 
     triangles: NDArray[np.int32]
     """Three vertices for each face, anticlockwise seen from outside, shape (nf, 3)."""
+
+    def edges(self) -> NDArray[np.int64]:
+        """Return the three edges of each face as it runs along them, shape (3 nf, 2)."""
+        return self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+
+    def boundary(self) -> NDArray[np.int64]:
+        """Return the edges that only one face has, as that face runs along them, shape (n, 2)."""
+        edges = self.edges()
+        number = edges.min(axis=1) * len(self.vertices) + edges.max(axis=1)
+        order = np.argsort(number)
+        differs = np.ones(len(number) + 1, dtype=bool)
+        differs[1:-1] = np.diff(number[order]) != 0
+        return edges[order[differs[:-1] & differs[1:]]]

@@ -29,5 +29,5 @@ class PyramidSlope(Terrain):
     def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the sides, falling by `grade` times a cell from ring to ring."""
         rings = plot.rings(plot.centred(self.platform))
-        rise = self.grade * plot.cell * (rings.max() - rings)
+        rise: NDArray[np.floating] = self.grade * plot.cell * (rings.max() - rings)
         return -rise if self.inverted else rise

@@ -42,5 +42,7 @@ class PyramidStairs(Terrain):
                 f"{self.platform:g} m and the edge of a patch of "
                 f"{plot.size[0]:g} m x {plot.size[1]:g} m"
             )
-        rise = self.step_height * (risers - np.minimum(-(-rings // width), risers))
+        rise: NDArray[np.floating] = self.step_height * (
+            risers - np.minimum(-(-rings // width), risers)
+        )
         return -rise if self.inverted else rise
