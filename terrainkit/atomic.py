@@ -20,7 +20,7 @@ def atomic_write(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
     Raises:
         ExportError: if a target exists and `overwrite` is not set, or cannot be written.
     """
-    _refuse(path, overwrite=overwrite)
+    check_target(path, overwrite=overwrite)
     try:
         # Beside the target, so that moving there is a rename on the same disk.
         folder = Path(tempfile.mkdtemp(prefix=".terrainkit-", dir=path.parent))
@@ -30,7 +30,7 @@ def atomic_write(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
         yield folder / path.name
         written = sorted(folder.iterdir())
         for file in written:
-            _refuse(path.with_name(file.name), overwrite=overwrite)
+            check_target(path.with_name(file.name), overwrite=overwrite)
         for file in written:
             file.replace(path.with_name(file.name))
     except OSError as error:
@@ -39,7 +39,8 @@ def atomic_write(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _refuse(path: Path, *, overwrite: bool) -> None:
+def check_target(path: Path, *, overwrite: bool) -> None:
+    """Raise ExportError if a file cannot or may not be written at `path`."""
     if path.is_dir():
         raise ExportError(f"cannot write {path}: it is a folder")
     if os.path.lexists(path) and not path.is_file():

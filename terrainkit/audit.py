@@ -196,7 +196,7 @@ def _edges(terrain_map: TerrainMap, mesh: TriMesh) -> Iterator[str]:
     ends = mesh.vertices[mesh.boundary()].astype(np.float64)
     inside = ~_on_outline(ends, terrain_map).any(axis=1)
     if inside.any():
-        x, y, z = ends[inside][0, 0]
+        x, y = ends[inside][0, 0, :2]
         yield f"{int(inside.sum())} edges have a face on one side only, as at ({x:.2f}, {y:.2f})"
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from terrainkit.atomic import atomic_write
+from terrainkit.atomic import atomic_write, check_target
 from terrainkit.errors import ExportError, listing
 
 if TYPE_CHECKING:
@@ -44,6 +44,12 @@ def export(
     with atomic_write(path, overwrite=overwrite) as temporary:
         write(terrain_map, temporary, **options)
     return path
+
+
+def check(path: str | Path, *, overwrite: bool = False) -> None:
+    """Raise the ExportError that :func:`export` would, before a map is made for it."""
+    find(Path(path))
+    check_target(Path(path), overwrite=overwrite)
 
 
 def find(path: Path) -> ModuleType:

@@ -1,0 +1,1 @@
+"""The `terrainkit` command: tyro reads its arguments, `render` alone prints."""

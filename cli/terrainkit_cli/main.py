@@ -1,0 +1,71 @@
+"""The entry point: find the command, run it, and turn every expected error into one line."""
+
+import importlib
+import sys
+import warnings
+from collections.abc import Sequence
+
+from terrainkit_cli import parse, render
+
+COMMANDS = {
+    "generate": "terrain_commands",
+    "list": "terrain_commands",
+    "info": "terrain_commands",
+    "preview": "terrain_commands",
+    "export": "terrain_commands",
+    "check": "terrain_commands",
+}
+"""Module of each command, so that only the one in use is imported."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line, and return its exit code.
+
+    0: done. 1: `check` found something. 2: bad input; one line on stderr says what and why.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    warnings.showwarning = render.show_warning
+    from terrainkit.errors import TerrainkitError
+
+    try:
+        return _run(arguments)
+    except TerrainkitError as error:
+        render.error(str(error))
+        return 2
+    except MemoryError:
+        render.error("out of memory; a smaller map, or a coarser cell, would do")
+        return 2
+    except BrokenPipeError:
+        render.drop_stdout()
+        return 0
+    except KeyboardInterrupt:
+        render.error("interrupted")
+        return 130
+
+
+def _run(arguments: list[str]) -> int:
+    from terrainkit import __version__
+
+    name = arguments[0] if arguments else "--help"
+    if name in ("-h", "--help"):
+        render.overview({name: command(name).__doc__ or "" for name in COMMANDS})
+        return 0
+    if name == "--version":
+        render.result(f"terrainkit {__version__}")
+        return 0
+    if name not in COMMANDS:
+        render.error(f"no command {name!r}; there are: {', '.join(COMMANDS)}")
+        return 2
+    parsed = parse.parse(command(name), f"terrainkit {name}", arguments[1:])
+    return parsed.run()
+
+
+def command(name: str) -> type[parse.Command]:
+    """Return the class of the command `name`."""
+    module = importlib.import_module(f"terrainkit_cli.{COMMANDS[name]}")
+    found: type[parse.Command] = getattr(module, name.title().replace("-", ""))
+    return found
+
+
+if __name__ == "__main__":
+    sys.exit(main())

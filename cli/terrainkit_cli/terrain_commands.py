@@ -1,0 +1,316 @@
+"""The commands that make, look at and check maps."""
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import tyro
+
+from terrainkit.choice import TerrainChoice
+from terrainkit.config import MapConfig
+from terrainkit.errors import ConfigError
+from terrainkit.parameter import Range, Value
+from terrainkit.terrain_map import TerrainMap
+from terrainkit_cli import render
+from terrainkit_cli.parse import Command
+
+MapFile = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="MAP.npz")]
+Output = Annotated[Path, tyro.conf.arg(aliases=["-o"])]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapOptions(MapConfig):
+    """What the map is like."""
+
+    terrains: tyro.conf.Suppress[tyro.conf.Fixed[tuple[TerrainChoice, ...]]] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Generate(Command):
+    """Make a map and write it."""
+
+    output: Output
+    """Where to write the map; the suffix names the format (.npz holds everything)."""
+
+    config: Path | None = None
+    """TOML file of a map; options given here go before what it says."""
+
+    terrain: str | None = None
+    """Make the whole map of this terrain; `terrainkit list` shows which there are."""
+
+    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
+    """Parameters of --terrain: name=value, or name=easy:hard for a range."""
+
+    overwrite: bool = False
+    """Replace an existing file."""
+
+    map: tyro.conf.OmitArgPrefixes[MapOptions] = dataclasses.field(default_factory=MapOptions)
+
+    @classmethod
+    def defaults(cls, arguments: list[str]) -> Self | None:
+        """Return the map of --config or --terrain, which the other options then change."""
+        given = {word.partition("=")[0] for word in arguments}
+        if not given & {"--config", "--terrain", "--set"}:
+            return None
+        source, _ = tyro.cli(_Source, args=arguments, return_unknown_args=True, add_help=False)
+        return cls(output=Path(), map=source.options("--preset" in given))
+
+    def run(self) -> int:
+        """Make the map, write it, and say what to do next."""
+        from terrainkit import export
+        from terrainkit.generate import generate
+
+        export.check(self.output, overwrite=self.overwrite)  # before the wait, not after
+        terrain_map = generate(self.map, progress=render.progress)
+        terrain_map.save(self.output, overwrite=self.overwrite)
+        render.result(_written(terrain_map, self.output))
+        if self.output.suffix == ".npz":
+            render.result(
+                f"next: terrainkit preview {self.output} -o preview.png  (look at it)\n"
+                f"      terrainkit export {self.output} -o map.xml  (MuJoCo; or .stl, .ply ...)\n"
+                f'      terrainkit.TerrainMap.load("{self.output}")      (Python; numpy.load too)'
+            )
+        return 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Source:
+    """The options of `generate` that say where the other options start from."""
+
+    config: Path | None = None
+    terrain: str | None = None
+    set: tuple[str, ...] = ()
+
+    def options(self, preset_given: bool) -> MapOptions:
+        if self.set and not self.terrain:
+            raise ConfigError("--set gives parameters to --terrain, which is missing")
+        config = MapConfig()
+        if self.config:
+            from terrainkit.config_text import read_config
+
+            config = read_config(self.config)
+        mix = () if preset_given else config.terrains
+        if self.terrain:
+            parameters = dict(_parameter(word) for word in self.set)
+            mix = (TerrainChoice(terrain=self.terrain, parameters=parameters),)
+        values = {f.name: getattr(config, f.name) for f in dataclasses.fields(config)}
+        return MapOptions(**values | {"terrains": mix})
+
+
+def _parameter(word: str) -> tuple[str, Value | Range]:
+    name, equals, text = word.partition("=")
+    values = [_value(name, part) for part in text.split(":")]
+    if not equals or len(values) > 2:
+        raise ConfigError(f"--set {word!r}; wanted name=value or name=easy:hard")
+    return name, values[0] if len(values) == 1 else (values[0], values[1])
+
+
+def _value(name: str, text: str) -> Value:
+    if text in ("true", "false"):
+        return text == "true"
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    raise ConfigError(f"--set {name}={text!r}; wanted a number, true or false")
+
+
+@dataclass(frozen=True, kw_only=True)
+class List(Command):
+    """List the terrains, or the parameters of one."""
+
+    terrain: Annotated[str | None, tyro.conf.Positional] = None
+    """A terrain, for its parameters."""
+
+    def run(self) -> int:
+        """Print a table."""
+        from terrainkit.describe import describe, summaries
+
+        if self.terrain is None:
+            render.table(list(summaries().items()))
+            render.result("\nterrainkit list TERRAIN shows the parameters of one.")
+            return 0
+        about = describe(self.terrain)
+        render.result(f"{about.name}: {about.text}\n")
+        rows = [("parameter", "easy", "hard", "")]
+        rows += [(p.name, p.easy, p.hard, p.text) for p in about.parameters]
+        render.table(rows)
+        return 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Info(Command):
+    """Print what a map holds."""
+
+    map: MapFile
+    """The map."""
+
+    patch: tuple[int, int] | None = None
+    """Row and column of a patch, for its parameters as asked and as built."""
+
+    def run(self) -> int:
+        """Print the size of the map and its columns, or one patch."""
+        terrain_map = TerrainMap.load(self.map)
+        if self.patch:
+            _print_patch(terrain_map, *self.patch)
+        else:
+            _print_map(terrain_map)
+        return 0
+
+
+def _print_map(terrain_map: TerrainMap) -> None:
+    from terrainkit.measure import hardness
+
+    config, grid = terrain_map.config, terrain_map.grid
+    heights = terrain_map.heights
+    facts = {
+        "patches": f"{config.rows} x {config.cols} of {_metres(*config.patch_size)}",
+        "samples": f"{grid.shape[0]} x {grid.shape[1]}, one every {config.cell:g} m",
+        "extent": f"{_metres(*grid.size)}, from ({grid.lower[0]:g}, {grid.lower[1]:g})",
+        "border": f"{config.border:g} m",
+        "heights": f"{heights.min():g} to {heights.max():g} m",
+        "mode": f"{config.mode}, seed {config.seed}",
+        "friction": f"static {config.static_friction:g}, dynamic {config.dynamic_friction:g}, "
+        f"restitution {config.restitution:g}",
+    }
+    render.table(list(facts.items()))
+    render.result("")
+    rows = [("column", "terrain", "difficulty", "hardness")]
+    for col in range(config.cols):
+        tiles = [terrain_map.tile(row, col) for row in range(config.rows)]
+        hard = [hardness(t.heights, config.cell, float(t.origin[2])) for t in tiles]
+        names = ", ".join(dict.fromkeys(tile.terrain for tile in tiles))
+        levels = [tile.difficulty for tile in tiles]
+        rows.append(
+            (
+                str(col),
+                names,
+                f"{min(levels):.2f} to {max(levels):.2f}",
+                f"{min(hard):.3f} to {max(hard):.3f} m",
+            )
+        )
+    render.table(rows)
+
+
+def _print_patch(terrain_map: TerrainMap, row: int, col: int) -> None:
+    try:
+        tile = terrain_map.tile(row, col)
+    except IndexError as error:
+        raise ConfigError(str(error)) from None
+    x, y, z = (float(value) for value in tile.origin)
+    render.result(
+        f"patch ({row}, {col}): {tile.terrain} at difficulty {tile.difficulty:.3f}, "
+        f"spawn origin ({x:g}, {y:g}, {z:g})\n"
+    )
+    rows = [("parameter", "asked", "built")]
+    for name, asked in tile.parameters.requested.items():
+        built = tile.parameters.realized[name]
+        text = " x ".join(f"{v:g}" for v in built) if isinstance(built, tuple) else f"{built:g}"
+        rows.append((name, f"{asked:g}", text))
+    render.table(rows)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Preview(Command):
+    """Draw a map from above: relief, names, levels and spawn origins."""
+
+    map: MapFile
+    """The map."""
+
+    output: Output
+    """The .png to write."""
+
+    width: int = 1600
+    """Least width of the ground in the picture [px]."""
+
+    overwrite: bool = False
+    """Replace an existing file."""
+
+    def run(self) -> int:
+        """Draw the picture and write it."""
+        from terrainkit.preview import write_preview
+
+        terrain_map = TerrainMap.load(self.map)
+        write_preview(terrain_map, self.output, width=self.width, overwrite=self.overwrite)
+        render.result(_written(terrain_map, self.output))
+        return 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Export(Command):
+    """Write a map in another format: .xml (MuJoCo), .stl, .ply, .obj, .glb or .png (heightmap)."""
+
+    map: MapFile
+    """The map."""
+
+    output: Output
+    """Where to write; the suffix names the format."""
+
+    collision: Literal["auto", "hfield", "boxes"] | None = None
+    """For .xml: one heightfield, or boxes with vertical walls where the ground is level. auto takes
+    boxes where they hold all of the ground and are few."""
+
+    full: bool = False
+    """For meshes: two triangles for every cell, instead of joining coplanar faces."""
+
+    closed: bool = False
+    """For meshes: add a skirt and a bottom, for a watertight solid."""
+
+    y_up: bool = False
+    """For meshes: turn the map so that y is up, as glTF viewers and game engines expect."""
+
+    overwrite: bool = False
+    """Replace an existing file."""
+
+    def run(self) -> int:
+        """Write the file."""
+        given = {
+            "collision": self.collision,
+            "merged": False if self.full else None,
+            "closed": self.closed or None,
+            "y_up": self.y_up or None,
+        }
+        options = {name: value for name, value in given.items() if value is not None}
+        terrain_map = TerrainMap.load(self.map)
+        terrain_map.save(self.output, overwrite=self.overwrite, **options)
+        render.result(_written(terrain_map, self.output))
+        return 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check(Command):
+    """Check that a map keeps every promise: spawns, patches, sizes, difficulty, mesh."""
+
+    map: MapFile
+    """The map."""
+
+    def run(self) -> int:
+        """Print what is wrong, and return 1 if anything is."""
+        from terrainkit.audit import audit
+        from terrainkit.export.npz import read_mesh
+
+        terrain_map = TerrainMap.load(self.map)
+        findings = audit(terrain_map, read_mesh(self.map))
+        for finding in findings:
+            render.result(f"{finding.check}: {finding.message}")
+        if findings:
+            render.result(f"\n{self.map}: {len(findings)} findings")
+            return 1
+        render.result(
+            f"{self.map}: {terrain_map.difficulty.size} patches, nothing to find fault with"
+        )
+        return 0
+
+
+def _written(terrain_map: TerrainMap, path: Path) -> str:
+    config, grid = terrain_map.config, terrain_map.grid
+    return (
+        f"wrote {path}: {config.rows} x {config.cols} patches of {_metres(*config.patch_size)}, "
+        f"{grid.shape[0]} x {grid.shape[1]} samples, {path.stat().st_size / 1e6:.1f} MB"
+    )
+
+
+def _metres(x: float, y: float) -> str:
+    return f"{x:g} m x {y:g} m"

@@ -1,0 +1,161 @@
+"""The preview: a shaded relief of a map from above, with its names, levels and spawn origins."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.atomic import atomic_write
+from terrainkit.errors import ExportError
+
+if TYPE_CHECKING:
+    from terrainkit.terrain_map import TerrainMap
+
+Picture = NDArray[np.uint8]
+
+_TINTS = (
+    (-10.0, (38, 32, 44)),
+    (-1.5, (70, 62, 92)),
+    (-0.4, (112, 138, 168)),
+    (0.0, (224, 221, 208)),
+    (0.4, (214, 178, 128)),
+    (1.5, (164, 104, 62)),
+    (4.0, (116, 66, 46)),
+)
+"""Colour (red, green, blue) of the ground by height [m]: blue below 0, brown above."""
+
+_INK = (40, 40, 46)
+_SPAWN = (196, 40, 40)
+_PAPER = (250, 249, 246)
+_MARGIN = (250, 60, 30, 70)
+"""Paper to the left, below, to the right and above the ground [px]."""
+
+_LIGHT = np.array([-0.55, 0.45, 0.7])
+"""Where the light comes from: the upper left, as on maps, lest hills look like holes."""
+
+
+def write_preview(
+    terrain_map: "TerrainMap", path: str | Path, *, width: int = 1600, overwrite: bool = False
+) -> Path:
+    """Write the preview of `terrain_map` to the .png file `path`, and return `path`.
+
+    Args:
+        terrain_map: The map.
+        path: Where to.
+        width: Least width of the ground in the picture [px].
+        overwrite: Replace an existing file.
+
+    Raises:
+        ExportError: if the suffix is not .png, or the target cannot be written.
+    """
+    import cv2
+
+    path = Path(path)
+    if path.suffix.lower() != ".png":
+        raise ExportError(f"a preview is a .png; got {path}")
+    if not 100 <= width <= 10_000:
+        raise ExportError(f"width is {width}; wanted 100 to 10000")
+    with atomic_write(path, overwrite=overwrite) as temporary:
+        _, data = cv2.imencode(".png", cv2.cvtColor(preview(terrain_map, width), cv2.COLOR_RGB2BGR))
+        temporary.write_bytes(data.tobytes())
+    return path
+
+
+def preview(terrain_map: "TerrainMap", width: int = 1600) -> Picture:
+    """Return the preview as red, green and blue, shape (height, width, 3): x right, y up."""
+    heights, crop = _without_border(terrain_map)
+    ground = relief(heights, terrain_map.config.cell)
+    # Downwards rows, and every sample a square of whole pixels (or a share of one, on a huge map).
+    ground = _resized(ground.swapaxes(0, 1)[::-1], width)
+    scale = ground.shape[1] / heights.shape[0] / terrain_map.config.cell
+    left, below, right, above = _MARGIN
+    height, span = ground.shape[:2]
+    sheet = np.full((height + above + below, span + left + right, 3), _PAPER, dtype=np.uint8)
+    sheet[above : above + height, left : left + span] = ground
+    _annotate(sheet, terrain_map, scale, (left - crop[0] * scale, above + height + crop[1] * scale))
+    return sheet
+
+
+def relief(heights: NDArray[np.float32], cell: float) -> Picture:
+    """Return heights as coloured, shaded ground, shape (nx, ny, 3).
+
+    Shading is Lambert's: the cosine between the ground's normal and the light.
+
+    Args:
+        heights: Heights [m], shape (nx, ny).
+        cell: Distance between two samples [m].
+    """
+    levels = [level for level, _ in _TINTS]
+    tint = np.stack(
+        [np.interp(heights, levels, [colour[k] for _, colour in _TINTS]) for k in range(3)], axis=-1
+    )
+    padded = np.pad(heights, 1, mode="edge")
+    slope_x = (padded[2:, 1:-1] - padded[:-2, 1:-1]) / (2 * cell)
+    slope_y = (padded[1:-1, 2:] - padded[1:-1, :-2]) / (2 * cell)
+    light = _LIGHT / np.linalg.norm(_LIGHT)
+    steepness = np.sqrt(slope_x**2 + slope_y**2 + 1)
+    shade = (light[2] - light[0] * slope_x - light[1] * slope_y) / steepness / light[2]
+    picture: Picture = np.clip(tint * np.clip(shade, 0.35, 1.25)[..., None], 0, 255).astype(
+        np.uint8
+    )
+    return picture
+
+
+def _without_border(
+    terrain_map: "TerrainMap",
+) -> tuple[NDArray[np.float32], tuple[float, float]]:
+    """Return the heights with a metre of the border, and the corner where they begin [m]."""
+    config = terrain_map.config
+    cut = max(0, config.border_cells - round(1.0 / config.cell))
+    heights = terrain_map.heights[cut : len(terrain_map.heights) - cut, :]
+    heights = heights[:, cut : heights.shape[1] - cut]
+    lower = terrain_map.grid.lower
+    return heights, (lower[0] + cut * config.cell, lower[1] + cut * config.cell)
+
+
+def _resized(picture: Picture, width: int) -> Picture:
+    import cv2
+
+    samples = picture.shape[1]
+    if samples <= width:
+        factor = -(-width // samples)
+        return picture.repeat(factor, axis=0).repeat(factor, axis=1)
+    size = (width, max(1, round(picture.shape[0] * width / samples)))
+    smaller = cv2.resize(np.ascontiguousarray(picture), size, interpolation=cv2.INTER_AREA)
+    return np.asarray(smaller, dtype=np.uint8)
+
+
+def _annotate(
+    sheet: Picture, terrain_map: "TerrainMap", scale: float, zero: tuple[float, float]
+) -> None:
+    import cv2
+
+    config, (rows, cols) = terrain_map.config, terrain_map.difficulty.shape
+    first = config.patch_grid(0, 0).lower
+
+    def pixel(x: float, y: float) -> tuple[int, int]:
+        return round(zero[0] + x * scale), round(zero[1] - y * scale)
+
+    def write(text: str, at: tuple[int, int], size: float = 0.5) -> None:
+        cv2.putText(sheet, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, _INK, 1, cv2.LINE_AA)
+
+    size_x, size_y = config.patch_size
+    by_column = config.mode != "randomized"
+    for col in range(cols):
+        _, y = pixel(0, first[1] + (col + 0.5) * size_y)
+        name = terrain_map.terrain_names[terrain_map.terrain_types[0, col]] if by_column else ""
+        write(f"{col:>3}  {name}", (10, y + 5))
+    for row in range(rows):
+        x, _ = pixel(first[0] + (row + 0.5) * size_x, 0)
+        low, high = terrain_map.difficulty[row].min(), terrain_map.difficulty[row].max()
+        level = f"{low:.2f}" if low == high else f"{low:.2f}-{high:.2f}"
+        write(f"{row}  {level}", (x - 28, sheet.shape[0] - _MARGIN[1] + 24))
+    write("columns (y): terrain", (10, _MARGIN[3] - 14))
+    write("rows (x): difficulty", (10, sheet.shape[0] - _MARGIN[1] + 24))
+    title = f"{rows} x {cols} patches of {size_x:g} m x {size_y:g} m, seed {config.seed}"
+    write(title, (_MARGIN[0], 40), 0.7)
+    radius = max(2, round(scale * config.spawn_radius))
+    for origin in terrain_map.env_origins.reshape(-1, 3).tolist():
+        cv2.circle(sheet, pixel(*origin[:2]), radius, _SPAWN, 1, cv2.LINE_AA)
+        cv2.circle(sheet, pixel(*origin[:2]), 2, _SPAWN, -1, cv2.LINE_AA)
