@@ -46,6 +46,6 @@ def check_target(path: Path, *, overwrite: bool) -> None:
     if os.path.lexists(path) and not path.is_file():
         raise ExportError(f"cannot write {path}: it is there, and not a plain file")
     if path.exists() and not overwrite:
-        raise ExportError(f"{path} exists; choose another name, or allow it to be overwritten")
+        raise ExportError(f"{path} exists; another name would do, or --overwrite (overwrite=True)")
     if not path.parent.is_dir():
         raise ExportError(f"cannot write {path}: there is no folder {path.parent}")

@@ -9,6 +9,9 @@ from terrainkit.choice import TerrainChoice
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid, whole_cells
 
+_MOST_CELLS = 10**6
+"""Cells along a side of a map, beyond which no memory is large enough to ask about it."""
+
 Mode = Literal["curriculum", "selected", "randomized"]
 
 
@@ -159,6 +162,12 @@ class MapConfig:
             ("border", self.border),
         ):
             whole_cells(name, size, self.cell)
+        for axis, cells in zip("xy", self.grid.shape, strict=True):
+            if cells > _MOST_CELLS:
+                raise ConfigError(
+                    f"the map has {float(min(cells, 10**300)):.3g} cells along {axis}; "
+                    f"wanted at most {_MOST_CELLS}"
+                )
 
     def _check_difficulties(self) -> None:
         if not self.random_difficulties:
@@ -189,7 +198,7 @@ class MapConfig:
                 )
         if self.mode == "selected" and len(mix) != 1:
             raise ConfigError(
-                f"mode selected wants a mix of one terrain; this one has {len(mix)}: "
+                f"mode selected wants a mix of one terrain (--terrain); this one has {len(mix)}: "
                 f"{', '.join(names)}"
             )
         if not sum(choice.proportion for choice in mix) > 0:

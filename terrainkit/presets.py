@@ -1,9 +1,33 @@
 """Presets: ready mixes of terrains, by name."""
 
+from functools import cache
+
 from terrainkit import registry
 from terrainkit.choice import TerrainChoice
 from terrainkit.errors import ConfigError, listing
 from terrainkit.parameter import parameters_of
+
+_INVERTED = "_inverted"
+"""Ends the name of a terrain that stands upside down."""
+
+_MIXES = {
+    # legged_gym's columns in its order. What it calls "stairs up" is climbed from the platform
+    # outwards, so it is the inverted pyramid here, and "stairs down" the upright one.
+    "legged_gym": {
+        "pyramid_slope_inverted": 1.0,
+        "pyramid_slope": 1.0,
+        "rough_slope": 1.0,
+        "pyramid_stairs_inverted": 2.0,
+        "pyramid_stairs": 1.0,
+        "obstacles": 1.0,
+        "stepping_stones": 1.0,
+        "gap": 1.0,
+        "pit": 1.0,
+    },
+    "rough": {"flat": 1.0, "rough": 1.0, "rough_slope": 1.0, "obstacles": 1.0, "wave": 1.0},
+    "stairs": {"stairs": 1.0, "pyramid_stairs": 1.0, "pyramid_stairs_inverted": 1.0},
+}
+"""Proportion of each terrain, by preset."""
 
 
 def names() -> tuple[str, ...]:
@@ -11,65 +35,32 @@ def names() -> tuple[str, ...]:
     return (*_MIXES, "all")
 
 
+@cache
 def find(name: str) -> tuple[TerrainChoice, ...]:
-    """Return the mix called `name`.
+    """Return the mix called `name`; "all" holds each terrain, upright and inverted, once.
 
     Raises:
         ConfigError: if there is none, listing those that exist.
     """
-    if name == "all":
-        return tuple(_all())
-    if name not in _MIXES:
+    if name not in names():
         raise ConfigError(f"no preset {name!r}; there are: {listing(names())}")
-    return _MIXES[name]
+    mix = dict.fromkeys(_all(), 1.0) if name == "all" else _MIXES[name]
+    return tuple(_choice(terrain, proportion) for terrain, proportion in mix.items())
 
 
-def _inverted(terrain: str, proportion: float = 1.0) -> TerrainChoice:
-    return TerrainChoice(
-        terrain=terrain,
-        name=f"{terrain}_inverted",
-        proportion=proportion,
-        parameters={"inverted": True},
-    )
-
-
-def _one(terrain: str) -> TerrainChoice:
-    return TerrainChoice(terrain=terrain)
-
-
-def _all() -> list[TerrainChoice]:
+def _all() -> list[str]:
     mix = []
     for terrain in registry.names():
-        mix.append(_one(terrain))
+        mix.append(terrain)
         if "inverted" in parameters_of(registry.find(terrain)):
-            mix.append(_inverted(terrain))
+            mix.append(terrain + _INVERTED)
     return mix
 
 
-_MIXES = {
-    # legged_gym's columns in its order. What it calls "stairs up" is climbed from the platform
-    # outwards, so it is the inverted pyramid here, and "stairs down" the upright one.
-    "legged_gym": (
-        _inverted("pyramid_slope"),
-        _one("pyramid_slope"),
-        _one("rough_slope"),
-        _inverted("pyramid_stairs", proportion=2.0),
-        _one("pyramid_stairs"),
-        _one("obstacles"),
-        _one("stepping_stones"),
-        _one("gap"),
-        _one("pit"),
-    ),
-    "rough": (
-        _one("flat"),
-        _one("rough"),
-        _one("rough_slope"),
-        _one("obstacles"),
-        _one("wave"),
-    ),
-    "stairs": (
-        _one("stairs"),
-        _one("pyramid_stairs"),
-        _inverted("pyramid_stairs"),
-    ),
-}
+def _choice(name: str, proportion: float) -> TerrainChoice:
+    return TerrainChoice(
+        terrain=name.removesuffix(_INVERTED),
+        name=name,
+        proportion=proportion,
+        parameters={"inverted": True} if name.endswith(_INVERTED) else {},
+    )

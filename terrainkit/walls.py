@@ -20,6 +20,8 @@ what its corners have in common at its centre follows from the edges that are no
 import numpy as np
 from numpy.typing import NDArray
 
+_ROWS = 32
+
 
 def wall_edges(
     heights: NDArray[np.float32], threshold: float
@@ -30,8 +32,15 @@ def wall_edges(
         heights: Samples [m], shape (nx, ny).
         threshold: Smallest difference that is no wall any more [m]; infinite for no walls.
     """
-    x, y = (np.diff(heights, axis=axis) for axis in (0, 1))
-    return np.abs(x, out=x) > threshold, np.abs(y, out=y) > threshold
+    nx, ny = heights.shape
+    x = np.empty((nx - 1, ny), dtype=bool)
+    y = np.empty((nx, ny - 1), dtype=bool)
+    # A few rows at a time: their differences stay in the cache, and no map-sized array is made.
+    for i in range(0, nx, _ROWS):
+        rows = heights[i : i + _ROWS + 1]
+        np.greater(np.abs(np.diff(rows, axis=0)), threshold, out=x[i : i + _ROWS])
+        np.greater(np.abs(np.diff(rows[:_ROWS], axis=1)), threshold, out=y[i : i + _ROWS])
+    return x, y
 
 
 def joined_corners(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -92,8 +92,10 @@ def _compact(lattice: Lattice, triangles: Ids, extra: NDArray[np.float32]) -> Tr
     """
     used = np.zeros(lattice.z.size + len(extra), dtype=bool)
     used[triangles.ravel()] = True
-    number = np.cumsum(used, dtype=np.int32) - 1
-    nodes = np.flatnonzero(used[: lattice.z.size])
+    old = np.flatnonzero(used)
+    number = np.empty(len(used), dtype=np.int32)
+    number[old] = np.arange(len(old), dtype=np.int32)
+    nodes = old[: np.searchsorted(old, lattice.z.size)]
     return TriMesh(
         vertices=np.concatenate([lattice.nodes(nodes), extra[used[lattice.z.size :]]]),
         triangles=number[triangles],

@@ -55,17 +55,19 @@ class Rectangles:
 
     def loops(self, lattice: Lattice, kept: Mask) -> Loops:
         """Return the rims, of those nodes that are `kept`."""
-        owner, k = laid_out(2 * (self.i1 - self.i0 + self.j1 - self.j0))
-        a, b = (self.i1 - self.i0)[owner], (self.j1 - self.j0)[owner]
-        # Along the bottom for a steps, up for b, back for a, down for b.
-        i = self.i0[owner] + np.clip(k, 0, a) - np.clip(k - a - b, 0, a)
-        j = self.j0[owner] + np.clip(k - a, 0, b) - np.clip(k - 2 * a - b, 0, b)
-        keep = kept[i, j]
+        ny = lattice.z.shape[1]
+        low, high = self.i0 * ny, self.i1 * ny
+        # Four sides, each from its first corner to just before the next.
+        first = np.stack([low + self.j0, high + self.j0, high + self.j1, low + self.j1], axis=1)
+        length = np.tile(np.stack([self.i1 - self.i0, self.j1 - self.j0], axis=1), 2)
+        side, k = laid_out(length.ravel())
+        nodes = first.ravel()[side] + k * np.array([ny, 1, -ny, -1])[side % 4]
+        keep = kept.ravel()[nodes]
         x = (lattice.x[self.i0] + lattice.x[self.i1]) / 2
         y = (lattice.y[self.j0] + lattice.y[self.j1]) / 2
         z = (lattice.z[self.i0, self.j0] + lattice.z[self.i1, self.j1]) / 2
         return Loops(
-            vertices=(i * lattice.z.shape[1] + j)[keep],
-            owner=owner[keep],
+            vertices=nodes[keep],
+            owner=side[keep] // 4,
             centres=np.column_stack([x, y, z]).astype(np.float32),
         )
