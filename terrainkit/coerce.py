@@ -1,7 +1,7 @@
 """Values from files and callers, checked against the annotation of the field they are for."""
 
 import types
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Any, Literal, Union, get_args, get_origin
 
 from terrainkit.errors import ConfigError, listing
 
@@ -14,14 +14,12 @@ def coerce(name: str, value: object, annotation: Any) -> Any:
     Args:
         name: What to call the value in the error.
         value: A number, text, list or tuple, or an instance of the annotated class.
-        annotation: A plain class, Literal, tuple[...], X | None, or one of these Annotated.
+        annotation: A plain class, Literal, tuple[...] or X | None.
 
     Raises:
         ConfigError: if `value` is of another kind; nothing is guessed, a text is never a number.
     """
     origin = get_origin(annotation)
-    if origin is Annotated:
-        return coerce(name, value, get_args(annotation)[0])
     if origin is Literal:
         return _one_of(name, value, get_args(annotation))
     if origin in (Union, types.UnionType):

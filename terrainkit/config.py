@@ -88,7 +88,7 @@ class MapConfig:
     def __post_init__(self) -> None:
         from terrainkit.coerce import coerce
 
-        for f in fields(self):
+        for f in fields(MapConfig):
             object.__setattr__(self, f.name, coerce(f.name, getattr(self, f.name), f.type))
         self._check_sizes()
         self._check_difficulties()

@@ -78,6 +78,6 @@ def _row_difficulty(config: MapConfig, row: int, col: int) -> float:
     return low + (high - low) * min(max(place / last, 0.0), 1.0)
 
 
-def _layout_rng(config: MapConfig, row: int, col: int) -> np.random.Generator:
+def _layout_rng(config: MapConfig, row: int, col: int) -> "np.random.Generator":
     entropy = np.random.SeedSequence([config.seed, row, col], spawn_key=_LAYOUT_STREAM)
     return np.random.default_rng(entropy)

@@ -87,7 +87,7 @@ class Terrain(ABC):
         parameters = parameters_of(self).items()
         return {name: p.realized(getattr(self, name), plot) for name, p in parameters}
 
-    def build(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.float32]:
+    def build(self, plot: Grid, rng: "np.random.Generator") -> NDArray[np.float32]:
         """Return the heights of the patch on `plot` [m], float32, shape `plot.shape`.
 
         The same terrain, plot and state of `rng` give the same bytes on every machine.
@@ -128,7 +128,7 @@ class Terrain(ABC):
         return plot.centre
 
     @abstractmethod
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+    def heights(self, plot: Grid, rng: "np.random.Generator") -> NDArray[np.floating]:
         """Return the heights on `plot` [m], shape `plot.shape`, drawing nothing but from `rng`.
 
         Draw first and scale after: the pattern then stays the same as the difficulty rises.

@@ -5,7 +5,7 @@ import io
 import re
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Self, TypeVar
+from typing import TypeVar
 
 from terrainkit.errors import TerrainkitError
 
@@ -13,11 +13,6 @@ from terrainkit.errors import TerrainkitError
 @dataclass(frozen=True, kw_only=True)
 class Command(ABC):
     """A command of `terrainkit`: its fields are the options."""
-
-    @classmethod
-    def defaults(cls, arguments: list[str]) -> Self | None:  # noqa: ARG003
-        """Return the command to take defaults from; a command that reads a file may look there."""
-        return None
 
     @abstractmethod
     def run(self) -> int:
@@ -42,12 +37,22 @@ def parse(command: type[_Command], program: str, arguments: list[str]) -> _Comma
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said):
-            default = command.defaults(arguments) or tyro.MISSING_NONPROP
-            return tyro.cli(command, prog=program, args=arguments, default=default)
+            return tyro.cli(command, prog=program, args=arguments)
     except SystemExit as end:
         if end.code in (0, None):
             raise
         raise UsageError(f"{_one_line(said.getvalue())}; see {program} --help") from None
+
+
+def value_of(word: str) -> str | float | bool | None:
+    """Return the value that `word` writes: a number, true, false, none, or the word itself."""
+    constants = {"true": True, "false": False, "none": None}
+    if word.lower() in constants:
+        return constants[word.lower()]
+    for kind in (int, float):
+        with contextlib.suppress(ValueError):
+            return kind(word)
+    return word
 
 
 def _one_line(box: str) -> str:
@@ -56,4 +61,4 @@ def _one_line(box: str) -> str:
     parts = " ".join(rows).split(" ─")
     told = [part.strip("─ ") for part in parts]
     told = [part for part in told if part and not part.startswith(("For full", "Argument help"))]
-    return re.sub(r"^Error parsing map: ", "", ". ".join(told))
+    return re.sub(r"^Error parsing (\S+): (?=\1 is )", "", ". ".join(told))

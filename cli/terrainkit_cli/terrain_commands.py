@@ -3,7 +3,7 @@
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal
 
 import tyro
 
@@ -13,17 +13,11 @@ from terrainkit.errors import ConfigError
 from terrainkit.parameter import Range, Value
 from terrainkit.terrain_map import TerrainMap
 from terrainkit_cli import render
-from terrainkit_cli.parse import Command
+from terrainkit_cli.map_options import MapOptions, given
+from terrainkit_cli.parse import Command, value_of
 
 MapFile = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="MAP.npz")]
 Output = Annotated[Path, tyro.conf.arg(aliases=["-o"])]
-
-
-@dataclass(frozen=True, kw_only=True)
-class MapOptions(MapConfig):
-    """What the map is like."""
-
-    terrains: tyro.conf.Suppress[tyro.conf.Fixed[tuple[TerrainChoice, ...]]] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,88 +27,65 @@ class Generate(Command):
     output: Output
     """Where to write the map; the suffix names the format (.npz holds everything)."""
 
-    config: Path | None = None
+    config: Annotated[str, tyro.conf.arg(metavar="FILE.toml", help_behavior_hint="")] = ""
     """TOML file of a map; options given here go before what it says."""
 
-    terrain: str | None = None
+    terrain: Annotated[str, tyro.conf.arg(metavar="NAME", help_behavior_hint="")] = ""
     """Make the whole map of this terrain; `terrainkit list` shows which there are."""
 
-    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = ()
-    """Parameters of --terrain: name=value, or name=easy:hard for a range."""
+    set: Annotated[str, tyro.conf.arg(metavar="NAME=VALUE,...", help_behavior_hint="")] = ""
+    """Parameters of --terrain: name=value, or name=easy:hard for a range, with commas between."""
 
     overwrite: bool = False
     """Replace an existing file."""
 
     map: tyro.conf.OmitArgPrefixes[MapOptions] = dataclasses.field(default_factory=MapOptions)
 
-    @classmethod
-    def defaults(cls, arguments: list[str]) -> Self | None:
-        """Return the map of --config or --terrain, which the other options then change."""
-        given = {word.partition("=")[0] for word in arguments}
-        if not given & {"--config", "--terrain", "--set"}:
-            return None
-        source, _ = tyro.cli(_Source, args=arguments, return_unknown_args=True, add_help=False)
-        return cls(output=Path(), map=source.options("--preset" in given))
-
     def run(self) -> int:
         """Make the map, write it, and say what to do next."""
         from terrainkit import export
         from terrainkit.generate import generate
 
+        config = self._config()
         export.check(self.output, overwrite=self.overwrite)  # before the wait, not after
-        terrain_map = generate(self.map, progress=render.progress)
+        terrain_map = generate(config, progress=render.progress)
         terrain_map.save(self.output, overwrite=self.overwrite)
         render.result(_written(terrain_map, self.output))
         if self.output.suffix == ".npz":
             render.result(
                 f"next: terrainkit preview {self.output} -o preview.png  (look at it)\n"
                 f"      terrainkit export {self.output} -o map.xml  (MuJoCo; or .stl, .ply ...)\n"
-                f'      terrainkit.TerrainMap.load("{self.output}")      (Python; numpy.load too)'
+                f'      terrainkit.TerrainMap.load("{self.output}")  (Python; numpy.load too)'
             )
         return 0
 
-
-@dataclass(frozen=True, kw_only=True)
-class _Source:
-    """The options of `generate` that say where the other options start from."""
-
-    config: Path | None = None
-    terrain: str | None = None
-    set: tuple[str, ...] = ()
-
-    def options(self, preset_given: bool) -> MapOptions:
-        if self.set and not self.terrain:
-            raise ConfigError("--set gives parameters to --terrain, which is missing")
+    def _config(self) -> MapConfig:
         config = MapConfig()
         if self.config:
             from terrainkit.config_text import read_config
 
             config = read_config(self.config)
-        mix = () if preset_given else config.terrains
+        options = given(self.map)
+        if "preset" in options:
+            options["terrains"] = ()
         if self.terrain:
-            parameters = dict(_parameter(word) for word in self.set)
-            mix = (TerrainChoice(terrain=self.terrain, parameters=parameters),)
-        values = {f.name: getattr(config, f.name) for f in dataclasses.fields(config)}
-        return MapOptions(**values | {"terrains": mix})
+            parameters = _parameters(self.set)
+            options["terrains"] = (TerrainChoice(terrain=self.terrain, parameters=parameters),)
+        elif self.set:
+            raise ConfigError("--set gives parameters to --terrain, which is missing")
+        fields = {f.name: getattr(config, f.name) for f in dataclasses.fields(config)}
+        return MapConfig(**fields | options)
 
 
-def _parameter(word: str) -> tuple[str, Value | Range]:
-    name, equals, text = word.partition("=")
-    values = [_value(name, part) for part in text.split(":")]
-    if not equals or len(values) > 2:
-        raise ConfigError(f"--set {word!r}; wanted name=value or name=easy:hard")
-    return name, values[0] if len(values) == 1 else (values[0], values[1])
-
-
-def _value(name: str, text: str) -> Value:
-    if text in ("true", "false"):
-        return text == "true"
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    raise ConfigError(f"--set {name}={text!r}; wanted a number, true or false")
+def _parameters(text: str) -> dict[str, Value | Range]:
+    parameters: dict[str, Any] = {}
+    for word in text.split(",") if text else []:
+        name, equals, value = word.partition("=")
+        values = tuple(value_of(part) for part in value.split(":"))
+        if not equals or len(values) > 2:
+            raise ConfigError(f"--set {word!r}; wanted name=value or name=easy:hard")
+        parameters[name.strip()] = values if len(values) == 2 else values[0]
+    return parameters
 
 
 @dataclass(frozen=True, kw_only=True)

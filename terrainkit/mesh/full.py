@@ -36,9 +36,7 @@ def full_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> Tri
     return TriMesh(vertices=vertices, triangles=triangles)
 
 
-def split_quads(
-    lattice: Lattice, numbers: NDArray[np.int64], out: NDArray[np.signedinteger]
-) -> None:
+def split_quads(lattice: Lattice, numbers: NDArray[np.int64], out: NDArray[np.int32]) -> None:
     """Write two triangles for each quad in `numbers` to `out`, shape (2 n, 3).
 
     The diagonal runs from (i, j) to (i + 1, j + 1), as MuJoCo's heightfields have it.

@@ -67,22 +67,22 @@ def _corners(quads: Mask) -> Mask:
 def _assemble(lattice: Lattice, single: Mask, loops: list[Loops], panels: list[Ids]) -> TriMesh:
     """Return the mesh of the quads that stand alone, the loops and the panels between them."""
     plain = np.flatnonzero(single & ~lattice.cut)
-    pairs = np.empty((2 * len(plain), 3), dtype=np.int64)
+    pairs = np.empty((2 * len(plain), 3), dtype=np.int32)
     split_quads(lattice, plain, out=pairs)
     count = lattice.vertex_count
     faces, added = cut_quads(lattice, np.flatnonzero(single & lattice.cut), count)
-    triangles: list[Ids] = [pairs, faces, *panels]
+    triangles = [pairs, *(part.astype(np.int32) for part in (faces, *panels))]
     extra = [lattice.middles(), added]
     count += len(added)
     for loop in loops:
         faces, added = loop.triangles(count)
-        triangles.append(faces)
+        triangles.append(faces.astype(np.int32))
         extra.append(added)
         count += len(added)
     return _compact(lattice, np.concatenate(triangles), np.concatenate(extra))
 
 
-def _compact(lattice: Lattice, triangles: Ids, extra: NDArray[np.float32]) -> TriMesh:
+def _compact(lattice: Lattice, triangles: NDArray[np.int32], extra: NDArray[np.float32]) -> TriMesh:
     """Return the mesh without the vertices that no triangle uses.
 
     Args:
