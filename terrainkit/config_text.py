@@ -2,12 +2,14 @@
 
 import dataclasses
 from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from terrainkit.choice import TerrainChoice
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError, listing
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 _NO_WALLS = "none"
 """How TOML, which has no null, writes a slope_threshold of None."""
@@ -53,15 +55,14 @@ def from_toml(text: str) -> MapConfig:
     return MapConfig(**table)
 
 
-def read_config(path: str | Path) -> MapConfig:
+def read_config(path: "str | Path") -> MapConfig:
     """Return the config in the TOML file `path`.
 
     Raises:
         ConfigError: if it cannot be read, is over a megabyte, or as :func:`from_toml`.
     """
-    path = Path(path)
     try:
-        with path.open("rb") as file:
+        with open(path, "rb") as file:  # noqa: PTH123 (importing pathlib is slow, and needless here)
             data = file.read(_LARGEST + 1)
     except OSError as error:
         raise ConfigError(f"cannot read {path}: {error.strerror or error}") from error

@@ -1,7 +1,6 @@
 """TerrainMap: the ground that everything else is a view of."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -15,6 +14,8 @@ from terrainkit.patch import Patch
 from terrainkit.surface import SurfacePoints, surface_at
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from terrainkit.boxes import BoxCover
     from terrainkit.mesh import TriMesh
 
@@ -158,14 +159,14 @@ class TerrainMap:
             env_origins=self.env_origins[levels, columns],
         )
 
-    def save(self, path: str | Path, *, overwrite: bool = False, **options: Any) -> Path:
+    def save(self, path: "str | Path", *, overwrite: bool = False, **options: Any) -> "Path":
         """Write the map in the format that the suffix of `path` names; see :mod:`export`."""
         from terrainkit.export import export
 
         return export(self, path, overwrite=overwrite, **options)
 
     @classmethod
-    def load(cls, path: str | Path) -> Self:
+    def load(cls, path: "str | Path") -> Self:
         """Read a map from a .npz file.
 
         Raises:
@@ -173,7 +174,7 @@ class TerrainMap:
         """
         from terrainkit.export.npz import read_map
 
-        return read_map(cls, Path(path))
+        return read_map(cls, path)
 
     def _seams(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return the first cell of each patch along x and y, and the end of the last."""

@@ -17,6 +17,8 @@ to the middle of the edge and is vertical there. A quad with a wall is cut along
 what its corners have in common at its centre follows from the edges that are not walls.
 """
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -49,7 +51,7 @@ def joined_corners(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
     Args:
         walls: Whether each edge is a wall, shape (n, 4).
     """
-    joined: NDArray[np.bool_] = _JOINED[walls @ _CASE]
+    joined: NDArray[np.bool_] = _joined_cases()[walls @ _CASE]
     return joined
 
 
@@ -63,7 +65,7 @@ def centre_heights(corners: NDArray[np.floating], walls: NDArray[np.bool_]) -> N
         corners: Heights of the corners [m], shape (n, 4).
         walls: Whether each edge is a wall, shape (n, 4).
     """
-    centres: NDArray[np.float64] = np.einsum("nij,nj->ni", _CENTRE_WEIGHTS[walls @ _CASE], corners)
+    centres: NDArray[np.float64] = np.einsum("nij,nj->ni", _centre_cases()[walls @ _CASE], corners)
     return centres
 
 
@@ -89,5 +91,13 @@ def _centre_weights(joined: NDArray[np.bool_]) -> NDArray[np.float64]:
 
 # There are 16 ways to put walls on four edges; each is a row of these tables.
 _CASE = np.array([1, 2, 4, 8])
-_JOINED = np.array([_joined((case & _CASE) > 0) for case in range(16)])
-_CENTRE_WEIGHTS = np.array([_centre_weights(joined) for joined in _JOINED])
+
+
+@cache
+def _joined_cases() -> NDArray[np.bool_]:
+    return np.array([_joined((case & _CASE) > 0) for case in range(16)])
+
+
+@cache
+def _centre_cases() -> NDArray[np.float64]:
+    return np.array([_centre_weights(joined) for joined in _joined_cases()])

@@ -64,7 +64,7 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
     )
 
 
-def read_map(cls: type[_Map], path: Path) -> _Map:
+def read_map(cls: type[_Map], path: str | Path) -> _Map:
     """Return the map in the .npz file `path`, as a `cls`.
 
     Raises:
@@ -95,7 +95,7 @@ def read_map(cls: type[_Map], path: Path) -> _Map:
         )
 
 
-def read_mesh(path: Path) -> TriMesh:
+def read_mesh(path: str | Path) -> TriMesh:
     """Return the trimesh in the .npz file `path`.
 
     Raises:
@@ -121,7 +121,8 @@ _MOST_FACES = 20
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator["_Archive"]:
+def _opened(name: str | Path) -> Iterator["_Archive"]:
+    path = Path(name)
     try:
         # A FIFO would block, a device never end.
         if path.exists() and not path.is_file():
