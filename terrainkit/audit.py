@@ -122,9 +122,9 @@ def _differences(found: Patch, made: Patch, where: str) -> Iterator[str]:
 
 
 def _realized(terrain_map: TerrainMap) -> Iterator[str]:
-    """Compare what was asked with what the cells hold: half a cell off, or one to stay centred."""
+    """Compare what was asked with what was built: half a cell off, or one to stay centred."""
     cell, mix = terrain_map.config.cell, terrain_map.config.mix
-    limit = {"none": 0.0, "cells": cell / 2, "centred": cell}
+    limit = {"none": cell / 2, "cells": cell / 2, "centred": cell}
     for row, col in _patch_indices(terrain_map):
         patch = terrain_map.tile(row, col)
         kinds = parameters_of(mix[terrain_map.terrain_types[row, col]].at(patch.difficulty))

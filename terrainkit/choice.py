@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from terrainkit import registry
+from terrainkit.coerce import coerce
 from terrainkit.errors import ConfigError
-from terrainkit.parameter import Range, Value
+from terrainkit.parameter import LARGEST, Range, Value
 from terrainkit.terrain import Terrain
 
 
@@ -30,12 +31,17 @@ class TerrainChoice:
     """Parameters to use instead of the defaults: a value, or a range (easy, hard)."""
 
     def __post_init__(self) -> None:
+        for name, kind in (("terrain", str), ("proportion", float), ("name", str)):
+            object.__setattr__(self, name, coerce(name, getattr(self, name), kind))
         if not self.name:
             object.__setattr__(self, "name", self.terrain)
-        if not 0 <= self.proportion < float("inf"):
+        if not 0 <= self.proportion <= LARGEST:
             raise ConfigError(
-                f"{self.name}: proportion is {self.proportion:g}; wanted a finite number, 0 or more"
+                f"{self.name}: proportion is {self.proportion:g}; wanted 0 to {LARGEST:g}"
             )
+        # A copy of its own: the caller's dict may change later, a config never does.
+        own = {k: tuple(v) if isinstance(v, list) else v for k, v in self.parameters.items()}
+        object.__setattr__(self, "parameters", own)
         for end in (0.0, 1.0):
             self.at(end)
 

@@ -3,8 +3,11 @@
 import types
 from typing import Any, Literal, Union, get_args, get_origin
 
+import numpy as np
+
 from terrainkit.errors import ConfigError, listing
 
+_LARGEST = 2**63 - 1
 _WORDS = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}
 
 
@@ -13,12 +16,16 @@ def coerce(name: str, value: object, annotation: Any) -> Any:
 
     Args:
         name: What to call the value in the error.
-        value: A number, text, list or tuple, or an instance of the annotated class.
+        value: A number (numpy's too), text, list or tuple, or an instance of the annotated class.
         annotation: A plain class, Literal, tuple[...] or X | None.
 
     Raises:
         ConfigError: if `value` is of another kind; nothing is guessed, a text is never a number.
     """
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, int) and abs(value) > _LARGEST:
+        raise ConfigError(f"{name} is a whole number beyond 64 bits")
     origin = get_origin(annotation)
     if origin is Literal:
         return _one_of(name, value, get_args(annotation))
@@ -28,18 +35,11 @@ def coerce(name: str, value: object, annotation: Any) -> Any:
     if origin is tuple:
         return _tuple(name, value, get_args(annotation))
     if annotation is float and isinstance(value, int) and not isinstance(value, bool):
-        return _float(name, value)
+        return float(value)
     if isinstance(value, bool) != (annotation is bool) or not isinstance(value, annotation):
         wanted = _WORDS.get(annotation, getattr(annotation, "__name__", annotation))
         raise ConfigError(f"{name} is {value!r}; wanted {wanted}")
     return value
-
-
-def _float(name: str, value: int) -> float:
-    try:
-        return float(value)
-    except OverflowError:
-        raise ConfigError(f"{name} is a number too large for a float") from None
 
 
 def _one_of(name: str, value: object, choices: tuple[Any, ...]) -> Any:

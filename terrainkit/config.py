@@ -39,7 +39,7 @@ class MapConfig:
     """Width of the level ground around the patches [m]."""
 
     preset: str = "legged_gym"
-    """Mix of terrains by name: legged_gym, rough, stairs or all."""
+    """Mix of terrains by name: legged_gym, rough, stairs or all; empty if `terrains` has one."""
 
     terrains: tuple[TerrainChoice, ...] = ()
     """A mix of one's own, used instead of the preset."""
@@ -90,6 +90,8 @@ class MapConfig:
 
         for f in fields(MapConfig):
             object.__setattr__(self, f.name, coerce(f.name, getattr(self, f.name), f.type))
+        if self.terrains:
+            object.__setattr__(self, "preset", "")
         self._check_sizes()
         self._check_difficulties()
         self._check_contact()
@@ -122,7 +124,7 @@ class MapConfig:
     @property
     def border_cells(self) -> int:
         """Cells of the border on each side."""
-        return whole_cells("border", self.border, self.cell)
+        return whole_cells("border", self.border, self.cell, least=0)
 
     @property
     def grid(self) -> Grid:
@@ -156,12 +158,6 @@ class MapConfig:
             _require(name, getattr(self, name), getattr(self, name) >= 0, "0 or more")
         if self.slope_threshold is not None:
             _require("slope_threshold", self.slope_threshold, self.slope_threshold > 0, "above 0")
-        for name, size in (
-            ("patch_size", self.patch_size[0]),
-            ("patch_size", self.patch_size[1]),
-            ("border", self.border),
-        ):
-            whole_cells(name, size, self.cell)
         for axis, cells in zip("xy", self.grid.shape, strict=True):
             if cells > _MOST_CELLS:
                 raise ConfigError(

@@ -40,7 +40,7 @@ def from_toml(text: str) -> MapConfig:
 
     try:
         table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # TOMLDecodeError is one; so is a number of 5000 digits
         raise ConfigError(f"not a TOML file: {error}") from error
     except RecursionError:
         raise ConfigError("not a TOML file of a map: nested too deeply") from None
@@ -94,11 +94,7 @@ def _choice(table: object) -> TerrainChoice:
     if not isinstance(table, Mapping) or "terrain" not in table:
         raise ConfigError(f"{table!r} in terrains; wanted a table with a key 'terrain'")
     own = {name: table[name] for name in ("terrain", "proportion", "name") if name in table}
-    parameters = {
-        name: tuple(value) if isinstance(value, list) else value
-        for name, value in table.items()
-        if name not in own
-    }
+    parameters = {name: value for name, value in table.items() if name not in own}
     return TerrainChoice(**own, parameters=parameters)
 
 

@@ -54,12 +54,14 @@ class Grid:
         lower = (self.lower[0] + start[0] * self.cell, self.lower[1] + start[1] * self.cell)
         return Grid(shape=shape, cell=self.cell, lower=lower)
 
-    def cells(self, length: float) -> int:
-        """Return the whole number of cells nearest to `length` [m]; halves round up.
+    def cells(self, length: float, *, least: int = 1) -> int:
+        """Return the whole number of cells nearest to `length` [m], `least` or more.
+
+        Halves round up.
 
         Truncating instead is how a gap of 0.3 m becomes one of 0.2 m: 0.3 / 0.1 is 2.999...
         """
-        return math.floor(length / self.cell + 0.5 + _WHOLE)
+        return max(least, math.floor(length / self.cell + 0.5 + _WHOLE))
 
     def length(self, count: int) -> float:
         """Return `count` cells in metres, to the nanometre: 3 cells of 0.1 m are 0.3 m."""
@@ -102,14 +104,14 @@ def _beyond(n: int, block: int) -> NDArray[np.int64]:
     return np.clip(outside, 0, None)
 
 
-def whole_cells(name: str, length: float, cell: float) -> int:
+def whole_cells(name: str, length: float, cell: float, *, least: int = 1) -> int:
     """Return `length` [m] in cells, or raise the error that says which lengths near it would do."""
     count = length / cell
     if not math.isfinite(count):
         raise ConfigError(f"{name} {length:g} m cannot be counted in cells of {cell:g} m")
     nearest = round(count)
-    if abs(count - nearest) > _WHOLE * max(1.0, count):
-        low = math.floor(count)
+    if nearest < least or abs(count - nearest) > _WHOLE * max(1.0, count):
+        low = max(least, math.floor(count))
         raise ConfigError(
             f"{name} {length:g} m is not a whole number of cells of {cell:g} m; "
             f"the nearest that are: {low * cell:g} m, {(low + 1) * cell:g} m"

@@ -17,7 +17,7 @@ def apportion(proportions: list[float], seats: int) -> list[int]:
     The counts sum to `seats`; each is its exact share rounded down or up. Ties go to the earlier.
     """
     shares = np.array(proportions) / sum(proportions) * seats
-    counts = np.floor(shares + 1e-9).astype(int)
+    counts = np.floor(shares).astype(int)
     # Rounded, so that remainders that are equal on paper tie and do not hang on the last bit.
     remainders = np.round(shares - counts, 9)
     for k in np.argsort(-remainders, kind="stable")[: seats - counts.sum()]:
@@ -37,7 +37,7 @@ def terrain_columns(config: MapConfig) -> list[int]:
     mix = config.mix
     counts = apportion([choice.proportion for choice in mix], config.cols)
     starved = [c.name for c, n in zip(mix, counts, strict=True) if n == 0 and c.proportion > 0]
-    if starved:
+    if starved and config.mode != "randomized":
         message = (
             f"{config.cols} columns are too few for {len(mix)} terrains at these proportions: "
             f"no column for {', '.join(starved)}"
@@ -75,7 +75,7 @@ def _row_difficulty(config: MapConfig, row: int, col: int) -> float:
     place = float(row)
     if config.difficulty_jitter > 0:
         place += config.difficulty_jitter * _layout_rng(config, row, col).uniform(-1.0, 1.0)
-    return low + (high - low) * min(max(place / last, 0.0), 1.0)
+    return low + (high - low) * place / last
 
 
 def _layout_rng(config: MapConfig, row: int, col: int) -> "np.random.Generator":

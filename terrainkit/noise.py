@@ -1,39 +1,64 @@
 """Noise on a coarse lattice, interpolated to the cells of a patch."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.grid import Grid
+from terrainkit.parameter import Realized
 
 
-def lattice_noise(
-    plot: Grid, spacing: float, amplitude: float, step: float, rng: np.random.Generator
-) -> NDArray[np.float64]:
-    """Return uniform noise between `-amplitude` and `amplitude` [m], shape `plot.shape`.
+@dataclass(frozen=True, kw_only=True)
+class LatticeNoise:
+    """Uniform noise drawn at the nodes of a lattice, like Isaac Gym's `random_uniform_terrain`.
 
-    A height is drawn at each node of a lattice that spans the patch, and interpolated bilinearly
-    in between, as Isaac Gym's `random_uniform_terrain` does. The pattern of draws depends on
-    neither `amplitude` nor `step`.
-
-    Args:
-        plot: Cells to fill.
-        spacing: Distance between two nodes [m], adjusted so that a whole number spans the patch.
-        amplitude: Largest height [m].
-        step: Heights drawn are multiples of this [m]; with 0 they are any number.
-        rng: Where the draws come from.
+    A whole number of intervals spans the patch, and a whole number of steps the amplitude.
     """
-    intervals = [max(1, round(extent / spacing)) for extent in plot.size]
-    nodes = rng.random((intervals[0] + 1, intervals[1] + 1))
-    if step > 0:
-        levels = math.floor(amplitude / step + 1e-9)  # the margin is for 0.05 / 0.005
-        nodes = (np.floor(nodes * (2 * levels + 1)) - levels) * step
-    else:
-        nodes = (2 * nodes - 1) * amplitude
-    for k in (0, 1):
-        nodes = _interpolate(nodes, plot.shape[k], axis=k)
-    return nodes
+
+    amplitude: float
+    """Largest height above or below 0 [m]."""
+
+    step: float
+    """Heights drawn are multiples of this [m]; below a micrometre they are any number."""
+
+    spacing: float
+    """Distance between two nodes [m]."""
+
+    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.float64]:
+        """Return the noise [m], shape `plot.shape`; interpolated bilinearly between nodes.
+
+        How many draws it takes, and their pattern, depend on the spacing alone.
+        """
+        x, y = self._intervals(plot)
+        nodes = rng.random((x + 1, y + 1))
+        if self._levels is None:
+            nodes = (2 * nodes - 1) * self.amplitude
+        else:
+            nodes = (np.floor(nodes * (2 * self._levels + 1)) - self._levels) * self.step
+        for k in (0, 1):
+            nodes = _interpolate(nodes, plot.shape[k], axis=k)
+        return nodes
+
+    def realized(self, plot: Grid) -> dict[str, Realized]:
+        """Return amplitude and spacing as they are on `plot`."""
+        counts = zip(plot.size, self._intervals(plot), strict=True)
+        x, y = (round(extent / count, 9) for extent, count in counts)
+        largest = self.amplitude if self._levels is None else round(self._levels * self.step, 9)
+        return {"amplitude": largest, "spacing": x if x == y else (x, y)}
+
+    @property
+    def _levels(self) -> int | None:
+        if self.step < 1e-6:
+            return None
+        return math.floor(self.amplitude / self.step + 1e-9)  # the margin is for 0.05 / 0.005
+
+    def _intervals(self, plot: Grid) -> tuple[int, int]:
+        # Nodes closer than the cells would be drawn and never seen.
+        spacing = max(self.spacing, plot.cell)
+        x, y = (max(1, math.floor(extent / spacing + 0.5)) for extent in plot.size)
+        return x, y
 
 
 def _interpolate(nodes: NDArray[np.float64], n: int, axis: int) -> NDArray[np.float64]:

@@ -5,10 +5,10 @@ and the value at difficulty 1; one value alone holds at every difficulty.
 """
 
 import dataclasses
-import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from terrainkit.coerce import coerce
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 
@@ -16,6 +16,13 @@ Snap = Literal["none", "cells", "centred"]
 Value = float | int | bool
 Range = tuple[float, float]
 Realized = float | int | bool | tuple[float, float]
+
+
+LARGEST = 1e6
+"""Largest number that a parameter takes: far beyond any ground, and far from overflow."""
+
+_MOST = 10_000
+"""Largest count that a parameter takes, so that building a patch takes bounded time."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +51,7 @@ class Parameter:
     def realized(self, value: Value, plot: Grid) -> Realized:
         """Return what the cells of `plot` make of `value`: a pair (x, y) where the axes differ."""
         if self.snap == "cells":
-            return plot.length(plot.cells(value))
+            return plot.length(plot.cells(value, least=0 if self.zero else 1))
         if self.snap == "centred":
             x, y = (plot.length(count) for count in plot.centred(value))
             return x if x == y else (x, y)
@@ -68,7 +75,7 @@ def height(easy: float, hard: float | None = None) -> Any:
 
 
 def length(easy: float, hard: float | None = None, *, zero: bool = False) -> Any:
-    """Declare a horizontal length [m]; it snaps to whole cells, at least one unless `zero`."""
+    """Declare a horizontal length [m]; it snaps to whole cells, one or more unless `zero`."""
     return _field(easy, hard, snap="cells", zero=zero)
 
 
@@ -77,9 +84,9 @@ def platform(side: float) -> Any:
     return _field(side, snap="centred", zero=False)
 
 
-def scalar(easy: float, hard: float | None = None) -> Any:
-    """Declare a number without a length: a grade, a ratio."""
-    return _field(easy, hard)
+def scalar(easy: float, hard: float | None = None, *, zero: bool = True) -> Any:
+    """Declare a number that the cells leave as it is: a grade, a spacing."""
+    return _field(easy, hard, zero=zero)
 
 
 def count(number: int) -> Any:
@@ -105,10 +112,8 @@ def parameters_of(terrain: Any) -> dict[str, Parameter]:
 
 def check_value(owner: str, name: str, value: object, parameter: Parameter) -> None:
     """Raise the ConfigError that says why `value` cannot be `owner`'s parameter `name`."""
-    kind = type(parameter.easy)
-    wanted = {bool: "true or false", int: "a whole number"}.get(kind, "a number")
-    if isinstance(value, bool) != (kind is bool) or not isinstance(value, kind | int):
-        raise ConfigError(f"{owner}: {name} is {value!r}; wanted {wanted}")
-    if not math.isfinite(value) or value < 0 or (value == 0 and not parameter.zero):
-        least = "0 or more" if parameter.zero else "above 0"
-        raise ConfigError(f"{owner}: {name} is {value:g}; wanted a finite number, {least}")
+    number = coerce(f"{owner}: {name}", value, type(parameter.easy))
+    most = LARGEST if isinstance(number, float) else _MOST
+    if not 0 <= number <= most or (number == 0 and not parameter.zero):
+        least = "0" if parameter.zero else "above 0"
+        raise ConfigError(f"{owner}: {name} is {number:g}; wanted {least} to {most:g}")

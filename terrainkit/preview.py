@@ -86,20 +86,23 @@ def relief(heights: NDArray[np.float32], cell: float) -> Picture:
         heights: Heights [m], shape (nx, ny).
         cell: Distance between two samples [m].
     """
-    levels = [level for level, _ in _TINTS]
-    tint = np.stack(
-        [np.interp(heights, levels, [colour[k] for _, colour in _TINTS]) for k in range(3)], axis=-1
-    )
     padded = np.pad(heights, 1, mode="edge")
     slope_x = (padded[2:, 1:-1] - padded[:-2, 1:-1]) / (2 * cell)
     slope_y = (padded[1:-1, 2:] - padded[1:-1, :-2]) / (2 * cell)
     light = _LIGHT / np.linalg.norm(_LIGHT)
     steepness = np.sqrt(slope_x**2 + slope_y**2 + 1)
     shade = (light[2] - light[0] * slope_x - light[1] * slope_y) / steepness / light[2]
-    picture: Picture = np.clip(tint * np.clip(shade, 0.35, 1.25)[..., None], 0, 255).astype(
-        np.uint8
-    )
+    picture: Picture = np.clip(
+        tints(heights) * np.clip(shade, 0.35, 1.25)[..., None], 0, 255
+    ).astype(np.uint8)
     return picture
+
+
+def tints(heights: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Return the colour (red, green, blue, each 0 to 255) of heights [m], shape (..., 3)."""
+    levels = [level for level, _ in _TINTS]
+    channels = zip(*(colour for _, colour in _TINTS), strict=True)
+    return np.stack([np.interp(heights, levels, channel) for channel in channels], axis=-1)
 
 
 def _without_border(

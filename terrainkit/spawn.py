@@ -32,7 +32,7 @@ def find_spawn(
         tolerance: Largest difference in height within it [m].
         threshold: Difference between neighbours above which there is a wall [m].
     """
-    reach = radius / plot.cell + 1  # a point is ruled by samples less than a cell away on each axis
+    reach = radius / plot.cell
     place = tuple((w - low) / plot.cell - 0.5 for w, low in zip(wanted, plot.lower, strict=True))
     if _inside(wanted, plot, radius):
         low, high = _extremes(heights, place, reach)
@@ -67,21 +67,31 @@ def _inside(point: tuple[float, float], plot: Grid, radius: float) -> bool:
 def _extremes(
     heights: NDArray[np.float32], place: tuple[float, ...], reach: float
 ) -> tuple[float, float]:
-    """Return the lowest and the highest sample within `reach` samples of `place`."""
+    """Return the lowest and the highest sample that rule a point within `reach` of `place`."""
     spans = [
-        (max(0, math.ceil(p - reach)), min(n, math.floor(p + reach) + 1))
+        (max(0, math.ceil(p - reach - 1)), min(n, math.floor(p + reach + 1) + 1))
         for p, n in zip(place, heights.shape, strict=True)
     ]
     square = heights[slice(*spans[0]), slice(*spans[1])]
     if square.min() != square.max():
         x, y = (np.arange(*span) - p for span, p in zip(spans, place, strict=True))
-        square = square[np.add.outer(x**2, y**2) <= reach**2]
+        square = square[_in_reach(x[:, None], y[None, :], reach)]
     return float(square.min()), float(square.max())
+
+
+def _in_reach(x: NDArray[np.floating], y: NDArray[np.floating], reach: float) -> NDArray[np.bool_]:
+    """Return whether samples at these offsets rule a point of the disc of radius `reach`.
+
+    A sample rules the four quads around it, so it counts if any point of that square, one sample
+    to each side, is in the disc.
+    """
+    beyond_x, beyond_y = (np.clip(np.abs(offset) - 1, 0, None) for offset in (x, y))
+    return np.asarray(beyond_x**2 + beyond_y**2 <= reach**2)
 
 
 def _level_cells(heights: NDArray[np.float32], reach: float, tolerance: float) -> NDArray[np.int64]:
     """Return the cells whose whole disc is in the patch and level, shape (n, 2)."""
-    margin = int(np.ceil(reach))
+    margin = math.ceil(reach + 1)
     inner = tuple(n - 2 * margin for n in heights.shape)
     if min(inner) <= 0:
         return np.empty((0, 2), dtype=np.int64)
@@ -89,7 +99,7 @@ def _level_cells(heights: NDArray[np.float32], reach: float, tolerance: float) -
     high = np.full(inner, -np.inf, dtype=np.float32)
     for di in range(-margin, margin + 1):
         for dj in range(-margin, margin + 1):
-            if di**2 + dj**2 <= reach**2:
+            if _in_reach(np.array(di), np.array(dj), reach):
                 shifted = heights[
                     margin + di : margin + di + inner[0], margin + dj : margin + dj + inner[1]
                 ]

@@ -54,6 +54,8 @@ class Terrain(ABC):
         Raises:
             ConfigError: if `given` names an unknown parameter or holds a value that it cannot take.
         """
+        if not 0 <= difficulty <= 1:
+            raise ConfigError(f"{cls.kind()}: difficulty is {difficulty:g}; wanted 0 to 1")
         given = given or {}
         known = parameters_of(cls)
         for name in given:
@@ -100,15 +102,10 @@ class Terrain(ABC):
         return np.asarray(self.heights(plot, rng), dtype=np.float32) + np.float32(0)
 
     def check_fit(self, plot: Grid) -> None:
-        """Raise ConfigError if `plot` cannot hold a length of this terrain."""
+        """Raise ConfigError if `plot` cannot hold a block of this terrain."""
         for name, parameter in parameters_of(self).items():
-            value = getattr(self, name)
-            if parameter.snap == "cells" and not parameter.zero and plot.cells(value) == 0:
-                raise ConfigError(
-                    f"{self.kind()}: {name} {value:g} m is less than half a cell of {plot.cell:g} m"
-                )
             if parameter.snap == "centred":
-                self._check_centred(name, value, plot)
+                self._check_centred(name, getattr(self, name), plot)
 
     def _check_centred(self, name: str, value: float, plot: Grid) -> None:
         counts = plot.centred(value)

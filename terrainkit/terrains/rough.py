@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.grid import Grid
-from terrainkit.noise import lattice_noise
+from terrainkit.noise import LatticeNoise
+from terrainkit.parameter import Realized
 from terrainkit.terrain import Terrain
 
 
@@ -21,13 +22,20 @@ class Rough(Terrain):
     step: float = parameter.height(0.005)
     """Heights are drawn as multiples of this [m]."""
 
-    spacing: float = parameter.length(0.2)
+    spacing: float = parameter.scalar(0.2, zero=False)
     """Distance between two draws [m]; heights in between are interpolated."""
 
     platform: float = parameter.platform(2.0)
     """Side of the level square in the middle [m]."""
 
+    def realized(self, plot: Grid) -> dict[str, Realized]:
+        """Return the parameters as built: whole steps, and whole intervals across the patch."""
+        return super().realized(plot) | self._noise().realized(plot)
+
+    def _noise(self) -> LatticeNoise:
+        return LatticeNoise(amplitude=self.amplitude, step=self.step, spacing=self.spacing)
+
     def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the noise, fading out over one spacing towards the platform."""
-        noise = lattice_noise(plot, self.spacing, self.amplitude, self.step, rng)
+        noise = self._noise().heights(plot, rng)
         return noise * plot.fade(plot.centred(self.platform), self.spacing)

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.grid import Grid
-from terrainkit.noise import lattice_noise
+from terrainkit.noise import LatticeNoise
+from terrainkit.parameter import Realized
 from terrainkit.terrain import Terrain
 from terrainkit.terrains.pyramid_slope import PyramidSlope
 
@@ -25,7 +26,7 @@ class RoughSlope(Terrain):
     step: float = parameter.height(0.005)
     """Noise is drawn as multiples of this [m]."""
 
-    spacing: float = parameter.length(0.2)
+    spacing: float = parameter.scalar(0.2, zero=False)
     """Distance between two draws [m]; heights in between are interpolated."""
 
     platform: float = parameter.platform(3.0)
@@ -34,9 +35,16 @@ class RoughSlope(Terrain):
     inverted: bool = parameter.switch()
     """Turn it upside down: the platform is the bottom, and the robot climbs to leave it."""
 
+    def realized(self, plot: Grid) -> dict[str, Realized]:
+        """Return the parameters as built: whole steps, and whole intervals across the patch."""
+        return super().realized(plot) | self._noise().realized(plot)
+
+    def _noise(self) -> LatticeNoise:
+        return LatticeNoise(amplitude=self.amplitude, step=self.step, spacing=self.spacing)
+
     def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the slope plus the noise, which fades out towards the platform."""
         slope = PyramidSlope(grade=self.grade, platform=self.platform, inverted=self.inverted)
-        noise = lattice_noise(plot, self.spacing, self.amplitude, self.step, rng)
+        noise = self._noise().heights(plot, rng)
         fade = plot.fade(plot.centred(self.platform), self.spacing)
         return slope.heights(plot, rng) + noise * fade

@@ -1,0 +1,16 @@
+"""Boxes of the default map: how many, how much of the ground, against the time of its heights."""
+
+from collections.abc import Iterator
+
+from clock import ratio
+
+import terrainkit
+
+
+def run() -> Iterator[tuple[str, float]]:
+    config = terrainkit.MapConfig()
+    terrain_map = terrainkit.generate(config)
+    cover = terrain_map.boxes()
+    yield "count", len(cover.centres)
+    yield "share_of_ground", float(cover.covered.mean())
+    yield "time_over_heights", ratio(terrain_map.boxes, lambda: terrainkit.generate(config), 3)

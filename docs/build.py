@@ -1,0 +1,116 @@
+"""Build what is generated in docs/: terrains.md, cli.md and the pictures.
+
+python docs/build.py            writes them
+python docs/build.py --check    exits 1 if a text is out of date or a picture is missing
+"""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+from isometric import isometric, side_by_side
+
+import terrainkit
+from terrainkit import presets, registry
+from terrainkit.describe import TerrainText, describe
+from terrainkit.grid import Grid
+from terrainkit.preview import write_preview
+from terrainkit_cli.main import COMMANDS
+
+DOCS = Path(__file__).parent
+PICTURES = DOCS / "pictures"
+NOTE = "<!-- Written by docs/build.py: change the docstrings, not this file. -->\n"
+SEED = 3
+
+
+def terrains_page() -> str:
+    parts = [
+        "# Terrains\n",
+        NOTE,
+        "Each terrain with its parameters. A parameter with two values is a range from difficulty",
+        "0 to difficulty 1; give one value, or a range of your own, in a [config](conventions.md) or",
+        "with `--set`. The pictures show difficulty 0.1, 0.5 and 1 on patches of 8 m x 8 m, with",
+        "holes cut short.\n",
+        "| terrain | what it is |\n|---|---|",
+    ]
+    parts += [f"| [{n}](#{n}) | {describe(n).text.splitlines()[0]} |" for n in registry.names()]
+    parts += ["", *(terrain_section(describe(name)) for name in registry.names())]
+    parts += ["## Presets\n", "| preset | columns |\n|---|---|"]
+    for name in presets.names():
+        mix = ", ".join(
+            f"{c.name} x {c.proportion:g}" if c.proportion != 1 else c.name
+            for c in presets.find(name)
+        )
+        parts.append(f"| {name} | {mix} |")
+    parts += [
+        "",
+        'What legged_gym calls "stairs up" is climbed from the platform outwards: here it is',
+        '`pyramid_stairs_inverted`, and "stairs down" is `pyramid_stairs`.',
+    ]
+    return "\n".join(parts) + "\n"
+
+
+def terrain_section(about: TerrainText) -> str:
+    lines = [
+        f"## {about.name}\n",
+        f"{about.text}\n",
+        f"![{about.name}](pictures/{about.name}.png)\n",
+    ]
+    if about.parameters:
+        lines.append("| parameter | easy | hard | |\n|---|---|---|---|")
+        lines += [
+            f"| {p.name} | {p.easy} | {p.hard or p.easy} | {p.text} |" for p in about.parameters
+        ]
+        lines.append("")
+    return "\n".join(lines)
+
+
+def cli_page() -> str:
+    parts = ["# The command line\n", NOTE]
+    for arguments in ([], *([name] for name in COMMANDS)):
+        title = " ".join(["terrainkit", *arguments])
+        parts.append(f"## {title}\n\n```text\n{help_of(arguments)}\n```\n")
+    return "\n".join(parts)
+
+
+def help_of(arguments: list[str]) -> str:
+    environment = os.environ | {"COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"}
+    command = [sys.executable, "-m", "terrainkit_cli.main", *arguments, "--help"]
+    run = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    return "\n".join(line.rstrip() for line in run.stdout.strip().splitlines())
+
+
+def draw_pictures() -> None:
+    PICTURES.mkdir(exist_ok=True)
+    plot = Grid(shape=(80, 80), cell=0.1)
+    for name in registry.names():
+        patches = [
+            registry.find(name).at(difficulty).build(plot, np.random.default_rng(SEED))
+            for difficulty in (0.1, 0.5, 1.0)
+        ]
+        picture = side_by_side([isometric(heights, plot.cell, scale=24) for heights in patches])
+        cv2.imwrite(str(PICTURES / f"{name}.png"), cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
+    terrain_map = terrainkit.generate(terrainkit.MapConfig())
+    write_preview(terrain_map, PICTURES / "map.png", width=820, overwrite=True)
+
+
+def main() -> int:
+    pages = {"terrains.md": terrains_page(), "cli.md": cli_page()}
+    if sys.argv[1:] == ["--check"]:
+        stale = [n for n, text in pages.items() if (DOCS / n).read_text() != text]
+        wanted = [f"{name}.png" for name in (*registry.names(), "map")]
+        stale += [name for name in wanted if not (PICTURES / name).exists()]
+        if stale:
+            print(f"out of date: {', '.join(stale)}; run python docs/build.py")
+        return 1 if stale else 0
+    for name, text in pages.items():
+        (DOCS / name).write_text(text)
+    draw_pictures()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
