@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit import registry
 from terrainkit.errors import TerrainkitError, TerrainkitWarning
 from terrainkit.layout import assign_patch, terrain_columns
 from terrainkit.mesh.tri_mesh import TriMesh
@@ -75,10 +76,10 @@ def _difficulty(terrain_map: TerrainMap) -> Iterator[str]:
     config, difficulty = terrain_map.config, terrain_map.difficulty
     if config.mode != "curriculum":
         return
-    last = len(difficulty) - 1
-    for row, wanted in zip((0, last), config.difficulty_range, strict=True):
+    low, high = config.difficulty_range
+    for row, wanted in {len(difficulty) - 1: high, 0: low}.items():  # a single row has the first
         off = difficulty[row][difficulty[row] != np.float32(wanted)]
-        if len(off) and (row or not last):
+        if len(off):
             yield f"row {row} has difficulty {off[0]:g}; wanted exactly {wanted:g}"
     if config.difficulty_jitter == 0:
         for row, col in np.argwhere(np.diff(difficulty, axis=0) < 0):
@@ -127,8 +128,11 @@ def _realized(terrain_map: TerrainMap) -> Iterator[str]:
     limit = {"none": cell / 2, "cells": cell / 2, "centred": cell}
     for row, col in _patch_indices(terrain_map):
         patch = terrain_map.tile(row, col)
-        kinds = parameters_of(mix[terrain_map.terrain_types[row, col]].at(patch.difficulty))
+        choice = mix[terrain_map.terrain_types[row, col]]
+        kinds = parameters_of(registry.find(choice.terrain))
         for name, asked in patch.parameters.requested.items():
+            if name not in kinds or name not in patch.parameters.realized:
+                continue  # already named: the record is not what the config makes
             built = patch.parameters.realized[name]
             off = float(np.max(np.abs(np.subtract(built, asked, dtype=np.float64))))
             if off > limit[kinds[name].snap] + 1e-6:

@@ -22,6 +22,7 @@ from terrainkit.config import MapConfig
 from terrainkit.config_text import from_toml, to_toml
 from terrainkit.errors import ConfigError, MapFileError
 from terrainkit.mesh.tri_mesh import TriMesh
+from terrainkit.parameter import Realized, Value
 from terrainkit.patch import Parameters
 
 if TYPE_CHECKING:
@@ -250,13 +251,22 @@ def _parameters_text(terrain_map: "TerrainMap") -> str:
 
 
 def _parameters(record: Mapping[str, Mapping[str, Any]]) -> Parameters:
-    return Parameters(
-        requested=dict(record["requested"]),
-        realized={
-            name: tuple(value) if isinstance(value, list) else value
-            for name, value in record["realized"].items()
-        },
-    )
+    realized = {name: _realized(value) for name, value in record["realized"].items()}
+    requested = {name: _number(value) for name, value in record["requested"].items()}
+    return Parameters(requested=requested, realized=realized)
+
+
+def _realized(value: Any) -> Realized:
+    if isinstance(value, list):
+        x, y = value
+        return _number(x), _number(y)
+    return _number(value)
+
+
+def _number(value: Any) -> Value:
+    if not isinstance(value, int | float):
+        raise TypeError(f"{value!r} is no number")
+    return value
 
 
 def _text(shape: tuple[int | None, ...]) -> str:

@@ -1,0 +1,136 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+import terrainkit as tk
+from terrainkit.audit import audit
+from terrainkit.mesh import TriMesh
+
+
+@pytest.fixture(scope="module")
+def sound():
+    return tk.generate(tk.MapConfig(rows=3, patch_size=(8.0, 8.0), border=1.0))
+
+
+def found(terrain_map, mesh=None):
+    return [(finding.check, finding.message) for finding in audit(terrain_map, mesh)]
+
+
+def changed(terrain_map, name, index, value):
+    array = getattr(terrain_map, name).copy()
+    array[index] = value
+    return dataclasses.replace(terrain_map, **{name: array})
+
+
+@pytest.mark.parametrize(
+    "config",
+    [
+        tk.MapConfig(rows=2, border=1.0, preset="legged_gym"),
+        tk.MapConfig(rows=2, cols=16, border=0.0, preset="all", seed=4, centered=True),
+        tk.MapConfig(rows=2, cols=5, border=1.0, mode="randomized", preset="rough"),
+        tk.MapConfig(rows=4, cols=1, border=1.0, difficulty_jitter=1.0, slope_threshold=None),
+        tk.MapConfig(rows=1, cols=1, border=0.0, terrains=(tk.TerrainChoice(terrain="wave"),)),
+    ],
+    ids=["legged_gym", "all", "randomized", "jitter", "one patch"],
+)
+@pytest.mark.filterwarnings("ignore::terrainkit.TerrainkitWarning")
+def test_a_map_of_ours_has_nothing_wrong(config):
+    terrain_map = tk.generate(config)
+    assert found(terrain_map) == []
+    assert found(terrain_map, terrain_map.mesh(merged=False)) == []
+
+
+def test_a_height_that_is_no_number(sound):
+    assert found(changed(sound, "heights", (3, 4), np.nan)) == [
+        ("finite", "heights: 1 values are not finite, the first at (3, 4)")
+    ]
+
+
+def test_an_origin_in_the_air(sound):
+    origin = sound.env_origins[1, 2] + np.float32([0, 0, 0.5])
+    assert found(changed(sound, "env_origins", (1, 2), origin)) == [
+        ("spawn", "patch (1, 2): the spawn origin is 0.500 m above the ground")
+    ]
+
+
+def test_an_origin_on_uneven_ground(sound):
+    x, y = sound.config.patch_grid(2, 5).centre
+    origin = [x + 2.0, y, sound.height([x + 2.0, y])]
+    ((check, message),) = found(changed(sound, "env_origins", (2, 5), origin))
+    assert check == "spawn"
+    assert message.startswith("patch (2, 5): the spawn origin stands on ground that differs by 0.")
+
+
+def test_an_origin_of_another_patch(sound):
+    findings = found(changed(sound, "env_origins", (0, 0), sound.env_origins[0, 1]))
+    assert ("spawn", "patch (0, 0): the spawn origin is outside the patch") in findings
+
+
+def test_a_patch_that_was_edited(sound):
+    i, j = sound.config.patch_start(1, 6)
+    findings = found(changed(sound, "heights", (i + 1, j + 1), 3.0))
+    assert [check for check, _ in findings] == ["patches"]
+    assert findings[0][1].startswith("patch (1, 6) is up to 3.")
+
+
+def test_swapped_axes():
+    square = tk.generate(tk.MapConfig(rows=10, border=1.0, preset="legged_gym"))
+    findings = found(dataclasses.replace(square, heights=square.heights.T.copy()))
+    assert any("with its axes swapped" in message for _, message in findings)
+
+
+def test_a_border_that_is_not_level(sound):
+    assert ("patches", "the border is not level at height 0") in found(
+        changed(sound, "heights", (0, 0), 0.01)
+    )
+
+
+def test_a_curriculum_that_never_reaches_its_end(sound):
+    stale = sound.difficulty * np.float32(0.9)
+    findings = found(dataclasses.replace(sound, difficulty=stale))
+    assert ("difficulty", "row 2 has difficulty 0.9; wanted exactly 1") in findings
+
+
+def test_a_difficulty_that_falls(sound):
+    messages = found(changed(sound, "difficulty", (1, 3), 1.5))
+    assert ("difficulty", "difficulty falls from row 1 to row 2 in column 3") in messages
+
+
+def test_a_width_that_the_patch_cannot_hold_is_named():
+    # A moat of 1 m around a platform of 3 m: a patch of 8 m x 4 m has 0.5 m for it along y.
+    config = tk.MapConfig(
+        rows=2, cols=1, patch_size=(8.0, 4.0), terrains=(tk.TerrainChoice(terrain="gap"),)
+    )
+    assert found(tk.generate(config)) == [
+        ("realized", "patch (1, 0), gap: width is (1.0, 0.5) where 1 was asked")
+    ]
+
+
+def test_a_mesh_with_a_hole(sound):
+    mesh = sound.mesh()
+    holed = TriMesh(vertices=mesh.vertices, triangles=mesh.triangles[100:])
+    messages = " ".join(message for _, message in found(sound, holed))
+    assert "edges have a face on one side only" in messages
+    assert "the mesh covers" in messages
+
+
+def test_a_mesh_with_a_face_turned_over(sound):
+    mesh = sound.mesh()
+    turned = mesh.triangles.copy()
+    turned[0] = turned[0, ::-1]
+    messages = [m for _, m in found(sound, TriMesh(vertices=mesh.vertices, triangles=turned))]
+    assert "1 faces look down" in messages
+    assert any("or by faces turned over" in message for message in messages)
+
+
+def test_a_mesh_of_another_map(sound):
+    lifted = sound.mesh().vertices + np.float32([0, 0, 0.25])
+    findings = found(sound, TriMesh(vertices=lifted, triangles=sound.mesh().triangles))
+    assert [check for check, _ in findings] == ["mesh"]
+    assert findings[0][1].startswith("the mesh is up to 0.250 m off the heights")
+
+
+def test_a_mesh_without_faces(sound):
+    empty = TriMesh(vertices=sound.mesh().vertices, triangles=np.empty((0, 3), dtype=np.int32))
+    assert found(sound, empty) == [("mesh", "the mesh has no faces")]

@@ -1,0 +1,32 @@
+import pytest
+
+from terrainkit import registry
+from terrainkit.describe import describe, summaries
+from terrainkit.errors import ConfigError
+
+
+@pytest.mark.parametrize("name", registry.names())
+def test_every_terrain_and_parameter_has_words_and_a_unit(name):
+    about = describe(name)
+    assert about.text.partition("\n")[0].endswith(".")
+    assert [p.name for p in about.parameters] == list(registry.find(name).at(0).requested())
+    unitless = {"grade", "number", "inverted"}
+    for parameter in about.parameters:
+        assert parameter.text.endswith(".")
+        assert ("[m]" in parameter.text) != (parameter.name in unitless)
+
+
+def test_a_range_has_two_ends_and_a_value_one():
+    step_height, step_width, *_ = describe("pyramid_stairs").parameters
+    assert (step_height.easy, step_height.hard) == ("0.05", "0.23")
+    assert (step_width.easy, step_width.hard) == ("0.31", "")
+
+
+def test_summaries_are_one_sentence_each():
+    assert list(summaries()) == list(registry.names())
+    assert all(text.count(". ") == 0 for text in summaries().values())
+
+
+def test_a_terrain_that_there_is_not():
+    with pytest.raises(ConfigError, match="no terrain 'moon'; there are: flat, gap"):
+        describe("moon")

@@ -1,0 +1,35 @@
+import subprocess
+import sys
+from collections.abc import Callable
+
+import pytest
+
+Run = subprocess.CompletedProcess[str]
+
+
+@pytest.fixture
+def terrainkit(tmp_path) -> Callable[..., Run]:
+    """Run `terrainkit` in a process of its own, in an empty folder."""
+
+    def run(*words: object) -> Run:
+        return subprocess.run(
+            [sys.executable, "-m", "terrainkit_cli.main", *map(str, words)],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+
+    return run
+
+
+@pytest.fixture
+def small(terrainkit) -> str:
+    """Make a small map with four terrains, and return its name."""
+    run = terrainkit("generate", "-o", "small.npz", *SMALL)
+    assert run.returncode == 0, run.stderr
+    return "small.npz"
+
+
+SMALL = ("--rows", 2, "--cols", 5, "--preset", "rough", "--border", 1, "--patch-size", 8, 6)

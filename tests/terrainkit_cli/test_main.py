@@ -1,0 +1,100 @@
+import importlib.metadata
+import subprocess
+import sys
+
+import pytest
+
+from terrainkit_cli.main import COMMANDS, command
+
+
+def test_without_a_command_it_lists_them(terrainkit):
+    run = terrainkit()
+    assert run.returncode == 0
+    for name in COMMANDS:
+        assert f"  {name} " in run.stdout
+
+
+def test_version_is_the_one_installed(terrainkit):
+    assert (
+        terrainkit("--version").stdout == f"terrainkit {importlib.metadata.version('terrainkit')}\n"
+    )
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_help_for_every_option(terrainkit, name):
+    run = terrainkit(name, "--help")
+    assert run.returncode == 0
+    assert command(name).__doc__.partition("\n")[0].split(":")[0] in run.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("generat",), "no command 'generat'; there are: generate, list,"),
+        (("generate",), "Missing from terrainkit generate: -o PATH"),
+        (("generate", "-o", "a.npz", "--row", 3), "Unrecognized options: --row, 3. Perhaps you"),
+        (
+            ("generate", "-o", "a.npz", "--rows", "three"),
+            "--rows is 'three'; wanted a whole number",
+        ),
+        (("generate", "-o", "a.npz", "--rows", 1.5), "--rows is 1.5; wanted a whole number"),
+        (("generate", "-o", "a.npz", "--rows", 0), "rows is 0; wanted"),
+        (("generate", "-o", "a.npz", "--rows", -3), "rows is -3; wanted"),
+        (("generate", "-o", "a.npz", "--cell", "nan"), "cell is nan; wanted"),
+        (("generate", "-o", "a.npz", "--cell", "inf"), "cell is inf; wanted"),
+        (("generate", "-o", "a.npz", "--cell", 0.3), "nearest that are: 7.8 m, 8.1 m"),
+        (("generate", "-o", "a.npz", "--patch-size", 2, 2), "does not fit in a patch of 2 m x 2 m"),
+        (("generate", "-o", "a.npz", "--patch-size", 8), "Expected 2 values"),
+        (("generate", "-o", "a.npz", "--rows", 9**30), "beyond 64 bits"),
+        (("generate", "-o", "a.npz", "--rows", 9**9), "cells along x; wanted at most"),
+        (("generate", "-o", "a.npz", "--rows", 9999, "--cols", 9999), "GB of memory;"),
+        (
+            ("generate", "-o", "a.npz", "--mode", "best"),
+            "wanted one of: curriculum, selected, rand",
+        ),
+        (
+            ("generate", "-o", "a.npz", "--mode", "selected"),
+            "wants a mix of one terrain (--terrain)",
+        ),
+        (
+            ("generate", "-o", "a.npz", "--preset", "moon"),
+            "no preset 'moon'; there are: legged_gym",
+        ),
+        (
+            ("generate", "-o", "a.npz", "--terrain", "moon"),
+            "no terrain 'moon'; there are: flat, gap",
+        ),
+        (("generate", "-o", "a.npz", "--terrain", "pit", "--set", "dept=1"), "it has: depth, side"),
+        (("generate", "-o", "a.npz", "--terrain", "pit", "--set", "depth"), "wanted name=value"),
+        (("generate", "-o", "a.npz", "--terrain", "pit", "--set", "depth=x"), "wanted a number"),
+        (("generate", "-o", "a.npz", "--set", "depth=1"), "--set gives parameters to --terrain"),
+        (("generate", "-o", "a.npz", "--config", "none.toml"), "cannot read none.toml"),
+        (("generate", "-o", "a.abc"), "no format for '.abc' (a.abc); there are: "),
+        (("generate", "-o", "a"), "no format for 'a name without suffix'"),
+        (("generate", "-o", "nowhere/a.npz"), "there is no folder nowhere"),
+        (("generate", "-o", "/proc/a.npz"), "cannot write /proc/a.npz"),
+        (("list", "moon"), "no terrain 'moon'; there are: flat, gap"),
+        (("info", "none.npz"), "no file none.npz"),
+        (("check", "."), "is not a file"),
+        (("preview", "none.npz", "-o", "a.png"), "no file none.npz"),
+        (("export", "none.npz", "-o", "a.stl"), "no file none.npz"),
+    ],
+    ids=lambda value: " ".join(map(str, value))[:60] if isinstance(value, tuple) else "",
+)
+def test_bad_input_is_one_line_and_exit_2_and_writes_nothing(terrainkit, tmp_path, words, said):
+    run = terrainkit(*words)
+    assert run.returncode == 2
+    assert run.stdout == ""
+    assert run.stderr.count("\n") == 1
+    assert run.stderr.startswith("terrainkit: error: ")
+    assert said in run.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_reader_that_goes_away_is_no_error():
+    command = f"{sys.executable} -m terrainkit_cli.main list | head -1; exit ${{PIPESTATUS[0]}}"
+    run = subprocess.run(
+        ["bash", "-c", command], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert run.returncode == 0
+    assert run.stderr == ""

@@ -1,0 +1,238 @@
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+import terrainkit as tk
+from terrainkit import registry
+
+CONFIG = """
+rows = 3
+cols = 2
+patch_size = [8.0, 4.0]
+border = 2.0
+seed = 5
+
+[[terrains]]
+terrain = "stairs"
+step_height = [0.05, 0.1]
+
+[[terrains]]
+terrain = "gap"
+name = "moat"
+width = 0.3
+"""
+
+
+def test_generate_writes_the_map_and_says_what_to_do_next(terrainkit, tmp_path):
+    run = terrainkit("generate", "--rows", 3, "--cols", 10, "-o", "map.npz")
+    assert run.returncode == 0
+    assert run.stderr == ""
+    assert "wrote map.npz: 3 x 10 patches of 8 m x 8 m" in run.stdout
+    assert "terrainkit preview map.npz" in run.stdout
+    assert tk.TerrainMap.load(tmp_path / "map.npz").config == tk.MapConfig(rows=3)
+
+
+def test_every_option_reaches_the_map(terrainkit, tmp_path):
+    terrainkit(
+        *("generate", "-o", "a.npz", "--rows", 2, "--cols", 3, "--patch-size", 8, 4, "--cell", 0.2),
+        *("--border", 2, "--terrain", "pit", "--set", "depth=0.1:0.6,side=2", "--seed", 9),
+        *("--centered", "--slope-threshold", "none", "--spawn-radius", 0.3, "--restitution", 0.5),
+        *("--difficulty-range", 0.2, 0.8, "--static-friction", 0.7, "--dynamic-friction", 0.6),
+    )
+    assert tk.TerrainMap.load(tmp_path / "a.npz").config == tk.MapConfig(
+        rows=2,
+        cols=3,
+        patch_size=(8.0, 4.0),
+        cell=0.2,
+        border=2.0,
+        terrains=(tk.TerrainChoice(terrain="pit", parameters={"depth": (0.1, 0.6), "side": 2}),),
+        seed=9,
+        centered=True,
+        slope_threshold=None,
+        spawn_radius=0.3,
+        restitution=0.5,
+        difficulty_range=(0.2, 0.8),
+        static_friction=0.7,
+        dynamic_friction=0.6,
+    )
+
+
+def test_selected_mode_takes_a_terrain_and_its_parameters(terrainkit, tmp_path):
+    terrainkit(
+        *("generate", "-o", "a.npz", "--rows", 2, "--cols", 2, "--border", 0),
+        *("--mode", "selected", "--terrain", "pyramid_slope", "--set", "grade=0.25,inverted=true"),
+    )
+    terrain_map = tk.TerrainMap.load(tmp_path / "a.npz")
+    # Platform 3 m in 8 m: 25 cells of 0.1 m down at a grade of 0.25.
+    assert terrain_map.env_origins[..., 2] == pytest.approx(-0.625)
+
+
+def test_options_go_before_the_config_file(terrainkit, tmp_path):
+    (tmp_path / "my.toml").write_text(CONFIG)
+    terrainkit("generate", "-o", "a.npz", "--config", "my.toml", "--rows", 4)
+    terrain_map = tk.TerrainMap.load(tmp_path / "a.npz")
+    assert terrain_map.config.rows == 4
+    assert terrain_map.config.seed == 5
+    assert terrain_map.terrain_names == ("stairs", "moat")
+
+
+def test_the_config_in_a_map_makes_the_same_bytes_again(terrainkit, tmp_path, small):
+    (tmp_path / "again.toml").write_text(str(np.load(tmp_path / small)["config"]))
+    terrainkit("generate", "-o", "again.npz", "--config", "again.toml")
+    one, two = (
+        hashlib.sha256((tmp_path / name).read_bytes()).hexdigest() for name in (small, "again.npz")
+    )
+    assert one == two
+
+
+@pytest.mark.parametrize("line", ["rowz = 3", "rows = 'three'", "preset = 'moon'", "rows ="])
+def test_a_wrong_config_file_is_one_line(terrainkit, tmp_path, line):
+    (tmp_path / "my.toml").write_text(line)
+    run = terrainkit("generate", "-o", "a.npz", "--config", "my.toml")
+    assert run.returncode == 2
+    assert run.stderr.count("\n") == 1
+    assert "my.toml" in run.stderr
+    assert not (tmp_path / "a.npz").exists()
+
+
+def test_an_existing_file_stays_unless_told(terrainkit, tmp_path):
+    (tmp_path / "a.npz").write_text("mine")
+    run = terrainkit("generate", "-o", "a.npz", "--rows", 1)
+    assert run.returncode == 2
+    assert "a.npz exists" in run.stderr
+    assert (tmp_path / "a.npz").read_text() == "mine"
+    assert terrainkit("generate", "-o", "a.npz", "--rows", 1, "--overwrite").returncode == 0
+    assert tk.TerrainMap.load(tmp_path / "a.npz").config.rows == 1
+
+
+def test_a_terrain_that_a_preset_has_no_column_for_is_a_warning(terrainkit):
+    run = terrainkit("generate", "-o", "a.npz", "--rows", 1, "--cols", 2, "--preset", "stairs")
+    assert run.returncode == 0
+    assert run.stderr == (
+        "terrainkit: warning: 2 columns are too few for 3 terrains at these proportions: "
+        "no column for pyramid_stairs_inverted (preset stairs)\n"
+    )
+
+
+def test_a_full_disk_is_one_line_and_leaves_nothing(tmp_path):
+    limit = "ulimit -f 64; trap '' XFSZ; exec "  # 64 KiB, and an error instead of a signal
+    command = f"{sys.executable} -m terrainkit_cli.main generate -o a.npz --rows 1"
+    run = subprocess.run(
+        ["bash", "-c", limit + command],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert run.returncode == 2
+    assert run.stderr == "terrainkit: error: cannot write a.npz: File too large\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_long_map_shows_a_bar_on_a_terminal_only(tmp_path):
+    import pty
+
+    command = [sys.executable, "-m", "terrainkit_cli.main", "generate", "-o", "a.npz"]
+    command += ["--rows", "60", "--cols", "10", "--patch-size", "4", "4", "--terrain", "flat"]
+    ours, theirs = pty.openpty()
+    run = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=theirs, text=True)
+    os.close(theirs)
+    shown = b""
+    try:
+        while chunk := os.read(ours, 4096):
+            shown += chunk
+    except OSError:
+        pass  # Linux ends a pseudo-terminal with an error, not with an empty read
+    result, _ = run.communicate()
+    assert b"patches" in shown
+    assert result.startswith("wrote a.npz")
+
+
+def test_list_names_every_terrain(terrainkit):
+    lines = terrainkit("list").stdout.splitlines()
+    for name in registry.names():
+        assert any(line.startswith(f"{name} ") for line in lines)
+
+
+def test_list_of_one_shows_its_parameters(terrainkit):
+    lines = [line.split() for line in terrainkit("list", "pyramid_stairs").stdout.splitlines()]
+    assert ["step_height", "0.05", "0.23", "Rise", "of", "a", "step", "[m]."] in lines
+
+
+def test_info_says_what_the_map_is(terrainkit, small):
+    said = terrainkit("info", small).stdout
+    assert "2 x 5 of 8 m x 6 m" in said
+    assert "82 x" not in said
+    assert "180 x 320, one every 0.1 m" in said  # 2 x 80 and 5 x 60 cells, and 10 on each side
+    assert "rough_slope" in said
+
+
+def test_info_of_a_patch_shows_asked_and_built(terrainkit):
+    terrainkit("generate", "-o", "a.npz", "--rows", 2, "--cols", 1, "--terrain", "stairs")
+    lines = [
+        line.split() for line in terrainkit("info", "a.npz", "--patch", 1, 0).stdout.split("\n")
+    ]
+    assert ["step_width", "0.31", "0.3"] in lines
+
+
+def test_info_of_a_patch_that_is_not_there(terrainkit, small):
+    run = terrainkit("info", small, "--patch", 2, 0)
+    assert run.returncode == 2
+    assert "no patch (2, 0) in a map of 2 rows and 5 columns" in run.stderr
+
+
+def test_preview_is_a_picture_of_the_width_asked(terrainkit, tmp_path, small):
+    run = terrainkit("preview", small, "-o", "a.png", "--width", 400)
+    assert run.returncode == 0
+    picture = cv2.imread(str(tmp_path / "a.png"))
+    assert picture.shape[1] >= 400
+    assert picture.std() > 10
+
+
+@pytest.mark.parametrize("name", ["a.xml", "a.stl", "a.ply", "a.obj", "a.glb", "a.png"])
+def test_export_writes_every_format(terrainkit, tmp_path, small, name):
+    run = terrainkit("export", small, "-o", name)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.startswith(f"wrote {name}: ")
+    assert (tmp_path / name).stat().st_size > 1000
+
+
+def test_an_option_of_another_format_is_an_error(terrainkit, small):
+    run = terrainkit("export", small, "-o", "a.stl", "--collision", "boxes")
+    assert run.returncode == 2
+    assert ".stl has no option 'collision'; it has: merged, closed, y_up" in run.stderr
+
+
+def test_check_finds_nothing_wrong_with_a_map_of_ours(terrainkit, small):
+    run = terrainkit("check", small)
+    assert run.returncode == 0
+    assert "nothing to find fault with" in run.stdout
+
+
+def test_check_of_a_broken_map_exits_1_with_what_is_wrong(terrainkit, tmp_path, small):
+    arrays = dict(np.load(tmp_path / small))
+    arrays["env_origins"][1, 2, 2] += 0.2
+    np.savez(tmp_path / "broken.npz", **arrays)
+    run = terrainkit("check", "broken.npz")
+    assert run.returncode == 1
+    assert "spawn: patch (1, 2): the spawn origin is 0.200 m above the ground" in run.stdout
+    assert "broken.npz: 1 findings" in run.stdout
+
+
+def test_help_and_generate_import_nothing_heavy(tmp_path):
+    code = (
+        "import sys; from terrainkit_cli.main import main;"
+        f"main(['generate', '-o', {str(Path(tmp_path) / 'a.npz')!r}, '--rows', '1']);"
+        "print(sorted({'trimesh', 'mujoco', 'torch', 'scipy', 'cv2'} & set(sys.modules)))"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert run.stdout.endswith("[]\n")
