@@ -41,11 +41,16 @@ def atomic_write(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
 
 def check_target(path: Path, *, overwrite: bool) -> None:
     """Raise ExportError if a file cannot or may not be written at `path`."""
-    if path.is_dir():
-        raise ExportError(f"cannot write {path}: it is a folder")
-    if os.path.lexists(path) and not path.is_file():
-        raise ExportError(f"cannot write {path}: it is there, and not a plain file")
-    if path.exists() and not overwrite:
-        raise ExportError(f"{path} exists; another name would do, or --overwrite (overwrite=True)")
-    if not path.parent.is_dir():
-        raise ExportError(f"cannot write {path}: there is no folder {path.parent}")
+    try:
+        if path.is_dir():
+            raise ExportError(f"cannot write {path}: it is a folder")
+        if os.path.lexists(path) and not path.is_file():
+            raise ExportError(f"cannot write {path}: it is there, and not a plain file")
+        if path.exists() and not overwrite:
+            raise ExportError(
+                f"{path} exists; another name would do, or --overwrite (overwrite=True)"
+            )
+        if not path.parent.is_dir():
+            raise ExportError(f"cannot write {path}: there is no folder {path.parent}")
+    except OSError as error:
+        raise ExportError(f"cannot write {path}: {error.strerror or error}") from error

@@ -35,6 +35,7 @@ def surface_at(
         threshold: Difference between neighbours above which there is a wall [m].
     """
     limit = np.array(heights.shape) - 1
+    beyond = (place < 0) | (place > limit)
     place = np.clip(place, 0, limit)
     low = np.minimum(place.astype(np.int64), np.maximum(limit - 1, 0))
     i, j = low.T
@@ -48,7 +49,7 @@ def surface_at(
     cut = walls.any(axis=1)
     if cut.any():
         height[cut], gradient[cut] = _fan(corners[cut], walls[cut], u[cut], v[cut])
-    return SurfacePoints(height=height, gradient=gradient)
+    return SurfacePoints(height=height, gradient=np.where(beyond, 0.0, gradient))
 
 
 def _two_triangles(

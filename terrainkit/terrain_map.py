@@ -116,7 +116,8 @@ class TerrainMap:
         limit = np.iinfo(np.int16)
         low, high = float(units.min()), float(units.max())
         if not (limit.min <= low and high <= limit.max):
-            least = max(high / limit.max, low / limit.min) * vertical_scale
+            # A hundredth more, so that it still is enough once it is rounded for the message.
+            least = max(high / limit.max, low / limit.min) * vertical_scale * 1.01
             raise ExportError(
                 f"heights from {self.heights.min():g} to {self.heights.max():g} m do not fit in "
                 f"int16 at vertical_scale {vertical_scale:g}; wanted {least:.3g} or more"

@@ -1,23 +1,16 @@
-"""The .npz map: what terrainkit reads and writes, and numpy alone can read.
-
-Format version 1. Reading trusts nothing: every array's dtype, shape and size is checked against the
-others from its header, before any of it is decompressed, and nothing is ever unpickled.
-"""
+"""The .npz map, format version 1: what terrainkit reads and writes, and numpy alone can read."""
 
 import dataclasses
 import json
 import math
-import zipfile
-import zlib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.capacity import require_memory
+from terrainkit.archive import LONGEST_TEXT, Archive, opened
 from terrainkit.config import MapConfig
 from terrainkit.config_text import from_toml, to_toml
 from terrainkit.errors import ConfigError, MapFileError
@@ -31,6 +24,9 @@ if TYPE_CHECKING:
 SUFFIXES = (".npz",)
 FORMAT_VERSION = 1
 
+_MOST_FACES = 20
+"""Most triangles, and vertices, that a mesh can have for each sample of its map."""
+
 _Map = TypeVar("_Map", bound="TerrainMap")
 
 
@@ -42,27 +38,28 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
         path: Where to.
     """
     config, mesh = terrain_map.config, terrain_map.mesh()
-    np.savez(
-        path,
-        allow_pickle=False,
-        format_version=np.int64(FORMAT_VERSION),
-        heights=terrain_map.heights,
-        cell=np.float64(config.cell),
-        lower=np.array(terrain_map.grid.lower),
-        border=np.float64(config.border),
-        patch_size=np.array(config.patch_size),
-        env_origins=terrain_map.env_origins,
-        terrain_types=terrain_map.terrain_types,
-        terrain_names=np.array(terrain_map.terrain_names),
-        difficulty=terrain_map.difficulty,
-        vertices=mesh.vertices,
-        triangles=mesh.triangles,
-        boxes=np.empty((0, 10), dtype=np.float32),
-        config=np.array(to_toml(config)),
-        parameters=np.array(_parameters_text(terrain_map)),
-        friction=np.array([config.static_friction, config.dynamic_friction]),
-        restitution=np.float64(config.restitution),
-    )
+    arrays: dict[str, Any] = {
+        "format_version": np.int64(FORMAT_VERSION),
+        "heights": terrain_map.heights,
+        "cell": np.float64(config.cell),
+        "lower": np.array(terrain_map.grid.lower),
+        "border": np.float64(config.border),
+        "patch_size": np.array(config.patch_size),
+        "env_origins": terrain_map.env_origins,
+        "terrain_types": terrain_map.terrain_types,
+        "terrain_names": np.array(terrain_map.terrain_names),
+        "difficulty": terrain_map.difficulty,
+        "vertices": mesh.vertices,
+        "triangles": mesh.triangles,
+        "boxes": np.empty((0, 10), dtype=np.float32),
+        "config": np.array(to_toml(config)),
+        "parameters": np.array(_parameters_text(terrain_map)),
+        "friction": np.array([config.static_friction, config.dynamic_friction]),
+        "restitution": np.float64(config.restitution),
+    }
+    # To an open file: given a name, savez adds .npz to one that ends in .NPZ.
+    with path.open("wb") as file:
+        np.savez(file, **arrays)
 
 
 def read_map(cls: type[_Map], path: str | Path) -> _Map:
@@ -72,27 +69,34 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
         MapFileError: if the file is missing, foreign, truncated, or not a whole map.
         CapacityError: if what it says it holds would not fit in memory.
     """
-    with _opened(path) as archive:
-        config = archive.config()
-        rows, cols, grid = config.rows, config.cols, config.grid
-        names = archive.array("terrain_names", "U", (len(config.mix),), limit=_LONGEST_TEXT)
-        archive.expect("cell", config.cell)
-        archive.expect("border", config.border)
-        archive.expect("patch_size", config.patch_size)
-        archive.expect("lower", grid.lower)
-        kinds = archive.array("terrain_types", "i", (rows, cols))
+    with opened(path) as archive:
+        config = _config(archive)
+        size, grid = (config.rows, config.cols), config.grid
+        for key, wanted in (
+            ("cell", config.cell),
+            ("border", config.border),
+            ("patch_size", config.patch_size),
+            ("lower", grid.lower),
+        ):
+            archive.expect(key, wanted)
+        names = archive.array("terrain_names", "U", (len(config.mix),), limit=LONGEST_TEXT)
+        kinds = archive.array("terrain_types", "i4", size)
         if kinds.min() < 0 or kinds.max() >= len(names):
             raise MapFileError(f"{path}: terrain_types points beyond the {len(names)} names")
-        archive.refuse_boxes()
+        solids = len(archive.array("boxes", "f4", (None, 10), limit=LONGEST_TEXT))
+        if solids:
+            raise MapFileError(
+                f"{path} has {solids} solids beside its heights; this terrainkit reads none"
+            )
         return cls(
             config=config,
             grid=grid,
-            heights=archive.array("heights", "f", grid.shape),
-            env_origins=archive.array("env_origins", "f", (rows, cols, 3)),
+            heights=archive.array("heights", "f4", grid.shape),
+            env_origins=archive.array("env_origins", "f4", (*size, 3)),
             terrain_types=kinds,
             terrain_names=tuple(str(name) for name in names),
-            difficulty=archive.array("difficulty", "f", (rows, cols)),
-            parameters=archive.parameters((rows, cols)),
+            difficulty=archive.array("difficulty", "f4", size),
+            parameters=_all_parameters(archive, size),
         )
 
 
@@ -103,151 +107,44 @@ def read_mesh(path: str | Path) -> TriMesh:
         MapFileError: if there is none, or a triangle points beyond the vertices.
         CapacityError: if what it says it holds would not fit in memory.
     """
-    with _opened(path) as archive:
-        limit = _MOST_FACES * 12 * math.prod(n + 2 for n in archive.config().grid.shape)
-        vertices = archive.array("vertices", "f", (None, 3), limit=limit)
-        triangles = archive.array("triangles", "i", (None, 3), limit=limit)
+    with opened(path) as archive:
+        limit = _MOST_FACES * 12 * math.prod(n + 2 for n in _config(archive).grid.shape)
+        vertices = archive.array("vertices", "f4", (None, 3), limit=limit)
+        triangles = archive.array("triangles", "i4", (None, 3), limit=limit)
     if triangles.size and not (triangles.min() >= 0 and triangles.max() < len(vertices)):
         raise MapFileError(f"{path}: triangles points beyond the {len(vertices)} vertices")
     return TriMesh(vertices=vertices, triangles=triangles)
 
 
-# ---- the archive -------------------------------------------------------------------------------
-
-_LONGEST_TEXT = 64 << 20
-"""Most that a text in a map may take [bytes]: the config, and the parameters of its patches."""
-
-_MOST_FACES = 20
-"""Most triangles and vertices that a mesh of a map can have for each sample."""
-
-
-@contextmanager
-def _opened(name: str | Path) -> Iterator["_Archive"]:
-    path = Path(name)
-    try:
-        # A FIFO would block, a device never end.
-        if path.exists() and not path.is_file():
-            raise MapFileError(f"{path} is not a file; wanted a map in .npz")
-        with zipfile.ZipFile(path) as file:
-            archive = _Archive(path, file)
-            archive.check_version()
-            yield archive
-    except FileNotFoundError:
-        raise MapFileError(f"no file {path}") from None
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
-        raise MapFileError(f"{path} is not an .npz file, or not a whole one: {error}") from error
-    except OSError as error:
-        raise MapFileError(f"cannot read {path}: {error.strerror or error}") from error
-
-
-class _Archive:
-    """An open .npz, whose arrays are checked before they are read."""
-
-    def __init__(self, path: Path, file: zipfile.ZipFile) -> None:
-        self._path = path
-        self._file = file
-
-    def check_version(self) -> None:
-        """Raise MapFileError unless this is a map of the version that we read."""
-        if "format_version.npy" not in self._file.namelist():
-            raise MapFileError(f"{self._path} is not a map of terrainkit: it has no format_version")
-        version = int(self.array("format_version", "iu", ()))
-        if version != FORMAT_VERSION:
-            raise MapFileError(
-                f"{self._path} has format version {version}; this terrainkit reads {FORMAT_VERSION}"
-            )
-
-    def array(
-        self, key: str, kinds: str, shape: tuple[int | None, ...], *, limit: int | None = None
-    ) -> NDArray[Any]:
-        """Return the array `key`.
-
-        Args:
-            key: Its name.
-            kinds: Kinds of dtype that it may have, as numpy's letters.
-            shape: Shape that it must have; None for any length.
-            limit: Most bytes that it may take.
-        """
-        try:
-            with self._file.open(f"{key}.npy") as member:
-                self._check_header(member, key, kinds, shape, limit)
-            with self._file.open(f"{key}.npy") as member:
-                return np.lib.format.read_array(member, allow_pickle=False)
-        except KeyError:
-            raise MapFileError(f"{self._path} has no {key}") from None
-        except ValueError as error:
-            raise MapFileError(f"{self._path}: {key} cannot be read: {error}") from error
-
-    def _check_header(
-        self,
-        member: IO[bytes],
-        key: str,
-        kinds: str,
-        shape: tuple[int | None, ...],
-        limit: int | None,
-    ) -> None:
-        version = np.lib.format.read_magic(member)
-        read = {
-            (1, 0): np.lib.format.read_array_header_1_0,
-            (2, 0): np.lib.format.read_array_header_2_0,
-        }
-        if version not in read:
-            raise MapFileError(f"{self._path}: {key} has an unknown .npy version {version}")
-        found, _, dtype = read[version](member)
-        if dtype.hasobject or dtype.kind not in kinds:
-            raise MapFileError(f"{self._path}: {key} has dtype {dtype}; wanted kind {kinds!r}")
-        fits = len(found) == len(shape) and all(
-            wanted in (n, None) for n, wanted in zip(found, shape, strict=True)
+def _config(archive: Archive) -> MapConfig:
+    """Return the config of the map, if this is one, of the version that we read."""
+    if "format_version" not in archive.names():
+        raise MapFileError(f"{archive.path} is not a map of terrainkit: it has no format_version")
+    version = int(archive.array("format_version", "i", ()))
+    if version != FORMAT_VERSION:
+        raise MapFileError(
+            f"{archive.path} has format version {version}; this terrainkit reads {FORMAT_VERSION}"
         )
-        if not fits:
-            raise MapFileError(f"{self._path}: {key} has shape {found}; wanted {_text(shape)}")
-        needed = math.prod(found) * dtype.itemsize
-        if limit is not None and needed > limit:
-            raise MapFileError(f"{self._path}: {key} takes {needed} bytes; {limit} at most")
-        require_memory(needed, f"{key} in {self._path}")
-
-    def expect(self, key: str, wanted: float | tuple[float, ...]) -> None:
-        """Raise MapFileError unless the numbers under `key` are those that the config says."""
-        found = self.array(key, "fiu", np.shape(wanted))
-        if not np.allclose(found, wanted, rtol=1e-9, atol=1e-9):
-            raise MapFileError(
-                f"{self._path}: {key} is {found.tolist()}, but its config says {wanted}"
-            )
-
-    def text(self, key: str) -> str:
-        """Return the text under `key`."""
-        return str(self.array(key, "U", (), limit=_LONGEST_TEXT))
-
-    def config(self) -> MapConfig:
-        """Return the config of the map."""
-        try:
-            return from_toml(self.text("config"))
-        except ConfigError as error:
-            raise MapFileError(f"{self._path}: config: {error}") from error
-
-    def parameters(self, shape: tuple[int, int]) -> NDArray[np.object_]:
-        """Return the parameters of each patch, shape `shape`."""
-        try:
-            rows = json.loads(self.text("parameters"))
-            table = np.empty(shape, dtype=object)
-            for index in np.ndindex(shape):
-                table[index] = _parameters(rows[index[0]][index[1]])
-        except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
-            raise MapFileError(f"{self._path}: parameters cannot be read: {error}") from error
-        return table
-
-    def refuse_boxes(self) -> None:
-        """Raise MapFileError if the map has solids, which no terrain of this version makes."""
-        count = len(self.array("boxes", "f", (None, 10), limit=_LONGEST_TEXT))
-        if count:
-            raise MapFileError(
-                f"{self._path} has {count} solids beside its heights; this terrainkit reads none"
-            )
+    try:
+        return from_toml(archive.text("config"))
+    except ConfigError as error:
+        raise MapFileError(f"{archive.path}: config: {error}") from error
 
 
 def _parameters_text(terrain_map: "TerrainMap") -> str:
     rows = [[dataclasses.asdict(patch) for patch in row] for row in terrain_map.parameters]
     return json.dumps(rows, separators=(",", ":"))
+
+
+def _all_parameters(archive: Archive, size: tuple[int, int]) -> NDArray[np.object_]:
+    table = np.empty(size, dtype=object)
+    try:
+        rows = json.loads(archive.text("parameters"))
+        for row, col in np.ndindex(size):
+            table[row, col] = _parameters(rows[row][col])
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+        raise MapFileError(f"{archive.path}: parameters cannot be read: {error}") from error
+    return table
 
 
 def _parameters(record: Mapping[str, Mapping[str, Any]]) -> Parameters:
@@ -267,7 +164,3 @@ def _number(value: Any) -> Value:
     if not isinstance(value, int | float):
         raise TypeError(f"{value!r} is no number")
     return value
-
-
-def _text(shape: tuple[int | None, ...]) -> str:
-    return f"({', '.join('any' if n is None else str(n) for n in shape)})"
