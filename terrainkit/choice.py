@@ -2,6 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
 
 from terrainkit import registry
 from terrainkit.coerce import coerce
@@ -39,8 +42,10 @@ class TerrainChoice:
             raise ConfigError(
                 f"{self.name}: proportion is {self.proportion:g}; wanted 0 to {LARGEST:g}"
             )
+        if not isinstance(self.parameters, Mapping):
+            raise ConfigError(f"{self.name}: parameters is {self.parameters!r}; wanted a mapping")
         # A copy of its own: the caller's dict may change later, a config never does.
-        own = {k: tuple(v) if isinstance(v, list) else v for k, v in self.parameters.items()}
+        own = {name: _plain(value) for name, value in self.parameters.items()}
         object.__setattr__(self, "parameters", own)
         for end in (0.0, 1.0):
             self.at(end)
@@ -48,3 +53,10 @@ class TerrainChoice:
     def at(self, difficulty: float) -> Terrain:
         """Return the terrain at `difficulty`, 0 to 1."""
         return registry.find(self.terrain).at(difficulty, self.parameters)
+
+
+def _plain(value: Any) -> Any:
+    """Return `value` with lists as tuples, and numpy's numbers as Python's."""
+    if isinstance(value, list | tuple):
+        return tuple(_plain(item) for item in value)
+    return value.item() if isinstance(value, np.generic) else value

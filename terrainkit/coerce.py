@@ -7,7 +7,7 @@ import numpy as np
 
 from terrainkit.errors import ConfigError, listing
 
-_LARGEST = 2**63 - 1
+_LARGEST = 2**63
 _WORDS = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}
 
 
@@ -24,8 +24,8 @@ def coerce(name: str, value: object, annotation: Any) -> Any:
     """
     if isinstance(value, np.generic):
         value = value.item()
-    if isinstance(value, int) and abs(value) > _LARGEST:
-        raise ConfigError(f"{name} is a whole number beyond 64 bits")
+    if isinstance(value, int) and not -_LARGEST <= value < _LARGEST:
+        raise ConfigError(f"{name} is a whole number beyond 64 bits with sign")
     origin = get_origin(annotation)
     if origin is Literal:
         return _one_of(name, value, get_args(annotation))
@@ -43,7 +43,7 @@ def coerce(name: str, value: object, annotation: Any) -> Any:
 
 
 def _one_of(name: str, value: object, choices: tuple[Any, ...]) -> Any:
-    if value not in choices:
+    if not isinstance(value, str) or value not in choices:
         raise ConfigError(f"{name} is {value!r}; wanted one of: {listing(map(str, choices))}")
     return value
 

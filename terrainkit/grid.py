@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 
-_WHOLE = 1e-6
+_WHOLE = 1e-5
 """How far from a whole number of cells a size may be, for sizes that floats cannot hold (0.1)."""
 
 
@@ -94,7 +94,7 @@ class Grid:
 
     def fade(self, inner: tuple[int, int], distance: float) -> NDArray[np.float64]:
         """Return a weight that is 0 on the centred block `inner` and 1 from `distance` [m] on."""
-        return np.clip(self.rings(inner) * (self.cell / distance), None, 1.0)
+        return np.clip(self.rings(inner) * (self.cell / max(distance, self.cell)), None, 1.0)
 
 
 def _beyond(n: int, block: int) -> NDArray[np.int64]:
@@ -110,7 +110,7 @@ def whole_cells(name: str, length: float, cell: float, *, least: int = 1) -> int
     if not math.isfinite(count):
         raise ConfigError(f"{name} {length:g} m cannot be counted in cells of {cell:g} m")
     nearest = round(count)
-    if nearest < least or abs(count - nearest) > _WHOLE * max(1.0, count):
+    if nearest < least or abs(count - nearest) > _WHOLE + 1e-9 * count:
         low = max(least, math.floor(count))
         raise ConfigError(
             f"{name} {length:g} m is not a whole number of cells of {cell:g} m; "

@@ -57,7 +57,7 @@ class LatticeNoise:
     def _intervals(self, plot: Grid) -> tuple[int, int]:
         # Nodes closer than the cells would be drawn and never seen.
         spacing = max(self.spacing, plot.cell)
-        x, y = (max(1, math.floor(extent / spacing + 0.5)) for extent in plot.size)
+        x, y = (max(1, math.floor(extent / spacing + 0.5 + 1e-9)) for extent in plot.size)
         return x, y
 
 

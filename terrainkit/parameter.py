@@ -110,10 +110,18 @@ def parameters_of(terrain: Any) -> dict[str, Parameter]:
     return {f.name: f.metadata["parameter"] for f in dataclasses.fields(terrain)}
 
 
-def check_value(owner: str, name: str, value: object, parameter: Parameter) -> None:
-    """Raise the ConfigError that says why `value` cannot be `owner`'s parameter `name`."""
-    number = coerce(f"{owner}: {name}", value, type(parameter.easy))
+def checked(owner: str, name: str, value: object, parameter: Parameter) -> Value:
+    """Return `value` as a plain number, or raise the ConfigError that says why it cannot be.
+
+    Args:
+        owner: The terrain, for the error.
+        name: The parameter, for the error.
+        value: What was given for it.
+        parameter: What is known of it.
+    """
+    number: Value = coerce(f"{owner}: {name}", value, type(parameter.easy))
     most = LARGEST if isinstance(number, float) else _MOST
     if not 0 <= number <= most or (number == 0 and not parameter.zero):
         least = "0" if parameter.zero else "above 0"
         raise ConfigError(f"{owner}: {name} is {number:g}; wanted {least} to {most:g}")
+    return number

@@ -16,7 +16,7 @@ from terrainkit.parameter import (
     Realized,
     Value,
     at_difficulty,
-    check_value,
+    checked,
     parameters_of,
 )
 
@@ -36,7 +36,8 @@ class Terrain(ABC):
 
     def __post_init__(self) -> None:
         for name, parameter in parameters_of(self).items():
-            check_value(self.kind(), name, getattr(self, name), parameter)
+            value = checked(self.kind(), name, getattr(self, name), parameter)
+            object.__setattr__(self, name, value)
 
     @classmethod
     def kind(cls) -> str:
@@ -76,9 +77,9 @@ class Terrain(ABC):
             if not parameter.ramps or len(value) != 2:
                 wanted = "one value or a pair (easy, hard)" if parameter.ramps else "one value"
                 raise ConfigError(f"{cls.kind()}: {name} is {value}; wanted {wanted}")
-            for end in value:
-                check_value(cls.kind(), name, end, parameter)
-        return at_difficulty(value, difficulty)
+            easy, hard = (checked(cls.kind(), name, end, parameter) for end in value)
+            return at_difficulty((easy, hard), difficulty)
+        return value
 
     def requested(self) -> dict[str, Value]:
         """Return the parameters by name, as asked."""

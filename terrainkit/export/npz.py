@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.archive import LONGEST_TEXT, Archive, opened
+from terrainkit.archive import LONGEST_TEXT, Archive, opened, write_arrays
 from terrainkit.config import MapConfig
 from terrainkit.config_text import from_toml, to_toml
 from terrainkit.errors import ConfigError, MapFileError
@@ -38,7 +38,7 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
         path: Where to.
     """
     config, mesh = terrain_map.config, terrain_map.mesh()
-    arrays: dict[str, Any] = {
+    arrays = {
         "format_version": np.int64(FORMAT_VERSION),
         "heights": terrain_map.heights,
         "cell": np.float64(config.cell),
@@ -57,9 +57,7 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
         "friction": np.array([config.static_friction, config.dynamic_friction]),
         "restitution": np.float64(config.restitution),
     }
-    # To an open file: given a name, savez adds .npz to one that ends in .NPZ.
-    with path.open("wb") as file:
-        np.savez(file, **arrays)
+    write_arrays(path, arrays)
 
 
 def read_map(cls: type[_Map], path: str | Path) -> _Map:
