@@ -31,9 +31,9 @@ def terrains_page() -> str:
         "# Terrains\n",
         NOTE,
         "Each terrain with its parameters. A parameter with two values is a range from difficulty",
-        "0 to difficulty 1; give one value, or a range of your own, in a [config](conventions.md) or",
-        "with `--set`. The pictures show difficulty 0.1, 0.5 and 1 on patches of 8 m x 8 m, with",
-        "holes cut short.\n",
+        "0 to difficulty 1; give one value, or a range of your own, in a",
+        "[config](conventions.md) or with `--set`. The pictures show difficulty 0.1, 0.5 and 1 on",
+        "patches of 8 m x 8 m, with holes cut short.\n",
         "| terrain | what it is |\n|---|---|",
     ]
     parts += [f"| [{n}](#{n}) | {describe(n).text.splitlines()[0]} |" for n in registry.names()]

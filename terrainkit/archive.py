@@ -111,7 +111,11 @@ class Archive:
         if version not in read:
             raise MapFileError(f"{self.path}: {key} has an unknown .npy version {version}")
         found, _, dtype = read[version](member)
-        if dtype.hasobject or not f"{dtype.kind}{dtype.itemsize}".startswith(kind):
+        if (
+            dtype.hasobject
+            or not dtype.isnative
+            or not f"{dtype.kind}{dtype.itemsize}".startswith(kind)
+        ):
             wanted = {"U": "a text", "i": "whole numbers"}.get(kind) or np.dtype(kind)
             raise MapFileError(f"{self.path}: {key} has dtype {dtype}; wanted {wanted}")
         fits = len(found) == len(shape) and all(

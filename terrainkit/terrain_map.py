@@ -104,7 +104,8 @@ class TerrainMap:
         Returns:
             Heights in units of `vertical_scale`, int16, shape (ny, nx): Isaac Gym's rows lie along
             y and its columns along x. `nbRows` is `shape[0]`, `nbColumns` is `shape[1]`, and the
-            transform's x and y are `first_sample`. legged_gym's own `height_samples` is `.T` of it.
+            transform's x and y are `first_sample`. Its buffer is column-major: pass
+            `.ravel(order="F")`. legged_gym's own `height_samples` is `.T`.
 
         Raises:
             ConfigError: if `vertical_scale` is not above 0.

@@ -32,7 +32,7 @@ def wall_edges(
 
     Args:
         heights: Samples [m], shape (nx, ny).
-        threshold: Smallest difference that is no wall any more [m]; infinite for no walls.
+        threshold: Largest difference that is no wall [m]; infinite for no walls.
     """
     nx, ny = heights.shape
     x = np.empty((nx - 1, ny), dtype=bool)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.boxes import THICKNESS, BoxCover
+from terrainkit.capacity import require_memory
 from terrainkit.coerce import coerce
 
 if TYPE_CHECKING:
@@ -25,6 +26,9 @@ Collision = Literal["auto", "hfield", "boxes"]
 
 _QUANTUM = 1e-4
 """Height of one unit of the elevation data [m]: whole numbers are short to write and to read."""
+
+_BYTES_PER_SAMPLE = 100
+"""Most that writing holds for each sample: its elevation, as a number and as text."""
 
 _RINGS = 2
 """Samples around the patches that the heightfield takes in. The ground of the border's first cell
@@ -43,13 +47,16 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
         path: Where to.
         collision: hfield: one heightfield, on which walls lean over one cell. boxes: the level
             ground as boxes with vertical walls, and a heightfield for what is not level, if
-            anything. auto: boxes where they hold all of the ground and are few, else hfield.
+            anything, which leans over one cell where it meets a wall. auto: boxes where they hold
+            all of the ground and are few, else hfield.
 
     Raises:
         ConfigError: if there is no such way of collision.
         CapacityError: if the map would not fit in memory.
     """
     collision = coerce("collision", collision, Collision)
+    samples = terrain_map.heights.size
+    require_memory(samples * _BYTES_PER_SAMPLE, f"a MuJoCo model of {samples} samples")
     cover = None if collision == "hfield" else terrain_map.boxes()
     if cover and collision == "auto" and not (cover.complete and len(cover.centres) <= _FEW_BOXES):
         cover = None

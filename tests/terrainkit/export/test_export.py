@@ -1,0 +1,101 @@
+import inspect
+from pathlib import Path
+
+import pytest
+
+from terrainkit.errors import ExportError
+from terrainkit.export import check, export, find, options_of, suffixes
+
+every_suffix = pytest.mark.parametrize("suffix", sorted(suffixes()))
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_the_formats_of_the_field_are_there():
+    assert set(suffixes()) >= {".npz", ".png", ".stl", ".ply", ".obj", ".glb", ".xml"}
+
+
+@every_suffix
+def test_an_exporter_takes_a_map_a_path_and_options_by_keyword(suffix):
+    map_, path, *options = inspect.signature(suffixes()[suffix].export).parameters.values()
+    assert (map_.name, path.name) == ("terrain_map", "path")
+    assert all(option.kind is option.KEYWORD_ONLY for option in options)
+
+
+@every_suffix
+def test_a_file_is_written_where_it_was_asked_for(level_map, tmp_path, suffix):
+    path = tmp_path / f"map{suffix}"
+    assert export(level_map, path) == path
+    assert path.stat().st_size > 0
+    assert {Path(name).stem for name in names(tmp_path)} == {"map"}
+
+
+@every_suffix
+def test_a_suffix_in_capitals_names_the_same_format(level_map, tmp_path, suffix):
+    path = tmp_path / f"MAP{suffix.upper()}"
+    assert export(level_map, str(path)) == path
+    assert path.is_file()
+
+
+@every_suffix
+def test_the_same_map_gives_the_same_bytes(level_map, tmp_path, suffix):
+    first, second = (export(level_map, tmp_path / f"{name}{suffix}") for name in "ab")
+    assert first.read_bytes() == second.read_bytes()
+
+
+@every_suffix
+def test_an_existing_file_is_kept_unless_told(level_map, tmp_path, suffix):
+    path = tmp_path / f"map{suffix}"
+    path.write_text("mine")
+    with pytest.raises(ExportError, match=rf"map\{suffix} exists"):
+        export(level_map, path)
+    assert path.read_text() == "mine"
+    assert names(tmp_path) == [f"map{suffix}"]
+    export(level_map, path, overwrite=True)
+    assert path.read_bytes() != b"mine"
+
+
+@pytest.mark.parametrize("name", ["map.usd", "map", "npz", "map.npz.bak", ".npz"])
+def test_an_unknown_suffix_is_an_error_that_lists_those_there_are(level_map, tmp_path, name):
+    with pytest.raises(ExportError, match=r"no format for .*; there are: ") as error:
+        export(level_map, tmp_path / name)
+    assert all(part in str(error.value) for part in (name, *suffixes()))
+    assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "option", "known"),
+    [
+        ("map.stl", "color", "merged, closed, y_up"),
+        ("map.xml", "merged", "collision"),
+        ("map.npz", "merged", "nothing"),
+    ],
+)
+def test_an_unknown_option_is_an_error_that_lists_those_there_are(
+    level_map, tmp_path, name, option, known
+):
+    with pytest.raises(ExportError, match=f"has no option '{option}'; it has: {known}"):
+        export(level_map, tmp_path / name, **{option: True})
+    assert names(tmp_path) == []
+
+
+def test_the_options_of_a_format_are_known_by_name():
+    assert options_of(Path("map.glb")) == ("merged", "closed", "y_up")
+
+
+def test_formats_of_one_kind_share_an_exporter():
+    assert find(Path("a.stl")) is find(Path("b.OBJ"))
+
+
+def test_a_target_is_checked_before_a_map_is_made_for_it(tmp_path):
+    path = tmp_path / "map.npz"
+    check(path)
+    path.write_text("mine")
+    check(path, overwrite=True)
+    with pytest.raises(ExportError, match=r"map\.npz exists"):
+        check(path)
+    with pytest.raises(ExportError, match=r"no format for '\.usd'"):
+        check(tmp_path / "map.usd")
+    assert path.read_text() == "mine"

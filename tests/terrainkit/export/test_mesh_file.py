@@ -1,0 +1,71 @@
+import json
+import struct
+
+import numpy as np
+import pytest
+import trimesh
+
+SUFFIXES = (".stl", ".ply", ".obj", ".glb")
+
+every_suffix = pytest.mark.parametrize("suffix", SUFFIXES)
+
+
+def saved(terrain_map, folder, suffix, **options):
+    return trimesh.load_mesh(terrain_map.save(folder / f"map{suffix}", **options))
+
+
+def points(terrain_map):
+    grid = terrain_map.grid
+    return np.random.default_rng(0).uniform(grid.lower, grid.upper, size=(1000, 2))
+
+
+@every_suffix
+@pytest.mark.parametrize("merged", [True, False])
+def test_the_mesh_is_the_ground(ray_down, terrain_map, tmp_path, suffix, merged):
+    mesh = saved(terrain_map, tmp_path, suffix, merged=merged)
+    assert len(mesh.faces) == len(terrain_map.mesh(merged=merged).triangles)
+    xy = points(terrain_map)
+    found = ray_down(mesh.vertices, mesh.faces, xy)
+    np.testing.assert_allclose(found, terrain_map.height(xy), atol=1e-3)
+
+
+@every_suffix
+def test_the_mesh_lies_in_the_frame_of_the_map(terrain_map, tmp_path, suffix):
+    bounds = saved(terrain_map, tmp_path, suffix).bounds
+    np.testing.assert_allclose(bounds[:, :2], [[-1.2, -1.2], [17.2, 13.2]], atol=1e-5)
+    heights = terrain_map.heights
+    np.testing.assert_allclose(bounds[:, 2], [heights.min(), heights.max()], atol=1e-5)
+
+
+@every_suffix
+@pytest.mark.parametrize("merged", [True, False])
+def test_a_closed_mesh_is_a_solid_with_the_ground_on_top(
+    ray_down, terrain_map, tmp_path, suffix, merged
+):
+    mesh = saved(terrain_map, tmp_path, suffix, merged=merged, closed=True)
+    assert mesh.is_watertight
+    assert mesh.is_winding_consistent
+    assert mesh.volume > 0
+    xy = points(terrain_map)
+    found = ray_down(mesh.vertices, mesh.faces, xy)
+    np.testing.assert_allclose(found, terrain_map.height(xy), atol=1e-3)
+
+
+@every_suffix
+def test_y_up_turns_the_map_a_quarter_about_x(ray_down, terrain_map, tmp_path, suffix):
+    mesh = saved(terrain_map, tmp_path, suffix, closed=True, y_up=True)
+    assert mesh.volume > 0  # turned, not mirrored
+    # x stays, z is up as y, and y comes out of the picture as -z.
+    x, up, towards = np.asarray(mesh.vertices).T
+    xy = points(terrain_map)
+    found = ray_down(np.column_stack([x, -towards, up]), mesh.faces, xy)
+    np.testing.assert_allclose(found, terrain_map.height(xy), atol=1e-3)
+
+
+def test_a_glb_says_in_its_extras_what_the_contact_is_like(terrain_map, tmp_path):
+    data = terrain_map.save(tmp_path / "map.glb").read_bytes()
+    # A header of 12 bytes, then the length and the kind of the first chunk, which is JSON.
+    (length,) = struct.unpack("<I", data[12:16])
+    (mesh,) = json.loads(data[20 : 20 + length])["meshes"]
+    contact = {"static_friction": 0.8, "dynamic_friction": 0.6, "restitution": 0.1}
+    assert contact.items() <= mesh["extras"].items()

@@ -1,0 +1,254 @@
+import os
+import re
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.ndimage import binary_dilation
+
+from terrainkit import MapConfig, TerrainChoice, generate
+from terrainkit.errors import ConfigError
+from terrainkit.walls import wall_edges
+
+ROOT = Path(__file__).parents[3]
+ROBOTS = Path(os.environ.get("TERRAINKIT_ROBOTS", ROOT.parent / "shared" / "robots"))
+GO2 = ROBOTS / "go2_mjcf" / "go2.xml"
+
+every_collision = pytest.mark.parametrize("collision", ["hfield", "boxes"])
+AROUND = np.ones((3, 3), dtype=bool)
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def loaded(terrain_map, folder, **options):
+    path = terrain_map.save(folder / "terrain.xml", **options)
+    return mujoco.MjModel.from_xml_path(str(path))
+
+
+def ray_cast(model, xy):
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    geom = np.zeros(1, dtype=np.int32)
+    high = 50.0
+    distances = [
+        mujoco.mj_ray(model, data, np.array([x, y, high]), -UP, None, 1, -1, geom) for x, y in xy
+    ]
+    return high - np.array(distances)
+
+
+def points_in(terrain_map, cells, count=1000):
+    grid = terrain_map.grid
+    xy = np.random.default_rng(0).uniform(grid.lower, grid.upper, size=(4 * count, 2))
+    i, j = ((xy - grid.lower) / grid.cell).astype(int).T
+    xy = xy[cells[i, j]][:count]
+    assert len(xy) == count
+    return xy
+
+
+def away_from_walls(terrain_map):
+    along_x, along_y = wall_edges(terrain_map.heights, terrain_map.config.wall_height)
+    beside = np.zeros(terrain_map.heights.shape, dtype=bool)
+    for side in (slice(None, -1), slice(1, None)):
+        beside[side] |= along_x
+        beside[:, side] |= along_y
+    return ~binary_dilation(beside, AROUND)
+
+
+@pytest.mark.parametrize("collision", ["hfield", "boxes", "auto"])
+def test_rays_meet_the_ground_farther_than_a_cell_from_walls(terrain_map, tmp_path, collision):
+    model = loaded(terrain_map, tmp_path, collision=collision)
+    xy = points_in(terrain_map, away_from_walls(terrain_map))
+    np.testing.assert_allclose(ray_cast(model, xy), terrain_map.height(xy), atol=1e-3)
+
+
+@pytest.mark.parametrize("collision", ["boxes", "auto"])
+def test_rays_meet_boxes_up_to_their_walls(level_map, tmp_path, collision):
+    model = loaded(level_map, tmp_path, collision=collision)
+    xy = points_in(level_map, np.ones(level_map.heights.shape, dtype=bool))
+    np.testing.assert_allclose(ray_cast(model, xy), level_map.height(xy), atol=1e-3)
+
+
+def test_rays_meet_boxes_up_to_their_walls_beside_a_heightfield(terrain_map, tmp_path):
+    model = loaded(terrain_map, tmp_path, collision="boxes")
+    # The heightfield that holds what is not level leans over the cells next to it.
+    xy = points_in(terrain_map, ~binary_dilation(~terrain_map.boxes().covered, AROUND))
+    np.testing.assert_allclose(ray_cast(model, xy), terrain_map.height(xy), atol=1e-3)
+
+
+@pytest.mark.parametrize("centered", [False, True])
+@pytest.mark.parametrize("border", [0.0, 0.1, 0.2, 0.3, 2.0])
+@every_collision
+def test_the_ground_reaches_to_the_edge_of_any_border(tmp_path, border, centered, collision):
+    slope = TerrainChoice(terrain="slope", parameters={"grade": 0.3, "landing": 1.0})
+    pit = TerrainChoice(terrain="pit", parameters={"side": 0.5})
+    config = MapConfig(
+        rows=1,
+        cols=2,
+        patch_size=(3.0, 2.0),
+        border=border,
+        centered=centered,
+        spawn_radius=0.1,
+        terrains=(slope, pit),
+    )
+    terrain_map = generate(config)
+    model = loaded(terrain_map, tmp_path, collision=collision)
+    xy = points_in(terrain_map, away_from_walls(terrain_map))
+    np.testing.assert_allclose(ray_cast(model, xy), terrain_map.height(xy), atol=1e-3)
+
+
+def test_rows_of_the_heightfield_lie_along_y_and_columns_along_x(terrain_map, tmp_path):
+    model = loaded(terrain_map, tmp_path, collision="hfield")
+    # 3 patches of 40 cells along y, 2 of 80 along x, and 2 samples of the border on each side.
+    assert model.hfield_nrow.tolist() == [3 * 40 + 4]
+    assert model.hfield_ncol.tolist() == [2 * 80 + 4]
+    half_x, half_y, _, _ = model.hfield_size[0]
+    assert [half_x, half_y] == pytest.approx([163 * 0.1 / 2, 123 * 0.1 / 2])
+
+
+def test_auto_takes_boxes_where_they_hold_all_of_the_ground(level_map, terrain_map, tmp_path):
+    assert loaded(level_map, tmp_path).nhfield == 0
+    (tmp_path / "terrain.xml").unlink()
+    model = loaded(terrain_map, tmp_path)
+    assert model.nhfield == 1
+    assert model.ngeom == 1 + 4  # and the border
+
+
+def test_a_flat_map_is_one_box(tmp_path):
+    flat = generate(MapConfig(rows=2, cols=1, terrains=(TerrainChoice(terrain="flat"),)))
+    model = loaded(flat, tmp_path)
+    assert model.ngeom == 1
+    assert ray_cast(model, [(1.0, 2.0), (-24.9, 32.9)]).tolist() == pytest.approx([0.0, 0.0])
+
+
+def test_a_flat_map_is_a_heightfield_too(tmp_path):
+    flat = generate(MapConfig(rows=1, cols=1, terrains=(TerrainChoice(terrain="flat"),)))
+    model = loaded(flat, tmp_path, collision="hfield")
+    assert ray_cast(model, [(1.0, 2.0), (-24.9, 32.9)]).tolist() == pytest.approx([0.0, 0.0])
+
+
+@every_collision
+def test_all_geoms_are_on_one_static_body(terrain_map, tmp_path, collision):
+    model = loaded(terrain_map, tmp_path, collision=collision)
+    assert set(model.geom_bodyid.tolist()) == {model.body("terrain").id}
+    assert model.body_weldid[model.body("terrain").id] == 0
+    assert model.nv == 0
+
+
+@every_collision
+def test_friction_is_that_of_the_config(terrain_map, tmp_path, collision):
+    model = loaded(terrain_map, tmp_path, collision=collision)
+    np.testing.assert_allclose(model.geom_friction[:, 0], 0.8)
+    contact = [
+        model.numeric(f"terrain_{name}").data.item()
+        for name in ("static_friction", "dynamic_friction", "restitution")
+    ]
+    assert contact == [0.8, 0.6, 0.1]
+
+
+@every_collision
+def test_the_same_config_gives_the_same_bytes(terrain_map, tmp_path, collision):
+    again = generate(terrain_map.config)
+    first, second = (
+        each.save(tmp_path / f"{k}.xml", collision=collision).read_bytes()
+        for k, each in enumerate((terrain_map, again))
+    )
+    assert first == second
+
+
+def test_an_unknown_collision_is_an_error_that_lists_those_there_are(terrain_map, tmp_path):
+    with pytest.raises(ConfigError, match=r"collision is 'mesh'; wanted .*: auto, hfield, boxes"):
+        terrain_map.save(tmp_path / "terrain.xml", collision="mesh")
+    assert list(tmp_path.iterdir()) == []
+
+
+ROBOT = """
+<mujoco model="robot">
+  <compiler angle="degree" meshdir="meshes" texturedir="textures" autolimits="true"/>
+  <default>
+    <geom contype="4" conaffinity="2" condim="6" friction="0.1 0.2 0.3" priority="1" group="4"
+          margin="0.2" gap="0.1" solref="0.5 2" solimp="0.5 0.6 0.1" solmix="7" rgba="1 0 0 1"/>
+  </default>
+  {before}
+  <worldbody>
+    <light pos="0 0 9"/>
+    <body name="ball" pos="0 0 9">
+      <freejoint/>
+      <geom name="ball" type="sphere" size="0.1" mass="1" contype="1" conaffinity="1" condim="3"
+            priority="0" margin="0" gap="0" solref="0.02 1" solimp="0.9 0.95 0.001"/>
+    </body>
+  </worldbody>
+  {after}
+</mujoco>
+"""
+INCLUDE = '<include file="terrain.xml"/>'
+
+
+@pytest.fixture(params=["before", "after"])
+def scene_with_ball(request):
+    places = {"before": "", "after": ""} | {request.param: INCLUDE}
+    return ROBOT.format(**places)
+
+
+def include(scene, terrain_map, folder, collision):
+    terrain_map.save(folder / "terrain.xml", collision=collision)
+    (folder / "scene.xml").write_text(scene)
+    return mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
+
+
+@every_collision
+def test_the_defaults_of_a_robot_leave_the_terrain_alone(
+    scene_with_ball, terrain_map, tmp_path, collision
+):
+    model = include(scene_with_ball, terrain_map, tmp_path, collision)
+    alone = mujoco.MjModel.from_xml_path(str(tmp_path / "terrain.xml"))
+    ground = np.flatnonzero(model.geom_bodyid == model.body("terrain").id)
+    assert len(ground) == alone.ngeom == model.ngeom - 1
+    names = "pos size contype conaffinity condim priority friction solmix solref solimp margin gap"
+    for name in (*names.split(), "group", "rgba"):
+        found, wanted = (getattr(each, f"geom_{name}") for each in (model, alone))
+        assert found[ground].tolist() == wanted.tolist()
+
+
+@every_collision
+def test_a_ball_dropped_on_a_spawn_origin_comes_to_rest_there(
+    scene_with_ball, terrain_map, tmp_path, collision
+):
+    model = include(scene_with_ball, terrain_map, tmp_path, collision)
+    data = mujoco.MjData(model)
+    for origin in terrain_map.env_origins.reshape(-1, 3).astype(float):
+        mujoco.mj_resetData(model, data)
+        data.qpos[:3] = origin + 0.3 * UP
+        mujoco.mj_step(model, data, nstep=700)
+        assert data.ncon > 0
+        assert np.abs(data.qvel).max() < 0.01
+        np.testing.assert_allclose(data.qpos[:3], origin + 0.1 * UP, atol=2e-3)
+
+
+TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+@pytest.mark.skipif(not GO2.is_file(), reason=f"no {GO2}; TERRAINKIT_ROBOTS says where robots are")
+@every_collision
+def test_a_real_robot_dropped_on_a_spawn_origin_lies_on_the_ground(
+    terrain_map, tmp_path, collision
+):
+    # Its meshes are only to look at, and one is missing: any will do.
+    (tmp_path / "assets").mkdir()
+    for name in re.findall(r'file="(\w+\.obj)"', GO2.read_text()):
+        (tmp_path / "assets" / name).write_text(TETRAHEDRON)
+    scene = f'<mujoco><include file="{GO2.resolve()}"/>{INCLUDE}</mujoco>'
+    model = include(scene, terrain_map, tmp_path, collision)
+    data = mujoco.MjData(model)
+    terrain = model.body("terrain").id
+    for origin in terrain_map.env_origins.reshape(-1, 3).astype(float):
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        data.qpos[:3] = origin + 0.3 * UP
+        mujoco.mj_step(model, data, nstep=1000)
+        # Its motors are off, so it lies on its belly.
+        base = data.qpos[:3] - origin
+        assert np.abs(data.qvel[:6]).max() < 0.05
+        assert np.abs(base[:2]).max() < 0.05
+        assert 0.05 < base[2] < 0.15
+        on_ground = (model.geom_bodyid[data.contact.geom] == terrain).any(axis=1)
+        assert on_ground.sum() >= 3
+        assert data.contact.dist[on_ground].min() > -5e-3

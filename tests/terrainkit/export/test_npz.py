@@ -1,0 +1,489 @@
+import dataclasses
+import io
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from terrainkit import MapConfig, TerrainChoice, TerrainMap, generate
+from terrainkit.config_text import from_toml
+from terrainkit.errors import CapacityError, MapFileError
+from terrainkit.export.npz import read_mesh
+
+
+@pytest.fixture(scope="module")
+def path(terrain_map, tmp_path_factory):
+    return terrain_map.save(tmp_path_factory.mktemp("npz") / "map.npz")
+
+
+@pytest.fixture(scope="module")
+def arrays(path):
+    with np.load(path, allow_pickle=False) as archive:
+        return dict(archive)
+
+
+# ---- what is in it -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("key", "dtype", "shape"),
+    [
+        ("format_version", "int64", ()),
+        ("heights", "float32", (184, 144)),
+        ("cell", "float64", ()),
+        ("lower", "float64", (2,)),
+        ("border", "float64", ()),
+        ("patch_size", "float64", (2,)),
+        ("env_origins", "float32", (2, 3, 3)),
+        ("terrain_types", "int32", (2, 3)),
+        ("difficulty", "float32", (2, 3)),
+        ("boxes", "float32", (0, 10)),
+    ],
+)
+def test_an_array_has_the_dtype_and_the_shape_of_the_format(arrays, key, dtype, shape):
+    assert arrays[key].dtype == dtype
+    assert arrays[key].shape == shape
+
+
+@pytest.mark.parametrize(("key", "dtype"), [("vertices", "float32"), ("triangles", "int32")])
+def test_the_trimesh_is_rows_of_three(arrays, key, dtype):
+    assert arrays[key].dtype == dtype
+    assert arrays[key].shape[1:] == (3,)
+
+
+@pytest.mark.parametrize(("key", "shape"), [("terrain_names", (3,)), ("config", ())])
+def test_a_text_is_no_object(arrays, key, shape):
+    assert arrays[key].dtype.kind == "U"
+    assert arrays[key].shape == shape
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("format_version", 1),
+        ("cell", 0.1),
+        ("lower", [-1.2, -1.2]),
+        ("border", 1.2),
+        ("patch_size", [8.0, 4.0]),
+        ("terrain_types", [[0, 1, 2]] * 2),
+        ("terrain_names", ["stairs", "obstacles", "rough_slope"]),
+        ("difficulty", [[0.0] * 3, [1.0] * 3]),
+        ("friction", [0.8, 0.6]),
+        ("restitution", 0.1),
+    ],
+)
+def test_an_array_says_what_the_map_is(arrays, key, value):
+    assert arrays[key].tolist() == value
+
+
+def test_heights_stand_where_cell_and_lower_say(arrays, terrain_map):
+    i, j = np.indices(arrays["heights"].shape)
+    xy = arrays["lower"] + (np.stack([i, j], axis=-1) + 0.5) * arrays["cell"]
+    np.testing.assert_allclose(terrain_map.height(xy), arrays["heights"], atol=1e-3)
+
+
+def test_the_trimesh_is_the_surface_seen_from_above(arrays, terrain_map, ray_down):
+    vertices, triangles = arrays["vertices"].astype(float), arrays["triangles"]
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    assert (np.cross(b - a, c - a)[:, 2] > -1e-9).all()
+    grid = terrain_map.grid
+    xy = np.random.default_rng(0).uniform(grid.lower, grid.upper, size=(500, 2))
+    found = ray_down(vertices, triangles, xy)
+    np.testing.assert_allclose(found, terrain_map.height(xy), atol=1e-3)
+
+
+def test_numpy_alone_reads_it_without_unpickling(path):
+    script = (
+        "import sys, numpy\n"
+        "with numpy.load(sys.argv[1], allow_pickle=False) as archive:\n"
+        "    print(sum(archive[key].nbytes for key in archive) > 0)\n"
+        "print(any(name.startswith('terrainkit') for name in sys.modules))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-I", "-c", script, path], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["True", "False"]
+
+
+def test_the_config_in_it_gives_the_same_bytes(arrays, path, tmp_path):
+    again = generate(from_toml(str(arrays["config"])))
+    assert again.save(tmp_path / "again.npz").read_bytes() == path.read_bytes()
+
+
+def test_what_is_read_is_what_was_written(path, terrain_map):
+    read = TerrainMap.load(path)
+    for field in dataclasses.fields(TerrainMap):
+        found, wanted = (getattr(each, field.name) for each in (read, terrain_map))
+        if isinstance(wanted, np.ndarray) and wanted.dtype != object:
+            assert (found.dtype, found.shape) == (wanted.dtype, wanted.shape)
+            assert found.tobytes() == wanted.tobytes()
+        else:
+            assert np.array_equal(found, wanted)
+
+
+def test_a_map_that_was_read_is_written_again_as_it_was(path, tmp_path):
+    again = TerrainMap.load(str(path)).save(tmp_path / "again.npz")
+    assert again.read_bytes() == path.read_bytes()
+
+
+def test_the_mesh_is_read_as_it_was_written(path, terrain_map):
+    read, wanted = read_mesh(path), terrain_map.mesh()
+    assert read.vertices.tobytes() == wanted.vertices.tobytes()
+    assert read.triangles.tobytes() == wanted.triangles.tobytes()
+
+
+# ---- what is no map ----------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def small_map():
+    pit = TerrainChoice(terrain="pit", parameters={"side": 0.6})
+    return generate(
+        MapConfig(
+            rows=2, cols=1, patch_size=(2.0, 1.0), border=0.1, spawn_radius=0.1, terrains=(pit,)
+        )
+    )
+
+
+@pytest.fixture(scope="module")
+def good(small_map, tmp_path_factory):
+    return small_map.save(tmp_path_factory.mktemp("good") / "map.npz")
+
+
+@pytest.fixture(scope="module")
+def bad(tmp_path_factory):
+    return tmp_path_factory.mktemp("bad") / "map.npz"
+
+
+def npy(value):
+    data = io.BytesIO()
+    np.lib.format.write_array(data, np.asarray(value), allow_pickle=True)
+    return data.getvalue()
+
+
+def npy_header(text):
+    data = text.encode() + b"\n"
+    return b"\x93NUMPY\x01\x00" + len(data).to_bytes(2, "little") + data
+
+
+def npy_that_declares(dtype, shape):
+    return npy_header(f"{{'descr': '{dtype}', 'fortran_order': False, 'shape': {shape}, }}")
+
+
+def repack(source, target, changes, compression=zipfile.ZIP_STORED):
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w", compression) as new:
+        members = {name: old.read(name) for name in old.namelist()}
+        for key, data in changes.items():
+            members[f"{key}.npy"] = data
+        for name, data in members.items():
+            if data is not None:
+                new.writestr(name, data)
+
+
+def config_with(good, old, new):
+    with np.load(good) as archive:
+        text = str(archive["config"])
+    assert old in text
+    return npy(text.replace(old, new))
+
+
+def refusal(path, read=TerrainMap.load):
+    with pytest.raises(MapFileError) as error:
+        read(path)
+    assert str(path) in str(error.value)
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+def test_a_file_that_is_not_there(tmp_path):
+    assert refusal(tmp_path / "none.npz").startswith("no file ")
+
+
+def test_a_folder(tmp_path):
+    assert "is not a file" in refusal(tmp_path)
+
+
+def test_a_fifo_does_not_block(tmp_path):
+    os.mkfifo(tmp_path / "map.npz")
+    assert "is not a file" in refusal(tmp_path / "map.npz")
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="no /dev/zero on this system")
+def test_a_device_is_not_read_without_end():
+    assert "is not a file" in refusal(Path("/dev/zero"))
+
+
+@pytest.mark.parametrize("data", [b"", b"hello\n", b"PK\x03\x04", b"\x93NUMPY", bytes(5000)])
+def test_a_file_of_another_kind(bad, data):
+    bad.write_bytes(data)
+    assert "is not an .npz file" in refusal(bad)
+
+
+def test_a_zip_of_another_kind(bad):
+    with zipfile.ZipFile(bad, "w") as archive:
+        archive.writestr("readme.txt", "hello")
+    assert "is not a map of terrainkit: it has no format_version" in refusal(bad)
+
+
+def test_an_npz_of_another_kind(bad):
+    np.savez(bad, heights=np.zeros((3, 3)))
+    assert "is not a map of terrainkit: it has no format_version" in refusal(bad)
+
+
+@pytest.mark.parametrize("read", [TerrainMap.load, read_mesh])
+@given(share=st.floats(0.0, 1.0, exclude_max=True))
+@settings(deadline=None, derandomize=True, max_examples=40)
+def test_a_truncated_file(good, bad, read, share):
+    data = good.read_bytes()
+    bad.write_bytes(data[: int(share * len(data))])
+    refusal(bad, read)
+
+
+@given(share=st.floats(0.0, 1.0, exclude_max=True), flip=st.integers(1, 255))
+@settings(deadline=None, derandomize=True, max_examples=200)
+def test_a_flipped_byte_is_noticed_or_makes_no_difference(good, bad, small_map, share, flip):
+    data = bytearray(good.read_bytes())
+    data[int(share * len(data))] ^= flip
+    bad.write_bytes(data)
+    try:
+        read = TerrainMap.load(bad)
+    except MapFileError as error:
+        assert "\n" not in str(error)  # noqa: PT017
+    else:
+        assert read.heights.tobytes() == small_map.heights.tobytes()
+        assert read.env_origins.tobytes() == small_map.env_origins.tobytes()
+        assert read.config == small_map.config
+
+
+@pytest.mark.parametrize("compression", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_a_compressed_map_is_read_but_not_one_that_is_damaged(good, bad, small_map, compression):
+    repack(good, bad, {}, compression)
+    assert TerrainMap.load(bad).heights.tobytes() == small_map.heights.tobytes()
+    data = bytearray(bad.read_bytes())
+    data[80:100] = bytes(20)  # within the first member
+    bad.write_bytes(data)
+    refusal(bad)
+
+
+def test_a_member_whose_name_is_no_text(good, bad):
+    data = good.read_bytes()
+    with zipfile.ZipFile(good) as archive:
+        directory = archive.start_dir
+    entry = bytearray(data[directory:])
+    entry[9] |= 0x08  # says that the name is UTF-8
+    entry[46] = 0xFF
+    bad.write_bytes(data[:directory] + entry)
+    refusal(bad)
+
+
+class Bomb:
+    def __init__(self, target):
+        self.target = target
+
+    def __reduce__(self):
+        return Path.touch, (self.target,)
+
+
+@pytest.mark.parametrize("key", ["heights", "config", "terrain_names", "format_version"])
+def test_a_pickled_object_is_not_even_unpickled(good, bad, tmp_path, key):
+    touched = tmp_path / "touched"
+    repack(good, bad, {key: npy(np.array(Bomb(touched), dtype=object))})
+    assert f"{key} has dtype object" in refusal(bad)
+    assert not touched.exists()
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        "heights",
+        "cell",
+        "lower",
+        "border",
+        "patch_size",
+        "env_origins",
+        "terrain_types",
+        "terrain_names",
+        "difficulty",
+        "boxes",
+        "config",
+        "parameters",
+    ],
+)
+def test_a_missing_array_is_named(good, bad, key):
+    repack(good, bad, {key: None})
+    assert f"has no {key}" in refusal(bad)
+
+
+@pytest.mark.parametrize("key", ["vertices", "triangles"])
+def test_a_missing_array_of_the_mesh_is_named(good, bad, key):
+    repack(good, bad, {key: None})
+    assert f"has no {key}" in refusal(bad, read_mesh)
+
+
+@pytest.mark.parametrize(
+    ("key", "shape", "wanted"),
+    [
+        ("heights", (12, 42), r"wanted (42, 12)"),  # x and y swapped
+        ("heights", (42 * 12,), r"wanted (42, 12)"),
+        ("env_origins", (1, 2, 3), r"wanted (2, 1, 3)"),
+        ("difficulty", (2,), r"wanted (2, 1)"),
+        ("lower", (3,), r"wanted (2)"),
+        ("cell", (1,), r"wanted ()"),
+    ],
+)
+def test_a_wrong_shape_is_named_with_the_right_one(good, bad, key, shape, wanted):
+    with np.load(good) as archive:
+        repack(good, bad, {key: npy(np.zeros(shape, dtype=archive[key].dtype))})
+    message = refusal(bad)
+    assert f"{key} has shape {shape}" in message
+    assert wanted in message
+
+
+@pytest.mark.parametrize(
+    ("key", "dtype"),
+    [
+        ("heights", "int32"),
+        ("heights", "float64"),
+        ("heights", "complex64"),
+        ("env_origins", "float64"),
+        ("terrain_types", "float32"),
+        ("terrain_types", "int64"),
+        ("difficulty", "bool"),
+    ],
+)
+def test_a_wrong_dtype_is_named(good, bad, key, dtype):
+    with np.load(good) as archive:
+        repack(good, bad, {key: npy(archive[key].astype(dtype))})
+    assert f"{key} has dtype {dtype}" in refusal(bad)
+
+
+def test_another_format_version_is_named_with_the_one_that_is_read(good, bad):
+    repack(good, bad, {"format_version": npy(2)})
+    assert "has format version 2; this terrainkit reads 1" in refusal(bad)
+
+
+@pytest.mark.parametrize("kind", [-1, 1, 1000])
+def test_a_terrain_type_must_have_a_name(good, bad, kind):
+    repack(good, bad, {"terrain_types": npy(np.array([[0], [kind]], dtype=np.int32))})
+    assert "terrain_types" in refusal(bad)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("cell", 0.2), ("border", 0.0), ("lower", [0.0, 0.0]), ("cell", np.nan)]
+)
+def test_numbers_that_contradict_the_config_are_named(good, bad, key, value):
+    repack(good, bad, {key: npy(value)})
+    assert f"{key} is {value}, but its config says" in refusal(bad)
+
+
+@pytest.mark.parametrize("corner", [-1, 1000])
+def test_a_triangle_must_have_its_vertices(good, bad, corner):
+    repack(good, bad, {"triangles": npy(np.array([[0, 1, corner]], dtype=np.int32))})
+    assert "triangles" in refusal(bad, read_mesh)
+
+
+def test_solids_are_not_dropped_in_silence(good, bad):
+    repack(good, bad, {"boxes": npy(np.zeros((2, 10), dtype=np.float32))})
+    assert "has 2 solids beside its height" in refusal(bad)
+
+
+@pytest.mark.parametrize("text", ["{{{", "hello", "rows = ", "a\0b", '"a\nb" = 1'])
+def test_a_config_that_is_not_toml(good, bad, text):
+    repack(good, bad, {"config": npy(text)})
+    assert "config: not a TOML file" in refusal(bad)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "named"),
+    [
+        ("rows = 2", "rows = 0", "rows"),
+        ("rows = 2", "rows = 2\nlayers = 3", "layers"),
+        ("rows = 2", 'rows = 2\n"a\\nb" = 3', "config"),
+        ('"curriculum"', "[1]", "mode"),
+        ('"pit"', '"moat"', "moat"),
+        ('"pit"', "[1]", "terrain"),
+        ("proportion = 1.0", "proportion = 'much'", "proportion"),
+        ("side = 0.6", "side = {a = 1}", "side"),
+        ("side = 0.6", f"side = {'9' * 400}", "side"),
+        ("cell = 0.1", "cell = nan", "cell"),
+    ],
+)
+def test_a_config_that_is_none(good, bad, old, new, named):
+    repack(good, bad, {"config": config_with(good, old, new)})
+    assert named in refusal(bad)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{}",
+        "[]",
+        "[[1], [2]]",
+        "[[{}], [{}]]",
+        '[[{"requested": {"depth": "deep"}, "realized": {}}], []]',
+        '[[{"requested": {}, "realized": {"side": [1, 2, 3]}}], []]',
+        "[" * 100_000,
+        "1" * 5000,
+    ],
+    ids=["none", "table", "empty", "numbers", "bare", "text", "triple", "deep", "long"],
+)
+def test_parameters_that_are_none(good, bad, text):
+    repack(good, bad, {"parameters": npy(text)})
+    assert "parameters cannot be read" in refusal(bad)
+
+
+@pytest.mark.parametrize(
+    "header",
+    ["", "{", "(" * 500, "[]", "{'descr': 'x', 'fortran_order': False, 'shape': ()}", "x" * 20_000],
+    ids=["none", "open", "deep", "list", "no dtype", "long"],
+)
+def test_an_array_whose_header_is_none(good, bad, header):
+    repack(good, bad, {"heights": npy_header(header)})
+    assert "heights cannot be read" in refusal(bad)
+
+
+def test_a_text_of_characters_that_there_are_not(good, bad):
+    repack(good, bad, {"config": npy_that_declares("<U2", ()) + b"\xff" * 8})
+    assert "config" in refusal(bad)
+
+
+# ---- what is too large -------------------------------------------------------------------------
+
+
+def test_heights_larger_than_the_map_are_not_read(good, bad):
+    repack(good, bad, {"heights": npy_that_declares("<f4", (10**6, 10**6))})
+    assert "heights has shape (1000000, 1000000); wanted (42, 12)" in refusal(bad)
+
+
+@pytest.mark.parametrize("key", ["config", "parameters"])
+def test_a_huge_text_is_not_read(good, bad, key):
+    repack(good, bad, {key: npy_that_declares("<U400000000", ())})
+    assert f"{key} takes 1600000000 bytes" in refusal(bad)
+
+
+@pytest.mark.parametrize(("key", "dtype"), [("vertices", "<f4"), ("triangles", "<i4")])
+def test_a_huge_mesh_is_not_read(good, bad, key, dtype):
+    repack(good, bad, {key: npy_that_declares(dtype, (10**12, 3))})
+    assert f"{key} takes {10**12 * 12} bytes" in refusal(bad, read_mesh)
+
+
+def test_a_map_beyond_the_memory_is_not_read(good, bad):
+    with np.load(good) as archive:
+        config = str(archive["config"]).replace("rows = 2", "rows = 1")
+    old = config[config.index("patch_size") : config.index("cell")]
+    changes = {
+        "config": npy(config.replace(old, "patch_size = [90000.0, 90000.0]\n")),
+        "patch_size": npy([90000.0, 90000.0]),
+        "terrain_types": npy(np.zeros((1, 1), dtype=np.int32)),
+        "heights": npy_that_declares("<f4", (900_002, 900_002)),
+    }
+    repack(good, bad, changes)
+    with pytest.raises(CapacityError, match=r"heights in .* needs .* GB of memory"):
+        TerrainMap.load(bad)

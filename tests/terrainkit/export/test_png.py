@@ -1,0 +1,101 @@
+import dataclasses
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from terrainkit.errors import ExportError
+
+
+@pytest.fixture(scope="module")
+def picture(terrain_map, tmp_path_factory):
+    path = terrain_map.save(tmp_path_factory.mktemp("png") / "map.png")
+    grey = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    return grey, json.loads(path.with_suffix(".json").read_text())
+
+
+def with_heights(terrain_map, low, high):
+    heights = np.full_like(terrain_map.heights, low)
+    heights[50:, 30:] = high
+    return dataclasses.replace(terrain_map, heights=heights)
+
+
+def read(path):
+    sidecar = json.loads(path.with_suffix(".json").read_text())
+    grey = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    return sidecar["offset"] + sidecar["scale"] * grey
+
+
+def test_it_is_16_bit_grey_as_wide_as_the_map_is_along_x(picture):
+    grey, _ = picture
+    assert grey.dtype == np.uint16
+    assert grey.shape == (144, 184)
+
+
+def test_all_grey_levels_are_used(picture):
+    grey, _ = picture
+    assert (grey.min(), grey.max()) == (0, 65535)
+
+
+def test_x_goes_right_and_y_up_with_the_sidecar_saying_where(picture, terrain_map):
+    grey, sidecar = picture
+    row, column = np.indices(grey.shape)
+    first = np.array(sidecar["first_sample"])
+    index = np.stack([column, grey.shape[0] - 1 - row], axis=-1)
+    heights = sidecar["offset"] + sidecar["scale"] * grey
+    expected = terrain_map.height(first + index * sidecar["cell"])
+    np.testing.assert_allclose(heights, expected, atol=1e-3)
+
+
+def test_the_highest_pixel_is_where_the_highest_ground_is(terrain_map, tmp_path):
+    heights = np.zeros_like(terrain_map.heights)
+    heights[20, 30] = 1.0
+    path = dataclasses.replace(terrain_map, heights=heights).save(tmp_path / "map.png")
+    # Column 20 from the left; row 30 counted from below, of 144.
+    assert np.argwhere(read(path) > 0.5).tolist() == [[144 - 1 - 30, 20]]
+
+
+def test_the_sidecar_holds_the_size_and_the_contact(picture):
+    _, sidecar = picture
+    assert sidecar["size"] == pytest.approx([18.4, 14.4])
+    assert sidecar["cell"] == 0.1
+    assert sidecar["static_friction"] == 0.8
+    assert sidecar["dynamic_friction"] == 0.6
+    assert sidecar["restitution"] == 0.1
+
+
+def test_flat_ground_keeps_its_height(terrain_map, tmp_path):
+    path = with_heights(terrain_map, 0.25, 0.25).save(tmp_path / "map.png")
+    np.testing.assert_allclose(read(path), 0.25)
+
+
+def test_ground_below_zero_keeps_its_height(terrain_map, tmp_path):
+    path = with_heights(terrain_map, -7.5, -3.0).save(tmp_path / "map.png")
+    heights = read(path)
+    assert heights.min() == pytest.approx(-7.5)
+    assert heights.max() == pytest.approx(-3.0)
+
+
+@pytest.mark.parametrize("height", [100.0, 131.0])
+def test_ground_up_to_131_metres_high_is_held_to_a_millimetre(terrain_map, tmp_path, height):
+    rng = np.random.default_rng(0)
+    heights = rng.uniform(0, height, terrain_map.heights.shape).astype(np.float32)
+    heights[0, :2] = 0.0, height
+    path = dataclasses.replace(terrain_map, heights=heights).save(tmp_path / "map.png")
+    # 65535 steps of 2 mm are 131.07 m; rounding is off by half a step.
+    np.testing.assert_allclose(read(path)[::-1].T, heights, atol=1e-3 + 1e-5)
+
+
+def test_ground_higher_than_that_is_an_error_and_writes_nothing(terrain_map, tmp_path):
+    with pytest.raises(ExportError, match=r"heights span 131\.2 m; a \.png holds 131\.07 m"):
+        with_heights(terrain_map, -0.1, 131.1).save(tmp_path / "map.png")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_json_that_is_there_is_kept(terrain_map, tmp_path):
+    (tmp_path / "map.json").write_text("mine")
+    with pytest.raises(ExportError, match=r"map\.json exists"):
+        terrain_map.save(tmp_path / "map.png")
+    assert (tmp_path / "map.json").read_text() == "mine"
+    assert not (tmp_path / "map.png").exists()

@@ -1,0 +1,74 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays
+
+from terrainkit.mesh.loops import Loops, laid_out, runs
+
+
+def loops(*rings, clockwise=False):
+    return Loops(
+        vertices=np.array([vertex for ring in rings for vertex in ring]),
+        owner=np.repeat(np.arange(len(rings)), [len(ring) for ring in rings]),
+        centres=np.array([[k, 0, 0] for k in range(len(rings))], dtype=np.float32),
+        clockwise=clockwise,
+    )
+
+
+def test_a_loop_of_four_vertices_is_cut_along_a_diagonal():
+    triangles, centres = loops([3, 4, 6, 5]).triangles(first=10)
+    assert triangles.tolist() == [[3, 4, 6], [3, 6, 5]]
+    assert len(centres) == 0
+
+
+def test_a_loop_with_more_is_a_fan_around_its_centre():
+    triangles, centres = loops([0, 1, 2, 3, 4]).triangles(first=10)
+    assert triangles.tolist() == [[0, 1, 10], [1, 2, 10], [2, 3, 10], [3, 4, 10], [4, 0, 10]]
+    assert centres.tolist() == [[0, 0, 0]]
+
+
+def test_only_fans_take_a_centre():
+    triangles, centres = loops([0, 1, 2, 3], [4, 5, 6, 7, 8], [5, 6, 7, 8, 9]).triangles(first=10)
+    assert centres[:, 0].tolist() == [1, 2]
+    assert np.unique(triangles[triangles >= 10]).tolist() == [10, 11]
+    assert len(triangles) == 2 + 5 + 5
+
+
+def test_clockwise_loops_are_turned():
+    triangles, _ = loops([3, 4, 6, 5], clockwise=True).triangles(first=10)
+    assert triangles.tolist() == [[6, 4, 3], [5, 6, 3]]
+
+
+@pytest.mark.parametrize(
+    ("lengths", "owner", "place"),
+    [
+        ([2, 0, 3], [0, 0, 2, 2, 2], [0, 1, 0, 1, 2]),
+        ([1], [0], [0]),
+        ([], [], []),
+    ],
+)
+def test_items_are_laid_end_to_end(lengths, owner, place):
+    found = laid_out(np.array(lengths, dtype=np.int64))
+    assert [each.tolist() for each in found] == [owner, place]
+
+
+def test_runs_are_told_apart_at_the_ends_of_rows():
+    mask = np.array([[1, 1, 0, 1], [1, 0, 0, 0], [0, 0, 0, 0], [1, 1, 1, 1]], dtype=bool)
+    row, start, stop = runs(mask)
+    assert row.tolist() == [0, 0, 1, 3]
+    assert start.tolist() == [0, 3, 0, 0]
+    assert stop.tolist() == [2, 4, 1, 4]
+
+
+@given(mask=arrays(bool, array_shapes(min_dims=2, max_dims=2, max_side=8), elements=st.booleans()))
+@settings(deadline=None, derandomize=True, max_examples=60)
+def test_runs_hold_every_true_once_and_end_at_a_false(mask):
+    row, start, stop = runs(mask)
+    count = np.zeros(mask.shape, dtype=int)
+    padded = np.pad(mask, ((0, 0), (1, 1)))
+    for i, a, b in zip(row, start, stop, strict=True):
+        count[i, a:b] += 1
+        assert not padded[i, a]
+        assert not padded[i, b + 1]
+    assert np.array_equal(count, mask)

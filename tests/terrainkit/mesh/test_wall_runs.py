@@ -1,0 +1,64 @@
+import numpy as np
+import pytest
+
+from terrainkit.grid import Grid
+from terrainkit.mesh.lattice import Lattice
+from terrainkit.mesh.wall_runs import WallRuns
+
+
+def cliff(height):
+    heights = np.zeros((2, 4), dtype=np.float32)
+    heights[1] = height
+    return heights
+
+
+@pytest.fixture(params=["across x", "across y"])
+def across_y(request):
+    return request.param == "across y"
+
+
+def lattice_and_runs(heights, straight, *, across_y):
+    heights = heights.T if across_y else heights
+    straight = straight.T if across_y else straight
+    lattice = Lattice.of(heights, Grid(shape=heights.shape, cell=1.0), 0.5)
+    find = WallRuns.across_y if across_y else WallRuns.across_x
+    return lattice, find(lattice, straight), straight
+
+
+def straight_quads():
+    quads = np.zeros((3, 5), dtype=bool)
+    quads[1] = True
+    return quads
+
+
+@pytest.mark.parametrize("height", [2.0, -2.0])
+def test_a_straight_wall_is_one_panel_that_faces_the_low_side(across_y, height):
+    lattice, found, _ = lattice_and_runs(cliff(height), straight_quads(), across_y=across_y)
+    panels = found.panels()
+    corners = lattice.middles()[panels - lattice.z.size].astype(float)
+    doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    # 4 m long and 2 m high, in two triangles; downhill is against the axis where it rises.
+    assert doubled[:, 1 if across_y else 0].tolist() == [-4.0 * height] * 2
+    assert np.delete(doubled, 1 if across_y else 0, axis=1).tolist() == [[0.0, 0.0]] * 2
+
+
+def test_a_wall_one_quad_long_is_left_alone(across_y):
+    quads = straight_quads()
+    quads[1, 1] = False
+    _, found, left = lattice_and_runs(cliff(2.0), quads, across_y=across_y)
+    assert found.j0.tolist() == [2]
+    assert found.j1.tolist() == [5]
+    assert left.sum() == 3
+
+
+def test_the_strips_beside_a_wall_keep_the_nodes_that_others_need(across_y):
+    lattice, found, _ = lattice_and_runs(cliff(2.0), straight_quads(), across_y=across_y)
+    kept = np.zeros(lattice.z.shape, dtype=bool)
+    found.keep_ends(kept)
+    assert kept.sum() == 4
+    low, high = found.strips(kept)
+    assert [len(low.vertices), len(high.vertices)] == [4, 4]
+    kept[(2, 1) if across_y else (1, 2)] = True  # on the low side
+    low, high = found.strips(kept)
+    assert [len(low.vertices), len(high.vertices)] == [5, 4]
+    assert [low.centres[0, 2], high.centres[0, 2]] == [0.0, 2.0]

@@ -1,0 +1,14 @@
+import numpy as np
+import pytest
+
+from terrainkit.grid import Grid
+
+
+@pytest.fixture
+def plot():
+    return Grid(shape=(80, 80), cell=0.1)
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(0)

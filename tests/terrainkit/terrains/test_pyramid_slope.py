@@ -1,0 +1,91 @@
+import numpy as np
+import pytest
+
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+from terrainkit.terrains.pyramid_slope import PyramidSlope
+
+
+def quads(heights):
+    """Return the four corners of each quad between samples, shape (4, nx - 1, ny - 1) [m]."""
+    return np.stack([heights[:-1, :-1], heights[1:, :-1], heights[:-1, 1:], heights[1:, 1:]])
+
+
+def test_a_grade_of_0_4_peaks_at_one_metre(plot, rng):
+    heights = PyramidSlope(grade=0.4, platform=3.0).build(plot, rng)
+    # From the platform of 3 m to the edge of the 8 m patch are 2.5 m.
+    assert heights.max() == pytest.approx(1.0)
+    assert heights.min() == 0.0
+
+
+@pytest.mark.parametrize("shape", [(80, 80), (80, 40), (73, 51)])
+def test_the_grade_is_the_one_asked_everywhere_off_the_platform(shape, rng):
+    corners = quads(PyramidSlope(grade=0.4).build(Grid(shape=shape, cell=0.1), rng))
+    off = corners.min(axis=0) < corners.max()
+    assert off.mean() > 0.5
+    grades = np.ptp(corners, axis=0) / 0.1
+    assert grades[off] == pytest.approx(np.full(off.sum(), 0.4), abs=1e-5)
+    assert not grades[~off].any()
+
+
+@pytest.mark.parametrize(
+    ("shape", "asked", "sides"),
+    [
+        ((80, 80), 3.0, (30, 30)),
+        ((80, 80), 2.0, (20, 20)),
+        ((80, 40), 3.0, (30, 30)),
+        ((73, 51), 3.0, (31, 31)),
+        ((80, 51), 3.0, (30, 31)),
+    ],
+)
+def test_the_platform_is_level_centred_and_as_large_as_asked(shape, asked, sides, rng):
+    plot = Grid(shape=shape, cell=0.1)
+    slope = PyramidSlope(grade=0.4, platform=asked)
+    top = slope.build(plot, rng) == slope.build(plot, rng).max()
+    assert (top.any(axis=1).sum(), top.any(axis=0).sum()) == sides
+    assert top.sum() == sides[0] * sides[1]
+    assert (top == top[::-1, ::-1]).all()
+    realized = slope.realized(plot)["platform"]
+    assert np.broadcast_to(realized, 2) == pytest.approx(np.array(sides) * 0.1)
+
+
+def test_where_the_patch_is_narrower_its_sides_end_higher(rng):
+    heights = PyramidSlope(grade=0.4).build(Grid(shape=(80, 40), cell=0.1), rng)
+    # Along x the ground falls for 2.5 m, along y for 0.5 m.
+    assert heights[0, 20] == 0.0
+    assert heights[40, 0] == pytest.approx(1.0 - 0.2)
+
+
+def test_all_four_sides_are_alike(plot, rng):
+    heights = PyramidSlope().build(plot, rng)
+    assert (heights == heights.T).all()
+    assert (heights == heights[::-1]).all()
+
+
+def test_inverted_is_upside_down(plot, rng):
+    upright = PyramidSlope(grade=0.3).build(plot, rng)
+    assert (PyramidSlope(grade=0.3, inverted=True).build(plot, rng) == -upright).all()
+
+
+@pytest.mark.parametrize(("difficulty", "peak"), [(0.0, 0.0), (0.5, 0.5), (1.0, 1.0)])
+def test_the_grade_grows_with_the_difficulty(difficulty, peak, plot, rng):
+    assert PyramidSlope.at(difficulty).build(plot, rng).max() == pytest.approx(peak)
+
+
+def test_a_platform_of_the_whole_patch_leaves_no_slope(plot, rng):
+    assert not PyramidSlope(grade=0.4, platform=8.0).build(plot, rng).any()
+
+
+@pytest.mark.parametrize(("shape", "size"), [((80, 80), "8 m x 8 m"), ((90, 80), "9 m x 8 m")])
+def test_a_platform_larger_than_the_patch_is_an_error(shape, size, rng):
+    with pytest.raises(
+        ConfigError, match=rf"pyramid_slope: platform 8\.2 m does not fit in a patch of {size}"
+    ):
+        PyramidSlope(platform=8.2).build(Grid(shape=shape, cell=0.1), rng)
+
+
+def test_a_platform_smaller_than_a_cell_is_an_error(plot, rng):
+    with pytest.raises(
+        ConfigError, match=r"platform 0\.05 m cannot be held by cells of 0\.1 m; wanted 0\.1 m"
+    ):
+        PyramidSlope(platform=0.05).build(plot, rng)

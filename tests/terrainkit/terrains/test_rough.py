@@ -1,0 +1,82 @@
+import numpy as np
+import pytest
+
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+from terrainkit.terrains.rough import Rough
+
+
+def build(plot, seed=0, **parameters):
+    return Rough(**parameters).build(plot, np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("shape", [(80, 80), (80, 40), (73, 51)])
+def test_heights_lie_within_the_amplitude_on_both_sides_of_zero(shape):
+    heights = build(Grid(shape=shape, cell=0.1), amplitude=0.08)
+    assert np.abs(heights).max() <= 0.08 + 1e-6
+    assert heights.min() < -0.04
+    assert heights.max() > 0.04
+
+
+@pytest.mark.parametrize(
+    ("shape", "asked", "sides"),
+    [((80, 80), 2.0, (20, 20)), ((80, 40), 3.0, (30, 30)), ((73, 51), 2.0, (21, 21))],
+)
+def test_the_platform_is_level_and_centred(shape, asked, sides):
+    plot = Grid(shape=shape, cell=0.1)
+    heights = build(plot, platform=asked)
+    x, y = ((n - side) // 2 for n, side in zip(shape, sides, strict=True))
+    assert not heights[x : x + sides[0], y : y + sides[1]].any()
+    assert heights[x - 1].any()
+    assert heights[:, y - 1].any()
+    assert heights[x + sides[0]].any()
+    assert Rough(platform=asked).realized(plot)["platform"] == pytest.approx(sides[0] * 0.1)
+
+
+def test_noise_grows_to_its_full_height_one_spacing_from_the_platform(plot):
+    near, far = (build(plot, platform=2.0, spacing=spacing) for spacing in (0.1, 0.2))
+    # The first ring around the platform has full noise at a spacing of one cell, half at two.
+    assert np.abs(near[29, 30:50]).max() > 0.03
+    assert np.abs(far[29, 30:50]).max() <= 0.05
+
+
+def test_heights_next_to_one_another_are_apart_by_at_most_the_lattice(plot):
+    # Between two draws 0.4 m apart lie four cells, and at most twice the amplitude.
+    heights = build(plot, amplitude=0.1, spacing=0.4, platform=0.2)
+    assert np.abs(np.diff(heights, axis=0)).max() <= 2 * 0.1 / 4 + 0.1 / 4 + 1e-6
+
+
+def test_the_pattern_stays_as_the_amplitude_grows(plot):
+    low, high = (build(plot, amplitude=amplitude, step=0.0) for amplitude in (0.05, 0.1))
+    assert high == pytest.approx(2 * low, abs=1e-6)
+
+
+def test_another_draw_is_another_ground(plot):
+    assert (build(plot, 1) != build(plot, 2)).any()
+
+
+@pytest.mark.parametrize(("difficulty", "amplitude"), [(0.0, 0.02), (0.5, 0.06), (1.0, 0.1)])
+def test_the_amplitude_grows_with_the_difficulty(difficulty, amplitude, plot, rng):
+    highest = np.abs(Rough.at(difficulty).build(plot, rng)).max()
+    assert 0.8 * amplitude < highest <= amplitude + 1e-6
+
+
+def test_what_is_built_is_recorded():
+    terrain = Rough(amplitude=0.036, step=0.005, spacing=0.27, platform=2.04)
+    assert terrain.realized(Grid(shape=(80, 51), cell=0.1)) == {
+        "amplitude": 0.035,
+        "step": 0.005,
+        # 8 m are 29.6 intervals of 0.27 m, so 30; 5.1 m are 18.9, so 19.
+        "spacing": (0.266666667, 0.268421053),
+        "platform": (2.0, 2.1),
+    }
+
+
+@pytest.mark.parametrize("spacing", [0.04, 1e-310])
+def test_a_spacing_below_a_cell_is_a_cell(spacing, plot):
+    assert (build(plot, spacing=spacing) == build(plot, spacing=0.1)).all()
+
+
+def test_a_platform_larger_than_the_patch_is_an_error(plot):
+    with pytest.raises(ConfigError, match="rough: platform 9 m does not fit in a patch of 8 m x 8"):
+        build(plot, platform=9.0)

@@ -1,0 +1,79 @@
+import numpy as np
+import pytest
+
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+from terrainkit.terrains.pyramid_slope import PyramidSlope
+from terrainkit.terrains.rough_slope import RoughSlope
+
+
+def roughness(terrain, plot, seed=0):
+    """Return how far the ground lies above the same slope without noise [m]."""
+    slope = PyramidSlope(grade=terrain.grade, platform=terrain.platform, inverted=terrain.inverted)
+    heights = terrain.build(plot, np.random.default_rng(seed)).astype(float)
+    return heights - slope.build(plot, np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("inverted", [False, True])
+def test_without_noise_it_is_the_pyramid_slope(inverted, plot):
+    terrain = RoughSlope(amplitude=0.0, inverted=inverted)
+    assert not roughness(terrain, plot).any()
+
+
+@pytest.mark.parametrize("shape", [(80, 80), (80, 40), (73, 51)])
+def test_noise_stays_within_its_amplitude_on_the_sides(shape):
+    noise = roughness(RoughSlope(amplitude=0.05), Grid(shape=shape, cell=0.1))
+    assert np.abs(noise).max() <= 0.05 + 1e-6
+    assert noise.min() < -0.02
+    assert noise.max() > 0.02
+
+
+@pytest.mark.parametrize(("shape", "side"), [((80, 80), 30), ((80, 40), 30), ((73, 51), 31)])
+def test_the_platform_is_level_and_the_sides_are_not(shape, side):
+    plot = Grid(shape=shape, cell=0.1)
+    noise = roughness(RoughSlope(platform=3.0), plot)
+    top = np.zeros(shape, dtype=bool)
+    x, y = ((n - side) // 2 for n in shape)
+    top[x : x + side, y : y + side] = True
+    assert not noise[top].any()
+    assert (noise[~top] != 0).mean() > 0.8
+
+
+def test_the_noise_is_the_same_at_every_grade_and_either_way_up(plot):
+    steep, level = RoughSlope(grade=0.4), RoughSlope(grade=0.0)
+    below = RoughSlope(grade=0.4, inverted=True)
+    assert roughness(steep, plot) == pytest.approx(roughness(level, plot), abs=1e-6)
+    assert roughness(below, plot) == pytest.approx(roughness(level, plot), abs=1e-6)
+
+
+def test_another_draw_is_other_noise(plot):
+    assert (roughness(RoughSlope(), plot, 1) != roughness(RoughSlope(), plot, 2)).any()
+
+
+@pytest.mark.parametrize(("difficulty", "peak"), [(0.0, 0.0), (0.5, 0.5), (1.0, 1.0)])
+def test_the_grade_grows_with_the_difficulty(difficulty, peak, plot, rng):
+    assert RoughSlope.at(difficulty).build(plot, rng)[40, 40] == pytest.approx(peak)
+
+
+def test_what_is_built_is_recorded():
+    terrain = RoughSlope(grade=0.3, amplitude=0.05, step=0.02, spacing=0.24, platform=2.9)
+    assert terrain.realized(Grid(shape=(80, 51), cell=0.1)) == {
+        "grade": 0.3,
+        "amplitude": 0.04,
+        "step": 0.02,
+        # 8 m are 33.3 intervals of 0.24 m, so 33; 5.1 m are 21.25, so 21.
+        "spacing": (0.242424242, 0.242857143),
+        "platform": (3.0, 2.9),
+        "inverted": False,
+    }
+
+
+def test_a_platform_larger_than_the_patch_is_an_error(plot, rng):
+    with pytest.raises(ConfigError, match="rough_slope: platform 9 m does not fit in a patch"):
+        RoughSlope(platform=9.0).build(plot, rng)
+
+
+@pytest.mark.parametrize("spacing", [0.04, 1e-310])
+def test_a_spacing_below_a_cell_is_a_cell(spacing, plot):
+    fine, cell = RoughSlope(spacing=spacing), RoughSlope(spacing=0.1)
+    assert (roughness(fine, plot) == roughness(cell, plot)).all()

@@ -1,0 +1,106 @@
+import numpy as np
+import pytest
+
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+from terrainkit.terrains.stepping_stones import SteppingStones
+
+
+def runs(line):
+    """Return the lengths of the runs of True in `line` that do not touch its ends, in cells."""
+    edges = np.flatnonzero(np.diff(line.astype(int)))
+    lengths = np.diff(edges)
+    return lengths[::2] if not line[0] else lengths[1::2]
+
+
+def build(plot, seed=0, **parameters):
+    return SteppingStones(**parameters).build(plot, np.random.default_rng(seed))
+
+
+def test_rows_of_stones_are_a_stone_deep_and_a_distance_apart(plot):
+    heights = build(plot, stone=0.5, distance=0.3)
+    holes = (heights[:, :20] < 0).all(axis=1)  # beside the platform, from 2.0 to 6.0 m
+    assert np.flatnonzero(~holes).tolist() == [k for k in range(80) if k % 8 < 5]
+
+
+def test_stones_in_a_row_are_as_wide_and_as_far_apart_as_asked(plot):
+    stones = build(plot, stone=0.5, distance=0.3)[:20] == 0
+    for row in (0, 8, 16):
+        assert set(runs(stones[row])) == {5}
+        assert set(runs(~stones[row])) == {3}
+
+
+def test_a_stone_is_square(plot):
+    stones = build(plot, stone=0.5, distance=0.3)[:20] == 0
+    assert all((stones[k] == stones[0]).all() for k in range(5))
+    assert all((stones[8 + k] == stones[8]).all() for k in range(5))
+
+
+def test_each_row_is_shifted_on_its_own(plot):
+    stones = build(plot, stone=0.5, distance=0.3, platform=0.2) == 0
+    assert len({stones[8 * row].tobytes() for row in range(10)}) > 3
+
+
+def test_stones_are_at_zero_and_holes_at_their_depth(plot):
+    assert np.unique(build(plot, stone=0.5, distance=0.3)).tolist() == [-10.0, 0.0]
+    assert np.unique(build(plot, stone=0.5, distance=0.3, depth=2.5)).tolist() == [-2.5, 0.0]
+
+
+def test_variation_gives_each_stone_its_own_level(plot):
+    heights = build(plot, stone=0.5, distance=0.3, variation=0.1, platform=0.2)
+    tops = heights[heights > -1]
+    assert np.abs(tops).max() <= 0.1
+    assert np.ptp(tops) > 0.1
+    first = heights[:5][:, heights[0] > -1]
+    assert np.ptp(first, axis=0).max() == 0.0
+    # Ten rows of ten stones or eleven, and the platform.
+    assert 100 <= len(np.unique(tops)) <= 111
+
+
+@pytest.mark.parametrize(("shape", "sides"), [((80, 80), (40, 40)), ((73, 51), (41, 41))])
+def test_the_platform_is_level_and_centred(shape, sides):
+    heights = build(Grid(shape=shape, cell=0.1), stone=0.3, distance=0.4, variation=0.05)
+    x, y = ((n - side) // 2 for n, side in zip(shape, sides, strict=True))
+    assert not heights[x : x + sides[0], y : y + sides[1]].any()
+    assert (heights[x - 1] != 0).all()
+    assert (heights[:, y - 1] != 0).all()
+
+
+def test_a_platform_as_wide_as_the_patch_bridges_it():
+    heights = build(Grid(shape=(80, 40), cell=0.1), platform=4.0)
+    assert not heights[20:60].any()
+    assert heights[:20].min() == -10.0
+
+
+@pytest.mark.parametrize(
+    ("difficulty", "asked", "built"),
+    [
+        # Easy 1.575 and 0.05 m, hard 0.075 and 0.1 m.
+        (0.0, (1.575, 0.05), (1.6, 0.1)),
+        (0.5, (0.825, 0.075), (0.8, 0.1)),
+        (1.0, (0.075, 0.1), (0.1, 0.1)),
+    ],
+)
+def test_stones_shrink_with_the_difficulty(difficulty, asked, built, plot):
+    terrain = SteppingStones.at(difficulty)
+    assert (terrain.stone, terrain.distance) == pytest.approx(asked)
+    realized = terrain.realized(plot)
+    assert (realized["stone"], realized["distance"]) == built
+    pitch = round((built[0] + built[1]) / 0.1)
+    rows = (terrain.build(plot, np.random.default_rng(0))[:20, :20] == 0).any(axis=1)
+    assert np.flatnonzero(~rows).tolist() == list(range(pitch - 1, 20, pitch))
+
+
+@pytest.mark.parametrize(("stone", "distance"), [(0.01, 0.3), (0.5, 0.01)])
+def test_a_length_below_a_cell_is_a_cell_and_the_record_says_so(stone, distance, plot):
+    terrain = SteppingStones(stone=stone, distance=distance)
+    realized = terrain.realized(plot)
+    assert (realized["stone"], realized["distance"]) == (max(stone, 0.1), max(distance, 0.1))
+    stones = build(plot, stone=stone, distance=distance)[:20] == 0
+    assert set(runs(stones[0])) == {round(max(stone, 0.1) / 0.1)}
+    assert set(runs(~stones[0])) == {round(max(distance, 0.1) / 0.1)}
+
+
+def test_a_platform_larger_than_the_patch_is_an_error(plot):
+    with pytest.raises(ConfigError, match="stepping_stones: platform 9 m does not fit"):
+        build(plot, platform=9.0)

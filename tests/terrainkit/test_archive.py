@@ -1,0 +1,89 @@
+import numpy as np
+import pytest
+
+from terrainkit.archive import opened
+from terrainkit.errors import MapFileError
+
+
+@pytest.fixture
+def path(tmp_path):
+    np.savez(
+        tmp_path / "some.npz",
+        heights=np.arange(6, dtype=np.float32).reshape(2, 3),
+        cell=np.float64(0.1),
+        lower=np.array([-1.0, 2.0]),
+        count=np.int64(3),
+        words=np.array(["slope", "\N{MOUNTAIN}"]),
+        note=np.array("gr\u00fcn"),
+    )
+    return tmp_path / "some.npz"
+
+
+@pytest.fixture
+def archive(path):
+    with opened(path) as archive:
+        yield archive
+
+
+def test_arrays_go_by_their_names(archive):
+    assert archive.names() == {"heights", "cell", "lower", "count", "words", "note"}
+
+
+@pytest.mark.parametrize(
+    ("key", "kind", "shape"),
+    [
+        ("heights", "f4", (2, 3)),
+        ("heights", "f4", (None, 3)),
+        ("heights", "f", (None, None)),
+        ("count", "i", ()),
+        ("words", "U", (2,)),
+    ],
+)
+def test_an_array_is_read_if_it_is_what_was_expected(archive, key, kind, shape):
+    array = archive.array(key, kind, shape)
+    assert len(array.shape) == len(shape)
+    assert array.dtype.kind == kind[0]
+
+
+def test_values_are_read_as_they_were_written(archive):
+    assert archive.array("heights", "f4", (2, 3)).tolist() == [[0, 1, 2], [3, 4, 5]]
+    assert archive.array("words", "U", (2,)).tolist() == ["slope", "\N{MOUNTAIN}"]
+    assert archive.text("note") == "gr\u00fcn"
+
+
+@pytest.mark.parametrize(
+    ("key", "kind", "shape", "message"),
+    [
+        ("heights", "f8", (2, 3), "heights has dtype float32; wanted float64"),
+        ("heights", "i", (2, 3), "heights has dtype float32; wanted whole numbers"),
+        ("heights", "U", (2, 3), "heights has dtype float32; wanted a text"),
+        ("heights", "f4", (3, 2), r"heights has shape \(2, 3\); wanted \(3, 2\)"),
+        ("heights", "f4", (None,), r"heights has shape \(2, 3\); wanted \(any\)"),
+        ("depths", "f4", (2, 3), "has no depths"),
+    ],
+)
+def test_an_array_that_is_not_as_expected_is_refused(archive, key, kind, shape, message):
+    with pytest.raises(MapFileError, match=message):
+        archive.array(key, kind, shape)
+
+
+def test_an_array_may_take_its_limit_and_no_more(archive):
+    assert archive.array("heights", "f4", (2, 3), limit=24).nbytes == 24
+    with pytest.raises(MapFileError, match="heights takes 24 bytes; 23 at most"):
+        archive.array("heights", "f4", (2, 3), limit=23)
+
+
+@pytest.mark.parametrize(("key", "wanted"), [("cell", 0.1), ("lower", (-1.0, 2.0))])
+def test_numbers_as_expected_pass(archive, key, wanted):
+    archive.expect(key, wanted)
+
+
+@pytest.mark.parametrize(("key", "wanted"), [("cell", 0.1001), ("lower", (2.0, -1.0))])
+def test_other_numbers_are_refused(archive, key, wanted):
+    with pytest.raises(MapFileError, match=f"{key} is .*, but its config says"):
+        archive.expect(key, wanted)
+
+
+def test_the_name_of_a_file_may_be_a_text(path):
+    with opened(str(path)) as archive:
+        assert archive.path == path

@@ -1,0 +1,178 @@
+import errno
+import os
+from pathlib import Path
+
+import pytest
+
+from terrainkit.atomic import atomic_write
+from terrainkit.errors import ExportError
+
+
+@pytest.fixture
+def target(tmp_path):
+    return tmp_path / "map.npz"
+
+
+def write(path, *, then=None, overwrite=False):
+    with atomic_write(path, overwrite=overwrite) as temporary:
+        temporary.write_text("new")
+        if then:
+            then(temporary)
+
+
+def fail_with(error):
+    def fail(_):
+        raise error
+
+    return fail
+
+
+def write_sidecar(temporary):
+    temporary.with_suffix(".json").write_text("{}")
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_what_is_written_is_there_once_the_block_is_through(target):
+    with atomic_write(target) as temporary:
+        temporary.write_text("new")
+        assert not target.exists()
+        assert temporary.name == target.name
+    assert target.read_text() == "new"
+    assert names(target.parent) == ["map.npz"]
+
+
+def test_an_existing_file_is_kept(target):
+    target.write_text("old")
+    with pytest.raises(ExportError, match=r"map\.npz exists"):
+        write(target)
+    assert target.read_text() == "old"
+    assert names(target.parent) == ["map.npz"]
+
+
+def test_an_existing_file_is_replaced_where_that_is_allowed(target):
+    target.write_text("old")
+    write(target, overwrite=True)
+    assert target.read_text() == "new"
+
+
+def test_a_file_that_appears_meanwhile_is_kept(target):
+    with pytest.raises(ExportError, match="exists"):
+        write(target, then=lambda _: target.write_text("other"))
+    assert target.read_text() == "other"
+    assert names(target.parent) == ["map.npz"]
+
+
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt, OSError])
+def test_an_error_inside_leaves_nothing_behind(target, error):
+    with pytest.raises((error, ExportError)):
+        write(target, then=fail_with(error))
+    assert names(target.parent) == []
+
+
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt, OSError])
+def test_an_error_inside_leaves_the_file_that_was_there(target, error):
+    target.write_text("old")
+    with pytest.raises((error, ExportError)):
+        write(target, then=fail_with(error), overwrite=True)
+    assert target.read_text() == "old"
+    assert names(target.parent) == ["map.npz"]
+
+
+def test_a_full_disk_is_an_export_error(target):
+    full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    with pytest.raises(ExportError, match=r"cannot write .*map\.npz: No space left on device"):
+        write(target, then=fail_with(full))
+    assert names(target.parent) == []
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
+def test_a_disk_that_fills_up_while_writing_is_an_export_error(target):
+    with pytest.raises(ExportError, match="No space left on device"):
+        write(target, then=lambda _: Path("/dev/full").write_text("more"))
+
+
+def test_a_sidecar_moves_along(target):
+    write(target, then=write_sidecar)
+    assert names(target.parent) == ["map.json", "map.npz"]
+
+
+def test_a_sidecar_replaces_no_file_that_is_there(target):
+    sidecar = target.with_suffix(".json")
+    sidecar.write_text("mine")
+    with pytest.raises(ExportError, match=r"map\.json exists"):
+        write(target, then=write_sidecar)
+    assert sidecar.read_text() == "mine"
+    assert names(target.parent) == ["map.json"]
+
+
+def test_a_sidecar_is_replaced_with_the_file_where_that_is_allowed(target):
+    sidecar = target.with_suffix(".json")
+    sidecar.write_text("mine")
+    write(target, then=write_sidecar, overwrite=True)
+    assert sidecar.read_text() == "{}"
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_a_folder_is_no_target(target, overwrite):
+    target.mkdir()
+    with pytest.raises(ExportError, match=r"cannot write .*map\.npz: it is a folder"):
+        write(target, overwrite=overwrite)
+    assert names(target.parent) == ["map.npz"]
+
+
+def test_a_missing_folder_is_not_made(tmp_path):
+    with pytest.raises(ExportError, match=r"cannot write .*: there is no folder .*nowhere"):
+        write(tmp_path / "nowhere" / "map.npz")
+    assert names(tmp_path) == []
+
+
+def test_a_file_is_no_folder(target):
+    target.write_text("old")
+    with pytest.raises(ExportError, match="cannot write"):
+        write(target / "map.npz")
+    assert target.read_text() == "old"
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_a_fifo_is_no_target(target, overwrite):
+    os.mkfifo(target)
+    with pytest.raises(ExportError, match="it is there, and not a plain file"):
+        write(target, overwrite=overwrite)
+    assert target.is_fifo()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
+def test_a_device_is_no_target(target):
+    target.symlink_to("/dev/full")
+    with pytest.raises(ExportError, match="it is there, and not a plain file"):
+        write(target, overwrite=True)
+    assert target.is_char_device()
+
+
+def test_a_link_to_nothing_is_no_target(target):
+    target.symlink_to("nowhere")
+    with pytest.raises(ExportError, match="it is there, and not a plain file"):
+        write(target, overwrite=True)
+
+
+def test_a_name_too_long_for_the_disk_is_an_export_error(tmp_path):
+    with pytest.raises(ExportError, match=r"cannot write .*: File name too long"):
+        write(tmp_path / ("m" * 300))
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_read_only_folder_is_an_export_error(target):
+    target.parent.chmod(0o500)
+    with pytest.raises(ExportError, match=r"cannot write .*: Permission denied"):
+        write(target)
+    target.parent.chmod(0o700)
+
+
+def test_others_may_read_what_is_written_as_the_umask_says(target):
+    before = os.umask(0o022)
+    write(target)
+    os.umask(before)
+    assert target.stat().st_mode & 0o777 == 0o644

@@ -1,0 +1,137 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays
+
+from terrainkit import MapConfig, TerrainChoice, generate
+from terrainkit.boxes import box_cover, level_cells
+from terrainkit.grid import Grid
+from terrainkit.surface import surface_at
+
+SMALL = arrays(
+    np.float32,
+    array_shapes(min_dims=2, max_dims=2, min_side=1, max_side=7),
+    elements=st.integers(0, 3),
+)
+HEIGHTFIELDS = SMALL | SMALL.map(lambda z: np.kron(z, np.ones((2, 3), dtype=np.float32)))
+
+
+def top_at(cover, xy):
+    beside = np.abs(xy[:, None] - cover.centres[:, :2]) > cover.half_sizes[:, :2]
+    tops = cover.centres[:, 2] + cover.half_sizes[:, 2]
+    return np.where(beside.any(axis=2), -np.inf, tops).max(axis=1, initial=-np.inf)
+
+
+def points_in_cells(cells, cell, lower):
+    inside = np.array([(0.02, 0.03), (0.96, 0.48), (0.52, 0.51), (0.04, 0.97), (0.98, 0.95)])
+    return ((np.argwhere(cells)[:, None] + inside) * cell + lower).reshape(-1, 2)
+
+
+def cover_of(heights, threshold):
+    seams = tuple(np.array([0, n // 2, n]) for n in heights.shape)
+    return box_cover(heights, Grid(shape=heights.shape, cell=1.0), threshold, seams)
+
+
+def patch(terrain, *, size=(6.0, 4.0), **parameters):
+    choice = TerrainChoice(terrain=terrain, parameters=parameters)
+    config = MapConfig(
+        rows=1, cols=1, patch_size=size, border=0.0, terrains=(choice,), spawn_radius=0.3
+    )
+    return generate(config)
+
+
+@given(heights=HEIGHTFIELDS, threshold=st.sampled_from([0.5, 1.5, 2.5]))
+@settings(deadline=None, derandomize=True, max_examples=100)
+def test_covered_cells_are_met_and_nothing_stands_above_the_ground(heights, threshold):
+    cover = cover_of(heights, threshold)
+    on, off = (points_in_cells(cells, 1.0, 0.0) for cells in (cover.covered, ~cover.covered))
+    ground = surface_at(heights, on - 0.5, threshold=threshold).height
+    np.testing.assert_allclose(top_at(cover, on), ground, atol=1e-6)
+    ground = surface_at(heights, off - 0.5, threshold=threshold).height
+    assert (top_at(cover, off) <= ground + 1e-6).all()
+
+
+@given(heights=HEIGHTFIELDS, threshold=st.sampled_from([0.5, 1.5, 2.5]))
+@settings(deadline=None, derandomize=True, max_examples=100)
+def test_a_level_cell_is_level_all_over(heights, threshold):
+    offsets = np.linspace(0.02, 0.98, 7) - 0.5
+    steps = np.stack(np.meshgrid(offsets, offsets), axis=-1).reshape(-1, 2)
+    place = (np.argwhere(np.ones(heights.shape))[:, None] + steps).reshape(-1, 2)
+    ground = surface_at(heights, place, threshold=threshold).height.reshape(*heights.shape, -1)
+    assert (np.ptp(ground, axis=2)[level_cells(heights, threshold)] < 1e-6).all()
+
+
+@given(heights=HEIGHTFIELDS)
+@settings(deadline=None, derandomize=True, max_examples=50)
+def test_with_a_wall_at_every_step_the_boxes_hold_all_of_the_ground(heights):
+    assert cover_of(heights, 0.5).complete
+
+
+def test_a_step_that_is_no_wall_leaves_the_cells_on_both_sides_to_a_heightfield():
+    heights = np.array([[0], [0], [0], [1], [1]], dtype=np.float32)
+    assert level_cells(heights, 2.0)[:, 0].tolist() == [True, True, False, False, True]
+    assert not cover_of(heights, 2.0).complete
+
+
+def test_a_level_map_is_met_to_a_millimetre_everywhere(level_map):
+    cover = level_map.boxes()
+    assert cover.complete
+    place = points_in_cells(cover.covered, level_map.config.cell, level_map.grid.lower)
+    np.testing.assert_allclose(top_at(cover, place), level_map.height(place), atol=1e-3)
+
+
+def test_a_map_with_slopes_is_met_where_it_is_level_and_nowhere_exceeded(terrain_map):
+    cover = terrain_map.boxes()
+    assert not cover.complete
+    assert 0.5 < cover.covered.mean() < 1.0
+    cell, lower = terrain_map.config.cell, terrain_map.grid.lower
+    on, off = (points_in_cells(cells, cell, lower) for cells in (cover.covered, ~cover.covered))
+    np.testing.assert_allclose(top_at(cover, on), terrain_map.height(on), atol=1e-3)
+    assert (top_at(cover, off) < terrain_map.height(off) + 1e-3).all()
+
+
+def test_every_box_reaches_a_metre_below_the_lowest_ground(level_map):
+    cover = level_map.boxes()
+    bottoms = cover.centres[:, 2] - cover.half_sizes[:, 2]
+    np.testing.assert_allclose(bottoms, level_map.heights.min() - 1.0)
+    assert (cover.half_sizes > 0).all()
+
+
+def test_a_flat_map_is_one_box():
+    config = MapConfig(
+        rows=2, cols=3, patch_size=(8.0, 4.0), border=1.0, terrains=(TerrainChoice(terrain="flat"),)
+    )
+    cover = generate(config).boxes()
+    assert cover.centres.tolist() == [pytest.approx([8.0, 6.0, -0.5])]
+    assert cover.half_sizes.tolist() == [pytest.approx([9.0, 7.0, 0.5])]
+
+
+@pytest.mark.parametrize("steps", [1, 2, 4])
+def test_a_pyramid_of_n_steps_is_a_stack_of_n_plus_1_boxes(steps):
+    # Steps of half a metre on either side of the platform, in a patch of 5 m.
+    pyramid = patch("pyramid_stairs", size=(5.0, 5.0), step_width=0.5, platform=5.0 - steps)
+    assert len(pyramid.boxes().centres) == steps + 1
+
+
+def test_a_pit_is_its_floor_and_four_boxes_around():
+    pit = patch("pit", depth=1.0, side=2.0)
+    assert len(pit.boxes().centres) == 4 + 1
+
+
+def test_an_inverted_pyramid_is_its_floor_and_four_boxes_a_step():
+    bowl = patch("pyramid_stairs", size=(5.0, 5.0), step_width=0.5, platform=2.0, inverted=True)
+    assert len(bowl.boxes().centres) == 3 * 4 + 1
+
+
+@pytest.mark.parametrize("inverted", [False, True])
+def test_a_flight_of_stairs_is_a_box_a_tread(inverted):
+    stairs = patch("stairs", step_height=0.2, step_width=0.4, landing=1.0, inverted=inverted)
+    assert len(stairs.boxes().centres) == len(np.unique(stairs.heights))
+
+
+def test_a_slope_is_boxes_under_its_level_ends_alone():
+    cover = patch("slope", grade=0.3, landing=1.5).boxes()
+    assert len(cover.centres) == 2
+    # From the last of 15 cells that leans upwards to the first that is as high as the landing.
+    assert np.flatnonzero(~cover.covered.all(axis=1)).tolist() == list(range(14, 45))

@@ -1,0 +1,161 @@
+import numpy as np
+import pytest
+
+from terrainkit.curriculum import assign_levels, update_levels
+from terrainkit.errors import ConfigError
+
+
+def update(levels, distance, commanded, *, rows=10, seed=0, **options):
+    return update_levels(
+        levels, distance, commanded, rows=rows, patch_length=8.0, seed=seed, **options
+    )
+
+
+def test_columns_share_the_environments_in_order():
+    _, columns = assign_levels(8, 10, 4, None, seed=0)
+    assert columns.tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
+
+
+def test_fewer_environments_than_columns_are_spread_over_them():
+    _, columns = assign_levels(5, 10, 10, None, seed=0)
+    assert columns.tolist() == [0, 2, 4, 6, 8]
+
+
+@pytest.mark.parametrize("num_envs", [1, 7, 19, 20, 21, 4096])
+def test_any_number_of_environments_is_shared_evenly(num_envs):
+    levels, columns = assign_levels(num_envs, 10, 20, None, seed=0)
+    assert levels.shape == columns.shape == (num_envs,)
+    assert (np.diff(columns) >= 0).all()
+    shares = np.bincount(columns, minlength=20)
+    assert len(shares) == 20
+    assert np.ptp(shares) <= 1
+
+
+def test_no_environments_are_none():
+    levels, columns = assign_levels(0, 10, 20, None, seed=0)
+    assert levels.shape == columns.shape == (0,)
+
+
+@pytest.mark.parametrize(
+    ("highest", "levels"), [(0, {0}), (5, set(range(6))), (None, set(range(10)))]
+)
+def test_levels_are_drawn_up_to_the_highest(highest, levels):
+    assert set(assign_levels(1000, 10, 20, highest, seed=0)[0].tolist()) == levels
+
+
+def test_levels_are_seeded():
+    one, again, other = (assign_levels(100, 10, 20, None, seed)[0] for seed in (1, 1, 2))
+    assert (one == again).all()
+    assert (one != other).any()
+
+
+def test_a_negative_number_of_environments_is_refused():
+    with pytest.raises(ConfigError, match="num_envs is -1; wanted 0 or more"):
+        assign_levels(-1, 10, 20, None, seed=0)
+
+
+@pytest.mark.parametrize("highest", [-1, 10])
+def test_a_level_that_is_not_on_the_map_is_refused(highest):
+    with pytest.raises(
+        ConfigError, match=f"max_init_level is {highest}; the map has levels 0 to 9"
+    ):
+        assign_levels(8, 10, 20, highest, seed=0)
+
+
+@pytest.mark.parametrize(
+    ("distance", "commanded", "level"),
+    [
+        (4.1, 8.0, 6),  # over half of the 8 m patch
+        (4.0, 8.0, 5),  # just half
+        (4.1, 20.0, 6),  # up wins over down
+        (4.0, 8.1, 4),  # under half of the command
+        (0.0, 8.0, 4),
+        (0.0, 0.0, 5),  # told to stand, and stood
+        (1.0, 2.0, 5),
+        (1.0, 2.1, 4),
+    ],
+)
+def test_who_walks_far_moves_up_and_who_falls_short_moves_down(distance, commanded, level):
+    assert update([5], [distance], [commanded]).tolist() == [level]
+
+
+def test_each_environment_moves_on_its_own():
+    assert update([1, 2, 3], [8.0, 0.0, 3.0], [8.0, 8.0, 5.0]).tolist() == [2, 1, 3]
+
+
+def test_level_zero_is_the_lowest():
+    assert update([0], [0.0], [8.0]).tolist() == [0]
+
+
+def test_who_solves_the_last_row_goes_to_one_of_the_last_three():
+    solved = update(np.full(300, 9), np.full(300, 8.0), np.full(300, 8.0))
+    assert np.bincount(solved, minlength=10)[7:].min() > 60
+    assert solved.min() == 7
+
+
+@pytest.mark.parametrize(
+    ("rows", "top_levels", "levels"), [(10, 1, {9}), (2, 3, {0, 1}), (1, 3, {0})]
+)
+def test_top_levels_are_at_most_the_rows(rows, top_levels, levels):
+    last = np.full(100, rows - 1)
+    solved = update(last, np.full(100, 8.0), np.full(100, 8.0), rows=rows, top_levels=top_levels)
+    assert set(solved.tolist()) == levels
+
+
+def test_the_draws_are_seeded_by_a_number_or_several():
+    last, far = np.full(100, 9), np.full(100, 8.0)
+    assert (update(last, far, far, seed=(0, 1)) == update(last, far, far, seed=(0, 1))).all()
+    assert (update(last, far, far, seed=(0, 1)) != update(last, far, far, seed=(0, 2))).any()
+
+
+def test_the_levels_before_are_left_alone():
+    before = np.array([1, 2, 3])
+    update(before, [8.0, 8.0, 8.0], [8.0, 8.0, 8.0])
+    assert before.tolist() == [1, 2, 3]
+
+
+def test_no_environments_have_no_levels():
+    assert update([], [], []).shape == (0,)
+
+
+@pytest.mark.parametrize(
+    ("levels", "message"),
+    [([0, 10], "levels go from 0 to 10; wanted 0 to 9"), ([-1, 3], "levels go from -1 to 3")],
+)
+def test_levels_off_the_map_are_refused(levels, message):
+    with pytest.raises(ConfigError, match=message):
+        update(levels, [0.0, 0.0], [0.0, 0.0])
+
+
+def test_top_levels_below_one_are_refused():
+    with pytest.raises(ConfigError, match="top_levels is 0; wanted 1 or more"):
+        update([0], [0.0], [0.0], top_levels=0)
+
+
+def careers(can_walk, episodes=120, num_envs=200):
+    levels, _ = assign_levels(num_envs, 10, 20, 5, seed=0)
+    rng = np.random.default_rng(0)
+    for episode in range(episodes):
+        distance = np.where(can_walk(levels, rng), 8.0, 0.0)
+        levels = update(levels, distance, np.full(num_envs, 8.0), seed=(0, episode))
+    return levels
+
+
+def test_robots_that_walk_everything_reach_the_top_and_stay_near_it():
+    levels = careers(lambda levels, _: levels < 10)
+    assert levels.min() >= 7
+    assert set(levels.tolist()) == {7, 8, 9}
+
+
+def test_robots_that_fall_now_and_then_stay_near_the_top():
+    levels = careers(lambda levels, rng: rng.random(levels.size) < 0.85)
+    assert levels.mean() > 7.5
+
+
+def test_robots_settle_at_the_level_they_can_walk():
+    levels = careers(lambda levels, _: levels <= 4)
+    assert set(levels.tolist()) <= {4, 5}
+
+
+def test_robots_that_walk_nothing_end_at_the_bottom():
+    assert not careers(lambda levels, _: levels < 0).any()

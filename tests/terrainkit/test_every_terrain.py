@@ -1,0 +1,226 @@
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from terrainkit import MapConfig, TerrainChoice, TerrainkitError, generate, registry
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+from terrainkit.measure import hardness
+from terrainkit.noise import LatticeNoise
+from terrainkit.parameter import LARGEST, parameters_of
+
+VARIANTS = [(name, {}) for name in registry.names()] + [
+    (name, {"inverted": True})
+    for name in registry.names()
+    if "inverted" in parameters_of(registry.find(name))
+]
+every_terrain = pytest.mark.parametrize(
+    ("terrain", "given_parameters"),
+    VARIANTS,
+    ids=[f"{name}_inverted" if inverted else name for name, inverted in VARIANTS],
+)
+every_plot = pytest.mark.parametrize(
+    "plot",
+    [
+        pytest.param(Grid(shape=(80, 80), cell=0.1), id="8x8"),
+        pytest.param(Grid(shape=(80, 40), cell=0.1), id="8x4"),
+        pytest.param(Grid(shape=(73, 51), cell=0.1), id="7.3x5.1"),
+        pytest.param(Grid(shape=(160, 160), cell=0.05), id="fine"),
+        pytest.param(Grid(shape=(40, 40), cell=0.2), id="coarse"),
+    ],
+)
+DIFFICULTIES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
+LATTICE = {field.name for field in dataclasses.fields(LatticeNoise)}
+
+
+def at_every_difficulty(terrain, parameters, plot, seed=0):
+    """Return the heights at each difficulty, all from the same draws."""
+    choice = TerrainChoice(terrain=terrain, parameters=parameters)
+    return [choice.at(d).build(plot, np.random.default_rng(seed)) for d in DIFFICULTIES]
+
+
+def map_of(terrain, parameters, plot, **rest):
+    """Return a map of one terrain: rows of difficulty 0, 0.5 and 1, and twenty draws of each."""
+    choice = TerrainChoice(terrain=terrain, parameters=parameters)
+    config = {"rows": 3, "cols": 20, "patch_size": plot.size, "cell": plot.cell, "border": 1.0}
+    return generate(MapConfig(**config | {"terrains": (choice,)} | rest))
+
+
+def assert_spawns_are_level(terrain_map, radius):
+    """Look at the ground itself all over the disc around each origin."""
+    x, y, z = terrain_map.env_origins.astype(float).reshape(-1, 3, 1, 1).transpose(1, 0, 2, 3)
+    r = np.linspace(0.0, radius, 21)[:, None]
+    angle = np.linspace(0.0, 2 * np.pi, 64, endpoint=False)
+    disc = np.stack([x + r * np.cos(angle), y + r * np.sin(angle)], axis=-1)
+    ground = terrain_map.height(disc)
+    assert np.abs(ground[:, :1] - z).max() < 1e-3
+    assert np.abs(ground - z).max() <= terrain_map.config.spawn_tolerance + 1e-5
+    assert np.ptp(ground, axis=(1, 2)).max() <= terrain_map.config.spawn_tolerance + 1e-5
+
+
+def assert_spawns_are_inside(terrain_map, radius):
+    config = terrain_map.config
+    for row, col in np.ndindex(config.rows, config.cols):
+        x, y, _ = terrain_map.env_origins[row, col]
+        grid = config.patch_grid(row, col)
+        assert grid.lower[0] + radius <= x <= grid.upper[0] - radius
+        assert grid.lower[1] + radius <= y <= grid.upper[1] - radius
+
+
+@every_plot
+@every_terrain
+def test_heights_are_finite_float32_of_the_shape_of_the_patch(terrain, given_parameters, plot):
+    for heights in at_every_difficulty(terrain, given_parameters, plot):
+        assert heights.dtype == np.float32
+        assert heights.shape == plot.shape
+        assert np.isfinite(heights).all()
+
+
+@every_plot
+@every_terrain
+def test_every_spawn_is_a_level_disc_on_the_ground(terrain, given_parameters, plot):
+    terrain_map = map_of(terrain, given_parameters, plot)
+    assert_spawns_are_level(terrain_map, 0.5)
+    assert_spawns_are_inside(terrain_map, 0.5)
+
+
+@pytest.mark.parametrize(
+    "rest",
+    [
+        pytest.param({"slope_threshold": None}, id="no walls"),
+        pytest.param({"spawn_radius": 0.7, "spawn_tolerance": 0.0}, id="wide and exact"),
+        pytest.param({"centered": True, "border": 0.0}, id="centered"),
+    ],
+)
+@every_terrain
+def test_every_spawn_is_level_whatever_the_map(terrain, given_parameters, rest):
+    terrain_map = map_of(terrain, given_parameters, Grid(shape=(80, 80), cell=0.1), **rest)
+    assert_spawns_are_level(terrain_map, terrain_map.config.spawn_radius)
+    assert_spawns_are_inside(terrain_map, terrain_map.config.spawn_radius)
+
+
+@every_terrain
+def test_the_same_draws_make_the_same_bytes(terrain, given_parameters):
+    plot = Grid(shape=(73, 51), cell=0.1)
+    once, again = (at_every_difficulty(terrain, given_parameters, plot, seed=3) for _ in "ab")
+    assert [heights.tobytes() for heights in once] == [heights.tobytes() for heights in again]
+
+
+@every_terrain
+def test_a_terrain_that_draws_is_another_with_another_seed(terrain, given_parameters):
+    plot, rng = Grid(shape=(80, 80), cell=0.1), np.random.default_rng(1)
+    one = TerrainChoice(terrain=terrain, parameters=given_parameters).at(1.0)
+    heights = one.build(plot, rng)
+    draws = rng.random() != np.random.default_rng(1).random()
+    other = one.build(plot, np.random.default_rng(2))
+    assert (heights != other).any() == draws
+
+
+@every_terrain
+def test_heights_do_not_hang_on_where_the_patch_stands(terrain, given_parameters):
+    here, there = (
+        Grid(shape=(80, 80), cell=0.1, lower=lower) for lower in ((0.0, 0.0), (72.0, -13.0))
+    )
+    assert (
+        at_every_difficulty(terrain, given_parameters, here)[-1].tobytes()
+        == at_every_difficulty(terrain, given_parameters, there)[-1].tobytes()
+    )
+
+
+@every_terrain
+def test_numpys_global_random_state_is_neither_read_nor_changed(terrain, given_parameters):
+    plot = Grid(shape=(80, 80), cell=0.1)
+    np.random.seed(1)  # noqa: NPY002
+    first = at_every_difficulty(terrain, given_parameters, plot)
+    after = np.random.random()  # noqa: NPY002
+    assert after == np.random.RandomState(1).random()
+    second = at_every_difficulty(terrain, given_parameters, plot)
+    assert np.array_equal(first, second)
+
+
+@every_plot
+@every_terrain
+def test_hardness_does_not_fall_as_the_difficulty_rises(terrain, given_parameters, plot):
+    x, y = registry.find(terrain).at(0.0).spawn(plot)
+    start = int(x / plot.cell), int(y / plot.cell)
+    hard = [
+        hardness(heights, plot.cell, heights[start])
+        for heights in at_every_difficulty(terrain, given_parameters, plot)
+    ]
+    assert np.diff(hard).min() >= -1e-9
+    ramps = [p.easy != p.hard for p in parameters_of(registry.find(terrain)).values()]
+    assert (hard[-1] > hard[0]) == any(ramps)
+
+
+@pytest.mark.parametrize(
+    ("shape", "cell"),
+    [((80, 80), 0.1), ((73, 51), 0.1), ((160, 120), 0.05), ((41, 40), 0.2)],
+    ids=["8x8", "7.3x5.1", "fine", "coarse"],
+)
+@every_terrain
+def test_what_is_built_is_within_a_cell_of_what_is_asked(terrain, given_parameters, shape, cell):
+    plot = Grid(shape=shape, cell=cell)
+    for difficulty in DIFFICULTIES:
+        built = registry.find(terrain).at(difficulty, given_parameters)
+        requested, realized = built.requested(), built.realized(plot)
+        assert list(realized) == list(requested)
+        # Noise rounds its amplitude and spacing to a lattice; test_noise looks at these.
+        rounded = LATTICE if set(requested) >= LATTICE else set()
+        for name, parameter in parameters_of(built).items():
+            if parameter.snap == "none":
+                assert realized[name] == requested[name] or name in rounded
+            else:
+                off = np.abs(np.array(realized[name]) - requested[name])
+                assert off.max() <= cell + 1e-9
+
+
+@pytest.mark.parametrize("value", [5e-324, LARGEST, 1e308])
+@pytest.mark.parametrize(
+    ("terrain", "parameter"),
+    [(name, key) for name in registry.names() for key in parameters_of(registry.find(name))],
+)
+def test_a_number_beyond_all_measure_is_built_or_refused(terrain, parameter, value):
+    kind = type(parameters_of(registry.find(terrain))[parameter].easy)
+    plot = Grid(shape=(80, 80), cell=0.1)
+    try:
+        choice = TerrainChoice(terrain=terrain, parameters={parameter: kind(value)})
+        built = choice.at(1.0)
+        heights = built.build(plot, np.random.default_rng(0))
+    except TerrainkitError:
+        return
+    assert np.isfinite(heights).all()
+    assert set(built.realized(plot)) == set(built.requested())
+
+
+@settings(deadline=None, derandomize=True, max_examples=200)
+@given(
+    variant=st.sampled_from(VARIANTS),
+    shape=st.tuples(st.integers(1, 90), st.integers(1, 90)),
+    cell=st.sampled_from([0.05, 0.1, 0.2, 0.5]),
+    difficulty=st.floats(0, 1),
+    radius=st.sampled_from([0.1, 0.3, 0.5]),
+)
+def test_any_patch_is_built_with_room_to_start_or_refused(variant, shape, cell, difficulty, radius):
+    terrain, parameters = variant
+    plot = Grid(shape=shape, cell=cell)
+    config = MapConfig(
+        mode="selected",
+        rows=1,
+        cols=1,
+        patch_size=plot.size,
+        cell=cell,
+        border=0.0,
+        selected_difficulty=difficulty,
+        spawn_radius=radius,
+        terrains=(TerrainChoice(terrain=terrain, parameters=parameters),),
+    )
+    try:
+        terrain_map = generate(config)
+    except ConfigError:
+        return
+    assert np.isfinite(terrain_map.heights).all()
+    assert_spawns_are_level(terrain_map, radius)
+    assert_spawns_are_inside(terrain_map, radius)

@@ -1,0 +1,180 @@
+import hashlib
+import os
+import re
+import subprocess
+import sys
+import tracemalloc
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from terrainkit import MapConfig, TerrainChoice, TerrainkitWarning, generate, tile
+from terrainkit.config import Mode
+from terrainkit.errors import CapacityError, ConfigError, TerrainkitError
+
+OBSTACLES, ROUGH, STAIRS = (
+    TerrainChoice(terrain=name) for name in ("obstacles", "rough", "stairs")
+)
+NUMBERS = [field.name for field in fields(MapConfig) if field.type in (float, float | None)]
+SMALL = MapConfig(
+    rows=3, cols=4, patch_size=(8.0, 6.0), border=1.0, terrains=(OBSTACLES, STAIRS), seed=5
+)
+
+
+def sha256(terrain_map):
+    return hashlib.sha256(terrain_map.heights.tobytes()).hexdigest()
+
+
+def test_the_default_map_has_the_bytes_it_always_had():
+    terrain_map = generate(MapConfig())
+    assert terrain_map.heights.shape == (1300, 1300)
+    assert sha256(terrain_map) == (
+        "abe5b051a3f58204bab0afe4da0f02592148a74d3075fe73252fbf173b0f6ff8"
+    )
+
+
+def test_another_process_makes_the_same_bytes():
+    code = (
+        "import hashlib, terrainkit as t;"
+        "m = t.generate(t.MapConfig(rows=3, cols=5, preset='rough', border=0.0, seed=3));"
+        "print(hashlib.sha256(m.heights.tobytes()).hexdigest())"
+    )
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path), "PYTHONHASHSEED": "1"}
+    other = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
+    )
+    here = generate(MapConfig(rows=3, cols=5, preset="rough", border=0.0, seed=3))
+    assert other.stdout.strip() == sha256(here)
+
+
+def test_another_seed_makes_other_bytes():
+    assert sha256(generate(MapConfig(seed=1))) != sha256(generate(MapConfig(seed=2)))
+
+
+def test_every_part_of_a_map_has_its_shape():
+    terrain_map = generate(SMALL)
+    # 3 x 80 and 4 x 60 cells, and 10 of border on each side.
+    assert terrain_map.heights.shape == terrain_map.grid.shape == (260, 260)
+    assert terrain_map.heights.dtype == np.float32
+    assert terrain_map.env_origins.shape == (3, 4, 3)
+    assert terrain_map.terrain_types.tolist() == [[0, 0, 1, 1]] * 3
+    assert terrain_map.terrain_names == ("obstacles", "stairs")
+    assert terrain_map.difficulty[:, 0].tolist() == [0.0, 0.5, 1.0]
+    assert terrain_map.parameters[2, 3].requested["step_height"] == 0.23
+
+
+def test_the_border_is_level_at_zero():
+    heights = generate(SMALL).heights.copy()
+    assert heights.any()
+    heights[10:-10, 10:-10] = 0.0
+    assert not heights.any()
+
+
+@pytest.mark.parametrize(("row", "col"), [(0, 0), (1, 2), (2, 0), (2, 3)])
+def test_a_tile_alone_equals_its_slice_of_the_map(row, col):
+    terrain_map, patch = generate(SMALL), tile(SMALL, row, col)
+    i, j = 10 + 80 * row, 10 + 60 * col
+    assert patch.heights.tobytes() == terrain_map.heights[i : i + 80, j : j + 60].tobytes()
+    assert patch.origin.tobytes() == terrain_map.env_origins[row, col].tobytes()
+    assert patch.difficulty == terrain_map.difficulty[row, col]
+    assert patch.parameters == terrain_map.parameters[row, col]
+
+
+def test_editing_one_column_leaves_the_others_identical():
+    edited = TerrainChoice(terrain="stairs", parameters={"step_height": 0.3, "inverted": True})
+    before = generate(SMALL).heights
+    after = generate(MapConfig(**vars(SMALL) | {"terrains": (OBSTACLES, edited)})).heights
+    start = 10 + 2 * 60  # the third column is the first of the stairs
+    assert before[:, :start].tobytes() == after[:, :start].tobytes()
+    assert (before[:, start:] != after[:, start:]).any()
+
+
+def test_more_rows_leave_the_draws_of_the_first_ones_alone():
+    few = MapConfig(rows=2, cols=2, border=0.0, terrains=(OBSTACLES,))
+    many = MapConfig(rows=5, cols=3, border=0.0, terrains=(OBSTACLES,))
+    assert tile(few, 0, 1).heights.tobytes() == tile(many, 0, 1).heights.tobytes()
+
+
+def test_centered_moves_the_map_and_changes_nothing_else():
+    corner, middle = generate(SMALL), generate(MapConfig(**vars(SMALL) | {"centered": True}))
+    assert corner.heights.tobytes() == middle.heights.tobytes()
+    assert corner.grid.lower == (-1.0, -1.0)
+    assert middle.grid.centre == pytest.approx((0.0, 0.0))
+    # Half of 3 x 8 m and of 4 x 6 m.
+    moved = middle.env_origins - corner.env_origins
+    assert np.abs(moved - (-12.0, -12.0, 0.0)).max() < 1e-5
+
+
+@pytest.mark.parametrize("mode", Mode.__args__)
+def test_every_mode_makes_a_map(mode):
+    terrain_map = generate(MapConfig(rows=2, cols=2, border=0.0, mode=mode, terrains=(STAIRS,)))
+    expected = {"curriculum": {0.0, 1.0}, "selected": {1.0}}.get(mode, {0.5, 0.75, 0.9})
+    assert set(terrain_map.difficulty.astype(float).round(6).flat) <= expected
+
+
+def test_a_map_too_large_for_memory_says_what_it_needs_before_it_takes_anything():
+    config = MapConfig(rows=10_000, cols=10_000, terrains=(STAIRS,))
+    tracemalloc.start()
+    with pytest.raises(CapacityError, match="a map of 800500 x 800500 samples needs") as caught:
+        generate(config)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    needed = float(re.search(r"needs (\S+) GB of memory; \S+ GB free", str(caught.value))[1])
+    # 800500 x 800500 heights of 4 bytes are 2563 GB.
+    assert 2563 <= needed < 3500
+    assert peak < 2**20
+
+
+@pytest.mark.parametrize(
+    "given",
+    [{name: value} for name in NUMBERS for value in (5e-324, 1e308)]
+    + [
+        {"patch_size": (8e-310, 8e-310), "cell": 1e-311},
+        {"patch_size": (8e300, 8e300), "cell": 1e299},
+        {"patch_size": (1e307, 1e307), "rows": 100, "centered": True},
+    ],
+    ids=lambda given: " ".join(f"{name}={value}" for name, value in given.items()),
+)
+def test_a_number_beyond_all_measure_makes_a_map_or_is_refused(given):
+    small = {"rows": 1, "cols": 1, "border": 0.0, "terrains": (ROUGH,)}
+    try:
+        terrain_map = generate(MapConfig(**small | given))
+    except TerrainkitError:
+        return
+    assert np.isfinite(terrain_map.heights).all()
+    assert np.isfinite(terrain_map.env_origins).all()
+    assert np.isfinite(terrain_map.height(np.array([[4.0, 4.0]]))).all()
+
+
+def test_numpys_global_random_state_is_neither_read_nor_changed():
+    np.random.seed(1)  # noqa: NPY002
+    first = generate(SMALL)
+    after = np.random.random()  # noqa: NPY002
+    np.random.seed(1)  # noqa: NPY002
+    assert after == np.random.random()  # noqa: NPY002
+    assert sha256(generate(SMALL)) == sha256(first)
+
+
+def test_progress_sees_every_patch():
+    seen = []
+
+    def watch(walk, total):
+        seen.append(total)
+        for place in walk:
+            seen.append(place)
+            yield place
+
+    generate(MapConfig(rows=2, cols=2, border=0.0, terrains=(STAIRS,)), progress=watch)
+    assert seen == [4, (0, 0), (0, 1), (1, 0), (1, 1)]
+
+
+def test_a_preset_with_too_few_columns_warns_once():
+    with pytest.warns(TerrainkitWarning, match="2 columns .*no column for rough_slope, ") as caught:
+        generate(MapConfig(rows=2, cols=2, preset="rough", border=0.0))
+    assert len(caught) == 1
+
+
+def test_a_terrain_that_does_not_fit_fails_the_map():
+    with pytest.raises(ConfigError, match=r"stairs: two landings of 2 m do not fit in a patch 3 m"):
+        generate(MapConfig(patch_size=(3.0, 3.0), terrains=(STAIRS,)))

@@ -1,0 +1,168 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid, whole_cells
+
+
+def test_samples_are_cell_centres():
+    grid = Grid(shape=(80, 40), cell=0.1)
+    assert grid.axis(0)[[0, 1, -1]] == pytest.approx([0.05, 0.15, 7.95])
+    assert grid.axis(1)[[0, 1, -1]] == pytest.approx([0.05, 0.15, 3.95])
+
+
+def test_shape_times_cell_is_the_ground_covered():
+    grid = Grid(shape=(80, 40), cell=0.1, lower=(-2.0, 1.0))
+    assert grid.size == pytest.approx((8.0, 4.0))
+    assert grid.upper == pytest.approx((6.0, 5.0))
+    assert grid.centre == pytest.approx((2.0, 3.0))
+
+
+def test_axis_starts_from_the_lower_corner():
+    grid = Grid(shape=(3, 2), cell=0.5, lower=(-1.0, 4.0))
+    assert grid.axis(0).tolist() == [-0.75, -0.25, 0.25]
+    assert grid.axis(1).tolist() == [4.25, 4.75]
+
+
+def test_block_stands_where_its_cells_do():
+    grid = Grid(shape=(10, 12), cell=0.5, lower=(1.0, -1.0))
+    block = grid.block((2, 3), (4, 5))
+    assert block == Grid(shape=(4, 5), cell=0.5, lower=(2.0, 0.5))
+    assert block.axis(0).tolist() == grid.axis(0)[2:6].tolist()
+    assert block.axis(1).tolist() == grid.axis(1)[3:8].tolist()
+
+
+@pytest.mark.parametrize(
+    ("length", "cell", "count"),
+    [
+        (0.3, 0.1, 3),  # 0.3 / 0.1 is 2.9999999999999996
+        (0.31, 0.1, 3),
+        (0.26, 0.1, 3),
+        (0.24, 0.1, 2),
+        (0.05, 0.1, 1),
+        (1.15, 0.1, 12),  # 1.15 / 0.1 is 11.499999999999998
+        (0.25, 0.1, 3),
+        (8.2, 0.1, 82),
+        (0.31, 0.05, 6),
+    ],
+)
+def test_lengths_round_to_the_nearest_cell_and_halves_up(length, cell, count):
+    assert Grid(shape=(1, 1), cell=cell).cells(length) == count
+
+
+@pytest.mark.parametrize("length", [0.0, 0.001, 0.04])
+def test_a_length_takes_one_cell_at_least_unless_none_will_do(length):
+    grid = Grid(shape=(1, 1), cell=0.1)
+    assert grid.cells(length) == 1
+    assert grid.cells(length, least=0) == 0
+
+
+def test_three_cells_of_a_tenth_are_exactly_three_tenths():
+    assert Grid(shape=(1, 1), cell=0.1).length(3) == 0.3
+
+
+@settings(deadline=None, derandomize=True, max_examples=100)
+@given(count=st.integers(1, 10_000), cell=st.sampled_from([0.01, 0.03, 0.05, 0.1, 0.2, 0.7]))
+def test_a_whole_number_of_cells_survives_metres(count, cell):
+    grid = Grid(shape=(1, 1), cell=cell)
+    assert grid.cells(grid.length(count)) == count
+
+
+@pytest.mark.parametrize(
+    ("shape", "size", "counts"),
+    [
+        ((80, 80), 3.0, (30, 30)),
+        ((80, 40), 3.04, (30, 30)),
+        ((80, 80), 3.1, (32, 32)),
+        ((73, 51), 3.0, (31, 31)),
+        ((80, 51), 3.0, (30, 31)),
+        ((81, 80), 3.1, (31, 32)),
+        ((80, 80), 0.09, (0, 0)),
+        ((81, 81), 0.09, (1, 1)),
+    ],
+)
+def test_a_centred_block_has_the_parity_of_its_axis(shape, size, counts):
+    assert Grid(shape=shape, cell=0.1).centred(size) == counts
+
+
+@settings(deadline=None, derandomize=True, max_examples=100)
+@given(n=st.integers(60, 120), size=st.floats(0.1, 5.9))
+def test_a_centred_block_is_within_one_cell_of_its_size_and_leaves_equal_margins(n, size):
+    grid = Grid(shape=(n, n), cell=0.1)
+    block = grid.centred(size)
+    assert abs(block[0] * 0.1 - size) <= 0.1 + 1e-6
+    middle = grid.middle(block)[0]
+    assert middle.stop - middle.start == block[0]
+    assert middle.start == n - middle.stop
+
+
+def test_rings_count_outwards_from_one_cell():
+    rings = Grid(shape=(5, 5), cell=0.1).rings((1, 1))
+    assert rings.tolist() == [
+        [2, 2, 2, 2, 2],
+        [2, 1, 1, 1, 2],
+        [2, 1, 0, 1, 2],
+        [2, 1, 1, 1, 2],
+        [2, 2, 2, 2, 2],
+    ]
+
+
+def test_rings_of_a_grid_that_is_longer_along_x():
+    rings = Grid(shape=(6, 4), cell=0.1).rings((2, 2))
+    assert rings.tolist() == [
+        [2, 2, 2, 2],
+        [1, 1, 1, 1],
+        [1, 0, 0, 1],
+        [1, 0, 0, 1],
+        [1, 1, 1, 1],
+        [2, 2, 2, 2],
+    ]
+
+
+def test_middle_indexes_the_cells_of_ring_zero():
+    grid = Grid(shape=(9, 6), cell=0.1)
+    inside = np.zeros(grid.shape, dtype=bool)
+    inside[grid.middle((3, 2))] = True
+    assert inside.sum() == 6
+    assert (inside == (grid.rings((3, 2)) == 0)).all()
+
+
+def test_fade_rises_from_the_block_to_one_at_the_distance():
+    fade = Grid(shape=(9, 9), cell=0.1).fade((1, 1), 0.2)
+    assert fade[4] == pytest.approx([1, 1, 1, 0.5, 0, 0.5, 1, 1, 1])
+    assert fade[0] == pytest.approx(np.ones(9))
+
+
+@pytest.mark.parametrize(
+    ("length", "cell", "count"), [(8.0, 0.1, 80), (0.3, 0.1, 3), (25.0, 0.05, 500), (0.1, 0.1, 1)]
+)
+def test_whole_cells_counts_what_divides_on_paper(length, cell, count):
+    assert whole_cells("border", length, cell) == count
+
+
+def test_whole_cells_may_be_none_where_that_is_the_least():
+    assert whole_cells("border", 0.0, 0.1, least=0) == 0
+
+
+@pytest.mark.parametrize("length", [0.0, 0.04])
+def test_whole_cells_are_one_or_more_otherwise(length):
+    with pytest.raises(ConfigError, match=rf"border {length:g} m is not .*: 0\.1 m, 0\.2 m"):
+        whole_cells("border", length, 0.1)
+
+
+def test_whole_cells_names_the_lengths_that_would_do():
+    with pytest.raises(
+        ConfigError,
+        match=r"border 8\.05 m is not a whole number of cells of 0\.1 m; .*: 8 m, 8\.1 m",
+    ):
+        whole_cells("border", 8.05, 0.1)
+
+
+@pytest.mark.parametrize("length", [math.inf, math.nan, 1e308])
+def test_whole_cells_refuses_what_cannot_be_counted(length):
+    with pytest.raises(ConfigError, match=r"border .* cannot be counted in cells of 0\.1 m"):
+        whole_cells("border", length, 0.1)

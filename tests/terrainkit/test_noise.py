@@ -1,0 +1,112 @@
+import numpy as np
+import pytest
+
+from terrainkit.grid import Grid
+from terrainkit.noise import LatticeNoise
+
+PLOT = Grid(shape=(60, 40), cell=0.1)
+
+
+def lattice(*, spacing=0.2, amplitude=0.05, step=0.005):
+    return LatticeNoise(spacing=spacing, amplitude=amplitude, step=step)
+
+
+def noise(*, seed=0, plot=PLOT, **fields):
+    return lattice(**fields).heights(plot, np.random.default_rng(seed))
+
+
+def test_noise_covers_the_plot():
+    assert noise().shape == (60, 40)
+
+
+@pytest.mark.parametrize("step", [0.0, 0.005, 0.02, 0.05])
+def test_noise_stays_within_its_amplitude_and_takes_both_signs(step):
+    heights = noise(step=step)
+    assert np.abs(heights).max() <= 0.05 + 1e-12
+    assert heights.min() < -0.02
+    assert heights.max() > 0.02
+
+
+def test_draws_are_multiples_of_the_step():
+    # With a node at every corner of a cell, a sample is the mean of four nodes.
+    quarters = noise(spacing=0.1, step=0.02) / (0.02 / 4)
+    assert quarters == pytest.approx(np.round(quarters), abs=1e-9)
+
+
+def test_a_step_below_a_micrometre_is_none():
+    assert (noise(step=9e-7) == noise(step=0.0)).all()
+    assert (noise(step=1e-6) != noise(step=0.0)).any()
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "step", "largest"),
+    [
+        (0.3, 0.1, 0.3),  # 0.3 / 0.1 is 2.9999999999999996
+        (0.05, 0.005, 0.05),
+        (0.036, 0.005, 0.035),
+        (0.05, 0.02, 0.04),
+        (0.05, 0.06, 0.0),
+        (0.0437, 0.0, 0.0437),
+    ],
+)
+def test_the_largest_height_is_the_amplitude_in_whole_steps(amplitude, step, largest):
+    plot = Grid(shape=(200, 200), cell=0.1)
+    assert lattice(amplitude=amplitude, step=step).realized(plot)["amplitude"] == largest
+    heights = noise(spacing=0.1, amplitude=amplitude, step=step, plot=plot)
+    assert np.abs(heights).max() <= largest + 1e-9
+    assert np.abs(heights).max() >= 0.9 * largest
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_between_nodes_the_ground_is_straight_along_either_axis(axis):
+    heights = noise(spacing=6.0, step=0.0)
+    assert np.abs(np.diff(heights, axis=axis)).max() > 1e-6
+    assert np.abs(np.diff(heights, 2, axis=axis)).max() < 1e-12
+
+
+def test_a_whole_number_of_intervals_spans_the_patch():
+    # 6 m at 2.6 m make two intervals of 3 m, so the ground bends at sample 30 and nowhere else.
+    heights = noise(spacing=2.6, step=0.0)
+    bends = np.abs(np.diff(heights, 2, axis=0)).max(axis=1) > 1e-12
+    assert set(np.flatnonzero(bends)) <= {28, 29}
+    assert bends.any()
+
+
+@pytest.mark.parametrize(
+    ("shape", "cell", "asked", "built"),
+    [
+        ((80, 80), 0.1, 0.2, 0.2),
+        ((80, 80), 0.1, 0.25, 0.25),  # between two cells
+        ((80, 80), 0.1, 3.0, 2.666666667),  # 2.67 intervals make three
+        ((80, 80), 0.1, 3.2, 2.666666667),  # 2.5 make three too
+        ((70, 70), 0.05, 0.28, 0.269230769),  # 12.5 make 13; 3.5 / 0.28 is 12.499999999999998
+        ((60, 40), 0.1, 2.6, (3.0, 2.0)),  # 2.3 and 1.5
+        ((80, 80), 0.1, 20.0, 8.0),
+        ((80, 80), 0.1, 0.04, 0.1),  # nodes closer than the cells would never be seen
+        ((80, 80), 0.1, 5e-324, 0.1),
+    ],
+)
+def test_the_spacing_is_what_whole_intervals_make_of_it(shape, cell, asked, built):
+    plot = Grid(shape=shape, cell=cell)
+    assert lattice(spacing=asked).realized(plot)["spacing"] == built
+
+
+def test_amplitude_scales_the_pattern_and_does_not_change_it():
+    assert noise(amplitude=0.1, step=0.0) == pytest.approx(2 * noise(amplitude=0.05, step=0.0))
+
+
+@pytest.mark.parametrize(("amplitude", "step"), [(0.0, 0.0), (0.1, 0.0), (0.1, 0.005)])
+def test_the_number_of_draws_depends_on_neither_amplitude_nor_step(amplitude, step):
+    rng, other = np.random.default_rng(3), np.random.default_rng(3)
+    lattice().heights(PLOT, rng)
+    lattice(amplitude=amplitude, step=step).heights(PLOT, other)
+    assert rng.random() == other.random()
+
+
+def test_no_amplitude_is_level():
+    assert not noise(amplitude=0.0).any()
+
+
+def test_the_seed_decides():
+    assert (noise(seed=1) == noise(seed=1)).all()
+    assert (noise(seed=1) != noise(seed=2)).any()

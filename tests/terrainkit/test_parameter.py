@@ -1,0 +1,131 @@
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from terrainkit import parameter
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hurdle:
+    rise: float = parameter.height(0.1, 0.4)
+    width: float = parameter.length(0.2)
+    gap: float = parameter.length(0.0, 1.0, zero=True)
+    landing: float = parameter.platform(3.0)
+    grade: float = parameter.scalar(0.4)
+    spacing: float = parameter.scalar(0.2, zero=False)
+    number: int = parameter.count(4)
+    inverted: bool = parameter.switch()
+
+
+HURDLE = parameter.parameters_of(Hurdle)
+
+
+def test_parameters_keep_the_order_of_the_fields():
+    assert list(HURDLE) == [
+        "rise", "width", "gap", "landing", "grade", "spacing", "number", "inverted",
+    ]  # fmt: skip
+
+
+def test_a_field_defaults_to_its_hard_end():
+    hurdle = Hurdle()
+    assert hurdle.rise == 0.4
+    assert hurdle.width == 0.2
+    assert hurdle.gap == 1.0
+
+
+@pytest.mark.parametrize(("difficulty", "rise"), [(0.0, 0.1), (0.5, 0.25), (1.0, 0.4)])
+def test_a_range_is_linear_in_the_difficulty(difficulty, rise):
+    assert HURDLE["rise"].at(difficulty) == pytest.approx(rise)
+
+
+def test_counts_and_switches_are_the_same_at_every_difficulty():
+    assert HURDLE["number"].at(0.3) == 4
+    assert isinstance(HURDLE["number"].at(0.3), int)
+    assert HURDLE["inverted"].at(0.3) is False
+
+
+@settings(deadline=None, derandomize=True)
+@given(easy=st.floats(-1e6, 1e6), hard=st.floats(-1e6, 1e6), d=st.floats(0, 1))
+def test_both_ends_of_a_range_are_exact_and_the_rest_lies_between(easy, hard, d):
+    assert parameter.at_difficulty((easy, hard), 0.0) == easy
+    assert parameter.at_difficulty((easy, hard), 1.0) == hard
+    margin = 1e-9 * (abs(easy) + abs(hard))
+    between = parameter.at_difficulty((easy, hard), d)
+    assert min(easy, hard) - margin <= between <= max(easy, hard) + margin
+
+
+def test_a_single_value_holds_at_every_difficulty():
+    assert parameter.at_difficulty(0.3, 0.7) == 0.3
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "realized"),
+    [
+        ("rise", 0.123, 0.123),
+        ("width", 0.31, 0.3),
+        ("width", 0.04, 0.1),
+        ("gap", 0.04, 0.0),
+        ("landing", 3.1, 3.2),
+        ("grade", 0.35, 0.35),
+        ("spacing", 0.27, 0.27),
+        ("number", 7, 7),
+        ("inverted", True, True),
+    ],
+)
+def test_realized_is_what_the_cells_hold(name, value, realized):
+    assert HURDLE[name].realized(value, Grid(shape=(80, 40), cell=0.1)) == realized
+
+
+def test_a_platform_is_a_pair_where_only_one_axis_is_odd():
+    assert HURDLE["landing"].realized(3.0, Grid(shape=(80, 51), cell=0.1)) == (3.0, 3.1)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("rise", -0.1, r"hurdle: rise is -0\.1; wanted 0 to 1e\+06"),
+        ("rise", 1.1e6, r"hurdle: rise is 1\.1e\+06; wanted 0 to 1e\+06"),
+        ("rise", math.nan, r"hurdle: rise is nan; wanted 0 to 1e\+06"),
+        ("rise", math.inf, r"hurdle: rise is inf; wanted 0 to 1e\+06"),
+        ("rise", "high", "hurdle: rise is 'high'; wanted a number"),
+        ("rise", True, "hurdle: rise is True; wanted a number"),
+        ("rise", None, "hurdle: rise is None; wanted a number"),
+        ("width", 0.0, r"hurdle: width is 0; wanted above 0 to 1e\+06"),
+        ("landing", 0, r"hurdle: landing is 0; wanted above 0 to 1e\+06"),
+        ("spacing", 0.0, r"hurdle: spacing is 0; wanted above 0 to 1e\+06"),
+        ("number", 0, "hurdle: number is 0; wanted above 0 to 10000"),
+        ("number", 10_001, "hurdle: number is 10001; wanted above 0 to 10000"),
+        pytest.param("number", 10**400, "hurdle: number is a whole number beyond", id="10**400"),
+        ("number", 4.0, r"hurdle: number is 4\.0; wanted a whole number"),
+        ("number", True, "hurdle: number is True; wanted a whole number"),
+        ("inverted", 1, "hurdle: inverted is 1; wanted true or false"),
+    ],
+)
+def test_a_value_that_cannot_be_is_refused(name, value, message):
+    with pytest.raises(ConfigError, match=message):
+        parameter.checked("hurdle", name, value, HURDLE[name])
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("rise", 0),
+        ("rise", parameter.LARGEST),
+        ("gap", 0.0),
+        ("grade", 0.0),
+        ("number", 1),
+        ("number", 10_000),
+        ("inverted", True),
+        ("rise", np.float32(0.1)),
+        ("number", np.int64(4)),
+        ("inverted", np.True_),
+    ],
+)
+def test_the_least_the_largest_and_numpys_numbers_are_taken(name, value):
+    parameter.checked("hurdle", name, value, HURDLE[name])

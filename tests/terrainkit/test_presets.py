@@ -1,0 +1,43 @@
+import pytest
+
+from terrainkit import MapConfig, generate, presets, registry
+from terrainkit.errors import ConfigError
+from terrainkit.parameter import parameters_of
+
+
+def test_an_unknown_preset_lists_those_that_exist():
+    with pytest.raises(
+        ConfigError, match="no preset 'leggedgym'; there are: legged_gym, rough, stairs, all"
+    ):
+        presets.find("leggedgym")
+
+
+def test_legged_gym_has_its_nine_terrains_in_order():
+    assert [(choice.name, choice.proportion) for choice in presets.find("legged_gym")] == [
+        ("pyramid_slope_inverted", 1),
+        ("pyramid_slope", 1),
+        ("rough_slope", 1),
+        ("pyramid_stairs_inverted", 2),
+        ("pyramid_stairs", 1),
+        ("obstacles", 1),
+        ("stepping_stones", 1),
+        ("gap", 1),
+        ("pit", 1),
+    ]
+
+
+@pytest.mark.parametrize("name", registry.names())
+def test_all_holds_every_terrain_and_its_inverse(name):
+    mix = {choice.name: choice for choice in presets.find("all")}
+    assert mix[name].at(1.0) == registry.find(name).at(1.0)
+    inverse = mix.get(f"{name}_inverted")
+    if "inverted" in parameters_of(registry.find(name)):
+        assert inverse.at(1.0).inverted
+    else:
+        assert inverse is None
+
+
+@pytest.mark.parametrize("name", presets.names())
+def test_every_preset_makes_a_map_with_each_of_its_terrains(name):
+    terrain_map = generate(MapConfig(preset=name, rows=2, cols=20, border=0.0))
+    assert set(terrain_map.terrain_types.flat) == set(range(len(terrain_map.terrain_names)))

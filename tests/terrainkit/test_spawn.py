@@ -1,0 +1,159 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from terrainkit.grid import Grid
+from terrainkit.spawn import find_spawn, room_error
+from terrainkit.surface import surface_at
+
+PLOT = Grid(shape=(40, 40), cell=0.1)
+WALL = 0.075
+
+
+def level(height=0.0, plot=PLOT):
+    return np.full(plot.shape, height, dtype=np.float32)
+
+
+def spawn(heights, wanted=(2.0, 2.0), *, radius=0.5, tolerance=0.01, threshold=WALL, plot=PLOT):
+    return find_spawn(
+        heights, plot, wanted, radius=radius, tolerance=tolerance, threshold=threshold
+    )
+
+
+def disc(heights, origin, *, radius=0.5, threshold=WALL, plot=PLOT):
+    """Return the height of the ground all over the disc around `origin` [m]."""
+    r, angle = np.meshgrid(np.linspace(0.0, radius, 26), np.linspace(0.0, 2 * math.pi, 121))
+    points = np.stack([origin[0] + r * np.cos(angle), origin[1] + r * np.sin(angle)], axis=-1)
+    place = (points.reshape(-1, 2) - plot.lower) / plot.cell - 0.5
+    return surface_at(heights, place, threshold=threshold).height
+
+
+def test_on_level_ground_the_origin_is_where_it_is_wanted():
+    assert spawn(level(0.7), (1.23, 2.71)) == pytest.approx((1.23, 2.71, 0.7))
+
+
+def test_the_origin_is_in_the_frame_of_the_plot():
+    plot = Grid(shape=(40, 40), cell=0.1, lower=(-10.0, 5.0))
+    assert spawn(level(plot=plot), (-8.0, 7.0), plot=plot) == (-8.0, 7.0, 0.0)
+
+
+@pytest.mark.parametrize("wanted", [(0.1, 2.0), (3.95, 2.0), (2.0, 0.3), (4.0, 4.0), (-1.0, 2.0)])
+def test_the_disc_stays_inside_the_patch(wanted):
+    x, y, _ = spawn(level(), wanted)
+    assert min(x, y) >= 0.5
+    assert max(x, y) <= 3.5
+    # It gives way by no more than it must: the margin and two cells.
+    nearest = np.clip(wanted, 0.5, 3.5)
+    assert np.abs(nearest - (x, y)).max() <= 0.2 + 1e-9
+
+
+@pytest.mark.parametrize("height", [0.3, -0.3])
+def test_a_wall_beside_the_wanted_place_is_given_way_to(height):
+    heights = level()
+    heights[21:] = height  # the wall stands at 2.1 m
+    x, y, z = spawn(heights)
+    assert 1.4 <= x <= 1.6 + 1e-9
+    assert y == pytest.approx(2.0, abs=0.05 + 1e-9)
+    assert z == 0.0
+
+
+def test_the_nearer_side_is_taken():
+    heights = level()
+    heights[:18] = 0.3  # the wall stands at 1.8 m
+    x, _, z = spawn(heights)
+    assert 2.3 - 1e-9 <= x <= 2.5
+    assert z == 0.0
+
+
+def test_one_high_sample_keeps_the_disc_away():
+    heights = level()
+    heights[20, 20] = 0.5  # a post over 2.0 to 2.1 m
+    x, y, _ = spawn(heights)
+    assert 0.55 <= math.hypot(x - 2.05, y - 2.05) <= 0.8
+
+
+@pytest.mark.parametrize(
+    ("sample", "height"), [((25, 22), 0.07), ((24, 24), -5.0), ((14, 17), -5.0)]
+)
+def test_the_disc_is_level_towards_its_diagonals(sample, height):
+    heights = level()
+    heights[sample] = height
+    ground = disc(heights, spawn(heights, threshold=math.inf), threshold=math.inf)
+    assert np.ptp(ground) <= 0.01 + 1e-6
+
+
+@pytest.mark.parametrize("sample", [(25, 23), (26, 20), (13, 19), (24, 25)])
+def test_a_sample_without_a_say_in_the_disc_does_not_move_it(sample):
+    # The disc reaches 5 samples from (19.5, 19.5). The square of (25, 23), one sample to each
+    # side, begins at offset (4.5, 2.5), and 4.5^2 + 2.5^2 is above 5^2.
+    heights = level()
+    heights[sample] = -5.0
+    assert spawn(heights) == (2.0, 2.0, 0.0)
+
+
+@settings(deadline=None, derandomize=True, max_examples=100)
+@given(
+    samples=st.lists(
+        st.tuples(st.integers(12, 27), st.integers(12, 27), st.sampled_from([-1.0, 0.07, 0.3])),
+        max_size=12,
+    ),
+    wanted=st.tuples(st.floats(1.0, 3.0), st.floats(1.0, 3.0)),
+    radius=st.sampled_from([0.3, 0.5, 0.7]),
+    threshold=st.sampled_from([WALL, math.inf]),
+)
+def test_every_disc_is_level_and_its_origin_on_the_ground(samples, wanted, radius, threshold):
+    heights = level()
+    for i, j, height in samples:
+        heights[i, j] = height
+    origin = spawn(heights, wanted, radius=radius, threshold=threshold)
+    if origin is None:
+        return
+    ground = disc(heights, origin, radius=radius, threshold=threshold)
+    assert ground[0] == pytest.approx(origin[2], abs=1e-6)
+    assert np.ptp(ground) <= 0.01 + 1e-6
+    assert radius <= min(origin[:2])
+    assert max(origin[:2]) <= 4.0 - radius
+
+
+def test_a_slope_within_the_tolerance_is_level_enough_and_its_origin_on_it():
+    x = (np.arange(40, dtype=np.float32) + 0.5) * 0.1
+    heights = np.broadcast_to(0.005 * x[:, None], PLOT.shape).astype(np.float32)
+    # Samples 14 to 25 have a say in the disc, 1.1 m apart: between them it rises by 5.5 mm.
+    assert spawn(heights, tolerance=0.0056) == pytest.approx((2.0, 2.0, 0.01), abs=1e-6)
+    assert spawn(heights, tolerance=0.0054) is None
+
+
+def test_no_room_is_none():
+    heights = level()
+    heights[::4] = 0.3
+    assert spawn(heights) is None
+
+
+@pytest.mark.parametrize("radius", [2.01, 3.0, 1e300])
+def test_a_disc_larger_than_the_patch_has_no_room(radius):
+    assert spawn(level(), radius=radius) is None
+
+
+def test_a_platform_larger_than_the_disc_by_a_cell_holds_it():
+    heights = level(-5.0)
+    heights[14:26, 14:26] = 0.0  # 1.2 m for a disc of 1 m
+    assert spawn(heights) == (2.0, 2.0, 0.0)
+
+
+def test_a_platform_smaller_than_the_disc_does_not_hold_it():
+    heights = level(-5.0)
+    heights[16:24, 16:24] = 0.0
+    x, y, z = spawn(heights)
+    assert z == -5.0
+    assert disc(heights, (x, y)).tolist() == [-5.0] * (26 * 121)
+
+
+def test_the_error_says_what_would_help():
+    error = room_error("rough", Grid(shape=(80, 40), cell=0.1), 0.5, 0.01)
+    assert str(error) == (
+        "rough: no level disc of radius 0.5 m (within 0.01 m) in a patch of 8 m x 4 m; "
+        "wanted a larger platform or a smaller spawn_radius"
+    )

@@ -1,0 +1,217 @@
+import dataclasses
+import re
+
+import numpy as np
+import pytest
+
+import terrainkit
+from terrainkit import MapConfig, TerrainChoice, generate
+from terrainkit.errors import ConfigError, ExportError
+
+
+@pytest.fixture(scope="module")
+def slope_map():
+    # Level to x = 1, up at grade 0.5, and level again from x = 5 on.
+    slope = TerrainChoice(terrain="slope", parameters={"grade": 0.5, "landing": 1.0})
+    return generate(
+        MapConfig(
+            rows=1,
+            cols=1,
+            patch_size=(6.0, 3.0),
+            border=0.0,
+            terrains=(slope,),
+            spawn_radius=0.2,
+        )
+    )
+
+
+def with_heights(terrain_map, value):
+    return dataclasses.replace(
+        terrain_map, heights=np.full_like(terrain_map.heights, np.float32(value))
+    )
+
+
+def test_height_at_a_sample_is_the_sample(terrain_map):
+    x, y = (terrain_map.grid.axis(k) for k in (0, 1))
+    xy = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+    np.testing.assert_allclose(terrain_map.height(xy), terrain_map.heights, atol=1e-6)
+
+
+def test_height_stands_where_the_axis_convention_says(terrain_map):
+    # Border 1.2 m and cell 0.1 m: cell (30, 45) is centred at x = -1.2 + 3.05, y = -1.2 + 4.55.
+    terrain_map = with_heights(terrain_map, 0.0)
+    terrain_map.heights[30, 45] = 2.0
+    assert terrain_map.height((1.85, 3.35)) == 2.0
+    assert terrain_map.height((3.35, 1.85)) == 0.0
+
+
+def test_first_sample_is_half_a_cell_inside_the_corner(terrain_map):
+    assert terrain_map.first_sample == pytest.approx((-1.15, -1.15))
+
+
+@pytest.mark.parametrize("shape", [(2,), (5, 2), (3, 4, 2), (0, 2)])
+def test_heights_and_normals_come_in_the_shape_of_the_points(terrain_map, shape):
+    assert terrain_map.height(np.ones(shape)).shape == shape[:-1]
+    assert terrain_map.normal(np.ones(shape)).shape == (*shape[:-1], 3)
+
+
+def test_points_may_be_a_list(terrain_map):
+    points = [[1.0, 2.0], [9.0, 3.0]]
+    assert terrain_map.height(points).tolist() == terrain_map.height(np.array(points)).tolist()
+
+
+@pytest.mark.parametrize("view", ["height", "normal"])
+@pytest.mark.parametrize(
+    ("xy", "shape"),
+    [
+        (1.0, r"\(\)"),
+        ([1.0, 2.0, 3.0], r"\(3,\)"),
+        (np.zeros((2, 5)), r"\(2, 5\)"),
+        ([], r"\(0,\)"),
+        ([np.nan, 0.0], r"\(2,\)"),
+        ([[0.0, np.inf]], r"\(1, 2\)"),
+    ],
+)
+def test_points_that_are_none_are_refused(terrain_map, view, xy, shape):
+    with pytest.raises(ConfigError, match=rf"xy has shape {shape}; wanted \(\.\.\., 2\), .*finite"):
+        getattr(terrain_map, view)(xy)
+
+
+@pytest.mark.parametrize("far", [1e3, 1e300])
+def test_height_beyond_the_map_is_that_of_its_edge(slope_map, far):
+    assert slope_map.height((far, 1.0)) == slope_map.heights.max() > 1.9
+    assert slope_map.height((-far, 1.0)) == 0.0
+
+
+def test_normal_of_level_ground_points_straight_up(slope_map):
+    assert slope_map.normal((0.3, 1.0)).tolist() == [0.0, 0.0, 1.0]
+
+
+def test_normal_of_a_slope_leans_downhill(slope_map):
+    # Grade 0.5 along x: (-0.5, 0, 1) / sqrt(1.25)
+    np.testing.assert_allclose(
+        slope_map.normal((3.0, 1.0)), np.array([-0.5, 0, 1]) / np.sqrt(1.25), atol=1e-5
+    )
+
+
+def test_normal_beyond_the_map_has_nothing_of_the_slope_across_its_edge(slope_map):
+    # Nothing but slope: its first row of samples is where the map ends.
+    heights = np.roll(slope_map.heights, -20, axis=0)
+    cut_short = dataclasses.replace(slope_map, heights=heights)
+    assert cut_short.normal((0.5, 1.0))[0] < 0
+    assert cut_short.normal((-5.0, 1.0)).tolist() == [0.0, 0.0, 1.0]
+
+
+def test_normals_are_upward_unit_vectors_at_right_angles_to_the_ground(terrain_map):
+    rng = np.random.default_rng(0)
+    xy = rng.uniform(terrain_map.grid.lower, terrain_map.grid.upper, size=(500, 2))
+    normal = terrain_map.normal(xy)
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1.0)
+    assert (normal[:, 2] > 0).all()
+    for k, step in enumerate(np.eye(2) * 1e-7):
+        rise = terrain_map.height(xy + step) - terrain_map.height(xy - step)
+        np.testing.assert_allclose(rise / 2e-7, -normal[:, k] / normal[:, 2], atol=1e-5)
+
+
+def test_isaac_gym_finds_every_sample_where_the_map_has_it(terrain_map):
+    raw = terrain_map.height_field_raw(vertical_scale=0.001)
+    rows, columns = raw.shape  # nbRows, nbColumns
+    # add_heightfield reads a flat buffer row by row; rows go along y and columns along x.
+    index = np.arange(rows * columns)
+    place = np.column_stack([index % columns, index // columns]) * terrain_map.config.cell
+    xy = place + terrain_map.first_sample
+    z = raw.ravel() * 0.001
+    np.testing.assert_allclose(z, terrain_map.height(xy), atol=0.0005 + 1e-6)
+
+
+def test_raw_heights_lie_row_by_row_in_int16(terrain_map):
+    raw = terrain_map.height_field_raw()
+    assert raw.dtype == np.int16
+    assert raw.flags["C_CONTIGUOUS"]
+    assert raw.shape == (144, 184)  # 3 * 40 + 2 * 12 along y, 2 * 80 + 2 * 12 along x
+
+
+@pytest.mark.parametrize(
+    ("height", "units"), [(0.0124, 2), (0.0126, 3), (-0.0124, -2), (-0.0126, -3), (0.3, 60)]
+)
+def test_raw_heights_are_rounded_not_truncated(terrain_map, height, units):
+    raw = with_heights(terrain_map, height).height_field_raw(vertical_scale=0.005)
+    assert np.unique(raw).tolist() == [units]
+
+
+@pytest.mark.parametrize(("height", "units"), [(163.835, 32767), (-163.84, -32768)])
+def test_raw_heights_may_take_all_of_16_bits(terrain_map, height, units):
+    assert with_heights(terrain_map, height).height_field_raw()[0, 0] == units
+
+
+@pytest.mark.parametrize("height", [163.84, -163.85, 1e6])
+def test_raw_heights_beyond_16_bits_are_an_error(terrain_map, height):
+    with pytest.raises(
+        ExportError, match=r"do not fit in int16 at vertical_scale 0\.005; wanted .* or more"
+    ):
+        with_heights(terrain_map, height).height_field_raw()
+
+
+@pytest.mark.parametrize("height", [10.0, -10.0, 163.84, 1e6])
+def test_the_vertical_scale_that_the_error_asks_for_is_enough(terrain_map, height):
+    high = with_heights(terrain_map, height)
+    with pytest.raises(ExportError) as error:
+        high.height_field_raw(vertical_scale=1e-5)
+    wanted = float(re.search(r"wanted (\S+) or more", str(error.value)).group(1))
+    assert high.height_field_raw(wanted)[0, 0] * wanted == pytest.approx(height, abs=wanted)
+
+
+@pytest.mark.parametrize("scale", [0.0, -0.005, np.nan, np.inf])
+def test_a_vertical_scale_must_be_above_0(terrain_map, scale):
+    with pytest.raises(ConfigError, match=f"vertical_scale is {scale:g}; wanted .*above 0"):
+        terrain_map.height_field_raw(scale)
+
+
+@pytest.mark.parametrize(("row", "col"), [(0, 0), (1, 0), (0, 1), (1, 2)])
+def test_a_tile_of_the_map_is_the_tile_made_alone(terrain_map, row, col):
+    part, alone = terrain_map.tile(row, col), terrainkit.tile(terrain_map.config, row, col)
+    assert part.heights.tobytes() == alone.heights.tobytes()
+    assert part.origin.tobytes() == alone.origin.tobytes()
+    assert (part.terrain, part.difficulty) == (alone.terrain, alone.difficulty)
+    assert part.parameters == alone.parameters
+    assert part.grid == alone.grid
+
+
+def test_a_tile_knows_its_terrain_and_where_it_stands(terrain_map):
+    patch = terrain_map.tile(1, 2)
+    assert patch.terrain == "rough_slope"
+    assert patch.difficulty == 1.0
+    assert patch.heights.shape == (80, 40)
+    assert patch.grid.lower == pytest.approx((8.0, 8.0))
+    assert patch.grid.upper == pytest.approx((16.0, 12.0))
+
+
+@pytest.mark.parametrize(("row", "col"), [(2, 0), (0, 3), (-1, 0), (0, -1)])
+def test_there_is_no_tile_beyond_the_rows_and_columns(terrain_map, row, col):
+    with pytest.raises(
+        IndexError, match=rf"no patch \({row}, {col}\) in a map of 2 rows and 3 columns"
+    ):
+        terrain_map.tile(row, col)
+
+
+def test_an_environment_starts_on_the_patch_of_its_level_and_column(terrain_map):
+    start = terrain_map.assign(12, seed=4)
+    assert start.columns.tolist() == [0] * 4 + [1] * 4 + [2] * 4
+    assert set(start.levels.tolist()) == {0, 1}
+    assert start.terrain_types.tolist() == start.columns.tolist()
+    for origin, level, column in zip(start.env_origins, start.levels, start.columns, strict=True):
+        assert origin.tolist() == terrain_map.tile(level, column).origin.tolist()
+
+
+def test_environments_start_no_higher_than_max_init_level(terrain_map):
+    assert terrain_map.assign(50, max_init_level=0).levels.tolist() == [0] * 50
+
+
+def test_env_origins_stand_on_the_ground(terrain_map):
+    x, y, z = np.moveaxis(terrain_map.env_origins.astype(float), -1, 0)
+    np.testing.assert_allclose(terrain_map.height(np.stack([x, y], axis=-1)), z, atol=1e-3)
+
+
+def test_save_writes_and_load_reads(terrain_map, tmp_path):
+    path = terrain_map.save(tmp_path / "map.npz")
+    assert type(terrain_map).load(path).heights.tobytes() == terrain_map.heights.tobytes()

@@ -1,0 +1,87 @@
+import numpy as np
+import pytest
+
+from terrainkit.walls import centre_heights, joined_corners, wall_edges
+
+
+def samples(*rows):
+    return np.array(rows, dtype=np.float32)
+
+
+def test_steps_along_x_and_along_y_are_told_apart():
+    along_x, along_y = wall_edges(samples([0, 0], [1, 0], [1, 1]), 0.5)
+    assert along_x.tolist() == [[True, False], [False, True]]
+    assert along_y.tolist() == [[False], [True], [False]]
+
+
+def test_a_step_down_is_a_wall_too():
+    along_x, _ = wall_edges(samples([1], [0]), 0.5)
+    assert along_x.tolist() == [[True]]
+
+
+def test_a_step_of_exactly_the_threshold_is_no_wall():
+    along_x, _ = wall_edges(samples([0], [0.5], [1.25]), 0.5)
+    assert along_x.tolist() == [[False], [True]]
+
+
+def test_no_step_is_a_wall_at_an_infinite_threshold():
+    along_x, along_y = wall_edges(samples([0, 1e30], [-1e30, 0]), np.inf)
+    assert not along_x.any()
+    assert not along_y.any()
+
+
+def test_a_single_sample_has_no_edges():
+    along_x, along_y = wall_edges(samples([3]), 0.5)
+    assert (along_x.shape, along_y.shape) == ((0, 1), (1, 0))
+
+
+WALLS = {
+    "no wall": [],
+    "one wall": [0],
+    "opposite walls": [0, 2],
+    "corner walls": [3, 0],
+    "three walls": [0, 1, 2],
+    "four walls": [0, 1, 2, 3],
+}
+
+
+def walls_on(edges):
+    return np.isin(np.arange(4), edges)[None]
+
+
+@pytest.mark.parametrize(
+    ("case", "groups"),
+    [
+        ("no wall", ["0123"]),
+        ("one wall", ["0123"]),
+        ("opposite walls", ["03", "12"]),
+        ("corner walls", ["0", "123"]),
+        ("three walls", ["03", "1", "2"]),
+        ("four walls", ["0", "1", "2", "3"]),
+    ],
+)
+def test_corners_are_joined_by_edges_without_a_wall(case, groups):
+    joined = joined_corners(walls_on(WALLS[case]))[0]
+    found = {"".join(str(k) for k in np.flatnonzero(row)) for row in joined}
+    assert sorted(found) == groups
+
+
+@pytest.mark.parametrize(
+    ("case", "centres"),
+    [
+        ("one wall", [3.5, 3.5, 3.5, 3.5]),  # (0 + 1 + 4 + 9) / 4
+        ("opposite walls", [4.5, 2.5, 2.5, 4.5]),  # (0 + 9) / 2 and (1 + 4) / 2
+        ("corner walls", [0.0, 5.0, 5.0, 5.0]),  # 0, and (1 + 9) / 2 on the plane of 1, 4, 9
+        ("three walls", [4.5, 1.0, 4.0, 4.5]),  # (0 + 9) / 2, 1 and 4
+        ("four walls", [0.0, 1.0, 4.0, 9.0]),
+    ],
+)
+def test_joined_corners_bring_one_height_to_the_centre(case, centres):
+    corners = np.array([[0.0, 1.0, 4.0, 9.0]])
+    assert centre_heights(corners, walls_on(WALLS[case])).tolist() == [centres]
+
+
+def test_quads_are_independent_of_one_another():
+    corners = np.array([[0.0, 1.0, 4.0, 9.0], [5.0, 5.0, 7.0, 7.0]])
+    walls = np.concatenate([walls_on([0, 1, 2, 3]), walls_on([1, 3])])
+    assert centre_heights(corners, walls).tolist() == [[0.0, 1.0, 4.0, 9.0], [5.0, 5.0, 7.0, 7.0]]
