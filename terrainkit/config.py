@@ -1,6 +1,7 @@
 """MapConfig: everything that decides the bytes of a map."""
 
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Literal
 
 from terrainkit import presets
@@ -116,7 +117,7 @@ class MapConfig:
         self._check_grid()
         self._check_mix()
 
-    @property
+    @cached_property
     def mix(self) -> tuple[TerrainChoice, ...]:
         """The terrains in use: one's own, or the preset's."""
         return self.terrains or presets.find(self.preset)
@@ -132,18 +133,18 @@ class MapConfig:
             return float("inf")
         return self.slope_threshold * self.cell + 1e-5
 
-    @property
+    @cached_property
     def patch_shape(self) -> tuple[int, int]:
         """Cells of a patch along x and y."""
         x, y = (whole_cells("patch_size", size, self.cell) for size in self.patch_size)
         return x, y
 
-    @property
+    @cached_property
     def border_cells(self) -> int:
         """Cells of the border on each side."""
         return whole_cells("border", self.border, self.cell, least=0)
 
-    @property
+    @cached_property
     def grid(self) -> Grid:
         """The grid of the whole map, border included."""
         x, y = self.patch_shape

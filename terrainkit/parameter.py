@@ -5,7 +5,9 @@ and the value at difficulty 1; one value alone holds at every difficulty.
 """
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Literal
 
 from terrainkit.coerce import coerce
@@ -105,8 +107,9 @@ def _field(easy: Value, hard: Value | None = None, **rest: Any) -> Any:
     return dataclasses.field(default=hard, metadata={"parameter": parameter})
 
 
-def parameters_of(terrain: Any) -> dict[str, Parameter]:
-    """Return the parameters of a terrain (or its class) by name, in the order of its fields."""
+@cache
+def parameters_of(terrain: type) -> Mapping[str, Parameter]:
+    """Return the parameters of a terrain's class by name, in the order of its fields."""
     return {f.name: f.metadata["parameter"] for f in dataclasses.fields(terrain)}
 
 

@@ -35,7 +35,7 @@ class Terrain(ABC):
     """
 
     def __post_init__(self) -> None:
-        for name, parameter in parameters_of(self).items():
+        for name, parameter in parameters_of(type(self)).items():
             value = checked(self.kind(), name, getattr(self, name), parameter)
             object.__setattr__(self, name, value)
 
@@ -83,11 +83,11 @@ class Terrain(ABC):
 
     def requested(self) -> dict[str, Value]:
         """Return the parameters by name, as asked."""
-        return {name: getattr(self, name) for name in parameters_of(self)}
+        return {name: getattr(self, name) for name in parameters_of(type(self))}
 
     def realized(self, plot: Grid) -> dict[str, Realized]:
         """Return the parameters by name, as the cells of `plot` hold them."""
-        parameters = parameters_of(self).items()
+        parameters = parameters_of(type(self)).items()
         return {name: p.realized(getattr(self, name), plot) for name, p in parameters}
 
     def build(self, plot: Grid, rng: "np.random.Generator") -> NDArray[np.float32]:
@@ -104,7 +104,7 @@ class Terrain(ABC):
 
     def check_fit(self, plot: Grid) -> None:
         """Raise ConfigError if `plot` cannot hold a block of this terrain."""
-        for name, parameter in parameters_of(self).items():
+        for name, parameter in parameters_of(type(self)).items():
             if parameter.snap == "centred":
                 self._check_centred(name, getattr(self, name), plot)
 
