@@ -4,7 +4,7 @@ import re
 import subprocess
 import sys
 import tracemalloc
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -84,7 +84,7 @@ def test_a_tile_alone_equals_its_slice_of_the_map(row, col):
 def test_editing_one_column_leaves_the_others_identical():
     edited = TerrainChoice(terrain="stairs", parameters={"step_height": 0.3, "inverted": True})
     before = generate(SMALL).heights
-    after = generate(MapConfig(**vars(SMALL) | {"terrains": (OBSTACLES, edited)})).heights
+    after = generate(replace(SMALL, terrains=(OBSTACLES, edited))).heights
     start = 10 + 2 * 60  # the third column is the first of the stairs
     assert before[:, :start].tobytes() == after[:, :start].tobytes()
     assert (before[:, start:] != after[:, start:]).any()
@@ -97,7 +97,7 @@ def test_more_rows_leave_the_draws_of_the_first_ones_alone():
 
 
 def test_centered_moves_the_map_and_changes_nothing_else():
-    corner, middle = generate(SMALL), generate(MapConfig(**vars(SMALL) | {"centered": True}))
+    corner, middle = generate(SMALL), generate(replace(SMALL, centered=True))
     assert corner.heights.tobytes() == middle.heights.tobytes()
     assert corner.grid.lower == (-1.0, -1.0)
     assert middle.grid.centre == pytest.approx((0.0, 0.0))
