@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 from terrainkit.capacity import require_memory
 from terrainkit.errors import MapFileError, TerrainkitError
 
+_LONGEST_HEADER = 10_000
+"""Most that a header may take [bytes]; those of numpy's own take a hundred."""
+
 LONGEST_TEXT = 64 << 20
 """Most that a text may take [bytes]."""
 
@@ -54,6 +57,21 @@ def opened(name: str | Path) -> Iterator["Archive"]:
         raise MapFileError(f"{path} is not an .npz file, or not a whole one: {error}") from error
     with file:
         yield Archive(path, file)
+
+
+class _Capped:
+    """The start of a file: numpy reads a header whole, however long it says that it is."""
+
+    def __init__(self, file: IO[bytes], most: int) -> None:
+        self._file = file
+        self._left = most
+
+    def read(self, size: int) -> bytes:
+        """Return the next `size` bytes, or raise ValueError if they reach too far."""
+        if size > self._left:
+            raise ValueError(f"its header is longer than {_LONGEST_HEADER} bytes")
+        self._left -= size
+        return self._file.read(size)
 
 
 class Archive:
@@ -103,14 +121,15 @@ class Archive:
         shape: tuple[int | None, ...],
         limit: int | None,
     ) -> None:
-        version = np.lib.format.read_magic(member)
+        start: Any = _Capped(member, _LONGEST_HEADER)
+        version = np.lib.format.read_magic(start)
         read = {
             (1, 0): np.lib.format.read_array_header_1_0,
             (2, 0): np.lib.format.read_array_header_2_0,
         }
         if version not in read:
             raise MapFileError(f"{self.path}: {key} has an unknown .npy version {version}")
-        found, _, dtype = read[version](member)
+        found, _, dtype = read[version](start)
         if (
             dtype.hasobject
             or not dtype.isnative
@@ -136,9 +155,9 @@ class Archive:
                 f"{self.path}: {key} is {found.tolist()}, but its config says {wanted}"
             )
 
-    def text(self, key: str) -> str:
-        """Return the text under `key`."""
-        return str(self.array(key, "U", (), limit=LONGEST_TEXT))
+    def text(self, key: str, *, limit: int = LONGEST_TEXT) -> str:
+        """Return the text under `key`, which may take `limit` bytes."""
+        return str(self.array(key, "U", (), limit=limit))
 
 
 def _is_text(array: NDArray[np.str_]) -> bool:

@@ -13,6 +13,11 @@ from terrainkit.walls import joined_corners, wall_edges
 THICKNESS = 1.0
 """Ground below the lowest point of the map, which every box reaches down to [m]."""
 
+_MANY_HEIGHTS = 50
+"""Heights in a block above which a box is searched only around the cells of its height, or the time
+would grow with the square of their number. Below, it may run on under higher ground to the edge of
+the block, and be joined with one beyond."""
+
 _Span = tuple[int, int, int, int]
 """Cells i0 to i1 along x and j0 to j1 along y, ends not included."""
 
@@ -112,9 +117,22 @@ def _lowest(heights: NDArray[np.float32], level: NDArray[np.bool_]) -> NDArray[n
 def _cover_block(
     heights: NDArray[np.float32], level: NDArray[np.bool_], low: NDArray[np.float32]
 ) -> Iterator[tuple[float, _Span]]:
-    for height in np.unique(heights[level]):
-        for span in rectangle_cover(level & (heights == height), low >= height):
-            yield float(height), span
+    """Yield the boxes of a block of cells, height by height."""
+    if not level.any():
+        return
+    i, j = np.nonzero(level)
+    order = np.argsort(heights[i, j], kind="stable")
+    i, j = i[order], j[order]
+    values, first = np.unique(heights[i, j], return_index=True)
+    groups = zip(values, np.split(i, first[1:]), np.split(j, first[1:]), strict=True)
+    for height, rows, cols in groups:
+        part = (slice(0, heights.shape[0]), slice(0, heights.shape[1]))
+        if len(values) > _MANY_HEIGHTS:
+            part = (slice(rows.min(), rows.max() + 1), slice(cols.min(), cols.max() + 1))
+        wanted = level[part] & (heights[part] == height)
+        for a, b, c, d in rectangle_cover(wanted, low[part] >= height):
+            i0, j0 = part[0].start, part[1].start
+            yield float(height), (int(i0 + a), int(i0 + b), int(j0 + c), int(j0 + d))
 
 
 def _joined(spans: list[_Span]) -> list[_Span]:

@@ -1,12 +1,13 @@
 """MapConfig: everything that decides the bytes of a map."""
 
+from collections import Counter
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Literal
 
 from terrainkit import presets
 from terrainkit.choice import TerrainChoice
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, listing
 from terrainkit.grid import Grid, whole_cells
 from terrainkit.parameter import LARGEST
 
@@ -187,15 +188,13 @@ class MapConfig:
     def _check_mix(self) -> None:
         mix = self.mix
         names = [choice.name for choice in mix]
-        for name in names:
-            if names.count(name) > 1:
-                raise ConfigError(
-                    f"two terrains of the mix are called {name!r}; give one another name"
-                )
+        (name, count), *_ = Counter(names).most_common(1)
+        if count > 1:
+            raise ConfigError(f"{count} terrains of the mix are called {name!r}; wanted own names")
         if self.mode == "selected" and len(mix) != 1:
             raise ConfigError(
                 f"mode selected wants a mix of one terrain (--terrain); this one has {len(mix)}: "
-                f"{', '.join(names)}"
+                f"{listing(names)}"
             )
         if not sum(choice.proportion for choice in mix) > 0:
-            raise ConfigError(f"the proportions of {', '.join(names)} sum to 0; wanted more")
+            raise ConfigError(f"the proportions of {listing(names)} sum to 0; wanted more")

@@ -30,6 +30,12 @@ class TerrainkitWarning(UserWarning):
     """Something was left out or changed, and the result is still sound."""
 
 
+_MOST_LISTED = 40
+
+
 def listing(names: Iterable[str]) -> str:
     """Return `names` as a sentence fragment, for the "what exists" part of a message."""
-    return ", ".join(names) or "nothing"
+    listed = list(names)
+    more = len(listed) - _MOST_LISTED
+    shown = listed if more <= 0 else [*listed[:_MOST_LISTED], f"and {more} more"]
+    return ", ".join(shown) or "nothing"

@@ -1,13 +1,19 @@
 """Generate: from a MapConfig to a TerrainMap."""
 
+import warnings
+from collections import Counter
 from collections.abc import Callable, Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
+from terrainkit import registry
 from terrainkit.capacity import require_memory
 from terrainkit.config import MapConfig
+from terrainkit.errors import TerrainkitWarning, listing
 from terrainkit.layout import assign_patch, terrain_columns
-from terrainkit.patch import build_patch
+from terrainkit.parameter import parameters_of
+from terrainkit.patch import Parameters, build_patch
 from terrainkit.terrain_map import TerrainMap
 
 Progress = Callable[[Iterator[tuple[int, int]], int], Iterator[tuple[int, int]]]
@@ -22,7 +28,8 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
         progress: Wraps the walk over the patches, for a progress bar.
 
     Warns:
-        TerrainkitWarning: if a terrain of a preset gets no column.
+        TerrainkitWarning: if a terrain of a preset gets no column, or the cells are too coarse (or
+            the patches too small) for what was asked.
 
     Raises:
         ConfigError: if a terrain does not fit in a patch, or leaves no room to spawn.
@@ -47,6 +54,7 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
         kinds[row, col] = kind
         difficulty[row, col] = level
         parameters[row, col] = patch.parameters
+    _warn_of_deviations(config, kinds, parameters)
     return TerrainMap(
         config=config,
         grid=grid,
@@ -57,6 +65,26 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
         difficulty=difficulty,
         parameters=parameters,
     )
+
+
+def _warn_of_deviations(
+    config: MapConfig, kinds: NDArray[np.int32], parameters: NDArray[np.object_]
+) -> None:
+    known = [parameters_of(registry.find(choice.terrain)) for choice in config.mix]
+    counts: Counter[str] = Counter()
+    records: list[Parameters] = parameters.ravel().tolist()
+    for kind, record in zip(kinds.flat, records, strict=True):
+        for name, asked in record.requested.items():
+            if known[kind][name].deviates(asked, record.realized[name], config.cell):
+                counts[f"{config.mix[kind].name}.{name}"] += 1
+    if counts:
+        said = listing(f"{name} on {count} patches" for name, count in counts.items())
+        warnings.warn(
+            f"cells of {config.cell:g} m, or the patches, are too coarse or small for what was "
+            f"asked: {said}; the map records what was built",
+            TerrainkitWarning,
+            stacklevel=3,
+        )
 
 
 def _bytes_needed(config: MapConfig) -> int:

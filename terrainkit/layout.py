@@ -5,7 +5,7 @@ import warnings
 import numpy as np
 
 from terrainkit.config import MapConfig
-from terrainkit.errors import ConfigError, TerrainkitWarning
+from terrainkit.errors import ConfigError, TerrainkitWarning, listing
 
 _LAYOUT_STREAM = (1,)
 """Sets a patch's layout draws apart from those that its terrain makes from the same numbers."""
@@ -40,7 +40,7 @@ def terrain_columns(config: MapConfig) -> list[int]:
     if starved and config.mode != "randomized":
         message = (
             f"{config.cols} columns are too few for {len(mix)} terrains at these proportions: "
-            f"no column for {', '.join(starved)}"
+            f"no column for {listing(starved)}"
         )
         if config.terrains:
             raise ConfigError(message)

@@ -43,6 +43,9 @@ class Parameter:
     zero: bool = True
     """Whether 0 is allowed; below 0 nothing is."""
 
+    is_grade: bool = False
+    """Whether it is a rise over run, which is no slope any more where it makes walls."""
+
     ramps: bool = True
     """Whether it may be given as a range (easy, hard)."""
 
@@ -59,6 +62,15 @@ class Parameter:
             return x if x == y else (x, y)
         return value
 
+    def deviates(self, asked: Value, built: Realized, cell: float) -> bool:
+        """Return whether `built` differs from `asked` by more than it has to.
+
+        A length on the cells may be half a cell off, or one to stay centred; any other number 5 %.
+        """
+        allowed = {"cells": cell / 2, "centred": cell, "none": 0.05 * asked}[self.snap]
+        ends = built if isinstance(built, tuple) else (built,)
+        return any(abs(end - asked) > allowed + 1e-6 for end in ends)
+
 
 def at_difficulty(value: Value | Range, difficulty: float) -> Value:
     """Return `value` at `difficulty` 0 to 1: linear from easy to hard, exact at both ends.
@@ -68,7 +80,8 @@ def at_difficulty(value: Value | Range, difficulty: float) -> Value:
     if not isinstance(value, tuple):
         return value
     easy, hard = value
-    return easy * (1.0 - difficulty) + hard * difficulty
+    # Else 0.31 (1 - d) + 0.31 d would be 0.31000000000000005 here and there.
+    return easy if easy == hard else easy * (1.0 - difficulty) + hard * difficulty
 
 
 def height(easy: float, hard: float | None = None) -> Any:
@@ -87,8 +100,13 @@ def platform(side: float) -> Any:
 
 
 def scalar(easy: float, hard: float | None = None, *, zero: bool = True) -> Any:
-    """Declare a number that the cells leave as it is: a grade, a spacing."""
+    """Declare a number that the cells leave as it is."""
     return _field(easy, hard, zero=zero)
+
+
+def grade(easy: float, hard: float) -> Any:
+    """Declare a rise over run; one above the map's slope_threshold would be a wall."""
+    return _field(easy, hard, is_grade=True)
 
 
 def count(number: int) -> Any:

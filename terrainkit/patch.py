@@ -8,10 +8,12 @@ from numpy.typing import NDArray
 
 from terrainkit.choice import TerrainChoice
 from terrainkit.config import MapConfig
+from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.layout import assign_patch, terrain_columns
-from terrainkit.parameter import Realized, Value
+from terrainkit.parameter import Realized, Value, parameters_of
 from terrainkit.spawn import find_spawn, room_error
+from terrainkit.terrain import Terrain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +74,7 @@ def build_patch(
     whatever order, process or company it is built.
     """
     terrain = choice.at(difficulty)
+    _refuse_walls(terrain, config)
     grid = config.patch_grid(row, col)
     rng = np.random.default_rng(np.random.SeedSequence([config.seed, row, col]))
     heights = terrain.build(grid, rng)
@@ -93,3 +96,15 @@ def build_patch(
         heights=heights,
         origin=np.array(origin, dtype=np.float32),
     )
+
+
+def _refuse_walls(terrain: Terrain, config: MapConfig) -> None:
+    """Raise ConfigError if a slope is so steep that the map would make it a stack of walls."""
+    for name, parameter in parameters_of(type(terrain)).items():
+        grade = getattr(terrain, name)
+        if parameter.is_grade and grade * config.cell > config.wall_height:
+            raise ConfigError(
+                f"{terrain.kind()}: {name} {grade:g} is above slope_threshold "
+                f"{config.slope_threshold:g}, so it would be walls; wanted less of one or more of "
+                "the other"
+            )

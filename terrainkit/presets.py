@@ -1,7 +1,5 @@
 """Presets: ready mixes of terrains, by name."""
 
-from functools import cache
-
 from terrainkit import registry
 from terrainkit.choice import TerrainChoice
 from terrainkit.errors import ConfigError, listing
@@ -35,7 +33,6 @@ def names() -> tuple[str, ...]:
     return (*_MIXES, "all")
 
 
-@cache
 def find(name: str) -> tuple[TerrainChoice, ...]:
     """Return the mix called `name`; "all" holds each terrain, upright and inverted, once.
 

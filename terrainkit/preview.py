@@ -1,5 +1,6 @@
 """The preview: a shaded relief of a map from above, with its names, levels and spawn origins."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,6 +32,12 @@ _PAPER = (250, 249, 246)
 _MARGIN = (250, 60, 30, 70)
 """Paper to the left, below, to the right and above the ground [px]."""
 
+_MOST_PIXELS = 10_000
+"""Largest side of the ground in a picture [px]."""
+
+_LINE, _WORD = 18, 80
+"""Room that a label takes, down and across [px]; where patches are smaller, some go without."""
+
 _LIGHT = np.array([-0.55, 0.45, 0.7])
 """Where the light comes from: the upper left, as on maps, lest hills look like holes."""
 
@@ -54,8 +61,9 @@ def write_preview(
     path = Path(path)
     if path.suffix.lower() != ".png":
         raise ExportError(f"a preview is a .png; got {path}")
-    if not 100 <= width <= 10_000:
-        raise ExportError(f"width is {width}; wanted 100 to 10000")
+    if not 100 <= width <= _MOST_PIXELS:
+        raise ExportError(f"width is {width}; wanted 100 to {_MOST_PIXELS}")
+    terrain_map.require_finite()
     with atomic_write(path, overwrite=overwrite) as temporary:
         _, data = cv2.imencode(".png", cv2.cvtColor(preview(terrain_map, width), cv2.COLOR_RGB2BGR))
         temporary.write_bytes(data.tobytes())
@@ -65,10 +73,18 @@ def write_preview(
 def preview(terrain_map: "TerrainMap", width: int = 1600) -> Picture:
     """Return the preview as red, green and blue, shape (height, width, 3): x right, y up."""
     heights, crop = _without_border(terrain_map)
-    ground = relief(heights, terrain_map.config.cell)
-    # Downwards rows, and every sample a square of whole pixels (or a share of one, on a huge map).
-    ground = _resized(ground.swapaxes(0, 1)[::-1], width)
-    scale = ground.shape[1] / heights.shape[0] / terrain_map.config.cell
+    cell = terrain_map.config.cell
+    extent = heights.shape[0] * cell
+    # A map that is much higher than wide gets a picture that is narrower than asked.
+    width = max(1, min(width, _MOST_PIXELS * heights.shape[0] // heights.shape[1]))
+    if heights.shape[0] > width:
+        heights, cell = _shrunk(heights, width), extent / width
+    # Downwards rows, and every sample a square of whole pixels.
+    factor = -(-width // heights.shape[0])
+    ground = (
+        relief(heights, cell).swapaxes(0, 1)[::-1].repeat(factor, axis=0).repeat(factor, axis=1)
+    )
+    scale = ground.shape[1] / extent
     left, below, right, above = _MARGIN
     height, span = ground.shape[:2]
     sheet = np.full((height + above + below, span + left + right, 3), _PAPER, dtype=np.uint8)
@@ -117,16 +133,14 @@ def _without_border(
     return heights, (lower[0] + cut * config.cell, lower[1] + cut * config.cell)
 
 
-def _resized(picture: Picture, width: int) -> Picture:
+def _shrunk(heights: NDArray[np.float32], width: int) -> NDArray[np.float32]:
+    """Return the heights averaged over fewer samples, `width` along x."""
     import cv2
 
-    samples = picture.shape[1]
-    if samples <= width:
-        factor = -(-width // samples)
-        return picture.repeat(factor, axis=0).repeat(factor, axis=1)
-    size = (width, max(1, round(picture.shape[0] * width / samples)))
-    smaller = cv2.resize(np.ascontiguousarray(picture), size, interpolation=cv2.INTER_AREA)
-    return np.asarray(smaller, dtype=np.uint8)
+    other = max(1, round(heights.shape[1] * width / heights.shape[0]))
+    # OpenCV's x is the second index.
+    shrunk = cv2.resize(heights, (other, width), interpolation=cv2.INTER_AREA)
+    return np.asarray(shrunk.reshape(width, other), dtype=np.float32)
 
 
 def _annotate(
@@ -145,11 +159,11 @@ def _annotate(
 
     size_x, size_y = config.patch_size
     by_column = config.mode != "randomized"
-    for col in range(cols):
+    for col in range(0, cols, max(1, math.ceil(_LINE / (size_y * scale)))):
         _, y = pixel(0, first[1] + (col + 0.5) * size_y)
         name = terrain_map.terrain_names[terrain_map.terrain_types[0, col]] if by_column else ""
         write(f"{col:>3}  {name}", (10, y + 5))
-    for row in range(rows):
+    for row in range(0, rows, max(1, math.ceil(_WORD / (size_x * scale)))):
         x, _ = pixel(first[0] + (row + 0.5) * size_x, 0)
         low, high = terrain_map.difficulty[row].min(), terrain_map.difficulty[row].max()
         level = f"{low:.2f}" if low == high else f"{low:.2f}-{high:.2f}"

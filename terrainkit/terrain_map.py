@@ -10,6 +10,7 @@ from terrainkit.config import MapConfig
 from terrainkit.curriculum import Assignment, assign_levels
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit.grid import Grid
+from terrainkit.parameter import LARGEST
 from terrainkit.patch import Patch
 from terrainkit.surface import SurfacePoints, surface_at
 
@@ -129,6 +130,17 @@ class TerrainMap:
     def first_sample(self) -> tuple[float, float]:
         """Where `heights[0, 0]` stands, x and y [m]: half a cell inside the corner of the map."""
         return self.grid.lower[0] + self.grid.cell / 2, self.grid.lower[1] + self.grid.cell / 2
+
+    def require_finite(self) -> None:
+        """Raise ExportError unless every height and origin is a number that a view can hold."""
+        for name in ("heights", "env_origins"):
+            values = getattr(self, name)
+            # One pass each: NaN makes both comparisons false.
+            if not (values.min() >= -LARGEST and values.max() <= LARGEST):
+                raise ExportError(
+                    f"{name} holds numbers that are not finite, or beyond {LARGEST:g} m; "
+                    "terrainkit check says where"
+                )
 
     def tile(self, row: int, col: int) -> Patch:
         """Return patch (row, col) of this map; :func:`terrainkit.tile` makes one without a map.

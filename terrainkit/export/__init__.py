@@ -41,6 +41,7 @@ def export(
     for name in options:
         if name not in known:
             raise ExportError(f"{path.suffix} has no option {name!r}; it has: {listing(known)}")
+    terrain_map.require_finite()
     with atomic_write(path, overwrite=overwrite) as temporary:
         write(terrain_map, temporary, **options)
     return path

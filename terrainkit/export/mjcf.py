@@ -13,7 +13,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.boxes import THICKNESS, BoxCover
+from terrainkit.boxes import THICKNESS, BoxCover, level_cells
 from terrainkit.capacity import require_memory
 from terrainkit.coerce import coerce
 
@@ -57,9 +57,7 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
     collision = coerce("collision", collision, Collision)
     samples = terrain_map.heights.size
     require_memory(samples * _BYTES_PER_SAMPLE, f"a MuJoCo model of {samples} samples")
-    cover = None if collision == "hfield" else terrain_map.boxes()
-    if cover and collision == "auto" and not (cover.complete and len(cover.centres) <= _FEW_BOXES):
-        cover = None
+    cover = _cover(terrain_map, collision)
     root = ET.Element("mujoco", model="terrain")
     _add_class(root, terrain_map)
     asset = ET.SubElement(root, "asset")
@@ -75,6 +73,19 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
             _add_box(body, *box)
     ET.indent(root)
     ET.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+
+
+def _cover(terrain_map: "TerrainMap", collision: Collision) -> BoxCover | None:
+    """Return the boxes to use, or None for a heightfield."""
+    if collision == "hfield":
+        return None
+    if collision == "auto":
+        threshold = terrain_map.config.wall_height
+        if not level_cells(terrain_map.heights, threshold).all():
+            return None
+        cover = terrain_map.boxes()
+        return cover if len(cover.centres) <= _FEW_BOXES else None
+    return terrain_map.boxes()
 
 
 def _add_class(root: ET.Element, terrain_map: "TerrainMap") -> None:

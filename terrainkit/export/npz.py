@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit import registry
 from terrainkit.archive import LONGEST_TEXT, Archive, opened, write_arrays
 from terrainkit.config import MapConfig
 from terrainkit.config_text import from_toml, to_toml
-from terrainkit.errors import ConfigError, MapFileError
+from terrainkit.errors import ConfigError, MapFileError, listing
 from terrainkit.mesh.tri_mesh import TriMesh
-from terrainkit.parameter import Realized, Value
+from terrainkit.parameter import LARGEST, Realized, Value, parameters_of
 from terrainkit.patch import Parameters
 
 if TYPE_CHECKING:
@@ -26,6 +27,9 @@ FORMAT_VERSION = 1
 
 _MOST_FACES = 20
 """Most triangles, and vertices, that a mesh can have for each sample of its map."""
+
+_TEXT_OF_A_PATCH = 8192
+"""Most that the record of the parameters of a patch may take [bytes]."""
 
 _Map = TypeVar("_Map", bound="TerrainMap")
 
@@ -94,7 +98,7 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
             terrain_types=kinds,
             terrain_names=tuple(str(name) for name in names),
             difficulty=archive.array("difficulty", "f4", size),
-            parameters=_all_parameters(archive, size),
+            parameters=_all_parameters(archive, config, kinds),
         )
 
 
@@ -134,20 +138,25 @@ def _parameters_text(terrain_map: "TerrainMap") -> str:
     return json.dumps(rows, separators=(",", ":"))
 
 
-def _all_parameters(archive: Archive, size: tuple[int, int]) -> NDArray[np.object_]:
-    table = np.empty(size, dtype=object)
+def _all_parameters(
+    archive: Archive, config: MapConfig, kinds: NDArray[np.int32]
+) -> NDArray[np.object_]:
+    table = np.empty(kinds.shape, dtype=object)
+    wanted = [set(parameters_of(registry.find(choice.terrain))) for choice in config.mix]
     try:
-        rows = json.loads(archive.text("parameters"))
-        for row, col in np.ndindex(size):
-            table[row, col] = _parameters(rows[row][col])
+        rows = json.loads(archive.text("parameters", limit=(table.size + 16) * _TEXT_OF_A_PATCH))
+        for row, col in np.ndindex(table.shape):
+            table[row, col] = _parameters(rows[row][col], wanted[kinds[row, col]])
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise MapFileError(f"{archive.path}: parameters cannot be read: {error}") from error
     return table
 
 
-def _parameters(record: Mapping[str, Mapping[str, Any]]) -> Parameters:
-    realized = {name: _realized(value) for name, value in record["realized"].items()}
+def _parameters(record: Mapping[str, Mapping[str, Any]], wanted: set[str]) -> Parameters:
     requested = {name: _number(value) for name, value in record["requested"].items()}
+    realized = {name: _realized(value) for name, value in record["realized"].items()}
+    if not requested.keys() == realized.keys() == wanted:
+        raise ValueError(f"wanted {listing(sorted(wanted))}, requested and realized")
     return Parameters(requested=requested, realized=realized)
 
 
@@ -159,6 +168,6 @@ def _realized(value: Any) -> Realized:
 
 
 def _number(value: Any) -> Value:
-    if not isinstance(value, int | float):
-        raise TypeError(f"{value!r} is no number")
+    if not isinstance(value, int | float) or not abs(value) <= LARGEST:
+        raise ValueError("a value is not a number within bounds")
     return value

@@ -17,7 +17,7 @@ from terrainkit.terrains.pyramid_slope import PyramidSlope
 class RoughSlope(Terrain):
     """A pyramid slope whose sides carry uniform noise; the platform stays level."""
 
-    grade: float = parameter.scalar(0.0, 0.4)
+    grade: float = parameter.grade(0.0, 0.4)
     """Rise over run of the sides, before the noise."""
 
     amplitude: float = parameter.height(0.05)

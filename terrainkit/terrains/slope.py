@@ -18,7 +18,7 @@ class Slope(Terrain):
     The robot starts at low x; both ends span the patch's whole width.
     """
 
-    grade: float = parameter.scalar(0.0, 0.4)
+    grade: float = parameter.grade(0.0, 0.4)
     """Rise over run of the slope."""
 
     landing: float = parameter.length(2.0)

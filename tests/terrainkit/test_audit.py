@@ -102,7 +102,9 @@ def test_a_width_that_the_patch_cannot_hold_is_named():
     config = tk.MapConfig(
         rows=2, cols=1, patch_size=(8.0, 4.0), terrains=(tk.TerrainChoice(terrain="gap"),)
     )
-    assert found(tk.generate(config)) == [
+    with pytest.warns(tk.TerrainkitWarning, match="gap.width on 1 patches; the map records"):
+        terrain_map = tk.generate(config)
+    assert found(terrain_map) == [
         ("realized", "patch (1, 0), gap: width is (1.0, 0.5) where 1 was asked")
     ]
 

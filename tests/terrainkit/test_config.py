@@ -117,7 +117,7 @@ def test_a_config_does_not_change():
         ({"mode": "random"}, "mode is 'random'; wanted one of: curriculum, selected, randomized"),
         ({"preset": "moon"}, "no preset 'moon'; there are: legged_gym, rough, stairs, all"),
         ({"terrains": (FLAT, "gap")}, "terrains is 'gap'; wanted TerrainChoice"),
-        ({"terrains": (GAP, GAP)}, "two terrains of the mix are called 'gap'"),
+        ({"terrains": (GAP, GAP)}, "2 terrains of the mix are called 'gap'"),
         ({"mode": "selected", "terrains": (GAP, FLAT)}, "mix of one terrain.* has 2: gap, flat"),
         ({"mode": "selected"}, "mode selected wants a mix of one terrain.* this one has 9: "),
         (

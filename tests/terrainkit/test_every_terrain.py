@@ -1,5 +1,3 @@
-import dataclasses
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,7 +7,6 @@ from terrainkit import MapConfig, TerrainChoice, TerrainkitError, generate, regi
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.measure import hardness
-from terrainkit.noise import LatticeNoise
 from terrainkit.parameter import LARGEST, parameters_of
 
 VARIANTS = [(name, {}) for name in registry.names()] + [
@@ -33,7 +30,8 @@ every_plot = pytest.mark.parametrize(
     ],
 )
 DIFFICULTIES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
-LATTICE = {field.name for field in dataclasses.fields(LatticeNoise)}
+# That the cells of some plots are too coarse for what is asked is said, and not the point here.
+coarse = pytest.mark.filterwarnings("ignore:cells of:terrainkit.TerrainkitWarning")
 
 
 def at_every_difficulty(terrain, parameters, plot, seed=0):
@@ -79,6 +77,7 @@ def test_heights_are_finite_float32_of_the_shape_of_the_patch(terrain, given_par
         assert np.isfinite(heights).all()
 
 
+@coarse
 @every_plot
 @every_terrain
 def test_every_spawn_is_a_level_disc_on_the_ground(terrain, given_parameters, plot):
@@ -167,11 +166,10 @@ def test_what_is_built_is_within_a_cell_of_what_is_asked(terrain, given_paramete
         built = registry.find(terrain).at(difficulty, given_parameters)
         requested, realized = built.requested(), built.realized(plot)
         assert list(realized) == list(requested)
-        # Noise rounds its amplitude and spacing to a lattice; test_noise looks at these.
-        rounded = LATTICE if set(requested) >= LATTICE else set()
-        for name, parameter in parameters_of(built).items():
+        for name, parameter in parameters_of(type(built)).items():
             if parameter.snap == "none":
-                assert realized[name] == requested[name] or name in rounded
+                # Noise keeps to a lattice, and no sample need stand on the crest of a wave.
+                assert np.array(realized[name]) == pytest.approx(requested[name], rel=0.05)
             else:
                 off = np.abs(np.array(realized[name]) - requested[name])
                 assert off.max() <= cell + 1e-9
@@ -195,6 +193,7 @@ def test_a_number_beyond_all_measure_is_built_or_refused(terrain, parameter, val
     assert set(built.realized(plot)) == set(built.requested())
 
 
+@coarse
 @settings(deadline=None, derandomize=True, max_examples=200)
 @given(
     variant=st.sampled_from(VARIANTS),

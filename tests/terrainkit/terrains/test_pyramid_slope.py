@@ -72,8 +72,9 @@ def test_the_grade_grows_with_the_difficulty(difficulty, peak, plot, rng):
     assert PyramidSlope.at(difficulty).build(plot, rng).max() == pytest.approx(peak)
 
 
-def test_a_platform_of_the_whole_patch_leaves_no_slope(plot, rng):
-    assert not PyramidSlope(grade=0.4, platform=8.0).build(plot, rng).any()
+def test_a_platform_of_the_whole_patch_is_an_error(plot, rng):
+    with pytest.raises(ConfigError, match="platform of 8 m leaves no slope in a patch of 8 m x 8"):
+        PyramidSlope(grade=0.4, platform=8.0).build(plot, rng)
 
 
 @pytest.mark.parametrize(("shape", "size"), [((80, 80), "8 m x 8 m"), ((90, 80), "9 m x 8 m")])
