@@ -4,11 +4,7 @@ test:          ## all tests
 	python -m pytest
 
 check:         ## what CI checks beside the tests
-	ruff check .
-	ruff format --check .
-	mypy
-	lint-imports
-	python docs/build.py --check
+	.ci/check
 
 format:        ## put the code in shape
 	ruff check --fix .

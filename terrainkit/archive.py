@@ -110,7 +110,7 @@ class Archive:
             said = " ".join(str(error).split()) or type(error).__name__
             raise MapFileError(f"{self.path}: {key} cannot be read: {said}") from error
         if kind == "U" and not _is_text(array):
-            raise MapFileError(f"{self.path}: {key} holds characters that there are not")
+            raise MapFileError(f"{self.path}: {key} contains invalid Unicode")
         return array
 
     def _check_header(

@@ -1,6 +1,5 @@
 """Atomic writes: what is written is there whole, or not at all."""
 
-import os
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -21,6 +20,8 @@ def atomic_write(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
         ExportError: if a target exists and `overwrite` is not set, or cannot be written.
     """
     check_target(path, overwrite=overwrite)
+    if path.is_symlink():
+        path = path.resolve()  # through the link, which stays one
     try:
         # Beside the target, so that moving there is a rename on the same disk.
         folder = Path(tempfile.mkdtemp(prefix=".terrainkit-", dir=path.parent))
@@ -44,7 +45,7 @@ def check_target(path: Path, *, overwrite: bool) -> None:
     try:
         if path.is_dir():
             raise ExportError(f"cannot write {path}: it is a folder")
-        if os.path.lexists(path) and not path.is_file():
+        if path.exists() and not path.is_file():
             raise ExportError(f"cannot write {path}: it is there, and not a plain file")
         if path.exists() and not overwrite:
             raise ExportError(

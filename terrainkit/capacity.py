@@ -1,6 +1,10 @@
 """Capacity: whether work fits in this machine's memory, asked before it is begun."""
 
+from pathlib import Path
+
 from terrainkit.errors import CapacityError
+
+_CONTROL_GROUP = Path("/sys/fs/cgroup")
 
 _SURE_TO_FIT = 1 << 28
 """Work below this is not worth asking the operating system about [bytes]."""
@@ -15,10 +19,22 @@ def require_memory(needed: int, what: str) -> None:
     """
     if needed <= _SURE_TO_FIT:
         return
-    import psutil
-
-    free = psutil.virtual_memory().available
+    free = _free_memory()
     if needed > free:
         raise CapacityError(
             f"{what} needs {needed / 1e9:.1f} GB of memory; {free / 1e9:.1f} GB free"
         )
+
+
+def _free_memory() -> int:
+    """Return the memory that this process may still take [bytes]: the machine's, or its share."""
+    import psutil
+
+    free = int(psutil.virtual_memory().available)
+    try:
+        # In a container or under a scheduler, Linux ends who takes more than the group's limit.
+        limit = int((_CONTROL_GROUP / "memory.max").read_text())
+        used = int((_CONTROL_GROUP / "memory.current").read_text())
+    except (OSError, ValueError):  # no such group, or "max": no limit
+        return free
+    return min(free, limit - used)

@@ -61,10 +61,10 @@ class MapConfig:
     """Width of the level ground around the patches [m]."""
 
     preset: str = "legged_gym"
-    """Mix of terrains by name: legged_gym, rough, stairs or all; empty if `terrains` has one."""
+    """Mix of terrains by name: legged_gym, rough, stairs or all."""
 
     terrains: tuple[TerrainChoice, ...] = ()
-    """A mix of one's own, used instead of the preset."""
+    """Your own terrains, instead of a preset."""
 
     mode: Mode = "curriculum"
     """curriculum: difficulty by row, terrain by column. selected: the only terrain of the mix

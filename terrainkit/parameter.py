@@ -128,6 +128,12 @@ def _field(easy: Value, hard: Value | None = None, **rest: Any) -> Any:
 @cache
 def parameters_of(terrain: type) -> Mapping[str, Parameter]:
     """Return the parameters of a terrain's class by name, in the order of its fields."""
+    for field in dataclasses.fields(terrain):
+        if "parameter" not in field.metadata:
+            raise ConfigError(
+                f"{terrain.__name__}: {field.name} is a plain field; wanted one declared with "
+                "parameter.height, length, platform, grade, scalar, count or switch"
+            )
     return {f.name: f.metadata["parameter"] for f in dataclasses.fields(terrain)}
 
 

@@ -80,7 +80,7 @@ def preview(terrain_map: "TerrainMap", width: int = 1600) -> Picture:
     if heights.shape[0] > width:
         heights, cell = _shrunk(heights, width), extent / width
     # Downwards rows, and every sample a square of whole pixels.
-    factor = -(-width // heights.shape[0])
+    factor = max(1, min(-(-width // heights.shape[0]), _MOST_PIXELS // max(heights.shape)))
     ground = (
         relief(heights, cell).swapaxes(0, 1)[::-1].repeat(factor, axis=0).repeat(factor, axis=1)
     )
@@ -167,12 +167,13 @@ def _annotate(
         x, _ = pixel(first[0] + (row + 0.5) * size_x, 0)
         low, high = terrain_map.difficulty[row].min(), terrain_map.difficulty[row].max()
         level = f"{low:.2f}" if low == high else f"{low:.2f}-{high:.2f}"
-        write(f"{row}  {level}", (x - 28, sheet.shape[0] - _MARGIN[1] + 24))
+        write(f"{row}: d {level}", (x - 36, sheet.shape[0] - _MARGIN[1] + 24))
     write("columns (y): terrain", (10, _MARGIN[3] - 14))
     write("rows (x): difficulty", (10, sheet.shape[0] - _MARGIN[1] + 24))
     title = f"{rows} x {cols} patches of {size_x:g} m x {size_y:g} m, seed {config.seed}"
     write(title, (_MARGIN[0], 40), 0.7)
     radius = max(2, round(scale * config.spawn_radius))
     for origin in terrain_map.env_origins.reshape(-1, 3).tolist():
+        cv2.circle(sheet, pixel(*origin[:2]), radius, _PAPER, 3, cv2.LINE_AA)
         cv2.circle(sheet, pixel(*origin[:2]), radius, _SPAWN, 1, cv2.LINE_AA)
         cv2.circle(sheet, pixel(*origin[:2]), 2, _SPAWN, -1, cv2.LINE_AA)

@@ -25,9 +25,11 @@ def find(name: str) -> type[Terrain]:
     if name not in names():
         raise ConfigError(f"no terrain {name!r}; there are: {listing(names())}")
     module = importlib.import_module(f"{terrains.__name__}.{name}")
-    (found,) = (
+    found = [
         value
         for value in vars(module).values()
         if isinstance(value, type) and issubclass(value, Terrain) and value.kind() == name
-    )
-    return found
+    ]
+    if len(found) != 1:
+        raise ConfigError(f"{module.__file__} has {len(found)} subclasses of Terrain; wanted one")
+    return found[0]

@@ -91,18 +91,24 @@ def _in_reach(x: NDArray[np.floating], y: NDArray[np.floating], reach: float) ->
 
 def _level_cells(heights: NDArray[np.float32], reach: float, tolerance: float) -> NDArray[np.int64]:
     """Return the cells whose whole disc is in the patch and level, shape (n, 2)."""
+    import cv2
+
     margin = math.ceil(reach + 1)
     inner = tuple(n - 2 * margin for n in heights.shape)
     if min(inner) <= 0:
         return np.empty((0, 2), dtype=np.int64)
     low = np.full(inner, np.inf, dtype=np.float32)
     high = np.full(inner, -np.inf, dtype=np.float32)
+    offsets = np.arange(-margin, margin + 1.0)
+    # Row by row of the disc: OpenCV takes the extremes along a row in a time that does not grow
+    # with its length, so the search takes the radius, not its square.
     for di in range(-margin, margin + 1):
-        for dj in range(-margin, margin + 1):
-            if _in_reach(np.array(di), np.array(dj), reach):
-                shifted = heights[
-                    margin + di : margin + di + inner[0], margin + dj : margin + dj + inner[1]
-                ]
-                np.minimum(low, shifted, out=low)
-                np.maximum(high, shifted, out=high)
+        ruling = offsets[_in_reach(np.array(float(di)), offsets, reach)]
+        if not len(ruling):
+            continue
+        kernel = np.ones((1, len(ruling)), dtype=np.uint8)
+        rows = np.ascontiguousarray(heights[margin + di : margin + di + inner[0]])
+        span = slice(margin, margin + inner[1])
+        np.minimum(low, cv2.erode(rows, kernel)[:, span], out=low)
+        np.maximum(high, cv2.dilate(rows, kernel)[:, span], out=high)
     return np.argwhere(high - low <= tolerance) + margin

@@ -100,7 +100,13 @@ class Terrain(ABC):
         """
         self.check_fit(plot)
         # Adding 0 turns -0.0 into 0.0: equal heights must be equal bytes.
-        return np.asarray(self.heights(plot, rng), dtype=np.float32) + np.float32(0)
+        heights = np.asarray(self.heights(plot, rng), dtype=np.float32) + np.float32(0)
+        if heights.shape != plot.shape or not np.isfinite(heights).all():
+            raise ConfigError(
+                f"{self.kind()}: heights() returned shape {heights.shape}; wanted {plot.shape}, "
+                "every number finite"
+            )
+        return heights
 
     def check_fit(self, plot: Grid) -> None:
         """Raise ConfigError if `plot` cannot hold a block of this terrain."""

@@ -1,5 +1,6 @@
 """TerrainMap: the ground that everything else is a view of."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
@@ -7,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from terrainkit.config import MapConfig
-from terrainkit.curriculum import Assignment, assign_levels
+from terrainkit.curriculum import Assignment, assign_levels, update_levels
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit.grid import Grid
 from terrainkit.parameter import LARGEST
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from terrainkit.mesh import TriMesh
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class TerrainMap:
     """A map of rows x cols patches with a border, and the views of its surface."""
 
@@ -48,6 +49,11 @@ class TerrainMap:
 
     parameters: NDArray[np.object_]
     """:class:`~terrainkit.patch.Parameters` of each patch, shape (rows, cols)."""
+
+    def __repr__(self) -> str:
+        rows, cols = self.difficulty.shape
+        names = ", ".join(self.terrain_names)
+        return f"<TerrainMap {rows} x {cols} patches, {self.heights.shape} samples: {names}>"
 
     def height(self, xy: ArrayLike) -> NDArray[np.float64]:
         """Return the height of the ground [m] at `xy`.
@@ -173,8 +179,28 @@ class TerrainMap:
             env_origins=self.env_origins[levels, columns],
         )
 
+    def update_levels(
+        self,
+        levels: ArrayLike,
+        distance: ArrayLike,
+        commanded: ArrayLike,
+        *,
+        seed: int | Sequence[int],
+        top_levels: int = 3,
+    ) -> NDArray[np.int64]:
+        """Return the levels after an episode; see :func:`terrainkit.update_levels`."""
+        return update_levels(
+            levels,
+            distance,
+            commanded,
+            rows=len(self.difficulty),
+            patch_length=self.config.patch_size[0],
+            seed=seed,
+            top_levels=top_levels,
+        )
+
     def save(self, path: "str | Path", *, overwrite: bool = False, **options: Any) -> "Path":
-        """Write the map in the format that the suffix of `path` names; see :mod:`export`."""
+        """Write the map in the format that `path` ends in; see :mod:`terrainkit.export`."""
         from terrainkit.export import export
 
         return export(self, path, overwrite=overwrite, **options)

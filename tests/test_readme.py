@@ -2,6 +2,7 @@
 stand-in that takes what the real one takes, and whose ground is then looked at."""
 
 import re
+import shlex
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import MagicMock
@@ -12,6 +13,8 @@ import pytest
 import trimesh
 
 import terrainkit as tk
+from terrainkit import registry
+from terrainkit_cli.main import main
 
 README = (Path(__file__).parent.parent / "README.md").read_text()
 BLOCKS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
@@ -29,7 +32,7 @@ def folder(tmp_path, monkeypatch):
 
 @pytest.fixture
 def m():
-    terrain_map = tk.generate(tk.MapConfig(rows=3, cols=10, patch_size=(8.0, 6.0), border=1.0))
+    terrain_map = tk.generate(tk.MapConfig(rows=4, cols=10, patch_size=(8.0, 6.0), border=1.0))
     terrain_map.save("map.npz")
     terrain_map.save("map.xml")
     return terrain_map
@@ -58,7 +61,7 @@ def test_terrainkit():
     exec(block("import terrainkit\n\nconfig"), names)
     assert names["m"].config.rows == 6
     assert len(names["start"].levels) == len(names["levels"]) == 4096
-    assert Path("map.npz").exists()
+    assert Path("first.npz").exists()
 
 
 def test_numpy(m):
@@ -106,7 +109,7 @@ def test_isaac_lab(m):
     generator = names["terrain"].terrain_generator
     made = generator.class_type(cfg=generator, device="cpu")
     assert made.terrain_mesh.bounds[:, :2] == pytest.approx(np.array([m.grid.lower, m.grid.upper]))
-    assert made.terrain_origins.shape == (3, 10, 3)
+    assert made.terrain_origins.shape == (4, 10, 3)
 
 
 def test_genesis(m):
@@ -137,3 +140,20 @@ def test_mjlab(m):
     cfg.events["origins"].func(env, None)
     (origins,), _ = env.scene.terrain.configure_env_origins.call_args
     assert origins is m.env_origins
+
+
+def test_every_terrain_is_in_the_table():
+    for name in registry.names():
+        assert f"[{name}](docs/terrains.md#{name})" in README, name
+
+
+@pytest.mark.usefixtures("m")
+def test_the_lines_of_the_command_line_run_one_after_the_other(tmp_path):
+    (lines,) = re.findall(r"## From the command line\n.*?```sh\n(.*?)```", README, re.DOTALL)
+    (config,) = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
+    (tmp_path / "own.toml").write_text(config)
+    Path("map.xml").unlink()
+    for line in lines.splitlines():
+        words = shlex.split(line, comments=True)
+        assert words[0] == "terrainkit"
+        assert main(words[1:]) == 0, line

@@ -1,6 +1,7 @@
 """The entry point: find the command, run it, and turn every expected error into one line."""
 
 import importlib
+import signal
 import sys
 import warnings
 from collections.abc import Sequence
@@ -27,8 +28,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     warnings.showwarning = render.show_warning
     from terrainkit.errors import TerrainkitError
 
+    # So that what is half written is cleaned up when a scheduler ends the process.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     try:
-        return _run(arguments)
+        code = _run(arguments)
+        sys.stdout.flush()
+        return code
     except TerrainkitError as error:
         render.error(str(error))
         return 2
@@ -38,6 +43,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         render.drop_stdout()
         return 0
+    except OSError as error:
+        render.drop_stdout()
+        render.error(error.strerror or str(error))
+        return 2
     except KeyboardInterrupt:
         render.error("interrupted")
         return 130

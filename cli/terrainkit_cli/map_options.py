@@ -17,7 +17,7 @@ _LEFT_OUT = object()
 def _option(name: str, kind: Any, default: object, text: str) -> tuple[str, Any, object]:
     """Return name, type and default of the option for a field of MapConfig."""
     if kind is bool:
-        return name, Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help=text)], False
+        return name, Annotated[bool, tyro.conf.arg(help=text, help_behavior_hint="")], False
     several = get_origin(kind) is tuple
     spec = tyro.constructors.PrimitiveConstructorSpec(
         nargs=_count(kind) if several else 1,

@@ -20,7 +20,7 @@ class Command(ABC):
 
 
 class UsageError(TerrainkitError):
-    """Words that are no command."""
+    """An invalid command line."""
 
 
 _Command = TypeVar("_Command", bound=Command)
@@ -37,7 +37,9 @@ def parse(command: type[_Command], program: str, arguments: list[str]) -> _Comma
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said):
-            return tyro.cli(command, prog=program, args=arguments)
+            # Flags without a negative: none of ours is on unless given.
+            markers = (tyro.conf.FlagCreatePairsOff,)
+            return tyro.cli(command, prog=program, args=arguments, config=markers)
     except SystemExit as end:
         if end.code in (0, None):
             raise

@@ -2,12 +2,13 @@
 
 import os
 import sys
+import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, TextIO
 
-_LONG = 300
-"""Patches from which a map takes long enough for a progress bar."""
+_PATIENCE = 0.5
+"""How long a walk may take before it shows a progress bar [s]."""
 
 
 def result(text: str) -> None:
@@ -55,14 +56,28 @@ def show_warning(
 
 
 def progress(walk: Iterator[Any], total: int) -> Iterator[Any]:
-    """Return `walk` with a bar on stderr, if that is a terminal and the walk is long."""
-    if total < _LONG or not sys.stderr.isatty():
-        return walk
-    from rich.console import Console
-    from rich.progress import track
+    """Return `walk` with a bar on stderr, if that is a terminal and the walk takes long."""
+    return _with_bar_when_slow(walk, total) if sys.stderr.isatty() else walk
 
-    bar = track(walk, "patches", total=total, console=Console(file=sys.stderr), transient=True)
-    return iter(bar)
+
+def _with_bar_when_slow(walk: Iterator[Any], total: int) -> Iterator[Any]:
+    start = time.monotonic()
+    done = 0
+    for item in walk:
+        yield item
+        done += 1
+        if time.monotonic() - start > _PATIENCE:
+            break
+    else:
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("patches", total=total, completed=done)
+        for item in walk:
+            yield item
+            bar.advance(task)
 
 
 def drop_stdout() -> None:

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
+from terrainkit import presets
 from terrainkit.choice import TerrainChoice
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
@@ -27,8 +28,8 @@ class Generate(Command):
     output: Output
     """Where to write the map; the suffix names the format (.npz holds everything)."""
 
-    config: Annotated[str, tyro.conf.arg(metavar="FILE.toml", help_behavior_hint="")] = ""
-    """TOML file of a map; options given here go before what it says."""
+    config: Annotated[str, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = ""
+    """TOML file of a map, or a map in .npz to take it from; options given here override it."""
 
     terrain: Annotated[str, tyro.conf.arg(metavar="NAME", help_behavior_hint="")] = ""
     """Make the whole map of this terrain; `terrainkit list` shows which there are."""
@@ -47,7 +48,8 @@ class Generate(Command):
         from terrainkit.generate import generate
 
         config = self._config()
-        export.check(self.output, overwrite=self.overwrite)  # before the wait, not after
+        samples = config.grid.shape[0] * config.grid.shape[1]
+        export.check(self.output, samples, overwrite=self.overwrite)  # before the wait
         terrain_map = generate(config, progress=render.progress)
         terrain_map.save(self.output, overwrite=self.overwrite)
         render.result(_written(terrain_map, self.output))
@@ -60,21 +62,27 @@ class Generate(Command):
         return 0
 
     def _config(self) -> MapConfig:
-        config = MapConfig()
-        if self.config:
-            from terrainkit.config_text import read_config
-
-            config = read_config(self.config)
         options = given(self.map)
-        if "preset" in options:
-            options["terrains"] = ()
+        if self.terrain and "preset" in options:
+            raise ConfigError("--terrain and --preset both name the terrains; wanted one of them")
+        if self.set and not self.terrain:
+            raise ConfigError("--set gives parameters to --terrain, which is missing")
         if self.terrain:
             parameters = _parameters(self.set)
             options["terrains"] = (TerrainChoice(terrain=self.terrain, parameters=parameters),)
-        elif self.set:
-            raise ConfigError("--set gives parameters to --terrain, which is missing")
+        elif "preset" in options:
+            options["terrains"] = ()
+        config = _config_of(self.config) if self.config else MapConfig()
         fields = {f.name: getattr(config, f.name) for f in dataclasses.fields(config)}
         return MapConfig(**fields | options)
+
+
+def _config_of(path: str) -> MapConfig:
+    if path.endswith(".npz"):
+        return TerrainMap.load(path).config
+    from terrainkit.config_text import read_config
+
+    return read_config(path)
 
 
 def _parameters(text: str) -> dict[str, Value | Range]:
@@ -84,6 +92,8 @@ def _parameters(text: str) -> dict[str, Value | Range]:
         values = tuple(value_of(part) for part in value.split(":"))
         if not equals or len(values) > 2:
             raise ConfigError(f"--set {word!r}; wanted name=value or name=easy:hard")
+        if name.strip() in parameters:
+            raise ConfigError(f"--set has {name.strip()} twice; wanted it once")
         parameters[name.strip()] = values if len(values) == 2 else values[0]
     return parameters
 
@@ -92,15 +102,22 @@ def _parameters(text: str) -> dict[str, Value | Range]:
 class List(Command):
     """List the terrains, or the parameters of one."""
 
-    terrain: Annotated[str | None, tyro.conf.Positional] = None
+    terrain: Annotated[
+        str, tyro.conf.Positional, tyro.conf.arg(metavar="[TERRAIN]", help_behavior_hint="")
+    ] = ""
     """A terrain, for its parameters."""
 
     def run(self) -> int:
         """Print a table."""
         from terrainkit.describe import describe, summaries
 
-        if self.terrain is None:
+        if not self.terrain:
             render.table(list(summaries().items()))
+            mixes = (
+                (name, ", ".join(c.name for c in presets.find(name))) for name in presets.names()
+            )
+            render.result("\npresets:")
+            render.table([(f"  {name}", mix) for name, mix in mixes])
             render.result("\nterrainkit list TERRAIN shows the parameters of one.")
             return 0
         about = describe(self.terrain)
@@ -118,7 +135,9 @@ class Info(Command):
     map: MapFile
     """The map."""
 
-    patch: tuple[int, int] | None = None
+    patch: Annotated[
+        tuple[int, int] | None, tyro.conf.arg(metavar="ROW COL", help_behavior_hint="")
+    ] = None
     """Row and column of a patch, for its parameters as asked and as built."""
 
     def run(self) -> int:
@@ -219,7 +238,10 @@ class Export(Command):
     output: Output
     """Where to write; the suffix names the format."""
 
-    collision: Literal["auto", "hfield", "boxes"] | None = None
+    collision: Annotated[
+        Literal["auto", "hfield", "boxes"] | None,
+        tyro.conf.arg(metavar="{auto,hfield,boxes}", help_behavior_hint="(default: auto)"),
+    ] = None
     """For .xml: one heightfield, or boxes with vertical walls where the ground is level. auto takes
     boxes where they hold all of the ground and are few."""
 
@@ -239,7 +261,7 @@ class Export(Command):
         """Write the file."""
         given = {
             "collision": self.collision,
-            "merged": False if self.full else None,
+            "full": self.full or None,
             "closed": self.closed or None,
             "y_up": self.y_up or None,
         }
@@ -247,6 +269,11 @@ class Export(Command):
         terrain_map = TerrainMap.load(self.map)
         terrain_map.save(self.output, overwrite=self.overwrite, **options)
         render.result(_written(terrain_map, self.output))
+        if self.output.suffix == ".xml" and "<hfield" in self.output.read_text():
+            render.result(
+                "on its heightfield, walls lean over one cell; "
+                "--collision boxes keeps them vertical where the ground is level"
+            )
         return 0
 
 
@@ -269,9 +296,7 @@ class Check(Command):
         if findings:
             render.result(f"\n{self.map}: {len(findings)} findings")
             return 1
-        render.result(
-            f"{self.map}: {terrain_map.difficulty.size} patches, nothing to find fault with"
-        )
+        render.result(f"{self.map}: {terrain_map.difficulty.size} patches, no problems found")
         return 0
 
 

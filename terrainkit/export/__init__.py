@@ -1,8 +1,8 @@
 """Export: a map as a file, in the format that the suffix names.
 
-Every file in this folder that has `SUFFIXES` is an exporter; nothing else lists them. It has one
-function, `export(terrain_map, path, ...)`, which writes `path` in full; its keyword-only arguments
-are the options of the format.
+Every file in this folder that has `SUFFIXES` is an exporter; nothing else lists them. Its function
+`export(terrain_map, path, ...)` writes `path` in full; the keyword-only arguments of that function
+are the options of the format. `BYTES_PER_SAMPLE` is the most memory that it takes for each sample.
 """
 
 import importlib
@@ -14,6 +14,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from terrainkit.atomic import atomic_write, check_target
+from terrainkit.capacity import require_memory
 from terrainkit.errors import ExportError, listing
 
 if TYPE_CHECKING:
@@ -47,10 +48,11 @@ def export(
     return path
 
 
-def check(path: str | Path, *, overwrite: bool = False) -> None:
-    """Raise the ExportError that :func:`export` would, before a map is made for it."""
-    find(Path(path))
+def check(path: str | Path, samples: int, *, overwrite: bool = False) -> None:
+    """Raise what :func:`export` would for a map of so many samples, before it is made."""
+    exporter = find(Path(path))
     check_target(Path(path), overwrite=overwrite)
+    require_memory(samples * exporter.BYTES_PER_SAMPLE, f"writing {samples} samples to {path}")
 
 
 def find(path: Path) -> ModuleType:

@@ -27,7 +27,7 @@ Collision = Literal["auto", "hfield", "boxes"]
 _QUANTUM = 1e-4
 """Height of one unit of the elevation data [m]: whole numbers are short to write and to read."""
 
-_BYTES_PER_SAMPLE = 100
+BYTES_PER_SAMPLE = 100
 """Most that writing holds for each sample: its elevation, as a number and as text."""
 
 _RINGS = 2
@@ -56,7 +56,7 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
     """
     collision = coerce("collision", collision, Collision)
     samples = terrain_map.heights.size
-    require_memory(samples * _BYTES_PER_SAMPLE, f"a MuJoCo model of {samples} samples")
+    require_memory(samples * BYTES_PER_SAMPLE, f"a MuJoCo model of {samples} samples")
     cover = _cover(terrain_map, collision)
     root = ET.Element("mujoco", model="terrain")
     _add_class(root, terrain_map)

@@ -15,6 +15,7 @@ from terrainkit.archive import LONGEST_TEXT, Archive, opened, write_arrays
 from terrainkit.config import MapConfig
 from terrainkit.config_text import from_toml, to_toml
 from terrainkit.errors import ConfigError, MapFileError, listing
+from terrainkit.mesh.lattice import BYTES_PER_NODE
 from terrainkit.mesh.tri_mesh import TriMesh
 from terrainkit.parameter import LARGEST, Realized, Value, parameters_of
 from terrainkit.patch import Parameters
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from terrainkit.terrain_map import TerrainMap
 
 SUFFIXES = (".npz",)
+BYTES_PER_SAMPLE = BYTES_PER_NODE
 FORMAT_VERSION = 1
 
 _MOST_FACES = 20

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from terrainkit.terrain_map import TerrainMap
 
 SUFFIXES = (".png",)
+BYTES_PER_SAMPLE = 20
 
 _COARSEST = 0.002
 """Largest height of a grey level that still holds the ground to a millimetre [m]."""

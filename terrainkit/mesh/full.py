@@ -42,7 +42,7 @@ def split_quads(lattice: Lattice, numbers: NDArray[np.int64], out: NDArray[np.in
     The diagonal runs from (i, j) to (i + 1, j + 1), as MuJoCo's heightfields have it.
     """
     ny = lattice.z.shape[1]
-    # A row has one quad less than nodes, so a quad's first node is its own number plus its row.
+    # A row has one fewer quad than nodes, so a quad's first node is its own number plus its row.
     corner = (numbers + numbers // (ny - 1)).astype(np.int32)
     pairs = out.reshape(-1, 2, 3)
     pairs[:, 0, 0] = pairs[:, 1, 0] = corner

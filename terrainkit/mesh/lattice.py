@@ -15,7 +15,7 @@ from terrainkit.capacity import require_memory
 from terrainkit.grid import Grid
 from terrainkit.walls import wall_edges
 
-_BYTES_PER_NODE = 120
+BYTES_PER_NODE = 120
 """Most that building a mesh holds for each node: its faces, and what they are made from."""
 
 
@@ -41,7 +41,7 @@ class Lattice:
     @classmethod
     def of(cls, heights: NDArray[np.float32], grid: Grid, threshold: float) -> "Lattice":
         """Return the lattice of a heightfield; a step above `threshold` [m] is a wall."""
-        require_memory(heights.size * _BYTES_PER_NODE, f"a mesh of {heights.size} samples")
+        require_memory(heights.size * BYTES_PER_NODE, f"a mesh of {heights.size} samples")
         z = np.pad(heights, 1, mode="edge")
         walls_x, walls_y = wall_edges(z, threshold)
         x, y = (np.concatenate([[grid.lower[k]], grid.axis(k), [grid.upper[k]]]) for k in (0, 1))

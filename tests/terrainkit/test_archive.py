@@ -1,3 +1,5 @@
+import zipfile
+
 import numpy as np
 import pytest
 
@@ -87,3 +89,15 @@ def test_other_numbers_are_refused(archive, key, wanted):
 def test_the_name_of_a_file_may_be_a_text(path):
     with opened(str(path)) as archive:
         assert archive.path == path
+
+
+def test_a_header_that_claims_to_be_huge_is_not_read(tmp_path):
+    path = tmp_path / "bomb.npz"
+    header = b"\x93NUMPY\x02\x00" + (1 << 31).to_bytes(4, "little")
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr("heights.npy", header + b" " * 10**6)
+    with (
+        pytest.raises(MapFileError, match="its header is longer than 10000 bytes"),
+        opened(path) as archive,
+    ):
+        archive.array("heights", "f4", (3,))

@@ -152,10 +152,13 @@ def test_a_device_is_no_target(target):
     assert target.is_char_device()
 
 
-def test_a_link_to_nothing_is_no_target(target):
-    target.symlink_to("nowhere")
-    with pytest.raises(ExportError, match="it is there, and not a plain file"):
-        write(target, overwrite=True)
+def test_a_link_stays_one_and_what_it_leads_to_is_written(target):
+    target.symlink_to("elsewhere.txt")
+    write(target)
+    assert target.is_symlink()
+    assert not target.with_name("elsewhere.txt").is_symlink()
+    with pytest.raises(ExportError, match="exists"):
+        write(target)
 
 
 def test_a_name_too_long_for_the_disk_is_an_export_error(tmp_path):

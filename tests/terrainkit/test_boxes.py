@@ -135,3 +135,14 @@ def test_a_slope_is_boxes_under_its_level_ends_alone():
     assert len(cover.centres) == 2
     # From the last of 15 cells that leans upwards to the first that is as high as the landing.
     assert np.flatnonzero(~cover.covered.all(axis=1)).tolist() == list(range(14, 45))
+
+
+def test_many_heights_are_covered_too():
+    # 60 columns of cells, each a level of its own: more than are searched over the whole block.
+    heights = np.repeat(np.arange(60, dtype=np.float32)[:, None], 20, axis=1)
+    cover = box_cover(
+        heights, Grid(shape=(60, 20), cell=0.1), 0.075, (np.array([0, 60]), np.array([0, 20]))
+    )
+    assert cover.complete
+    assert len(cover.centres) == 60
+    assert sorted(cover.centres[:, 2] + cover.half_sizes[:, 2]) == pytest.approx(range(60))

@@ -86,3 +86,13 @@ def test_a_preset_with_too_few_columns_warns():
 def test_a_patch_does_not_change():
     with pytest.raises(dataclasses.FrozenInstanceError):
         tile(MapConfig(terrains=(PIT,)), 0, 0).difficulty = 1.0
+
+
+def test_a_slope_above_the_threshold_would_be_walls():
+    steep = TerrainChoice(terrain="pyramid_slope", parameters={"grade": 0.8})
+    config = MapConfig(rows=1, cols=1, terrains=(steep,))
+    with pytest.raises(ConfigError, match=r"grade 0\.8 is above slope_threshold 0\.75"):
+        tile(config, 0, 0)
+    assert tile(
+        dataclasses.replace(config, slope_threshold=None), 0, 0
+    ).heights.max() == pytest.approx(2.0)

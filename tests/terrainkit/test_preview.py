@@ -89,3 +89,13 @@ def test_an_existing_picture_stays_unless_told(pits, tmp_path):
     assert target.read_text() == "mine"
     write_preview(pits, target, overwrite=True)
     assert target.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_long_map_stays_within_bounds():
+    flat = tk.TerrainChoice(terrain="flat")
+    config = tk.MapConfig(
+        rows=1, cols=300, patch_size=(2.0, 2.0), cell=0.2, border=0.0, terrains=(flat,)
+    )
+    height, width, _ = preview(tk.generate(config), 1600).shape
+    assert height <= 10_000 + 70 + 60
+    assert width < 300 + 10_000 / 300 + 30

@@ -1,4 +1,5 @@
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from terrainkit import registry, terrains
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
+from terrainkit.terrain import Terrain
 
 MOON = """
 from dataclasses import dataclass
@@ -18,7 +20,7 @@ from terrainkit.terrain import Terrain
 class Moon(Terrain):
     height: float = parameter.height(1.0, 3.0)
 
-    def heights(self, plot, rng):
+    def heights(self, plot, rng):  # noqa: ARG002
         return np.full(plot.shape, self.height)
 """
 
@@ -60,3 +62,29 @@ def test_a_new_file_is_a_new_terrain():
     terrain = registry.find("moon").at(0.5)
     heights = terrain.build(Grid(shape=(3, 2), cell=0.1), np.random.default_rng(0))
     assert heights.tolist() == [[2, 2], [2, 2], [2, 2]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Careless(Terrain):
+    number: int = 3
+
+    def heights(self, plot, rng):  # noqa: ARG002
+        return np.zeros(plot.shape)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Turned(Terrain):
+    def heights(self, plot, rng):  # noqa: ARG002
+        return np.zeros(plot.shape[::-1])
+
+
+def test_a_plain_field_is_named():
+    with pytest.raises(
+        ConfigError, match="_Careless: number is a plain field; wanted one declared"
+    ):
+        _Careless()
+
+
+def test_heights_of_another_shape_are_named():
+    with pytest.raises(ConfigError, match=r"shape \(4, 8\); wanted \(8, 4\)"):
+        _Turned().build(Grid(shape=(8, 4), cell=1.0), np.random.default_rng(0))

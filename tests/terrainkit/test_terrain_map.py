@@ -215,3 +215,14 @@ def test_env_origins_stand_on_the_ground(terrain_map):
 def test_save_writes_and_load_reads(terrain_map, tmp_path):
     path = terrain_map.save(tmp_path / "map.npz")
     assert type(terrain_map).load(path).heights.tobytes() == terrain_map.heights.tobytes()
+
+
+def test_the_map_updates_levels_as_the_pure_function_does(terrain_map):
+    # Patches of 8 m: more than 4 m is up, less than half of what was commanded is down.
+    after = terrain_map.update_levels([0, 1, 1], [4.5, 1.0, 3.0], [6.0, 6.0, 4.0], seed=1)
+    assert after.tolist() == [1, 0, 1]
+
+
+def test_it_says_what_it_is_in_one_line(terrain_map):
+    assert repr(terrain_map).startswith("<TerrainMap 2 x 3 patches, (")
+    assert "\n" not in repr(terrain_map)

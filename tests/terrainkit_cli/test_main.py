@@ -68,6 +68,9 @@ def test_every_command_has_help_for_every_option(terrainkit, name):
         (("generate", "-o", "a.npz", "--terrain", "pit", "--set", "depth"), "wanted name=value"),
         (("generate", "-o", "a.npz", "--terrain", "pit", "--set", "depth=x"), "wanted a number"),
         (("generate", "-o", "a.npz", "--set", "depth=1"), "--set gives parameters to --terrain"),
+        (("generate", "-o", "a.npz", "--terrain", "pit", "--preset", "all"), "wanted one of them"),
+        (("generate", "-o", "a.npz", "--terrain", "pit", "--set", "side=2,side=3"), "side twice"),
+        (("generate", "-o", "a.npz", "--terrain", "slope", "--set", "grade=2"), "would be walls"),
         (("generate", "-o", "a.npz", "--config", "none.toml"), "cannot read none.toml"),
         (("generate", "-o", "a.abc"), "no format for '.abc' (a.abc); there are: "),
         (("generate", "-o", "a"), "no format for 'a name without suffix'"),
@@ -98,3 +101,12 @@ def test_a_reader_that_goes_away_is_no_error():
     )
     assert run.returncode == 0
     assert run.stderr == ""
+
+
+def test_a_full_standard_output_is_one_line():
+    command = f"{sys.executable} -m terrainkit_cli.main list > /dev/full"
+    run = subprocess.run(
+        ["bash", "-c", command], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert run.returncode == 2
+    assert run.stderr == "terrainkit: error: No space left on device\n"

@@ -1,6 +1,8 @@
+import dataclasses
 import inspect
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from terrainkit.errors import ExportError
@@ -68,7 +70,7 @@ def test_an_unknown_suffix_is_an_error_that_lists_those_there_are(level_map, tmp
 @pytest.mark.parametrize(
     ("name", "option", "known"),
     [
-        ("map.stl", "color", "merged, closed, y_up"),
+        ("map.stl", "color", "full, closed, y_up"),
         ("map.xml", "merged", "collision"),
         ("map.npz", "merged", "nothing"),
     ],
@@ -82,7 +84,7 @@ def test_an_unknown_option_is_an_error_that_lists_those_there_are(
 
 
 def test_the_options_of_a_format_are_known_by_name():
-    assert options_of(Path("map.glb")) == ("merged", "closed", "y_up")
+    assert options_of(Path("map.glb")) == ("full", "closed", "y_up")
 
 
 def test_formats_of_one_kind_share_an_exporter():
@@ -91,11 +93,22 @@ def test_formats_of_one_kind_share_an_exporter():
 
 def test_a_target_is_checked_before_a_map_is_made_for_it(tmp_path):
     path = tmp_path / "map.npz"
-    check(path)
+    check(path, 100)
     path.write_text("mine")
-    check(path, overwrite=True)
+    check(path, 100, overwrite=True)
     with pytest.raises(ExportError, match=r"map\.npz exists"):
-        check(path)
+        check(path, 100)
     with pytest.raises(ExportError, match=r"no format for '\.usd'"):
-        check(tmp_path / "map.usd")
+        check(tmp_path / "map.usd", 100)
     assert path.read_text() == "mine"
+
+
+@pytest.mark.parametrize("height", [np.nan, np.inf, 1e30])
+@pytest.mark.parametrize("suffix", [".npz", ".xml", ".stl", ".png"])
+def test_heights_that_no_view_can_hold_are_not_exported(terrain_map, tmp_path, suffix, height):
+    heights = terrain_map.heights.copy()
+    heights[3, 4] = height
+    broken = dataclasses.replace(terrain_map, heights=heights)
+    with pytest.raises(ExportError, match="heights holds numbers that are not finite, or beyond"):
+        broken.save(tmp_path / f"a{suffix}")
+    assert list(tmp_path.iterdir()) == []

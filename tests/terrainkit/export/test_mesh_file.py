@@ -22,7 +22,7 @@ def points(terrain_map):
 @every_suffix
 @pytest.mark.parametrize("merged", [True, False])
 def test_the_mesh_is_the_ground(ray_down, terrain_map, tmp_path, suffix, merged):
-    mesh = saved(terrain_map, tmp_path, suffix, merged=merged)
+    mesh = saved(terrain_map, tmp_path, suffix, full=not merged)
     assert len(mesh.faces) == len(terrain_map.mesh(merged=merged).triangles)
     xy = points(terrain_map)
     found = ray_down(mesh.vertices, mesh.faces, xy)
@@ -42,7 +42,7 @@ def test_the_mesh_lies_in_the_frame_of_the_map(terrain_map, tmp_path, suffix):
 def test_a_closed_mesh_is_a_solid_with_the_ground_on_top(
     ray_down, terrain_map, tmp_path, suffix, merged
 ):
-    mesh = saved(terrain_map, tmp_path, suffix, merged=merged, closed=True)
+    mesh = saved(terrain_map, tmp_path, suffix, full=not merged, closed=True)
     assert mesh.is_watertight
     assert mesh.is_winding_consistent
     assert mesh.volume > 0
