@@ -103,11 +103,6 @@ def words(text: str) -> list[str]:
     return re.findall(r"[\w.:/*-]*\w", text)
 
 
-def words(text: str) -> list[str]:
-    # Not the frames and line breaks: tyro may draw its help otherwise in its next version.
-    return re.findall(r"[\w.:/*-]*\w", text)
-
-
 def main() -> int:
     pages = {"terrains.md": terrains_page(), "cli.md": cli_page()}
     if sys.argv[1:] == ["--check"]:
