@@ -29,7 +29,7 @@ class BoxCover:
     Boxes may overlap below the ground: a pyramid of stairs is a stack of them, one for each step.
     """
 
-    centres: NDArray[np.float64]
+    centers: NDArray[np.float64]
     """Middle of each box [m], shape (n, 3)."""
 
     half_sizes: NDArray[np.float64]
@@ -168,4 +168,4 @@ def _solids(
     tops = np.array([height for _, height in boxes], dtype=np.float64)
     lower = np.column_stack([spans[:, [0, 2]] * grid.cell + grid.lower, np.full(len(tops), bottom)])
     upper = np.column_stack([spans[:, [1, 3]] * grid.cell + grid.lower, tops])
-    return BoxCover(centres=(lower + upper) / 2, half_sizes=(upper - lower) / 2, covered=level)
+    return BoxCover(centers=(lower + upper) / 2, half_sizes=(upper - lower) / 2, covered=level)

@@ -124,7 +124,7 @@ class MapConfig:
         return self.terrains or presets.find(self.preset)
 
     @property
-    def wall_height(self) -> float:
+    def wall_threshold(self) -> float:
         """Difference between two samples above which there is a wall [m]; infinite for no walls.
 
         A hundredth of a millimetre of grace keeps a step of just the threshold from being a wall

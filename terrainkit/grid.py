@@ -1,6 +1,6 @@
 """The grid: where the samples of a heightfield stand. The axis convention lives here.
 
-`heights[i, j]` is the height at the centre of cell (i, j): the first index counts along x, the
+`heights[i, j]` is the height at the center of cell (i, j): the first index counts along x, the
 second along y. A grid of shape (80, 40) and cell 0.1 m therefore covers exactly 8 m x 4 m.
 """
 
@@ -18,7 +18,7 @@ _WHOLE = 1e-5
 
 @dataclass(frozen=True, kw_only=True)
 class Grid:
-    """Square cells side by side, with one sample at the centre of each."""
+    """Square cells side by side, with one sample at the center of each."""
 
     shape: tuple[int, int]
     """Cells along x and along y."""
@@ -40,14 +40,14 @@ class Grid:
         return self.lower[0] + self.size[0], self.lower[1] + self.size[1]
 
     @property
-    def centre(self) -> tuple[float, float]:
+    def center(self) -> tuple[float, float]:
         """Middle of the grid, x and y [m]."""
         return self.lower[0] + self.size[0] / 2, self.lower[1] + self.size[1] / 2
 
     def axis(self, k: int) -> NDArray[np.float64]:
         """Return the coordinate of each sample along axis `k` (0 is x, 1 is y) [m], shape (n,)."""
-        centres = np.arange(self.shape[k], dtype=np.float64) + 0.5
-        return self.lower[k] + centres * self.cell
+        centers = np.arange(self.shape[k], dtype=np.float64) + 0.5
+        return self.lower[k] + centers * self.cell
 
     def block(self, start: tuple[int, int], shape: tuple[int, int]) -> "Grid":
         """Return the grid of the `shape` cells from cell `start` on."""
@@ -67,20 +67,20 @@ class Grid:
         """Return `count` cells in metres, to the nanometre: 3 cells of 0.1 m are 0.3 m."""
         return round(count * self.cell, 9)
 
-    def centred(self, size: float) -> tuple[int, int]:
-        """Return how many cells a square of `size` [m] takes along x and y to stand centred.
+    def centered(self, size: float) -> tuple[int, int]:
+        """Return how many cells a square of `size` [m] takes along x and y to stand centered.
 
-        A block is centred exactly only where its count is even as the grid's is, or odd as it is,
+        A block is centered exactly only where its count is even as the grid's is, or odd as it is,
         so the count is the nearest of that parity: it may differ from `size` by up to one cell.
         """
-        return self._centred(size, 0), self._centred(size, 1)
+        return self._centered(size, 0), self._centered(size, 1)
 
-    def _centred(self, size: float, k: int) -> int:
+    def _centered(self, size: float, k: int) -> int:
         odd = self.shape[k] % 2
         return max(0, 2 * math.floor((size / self.cell - odd) / 2 + 0.5 + _WHOLE) + odd)
 
     def rings(self, inner: tuple[int, int]) -> NDArray[np.int64]:
-        """Return in which ring around the centred block `inner` each cell lies, shape `shape`.
+        """Return in which ring around the centered block `inner` each cell lies, shape `shape`.
 
         0 is the block itself, 1 the cells that touch its sides or corners, and so on.
         """
@@ -88,12 +88,12 @@ class Grid:
         return np.maximum(x[:, None], y[None, :])
 
     def middle(self, block: tuple[int, int]) -> tuple[slice, slice]:
-        """Return the index of the centred block of that many cells."""
+        """Return the index of the centered block of that many cells."""
         x, y = ((n - b) // 2 for n, b in zip(self.shape, block, strict=True))
         return slice(x, x + block[0]), slice(y, y + block[1])
 
     def fade(self, inner: tuple[int, int], distance: float) -> NDArray[np.float64]:
-        """Return a weight that is 0 on the centred block `inner` and 1 from `distance` [m] on."""
+        """Return a weight that is 0 on the centered block `inner` and 1 from `distance` [m] on."""
         return np.clip(self.rings(inner) * (self.cell / max(distance, self.cell)), None, 1.0)
 
 

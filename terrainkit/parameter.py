@@ -14,7 +14,7 @@ from terrainkit.coerce import coerce
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 
-Snap = Literal["none", "cells", "centred"]
+Snap = Literal["none", "cells", "centered"]
 Value = float | int | bool
 Range = tuple[float, float]
 Realized = float | int | bool | tuple[float, float]
@@ -38,7 +38,7 @@ class Parameter:
     """Default at difficulty 1."""
 
     snap: Snap = "none"
-    """How it meets the cells: as it is, as whole cells, or as a block centred in the patch."""
+    """How it meets the cells: as it is, as whole cells, or as a block centered in the patch."""
 
     zero: bool = True
     """Whether 0 is allowed; below 0 nothing is."""
@@ -57,17 +57,17 @@ class Parameter:
         """Return what the cells of `plot` make of `value`: a pair (x, y) where the axes differ."""
         if self.snap == "cells":
             return plot.length(plot.cells(value, least=0 if self.zero else 1))
-        if self.snap == "centred":
-            x, y = (plot.length(count) for count in plot.centred(value))
+        if self.snap == "centered":
+            x, y = (plot.length(count) for count in plot.centered(value))
             return x if x == y else (x, y)
         return value
 
     def deviates(self, asked: Value, built: Realized, cell: float) -> bool:
         """Return whether `built` differs from `asked` by more than it has to.
 
-        A length on the cells may be half a cell off, or one to stay centred; any other number 5 %.
+        A length on the cells may be half a cell off, or one to stay centered; any other number 5 %.
         """
-        allowed = {"cells": cell / 2, "centred": cell, "none": 0.05 * asked}[self.snap]
+        allowed = {"cells": cell / 2, "centered": cell, "none": 0.05 * asked}[self.snap]
         ends = built if isinstance(built, tuple) else (built,)
         return any(abs(end - asked) > allowed + 1e-6 for end in ends)
 
@@ -95,8 +95,8 @@ def length(easy: float, hard: float | None = None, *, zero: bool = False) -> Any
 
 
 def platform(side: float) -> Any:
-    """Declare the side of a square in the middle of the patch [m], kept centred on the cells."""
-    return _field(side, snap="centred", zero=False)
+    """Declare the side of a square in the middle of the patch [m], kept centered on the cells."""
+    return _field(side, snap="centered", zero=False)
 
 
 def scalar(easy: float, hard: float | None = None, *, zero: bool = True) -> Any:

@@ -84,7 +84,7 @@ def build_patch(
         terrain.spawn(grid),
         radius=config.spawn_radius,
         tolerance=config.spawn_tolerance,
-        threshold=config.wall_height,
+        threshold=config.wall_threshold,
     )
     if origin is None:
         raise room_error(choice.name, grid, config.spawn_radius, config.spawn_tolerance)
@@ -102,7 +102,7 @@ def _refuse_walls(terrain: Terrain, config: MapConfig) -> None:
     """Raise ConfigError if a slope is so steep that the map would make it a stack of walls."""
     for name, parameter in parameters_of(type(terrain)).items():
         grade = getattr(terrain, name)
-        if parameter.is_grade and grade * config.cell > config.wall_height:
+        if parameter.is_grade and grade * config.cell > config.wall_threshold:
             raise ConfigError(
                 f"{terrain.kind()}: {name} {grade:g} is above slope_threshold "
                 f"{config.slope_threshold:g}, so it would be walls; wanted less of one or more of "

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.walls import centre_heights
+from terrainkit.walls import center_heights
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +26,7 @@ def surface_at(
 
     Between four samples without a wall the ground is two triangles that share the diagonal from
     (i, j) to (i + 1, j + 1), the one along which MuJoCo splits a cell. A quad with a wall is a fan
-    of triangles around its centre; see :mod:`terrainkit.walls`. Beyond the outermost samples the
+    of triangles around its center; see :mod:`terrainkit.walls`. Beyond the outermost samples the
     ground goes on level.
 
     Args:
@@ -79,13 +79,13 @@ def _fan(
     s = np.choose(edge, [u, v, 1 - u, 1 - v])  # along the edge, 0 to 1
     t = np.choose(edge, [v, 1 - u, 1 - v, u])  # away from it, 0 to 1/2
     start, end = corners[n, edge], corners[n, (edge + 1) % 4]
-    centre = centre_heights(corners, walls)
+    center = center_heights(corners, walls)
     wall = walls[n, edge]
     near = np.where(s < 0.5, start, end)
-    own = centre[n, np.where(s < 0.5, edge, (edge + 1) % 4)]
+    own = center[n, np.where(s < 0.5, edge, (edge + 1) % 4)]
     # On a wall's triangle the ground is level along the edge; on another it joins both ends.
     along = np.where(wall, 0.0, end - start)
-    away = np.where(wall, 2 * (own - near), 2 * centre[n, edge] - start - end)
+    away = np.where(wall, 2 * (own - near), 2 * center[n, edge] - start - end)
     height = np.where(wall, near, start) + along * s + away * t
     direction = _ALONG[edge]
     normal = np.stack([-direction[:, 1], direction[:, 0]], axis=1)

@@ -111,11 +111,11 @@ class Terrain(ABC):
     def check_fit(self, plot: Grid) -> None:
         """Raise ConfigError if `plot` cannot hold a block of this terrain."""
         for name, parameter in parameters_of(type(self)).items():
-            if parameter.snap == "centred":
-                self._check_centred(name, getattr(self, name), plot)
+            if parameter.snap == "centered":
+                self._check_centered(name, getattr(self, name), plot)
 
-    def _check_centred(self, name: str, value: float, plot: Grid) -> None:
-        counts = plot.centred(value)
+    def _check_centered(self, name: str, value: float, plot: Grid) -> None:
+        counts = plot.centered(value)
         if value > min(plot.size) + plot.cell / 2:
             x, y = plot.size
             raise ConfigError(
@@ -129,7 +129,7 @@ class Terrain(ABC):
 
     def spawn(self, plot: Grid) -> tuple[float, float]:
         """Return where a robot should start, x and y [m]: in the middle, by default."""
-        return plot.centre
+        return plot.center
 
     @abstractmethod
     def heights(self, plot: Grid, rng: "np.random.Generator") -> NDArray[np.floating]:

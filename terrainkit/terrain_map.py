@@ -91,7 +91,7 @@ class TerrainMap:
         """
         from terrainkit.mesh import closed_mesh, full_mesh, merged_mesh
 
-        threshold = self.config.wall_height
+        threshold = self.config.wall_threshold
         mesh = (merged_mesh if merged else full_mesh)(self.heights, self.grid, threshold)
         return closed_mesh(mesh) if closed else mesh
 
@@ -100,7 +100,7 @@ class TerrainMap:
         from terrainkit.boxes import box_cover
 
         config = self.config
-        return box_cover(self.heights, self.grid, config.wall_height, self._seams())
+        return box_cover(self.heights, self.grid, config.wall_threshold, self._seams())
 
     def height_field_raw(self, vertical_scale: float = 0.005) -> NDArray[np.int16]:
         """Return the heights as Isaac Gym's `add_heightfield` wants them.
@@ -224,7 +224,7 @@ class TerrainMap:
 
     def _at(self, points: NDArray[np.float64]) -> SurfacePoints:
         place = (points - self.first_sample) / self.grid.cell
-        return surface_at(self.heights, place, threshold=self.config.wall_height)
+        return surface_at(self.heights, place, threshold=self.config.wall_threshold)
 
 
 def _points(xy: ArrayLike) -> tuple[NDArray[np.float64], tuple[int, ...]]:

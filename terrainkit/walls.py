@@ -14,7 +14,7 @@ with the smallest x and y, and edge k runs from corner k to corner k + 1:
 
 An edge whose ends differ by more than a threshold is a wall: the ground stays level from either end
 to the middle of the edge and is vertical there. A quad with a wall is cut along its midlines, and
-what its corners have in common at its centre follows from the edges that are not walls.
+what its corners have in common at its center follows from the edges that are not walls.
 """
 
 from functools import cache
@@ -55,8 +55,8 @@ def joined_corners(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return joined
 
 
-def centre_heights(corners: NDArray[np.floating], walls: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return the height that each corner of a quad brings to the quad's centre, shape (n, 4).
+def center_heights(corners: NDArray[np.floating], walls: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return the height that each corner of a quad brings to the quad's center, shape (n, 4).
 
     Corners that are joined bring the same height, so that no crack opens; corners with only walls
     between them bring different ones, and the walls meet there.
@@ -65,8 +65,8 @@ def centre_heights(corners: NDArray[np.floating], walls: NDArray[np.bool_]) -> N
         corners: Heights of the corners [m], shape (n, 4).
         walls: Whether each edge is a wall, shape (n, 4).
     """
-    centres: NDArray[np.float64] = np.einsum("nij,nj->ni", _centre_cases()[walls @ _CASE], corners)
-    return centres
+    centers: NDArray[np.float64] = np.einsum("nij,nj->ni", _center_cases()[walls @ _CASE], corners)
+    return centers
 
 
 def _joined(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -78,11 +78,11 @@ def _joined(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return joined
 
 
-def _centre_weights(joined: NDArray[np.bool_]) -> NDArray[np.float64]:
+def _center_weights(joined: NDArray[np.bool_]) -> NDArray[np.float64]:
     weights = joined.astype(float)
     for k in range(4):
         if joined[k].sum() == 3:
-            # Three corners lie in one plane; at the centre it is midway between the outer two.
+            # Three corners lie in one plane; at the center it is midway between the outer two.
             missing = int(np.flatnonzero(~joined[k])[0])
             weights[k, (missing + 2) % 4] = 0.0
     weights /= weights.sum(axis=1, keepdims=True)
@@ -99,5 +99,5 @@ def _joined_cases() -> NDArray[np.bool_]:
 
 
 @cache
-def _centre_cases() -> NDArray[np.float64]:
-    return np.array([_centre_weights(joined) for joined in _joined_cases()])
+def _center_cases() -> NDArray[np.float64]:
+    return np.array([_center_weights(joined) for joined in _joined_cases()])

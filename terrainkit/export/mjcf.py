@@ -69,7 +69,7 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
     else:
         if not cover.complete:
             _add_hfield(asset, body, terrain_map, _without_boxes(terrain_map.heights, cover))
-        for box in zip(cover.centres, cover.half_sizes, strict=True):
+        for box in zip(cover.centers, cover.half_sizes, strict=True):
             _add_box(body, *box)
     ET.indent(root)
     ET.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
@@ -80,11 +80,11 @@ def _cover(terrain_map: "TerrainMap", collision: Collision) -> BoxCover | None:
     if collision == "hfield":
         return None
     if collision == "auto":
-        threshold = terrain_map.config.wall_height
+        threshold = terrain_map.config.wall_threshold
         if not level_cells(terrain_map.heights, threshold).all():
             return None
         cover = terrain_map.boxes()
-        return cover if len(cover.centres) <= _FEW_BOXES else None
+        return cover if len(cover.centers) <= _FEW_BOXES else None
     return terrain_map.boxes()
 
 
@@ -137,7 +137,7 @@ def _add_hfield(
         # Inline elevation starts with the row of highest y.
         elevation="\n".join(" ".join(map(str, row)) for row in levels.T[::-1].tolist()),
     )
-    position = _numbers(*terrain_map.grid.centre, low)
+    position = _numbers(*terrain_map.grid.center, low)
     ET.SubElement(body, "geom", {"class": "terrain"}, type="hfield", hfield="terrain", pos=position)
 
 
@@ -172,8 +172,8 @@ def _without_boxes(heights: NDArray[np.float32], cover: BoxCover) -> NDArray[np.
     return np.where(sunk, heights.min() - np.float32(THICKNESS / 2), heights)
 
 
-def _add_box(body: ET.Element, centre: NDArray[np.float64], half_size: NDArray[np.float64]) -> None:
-    position, size = _numbers(*centre), _numbers(*half_size)
+def _add_box(body: ET.Element, center: NDArray[np.float64], half_size: NDArray[np.float64]) -> None:
+    position, size = _numbers(*center), _numbers(*half_size)
     ET.SubElement(body, "geom", {"class": "terrain"}, type="box", pos=position, size=size)
 
 

@@ -38,8 +38,8 @@ def closed_mesh(surface: TriMesh) -> TriMesh:
         np.column_stack([start_foot, end_foot, middle])[:, ::-1],
     ]
     bottom = float(vertices[:, 2].min()) - THICKNESS
-    centre = (rim.min(axis=0) + rim.max(axis=0)) / 2
-    added = np.column_stack([np.vstack([rim, centre]), np.full(len(rim) + 1, bottom)])
+    center = (rim.min(axis=0) + rim.max(axis=0)) / 2
+    added = np.column_stack([np.vstack([rim, center]), np.full(len(rim) + 1, bottom)])
     return TriMesh(
         vertices=np.concatenate([vertices, added.astype(np.float32)]),
         triangles=np.concatenate([triangles, *sides]).astype(np.int32),

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.mesh.lattice import Lattice
-from terrainkit.walls import centre_heights
+from terrainkit.walls import center_heights
 
 Ids = NDArray[np.int64]
 
@@ -39,8 +39,8 @@ class _Quads:
     """Position of each corner, x and y [m], shape (K, 4, 2)."""
 
     @property
-    def centre(self) -> NDArray[np.float64]:
-        """Position of the centre, x and y [m], shape (K, 2)."""
+    def center(self) -> NDArray[np.float64]:
+        """Position of the center, x and y [m], shape (K, 2)."""
         return (self.xy[:, 0] + self.xy[:, 2]) / 2
 
     def __getitem__(self, which: NDArray[np.bool_]) -> "_Quads":
@@ -121,9 +121,9 @@ def _gather(lattice: Lattice, numbers: Ids) -> _Quads:
 
 
 def _fans(quads: _Quads, first: int) -> tuple[Ids, NDArray[np.float32]]:
-    """Return a fan around the centre of each quad, which has one vertex for each height there."""
-    heights = centre_heights(quads.z, quads.walls).astype(np.float32)
-    column = _Column.of(heights, quads.centre, first)
+    """Return a fan around the center of each quad, which has one vertex for each height there."""
+    heights = center_heights(quads.z, quads.walls).astype(np.float32)
+    column = _Column.of(heights, quads.center, first)
     triangles = []
     for k in range(4):
         after = (k + 1) % 4
@@ -139,10 +139,10 @@ def _fans(quads: _Quads, first: int) -> tuple[Ids, NDArray[np.float32]]:
 
 
 def _saddles(quads: _Quads, first: int) -> tuple[Ids, NDArray[np.float32]]:
-    """Return the quads whose corners 0 and 2 stand above 1 and 3, with two centres each."""
-    pull = (quads.xy[:, 0] - quads.centre) * _PINCH
-    west = _Column.of(quads.z[:, [0, 1, 3]], quads.centre + pull, first)
-    east = _Column.of(quads.z[:, [2, 1, 3]], quads.centre - pull, first + len(west.positions))
+    """Return the quads whose corners 0 and 2 stand above 1 and 3, with two centers each."""
+    pull = (quads.xy[:, 0] - quads.center) * _PINCH
+    west = _Column.of(quads.z[:, [0, 1, 3]], quads.center + pull, first)
+    east = _Column.of(quads.z[:, [2, 1, 3]], quads.center - pull, first + len(west.positions))
     c0, c1, c2, c3 = quads.corners.T
     (m0, n0), (m1, n1), (m2, n2), (m3, n3) = (quads.middles[:, k].T for k in range(4))
     every = np.ones(len(c0), dtype=bool)

@@ -21,18 +21,18 @@ def full_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> Tri
         CapacityError: if the mesh would not fit in memory; nothing was allocated.
     """
     lattice = Lattice.of(heights, grid, threshold)
-    fans, centres = cut_quads(lattice, np.flatnonzero(lattice.cut), lattice.vertex_count)
+    fans, centers = cut_quads(lattice, np.flatnonzero(lattice.cut), lattice.vertex_count)
     plain = np.flatnonzero(~lattice.cut)
     triangles = np.empty((2 * len(plain) + len(fans), 3), dtype=np.int32)
     split_quads(lattice, plain, out=triangles[: 2 * len(plain)])
     triangles[2 * len(plain) :] = fans
 
     n = lattice.z.size
-    vertices = np.empty((lattice.vertex_count + len(centres), 3), dtype=np.float32)
+    vertices = np.empty((lattice.vertex_count + len(centers), 3), dtype=np.float32)
     nodes = vertices[:n].reshape(*lattice.z.shape, 3)
     nodes[..., 0], nodes[..., 1], nodes[..., 2] = lattice.x[:, None], lattice.y, lattice.z
     vertices[n : lattice.vertex_count] = lattice.middles()
-    vertices[lattice.vertex_count :] = centres
+    vertices[lattice.vertex_count :] = centers
     return TriMesh(vertices=vertices, triangles=triangles)
 
 

@@ -1,7 +1,7 @@
 """The lattice that a mesh is built on: nodes, the quads between them, and which of those are cut.
 
 The nodes are the samples, plus a rim at the edge of the map that repeats the outermost samples, so
-that the mesh covers the map and not only the samples' centres. Node (i, j) has the number
+that the mesh covers the map and not only the samples' centers. Node (i, j) has the number
 `i * ny + j`; the vertices in the middle of walls follow, two for each.
 """
 

@@ -19,22 +19,22 @@ class Loops:
     owner: Ids
     """Which loop each vertex belongs to, ascending, shape (v,)."""
 
-    centres: NDArray[np.float32]
+    centers: NDArray[np.float32]
     """Middle of each loop [m], shape (n, 3)."""
 
     clockwise: bool = False
     """Whether the order is clockwise, seen from above."""
 
     def triangles(self, first: int) -> tuple[Ids, NDArray[np.float32]]:
-        """Return the triangles, shape (t, 3), and the centres that they use [m], shape (c, 3).
+        """Return the triangles, shape (t, 3), and the centers that they use [m], shape (c, 3).
 
         A loop with nothing but its corners is cut along a diagonal; any other is a fan from its
-        centre, since a fan from a corner would have faces without area.
+        center, since a fan from a corner would have faces without area.
 
         Args:
-            first: Number that the first centre takes.
+            first: Number that the first center takes.
         """
-        sizes = np.bincount(self.owner, minlength=len(self.centres))
+        sizes = np.bincount(self.owner, minlength=len(self.centers))
         starts = np.cumsum(sizes) - sizes
         bare = sizes == 4
         a, b, c, d = (self.vertices[starts[bare] + k] for k in range(4))
@@ -43,10 +43,10 @@ class Loops:
         fanned = ~bare[self.owner]
         after = np.roll(self.vertices, -1)
         after[starts + sizes - 1] = self.vertices[starts]
-        centre = first + np.cumsum(~bare) - 1
-        fans = np.column_stack([self.vertices, after, centre[self.owner]])[fanned]
+        center = first + np.cumsum(~bare) - 1
+        fans = np.column_stack([self.vertices, after, center[self.owner]])[fanned]
         triangles = np.concatenate([halves, fans])
-        return triangles[:, ::-1] if self.clockwise else triangles, self.centres[~bare]
+        return triangles[:, ::-1] if self.clockwise else triangles, self.centers[~bare]
 
 
 def laid_out(lengths: Ids) -> tuple[Ids, Ids]:

@@ -69,5 +69,5 @@ class Rectangles:
         return Loops(
             vertices=nodes[keep],
             owner=side[keep] // 4,
-            centres=np.column_stack([x, y, z]).astype(np.float32),
+            centers=np.column_stack([x, y, z]).astype(np.float32),
         )

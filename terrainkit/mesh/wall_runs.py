@@ -99,7 +99,7 @@ class WallRuns:
         return Loops(
             vertices=vertices[keep],
             owner=owner[keep],
-            centres=view.positions(across, along, view.z[i, self.j0]),
+            centers=view.positions(across, along, view.z[i, self.j0]),
             clockwise=(side == 1) != view.mirrored,
         )
 

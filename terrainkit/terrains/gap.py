@@ -26,13 +26,13 @@ class Gap(Terrain):
 
     def realized(self, plot: Grid) -> dict[str, Realized]:
         """Return the parameters as built: the width ends where the patch does."""
-        asked, block = plot.cells(self.width, least=0), plot.centred(self.platform)
+        asked, block = plot.cells(self.width, least=0), plot.centered(self.platform)
         room = ((n - b) // 2 for n, b in zip(plot.shape, block, strict=True))
         x, y = (plot.length(min(asked, cells)) for cells in room)
         return super().realized(plot) | {"width": x if x == y else (x, y)}
 
     def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return 0, and `-depth` in the rings that the moat takes."""
-        rings = plot.rings(plot.centred(self.platform))
+        rings = plot.rings(plot.centered(self.platform))
         moat = (rings > 0) & (rings <= plot.cells(self.width, least=0))
         return np.where(moat, -self.depth, 0.0)

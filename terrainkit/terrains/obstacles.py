@@ -48,5 +48,5 @@ class Obstacles(Terrain):
         ground = np.zeros(plot.shape)
         for (i, j), (di, dj), level in zip(starts, sides, levels, strict=True):
             ground[i : i + di, j : j + dj] = level
-        ground[plot.middle(plot.centred(self.platform))] = 0.0
+        ground[plot.middle(plot.centered(self.platform))] = 0.0
         return ground

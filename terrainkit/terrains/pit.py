@@ -23,5 +23,5 @@ class Pit(Terrain):
     def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return 0, and `-depth` inside the pit."""
         ground = np.zeros(plot.shape)
-        ground[plot.middle(plot.centred(self.side))] = -self.depth
+        ground[plot.middle(plot.centered(self.side))] = -self.depth
         return ground

@@ -29,7 +29,7 @@ class PyramidSlope(Terrain):
 
     def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the sides, falling by `grade` times a cell from ring to ring."""
-        rings = plot.rings(plot.centred(self.platform))
+        rings = plot.rings(plot.centered(self.platform))
         if rings.max() == 0:
             raise ConfigError(
                 f"{self.kind()}: the platform of {self.platform:g} m leaves no slope in a patch of "

@@ -34,7 +34,7 @@ class PyramidStairs(Terrain):
     def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the treads, counted outwards from the platform."""
         width = plot.cells(self.step_width)
-        rings = plot.rings(plot.centred(self.platform))
+        rings = plot.rings(plot.centered(self.platform))
         risers = rings.max() // width
         if risers == 0:
             raise ConfigError(

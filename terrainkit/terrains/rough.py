@@ -38,4 +38,4 @@ class Rough(Terrain):
     def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the noise, fading out over one spacing towards the platform."""
         noise = self._noise().heights(plot, rng)
-        return noise * plot.fade(plot.centred(self.platform), self.spacing)
+        return noise * plot.fade(plot.centered(self.platform), self.spacing)

@@ -46,5 +46,5 @@ class RoughSlope(Terrain):
         """Return the slope plus the noise, which fades out towards the platform."""
         slope = PyramidSlope(grade=self.grade, platform=self.platform, inverted=self.inverted)
         noise = self._noise().heights(plot, rng)
-        fade = plot.fade(plot.centred(self.platform), self.spacing)
+        fade = plot.fade(plot.centered(self.platform), self.spacing)
         return slope.heights(plot, rng) + noise * fade

@@ -32,7 +32,7 @@ class Stairs(Terrain):
 
     def spawn(self, plot: Grid) -> tuple[float, float]:
         """Return the middle of the level start."""
-        return plot.lower[0] + plot.length(plot.cells(self.landing)) / 2, plot.centre[1]
+        return plot.lower[0] + plot.length(plot.cells(self.landing)) / 2, plot.center[1]
 
     def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the treads, one riser at the end of the landing and one every `step_width`."""

@@ -41,5 +41,5 @@ class SteppingStones(Terrain):
         row, x = np.divmod(np.arange(plot.shape[0])[:, None], pitch)
         column, y = np.divmod(np.arange(plot.shape[1])[None, :] + shifts[row], pitch)
         ground = np.where((x < stone) & (y < stone), tops[row, column % plot.shape[1]], -self.depth)
-        ground[plot.middle(plot.centred(self.platform))] = 0.0
+        ground[plot.middle(plot.centered(self.platform))] = 0.0
         return ground

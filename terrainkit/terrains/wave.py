@@ -47,5 +47,5 @@ class Wave(Terrain):
             )
         x, y = self._waves(plot)
         quarter = min(plot.size) / (4 * self.number)
-        fade = plot.fade(plot.centred(self.platform), quarter)
+        fade = plot.fade(plot.centered(self.platform), quarter)
         return self.amplitude * np.outer(x, y) * fade

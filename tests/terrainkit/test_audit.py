@@ -55,7 +55,7 @@ def test_an_origin_in_the_air(sound):
 
 
 def test_an_origin_on_uneven_ground(sound):
-    x, y = sound.config.patch_grid(2, 5).centre
+    x, y = sound.config.patch_grid(2, 5).center
     origin = [x + 2.0, y, sound.height([x + 2.0, y])]
     ((check, message),) = found(changed(sound, "env_origins", (2, 5), origin))
     assert check == "spawn"

@@ -18,8 +18,8 @@ HEIGHTFIELDS = SMALL | SMALL.map(lambda z: np.kron(z, np.ones((2, 3), dtype=np.f
 
 
 def top_at(cover, xy):
-    beside = np.abs(xy[:, None] - cover.centres[:, :2]) > cover.half_sizes[:, :2]
-    tops = cover.centres[:, 2] + cover.half_sizes[:, 2]
+    beside = np.abs(xy[:, None] - cover.centers[:, :2]) > cover.half_sizes[:, :2]
+    tops = cover.centers[:, 2] + cover.half_sizes[:, 2]
     return np.where(beside.any(axis=2), -np.inf, tops).max(axis=1, initial=-np.inf)
 
 
@@ -93,7 +93,7 @@ def test_a_map_with_slopes_is_met_where_it_is_level_and_nowhere_exceeded(terrain
 
 def test_every_box_reaches_a_metre_below_the_lowest_ground(level_map):
     cover = level_map.boxes()
-    bottoms = cover.centres[:, 2] - cover.half_sizes[:, 2]
+    bottoms = cover.centers[:, 2] - cover.half_sizes[:, 2]
     np.testing.assert_allclose(bottoms, level_map.heights.min() - 1.0)
     assert (cover.half_sizes > 0).all()
 
@@ -103,7 +103,7 @@ def test_a_flat_map_is_one_box():
         rows=2, cols=3, patch_size=(8.0, 4.0), border=1.0, terrains=(TerrainChoice(terrain="flat"),)
     )
     cover = generate(config).boxes()
-    assert cover.centres.tolist() == [pytest.approx([8.0, 6.0, -0.5])]
+    assert cover.centers.tolist() == [pytest.approx([8.0, 6.0, -0.5])]
     assert cover.half_sizes.tolist() == [pytest.approx([9.0, 7.0, 0.5])]
 
 
@@ -111,28 +111,28 @@ def test_a_flat_map_is_one_box():
 def test_a_pyramid_of_n_steps_is_a_stack_of_n_plus_1_boxes(steps):
     # Steps of half a metre on either side of the platform, in a patch of 5 m.
     pyramid = patch("pyramid_stairs", size=(5.0, 5.0), step_width=0.5, platform=5.0 - steps)
-    assert len(pyramid.boxes().centres) == steps + 1
+    assert len(pyramid.boxes().centers) == steps + 1
 
 
 def test_a_pit_is_its_floor_and_four_boxes_around():
     pit = patch("pit", depth=1.0, side=2.0)
-    assert len(pit.boxes().centres) == 4 + 1
+    assert len(pit.boxes().centers) == 4 + 1
 
 
 def test_an_inverted_pyramid_is_its_floor_and_four_boxes_a_step():
     bowl = patch("pyramid_stairs", size=(5.0, 5.0), step_width=0.5, platform=2.0, inverted=True)
-    assert len(bowl.boxes().centres) == 3 * 4 + 1
+    assert len(bowl.boxes().centers) == 3 * 4 + 1
 
 
 @pytest.mark.parametrize("inverted", [False, True])
 def test_a_flight_of_stairs_is_a_box_a_tread(inverted):
     stairs = patch("stairs", step_height=0.2, step_width=0.4, landing=1.0, inverted=inverted)
-    assert len(stairs.boxes().centres) == len(np.unique(stairs.heights))
+    assert len(stairs.boxes().centers) == len(np.unique(stairs.heights))
 
 
 def test_a_slope_is_boxes_under_its_level_ends_alone():
     cover = patch("slope", grade=0.3, landing=1.5).boxes()
-    assert len(cover.centres) == 2
+    assert len(cover.centers) == 2
     # From the last of 15 cells that leans upwards to the first that is as high as the landing.
     assert np.flatnonzero(~cover.covered.all(axis=1)).tolist() == list(range(14, 45))
 
@@ -144,5 +144,5 @@ def test_many_heights_are_covered_too():
         heights, Grid(shape=(60, 20), cell=0.1), 0.075, (np.array([0, 60]), np.array([0, 20]))
     )
     assert cover.complete
-    assert len(cover.centres) == 60
-    assert sorted(cover.centres[:, 2] + cover.half_sizes[:, 2]) == pytest.approx(range(60))
+    assert len(cover.centers) == 60
+    assert sorted(cover.centers[:, 2] + cover.half_sizes[:, 2]) == pytest.approx(range(60))

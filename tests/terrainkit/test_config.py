@@ -41,8 +41,8 @@ def test_centered_puts_zero_at_the_middle():
     config = MapConfig(rows=3, cols=5, patch_size=(8.0, 4.0), border=1.0, centered=True)
     # 3 x 8 + 2 = 26 m along x, 5 x 4 + 2 = 22 m along y.
     assert config.grid.lower == pytest.approx((-13.0, -11.0))
-    assert config.grid.centre == pytest.approx((0.0, 0.0))
-    assert config.patch_grid(1, 2).centre == pytest.approx((0.0, 0.0))
+    assert config.grid.center == pytest.approx((0.0, 0.0))
+    assert config.patch_grid(1, 2).center == pytest.approx((0.0, 0.0))
 
 
 def test_a_mix_of_ones_own_replaces_the_preset():
@@ -52,9 +52,9 @@ def test_a_mix_of_ones_own_replaces_the_preset():
 
 
 def test_walls_begin_a_hair_above_the_threshold_times_the_cell():
-    wall = MapConfig(slope_threshold=0.5, cell=0.2, border=0.0).wall_height
+    wall = MapConfig(slope_threshold=0.5, cell=0.2, border=0.0).wall_threshold
     assert wall == pytest.approx(0.10001, abs=1e-9)
-    assert MapConfig(slope_threshold=None).wall_height == math.inf
+    assert MapConfig(slope_threshold=None).wall_threshold == math.inf
 
 
 def test_a_million_cells_along_a_side_are_the_most():

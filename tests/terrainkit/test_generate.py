@@ -100,7 +100,7 @@ def test_centered_moves_the_map_and_changes_nothing_else():
     corner, middle = generate(SMALL), generate(replace(SMALL, centered=True))
     assert corner.heights.tobytes() == middle.heights.tobytes()
     assert corner.grid.lower == (-1.0, -1.0)
-    assert middle.grid.centre == pytest.approx((0.0, 0.0))
+    assert middle.grid.center == pytest.approx((0.0, 0.0))
     # Half of 3 x 8 m and of 4 x 6 m.
     moved = middle.env_origins - corner.env_origins
     assert np.abs(moved - (-12.0, -12.0, 0.0)).max() < 1e-5

@@ -9,7 +9,7 @@ from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid, whole_cells
 
 
-def test_samples_are_cell_centres():
+def test_samples_are_cell_centers():
     grid = Grid(shape=(80, 40), cell=0.1)
     assert grid.axis(0)[[0, 1, -1]] == pytest.approx([0.05, 0.15, 7.95])
     assert grid.axis(1)[[0, 1, -1]] == pytest.approx([0.05, 0.15, 3.95])
@@ -19,7 +19,7 @@ def test_shape_times_cell_is_the_ground_covered():
     grid = Grid(shape=(80, 40), cell=0.1, lower=(-2.0, 1.0))
     assert grid.size == pytest.approx((8.0, 4.0))
     assert grid.upper == pytest.approx((6.0, 5.0))
-    assert grid.centre == pytest.approx((2.0, 3.0))
+    assert grid.center == pytest.approx((2.0, 3.0))
 
 
 def test_axis_starts_from_the_lower_corner():
@@ -85,15 +85,15 @@ def test_a_whole_number_of_cells_survives_metres(count, cell):
         ((81, 81), 0.09, (1, 1)),
     ],
 )
-def test_a_centred_block_has_the_parity_of_its_axis(shape, size, counts):
-    assert Grid(shape=shape, cell=0.1).centred(size) == counts
+def test_a_centered_block_has_the_parity_of_its_axis(shape, size, counts):
+    assert Grid(shape=shape, cell=0.1).centered(size) == counts
 
 
 @settings(deadline=None, derandomize=True, max_examples=100)
 @given(n=st.integers(60, 120), size=st.floats(0.1, 5.9))
-def test_a_centred_block_is_within_one_cell_of_its_size_and_leaves_equal_margins(n, size):
+def test_a_centered_block_is_within_one_cell_of_its_size_and_leaves_equal_margins(n, size):
     grid = Grid(shape=(n, n), cell=0.1)
-    block = grid.centred(size)
+    block = grid.centered(size)
     assert abs(block[0] * 0.1 - size) <= 0.1 + 1e-6
     middle = grid.middle(block)[0]
     assert middle.stop - middle.start == block[0]

@@ -36,10 +36,10 @@ def test_without_a_wall_a_quad_is_split_from_low_to_high_corner(place, height):
     assert height_at(quad(0, 1, 2, 3), place, np.inf) == height
 
 
-ONE_WALL = quad(0, 4, 4, 2)  # the centre is at (0 + 4 + 4 + 2) / 4 = 2.5
+ONE_WALL = quad(0, 4, 4, 2)  # the center is at (0 + 4 + 4 + 2) / 4 = 2.5
 OPPOSITE_WALLS = quad(0, 5, 6, 1)  # two planes, v on the left and 5 + v on the right
-CORNER_WALLS = quad(0, 5, 7, 6)  # the centre is at 0 and at (5 + 6) / 2 = 5.5
-THREE_WALLS = quad(0, 4, 8, 1)  # the centre is at (0 + 1) / 2, at 4 and at 8
+CORNER_WALLS = quad(0, 5, 7, 6)  # the center is at 0 and at (5 + 6) / 2 = 5.5
+THREE_WALLS = quad(0, 4, 8, 1)  # the center is at (0 + 1) / 2, at 4 and at 8
 SADDLE = quad(9, 0, 6, 3)
 
 
@@ -72,7 +72,7 @@ SADDLE = quad(9, 0, 6, 3)
         (SADDLE, (0.375, 0.625), 3.0),
     ],
 )
-def test_a_quad_with_walls_is_a_fan_around_its_centre(heights, place, height):
+def test_a_quad_with_walls_is_a_fan_around_its_center(heights, place, height):
     assert height_at(heights, place, threshold=2.5) == height
 
 

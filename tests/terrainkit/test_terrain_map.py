@@ -38,7 +38,7 @@ def test_height_at_a_sample_is_the_sample(terrain_map):
 
 
 def test_height_stands_where_the_axis_convention_says(terrain_map):
-    # Border 1.2 m and cell 0.1 m: cell (30, 45) is centred at x = -1.2 + 3.05, y = -1.2 + 4.55.
+    # Border 1.2 m and cell 0.1 m: cell (30, 45) is centered at x = -1.2 + 3.05, y = -1.2 + 4.55.
     terrain_map = with_heights(terrain_map, 0.0)
     terrain_map.heights[30, 45] = 2.0
     assert terrain_map.height((1.85, 3.35)) == 2.0

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit.walls import centre_heights, joined_corners, wall_edges
+from terrainkit.walls import center_heights, joined_corners, wall_edges
 
 
 def samples(*rows):
@@ -67,7 +67,7 @@ def test_corners_are_joined_by_edges_without_a_wall(case, groups):
 
 
 @pytest.mark.parametrize(
-    ("case", "centres"),
+    ("case", "centers"),
     [
         ("one wall", [3.5, 3.5, 3.5, 3.5]),  # (0 + 1 + 4 + 9) / 4
         ("opposite walls", [4.5, 2.5, 2.5, 4.5]),  # (0 + 9) / 2 and (1 + 4) / 2
@@ -76,12 +76,12 @@ def test_corners_are_joined_by_edges_without_a_wall(case, groups):
         ("four walls", [0.0, 1.0, 4.0, 9.0]),
     ],
 )
-def test_joined_corners_bring_one_height_to_the_centre(case, centres):
+def test_joined_corners_bring_one_height_to_the_center(case, centers):
     corners = np.array([[0.0, 1.0, 4.0, 9.0]])
-    assert centre_heights(corners, walls_on(WALLS[case])).tolist() == [centres]
+    assert center_heights(corners, walls_on(WALLS[case])).tolist() == [centers]
 
 
 def test_quads_are_independent_of_one_another():
     corners = np.array([[0.0, 1.0, 4.0, 9.0], [5.0, 5.0, 7.0, 7.0]])
     walls = np.concatenate([walls_on([0, 1, 2, 3]), walls_on([1, 3])])
-    assert centre_heights(corners, walls).tolist() == [[0.0, 1.0, 4.0, 9.0], [5.0, 5.0, 7.0, 7.0]]
+    assert center_heights(corners, walls).tolist() == [[0.0, 1.0, 4.0, 9.0], [5.0, 5.0, 7.0, 7.0]]

@@ -46,7 +46,7 @@ def points_in(terrain_map, cells, count=1000):
 
 
 def away_from_walls(terrain_map):
-    along_x, along_y = wall_edges(terrain_map.heights, terrain_map.config.wall_height)
+    along_x, along_y = wall_edges(terrain_map.heights, terrain_map.config.wall_threshold)
     beside = np.zeros(terrain_map.heights.shape, dtype=bool)
     for side in (slice(None, -1), slice(1, None)):
         beside[side] |= along_x

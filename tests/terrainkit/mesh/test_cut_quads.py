@@ -13,7 +13,7 @@ def lattice_of(rows, threshold=0.1):
     return Lattice.of(heights, Grid(shape=heights.shape, cell=CELL), threshold)
 
 
-def centre_quad(corners, first=100):
+def center_quad(corners, first=100):
     low_left, low_right, high_right, high_left = corners
     lattice = lattice_of([[low_left, high_left], [low_right, high_right]])
     return cut_quads(lattice, np.array([4]), first)  # the middle one of 3 x 3
@@ -26,7 +26,7 @@ def test_no_quads_are_no_faces():
 
 
 @pytest.mark.parametrize(
-    ("corners", "centres"),
+    ("corners", "centers"),
     [
         ((0, 1, 1, 0), [0.0, 1.0]),
         ((1, 0, 0, 0), [0.0, 1.0]),
@@ -36,17 +36,17 @@ def test_no_quads_are_no_faces():
         ((0, 0.0625, 0.125, 0.1875), [0.09375]),  # one wall: (0 + 1 + 2 + 3) / 4 sixteenths
     ],
 )
-def test_the_centre_has_one_vertex_for_each_height_there(corners, centres):
-    triangles, vertices = centre_quad(corners)
-    assert vertices[:, 2].tolist() == centres
+def test_the_center_has_one_vertex_for_each_height_there(corners, centers):
+    triangles, vertices = center_quad(corners)
+    assert vertices[:, 2].tolist() == centers
     np.testing.assert_allclose(vertices[:, :2], CELL)
     added = np.unique(triangles[triangles >= 100])
-    assert added.tolist() == list(range(100, 100 + len(centres)))
+    assert added.tolist() == list(range(100, 100 + len(centers)))
 
 
 @pytest.mark.parametrize("corners", [(1, 0, 1, 0), (0, 1, 0, 1), (3, 0, 2, 1), (0, 3, 1, 2)])
 def test_two_high_corners_that_meet_in_a_point_are_kept_apart(corners):
-    _, vertices = centre_quad(corners)
+    _, vertices = center_quad(corners)
     places = np.unique(vertices[:, :2], axis=0)
     assert len(places) == 2
     assert 0 < np.abs(places - CELL).max() < 0.001
@@ -57,7 +57,7 @@ def test_two_high_corners_that_meet_in_a_point_are_kept_apart(corners):
 
 @pytest.mark.parametrize("corners", [(1, 0, 1, 0), (3, 0, 2, 1)])
 def test_the_low_corners_of_a_saddle_are_joined_below_the_high_ones(corners):
-    triangles, vertices = centre_quad(corners)
+    triangles, vertices = center_quad(corners)
     low = 100 + np.flatnonzero(vertices[:, 2] == 0)
     assert len(low) == 2
     floor = np.isin(triangles, low).sum(axis=1) == 2

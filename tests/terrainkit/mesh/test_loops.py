@@ -11,26 +11,26 @@ def loops(*rings, clockwise=False):
     return Loops(
         vertices=np.array([vertex for ring in rings for vertex in ring]),
         owner=np.repeat(np.arange(len(rings)), [len(ring) for ring in rings]),
-        centres=np.array([[k, 0, 0] for k in range(len(rings))], dtype=np.float32),
+        centers=np.array([[k, 0, 0] for k in range(len(rings))], dtype=np.float32),
         clockwise=clockwise,
     )
 
 
 def test_a_loop_of_four_vertices_is_cut_along_a_diagonal():
-    triangles, centres = loops([3, 4, 6, 5]).triangles(first=10)
+    triangles, centers = loops([3, 4, 6, 5]).triangles(first=10)
     assert triangles.tolist() == [[3, 4, 6], [3, 6, 5]]
-    assert len(centres) == 0
+    assert len(centers) == 0
 
 
-def test_a_loop_with_more_is_a_fan_around_its_centre():
-    triangles, centres = loops([0, 1, 2, 3, 4]).triangles(first=10)
+def test_a_loop_with_more_is_a_fan_around_its_center():
+    triangles, centers = loops([0, 1, 2, 3, 4]).triangles(first=10)
     assert triangles.tolist() == [[0, 1, 10], [1, 2, 10], [2, 3, 10], [3, 4, 10], [4, 0, 10]]
-    assert centres.tolist() == [[0, 0, 0]]
+    assert centers.tolist() == [[0, 0, 0]]
 
 
-def test_only_fans_take_a_centre():
-    triangles, centres = loops([0, 1, 2, 3], [4, 5, 6, 7, 8], [5, 6, 7, 8, 9]).triangles(first=10)
-    assert centres[:, 0].tolist() == [1, 2]
+def test_only_fans_take_a_center():
+    triangles, centers = loops([0, 1, 2, 3], [4, 5, 6, 7, 8], [5, 6, 7, 8, 9]).triangles(first=10)
+    assert centers[:, 0].tolist() == [1, 2]
     assert np.unique(triangles[triangles >= 10]).tolist() == [10, 11]
     assert len(triangles) == 2 + 5 + 5
 

@@ -60,4 +60,4 @@ def test_a_rim_runs_anticlockwise_over_the_nodes_that_are_kept(lattice):
     kept[2, 4] = kept[1, 1] = True  # on the rim, and inside
     loop = rectangle.loops(lattice, kept)
     assert loop.vertices.tolist() == [0, 15, 19, 14, 4]
-    assert loop.centres.tolist() == [[1.0, 1.5, 0.0]]
+    assert loop.centers.tolist() == [[1.0, 1.5, 0.0]]

@@ -61,4 +61,4 @@ def test_the_strips_beside_a_wall_keep_the_nodes_that_others_need(across_y):
     kept[(2, 1) if across_y else (1, 2)] = True  # on the low side
     low, high = found.strips(kept)
     assert [len(low.vertices), len(high.vertices)] == [5, 4]
-    assert [low.centres[0, 2], high.centres[0, 2]] == [0.0, 2.0]
+    assert [low.centers[0, 2], high.centers[0, 2]] == [0.0, 2.0]

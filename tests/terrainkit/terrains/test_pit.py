@@ -16,7 +16,7 @@ from terrainkit.terrains.pit import Pit
         ((80, 51), 4.0, (40, 41)),
     ],
 )
-def test_the_pit_is_square_centred_and_as_large_as_asked(shape, asked, sides, rng):
+def test_the_pit_is_square_centered_and_as_large_as_asked(shape, asked, sides, rng):
     plot = Grid(shape=shape, cell=0.1)
     pit = Pit(depth=0.6, side=asked)
     low = pit.build(plot, rng) < 0

@@ -38,7 +38,7 @@ def test_the_grade_is_the_one_asked_everywhere_off_the_platform(shape, rng):
         ((80, 51), 3.0, (30, 31)),
     ],
 )
-def test_the_platform_is_level_centred_and_as_large_as_asked(shape, asked, sides, rng):
+def test_the_platform_is_level_centered_and_as_large_as_asked(shape, asked, sides, rng):
     plot = Grid(shape=shape, cell=0.1)
     slope = PyramidSlope(grade=0.4, platform=asked)
     top = slope.build(plot, rng) == slope.build(plot, rng).max()

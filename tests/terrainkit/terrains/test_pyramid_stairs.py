@@ -44,7 +44,7 @@ def test_the_usual_step_of_31_cm_is_built_as_30_cm(plot, rng):
         ((80, 51), 3.0, (30, 31)),
     ],
 )
-def test_the_platform_is_centred_and_as_large_as_asked(shape, asked, sides, rng):
+def test_the_platform_is_centered_and_as_large_as_asked(shape, asked, sides, rng):
     plot = Grid(shape=shape, cell=0.1)
     stairs = PyramidStairs(platform=asked)
     heights = stairs.build(plot, rng)

@@ -22,7 +22,7 @@ def test_heights_lie_within_the_amplitude_on_both_sides_of_zero(shape):
     ("shape", "asked", "sides"),
     [((80, 80), 2.0, (20, 20)), ((80, 40), 3.0, (30, 30)), ((73, 51), 2.0, (21, 21))],
 )
-def test_the_platform_is_level_and_centred(shape, asked, sides):
+def test_the_platform_is_level_and_centered(shape, asked, sides):
     plot = Grid(shape=shape, cell=0.1)
     heights = build(plot, platform=asked)
     x, y = ((n - side) // 2 for n, side in zip(shape, sides, strict=True))

@@ -58,7 +58,7 @@ def test_variation_gives_each_stone_its_own_level(plot):
 
 
 @pytest.mark.parametrize(("shape", "sides"), [((80, 80), (40, 40)), ((73, 51), (41, 41))])
-def test_the_platform_is_level_and_centred(shape, sides):
+def test_the_platform_is_level_and_centered(shape, sides):
     heights = build(Grid(shape=shape, cell=0.1), stone=0.3, distance=0.4, variation=0.05)
     x, y = ((n - side) // 2 for n, side in zip(shape, sides, strict=True))
     assert not heights[x : x + sides[0], y : y + sides[1]].any()

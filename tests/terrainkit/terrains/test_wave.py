@@ -42,7 +42,7 @@ def test_crests_and_troughs_reach_the_amplitude(plot, rng):
 
 
 @pytest.mark.parametrize(("shape", "side"), [((80, 80), 16), ((80, 40), 16), ((73, 51), 15)])
-def test_the_platform_is_level_and_centred(shape, side, rng):
+def test_the_platform_is_level_and_centered(shape, side, rng):
     # 1.5 m are 15 cells: half-way between 14 and 16, and halves round up.
     plot = Grid(shape=shape, cell=0.1)
     heights = Wave(amplitude=0.2).build(plot, rng)
