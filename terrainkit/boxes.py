@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.grid import Grid
+from terrainkit.mesh.closed import THICKNESS
+from terrainkit.mesh.lattice import Lattice
 from terrainkit.rectangle_cover import rectangle_cover
-from terrainkit.walls import joined_corners, wall_edges
-
-THICKNESS = 1.0
-"""Ground below the lowest point of the map, which every box reaches down to [m]."""
+from terrainkit.walls import joined_corners
 
 _MANY_HEIGHTS = 50
 """Heights in a block above which a box is searched only around the cells of its height, or the time
@@ -63,7 +62,7 @@ def box_cover(
         threshold: Difference between neighbours above which there is a wall [m].
         seams: Cells along x and along y where patches meet; no box is searched across them.
     """
-    level = level_cells(heights, threshold)
+    level = level_cells(heights, grid, threshold)
     low = _lowest(heights, level)
     edges = [
         np.unique(np.concatenate([[0], lines, [n]]))
@@ -80,27 +79,22 @@ def box_cover(
     return _solids(joined, grid, float(heights.min()) - THICKNESS, level)
 
 
-def level_cells(heights: NDArray[np.float32], threshold: float) -> NDArray[np.bool_]:
+def level_cells(heights: NDArray[np.float32], grid: Grid, threshold: float) -> NDArray[np.bool_]:
     """Return which cells are level all over, shape of `heights`.
 
     A cell takes a quarter of each of the four quads around its sample, and is level if the corner
     that it has in each is joined, without a wall between, to none but corners of its own height.
     """
-    z = np.pad(heights, 1, mode="edge")
-    walls_x, walls_y = wall_edges(z, threshold)
-    same_x, same_y = z[:-1] == z[1:], z[:, :-1] == z[:, 1:]
-    even_x, even_y = same_x[:, :-1] & same_x[:, 1:], same_y[:-1] & same_y[1:]
-    cut = walls_x[:, :-1] | walls_x[:, 1:] | walls_y[:-1] | walls_y[1:]
-    i, j = np.nonzero(cut)
-    corners = np.stack([z[i, j], z[i + 1, j], z[i + 1, j + 1], z[i, j + 1]], axis=1)
-    walls = np.stack([walls_x[i, j], walls_y[i + 1, j], walls_x[i, j + 1], walls_y[i, j]], axis=1)
+    lattice = Lattice.of(heights, grid, threshold)
+    i, j = np.nonzero(lattice.cut)
+    corners = lattice.z.ravel()[lattice.corners(i, j)]
     same = corners[:, :, None] == corners[:, None, :]
-    at_cut = (same | ~joined_corners(walls)).all(axis=2)
+    at_cut = (same | ~joined_corners(lattice.walls(i, j))).all(axis=2)
 
-    level = np.ones(z.shape, dtype=bool)
+    level = np.ones(lattice.z.shape, dtype=bool)
     quads = (slice(None, -1), slice(1, None))
     for k, (a, b) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1))):
-        corner = even_x & even_y
+        corner = lattice.even_x & lattice.even_y
         corner[i, j] = at_cut[:, k]
         level[quads[a], quads[b]] &= corner
     return level[1:-1, 1:-1]

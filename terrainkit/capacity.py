@@ -1,10 +1,8 @@
 """Capacity: whether work fits in this machine's memory, asked before it is begun."""
 
-from pathlib import Path
-
 from terrainkit.errors import CapacityError
 
-_CONTROL_GROUP = Path("/sys/fs/cgroup")
+_CONTROL_GROUP = "/sys/fs/cgroup"
 
 _SURE_TO_FIT = 1 << 28
 """Work below this is not worth asking the operating system about [bytes]."""
@@ -28,13 +26,16 @@ def require_memory(needed: int, what: str) -> None:
 
 def _free_memory() -> int:
     """Return the memory that this process may still take [bytes]: the machine's, or its share."""
+    from pathlib import Path
+
     import psutil
 
+    group = Path(_CONTROL_GROUP)
     free = int(psutil.virtual_memory().available)
     try:
         # In a container or under a scheduler, Linux ends who takes more than the group's limit.
-        limit = int((_CONTROL_GROUP / "memory.max").read_text())
-        used = int((_CONTROL_GROUP / "memory.current").read_text())
+        limit = int((group / "memory.max").read_text())
+        used = int((group / "memory.current").read_text())
     except (OSError, ValueError):  # no such group, or "max": no limit
         return free
     return min(free, limit - used)

@@ -157,6 +157,13 @@ class MapConfig:
             lower = (-self.border, -self.border)
         return Grid(shape=shape, cell=self.cell, lower=lower)
 
+    def check_patch(self, row: int, col: int) -> None:
+        """Raise IndexError if the map has no patch (row, col)."""
+        if not (0 <= row < self.rows and 0 <= col < self.cols):
+            raise IndexError(
+                f"no patch ({row}, {col}) in a map of {self.rows} rows and {self.cols} columns"
+            )
+
     def patch_start(self, row: int, col: int) -> tuple[int, int]:
         """Return the first cell of patch (row, col) in the grid of the map."""
         x, y = self.patch_shape

@@ -12,7 +12,6 @@ from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.layout import assign_patch, terrain_columns
 from terrainkit.parameter import Realized, Value, parameters_of
-from terrainkit.spawn import find_spawn, room_error
 from terrainkit.terrain import Terrain
 
 
@@ -57,10 +56,7 @@ def tile(config: MapConfig, row: int, col: int) -> Patch:
         IndexError: if there is no such patch.
         ConfigError: if the terrain does not fit in the patch, or leaves no room to spawn.
     """
-    if not (0 <= row < config.rows and 0 <= col < config.cols):
-        raise IndexError(
-            f"no patch ({row}, {col}) in a map of {config.rows} rows and {config.cols} columns"
-        )
+    config.check_patch(row, col)
     kind, difficulty = assign_patch(config, terrain_columns(config), row, col)
     return build_patch(config, config.mix[kind], difficulty, row, col)
 
@@ -73,6 +69,8 @@ def build_patch(
     The draws come from the seed, the row and the column alone, so the patch has the same bytes in
     whatever order, process or company it is built.
     """
+    from terrainkit.spawn import find_spawn, room_error
+
     terrain = choice.at(difficulty)
     _refuse_walls(terrain, config)
     grid = config.patch_grid(row, col)

@@ -13,13 +13,13 @@ from terrainkit.errors import ConfigError, ExportError
 from terrainkit.grid import Grid
 from terrainkit.parameter import LARGEST
 from terrainkit.patch import Patch
-from terrainkit.surface import SurfacePoints, surface_at
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from terrainkit.boxes import BoxCover
     from terrainkit.mesh import TriMesh
+    from terrainkit.surface import SurfacePoints
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -154,9 +154,7 @@ class TerrainMap:
         Raises:
             IndexError: if there is no such patch.
         """
-        rows, cols = self.difficulty.shape
-        if not (0 <= row < rows and 0 <= col < cols):
-            raise IndexError(f"no patch ({row}, {col}) in a map of {rows} rows and {cols} columns")
+        self.config.check_patch(row, col)
         grid = self.config.patch_grid(row, col)
         i, j = self.config.patch_start(row, col)
         return Patch(
@@ -222,7 +220,9 @@ class TerrainMap:
         x, y = self.config.patch_shape
         return border + x * np.arange(rows + 1), border + y * np.arange(cols + 1)
 
-    def _at(self, points: NDArray[np.float64]) -> SurfacePoints:
+    def _at(self, points: NDArray[np.float64]) -> "SurfacePoints":
+        from terrainkit.surface import surface_at
+
         place = (points - self.first_sample) / self.grid.cell
         return surface_at(self.heights, place, threshold=self.config.wall_threshold)
 

@@ -13,9 +13,10 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.boxes import THICKNESS, BoxCover, level_cells
+from terrainkit.boxes import BoxCover, level_cells
 from terrainkit.capacity import require_memory
 from terrainkit.coerce import coerce
+from terrainkit.mesh.closed import THICKNESS
 
 if TYPE_CHECKING:
     from terrainkit.terrain_map import TerrainMap
@@ -81,7 +82,7 @@ def _cover(terrain_map: "TerrainMap", collision: Collision) -> BoxCover | None:
         return None
     if collision == "auto":
         threshold = terrain_map.config.wall_threshold
-        if not level_cells(terrain_map.heights, threshold).all():
+        if not level_cells(terrain_map.heights, terrain_map.grid, threshold).all():
             return None
         cover = terrain_map.boxes()
         return cover if len(cover.centers) <= _FEW_BOXES else None

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from terrainkit.mesh.tri_mesh import TriMesh
 
 THICKNESS = 1.0
-"""Ground below the lowest point of the surface [m]."""
+"""Ground below the lowest point of the surface, for every solid that is made of it [m]."""
 
 
 def closed_mesh(surface: TriMesh) -> TriMesh:

@@ -81,18 +81,8 @@ def cut_quads(lattice: Lattice, numbers: Ids, first: int) -> tuple[Ids, NDArray[
 
 
 def _gather(lattice: Lattice, numbers: Ids) -> _Quads:
-    ny = lattice.z.shape[1]
-    i, j = np.divmod(numbers, ny - 1)
-    corners = np.stack([i * ny + j, (i + 1) * ny + j, (i + 1) * ny + j + 1, i * ny + j + 1], axis=1)
-    walls = np.stack(
-        [
-            lattice.walls_x[i, j],
-            lattice.walls_y[i + 1, j],
-            lattice.walls_x[i, j + 1],
-            lattice.walls_y[i, j],
-        ],
-        axis=1,
-    )
+    i, j = np.divmod(numbers, lattice.z.shape[1] - 1)
+    corners = lattice.corners(i, j)
     low_side = np.stack(
         [
             lattice.middle_x(i, j),
@@ -108,7 +98,7 @@ def _gather(lattice: Lattice, numbers: Ids) -> _Quads:
     return _Quads(
         corners=corners,
         z=lattice.z.ravel()[corners],
-        walls=walls,
+        walls=lattice.walls(i, j),
         middles=np.stack([low_side + backwards, low_side + 1 - backwards], axis=2),
         xy=np.stack(
             [

@@ -56,6 +56,31 @@ class Lattice:
         return either
 
     @cached_property
+    def even_x(self) -> NDArray[np.bool_]:
+        """Whether each quad is level along x, on both of its sides."""
+        same = self.z[:-1] == self.z[1:]
+        even: NDArray[np.bool_] = same[:, :-1] & same[:, 1:]
+        return even
+
+    @cached_property
+    def even_y(self) -> NDArray[np.bool_]:
+        """Whether each quad is level along y, on both of its sides."""
+        same = self.z[:, :-1] == self.z[:, 1:]
+        even: NDArray[np.bool_] = same[:-1] & same[1:]
+        return even
+
+    def corners(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the numbers of the four corners of each quad (i, j), anticlockwise, (n, 4)."""
+        ny = self.z.shape[1]
+        first = i * ny + j
+        return np.stack([first, first + ny, first + ny + 1, first + 1], axis=1)
+
+    def walls(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return whether each of the four edges of each quad (i, j) is a wall, (n, 4)."""
+        x, y = self.walls_x, self.walls_y
+        return np.stack([x[i, j], y[i + 1, j], x[i, j + 1], y[i, j]], axis=1)
+
+    @cached_property
     def edges_x(self) -> NDArray[np.int64]:
         """Flat index into `walls_x` of each wall, in order."""
         return np.flatnonzero(self.walls_x)

@@ -31,10 +31,7 @@ def merged_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> T
         CapacityError: if the mesh would not fit in memory; nothing was allocated.
     """
     lattice = Lattice.of(heights, grid, threshold)
-    same_x = lattice.z[:-1] == lattice.z[1:]
-    same_y = lattice.z[:, :-1] == lattice.z[:, 1:]
-    even_x = same_x[:, :-1] & same_x[:, 1:]  # the quad is level along x
-    even_y = same_y[:-1] & same_y[1:]
+    even_x, even_y = lattice.even_x, lattice.even_y
     level = even_x & even_y
     # Where the ground is level along y, walls on both edges across it make one straight wall.
     walls_x = even_y & lattice.walls_x[:, :-1] & lattice.walls_x[:, 1:]

@@ -33,6 +33,10 @@ def cover_of(heights, threshold):
     return box_cover(heights, Grid(shape=heights.shape, cell=1.0), threshold, seams)
 
 
+def level_of(heights, threshold):
+    return level_cells(heights, Grid(shape=heights.shape, cell=1.0), threshold)
+
+
 def patch(terrain, *, size=(6.0, 4.0), **parameters):
     choice = TerrainChoice(terrain=terrain, parameters=parameters)
     config = MapConfig(
@@ -59,7 +63,7 @@ def test_a_level_cell_is_level_all_over(heights, threshold):
     steps = np.stack(np.meshgrid(offsets, offsets), axis=-1).reshape(-1, 2)
     place = (np.argwhere(np.ones(heights.shape))[:, None] + steps).reshape(-1, 2)
     ground = surface_at(heights, place, threshold=threshold).height.reshape(*heights.shape, -1)
-    assert (np.ptp(ground, axis=2)[level_cells(heights, threshold)] < 1e-6).all()
+    assert (np.ptp(ground, axis=2)[level_of(heights, threshold)] < 1e-6).all()
 
 
 @given(heights=HEIGHTFIELDS)
@@ -70,7 +74,7 @@ def test_with_a_wall_at_every_step_the_boxes_hold_all_of_the_ground(heights):
 
 def test_a_step_that_is_no_wall_leaves_the_cells_on_both_sides_to_a_heightfield():
     heights = np.array([[0], [0], [0], [1], [1]], dtype=np.float32)
-    assert level_cells(heights, 2.0)[:, 0].tolist() == [True, True, False, False, True]
+    assert level_of(heights, 2.0)[:, 0].tolist() == [True, True, False, False, True]
     assert not cover_of(heights, 2.0).complete
 
 

@@ -26,3 +26,20 @@ def test_the_error_is_one_to_catch_as_memory_error_too():
 def test_a_map_beyond_the_memory_is_refused_before_it_is_begun():
     with pytest.raises(CapacityError, match=r"a map of \d+ x \d+ samples needs .* GB of memory"):
         generate(MapConfig(rows=10_000, cols=10_000))
+
+
+def test_the_limit_of_a_control_group_counts(tmp_path, monkeypatch):
+    (tmp_path / "memory.max").write_text(f"{3 * 10**9}\n")
+    (tmp_path / "memory.current").write_text(f"{2 * 10**9}\n")
+    monkeypatch.setattr("terrainkit.capacity._CONTROL_GROUP", str(tmp_path))
+    require_memory(9 * 10**8, "a map")
+    with pytest.raises(CapacityError, match=r"a map needs 1\.1 GB of memory; 1\.0 GB free"):
+        require_memory(11 * 10**8, "a map")
+
+
+@pytest.mark.parametrize("limit", ["max\n", ""])
+def test_a_control_group_without_a_limit_does_not(tmp_path, monkeypatch, limit):
+    (tmp_path / "memory.max").write_text(limit)
+    (tmp_path / "memory.current").write_text("1\n")
+    monkeypatch.setattr("terrainkit.capacity._CONTROL_GROUP", str(tmp_path))
+    require_memory(3 * 10**8, "a map")
