@@ -1,29 +1,60 @@
-"""The registry: every file in `terrainkit/terrains` is a terrain, named as its file is."""
+"""The registry: every file in `terrainkit/terrains` is a terrain, named as its file is.
+
+Another package brings terrains of its own as entry points of the group `terrainkit.terrains`.
+"""
 
 import importlib
 import pkgutil
 from functools import cache
+from typing import TYPE_CHECKING
 
 from terrainkit import terrains
 from terrainkit.errors import ConfigError, listing
 from terrainkit.terrain import Terrain
 
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+ENTRY_POINTS = "terrainkit.terrains"
+
 
 @cache
 def names() -> tuple[str, ...]:
-    """Return the name of each terrain, in alphabetical order; imports none of them."""
+    """Return the name of each terrain of ours, in alphabetical order; imports none of them."""
     return tuple(sorted(module.name for module in pkgutil.iter_modules(terrains.__path__)))
+
+
+def plugins() -> dict[str, "EntryPoint"]:
+    """Return the entry point of each terrain that another installed package brings, by name."""
+    from importlib.metadata import entry_points
+
+    return {point.name: point for point in entry_points(group=ENTRY_POINTS)}
 
 
 @cache
 def find(name: str) -> type[Terrain]:
-    """Return the terrain called `name`.
+    """Return the terrain called `name`; ours go before those of other packages.
 
     Raises:
         ConfigError: if there is none, listing those that exist.
     """
-    if name not in names():
-        raise ConfigError(f"no terrain {name!r}; there are: {listing(names())}")
+    if name in names():
+        return _ours(name)
+    others = plugins()
+    if name not in others:
+        raise ConfigError(f"no terrain {name!r}; there are: {listing([*names(), *others])}")
+    try:
+        found = others[name].load()
+    except (ImportError, AttributeError) as error:
+        raise ConfigError(f"{name} ({others[name].value}) cannot be loaded: {error}") from error
+    if not (isinstance(found, type) and issubclass(found, Terrain)):
+        raise ConfigError(
+            f"{name} ({others[name].value}) is {found!r}; wanted a subclass of Terrain"
+        )
+    return found
+
+
+def _ours(name: str) -> type[Terrain]:
     module = importlib.import_module(f"{terrains.__name__}.{name}")
     found = [
         value

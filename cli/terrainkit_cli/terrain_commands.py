@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from terrainkit import presets
+from terrainkit import presets, registry
 from terrainkit.choice import TerrainChoice
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
@@ -113,6 +113,9 @@ class List(Command):
 
         if not self.terrain:
             render.table(list(summaries().items()))
+            if others := registry.plugins():
+                render.result("\nfrom other packages:")
+                render.table([(f"  {name}", point.value) for name, point in others.items()])
             mixes = (
                 (name, ", ".join(c.name for c in presets.find(name))) for name in presets.names()
             )

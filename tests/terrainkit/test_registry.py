@@ -1,3 +1,4 @@
+import importlib.metadata
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -5,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from terrainkit import registry, terrains
+from terrainkit import MapConfig, TerrainChoice, generate, registry, terrains
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.terrain import Terrain
@@ -88,3 +89,45 @@ def test_a_plain_field_is_named():
 def test_heights_of_another_shape_are_named():
     with pytest.raises(ConfigError, match=r"shape \(4, 8\); wanted \(8, 4\)"):
         _Turned().build(Grid(shape=(8, 4), cell=1.0), np.random.default_rng(0))
+
+
+@pytest.fixture
+def plugin(monkeypatch):
+    """Install an entry point called dunes, and forget what was found before and after."""
+
+    def install(value):
+        point = importlib.metadata.EntryPoint("dunes", value, registry.ENTRY_POINTS)
+        found = {registry.ENTRY_POINTS: (point,)}
+        monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: found[group])
+
+    registry.find.cache_clear()
+    yield install
+    registry.find.cache_clear()
+
+
+def test_a_terrain_of_another_package_is_found_by_its_entry_point(plugin):
+    plugin("terrainkit.terrains.wave:Wave")
+    assert registry.find("dunes") is registry.find("wave")
+    dunes = TerrainChoice(terrain="dunes", parameters={"amplitude": 0.1})
+    assert generate(MapConfig(rows=1, cols=1, border=0.0, terrains=(dunes,))).heights.max() > 0.09
+
+
+def test_an_entry_point_that_is_no_terrain_is_named(plugin):
+    plugin("math:pi")
+    with pytest.raises(
+        ConfigError, match=r"dunes \(math:pi\) is 3\.14.*; wanted a subclass of Terr"
+    ):
+        registry.find("dunes")
+
+
+def test_terrains_of_other_packages_are_listed_among_those_there_are(plugin):
+    plugin("terrainkit.terrains.wave:Wave")
+    with pytest.raises(ConfigError, match=r"there are: flat, .*, wave, dunes"):
+        registry.find("moon")
+
+
+@pytest.mark.parametrize("value", ["no_such_package:Dunes", "math:no_such_name"])
+def test_an_entry_point_that_leads_nowhere_is_named(plugin, value):
+    plugin(value)
+    with pytest.raises(ConfigError, match=rf"dunes \({value}\) cannot be loaded: "):
+        registry.find("dunes")
