@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ _MANY_HEIGHTS = 50
 """Heights in a block above which a box is searched only around the cells of its height, or the time
 would grow with the square of their number. Below, it may run on under higher ground to the edge of
 the block, and be joined with one beyond."""
+
+_Cell = TypeVar("_Cell", bound=np.generic)
 
 _Span = tuple[int, int, int, int]
 """Cells i0 to i1 along x and j0 to j1 along y, ends not included."""
@@ -102,10 +105,14 @@ def level_cells(heights: NDArray[np.float32], grid: Grid, threshold: float) -> N
 
 def _lowest(heights: NDArray[np.float32], level: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Return a height that the ground of each cell is nowhere below [m]."""
-    z = np.pad(heights, 1, mode="edge")
-    nx, ny = heights.shape
-    around = [z[i : i + nx, j : j + ny] for i in range(3) for j in range(3)]
-    return np.where(level, heights, np.minimum.reduce(around))
+    return np.where(level, heights, np.minimum.reduce(around(heights)))
+
+
+def around(values: NDArray[_Cell]) -> list[NDArray[_Cell]]:
+    """Return what is in each cell and in the eight around it, nine arrays of the same shape."""
+    padded = np.pad(values, 1, mode="edge")
+    nx, ny = values.shape
+    return [padded[i : i + nx, j : j + ny] for i in range(3) for j in range(3)]
 
 
 def _cover_block(

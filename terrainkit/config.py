@@ -7,6 +7,7 @@ from typing import Literal
 
 from terrainkit import presets
 from terrainkit.choice import TerrainChoice
+from terrainkit.coerce import coerce
 from terrainkit.errors import ConfigError, listing
 from terrainkit.grid import Grid, whole_cells
 from terrainkit.parameter import LARGEST
@@ -108,8 +109,6 @@ class MapConfig:
     """Restitution of the ground, 0 to 1."""
 
     def __post_init__(self) -> None:
-        from terrainkit.coerce import coerce
-
         for f in fields(MapConfig):
             object.__setattr__(self, f.name, coerce(f.name, getattr(self, f.name), f.type))
         if self.terrains:
@@ -122,6 +121,12 @@ class MapConfig:
     def mix(self) -> tuple[TerrainChoice, ...]:
         """The terrains in use: one's own, or the preset's."""
         return self.terrains or presets.find(self.preset)
+
+    @property
+    def contact(self) -> dict[str, float]:
+        """Friction and restitution of the ground by name, for the formats that can carry them."""
+        names = ("static_friction", "dynamic_friction", "restitution")
+        return {name: getattr(self, name) for name in names}
 
     @property
     def wall_threshold(self) -> float:

@@ -51,7 +51,7 @@ class Parameter:
 
     def at(self, difficulty: float) -> Value:
         """Return the default at `difficulty`, 0 to 1."""
-        return at_difficulty((self.easy, self.hard), difficulty) if self.ramps else self.easy
+        return at_difficulty((self.easy, self.hard), difficulty)
 
     def realized(self, value: Value, plot: Grid) -> Realized:
         """Return what the cells of `plot` make of `value`: a pair (x, y) where the axes differ."""

@@ -27,7 +27,7 @@ class Terrain(ABC):
 
     A terrain never sees a difficulty. :meth:`at` interpolates every range once,
 
-    .. math:: p(d) = (1 - d)\\, p_\\text{easy} + d\\, p_\\text{hard},
+    .. math:: p(d) = (1 - d)\, p_\text{easy} + d\, p_\text{hard},
 
     and the terrain that results is plain numbers. Its fields are declared with the functions of
     :mod:`terrainkit.parameter`; a field's docstring is its help wherever it is shown.

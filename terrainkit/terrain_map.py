@@ -167,7 +167,7 @@ class TerrainMap:
         )
 
     def assign(self, num_envs: int, max_init_level: int | None = None, seed: int = 0) -> Assignment:
-        """Return where `num_envs` environments start; see :func:`curriculum.assign_levels`."""
+        """Return where `num_envs` environments start; see :mod:`terrainkit.curriculum`."""
         rows, cols = self.difficulty.shape
         levels, columns = assign_levels(num_envs, rows, cols, max_init_level, seed)
         return Assignment(

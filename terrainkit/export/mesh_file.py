@@ -38,11 +38,9 @@ def export(
     if y_up:
         vertices = vertices[:, [0, 2, 1]] * np.array([1, 1, -1], dtype=np.float32)
     mesh = trimesh.Trimesh(
-        vertices=vertices, faces=surface.triangles, process=False, metadata=_contact(terrain_map)
+        vertices=vertices,
+        faces=surface.triangles,
+        process=False,
+        metadata=terrain_map.config.contact,
     )
     mesh.export(path)
-
-
-def _contact(terrain_map: "TerrainMap") -> dict[str, float]:
-    names = ("static_friction", "dynamic_friction", "restitution")
-    return {name: getattr(terrain_map.config, name) for name in names}

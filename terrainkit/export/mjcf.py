@@ -13,7 +13,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.boxes import BoxCover, level_cells
+from terrainkit.boxes import BoxCover, around, level_cells
 from terrainkit.capacity import require_memory
 from terrainkit.coerce import coerce
 from terrainkit.mesh.closed import THICKNESS
@@ -93,9 +93,8 @@ def _add_class(root: ET.Element, terrain_map: "TerrainMap") -> None:
     config = terrain_map.config
     # MuJoCo has one sliding friction and no restitution; the numbers travel along for others.
     custom = ET.SubElement(root, "custom")
-    for name in ("static_friction", "dynamic_friction", "restitution"):
-        value = _numbers(getattr(config, name))
-        ET.SubElement(custom, "numeric", name=f"terrain_{name}", data=value)
+    for name, value in config.contact.items():
+        ET.SubElement(custom, "numeric", name=f"terrain_{name}", data=_numbers(value))
     terrain = ET.SubElement(ET.SubElement(root, "default"), "default", {"class": "terrain"})
     ET.SubElement(
         terrain,
@@ -166,10 +165,7 @@ def _border_boxes(
 
 def _without_boxes(heights: NDArray[np.float32], cover: BoxCover) -> NDArray[np.float32]:
     """Return the heights with those samples sunk into their boxes that have no say elsewhere."""
-    padded = np.pad(cover.covered, 1, mode="edge")
-    nx, ny = heights.shape
-    around = [padded[i : i + nx, j : j + ny] for i in range(3) for j in range(3)]
-    sunk = np.logical_and.reduce(around)
+    sunk = np.logical_and.reduce(around(cover.covered))
     return np.where(sunk, heights.min() - np.float32(THICKNESS / 2), heights)
 
 

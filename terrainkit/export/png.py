@@ -49,8 +49,6 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
         "cell": config.cell,
         "first_sample": list(terrain_map.first_sample),
         "size": list(terrain_map.grid.size),
-        "static_friction": config.static_friction,
-        "dynamic_friction": config.dynamic_friction,
-        "restitution": config.restitution,
+        **config.contact,
     }
     path.with_suffix(".json").write_text(json.dumps(sidecar, indent=2) + "\n")
