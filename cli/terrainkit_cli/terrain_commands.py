@@ -131,6 +131,10 @@ class List(Command):
         return 0
 
 
+_WHOLE_MAP = (-1, -1)
+"""No patch in particular; not None, since tyro's errors about a union name its members."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Info(Command):
     """Print what a map holds."""
@@ -138,15 +142,15 @@ class Info(Command):
     map: MapFile
     """The map."""
 
-    patch: Annotated[
-        tuple[int, int] | None, tyro.conf.arg(metavar="ROW COL", help_behavior_hint="")
-    ] = None
+    patch: Annotated[tuple[int, int], tyro.conf.arg(metavar="ROW COL", help_behavior_hint="")] = (
+        _WHOLE_MAP
+    )
     """Row and column of a patch, for its parameters as asked and as built."""
 
     def run(self) -> int:
         """Print the size of the map and its columns, or one patch."""
         terrain_map = TerrainMap.load(self.map)
-        if self.patch:
+        if self.patch != _WHOLE_MAP:
             _print_patch(terrain_map, *self.patch)
         else:
             _print_map(terrain_map)
