@@ -1,4 +1,4 @@
-"""Build what is generated in docs/: terrains.md, cli.md and the pictures.
+"""Build what is generated in docs/: terrains.md, rules.md, cli.md and the pictures.
 
 python docs/build.py            writes them
 python docs/build.py --check    exits 1 if a text is out of date or a picture is missing
@@ -20,6 +20,7 @@ from terrainkit.describe import TerrainText, describe
 from terrainkit.grid import Grid
 from terrainkit.preview import write_preview
 from terrainkit_cli.main import COMMANDS
+from terrainkit_robots.rule import FAMILIES, Rule, rules
 
 DOCS = Path(__file__).parent
 PICTURES = DOCS / "pictures"
@@ -69,6 +70,52 @@ def terrain_section(about: TerrainText) -> str:
     return "\n".join(lines)
 
 
+def rules_page() -> str:
+    parts = [
+        "# The rules of check-robot\n",
+        NOTE,
+        "What `terrainkit check-robot` looks for. An error would break the training or the",
+        "simulator, a warning is something that a careful engineer would change, and a note is to",
+        "be known. `--fix` repairs what can be repaired without a change for any reader that could",
+        "read the file; `--unsafe-fixes` changes numbers, shapes or other files, too.\n",
+    ]
+    for family, about in FAMILIES.items():
+        parts.append(f"## {family}: {about}\n\n| rule | | | fixed by |\n|---|---|---|---|")
+        for rule in rules():
+            if rule.family == family:
+                link = f"[{rule.code} {rule.name}](#{rule.code.lower()}-{rule.name})"
+                parts.append(
+                    f"| {link} | {markup(rule.title)} | {rule.severity} | {FIXED[rule.fixes]} |"
+                )
+        parts += ["", *(rule_section(rule) for rule in rules() if rule.family == family)]
+    return "\n".join(parts)
+
+
+FIXED = {"safe": "`--fix`", "unsafe": "`--unsafe-fixes`", "no": ""}
+
+
+def rule_section(rule: Rule) -> str:
+    severity = {"info": "A note"}.get(rule.severity, f"An {rule.severity}".replace("An w", "A w"))
+    fixed = f", repaired by {FIXED[rule.fixes]}" if FIXED[rule.fixes] else ""
+    return (
+        f"### {rule.code} {rule.name}\n\n"
+        f"**{markup(rule.title)}** {severity}{fixed}.\n\n"
+        f"{markup(rule.why)}\n\n"
+        f"*To fix it:* {markup(rule.how_to_fix)}\n\n"
+        f"*Source:* {markup(rule.reference)}\n"
+    )
+
+
+def markup(text: str) -> str:
+    """Return words of a docstring as Markdown, in which `code` stays what it is."""
+    parts = re.split(r"(`[^`]*`)", text)
+    parts[::2] = [
+        re.sub(r"([\\*\[\]|~]|\b_|_\b)", r"\\\1", part).replace("<", "&lt;").replace(">", "&gt;")
+        for part in parts[::2]
+    ]
+    return "".join(parts)
+
+
 def cli_page() -> str:
     parts = ["# The command line\n", NOTE]
     for arguments in ([], *([name] for name in COMMANDS)):
@@ -98,15 +145,20 @@ def draw_pictures() -> None:
     write_preview(terrain_map, PICTURES / "map.png", width=820, overwrite=True)
 
 
+def written(name: str) -> str:
+    path = DOCS / name
+    return path.read_text() if path.exists() else ""
+
+
 def words(text: str) -> list[str]:
     # Not the frames and line breaks: tyro may draw its help otherwise in its next version.
     return re.findall(r"[\w.:/*-]*\w", text)
 
 
 def main() -> int:
-    pages = {"terrains.md": terrains_page(), "cli.md": cli_page()}
+    pages = {"terrains.md": terrains_page(), "rules.md": rules_page(), "cli.md": cli_page()}
     if sys.argv[1:] == ["--check"]:
-        stale = [n for n, text in pages.items() if words((DOCS / n).read_text()) != words(text)]
+        stale = [n for n, text in pages.items() if words(written(n)) != words(text)]
         wanted = [f"{name}.png" for name in (*registry.names(), "map")]
         stale += [name for name in wanted if not (PICTURES / name).exists()]
         if stale:

@@ -150,10 +150,70 @@ def test_every_terrain_is_in_the_table():
 @pytest.mark.usefixtures("m")
 def test_the_lines_of_the_command_line_run_one_after_the_other(tmp_path):
     (lines,) = re.findall(r"## From the command line\n.*?```sh\n(.*?)```", README, re.DOTALL)
-    (config,) = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
+    (config,) = re.findall(r"```toml\n(rows.*?)```", README, re.DOTALL)
     (tmp_path / "own.toml").write_text(config)
     Path("map.xml").unlink()
     for line in lines.splitlines():
         words = shlex.split(line, comments=True)
         assert words[0] == "terrainkit"
         assert main(words[1:]) == 0, line
+
+
+def check_robot_lines():
+    (part,) = re.findall(r"## Check a robot\n(.*?)\n## ", README, re.DOTALL)
+    (lines,) = re.findall(r"```sh\n(.*?)```", part, re.DOTALL)
+    return part, [shlex.split(line, comments=True) for line in lines.splitlines()]
+
+
+@pytest.fixture
+def my_robot():
+    """Write the robot of the example: two numbers exchanged, and a 2 instead of a 1."""
+    from terrainkit_robots import bundled
+
+    path = bundled.find("quadruped")
+    assert path is not None
+    text = path.read_text()
+    limits = 'lower="-2.7227" upper="-0.83776"', 'lower="-0.83776" upper="-2.7227"'
+    for old, new in (limits, ('axis xyz="0 1 0"', 'axis xyz="0 2 0"')):
+        assert old in text
+        text = text.replace(old, new, 1)
+    Path("my_robot.urdf").write_text(text)
+    Path("my_robot.xacro").write_text(path.read_text())
+    return text
+
+
+@pytest.mark.usefixtures("my_robot")
+def test_the_lines_that_check_a_robot_run():
+    _, lines = check_robot_lines()
+    codes = []
+    for words in lines:
+        words = [word for part in words for word in (["my_robot.urdf"] if "*" in part else [part])]
+        assert words.pop(0) == "terrainkit"
+        codes.append(main(words))
+    assert codes == [0, 1, 0, 1, 0]
+    assert Path("robots.sarif").exists()
+
+
+@pytest.mark.usefixtures("my_robot")
+def test_the_example_of_a_checked_robot_is_what_is_printed(capsys):
+    part, _ = check_robot_lines()
+    (example,) = re.findall(r"```text\n(.*?)```", part, re.DOTALL)
+    assert main(["check-robot", "my_robot.urdf"]) == 1
+    printed = capsys.readouterr().out
+    for shown in example.split("  ...\n"):
+        assert shown in printed
+
+
+def test_the_comment_and_the_settings_of_the_example_ignore_what_they_say(my_robot, capsys):
+    part, _ = check_robot_lines()
+    (comment,) = re.findall(r"```xml\n(.*?)```", part, re.DOTALL)
+    (settings,) = re.findall(r"```toml\n(.*?)```", part, re.DOTALL)
+    asked = ["check-robot", "my_robot.urdf", "--select", "JNT005"]
+    assert main([*asked, "--strict"]) == 1
+    Path("my_robot.urdf").write_text(my_robot.replace('<axis xyz="0 2 0"/>\n', comment))
+    assert main([*asked, "--strict"]) == 0
+    assert "the reader divides" in capsys.readouterr().out
+    Path("my_robot.urdf").write_text(my_robot)
+    Path("pyproject.toml").write_text(settings)
+    assert main([*asked, "--strict"]) == 0
+    assert "our reader divides" in capsys.readouterr().out

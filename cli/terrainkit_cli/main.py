@@ -15,6 +15,8 @@ COMMANDS = {
     "preview": "terrain_commands",
     "export": "terrain_commands",
     "check": "terrain_commands",
+    "check-robot": "robot_commands",
+    "rule": "robot_commands",
 }
 """Module of each command, so that only the one in use is imported."""
 
@@ -22,7 +24,7 @@ COMMANDS = {
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line, and return its exit code.
 
-    0: done. 1: `check` found something. 2: bad input; one line on stderr says what and why.
+    0: done. 1: a check found something. 2: bad input; one line on stderr says what and why.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     warnings.showwarning = render.show_warning

@@ -59,8 +59,9 @@ def value_of(word: str) -> str | float | bool | None:
 
 def _one_line(box: str) -> str:
     """Return what tyro's box says as one line, without its title and its closing advice."""
-    rows = [row.strip("│ ") for row in box.splitlines() if row.startswith("│")]
-    parts = " ".join(rows).split(" ─")
-    told = [part.strip("─ ") for part in parts]
+    # A terminal that is not UTF-8 gets a box of other characters.
+    rows = [row.strip("│| ") for row in box.splitlines()[1:]]
+    parts = " ".join(row if row.strip("─╰╯+- ") else "\n" for row in rows).split("\n")
+    told = [part.strip() for part in parts]
     told = [part for part in told if part and not part.startswith(("For full", "Argument help"))]
     return re.sub(r"^Error parsing (\S+): (?=\1 is )", "", ". ".join(told))

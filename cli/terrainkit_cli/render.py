@@ -1,11 +1,16 @@
 """Printing: results on stdout, everything else on stderr."""
 
+import io
 import os
+import shutil
 import sys
 import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
+
+if TYPE_CHECKING:
+    from terrainkit_robots.report.text import Span
 
 _PATIENCE = 0.5
 """How long a walk may take before it shows a progress bar [s]."""
@@ -27,9 +32,46 @@ def table(rows: Sequence[Sequence[str]]) -> None:
 def overview(commands: Mapping[str, str]) -> None:
     """Print what commands there are, with the first line of the help of each."""
     print("usage: terrainkit COMMAND ...\n")
-    print("Terrain for legged robots: curriculum heightfields, trimeshes and spawn origins.\n")
+    print("For legged robots: terrain to train on, and checks of the robot before it is trained.\n")
     table([(f"  {name}", text.partition("\n")[0]) for name, text in commands.items()])
     print("\nterrainkit COMMAND --help says more; terrainkit --version says which this is.")
+
+
+def report(text: str) -> None:
+    """Print a text that ends its lines itself; what the terminal cannot write is escaped."""
+    _escape_unknown()
+    print(text, end="")
+
+
+def styled(lines: "Iterator[tuple[Span, ...]]") -> None:
+    """Print lines whose spans have styles, in color."""
+    from rich.console import Console
+    from rich.text import Text
+
+    _escape_unknown()
+    console = Console(highlight=False, soft_wrap=True)
+    for line in lines:
+        console.print(Text.assemble(*((span.text, span.style) for span in line)))
+
+
+def has_colors() -> bool:
+    """Whether the results are read on a terminal that has colors."""
+    return sys.stdout.isatty() and os.environ.get("TERM") != "dumb" and "NO_COLOR" not in os.environ
+
+
+def width() -> int:
+    """Return how wide the text of a report is to be: as the terminal, and neither tiny nor huge."""
+    return min(max(shutil.get_terminal_size().columns, 60), 120)
+
+
+def note(message: str) -> None:
+    """Print a remark beside the result."""
+    print(f"terrainkit: {message}", file=sys.stderr)
+
+
+def _escape_unknown() -> None:
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 def error(message: str) -> None:

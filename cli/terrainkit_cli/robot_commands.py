@@ -1,0 +1,331 @@
+"""The commands that check robots, and explain what they are checked for."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from terrainkit.errors import ConfigError, TerrainkitError
+from terrainkit_cli import render
+from terrainkit_cli.parse import Command
+
+if TYPE_CHECKING:
+    from terrainkit_robots.lint import Report
+    from terrainkit_robots.rule import Rule as RobotRule
+    from terrainkit_robots.settings import Settings
+
+    Words = list[str]
+else:
+    # tyro would look at list[str] through typeguard, whose import takes a quarter of the time of a
+    # whole `terrainkit check-robot`.
+    Words = list
+
+Files = Annotated[
+    Words, tyro.conf.Positional, tyro.conf.arg(metavar="FILE [FILE ...]", help_behavior_hint="")
+]
+
+
+def _repeated(metavar: str) -> tuple[object, ...]:
+    hint = "(may be repeated)"
+    return tyro.conf.UseAppendAction, tyro.conf.arg(metavar=metavar, help_behavior_hint=hint)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckRobot(Command):
+    """Check a robot's URDF, xacro or MJCF file: what would go wrong when it is trained.
+
+    Exit code 0: no errors (warnings are allowed; not with --strict). 1: errors were found. 2: a
+    file cannot be opened, or an option is wrong; the other files are reported all the same.
+
+    Options are also read from [tool.terrainkit.check-robot] in pyproject.toml or [check-robot] in
+    terrainkit.toml, in the folder of the robot or above it: select, ignore, package, xacro-arg,
+    strict. A comment in the robot's file ignores a rule for the element that it is on, in or above:
+    <!-- terrainkit: ignore INR004 the reason -->
+    """
+
+    files: Files = field(default_factory=list)
+    """Files to check, or names of bundled robots: quadruped, biped."""
+
+    format: Literal["text", "json", "sarif", "github", "markdown"] = "text"
+    """How to report. Of several files, json writes one document on a line each."""
+
+    output: Annotated[str, tyro.conf.arg(aliases=["-o"], metavar="PATH", help_behavior_hint="")] = (
+        ""
+    )
+    """Write the report to this file; one that is there is replaced."""
+
+    select: Annotated[Words, *_repeated("CODES")] = field(default_factory=list)
+    """Ask only these rules: codes, starts of codes, or names, with commas between."""
+
+    ignore: Annotated[Words, *_repeated("CODES=REASON")] = field(default_factory=list)
+    """Do not ask these rules; the reason goes into the report."""
+
+    package: Annotated[Words, *_repeated("NAME=DIR")] = field(default_factory=list)
+    """Folder of a ROS package, for package:// and $(find ...)."""
+
+    xacro_arg: Annotated[Words, *_repeated("NAME:=VALUE")] = field(default_factory=list)
+    """Value of a xacro argument."""
+
+    strict: bool = False
+    """Let warnings count as errors in the exit code."""
+
+    fix: bool = False
+    """Repair the files where that changes nothing for a reader that could read them."""
+
+    unsafe_fixes: bool = False
+    """Repair more: also where a number, a shape or another file changes. Look at the result."""
+
+    diff: bool = False
+    """Show what --fix (or --unsafe-fixes) would change, and write nothing."""
+
+    def run(self) -> int:
+        """Check each file, and report."""
+        if not self.files:
+            raise ConfigError("no FILE to check; wanted one or more, or quadruped, or biped")
+        if self.diff and self.format != "text":
+            raise ConfigError(f"--diff shows a diff, not a report as {self.format}; wanted one")
+        options = self._settings()
+        output = Path(self.output) if self.output else None
+        if output is not None:
+            _check_output(output, [Path(name) for name in self.files])
+        checks = []
+        failed = False
+        for name in self.files:
+            try:
+                checks.append(_check(name, self, options))
+            except TerrainkitError as error:
+                failed = True
+                render.error(str(error))
+            except OSError as error:
+                failed = True
+                render.error(f"{name}: {error.strerror or error}")
+            except MemoryError:
+                failed = True
+                render.error(f"{name}: out of memory")
+        self._say(checks, output)
+        return 2 if failed else int(any(check.bad for check in checks))
+
+    def _settings(self) -> "Settings":
+        from terrainkit_robots.selection import choose
+        from terrainkit_robots.settings import Settings, package_folder
+
+        settings = Settings(
+            select=tuple(word for words in self.select for word in _listed(words)),
+            ignore=_reasons(self.ignore),
+            packages={
+                name: package_folder(name, Path(folder))
+                for name, folder in _pairs("--package", self.package, "=", "NAME=DIR").items()
+            },
+            xacro_arguments=_pairs("--xacro-arg", self.xacro_arg, ":=", "NAME:=VALUE"),
+            strict=self.strict,
+        )
+        choose(settings)
+        return settings
+
+    def _say(self, checks: "Sequence[_Checked]", output: Path | None) -> None:
+        from terrainkit_robots.report import as_text
+        from terrainkit_robots.report.tally import tally
+
+        reports = [check.report for check in checks]
+        if self.diff:
+            text = "".join(check.diff for check in checks)
+            if checks and not text:
+                render.note("there is nothing to fix")
+        elif output is None and self.format == "text" and render.has_colors():
+            from terrainkit_robots.report.text import lines
+
+            render.styled(lines(reports, width=render.width()))
+            return
+        else:
+            text = as_text(reports, self.format)
+        if output is None:
+            render.report(text)
+        elif reports:
+            _check_output(output, [path for r in reports for path in r.facts.model.sources])
+            _write(output, text)
+            render.result(f"wrote {output}: {tally(reports)}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Checked:
+    """What there is to say of one file."""
+
+    report: "Report"
+    bad: bool
+    """Whether the exit code has to be 1."""
+
+    diff: str = ""
+
+
+def _check(name: str, command: CheckRobot, options: "Settings") -> _Checked:
+    from terrainkit_robots import bundled
+    from terrainkit_robots.facts import Facts
+    from terrainkit_robots.meshes import Meshes
+    from terrainkit_robots.robot_file import read_robot
+    from terrainkit_robots.selection import lint_selected
+    from terrainkit_robots.settings import read_settings
+
+    path = _find(name)
+    ours = path == bundled.find(name)
+    settings = options.over(read_settings(Path() if ours else path.parent))
+
+    def look(contents: Mapping[Path, bytes]) -> "Report":
+        model = read_robot(
+            path,
+            packages=settings.packages,
+            xacro_arguments=settings.xacro_arguments,
+            contents=contents,
+        )
+        return lint_selected(Facts(model, Meshes(contents)), settings, contents)
+
+    report, diff = look({}), ""
+    if command.fix or command.unsafe_fixes or command.diff:
+        if ours:
+            raise ConfigError(f"{name} is a bundled robot, which is not changed; copy it first")
+        report, diff = _repaired(path, report, look, command)
+    bad = ("fail", "warn") if settings.strict else ("fail",)
+    return _Checked(report=report, bad=report.verdict in bad, diff=diff)
+
+
+def _repaired(
+    path: Path,
+    found: "Report",
+    look: "Callable[[Mapping[Path, bytes]], Report]",
+    command: CheckRobot,
+) -> "tuple[Report, str]":
+    """Return the report once the fixes are written; what was found and a diff, if none is to be."""
+    from terrainkit_robots.apply_fixes import fix_robot, unified_diff, write_fixes
+    from terrainkit_robots.report.repaired import Repaired
+
+    result = fix_robot(
+        path, lambda contents: look(contents) if contents else found, unsafe=command.unsafe_fixes
+    )
+    if command.diff:
+        return found, unified_diff(result)
+    write_fixes(result)
+    wanted = ("safe", "unsafe") if command.unsafe_fixes else ("safe",)
+    left = tuple(
+        (each.finding, each.reason)
+        for each in result.unfixed
+        if each.finding.fix is not None and each.finding.fix.safety in wanted
+    )
+    report = result.report
+    return Repaired(
+        facts=report.facts,
+        findings=report.findings,
+        skipped=report.skipped,
+        fixed=result.fixed,
+        unfixed=left,
+    ), ""
+
+
+def _find(name: str) -> Path:
+    """Return the file of that name, or else the bundled robot."""
+    from terrainkit_robots import bundled
+
+    path = Path(name)
+    try:
+        if path.is_file():
+            return path
+        found = bundled.find(name)
+        if found is None and not path.exists():
+            raise ConfigError(
+                f"there is no file {name}, nor is a bundled robot called so; "
+                f"there are: {', '.join(bundled.names())}"
+            )
+    except OSError as error:
+        raise ConfigError(f"cannot read {name}: {error.strerror or error}") from error
+    return found or path
+
+
+def _check_output(output: Path, inputs: Sequence[Path]) -> None:
+    """Raise an error if the report cannot be written, or would replace what it is about."""
+    from terrainkit.atomic import check_target
+
+    check_target(output, overwrite=True)
+    for path in inputs:
+        if output.exists() and path.exists() and output.samefile(path):
+            raise ConfigError(f"--output {output} would replace {path}, which is checked")
+
+
+def _write(output: Path, text: str) -> None:
+    from terrainkit.atomic import atomic_write
+
+    with atomic_write(output, overwrite=True) as path:
+        path.write_bytes(text.encode("utf-8", "backslashreplace"))
+
+
+def _listed(words: str) -> list[str]:
+    return [word.strip() for word in words.split(",") if word.strip()]
+
+
+def _reasons(words: Sequence[str]) -> dict[str, str]:
+    """Return the reason for each rule that is not asked."""
+    pairs = _pairs("--ignore", words, "=", "CODES=REASON")
+    return {code: reason for codes, reason in pairs.items() for code in _listed(codes)}
+
+
+def _pairs(option: str, words: Sequence[str], sign: str, wanted: str) -> dict[str, str]:
+    pairs: dict[str, str] = {}
+    for word in words:
+        name, found, value = (part.strip() for part in word.partition(sign))
+        if not name or not found or not (value or sign == ":="):
+            raise ConfigError(f"{option} {word!r}; wanted {wanted}")
+        if name in pairs:
+            raise ConfigError(f"{option} has {name} twice; wanted it once")
+        pairs[name] = value
+    return pairs
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rule(Command):
+    """Print what a rule of check-robot looks for, why, and how to fix what it finds."""
+
+    code: Annotated[
+        str, tyro.conf.Positional, tyro.conf.arg(metavar="CODE", help_behavior_hint="")
+    ] = ""
+    """Code or name of the rule."""
+
+    all: bool = False
+    """List all rules."""
+
+    def run(self) -> int:
+        """Print the page of a rule, or a line for each."""
+        from terrainkit_robots.rule import FAMILIES, find, rules
+
+        if bool(self.code) == self.all:
+            raise ConfigError("wanted the code or the name of a rule, or --all")
+        if not self.all:
+            render.result(_page(find(self.code)))
+            return 0
+        for family, about in FAMILIES.items():
+            render.result(f"{family}: {about}")
+            mine = [rule for rule in rules() if rule.family == family]
+            render.table(
+                [(f"  {r.code}", r.name, r.severity, _FIXES[r.fixes], r.title) for r in mine]
+            )
+            render.result("")
+        render.result("terrainkit rule CODE says more.")
+        return 0
+
+
+_FIXES = {"safe": "--fix", "unsafe": "--unsafe-fixes", "no": ""}
+"""The option that repairs what a rule finds."""
+
+
+def _page(rule: "RobotRule") -> str:
+    import textwrap
+
+    from terrainkit_robots.rule import FAMILIES
+
+    fixes = f"; repaired by {_FIXES[rule.fixes]}" if rule.fixes != "no" else ""
+    paragraphs = [
+        f"{rule.code} {rule.name} ({rule.severity}{fixes}), of {FAMILIES[rule.family]}",
+        rule.title,
+        *rule.why.split("\n\n"),
+        f"Fix: {rule.how_to_fix}",
+        f"Source: {rule.reference}",
+    ]
+    return "\n\n".join(textwrap.fill(paragraph, 88) for paragraph in paragraphs)

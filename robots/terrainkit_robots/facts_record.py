@@ -1,0 +1,84 @@
+"""The facts of a robot as plain data, which every report carries."""
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from terrainkit_robots.facts import Facts
+    from terrainkit_robots.legs import Leg
+
+_DIGITS = 6
+"""Significant digits of each number: more than any robot is built to."""
+
+
+def facts_record(facts: "Facts") -> dict[str, Any]:
+    """Return the facts as JSON has them: SI units and radians, and None for what is not known.
+
+    The keys are the same for every robot: one without legs has no feet and no standing pose.
+    `observation_size` counts what legged_gym's policies see without the terrain: velocities,
+    gravity and command (12 numbers), and position, speed and last action of each actuated joint.
+    """
+    legs, actuated = facts.legs, len(facts.actuated)
+    return {
+        "name": facts.model.name,
+        "total_mass": number(facts.total_mass),
+        "links": len(facts.links),
+        "bodies": sum(not body.virtual for body in facts.bodies),
+        "joints": len(facts.joints),
+        "actuated_joints": actuated,
+        "joint_names": [joint.name for joint in facts.joints],
+        "legs": [_leg(leg) for leg in legs],
+        "feet": [leg.foot for leg in legs],
+        "leg_length": number(sum(leg.length for leg in legs) / len(legs)) if legs else None,
+        "mirrored_joints": _mirrored(facts),
+        **_standing(facts),
+        "action_size": actuated,
+        "observation_size": 12 + 3 * actuated,
+    }
+
+
+def number(value: float) -> float | None:
+    """Return `value` rounded to the digits that mean something; None if it is not finite."""
+    return float(f"{value:.{_DIGITS}g}") if math.isfinite(value) else None
+
+
+def _leg(leg: "Leg") -> dict[str, Any]:
+    pairs = zip(leg.joints, leg.roles, strict=True)
+    return {
+        "foot": leg.foot,
+        "length": number(leg.length),
+        "joints": [{"name": joint.name, "role": role} for joint, role in pairs],
+    }
+
+
+def _mirrored(facts: "Facts") -> list[dict[str, Any]]:
+    records = []
+    for pair in facts.mirror.pairs:
+        left, right = facts.bodies[pair.left].joint, facts.bodies[pair.right].joint
+        if left is not None and right is not None and left.moves and right.moves:
+            records.append({"left": left.name, "right": right.name, "sign": pair.sign})
+    return records
+
+
+def _standing(facts: "Facts") -> dict[str, Any]:
+    stance = facts.stance
+    if stance is None:
+        keys = ("standing_pose", "standing_height", "spawn_height", "standing_width")
+        return dict.fromkeys((*keys, "support_margin", "holding_torques"))
+    with np.errstate(all="ignore"):  # lengths of 1e308 are told by a rule, not by numpy
+        width = float(np.ptp(stance.contacts @ facts.mirror.normal))
+    return {
+        "standing_pose": _numbers(stance.positions),
+        "standing_height": number(stance.height),
+        "spawn_height": number(stance.spawn_height),
+        "standing_width": number(width),
+        "support_margin": number(stance.margin),
+        "holding_torques": _numbers(stance.torques),
+    }
+
+
+def _numbers(values: Mapping[str, float]) -> dict[str, float | None]:
+    return {name: number(value) for name, value in values.items()}

@@ -1,0 +1,123 @@
+"""Linting: every rule that was selected, on one robot, in one pass."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+from typing import Literal
+
+from terrainkit_robots.facts import Facts
+from terrainkit_robots.fix import Fix
+from terrainkit_robots.rule import (
+    CannotCheckError,
+    Certainty,
+    Defect,
+    Measured,
+    Rule,
+    Severity,
+    rules,
+)
+
+Verdict = Literal["pass", "warn", "fail"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """A defect and the rule that found it: what the reports print."""
+
+    code: str
+    name: str
+    severity: Severity
+    certainty: Certainty
+    subject: str
+    message: str
+    hint: str
+    file: Path
+    line: int
+    measured: Measured = field(default_factory=dict)
+    fix: Fix | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Skipped:
+    """A rule that could not be asked, or was told to be quiet."""
+
+    code: str
+    reason: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """Everything that is to be said of one robot."""
+
+    facts: Facts
+    findings: tuple[Finding, ...]
+    """Errors first, then by place in the file."""
+
+    skipped: tuple[Skipped, ...] = ()
+
+    @property
+    def verdict(self) -> Verdict:
+        """Fail with an error, warn with a warning, else pass."""
+        severities = {finding.severity for finding in self.findings}
+        return "fail" if "error" in severities else "warn" if "warning" in severities else "pass"
+
+
+MOST_FINDINGS = 50
+"""So many defects of one rule are told: of 10,000 alike nobody reads the last."""
+
+_OF_WHOLE_ROBOTS = ("LEG", "SYM")
+"""Families that compare limbs, and would tell again what a broken tree has lost."""
+
+INTERNAL = "internal error, please report it"
+"""How the reason of a rule begins that raised what it should not."""
+
+
+def lint(facts: Facts, chosen: Sequence[Rule] | None = None) -> Report:
+    """Return what the rules find on a robot.
+
+    Args:
+        facts: The robot.
+        chosen: Rules to ask; all of them unless told.
+    """
+    findings: list[Finding] = []
+    skipped: list[Skipped] = []
+    for each in rules() if chosen is None else chosen:
+        try:
+            if each.family in _OF_WHOLE_ROBOTS and facts.tree.left_out:
+                raise CannotCheckError("links or joints are missing from the tree")
+            if each.legged and not facts.legs:
+                raise CannotCheckError("no legs were found")
+            defects = list(islice(each.check(facts), MOST_FINDINGS + 1))
+            findings += [_finding(each, defect) for defect in defects[:MOST_FINDINGS]]
+            if len(defects) > MOST_FINDINGS:
+                reason = f"it found more than the {MOST_FINDINGS} defects that are shown"
+                skipped.append(Skipped(code=each.code, reason=reason))
+        except CannotCheckError as cannot:
+            skipped.append(Skipped(code=each.code, reason=str(cannot)))
+        except MemoryError:
+            raise
+        except Exception as error:
+            # One rule that fails on a strange robot must not cost what the others found; that it
+            # failed is told, and the tests take it for the bug that it is.
+            reason = f"{INTERNAL}: {type(error).__name__}: {error}"
+            skipped.append(Skipped(code=each.code, reason=reason))
+    order = {"error": 0, "warning": 1, "info": 2}
+    findings.sort(key=lambda f: (order[f.severity], str(f.file), f.line, f.code))
+    return Report(facts=facts, findings=tuple(findings), skipped=tuple(skipped))
+
+
+def _finding(rule: Rule, defect: Defect) -> Finding:
+    return Finding(
+        code=rule.code,
+        name=rule.name,
+        severity=defect.severity or rule.severity,
+        certainty=defect.certainty,
+        subject=defect.subject,
+        message=defect.message,
+        hint=defect.hint or rule.how_to_fix,
+        file=defect.source.file,
+        line=defect.source.line,
+        measured=defect.measured,
+        fix=defect.fix,
+    )

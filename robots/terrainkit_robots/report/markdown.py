@@ -1,0 +1,64 @@
+"""Markdown: a section for each robot with its facts and findings, for issues and pull requests."""
+
+import re
+from collections.abc import Iterator, Sequence
+
+from terrainkit_robots.lint import Finding, Report
+from terrainkit_robots.report.plain import plain
+from terrainkit_robots.report.repaired import fixed, unfixed
+from terrainkit_robots.report.robot_summary import robot_summary
+from terrainkit_robots.report.tally import WORDS, fixable, grouped, place, tally
+
+
+def write(reports: Sequence[Report]) -> str:
+    """Return a section for each robot."""
+    return "\n".join(line for report in reports for line in _section(report))
+
+
+def _section(report: Report) -> Iterator[str]:
+    yield f"## {_cell(str(report.facts.model.file))}\n"
+    repairs = fixable(report.findings)
+    yield f"**{tally([report])}**{f' ({repairs})' if repairs else ''}\n"
+    yield "| | |\n|---|---|"
+    for label, text in robot_summary(report.facts):
+        yield f"| {label.strip()} | {_cell(text)} |"
+    yield ""
+    yield from _list("Fixed", [(f.code, f"{f.name}: {f.message}") for f in fixed(report)])
+    left = [(f.code, f"{f.subject or f.name}: {reason}") for f, reason in unfixed(report)]
+    yield from _list("Could not be fixed", left)
+    if report.findings:
+        yield "| | rule | where | what | what to do |\n|---|---|---|---|---|"
+        yield from (_row(finding) for finding in report.findings)
+        yield ""
+    skipped = [(codes, reason) for _, codes, reason in grouped(report.skipped)]
+    yield from _list("Not checked, or ignored", skipped)
+
+
+def _list(title: str, items: Sequence[tuple[str, str]]) -> Iterator[str]:
+    if items:
+        yield f"{title}:\n"
+        yield from (f"- {_cell(head)}: {_cell(text)}" for head, text in items)
+        yield ""
+
+
+def _row(finding: Finding) -> str:
+    likely = " (likely)" if finding.certainty == "likely" else ""
+    cells = (
+        WORDS[finding.severity],
+        f"{finding.code} {finding.name}",
+        place(finding),
+        finding.message + likely,
+        finding.hint,
+    )
+    return f"| {' | '.join(map(_cell, cells))} |"
+
+
+def _cell(text: str) -> str:
+    """Return `text` so that it shows as it is: no markup, no mention of people, one line."""
+    escaped = re.sub(r"([\\`*_{}\[\]|~#$])", r"\\\1", plain(text))
+    return (
+        escaped.replace("&", "&amp;")
+        .replace("<", "&lt;")
+        .replace(">", "&gt;")
+        .replace("@", "&#64;")
+    )

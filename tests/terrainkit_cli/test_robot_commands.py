@@ -1,0 +1,362 @@
+import json
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+
+from terrainkit_cli.main import main
+from terrainkit_robots import bundled
+from terrainkit_robots.rule import rules
+
+GOOD = """<?xml version="1.0"?>
+<robot name="box">
+  <link name="trunk">
+    <inertial>
+      <mass value="1"/>
+      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>
+    </inertial>
+    <collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision>
+  </link>
+</robot>
+"""
+BAD = GOOD.replace('mass value="1"', 'mass value="-1"')
+UNNAMED = GOOD.replace(' name="box"', "")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for name, text in {"good": GOOD, "bad": BAD, "unnamed": UNNAMED}.items():
+        (tmp_path / f"{name}.urdf").write_text(text)
+    return tmp_path
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch, capsys):
+    """Run `terrainkit` in this process, in an empty folder; a new one takes half a second."""
+
+    def run(*words):
+        capsys.readouterr()
+        code = main([str(word) for word in words])
+        said = capsys.readouterr()
+        return subprocess.CompletedProcess(words, code, said.out, said.err)
+
+    monkeypatch.chdir(tmp_path)
+    return run
+
+
+# What is found, and how the command ends.
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [
+        (("good.urdf",), 0),
+        (("bad.urdf",), 1),
+        (("unnamed.urdf",), 0),
+        (("unnamed.urdf", "--strict"), 1),
+        (("good.urdf", "bad.urdf"), 1),
+        (("bad.urdf", "--ignore", "INR002=a balloon", "--select", "INR002,XML"), 0),
+        (("none.urdf",), 2),
+        (("good.urdf", "none.urdf"), 2),
+        (("bad.urdf", "none.urdf"), 2),
+    ],
+)
+@pytest.mark.usefixtures("folder")
+def test_the_exit_code_says_what_was_found(here, words, code):
+    assert here("check-robot", *words).returncode == code
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_finding_has_its_file_and_line_where_an_editor_looks_for_them(terrainkit):
+    run = terrainkit("check-robot", "bad.urdf", "--select", "negative-mass")
+    assert "\nerror INR002 negative-mass\n  bad.urdf:4: " in run.stdout
+    assert run.stdout.endswith("\nbad.urdf: 1 error\n")
+    assert run.stderr == ""
+
+
+@pytest.mark.usefixtures("folder")
+def test_other_files_are_reported_although_one_cannot_be_opened(here):
+    run = here("check-robot", "none.urdf", "bad.urdf", "--format", "json")
+    assert json.loads(run.stdout)["file"] == "bad.urdf"
+    assert run.stderr.count("\n") == 1
+    assert run.stderr.startswith("terrainkit: error: there is no file none.urdf")
+
+
+@pytest.mark.parametrize("name", bundled.names())
+def test_a_bundled_robot_is_found_by_name(here, name):
+    run = here("check-robot", name, "--strict")
+    assert run.returncode == 0, run.stdout
+    assert f"robot     {name} (URDF)\n" in run.stdout
+
+
+def test_a_file_of_that_name_goes_first_and_a_folder_does_not(here, tmp_path):
+    (tmp_path / "quadruped").mkdir()
+    assert "robot     quadruped (URDF)" in here("check-robot", "quadruped").stdout
+    (tmp_path / "biped").write_text(GOOD)
+    assert "robot     box (URDF)" in here("check-robot", "biped").stdout
+
+
+@pytest.mark.usefixtures("folder")
+def test_several_files_are_json_lines_and_one_sarif_document(here):
+    words = ("good.urdf", "bad.urdf", "--select", "INR002")
+    lines = here("check-robot", *words, "--format", "json").stdout.splitlines()
+    assert [json.loads(line)["verdict"] for line in lines] == ["pass", "fail"]
+    document = json.loads(here("check-robot", *words, "--format", "sarif").stdout)
+    assert [result["ruleId"] for result in document["runs"][0]["results"]] == ["INR002"]
+
+
+# Options.
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "no FILE to check"),
+        (
+            ("none.urdf",),
+            "there is no file none.urdf, nor is a bundled robot called so; there are:",
+        ),
+        ((".",), ". is a folder; wanted a URDF, xacro or MJCF file"),
+        (("fifo",), "fifo is not a plain file"),
+        (("good.urdf", "--select", "XYZ1"), "no rule 'XYZ1'; wanted a code"),
+        (("good.urdf", "--ignore", "INR002"), "--ignore 'INR002'; wanted CODES=REASON"),
+        (("good.urdf", "--ignore", "INR002="), "--ignore 'INR002='; wanted CODES=REASON"),
+        (("good.urdf", "--ignore", "XYZ1=why"), "no rule 'XYZ1'"),
+        (("good.urdf", "--ignore", "INR=a", "--ignore", "INR=b"), "--ignore has INR twice"),
+        (("good.urdf", "--package", "mine"), "--package 'mine'; wanted NAME=DIR"),
+        (
+            ("good.urdf", "--package", "mine=none"),
+            "package mine is to be in none, where there is no",
+        ),
+        (("good.urdf", "--xacro-arg", "a=1"), "--xacro-arg 'a=1'; wanted NAME:=VALUE"),
+        (("good.urdf", "--diff", "--format", "json"), "--diff shows a diff"),
+        (("good.urdf", "-o", "nowhere/a.txt"), "there is no folder nowhere"),
+        (("good.urdf", "-o", "."), "it is a folder"),
+        (("good.urdf", "-o", "/proc/report.txt"), "cannot write /proc/report.txt"),
+        (("good.urdf", "-o", "good.urdf"), "would replace good.urdf, which is checked"),
+        (("quadruped", "--fix"), "quadruped is a bundled robot, which is not changed"),
+    ],
+    ids=lambda value: " ".join(map(str, value))[:60] if isinstance(value, tuple) else "",
+)
+def test_what_cannot_be_run_is_one_line_and_exit_2(here, folder, words, said):
+    os.mkfifo(folder / "fifo")
+    before = sorted(folder.iterdir())
+    run = here("check-robot", *words)
+    assert run.returncode == 2
+    assert run.stdout == ""
+    assert run.stderr.count("\n") == 1
+    assert run.stderr.startswith("terrainkit: error: ")
+    assert said in run.stderr
+    assert sorted(folder.iterdir()) == before
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read every file")
+def test_a_file_that_may_not_be_read_is_one_line(here, folder):
+    (folder / "good.urdf").chmod(0)
+    run = here("check-robot", "good.urdf")
+    assert (run.returncode, run.stderr) == (
+        2,
+        "terrainkit: error: cannot read good.urdf: Permission denied\n",
+    )
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_format_that_there_is_not_is_one_line(terrainkit):
+    run = terrainkit("check-robot", "good.urdf", "--format", "xml")
+    assert (run.returncode, run.stdout, run.stderr.count("\n")) == (2, "", 1)
+    assert "invalid choice 'xml' for argument '--format'" in run.stderr
+
+
+def test_a_report_goes_to_a_file_which_may_be_there(here, folder):
+    (folder / "report.json").write_text("old")
+    run = here("check-robot", "bad.urdf", "--format", "json", "-o", "report.json")
+    assert run.returncode == 1
+    assert run.stdout.startswith("wrote report.json: ")
+    assert json.loads((folder / "report.json").read_text())["verdict"] == "fail"
+    assert sorted(path.name for path in folder.iterdir() if path.suffix != ".urdf") == [
+        "report.json"
+    ]
+
+
+def test_a_report_does_not_replace_what_it_is_about_through_a_link(here, folder):
+    (folder / "link.txt").symlink_to("good.urdf")
+    run = here("check-robot", "good.urdf", "-o", "link.txt")
+    assert run.returncode == 2
+    assert (folder / "good.urdf").read_text() == GOOD
+
+
+def test_a_report_does_not_replace_another_file_that_it_is_about(here, folder):
+    run = here("check-robot", "none.urdf", "good.urdf", "bad.urdf", "-o", "bad.urdf")
+    assert run.returncode == 2
+    include = '<mujoco><worldbody><include file="part.xml"/></worldbody></mujoco>'
+    (folder / "whole.xml").write_text(include)
+    (folder / "part.xml").write_text("<mujocoinclude/>")
+    run = here("check-robot", "whole.xml", "good.urdf", "-o", "part.xml")
+    assert run.returncode == 2
+    assert (
+        run.stderr
+        == "terrainkit: error: --output part.xml would replace part.xml, which is checked\n"
+    )
+    assert (folder / "bad.urdf").read_text() == BAD
+    assert (folder / "part.xml").read_text() == "<mujocoinclude/>"
+
+
+def test_a_xacro_file_has_its_arguments_and_packages_from_options_or_settings(here, folder):
+    (folder / "parts").mkdir()
+    (folder / "parts" / "trunk.urdf").write_text(GOOD)
+    (folder / "robot.xacro").write_text(
+        '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="$(arg called)">'
+        '<xacro:include filename="$(find mine)/trunk.urdf"/></robot>'
+    )
+    words = ("check-robot", "robot.xacro", "--select", "XML")
+    assert here(*words).returncode == 1
+    options = ("--package", "mine=parts", "--xacro-arg", "called:=one two")
+    run = here(*words, *options)
+    assert run.returncode == 0, run.stdout
+    assert "robot     one two (xacro)" in run.stdout
+    table = '[check-robot]\npackage = { mine = "parts" }\nxacro-arg = { called = 3 }\n'
+    (folder / "terrainkit.toml").write_text(table)
+    assert "robot     3 (xacro)" in here(*words).stdout
+    assert "robot     4 (xacro)" in here(*words, "--xacro-arg", "called:=4").stdout
+
+
+def test_settings_come_from_the_folder_of_the_robot_and_the_command_line_wins(here, folder):
+    (folder / "sub").mkdir()
+    (folder / "sub" / "bad.urdf").write_text(BAD)
+    (folder / "pyproject.toml").write_text(
+        "[tool.terrainkit.check-robot]\nselect=['INR002', 'XML']\nignore={INR002='a balloon'}\n"
+    )
+    run = here("check-robot", "sub/bad.urdf")
+    assert run.returncode == 0
+    assert "skipped: INR002: ignored: a balloon\n" in run.stdout
+    run = here("check-robot", "sub/bad.urdf", "--ignore", "INR002=a feather, perhaps")
+    assert "skipped: INR002: ignored: a feather, perhaps\n" in run.stdout
+    (folder / "pyproject.toml").write_text("[tool.terrainkit.check-robot]\nselekt=[]\n")
+    run = here("check-robot", "sub/bad.urdf")
+    assert run.returncode == 2
+    assert "pyproject.toml: no key 'selekt'; there are: select, ignore" in run.stderr
+
+
+def test_names_that_the_terminal_cannot_write_are_escaped(terrainkit, folder, monkeypatch):
+    monkeypatch.setenv("PYTHONIOENCODING", "ascii")
+    (folder / "good.urdf").write_text(GOOD.replace("box", "b\u00f6x"))
+    run = terrainkit("check-robot", "good.urdf")
+    assert (run.returncode, run.stderr) == (0, "")
+    assert "robot     b\\xf6x (URDF)" in run.stdout
+
+
+@pytest.mark.usefixtures("folder")
+def test_only_what_is_used_is_imported():
+    # Each of these would cost a tenth and more of the time of the whole command.
+    heavy = ("typeguard", "rich", "jsonschema", "scipy", "unittest.mock", "asyncio")
+    script = (
+        "import sys; from terrainkit_cli.main import main; main(sys.argv[1:]);"
+        f"print([name for name in {heavy} if name in sys.modules], file=sys.stderr)"
+    )
+    command = [sys.executable, "-c", script, "check-robot", "quadruped", "--select", "XML"]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    assert run.stderr == "[]\n"
+
+
+# Fixes.
+
+
+def test_a_fix_is_made_and_told_and_nothing_is_left_to_fix(here, folder):
+    run = here("check-robot", "unnamed.urdf", "--fix")
+    assert run.returncode == 0
+    assert "\nfixed\n  unnamed.urdf:2: XML003, " in run.stdout
+    assert run.stdout.endswith("\nunnamed.urdf: no problems found\n")
+    text = (folder / "unnamed.urdf").read_text()
+    assert re.sub(r"<robot [^>]*>", "<robot>", text) == UNNAMED
+    again = here("check-robot", "unnamed.urdf", "--fix")
+    assert "fixed" not in again.stdout
+    assert (folder / "unnamed.urdf").read_text() == text
+
+
+def test_a_diff_is_shown_and_nothing_written(here, folder):
+    run = here("check-robot", "unnamed.urdf", "--diff", "--strict")
+    assert run.returncode == 1  # of the file as it stands
+    assert run.stdout.startswith("--- unnamed.urdf\n+++ unnamed.urdf\n")
+    assert "\n-<robot>\n+<robot name=" in run.stdout
+    assert (folder / "unnamed.urdf").read_text() == UNNAMED
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_diff_of_nothing_says_so(here):
+    run = here("check-robot", "good.urdf", "--diff")
+    assert (run.returncode, run.stdout) == (0, "")
+    assert run.stderr == "terrainkit: there is nothing to fix\n"
+
+
+@pytest.mark.usefixtures("folder")
+def test_json_tells_what_was_fixed(here):
+    run = here("check-robot", "unnamed.urdf", "--fix", "--format", "json")
+    document = json.loads(run.stdout)
+    assert [finding["code"] for finding in document["fixed"]] == ["XML003"]
+    assert document["verdict"] == "pass"
+
+
+# Colors.
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_terminal_gets_colors_and_no_escapes_of_the_file(folder):
+    (folder / "bad.urdf").write_text(BAD.replace("trunk", "tr\u009b31munk"))
+    script = "import pty, sys; sys.exit(pty.spawn(sys.argv[1:]) >> 8)"
+    command = [sys.executable, "-c", script, sys.executable, "-m", "terrainkit_cli.main"]
+    run = subprocess.run(
+        [*command, "check-robot", "bad.urdf", "--select", "INR002"],
+        cwd=folder,
+        env=os.environ | {"TERM": "xterm-256color"},
+        capture_output=True,
+        timeout=60,
+        check=False,
+    )
+    assert run.returncode == 1
+    assert b"\x1b[1;31merror\x1b[0m INR002 negative-mass" in run.stdout
+    assert "\u009b".encode() not in run.stdout
+    assert b"tr\\x9b31munk" in run.stdout
+
+
+# Rules.
+
+
+def test_a_rule_has_a_page(here):
+    run = here("rule", "inr002")
+    assert run.returncode == 0
+    assert run.stdout.startswith("INR002 negative-mass (error), of masses and inertias\n\n")
+    for part in ("\n\nFix: ", "\n\nSource: "):
+        assert part in run.stdout
+    assert here("rule", "negative-mass").stdout == run.stdout
+
+
+def test_every_rule_is_listed(here):
+    listed = here("rule", "--all").stdout
+    for rule in rules():
+        assert re.search(rf"^  {rule.code} +{rule.name} +{rule.severity}\b", listed, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "wanted the code or the name of a rule, or --all"),
+        (("INR002", "--all"), "wanted the code or the name of a rule, or --all"),
+        (("INR999",), "no rule 'INR999'; there are: XML001"),
+    ],
+)
+def test_a_rule_that_there_is_not_is_one_line(here, words, said):
+    run = here("rule", *words)
+    assert (run.returncode, run.stdout) == (2, "")
+    assert run.stderr.count("\n") == 1
+    assert said in run.stderr
+
+
+def test_the_command_line_offers_every_format():
+    import typing
+
+    from terrainkit_cli.robot_commands import CheckRobot
+    from terrainkit_robots.report import FORMATS
+
+    assert typing.get_args(typing.get_type_hints(CheckRobot)["format"]) == FORMATS
