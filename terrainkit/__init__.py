@@ -6,14 +6,17 @@
 (4, 10, 3)
 """
 
-from terrainkit.choice import TerrainChoice
-from terrainkit.config import MapConfig
-from terrainkit.config_text import read_config
-from terrainkit.curriculum import update_levels
-from terrainkit.errors import TerrainkitError, TerrainkitWarning
-from terrainkit.generate import generate
-from terrainkit.patch import Patch, tile
-from terrainkit.terrain_map import TerrainMap
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from terrainkit.choice import TerrainChoice
+    from terrainkit.config import MapConfig
+    from terrainkit.config_text import read_config
+    from terrainkit.curriculum import update_levels
+    from terrainkit.errors import TerrainkitError, TerrainkitWarning
+    from terrainkit.generation import generate
+    from terrainkit.patch import Patch, tile
+    from terrainkit.terrain_map import TerrainMap
 
 __all__ = [
     "MapConfig",
@@ -28,3 +31,31 @@ __all__ = [
     "update_levels",
 ]
 __version__ = "0.1.0"
+
+_MODULES = {
+    "MapConfig": "config",
+    "Patch": "patch",
+    "TerrainChoice": "choice",
+    "TerrainMap": "terrain_map",
+    "TerrainkitError": "errors",
+    "TerrainkitWarning": "errors",
+    "generate": "generation",
+    "read_config": "config_text",
+    "tile": "patch",
+    "update_levels": "curriculum",
+}
+"""Module of each public name, so that only those in use are imported: a robot needs no terrain."""
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    value = getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -45,7 +45,7 @@ class Generate(Command):
     def run(self) -> int:
         """Make the map, write it, and say what to do next."""
         from terrainkit import export
-        from terrainkit.generate import generate
+        from terrainkit.generation import generate
 
         config = self._config()
         samples = config.grid.shape[0] * config.grid.shape[1]

@@ -97,7 +97,7 @@ def convex_hull(points: Matrix) -> Matrix:
 
     Andrew's monotone chain.
     """
-    ordered = np.unique(np.round(points, 9), axis=0)
+    ordered = np.array(sorted(set(map(tuple, points.round(9).tolist()))))
     if len(ordered) < 3:
         return ordered
 

@@ -1,7 +1,7 @@
 """Limbs: chains of bodies from the trunk to a leaf, and how much each one looks like a leg.
 
-The score and its thresholds were tried on 39 robots: quadrupeds, humanoids, hexapods, arms, hands,
-drones and cars.
+The score and its thresholds were tried on 60 robots: quadrupeds, humanoids, hexapods, arms, hands,
+drones and cars, as published, and with names that say nothing.
 """
 
 import re
@@ -93,24 +93,15 @@ def find_limbs(facts: "Facts") -> tuple[Limb, ...]:
     height = max(float(upper[2]) - min(float(lower[2]), ground), 1e-6)
     size = max(float(np.linalg.norm(upper - lower)), 1e-6)
     rest = _lowest_of_the_rest(facts, leaves)
-    drawback = 0.5 * _bolted(facts)
+    bolted = 0.5 * _bolted(facts)
+
+    def stands(foot: float) -> float:
+        above, held_up = (foot - ground) / height, foot - rest > _HELD_UP * height
+        return (above <= _NEARISH) / 2 + (above <= _NEAR) / 2 - held_up - bolted
+
     return tuple(
-        _scored(
-            leaf,
-            leaves,
-            facts.bodies,
-            size,
-            _closeness((float(leaf.tip[2]) - ground) / height)
-            - 1.0 * (float(leaf.tip[2]) - rest > _HELD_UP * height)
-            - drawback,
-        )
-        for leaf in leaves
+        _scored(leaf, leaves, facts.bodies, size, stands(float(leaf.tip[2]))) for leaf in leaves
     )
-
-
-def _closeness(above: float) -> float:
-    """Return what a foot this far above the ground, as a share of the robot's height, counts."""
-    return 1.0 if above <= _NEAR else 0.5 if above <= _NEARISH else 0.0
 
 
 def _lowest_of_the_rest(facts: "Facts", leaves: Sequence[Chain]) -> float:
@@ -236,12 +227,10 @@ def _scored(
 
 
 def _words(names: Sequence[str]) -> tuple[int, int]:
-    """Return how many names speak of legs, and how many of other limbs."""
+    """Return how many names speak of legs, and how many of other limbs and of none."""
     apart = [re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower() for name in names]
-    return (
-        sum(bool(_LEG_WORDS.search(name)) for name in apart),
-        sum(bool(_OTHER_WORDS.search(name)) for name in apart),
-    )
+    rest = [name for name in apart if not _LEG_WORDS.search(name)]
+    return len(apart) - len(rest), sum(bool(_OTHER_WORDS.search(name)) for name in rest)
 
 
 def _is_twin(leaf: Chain, twin: Chain, size: float) -> bool:

@@ -32,6 +32,10 @@ class Stance:
     contacts: Matrix
     """Middle of each foot's contact in the trunk's frame, shape (legs, 3) [m]."""
 
+    pressures: Matrix
+    """Where the ground pushes on each foot in the trunk's frame, shape (legs, 3) [m]: moved within
+    its sole from the middle to where the feet balance the mass."""
+
     support: Matrix
     """Support polygon in the trunk's frame, convex, counter-clockwise, shape (n, 2) [m]."""
 
@@ -59,14 +63,32 @@ def stand(facts: "Facts", positions: Mapping[str, float]) -> Stance:
     contacts = np.array([points.mean(axis=0) for points in soles])
     center = center_of_mass(bodies, poses)
     support = convex_hull(np.concatenate(soles)[:, :2])
+    forces = ground_forces(contacts[:, :2], center[:2], facts.total_mass * GRAVITY)
+    pressures = _pressures(soles, contacts, forces, center)
     return Stance(
         positions=positions,
         height=-_lowest(facts, poses, contacts),
         contacts=contacts,
+        pressures=pressures,
         support=support,
         center=center,
         margin=margin(center[:2], support),
-        torques=_torques(facts, poses, contacts, center),
+        torques=_torques(facts, poses, pressures, forces),
+    )
+
+
+def _pressures(soles: Sequence[Matrix], contacts: Matrix, forces: Matrix, center: Matrix) -> Matrix:
+    """Return where feet are pushed, shape (n, 3) [m]: as far from the middle as balance needs."""
+    weight = float(forces.sum())
+    if weight <= 0:
+        return contacts
+    missing = (center - forces @ contacts / weight) * [1, 1, 0]
+    moved = [
+        np.clip(contact + missing, sole.min(axis=0), sole.max(axis=0))
+        for contact, sole in zip(contacts, soles, strict=True)
+    ]
+    return np.array(
+        [[*place[:2], contact[2]] for place, contact in zip(moved, contacts, strict=True)]
     )
 
 
@@ -80,10 +102,9 @@ def _lowest(facts: "Facts", poses: Sequence[Matrix], contacts: Matrix) -> float:
 
 
 def _torques(
-    facts: "Facts", poses: Sequence[Matrix], contacts: Matrix, center: Matrix
+    facts: "Facts", poses: Sequence[Matrix], places: Matrix, forces: Matrix
 ) -> dict[str, float]:
     """Return what holds each joint of the legs against gravity and the ground's push."""
-    pushes = ground_forces(contacts[:, :2], center[:2], facts.total_mass * GRAVITY)
     up = np.array([0.0, 0.0, 1.0])
     torques: dict[str, float] = {}
     for index in sorted({index for leg in facts.legs for index in leg.limb.chain}):
@@ -92,8 +113,8 @@ def _torques(
             continue
         # A waist carries what all legs below it do.
         loads = [
-            (contact, push * up)
-            for leg, contact, push in zip(facts.legs, contacts, pushes, strict=True)
+            (place, push * up)
+            for leg, place, push in zip(facts.legs, places, forces, strict=True)
             if index in leg.limb.chain
         ]
         for below in _below(facts, index):

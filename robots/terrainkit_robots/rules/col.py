@@ -1,5 +1,6 @@
 """Collision shapes: whether the robot can touch what it should, and only that."""
 
+import math
 from collections import Counter
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -9,6 +10,7 @@ import numpy as np
 from terrainkit_robots.bodies import Body, Placed
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.legs import Leg
+from terrainkit_robots.model import Matrix
 from terrainkit_robots.pose import range_of
 from terrainkit_robots.rule import CannotCheckError, Defect, rule
 from terrainkit_robots.shapes import has_extent, lowest
@@ -26,7 +28,10 @@ _SHORT = 0.005
 """How much lower a shape without contacts may be than those with, such as a rubber's skin [m]."""
 
 _SAMPLES = 64
-"""Random positions of all joints that are tried for overlaps."""
+"""Positions of all joints that are tried for overlaps."""
+
+_PRIMES = [n for n in range(2, 542) if all(n % k for k in range(2, math.isqrt(n) + 1))]
+"""The first hundred, one for each joint."""
 
 _LARGE_SHARE = 0.5
 """Share of the joint range from which an overlap is told: the arms of a humanoid meet its trunk in
@@ -232,17 +237,16 @@ def overlap_in_range(robot: Facts) -> Iterator[Defect]:
         Compare the joint limits with the robot's, and the shapes with its parts.
 
     Source:
-        Counted over random positions within the limits, with a fixed seed.
+        Counted over positions spread evenly within the limits, a Kronecker sequence.
     """
     if not robot.joints:
         raise CannotCheckError("there are no moving joints")
-    random = np.random.default_rng(0)
     positions = {}
-    for joint in robot.joints:
+    for index, joint in enumerate(robot.joints):
         lower, upper = range_of(joint)
-        wide = upper - lower > 4 * np.pi
-        span = (-_WIDE, _WIDE) if wide else (lower, upper)
-        positions[joint.name] = random.uniform(*span, size=_SAMPLES)
+        if upper - lower > 4 * np.pi:
+            lower, upper = -_WIDE, _WIDE
+        positions[joint.name] = lower + (upper - lower) * _spread(index)
     counts: Counter[tuple[str, str]] = Counter()
     for found in robot.overlaps.sweep(positions, _SAMPLES):
         counts.update(pair for pair, w in _worst(robot, found).items() if w.depth > _SLIGHT)
@@ -259,6 +263,15 @@ def overlap_in_range(robot: Facts) -> Iterator[Defect]:
                 certainty="likely",
                 measured={"share": share},
             )
+
+
+def _spread(dimension: int) -> Matrix:
+    """Return numbers from 0 to 1, evenly spread with those of other dimensions, shape (_SAMPLES,).
+
+    Multiples of the square root of a prime, of which no two have a common factor.
+    """
+    prime = _PRIMES[dimension % len(_PRIMES)]
+    return np.asarray(np.arange(1, _SAMPLES + 1) * math.sqrt(prime) % 1)
 
 
 @rule("COL007", "foot-contacts-off", "error", legged=True)
