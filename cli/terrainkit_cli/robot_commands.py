@@ -105,6 +105,10 @@ class CheckRobot(Command):
                 failed = True
                 render.error(f"{name}: out of memory")
         self._say(checks, output)
+        for check in checks:
+            for rule in check.report.crashed:
+                failed = True
+                render.error(f"{check.report.facts.model.file}: {rule.code}: {rule.reason}")
         return 2 if failed else int(any(check.bad for check in checks))
 
     def _settings(self) -> "Settings":

@@ -29,6 +29,9 @@ Look = Callable[[Mapping[Path, bytes]], Report]
 _MOST_ROUNDS = 50
 """So often a robot is checked again; fixes that wait for each other need a handful of rounds."""
 
+_FOLDERS = {"urdf", "xacro", "mjcf", "xml", "robots"}
+"""What the folder of the robot's file is called in a package, by custom."""
+
 _NEW_FILES = frozenset({".stl", ".obj"})
 """What a fix may add is a mesh, whatever its name was made from."""
 
@@ -113,6 +116,12 @@ def _key(finding: Finding) -> _Key:
 
 def _state(now: Mapping[Path, bytes]) -> frozenset[tuple[Path, bytes]]:
     return frozenset((path, hashlib.sha256(data).digest()) for path, data in now.items())
+
+
+def _package(folder: Path) -> Path:
+    """Return the folder that is the robot's own: that of its package, if it is in one."""
+    above = folder.parent
+    return above if folder.name in _FOLDERS or (above / "package.xml").is_file() else folder
 
 
 def _where(path: Path) -> Path:
@@ -240,17 +249,16 @@ class _Stage:
     def _to_be_added(self, edit: WriteFile) -> Path:
         """Return where the path of a new file leads, if there may be one.
 
-        That is in the folder of the robot, or in one beside it, as is meshes/ beside urdf/.
+        That is in the folder of the robot, or of its package, as is meshes/ beside urdf/: the file
+        names its meshes, and must not say where else something is written.
         """
         path = _where(edit.path.parent) / edit.path.name
-        above = self._files.folder.parent
-        inside = path.is_relative_to(self._files.folder) or (
-            path.is_relative_to(above)
-            and above != above.parent
-            and not any(part.startswith(".") for part in path.relative_to(above).parts)
+        package = _package(self._files.folder)
+        hidden = path.is_relative_to(package) and any(
+            part.startswith(".") for part in path.relative_to(package).parts
         )
-        if not inside:
-            raise EditError(f"{edit.path} would be outside of {above}: nothing is written there")
+        if hidden or not path.is_relative_to(package):
+            raise EditError(f"{edit.path} would be outside of {package}: nothing is written there")
         if path.suffix.lower() not in _NEW_FILES:
             raise EditError(f"{edit.path} would be no mesh, to go by its name")
         if not path.parent.is_dir():

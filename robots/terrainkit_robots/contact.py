@@ -13,6 +13,9 @@ from terrainkit_robots.shapes import has_extent
 SOLE = 0.01
 """Points up to this far above the lowest one count as sole: soles are rounded and bevelled [m]."""
 
+_SOLE_SHARE = 0.05
+"""The same as a share of the body's own size, for robots smaller than a dog."""
+
 _TURNS = np.linspace(-1.5, 1.5, 61)
 """Turns of a foot that are tried [rad]."""
 
@@ -34,7 +37,8 @@ def sole(body: Body, pose: Matrix, meshes: Meshes) -> Matrix:
     if not len(points):
         points = np.array([(pose @ local)[:3, 3] for local in body.poses])
         return np.asarray(points[points[:, 2].argmin()][None])
-    return np.asarray(points[points[:, 2] <= points[:, 2].min() + SOLE])
+    thickness = min(SOLE, _SOLE_SHARE * float(np.linalg.norm(np.ptp(points, axis=0))))
+    return np.asarray(points[points[:, 2] <= points[:, 2].min() + thickness])
 
 
 def level_turn(body: Body, pose: Matrix, axis: Matrix, meshes: Meshes) -> float:

@@ -1,5 +1,6 @@
 """Facts: what follows from a robot's description, each worked out when it is first asked for."""
 
+import math
 from collections.abc import Mapping
 from functools import cached_property
 
@@ -58,12 +59,15 @@ class Facts:
         In URDF those that mimic no other; in MJCF those with an actuator, or all without any.
         """
         joints = tuple(joint for joint in self.joints if joint.mimic is None)
-        driven = {actuator.joint for actuator in self.model.actuators}
+        driven = {actuator.joint for actuator in self.model.actuators} - {""}
         return tuple(j for j in joints if j.name in driven) if driven else joints
 
     @cached_property
     def total_mass(self) -> float:
-        """Sum of the declared masses [kg]."""
+        """Sum of the declared masses [kg]; NaN where MuJoCo takes one from a mesh file."""
+        masses = [link.inertial.mass for link in self.links if link.inertial is not None]
+        if any(mass is not None and math.isnan(mass) for mass in masses):
+            return math.nan
         return sum(body.mass for body in self.bodies)
 
     @cached_property
@@ -100,7 +104,10 @@ class Facts:
         if self.stance is not None:
             return self.stance.positions
         home = self.model.home
-        return {joint.name: home.get(joint.name, nearest(joint, 0.0)) for joint in self.joints}
+        return {
+            joint.name: home.get(joint.name, nearest(joint, joint.reference))
+            for joint in self.joints
+        }
 
     @cached_property
     def overlaps(self) -> OverlapScene:

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from terrainkit_robots.bodies import Body
-from terrainkit_robots.model import Matrix
+from terrainkit_robots.model import Joint, Matrix
 
 
 def body_poses(
@@ -29,10 +29,24 @@ def body_poses(
             continue
         local = body.mount
         if body.joint is not None and body.joint.moves:
-            q = np.asarray(positions.get(body.joint.name, 0.0), dtype=float)
+            q = np.asarray(position_of(body.joint, positions), dtype=float)
             local = local @ joint_motion(body, q)
         poses.append(poses[body.parent] @ local)
     return poses
+
+
+def position_of(
+    joint: Joint, positions: Mapping[str, float] | Mapping[str, Matrix]
+) -> float | Matrix:
+    """Return the position of a joint, which one that mimics another takes from that.
+
+    Args:
+        joint: The joint.
+        positions: Positions by name; joints that are not named are at 0.
+    """
+    if joint.mimic is None:
+        return positions.get(joint.name, 0.0)
+    return joint.mimic.multiplier * positions.get(joint.mimic.joint, 0.0) + joint.mimic.offset
 
 
 def joint_motion(body: Body, position: Matrix | np.float64) -> Matrix:

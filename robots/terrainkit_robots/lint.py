@@ -21,6 +21,10 @@ from terrainkit_robots.rule import (
 Verdict = Literal["pass", "warn", "fail"]
 
 
+INTERNAL = "internal error, please report it"
+"""How the reason of a rule begins that raised what it should not."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Finding:
     """A defect and the rule that found it: what the reports print."""
@@ -57,6 +61,11 @@ class Report:
     skipped: tuple[Skipped, ...] = ()
 
     @property
+    def crashed(self) -> tuple[Skipped, ...]:
+        """The rules that raised what they should not have."""
+        return tuple(each for each in self.skipped if each.reason.startswith(INTERNAL))
+
+    @property
     def verdict(self) -> Verdict:
         """Fail with an error, warn with a warning, else pass."""
         severities = {finding.severity for finding in self.findings}
@@ -68,9 +77,6 @@ MOST_FINDINGS = 50
 
 _OF_WHOLE_ROBOTS = ("LEG", "SYM")
 """Families that compare limbs, and would tell again what a broken tree has lost."""
-
-INTERNAL = "internal error, please report it"
-"""How the reason of a rule begins that raised what it should not."""
 
 
 def lint(facts: Facts, chosen: Sequence[Rule] | None = None) -> Report:

@@ -65,6 +65,10 @@ class Mirror:
     pairs: tuple[Pair, ...]
     """Pairs in the order of the left bodies; a body is in one pair at most."""
 
+    offset: float = 0.0
+    """How far the plane is from the trunk's origin along the normal [m]: not where the trunk's
+    frame is that of an IMU at one side."""
+
     def image(self, vectors: Matrix) -> Matrix:
         """Return mirrored vectors, shape (..., 3)."""
         return np.asarray(vectors - 2 * (vectors @ self.normal)[..., None] * self.normal)
@@ -81,7 +85,8 @@ def find_mirror(facts: "Facts") -> Mirror:
     """Return the mirrored pairs of a robot: by place first, and by name where that finds none."""
     normal = _normal(facts)
     mirror = Mirror(normal=normal, pairs=())
-    points = np.array([pose[:3, 3] for pose in facts.at_zero]).reshape(-1, 3)
+    offset = _offset(facts, normal)
+    points = np.array([pose[:3, 3] - offset * normal for pose in facts.at_zero]).reshape(-1, 3)
     near = _NEAR * float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
     twins: dict[int, int] = {}
     for find in (_by_place, _by_name):
@@ -93,7 +98,8 @@ def find_mirror(facts: "Facts") -> Mirror:
         left, right = (a, b) if points[a] @ normal >= points[b] @ normal else (b, a)
         if (left, right) == (a, b):
             pairs.append(Pair(left=left, right=right, sign=_sign(facts, mirror, left, right)))
-    return Mirror(normal=normal, pairs=tuple(sorted(pairs, key=lambda pair: pair.left)))
+    pairs.sort(key=lambda pair: pair.left)
+    return Mirror(normal=normal, pairs=tuple(pairs), offset=offset)
 
 
 def _normal(facts: "Facts") -> Matrix:
@@ -102,6 +108,20 @@ def _normal(facts: "Facts") -> Matrix:
     radial = any(0.5 < abs(leg.pitch[0]) < 0.87 for leg in facts.legs)  # legs around, as a spider's
     x = 2 * sideways > len(facts.legs) and not radial
     return np.array([1.0, 0, 0] if x else [0, 1.0, 0])
+
+
+def _offset(facts: "Facts", normal: Matrix) -> float:
+    """Return how far the middle of the legs is aside of the trunk's origin [m].
+
+    Only if the trunk's own mass is there, too: else a leg is out of place, not the origin.
+    """
+    starts = sorted(float(leg.limb.points[0] @ normal) for leg in facts.legs)
+    if len(starts) < 2:
+        return 0.0
+    half = len(starts) // 2
+    middle = (starts[half - 1] + starts[-half]) / 2
+    mass = float(facts.bodies[0].center @ normal)
+    return middle if abs(mass - middle) < abs(mass) / 2 else 0.0
 
 
 def _by_place(

@@ -13,8 +13,10 @@ import numpy as np
 
 from terrainkit_robots.bodies import Body, Placed
 from terrainkit_robots.kinematics import body_poses
+from terrainkit_robots.meshes import MeshError
 from terrainkit_robots.model import Matrix
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.rule import CannotCheckError
 from terrainkit_robots.shapes import bounds, has_extent
 
 if TYPE_CHECKING:
@@ -56,7 +58,12 @@ class OverlapScene:
             for body in facts.bodies
             for placed in body.collisions
             if _solid(placed, facts)
-        ][:_MOST_SHAPES]
+        ]
+        if len(self._shapes) > _MOST_SHAPES:
+            raise CannotCheckError(
+                f"there are {len(self._shapes)} collision shapes, and more than {_MOST_SHAPES} "
+                "are not compared"
+            )
 
     def overlaps(self, positions: Mapping[str, float]) -> list[Overlap]:
         """Return the overlaps of bodies that are not neighbours, the deepest first.
@@ -194,4 +201,8 @@ def _solid(placed: Placed, facts: "Facts") -> bool:
     if geometry.shape != "mesh":
         return min(geometry.size) > _THINNEST
     assert geometry.mesh is not None
-    return not facts.meshes.is_flat(geometry.mesh)
+    try:
+        facts.meshes.hull(geometry.mesh.path)
+    except MeshError:
+        return False  # MSH010 tells of a mesh without a hull
+    return True

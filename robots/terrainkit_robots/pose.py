@@ -13,7 +13,13 @@ import numpy as np
 
 from terrainkit_robots.bodies import Body
 from terrainkit_robots.contact import level_turn, sole
-from terrainkit_robots.kinematics import axis_in_trunk, body_poses, joint_motion, rotation
+from terrainkit_robots.kinematics import (
+    axis_in_trunk,
+    body_poses,
+    joint_motion,
+    position_of,
+    rotation,
+)
 from terrainkit_robots.legs import Leg
 from terrainkit_robots.model import Joint, Matrix
 
@@ -33,8 +39,11 @@ length: under the mass is a must, the height a preference."""
 _GRID = 21
 """Positions of a joint that are tried in each round."""
 
-_ROUNDS = 5
+_ROUNDS = 4
 """Each round closes in on a fifth of the range around the best place."""
+
+_BASINS = 4
+"""So many places that are better than all around them are looked at closer."""
 
 _BENDING = ("hip", "knee", "ankle")
 
@@ -64,16 +73,17 @@ def solve_positions(facts: "Facts") -> Mapping[str, float]:
     home = facts.model.home
     if home and all(joint.name in home for joint in joints):
         return {joint.name: home.get(joint.name, 0.0) for joint in facts.joints}
-    positions = {joint.name: nearest(joint, 0.0) for joint in facts.joints}
+    positions = {joint.name: nearest(joint, joint.reference) for joint in facts.joints}
     # The centre of mass moves with the legs, so that their feet follow it in a second pass.
-    for _ in range(2):
+    for _ in range(2 if facts.legs else 0):
         shift = _offset(facts, positions)
         for leg, twin, signs in _alike(facts):
             bent = _bend(leg, facts, positions, shift)
             positions |= bent
             if twin is not None:
                 positions |= _copied(bent, leg, twin, signs)
-    return positions
+    followers = [joint for joint in facts.joints if joint.mimic is not None]
+    return positions | {joint.name: float(position_of(joint, positions)) for joint in followers}
 
 
 def nearest(joint: Joint, position: float) -> float:
@@ -244,19 +254,47 @@ def _bend(
     bending = _bending(leg, facts, positions, shift)
     if bending is None:
         return {}
-    ranges = [_searched(bending.hip), _searched(bending.knee)]
-    limits = ranges
-    best = (0.0, 0.0)
+    limits = [_searched(bending.hip), _searched(bending.knee)]
+    hip, knee, cost = _grid(bending, limits)
+    # The knee may bend both ways; which is better shows only close to the best place of each.
+    found = [
+        _closing_in(bending, (float(hip[place]), float(knee[place])), limits)
+        for place in _minima(cost)[:_BASINS]
+    ]
+    _, best_hip, best_knee = min(found)
+    return {n: float(q) for n, q in bending.at(np.array(best_hip), np.array(best_knee)).items()}
+
+
+def _grid(
+    bending: _Bending, ranges: Sequence[tuple[float, float]]
+) -> tuple[Matrix, Matrix, Matrix]:
+    """Return positions of hip and knee all over their ranges, and what each pair costs."""
+    hip, knee = np.meshgrid(*(np.linspace(a, b, _GRID) for a, b in ranges), indexing="ij")
+    return hip, knee, bending.cost(hip, knee)
+
+
+def _minima(cost: Matrix) -> list[tuple[int, int]]:
+    """Return where no neighbour costs less, the cheapest first."""
+    padded = np.pad(cost, 1, constant_values=np.inf)
+    around = np.lib.stride_tricks.sliding_window_view(padded, (3, 3)).min(axis=(-1, -2))
+    places = [(int(i), int(j)) for i, j in np.argwhere(cost <= around)]
+    return sorted(places, key=lambda place: float(cost[place]))
+
+
+def _closing_in(
+    bending: _Bending, start: tuple[float, float], limits: Sequence[tuple[float, float]]
+) -> tuple[float, float, float]:
+    """Return the cost of the best positions around `start`, and these."""
+    best, cheapest, ranges = start, np.inf, list(limits)
     for _ in range(_ROUNDS):
-        hip, knee = np.meshgrid(*(np.linspace(a, b, _GRID) for a, b in ranges), indexing="ij")
-        cost = bending.cost(hip, knee)
-        place = np.unravel_index(int(cost.argmin()), cost.shape)
-        best = float(hip[place]), float(knee[place])
         ranges = [
             (max(low, x - (b - a) / 10), min(high, x + (b - a) / 10))
             for x, (a, b), (low, high) in zip(best, ranges, limits, strict=True)
         ]
-    return {n: float(q) for n, q in bending.at(np.array(best[0]), np.array(best[1])).items()}
+        hip, knee, cost = _grid(bending, ranges)
+        place = np.unravel_index(int(cost.argmin()), cost.shape)
+        best, cheapest = (float(hip[place]), float(knee[place])), float(cost[place])
+    return cheapest, *best
 
 
 def _searched(joint: Joint) -> tuple[float, float]:
@@ -275,11 +313,14 @@ def _bending(
     bodies = [facts.bodies[i] for i in leg.limb.chain]
     ankles = [j for j, r in zip(leg.joints, leg.roles, strict=True) if r == "ankle"]
     leaf = facts.bodies[leg.limb.chain[-1]]
-    turn = level_turn(leaf, facts.at_zero[leaf.index], leg.pitch, facts.meshes) if ankles else 0.0
-    flat = facts.at_zero[leaf.index].copy()
-    flat[:3, :3] = rotation(leg.pitch, np.float64(turn)) @ flat[:3, :3]
-    contact = sole(leaf, flat, facts.meshes).mean(axis=0)
     poses = body_poses(facts.bodies, positions)
+    if ankles:
+        turn = level_turn(leaf, facts.at_zero[leaf.index], leg.pitch, facts.meshes)
+        foot = facts.at_zero[leaf.index].copy()
+        foot[:3, :3] = rotation(leg.pitch, np.float64(turn)) @ foot[:3, :3]
+    else:
+        turn, foot = 0.0, poses[leaf.index]  # a ball rolls: its contact depends on the pose
+    contact = sole(leaf, foot, facts.meshes).mean(axis=0)
     start = poses[bodies[0].parent or 0]
     ratio = _BENT.get(len(facts.legs), _BENT_ELSE)
     hip_place, length = _hip(leg, facts, poses), max(leg.length, 1e-6)
@@ -291,7 +332,7 @@ def _bending(
         ankle=ankles[-1] if ankles else None,
         level=_level(leg, facts, positions, turn) if ankles else (0.0, 0.0, 0.0),
         fixed=positions,
-        tip=flat[:3, :3].T @ (contact - flat[:3, 3]),
+        tip=foot[:3, :3].T @ (contact - foot[:3, 3]),
         hip_place=hip_place,
         wanted=shift + np.array([0.0, 0.0, -ratio * leg.length]),
         pitch=leg.pitch,

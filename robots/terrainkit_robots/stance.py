@@ -1,5 +1,6 @@
 """The stance: how a robot stands at given joint positions, and what that takes."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -43,10 +44,12 @@ class Stance:
     """Centre of mass in the trunk's frame, shape (3,) [m]."""
 
     margin: float
-    """Distance of the centre of mass to the edge of the support polygon [m]; negative outside."""
+    """Distance of the centre of mass to the edge of the support polygon [m]; negative outside, NaN
+    if a mass is not known."""
 
     torques: Mapping[str, float]
-    """Torque [N m], or force [N] of a sliding joint, that holds each joint of the legs, by name."""
+    """Torque [N m], or force [N] of a sliding joint, that holds each joint of the legs, by name;
+    empty if a mass is not known."""
 
     @property
     def spawn_height(self) -> float:
@@ -63,7 +66,9 @@ def stand(facts: "Facts", positions: Mapping[str, float]) -> Stance:
     contacts = np.array([points.mean(axis=0) for points in soles])
     center = center_of_mass(bodies, poses)
     support = convex_hull(np.concatenate(soles)[:, :2])
-    forces = ground_forces(contacts[:, :2], center[:2], facts.total_mass * GRAVITY)
+    known = math.isfinite(facts.total_mass)
+    weight = sum(body.mass for body in bodies) * GRAVITY
+    forces = ground_forces(contacts[:, :2], center[:2], weight)
     pressures = _pressures(soles, contacts, forces, center)
     return Stance(
         positions=positions,
@@ -72,8 +77,8 @@ def stand(facts: "Facts", positions: Mapping[str, float]) -> Stance:
         pressures=pressures,
         support=support,
         center=center,
-        margin=margin(center[:2], support),
-        torques=_torques(facts, poses, pressures, forces),
+        margin=margin(center[:2], support) if known else math.nan,
+        torques=_torques(facts, poses, pressures, forces) if known else {},
     )
 
 
@@ -145,10 +150,17 @@ def ground_forces(places: Matrix, center: Matrix, weight: float) -> Matrix:
         center: Where the weight is, shape (2,) [m].
         weight: How much it is [N].
     """
-    balance = np.vstack([np.ones(len(places)), (places - center).T])
-    wanted = np.array([weight, 0.0, 0.0])
-    even = np.full(len(places), weight / len(places))
-    change, *_ = np.linalg.lstsq(balance, wanted - balance @ even, rcond=1e-9)
-    forces = np.clip(even + change, 0, None)  # the ground does not pull
+    forces = np.zeros(len(places))
+    standing = np.arange(len(places))
+    while len(standing):
+        balance = np.vstack([np.ones(len(standing)), (places[standing] - center).T])
+        even = np.full(len(standing), weight / len(standing))
+        missing = np.array([weight, 0.0, 0.0]) - balance @ even
+        change, *_ = np.linalg.lstsq(balance, missing, rcond=1e-9)
+        pulled = even + change < -1e-9 * abs(weight)  # the ground does not pull: a foot that lifts
+        if not pulled.any():
+            forces[standing] = np.clip(even + change, 0, None)
+            break
+        standing = standing[~pulled]
     total = float(forces.sum())
-    return np.asarray(forces * weight / total if total > 0 else even)
+    return forces * weight / total if total > 0 else np.full(len(places), weight / len(places))

@@ -87,8 +87,8 @@ def _joint_of(robot: Facts, index: int, paired: Container[int]) -> Matrix:
     body, pose = robot.bodies[index], robot.at_zero[index]
     point = pose[:3, 3] if body.joint is None else axis_in_trunk(body, pose)[0]
     if index not in paired:
-        normal = robot.mirror.normal
-        return np.asarray(point - (point @ normal) * normal)
+        normal, offset = robot.mirror.normal, robot.mirror.offset
+        return np.asarray(point - (point @ normal - offset) * normal)
     return point
 
 

@@ -117,8 +117,9 @@ def test_joints_count_that_a_motor_or_a_tendon_drives(actuators, count):
     text = (
         '<mujoco><worldbody><body name="a"><freejoint/><geom size="0.1"/><body name="b">'
         '<joint name="i" axis="0 1 0"/><geom size="0.1"/><body name="c" pos="0 0 -1">'
-        '<joint name="j" axis="0 1 0"/><geom size="0.1" pos="0 0 -1"/></body></body></body></worldbody>'
-        '<tendon><fixed name="t"><joint joint="i" coef="1"/><joint joint="j" coef="1"/></fixed>'
+        '<joint name="j" axis="0 1 0"/><geom size="0.1" pos="0 0 -1"/></body></body></body>'
+        '</worldbody><tendon><fixed name="t"><joint joint="i" coef="1"/>'
+        '<joint joint="j" coef="1"/></fixed>'
         f"</tendon><actuator>{actuators}</actuator></mujoco>"
     )
     file = Path("/robots/robot.xml")

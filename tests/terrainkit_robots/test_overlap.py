@@ -1,6 +1,5 @@
 import math
 import struct
-import time
 from pathlib import Path
 
 import mujoco
@@ -9,6 +8,7 @@ import pytest
 
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.robot_file import read_robot
+from terrainkit_robots.rule import CannotCheckError
 
 FILE = Path("/robots/robot.urdf")
 BOX = '<box size="0.2 0.2 0.2"/>'
@@ -148,8 +148,9 @@ def test_masses_do_not_matter():
 def mjcf(attributes="", contact="", joints='<joint name="j"/>'):
     return (
         f'<mujoco><worldbody><body name="a"><geom size="0.1"/><body name="b"><joint name="i"/>'
-        f'<inertial mass="1" pos="0 0 0" diaginertia="1 1 1"/><body name="c" pos="0.15 0 0">{joints}'
-        f'<geom size="0.1" {attributes}/></body></body></body></worldbody>{contact}</mujoco>'
+        '<inertial mass="1" pos="0 0 0" diaginertia="1 1 1"/><body name="c" pos="0.15 0 0">'
+        f'{joints}<geom size="0.1" {attributes}/></body></body></body></worldbody>'
+        f"{contact}</mujoco>"
     )
 
 
@@ -241,7 +242,7 @@ def test_a_joint_moves_shapes_apart_and_together():
 
 
 def test_a_sweep_is_one_look_after_the_other():
-    robot = scene(apart(BOX, BOX, "0.25 0 0"))
+    robot = scene(apart(BOX, BOX, "0.22 0 0"))
     angles = np.linspace(-3, 3, 7)
     swept = list(robot.sweep({"c_joint": angles}, len(angles)))
     single = [robot.overlaps({"c_joint": float(q)}) for q in angles]
@@ -257,12 +258,11 @@ def test_without_shapes_there_is_nothing_to_look_at():
     assert list(scene('<robot name="r"/>').sweep({}, 3)) == [[], [], []]
 
 
-def test_a_heap_of_shapes_takes_bounded_time():
+def test_a_heap_of_shapes_is_not_compared():
     links = link("a") + "".join(link(f"l{k}", BOX) for k in range(1500))
     joints = "".join(joint("a", f"l{k}") for k in range(1500))
-    start = time.perf_counter()
-    assert scene(f'<robot name="r">{links}{joints}</robot>').overlaps({})
-    assert time.perf_counter() - start < 5
+    with pytest.raises(CannotCheckError, match="1500 collision shapes"):
+        scene(f'<robot name="r">{links}{joints}</robot>')
 
 
 @pytest.mark.parametrize("name", ["a1/urdf/a1.urdf", "go2/urdf/go2.urdf"])

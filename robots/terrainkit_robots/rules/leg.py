@@ -1,5 +1,6 @@
 """Legs: whether those that were found can carry a robot and be trained."""
 
+import math
 import re
 from collections import Counter
 from collections.abc import Iterator
@@ -255,6 +256,8 @@ def falls_over(robot: Facts) -> Iterator[Defect]:
     """
     stance = robot.stance
     assert stance is not None
+    if math.isnan(stance.margin):
+        raise CannotCheckError("a mass is made from a mesh, by MuJoCo")
     if len(stance.support) < 3:
         raise CannotCheckError("the feet touch the ground in points or on a line, without an area")
     best = margin(stance.support.mean(axis=0), stance.support)
