@@ -92,14 +92,14 @@ def rules_page() -> str:
 
 
 FIXED = {"safe": "`--fix`", "unsafe": "`--unsafe-fixes`", "no": ""}
+SEVERITY = {"error": "An error", "warning": "A warning", "info": "A note"}
 
 
 def rule_section(rule: Rule) -> str:
-    severity = {"info": "A note"}.get(rule.severity, f"An {rule.severity}".replace("An w", "A w"))
     fixed = f", repaired by {FIXED[rule.fixes]}" if FIXED[rule.fixes] else ""
     return (
         f"### {rule.code} {rule.name}\n\n"
-        f"**{markup(rule.title)}** {severity}{fixed}.\n\n"
+        f"**{markup(rule.title)}** {SEVERITY[rule.severity]}{fixed}.\n\n"
         f"{markup(rule.why)}\n\n"
         f"*To fix it:* {markup(rule.how_to_fix)}\n\n"
         f"*Source:* {markup(rule.reference)}\n"

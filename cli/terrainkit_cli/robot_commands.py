@@ -90,26 +90,14 @@ class CheckRobot(Command):
         output = Path(self.output) if self.output else None
         if output is not None:
             _check_output(output, [Path(name) for name in self.files])
-        checks = []
-        failed = False
-        for name in self.files:
-            try:
-                checks.append(_check(name, self, options))
-            except TerrainkitError as error:
-                failed = True
-                render.error(str(error))
-            except OSError as error:
-                failed = True
-                render.error(f"{name}: {error.strerror or error}")
-            except MemoryError:
-                failed = True
-                render.error(f"{name}: out of memory")
+        checks = [check for name in self.files if (check := _tried(name, self, options))]
         self._say(checks, output)
-        for check in checks:
-            for rule in check.report.crashed:
-                failed = True
-                render.error(f"{check.report.facts.model.file}: {rule.code}: {rule.reason}")
-        return 2 if failed else int(any(check.bad for check in checks))
+        crashed = [rule for check in checks for rule in check.report.crashed]
+        for rule in crashed:
+            render.error(f"{rule.code}: {rule.reason}")
+        if crashed or len(checks) < len(self.files):
+            return 2
+        return int(any(check.bad for check in checks))
 
     def _settings(self) -> "Settings":
         from terrainkit_robots.selection import choose
@@ -163,6 +151,26 @@ class _Checked:
     diff: str = ""
 
 
+def _tried(name: str, command: CheckRobot, options: "Settings") -> _Checked | None:
+    """Return what there is to say of a file; None, and one line of error, if that failed."""
+    from terrainkit_robots.facts_record import facts_record
+    from terrainkit_robots.lint import INTERNAL
+
+    try:
+        check = _check(name, command, options)
+        facts_record(check.report.facts)  # so that what fails in it fails here
+        return check
+    except TerrainkitError as error:
+        render.error(str(error))
+    except OSError as error:
+        render.error(f"{name}: {error.strerror or error}")
+    except MemoryError:
+        render.error(f"{name}: out of memory")
+    except Exception as error:  # a bug of ours is told as one, and costs no other file
+        render.error(f"{name}: {INTERNAL}: {type(error).__name__}: {error}")
+    return None
+
+
 def _check(name: str, command: CheckRobot, options: "Settings") -> _Checked:
     from terrainkit_robots import bundled
     from terrainkit_robots.facts import Facts
@@ -188,6 +196,8 @@ def _check(name: str, command: CheckRobot, options: "Settings") -> _Checked:
     if command.fix or command.unsafe_fixes or command.diff:
         if ours:
             raise ConfigError(f"{name} is a bundled robot, which is not changed; copy it first")
+        if report.facts.model.kind == "xacro":
+            raise ConfigError(f"{name} is xacro, which is not changed; edit what the findings name")
         report, diff = _repaired(path, report, look, command)
     bad = ("fail", "warn") if settings.strict else ("fail",)
     return _Checked(report=report, bad=report.verdict in bad, diff=diff)
@@ -299,9 +309,9 @@ class Rule(Command):
         """Print the page of a rule, or a line for each."""
         from terrainkit_robots.rule import FAMILIES, find, rules
 
-        if bool(self.code) == self.all:
+        if self.code and self.all:
             raise ConfigError("wanted the code or the name of a rule, or --all")
-        if not self.all:
+        if self.code:
             render.result(_page(find(self.code)))
             return 0
         for family, about in FAMILIES.items():

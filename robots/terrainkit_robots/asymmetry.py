@@ -8,10 +8,10 @@ import numpy as np
 
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.kinematics import axis_in_trunk
-from terrainkit_robots.model import Joint
+from terrainkit_robots.model import Joint, Matrix
 from terrainkit_robots.twins import Twin, partners, twins
 
-_LIMIT, _LIMIT_SHARE = 0.01, 0.02
+LIMIT, LIMIT_SHARE = 0.01, 0.02
 """How far limits may differ: half a degree [rad], or [m], and a share of the range, since some are
 measured on the robot."""
 
@@ -117,7 +117,7 @@ def limits_of(joint: Joint) -> tuple[float, float] | None:
 def limits_match(a: tuple[float, float], b: tuple[float, float], sign: int) -> bool:
     """Return whether limits are mirrored: the same, or with a negative sign, turned around."""
     mirrored = b if sign > 0 else (-b[1], -b[0])
-    allowed = _LIMIT + _LIMIT_SHARE * min(a[1] - a[0], b[1] - b[0])
+    allowed = LIMIT + LIMIT_SHARE * min(a[1] - a[0], b[1] - b[0])
     return all(abs(x - y) <= allowed for x, y in zip(a, mirrored, strict=True))
 
 
@@ -126,11 +126,24 @@ def opposed(left: Twin, right: Twin) -> bool:
     return bool(left.axis @ right.axis < 0)
 
 
-def against_the_rest(robot: Facts) -> Iterator[tuple[Joint, int]]:
-    """Yield the joints of legs that turn the other way than those of all other legs, three or more.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stray:
+    """A joint of a leg that turns the other way than those of all other legs."""
 
-    Also yields how many others there are.
-    """
+    joint: Joint
+
+    others: int
+    """How many other legs there are: three or more."""
+
+    axis: Matrix
+    """Its axis in the trunk's frame, all joints at 0, shape (3,)."""
+
+    usual: Matrix
+    """That of the same joint of another leg."""
+
+
+def against_the_rest(robot: Facts) -> Iterator[Stray]:
+    """Yield the joints of legs that turn the other way than those of all other legs."""
     lengths = {len(leg.limb.chain) for leg in robot.legs}
     if len(robot.legs) < _CROWD or len(lengths) != 1:
         return
@@ -141,11 +154,12 @@ def against_the_rest(robot: Facts) -> Iterator[tuple[Joint, int]]:
         agreement = [float(axis @ axes[0]) for axis in axes]
         if min(map(abs, agreement)) < _PARALLEL:
             continue
-        with_first = [joint for joint, x in zip(joints, agreement, strict=True) if x > 0]
-        against = [joint for joint, x in zip(joints, agreement, strict=True) if x < 0]
-        for few in (with_first, against):
-            if len(few) == 1 and few[0] is not None:
-                yield few[0], len(joints) - 1
+        with_first = [k for k, x in enumerate(agreement) if x > 0]
+        against = [k for k, x in enumerate(agreement) if x < 0]
+        for few, many in ((with_first, against), (against, with_first)):
+            joint = joints[few[0]] if len(few) == 1 else None
+            if joint is not None:
+                yield Stray(joint=joint, others=len(many), axis=axes[few[0]], usual=axes[many[0]])
 
 
 def against_its_kind(robot: Facts) -> Iterator[tuple[Twin, Twin, int]]:
@@ -154,7 +168,7 @@ def against_its_kind(robot: Facts) -> Iterator[tuple[Twin, Twin, int]]:
     Of one kind are those that bend the legs, and those that do not. Where the limits tell left from
     right, they are believed. Also yields how many others there are, two or more.
     """
-    if len(robot.legs) != _TWO:
+    if len(robot.legs) != 2:
         return
     in_legs = {index for leg in robot.legs for index in leg.limb.chain}
     pairs = [(left, right) for pair, left, right in twins(robot) if pair.left in in_legs]
@@ -166,11 +180,12 @@ def against_its_kind(robot: Facts) -> Iterator[tuple[Twin, Twin, int]]:
         ]
         few = [(left, right) for left, right in kind if opposed(left, right)]
         others = len(kind) - len(few)
-        if len(few) == 1 and others >= _TWO and _either_way(*few[0]):
+        if len(few) == 1 and others >= _FEWEST_OTHERS and _either_way(*few[0]):
             yield *few[0], others
 
 
-_TWO = 2
+_FEWEST_OTHERS = 2
+"""Pairs that turn one way from which on the one that does not is odd."""
 
 
 def _either_way(left: Twin, right: Twin) -> bool:

@@ -33,6 +33,11 @@ def facts_record(facts: "Facts") -> dict[str, Any]:
         "legs": [_leg(leg) for leg in legs],
         "feet": [leg.foot for leg in legs],
         "leg_length": number(sum(leg.length for leg in legs) / len(legs)) if legs else None,
+        "joint_orders": {"file": [joint.name for joint in facts.model.joints if joint.moves]},
+        "mirror_plane": {
+            "normal": [number(float(x)) for x in facts.mirror.normal],
+            "offset": number(facts.mirror.offset),
+        },
         "mirrored_joints": _mirrored(facts),
         **_standing(facts),
         "action_size": actuated,
@@ -67,7 +72,7 @@ def _standing(facts: "Facts") -> dict[str, Any]:
     stance = facts.stance
     if stance is None:
         keys = ("standing_pose", "standing_height", "spawn_height", "standing_width")
-        return dict.fromkeys((*keys, "support_margin", "holding_torques"))
+        return dict.fromkeys((*keys, "support_polygon", "support_margin", "holding_torques"))
     with np.errstate(all="ignore"):  # lengths of 1e308 are told by a rule, not by numpy
         width = float(np.ptp(stance.contacts @ facts.mirror.normal))
     return {
@@ -75,6 +80,7 @@ def _standing(facts: "Facts") -> dict[str, Any]:
         "standing_height": number(stance.height),
         "spawn_height": number(stance.spawn_height),
         "standing_width": number(width),
+        "support_polygon": [[number(float(v)) for v in corner] for corner in stance.support],
         "support_margin": number(stance.margin),
         "holding_torques": _numbers(stance.torques),
     }

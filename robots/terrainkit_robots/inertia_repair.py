@@ -1,13 +1,16 @@
 """Repairs of inertias: what to write into the file instead."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from terrainkit_robots.facts import Facts
-from terrainkit_robots.fix import Edit, Fix, SetAttribute
+from terrainkit_robots.fix import Edit, Fix, RemoveAttribute, SetAttribute
 from terrainkit_robots.model import Inertial, Link, Matrix
 from terrainkit_robots.per_robot import per_robot
 from terrainkit_robots.physical_inertia import (
     box_inertia,
+    gyration_radius,
     nearest_physical,
     principal_moments,
     triangle_ratio,
@@ -28,38 +31,21 @@ def repair(robot: Facts, link: Link) -> Fix | None:
     inertial = link.inertial
     if inertial is None or inertial.inertia is None:
         return None
-    name = _attribute(robot, link, inertial)
-    if name is None:
-        return None
+    source = inertial.inertia_source or inertial.source
+    if source.element is None or source == link.source:
+        return None  # it cannot be written, or MuJoCo made it up
     for inertia, what in (
         (_mirrored(robot, link), "that of its mirror image"),
-        (nearest_physical(inertial.inertia), "the nearest one that a body can have"),
+        (_nearest(robot, link, inertial.inertia), "the nearest one that a body can have"),
         (_of_a_box(robot, link, inertial), "that of a solid box around the body"),
     ):
-        if inertia is not None and (name != "diaginertia" or _is_diagonal(inertia)):
+        if inertia is not None:
             return Fix(
                 safety="unsafe",
                 description=f"Replace the inertia of link {link.name} by {what}.",
-                edits=_edits(inertial, name, inertia),
+                edits=tuple(_edits(inertial, inertia)),
             )
     return None
-
-
-def _attribute(robot: Facts, link: Link, inertial: Inertial) -> str | None:
-    """Return the attribute that holds the inertia, or nothing for the six of URDF.
-
-    None where it cannot be written, or MJCF may have either of two and must not get both.
-    """
-    source = inertial.inertia_source or inertial.source
-    assert inertial.inertia is not None
-    if source.element is None or source == link.source:
-        return None
-    if robot.model.kind != "mjcf":
-        return ""
-    if not _is_diagonal(inertial.inertia):
-        return "fullinertia"
-    # A full inertia has no axes of its own.
-    return None if np.array_equal(inertial.origin[:3, :3], np.eye(3)) else "diaginertia"
 
 
 def _is_diagonal(inertia: Matrix) -> bool:
@@ -102,6 +88,19 @@ def _place(robot: Facts, link: Link) -> Matrix:
     return np.asarray(pose[:3, :3])
 
 
+def _nearest(robot: Facts, link: Link, inertia: Matrix) -> Matrix | None:
+    """Return the nearest physical inertia, unless the body is too small for it.
+
+    One number that is far too large makes the nearest of all six far too large.
+    """
+    nearest, body, mass = nearest_physical(inertia), robot.body_of.get(link.name), _mass(link)
+    box = None if body is None else bounds(body.collisions or body.visuals, robot.meshes)
+    if nearest is None or box is None or not mass > 0:
+        return nearest
+    radius = gyration_radius(principal_moments(nearest), mass)
+    return nearest if radius <= np.linalg.norm(box[1] - box[0]) / 2 else None
+
+
 def _of_a_box(robot: Facts, link: Link, inertial: Inertial) -> Matrix | None:
     """Return the inertia of a box as large as the link's body, in the frame of its <inertial>."""
     body = robot.body_of.get(link.name)
@@ -112,16 +111,26 @@ def _of_a_box(robot: Facts, link: Link, inertial: Inertial) -> Matrix | None:
     return np.asarray(turn.T @ box_inertia(_mass(link), box[1] - box[0]) @ turn)
 
 
-def _edits(inertial: Inertial, name: str, inertia: Matrix) -> tuple[Edit, ...]:
-    """Return the edits; without a name, the six attributes of URDF."""
+def _edits(inertial: Inertial, inertia: Matrix) -> Iterator[Edit]:
+    """Yield the edits that write an inertia, given in the frame of the <inertial>."""
     source = inertial.inertia_source or inertial.source
-    order = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    if not inertial.attribute:
+        for name, number in zip(_NAMES, _six(inertia), strict=True):
+            yield SetAttribute(source=source, name=name, value=number)
+    elif inertial.attribute == "diaginertia" and _is_diagonal(inertia):
+        yield SetAttribute(source=source, name="diaginertia", value=" ".join(_six(inertia)[:3]))
+    else:  # which has no axes of its own
+        turn = inertial.origin[:3, :3]
+        full = " ".join(_six(turn @ inertia @ turn.T))
+        yield SetAttribute(source=source, name="fullinertia", value=full)
+        for name in (inertial.attribute, inertial.axes_attribute):
+            if name not in ("", "fullinertia"):
+                yield RemoveAttribute(source=source, name=name)
+
+
+_NAMES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+
+
+def _six(inertia: Matrix) -> list[str]:
     places = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-    values = [f"{inertia[place] + 0.0:.10g}" for place in places]
-    if name:
-        text = " ".join(values if name == "fullinertia" else values[:3])
-        return (SetAttribute(source=source, name=name, value=text),)
-    return tuple(
-        SetAttribute(source=source, name=each, value=value)
-        for each, value in zip(order, values, strict=True)
-    )
+    return [f"{inertia[place] + 0.0:.10g}" for place in places]

@@ -75,6 +75,9 @@ class Report:
 MOST_FINDINGS = 50
 """So many defects of one rule are told: of 10,000 alike nobody reads the last."""
 
+_UNREADABLE = ("XML001", "XML002", "XML005", "XML011")
+"""Problems that can leave nothing of a file."""
+
 _OF_WHOLE_ROBOTS = ("LEG", "SYM")
 """Families that compare limbs, and would tell again what a broken tree has lost."""
 
@@ -88,7 +91,10 @@ def lint(facts: Facts, chosen: Sequence[Rule] | None = None) -> Report:
     """
     findings: list[Finding] = []
     skipped: list[Skipped] = []
-    for each in rules() if chosen is None else chosen:
+    chosen = rules() if chosen is None else chosen
+    if not facts.model.links and any(p.code in _UNREADABLE for p in facts.model.problems):
+        chosen = [rule for rule in chosen if rule.family == "XML"]  # there is no robot to look at
+    for each in chosen:
         try:
             if each.family in _OF_WHOLE_ROBOTS and facts.tree.left_out:
                 raise CannotCheckError("links or joints are missing from the tree")

@@ -12,6 +12,7 @@ from terrainkit_robots.mesh_header import Header
 from terrainkit_robots.meshes import Meshes
 from terrainkit_robots.model import Geometry, Link, MeshFile, Source
 from terrainkit_robots.packages import is_absolute, names_package, right_letters
+from terrainkit_robots.wording import names
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -68,9 +69,7 @@ class UsedMesh:
     def role(self) -> str:
         """What the file is, in words: a collision mesh of which links, or a visual one."""
         kind, uses = ("collision", self.collisions) if self.collisions else ("visual", self.uses)
-        names = list(dict.fromkeys(use.link.name for use in uses))
-        more = f" and {len(names) - 1} more" if len(names) > 1 else ""
-        return f"{kind} mesh of {names[0]}{more}"
+        return f"{kind} mesh of {names(dict.fromkeys(use.link.name for use in uses), 2)}"
 
 
 def mesh_uses(robot: Facts) -> Iterator[MeshUse]:

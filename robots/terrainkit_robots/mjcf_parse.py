@@ -4,7 +4,6 @@ It stops at the first one. So what it refuses is told, taken out of the tree, an
 to it again.
 """
 
-import difflib
 import itertools
 import re
 import time
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING
 from terrainkit_robots.mjcf_document import MjcfDocument, Node, bound, harmless
 from terrainkit_robots.model import Problem
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.wording import closest, short
 from terrainkit_robots.xml_numbers import parse_numbers, without_commas
 
 if TYPE_CHECKING:
@@ -25,6 +25,9 @@ _MOST_ATTEMPTS = 50
 
 _MOST_SECONDS = 4.0
 """After this time the parser is not asked again [s]."""
+
+_NEAR = 0.7
+"""Share of common letters from which on a word that MuJoCo refuses looks like one that it knows."""
 
 _COUNTS: Mapping[str, tuple[int, ...]] = {
     **dict.fromkeys(("mass", "density", "armature", "ref", "margin", "timestep"), (1,)),
@@ -134,7 +137,7 @@ def _check_numbers(document: MjcfDocument, node: Node) -> None:
             document,
             node,
             "XML006",
-            f"{name} of <{node.tag}> is {_short(text)!r}; wanted {wanted}"
+            f"{name} of <{node.tag}> is {short(text, 40)!r}; wanted {wanted}"
             + (", with a point for the decimals and spaces between" if repaired else ""),
             attribute=name,
             repaired=repaired,
@@ -143,10 +146,6 @@ def _check_numbers(document: MjcfDocument, node: Node) -> None:
             node.attributes[name] = repaired
         else:
             del node.attributes[name]
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= 40 else f"{text[:37]}..."
 
 
 # Repairs
@@ -218,7 +217,7 @@ def _unknown_attribute(document: MjcfDocument, node: Node, match: re.Match[str])
     if name not in node.attributes:
         return False
     nodes = _alike(document, node, attribute=name)
-    known = _closest(name, _schema().get(node.tag, frozenset()) - node.attributes.keys())
+    known = closest(name, _schema().get(node.tag, frozenset()) - node.attributes.keys(), _NEAR)
     what = f"attribute {name} of <{node.tag}> is not known to {_mujoco()}, which refuses the file"
     tell(
         document,
@@ -242,7 +241,7 @@ def _unknown_element(document: MjcfDocument, node: Node, match: re.Match[str]) -
     if node.parent is None:
         return False
     nodes = _alike(document, node)
-    known = _closest(node.tag, _places().get(node.parent.tag, frozenset(_schema())))
+    known = closest(node.tag, _places().get(node.parent.tag, frozenset(_schema())), _NEAR)
     what = (
         f"<{node.tag}> in <{node.parent.tag}> is not known to {_mujoco()}, which refuses the file"
     )
@@ -278,7 +277,7 @@ def _bad_number(document: MjcfDocument, node: Node, match: re.Match[str]) -> boo
     why = "is too large" if "large" in match[0] else ""
     wanted = "other numbers" if counts is None else f"{counts[0]} numbers" if counts[0] > 1 else ""
     why = why or f"wanted {wanted or 'a number'}"
-    message = f"{name} of <{node.tag}> is {_short(text)!r}; {why}"
+    message = f"{name} of <{node.tag}> is {short(text, 40)!r}; {why}"
     tell(document, node, "XML006", message, attribute=name, repaired="")
     return True
 
@@ -468,11 +467,3 @@ def _schema_rows() -> tuple[tuple[int, str, frozenset[str]], ...]:
             depth, tag, attributes = rows[-1]
             rows[-1] = (depth, tag, attributes | frozenset(line.split()))
     return tuple(rows)
-
-
-def _closest(word: str, known: frozenset[str]) -> str:
-    """Return the known word that `word` is likely to be meant for; nothing if none is close."""
-    for other in sorted(known):
-        if word.lower() == other or sorted(word.lower()) == sorted(other):
-            return other
-    return next(iter(difflib.get_close_matches(word.lower(), sorted(known), 1, 0.7)), "")

@@ -11,6 +11,7 @@ import numpy as np
 from terrainkit_robots.mjcf_document import Node
 from terrainkit_robots.mjcf_inertia import Solid
 from terrainkit_robots.model import Geometry, Matrix, MeshFile, ShapeKind
+from terrainkit_robots.packages import resolve_in
 
 if TYPE_CHECKING:
     import mujoco
@@ -219,10 +220,13 @@ def mesh_file(mesh: Any, node: Node, strip: bool) -> MeshFile | None:
     if not name:
         return None
     x, y, z = map(float, mesh.scale)
+    folder = node.folder / str(mesh.compiler.meshdir or "")
+    path, found_by = resolve_in((folder,), Path(name).name if strip else name)
     return MeshFile(
         source=node.source,
         filename=name,
-        path=node.folder / str(mesh.compiler.meshdir or "") / (Path(name).name if strip else name),
+        path=path,
+        found_by=found_by,
         attribute="file",
         scale=(x, y, z),
     )

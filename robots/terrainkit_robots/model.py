@@ -79,6 +79,15 @@ class Inertial:
     inertia_source: Source | None = None
     """The element that holds the six numbers, if it is another than `source`."""
 
+    attribute: str = ""
+    """The attribute that holds the inertia, `diaginertia` or `fullinertia`; MJCF only."""
+
+    axes_attribute: str = ""
+    """The attribute that turns the axes of `origin`: `quat`, `euler` or others; MJCF only."""
+
+    missing: tuple[str, ...] = ()
+    """Those of ixx, iyy and izz that are not written; URDF only."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeshFile:

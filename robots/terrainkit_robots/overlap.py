@@ -175,14 +175,14 @@ class OverlapScene:
     def _apart(self, one: tuple[Body, Placed], other: tuple[Body, Placed]) -> bool:
         """Return whether a simulator would let two shapes collide."""
         (a, first), (b, second) = one, other
-        if a is b or self._neighbours(a, b):
+        if a is b or self._neighbors(a, b):
             return False
         if frozenset((first.link, second.link)) in self._facts.model.excluded:
             return False
         g, h = first.geometry, second.geometry
         return bool((g.contype & h.conaffinity) or (h.contype & g.conaffinity))
 
-    def _neighbours(self, a: Body, b: Body) -> bool:
+    def _neighbors(self, a: Body, b: Body) -> bool:
         return self._above(a) == b.index or self._above(b) == a.index
 
     def _above(self, body: Body) -> int | None:

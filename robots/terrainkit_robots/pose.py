@@ -254,23 +254,13 @@ def _bend(
     bending = _bending(leg, facts, positions, shift)
     if bending is None:
         return {}
-    limits = [_searched(bending.hip), _searched(bending.knee)]
-    hip, knee, cost = _grid(bending, limits)
+    limits = np.array([_searched(bending.hip), _searched(bending.knee)])
+    axes = np.linspace(limits[:, 0], limits[:, 1], _GRID, axis=-1)
+    cost = bending.cost(*np.meshgrid(axes[0], axes[1], indexing="ij"))
     # The knee may bend both ways; which is better shows only close to the best place of each.
-    found = [
-        _closing_in(bending, (float(hip[place]), float(knee[place])), limits)
-        for place in _minima(cost)[:_BASINS]
-    ]
-    _, best_hip, best_knee = min(found)
-    return {n: float(q) for n, q in bending.at(np.array(best_hip), np.array(best_knee)).items()}
-
-
-def _grid(
-    bending: _Bending, ranges: Sequence[tuple[float, float]]
-) -> tuple[Matrix, Matrix, Matrix]:
-    """Return positions of hip and knee all over their ranges, and what each pair costs."""
-    hip, knee = np.meshgrid(*(np.linspace(a, b, _GRID) for a, b in ranges), indexing="ij")
-    return hip, knee, bending.cost(hip, knee)
+    starts = np.array([(axes[0, i], axes[1, j]) for i, j in _minima(cost)[:_BASINS]])
+    hip, knee = _closest_in(bending, starts, limits)
+    return {name: float(q) for name, q in bending.at(hip, knee).items()}
 
 
 def _minima(cost: Matrix) -> list[tuple[int, int]]:
@@ -281,20 +271,18 @@ def _minima(cost: Matrix) -> list[tuple[int, int]]:
     return sorted(places, key=lambda place: float(cost[place]))
 
 
-def _closing_in(
-    bending: _Bending, start: tuple[float, float], limits: Sequence[tuple[float, float]]
-) -> tuple[float, float, float]:
-    """Return the cost of the best positions around `start`, and these."""
-    best, cheapest, ranges = start, np.inf, list(limits)
+def _closest_in(bending: _Bending, starts: Matrix, limits: Matrix) -> Matrix:
+    """Return the best positions of hip and knee around any of the starts, shape (n, 2)."""
+    best, width, rows = starts, np.ptp(limits, axis=1), np.arange(len(starts))
     for _ in range(_ROUNDS):
-        ranges = [
-            (max(low, x - (b - a) / 10), min(high, x + (b - a) / 10))
-            for x, (a, b), (low, high) in zip(best, ranges, limits, strict=True)
-        ]
-        hip, knee, cost = _grid(bending, ranges)
-        place = np.unravel_index(int(cost.argmin()), cost.shape)
-        best, cheapest = (float(hip[place]), float(knee[place])), float(cost[place])
-    return cheapest, *best
+        width = width / 5
+        lower, upper = (np.clip(best + side * width / 2, *limits.T) for side in (-1, 1))
+        axes = np.linspace(lower, upper, _GRID, axis=-1)
+        grid = np.broadcast_arrays(axes[:, 0, :, None], axes[:, 1, None, :])
+        cost = bending.cost(*grid).reshape(len(starts), -1)
+        place = cost.argmin(axis=1)
+        best = np.stack([q.reshape(len(starts), -1)[rows, place] for q in grid], axis=1)
+    return np.asarray(best[cost.min(axis=1).argmin()])
 
 
 def _searched(joint: Joint) -> tuple[float, float]:

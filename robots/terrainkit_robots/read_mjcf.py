@@ -229,6 +229,8 @@ class _Reader:
             mass=float(body.mass) * scale.mass if known else None,
             origin=origin,
             inertia=None if inertia is None else inertia * (scale.mass * scale.length**2),
+            attribute=_first(written, ("fullinertia", "diaginertia")),
+            axes_attribute=_first(written, ("quat", "axisangle", "xyaxes", "zaxis", "euler")),
         )
 
     def _turn(self, body: Any, node: Node) -> Matrix:
@@ -430,6 +432,11 @@ def _limit(
         return None if effort is None else Limit(source=source, effort=effort)
     lower, upper = limits
     return Limit(source=source, lower=lower * unit, upper=upper * unit, effort=effort)
+
+
+def _first(node: Node, attributes: Sequence[str]) -> str:
+    """Return the first of some attributes that an element has; nothing if it has none of them."""
+    return next((name for name in attributes if name in node.attributes), "")
 
 
 class _Names:

@@ -25,6 +25,7 @@ from terrainkit_robots.model import (
 )
 from terrainkit_robots.packages import Packages
 from terrainkit_robots.urdf_words import has_variable, misspelt, unexpanded
+from terrainkit_robots.wording import short
 from terrainkit_robots.xml_document import XmlDocument
 from terrainkit_robots.xml_numbers import parse_numbers, without_commas
 
@@ -107,7 +108,7 @@ class _Reader:
         self._tell(
             "XML006",
             element,
-            f"{name} of <{element.tag}> is {_short(text)!r}; wanted {wanted}"
+            f"{name} of <{element.tag}> is {short(text, 40)!r}; wanted {wanted}"
             + (", with a point for the decimals and spaces between" if repaired else ""),
             attribute=name,
             repaired=repaired,
@@ -168,6 +169,11 @@ class _Reader:
             origin=self._origin(element),
             inertia=inertia,
             inertia_source=None if written is None else self._document.source(written),
+            missing=tuple(
+                name
+                for name in ("ixx", "iyy", "izz")
+                if written is None or written.get(name) is None
+            ),
         )
 
     def _geometries(self, link: "etree._Element", tag: str) -> Iterator[Geometry]:
@@ -300,10 +306,6 @@ def rotation_of(rpy: Matrix) -> Matrix:
             [-sp, cp * sr, cp * cr],
         ]
     )
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= 40 else f"{text[:37]}..."
 
 
 def _symmetric(six: list[float | None]) -> Matrix | None:

@@ -1,9 +1,10 @@
 """The words of URDF: which elements and attributes there are, and which look like misspelt ones."""
 
-import difflib
 from collections.abc import Iterator, Mapping
 
 from lxml import etree
+
+from terrainkit_robots.wording import closest
 
 _ATTRIBUTES: Mapping[str, frozenset[str]] = {
     tag: frozenset(names.split())
@@ -84,21 +85,13 @@ def misspelt(root: "etree._Element") -> Iterator[tuple["etree._Element", str, st
         known = _ATTRIBUTES.get(element.tag, frozenset())
         others = sorted(set(element.keys()) - known)[:_MOST_OTHERS] if known else ()
         for name in others:
-            alike = _closest(name, known - set(element.keys()), _NEAR_ATTRIBUTE)
+            alike = closest(name, known - set(element.keys()), _NEAR_ATTRIBUTE)
             if alike:
                 yield element, name, alike
         places = _CHILDREN.get(element.tag, frozenset())
         for child in element.iterchildren(etree.Element) if places else ():
-            alike = "" if child.tag in places else _closest(child.tag, places, _NEAR_TAG)
+            alike = "" if child.tag in places else closest(child.tag, places, _NEAR_TAG)
             if alike:
                 yield child, "", alike
             elif child.tag in places:
                 stack.append(child)
-
-
-def _closest(word: str, known: frozenset[str], near: float) -> str:
-    """Return the known word that `word` is likely to be meant for; nothing if none is close."""
-    for other in sorted(known):
-        if word.lower() == other or sorted(word.lower()) == sorted(other):
-            return other
-    return next(iter(difflib.get_close_matches(word.lower(), sorted(known), 1, near)), "")

@@ -18,6 +18,7 @@ from xml.dom import expatbuilder
 from xml.parsers import expat
 
 from terrainkit_robots.packages import Packages
+from terrainkit_robots.wording import short
 
 ORIGIN = "terrainkit-origin"
 """Attribute that carries the file and line of an element through the expansion."""
@@ -148,7 +149,7 @@ def _check_expression(text: str) -> None:
             name = node.id
         if name.startswith(_INSIDES):
             raise _RefusedError(
-                f"the expression {_short(text)} uses {name}, which is not allowed here"
+                f"the expression {short(text, 60)} uses {name}, which is not allowed here"
             )
 
 
@@ -268,12 +269,12 @@ def _told(error: BaseException, request: Mapping[str, Any]) -> str:
             case "ExpatError":
                 return f"xacro: malformed XML: {each}"
         if isinstance(each, SyntaxError):
-            return f"xacro: invalid expression {_short((each.text or '').strip())!r}: {each.msg}"
+            return f"xacro: invalid expression {short((each.text or '').strip(), 60)!r}: {each.msg}"
         if isinstance(each, OSError):
             return f"xacro: cannot read {each.filename}: {each.strerror}"
     macro = next(iter(getattr(error, "macros", ())), None)
     words = f"{error}{_of(macro)}" or type(error).__name__
-    return f"xacro: {_short(' '.join(words.split()), _WORDS)}"
+    return f"xacro: {short(' '.join(words.split()), _WORDS)}"
 
 
 def _of(macro: Any) -> str:
@@ -288,10 +289,6 @@ def _chain(error: BaseException | None) -> Iterator[BaseException]:
         seen.add(id(error))
         yield error
         error = getattr(error, "exc", None) or error.__cause__ or error.__context__
-
-
-def _short(text: str, length: int = 60) -> str:
-    return text if len(text) <= length else f"{text[: length - 3]}..."
 
 
 if __name__ == "__main__":

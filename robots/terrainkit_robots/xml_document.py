@@ -156,7 +156,7 @@ def without_mark(problem: Problem) -> Fix:
     edit = ReplaceBytes(
         source=problem.source, start=0, end=int(problem.details["bytes"]), replacement=b""
     )
-    return Fix(safety="safe", description="take it away", edits=(edit,))
+    return Fix(safety="safe", description="Take it away.", edits=(edit,))
 
 
 def _mistakes(file: Path, parser: etree.XMLParser) -> list[Problem]:

@@ -341,7 +341,6 @@ def test_every_rule_is_listed(here):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ((), "wanted the code or the name of a rule, or --all"),
         (("INR002", "--all"), "wanted the code or the name of a rule, or --all"),
         (("INR999",), "no rule 'INR999'; there are: XML001"),
     ],

@@ -91,6 +91,27 @@ def test_joints_that_are_not_named_are_at_zero():
     np.testing.assert_allclose(body_poses(bodies, {})[2], at(2, 0, 1))
 
 
+def test_a_joint_that_mimics_follows():
+    follows = '<mimic joint="turn" multiplier="2" offset="0.1"/><axis xyz="2 0 0"/>'
+    bodies = facts(ARM.replace('<axis xyz="2 0 0"/>', follows)).bodies
+    turned = body_poses(bodies, {"turn": 0.5, "slide": 77.0})[2]
+    reach = 2 + 2 * 0.5 + 0.1
+    np.testing.assert_allclose(
+        turned[:3, 3], [reach * np.cos(0.5), reach * np.sin(0.5), 1], atol=1e-12
+    )
+    np.testing.assert_allclose(body_poses(bodies, {})[2], at(2.1, 0, 1))
+
+
+def test_many_positions_at_once():
+    bodies = facts(ARM).bodies
+    turns, slides = np.linspace(-3, 3, 5), np.linspace(0, 1, 5)
+    many = body_poses(bodies, {"turn": turns, "slide": slides})[2]
+    assert many.shape == (5, 4, 4)
+    for pose, turn, slide in zip(many, turns, slides, strict=True):
+        one = body_poses(bodies, {"turn": float(turn), "slide": float(slide)})[2]
+        np.testing.assert_allclose(pose, one, atol=1e-15)
+
+
 def test_names_that_are_not_there_are_ignored():
     np.testing.assert_allclose(body_poses(facts(ARM).bodies, {"x": 1.0})[2], at(2, 0, 1))
 

@@ -67,7 +67,7 @@ def test_one_for_each_file_that_is_there(robot):
     assert used.name == "m/foot.stl"
     assert used.source.line == 3
     assert len(used.uses) == 3
-    assert used.role == "collision mesh of a and 1 more"
+    assert used.role == "collision mesh of a, b"
     assert [use.link.name for use in used.collisions] == ["a", "b"]
 
 

@@ -276,6 +276,24 @@ def test_a_robot_that_walks_along_y_is_mirrored_across_x():
     assert len(robot.mirror.pairs) == 4
 
 
+def test_a_robot_beside_its_own_origin_is_mirrored_in_its_middle():
+    # The frame of the trunk is that of a sensor at its side.
+    path = bundled.find("quadruped")
+    plain = Facts(read_robot(path))
+    trunk = plain.bodies[0].top.name
+    text = path.read_text().replace(
+        "</robot>",
+        '<link name="sensor"/><joint name="mounted" type="fixed"><parent link="sensor"/>'
+        f'<child link="{trunk}"/><origin xyz="0 0.1 0"/></joint></robot>',
+    )
+    robot = Facts(read_robot(FILE, contents={FILE: text.encode()}))
+    assert robot.bodies[0].top.name == "sensor"
+    assert robot.mirror.offset == pytest.approx(0.1)
+    assert plain.mirror.offset == 0
+    assert pairs(robot) == pairs(plain)
+    assert robot.stance.positions == pytest.approx(plain.stance.positions, abs=1e-6)
+
+
 def test_robots_without_bodies_or_joints():
     assert facts().mirror.pairs == ()
     assert Facts(read_robot(FILE, contents={FILE: b'<robot name="r"/>'})).mirror.pairs == ()

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from terrainkit_robots.effort import effort_of
 from terrainkit_robots.facts_record import facts_record
 from terrainkit_robots.report.tally import count
 
@@ -29,9 +30,7 @@ def robot_summary(facts: "Facts") -> Iterator[tuple[str, str]]:
 
 def _efforts(facts: "Facts") -> dict[str, float]:
     """Return the largest torque of each joint, where that is known."""
-    limits = {joint.name: joint.limit for joint in facts.joints}
-    efforts = {name: limit.effort for name, limit in limits.items() if limit is not None}
-    efforts |= {actuator.joint: actuator.effort for actuator in facts.model.actuators}
+    efforts = {joint.name: effort_of(facts, joint) for joint in facts.joints}
     return {name: effort for name, effort in efforts.items() if effort is not None and effort > 0}
 
 
@@ -73,7 +72,9 @@ def _joints(record: Mapping[str, Any], efforts: Mapping[str, float]) -> Iterator
             role = joint["role"]
             seen[role] = seen.get(role, 0) + 1
             label = role if seen[role] == 1 else f"{role} {seen[role]}"
-            roles.setdefault(label, []).append(joint["name"])
+            same = roles.setdefault(label, [])
+            if joint["name"] not in same:  # a waist is a part of every leg
+                same.append(joint["name"])
     for label, names in roles.items():
         unit = "m" if label.startswith("slide") else "rad"
         positions = [record["standing_pose"].get(name) for name in names]

@@ -56,7 +56,8 @@ def lines(reports: Sequence[Report], width: int = WIDTH) -> Iterator[Line]:
 def _robot(report: Report, width: int) -> Iterator[Line]:
     file = plain(str(report.facts.model.file))
     yield (Span(file, "bold"),)
-    for label, text in robot_summary(report.facts):
+    model = report.facts.model  # of a file that is no robot there is nothing to sum up
+    for label, text in robot_summary(report.facts) if model.links or not model.problems else ():
         first = f"  {label:<9} "
         yield from _wrapped(Span(first, "dim"), plain(text), width, indent=len(first))
     yield ()

@@ -77,7 +77,9 @@ def no_foot_collision(robot: Facts) -> Iterator[Defect]:
                 yield Defect(
                     subject=leg.foot,
                     source=link.source,
-                    message=f"{leg.foot}, the foot of a leg, has no collision shape",
+                    message=(
+                        f"{leg.foot}, the foot of a leg, has 0 collision shapes; wanted 1 or more"
+                    ),
                     certainty="likely",
                 )
         elif _bare(leg, body, robot):
@@ -85,8 +87,8 @@ def no_foot_collision(robot: Facts) -> Iterator[Defect]:
                 subject=leg.foot,
                 source=link.source,
                 message=(
-                    f"{leg.foot}, the foot of a leg, is drawn, but has no collision shape; those "
-                    f"of {body.top.name} end above it"
+                    f"{leg.foot}, the foot of a leg, is drawn, but has 0 collision shapes, and "
+                    f"those of {body.top.name} end above it; wanted 1 or more"
                 ),
                 certainty="likely",
             )
@@ -116,16 +118,18 @@ def no_trunk_collision(robot: Facts) -> Iterator[Defect]:
     Source:
         legged_gym's terminate_after_contacts_on and Isaac Lab's illegal_contact both name the base.
     """
-    legs = {index for leg in robot.legs for index in leg.limb.chain}
-    rest = [body for body in robot.bodies if body.index not in legs]
-    if any(_has_contacts(body) for body in rest):
+    # A body that several legs hang from is no leg, and a planar walker's trunk hangs from slides.
+    used = Counter(index for leg in robot.legs for index in leg.limb.chain)
+    rest = [body for body in robot.bodies if used[body.index] != 1]
+    if any(_has_contacts(body) for body in rest) or robot.bodies[0].virtual:
         return
     if any(_has_contacts(body) for body in robot.bodies):
         trunk = robot.bodies[0]
         yield Defect(
             subject=trunk.name,
             source=robot.tree.links[trunk.name].source,
-            message=f"{trunk.name}, the trunk, has no collision shape, nor has anything above it",
+            message=f"{trunk.name}, the trunk, has 0 collision shapes, and so has all that is no "
+            "leg; wanted 1 or more",
             certainty="likely",
         )
 
@@ -146,7 +150,7 @@ def no_collision(robot: Facts) -> Iterator[Defect]:
         yield Defect(
             subject=robot.model.name or robot.model.file.name,
             source=robot.model.source,
-            message=f"none of the {len(robot.links)} links has a collision shape",
+            message=f"none of the {len(robot.links)} links has a collision shape; wanted 1 or more",
         )
 
 
@@ -186,7 +190,9 @@ def overlap(robot: Facts) -> Iterator[Defect]:
 
     Simulators filter contacts between a body and its parent, and no others. Every other overlap is
     pushed apart from the first step on: the robot jumps, jitters, or explodes. Primitives are
-    compared as they are, meshes by their convex hull, as most simulators do.
+    compared as they are, meshes by their convex hull, as most simulators do. Over 1 mm is a
+    warning, over 10 mm an error on a robot with legs; mesh hulls are a warning at most, since other
+    simulators may use the mesh itself, or pieces of it.
 
     Fix:
         Shrink or move one of the shapes, or switch the contact of this pair off (<exclude> in MJCF,
@@ -200,8 +206,8 @@ def overlap(robot: Facts) -> Iterator[Defect]:
     for pair, worst in _worst(robot, robot.overlaps.overlaps(robot.positions)).items():
         if worst.depth <= _SLIGHT:
             continue
-        severe = worst.depth > _DEEP and not worst.hulls
-        limit = _DEEP if severe else _SLIGHT
+        # An arm is bolted down, and its drivers keep pairs that always touch out of the check.
+        severe = worst.depth > _DEEP and not worst.hulls and bool(robot.legs)
         what = "the convex hulls of " if worst.hulls else ""
         first, second = worst.first.link, worst.second.link
         yield Defect(
@@ -209,7 +215,7 @@ def overlap(robot: Facts) -> Iterator[Defect]:
             source=worst.second.geometry.source,
             message=(
                 f"{what}{first} and {second} are {1000 * worst.depth:.1f} mm inside each other at "
-                f"the default pose; wanted at most {1000 * limit:.0f} mm"
+                f"the default pose; wanted at most {1000 * _SLIGHT:.0f} mm"
             ),
             severity="error" if severe else "warning",
             certainty="likely" if worst.hulls else "proven",

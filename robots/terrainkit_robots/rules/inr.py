@@ -16,7 +16,7 @@ from terrainkit_robots.density import (
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.inertia_repair import repair
 from terrainkit_robots.main_link import inertia_source, main_link, mass_source
-from terrainkit_robots.model import Link, Matrix
+from terrainkit_robots.model import Inertial, Link, Matrix
 from terrainkit_robots.per_robot import per_robot
 from terrainkit_robots.physical_inertia import (
     LARGEST,
@@ -30,6 +30,7 @@ from terrainkit_robots.physical_inertia import (
 from terrainkit_robots.placeholder import is_identity, placeholders
 from terrainkit_robots.rule import Defect, Severity, rule
 from terrainkit_robots.unread import Unread
+from terrainkit_robots.wording import names
 
 _IMPOSSIBLE = 0.99
 """Ratio (e0 + e1) / e2 below which no rounding explains that a body cannot exist."""
@@ -116,13 +117,13 @@ def _empty_links(robot: Facts) -> Iterator[Defect]:
     told: tuple[tuple[list[Link], Severity], ...] = ((parts, "warning"), (frames, "info"))
     for links, severity in told:
         if links:
-            names = ", ".join(link.name for link in links[:6]) + ", ..." * (len(links) > 6)
             yield Defect(
                 subject=links[0].name,
                 source=mass_source(links[0]),
                 severity=severity,
-                message=f"the mass of {names} is 0 kg; that is fine where fixed joints are merged, "
-                "and refused or replaced by simulators that keep such links as bodies",
+                message=f"the mass of {names(link.name for link in links)} is 0 kg; that is fine "
+                "where fixed joints are merged, and refused or replaced by simulators that keep "
+                "such links as bodies",
                 measured={"links": len(links)},
             )
 
@@ -201,7 +202,7 @@ def not_positive_definite(robot: Facts) -> Iterator[Defect]:
     Turning a body about any axis takes work, so all principal moments are above zero. With one that
     is not, the body spins up by itself and the simulation ends in NaN; MuJoCo refuses the file.
     Large products ixy, ixz, iyz beside small ixx, iyy, izz do that, too. A zero inertia is fine
-    on a link that fixed joints make part of a body with an inertia.
+    on a small link that fixed joints make part of a body with an inertia.
 
     Fix:
         Take the six numbers from CAD, about the centre of mass, in kg m2. The unsafe fix puts the
@@ -217,10 +218,10 @@ def not_positive_definite(robot: Facts) -> Iterator[Defect]:
             continue
         assert link.inertial is not None
         inertia = link.inertial.inertia
-        if inertia is None and robot.model.kind != "mjcf":
-            message = f"link {link.name} has a mass but not all of an inertia; wanted both"
-            yield Defect(subject=link.name, source=link.inertial.source, message=message)
-        elif inertia is None or is_zero(inertia):
+        if inertia is None:
+            if robot.model.kind != "mjcf" or _spins_freely(robot, link, main):
+                yield _incomplete(robot, link, link.inertial)
+        elif is_zero(inertia):
             if _spins_freely(robot, link, main):
                 yield _indefinite(robot, link, "is zero")
         elif in_reach(inertia) and principal_moments(inertia)[0] <= NOTHING:
@@ -231,10 +232,25 @@ _SIX = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz", "diaginertia", "fullinertia")
 """Attributes that hold an inertia, in URDF and MJCF."""
 
 
+def _incomplete(robot: Facts, link: Link, inertial: Inertial) -> Defect:
+    lacks, wanted = "no <inertia>", "an <inertia>"
+    if robot.model.kind == "mjcf":
+        lacks, wanted = "neither diaginertia nor fullinertia", "one of them"
+    elif inertial.inertia_source is not None:
+        lacks = f"an <inertia> without {', '.join(inertial.missing) or 'numbers'}"
+        wanted = "all of ixx, iyy and izz"
+    return Defect(
+        subject=link.name,
+        source=inertia_source(link),
+        message=f"link {link.name} has a mass of {inertial.mass:.4g} kg, but {lacks}; wanted "
+        f"{wanted}",
+    )
+
+
 def _indefinite(robot: Facts, link: Link, what: str) -> Defect:
     assert link.inertial is not None
-    inertia = link.inertial.inertia
-    moments = np.zeros(3) if inertia is None else principal_moments(inertia)
+    assert link.inertial.inertia is not None
+    moments = principal_moments(link.inertial.inertia)
     return Defect(
         subject=link.name,
         source=inertia_source(link),
@@ -246,15 +262,16 @@ def _indefinite(robot: Facts, link: Link, what: str) -> Defect:
 
 
 def _spins_freely(robot: Facts, link: Link, main: Container[int]) -> bool:
-    """Return whether the link's body is moved and has no inertia from its other links either.
+    """Return whether the link is the main one of a body that is moved.
 
-    Of the links of such a body only one is told of: the one in `main`.
+    In URDF, small parts that are fixed to it would hide that its inertia was forgotten, but not
+    make it up; in MJCF a body is a part of another on purpose.
     """
     body = robot.body_of.get(link.name) if id(link) in main else None
     if body is None or body.virtual or body.mass <= NOTHING:
         return False
     moved = body.parent is not None or bool(robot.legs)
-    return moved and float(body.principal[0]) <= NOTHING
+    return moved and (robot.model.kind != "mjcf" or float(body.principal[0]) <= NOTHING)
 
 
 @rule("INR004", "triangle-inequality", "error", fixes="unsafe")
@@ -316,10 +333,10 @@ def placeholder_inertia(robot: Facts) -> Iterator[Defect]:
         else:
             value = f"{_listed(np.diag(first.inertial.inertia))} kg m2"
             wanted = "each its own, as they are not the same part"
-        names = ", ".join(link.name for link in links[:5]) + ", ..." * (len(links) > 5)
-        whose = f"{len(links)} of {_count_massive(robot)} bodies ({names})"
+        listed = names(link.name for link in links)
+        whose = f"{len(links)} of {_count_massive(robot)} bodies ({listed})"
         if len(links) == 1:
-            whose = f"body {names}"
+            whose = f"body {listed}"
         yield Defect(
             subject=first.name,
             source=first.inertial.inertia_source or first.inertial.source,
@@ -523,7 +540,7 @@ def mass_ratio(robot: Facts) -> Iterator[Defect]:
             source=mass_source(main_link(light)),
             message=f"body {light.name} has {light.mass:.3g} kg and its neighbour {heavy.name} "
             f"{heavy.mass:.4g} kg: a ratio of {ratio:.0f}; wanted {_RATIO:.0f} at most",
-            measured={"ratio": ratio, "mass": light.mass, "neighbour": heavy.mass},
+            measured={"ratio": ratio, "mass": light.mass, "neighbor": heavy.mass},
         )
 
 
@@ -607,15 +624,14 @@ def mass_drift(robot: Facts) -> Iterator[Defect]:
     share = total / robot.total_mass
     if share <= _DRIFT:
         return
-    names = sorted((link for link in added if added[link] > 0), key=lambda link: -added[link])
-    listed = ", ".join(link.name for link in names[:5]) + (", ..." if len(names) > 5 else "")
+    added_to = sorted((link for link in added if added[link] > 0), key=lambda link: -added[link])
     yield Defect(
-        subject=names[0].name,
-        source=names[0].source,
+        subject=added_to[0].name,
+        source=added_to[0].source,
         severity="error" if share > _DRIFT_FAR else "warning",
         message=f"MuJoCo adds {total:.3g} kg for the collision shapes of links without <inertial> "
-        f"({listed}): {share:.1%} of the declared {robot.total_mass:.4g} kg; wanted "
-        f"{_DRIFT:.0%} at most",
+        f"({names(link.name for link in added_to)}): {share:.1%} of the declared "
+        f"{robot.total_mass:.4g} kg; wanted {_DRIFT:.0%} at most",
         measured={"added": total, "declared": robot.total_mass, "share": share},
     )
 

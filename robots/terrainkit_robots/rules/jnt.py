@@ -1,6 +1,5 @@
 """JNT: joints."""
 
-import difflib
 import math
 from collections.abc import Iterator
 
@@ -20,6 +19,7 @@ from terrainkit_robots.rules.inr import (
 )
 from terrainkit_robots.stance import GRAVITY
 from terrainkit_robots.unread import Unread
+from terrainkit_robots.wording import closest, names, short
 
 _TINY = 1e-6
 """Length below which an axis points nowhere: MuJoCo refuses those."""
@@ -46,6 +46,9 @@ _NO_SPIN = 1500.0
 _ZERO = 1e-3
 """How far zero may be outside the limits [rad] or [m]; less is rounding."""
 
+_ALIKE = 0.6
+"""Share of common letters from which on a type is taken for a misspelt one."""
+
 _WEAK, _TOO_WEAK = 0.5, 0.9
 """Share of the effort that standing still may take: walking needs two to three times as much."""
 
@@ -66,11 +69,11 @@ def unknown_type(robot: Facts) -> Iterator[Defect]:
     known = JOINT_TYPES if robot.model.kind == "mjcf" else JOINT_TYPES - {"ball"}
     for joint in robot.model.joints:
         if joint.kind and joint.kind not in known:
-            alike = _closest(joint.kind, known)
+            alike = _meant(joint.kind, known)
             yield Defect(
                 subject=joint.name,
                 source=joint.source,
-                message=f"joint {joint.name} is of type {joint.kind[:40]!r}"
+                message=f"joint {joint.name} is of type {short(joint.kind, 40)!r}"
                 f"{f', which may stand for {alike}' if alike else ''}; wanted one of "
                 f"{', '.join(sorted(known))}",
             )
@@ -91,11 +94,9 @@ _OTHER_NAMES = {
 }
 
 
-def _closest(kind: str, known: frozenset[str]) -> str:
+def _meant(kind: str, known: frozenset[str]) -> str:
     word = kind.strip().lower()
-    if word in _OTHER_NAMES:
-        return _OTHER_NAMES[word]
-    return next(iter(difflib.get_close_matches(word, sorted(known), 1, 0.6)), "")
+    return _OTHER_NAMES.get(word) or closest(word, known, _ALIKE)
 
 
 @rule("JNT002", "prismatic-leg", "warning", legged=True)
@@ -225,11 +226,12 @@ def unnormalized_axis(robot: Facts) -> Iterator[Defect]:
 
 @rule("JNT006", "missing-limit", "error")
 def missing_limit(robot: Facts) -> Iterator[Defect]:
-    """A revolute or prismatic joint has no limits, or the same one twice.
+    """A revolute or prismatic joint has no limits, only one, or the same one twice.
 
     What is not written counts as 0, and a range of nothing as no range at all: MuJoCo and
-    legged_gym let the joint turn without end, urdfdom refuses the file, others lock the joint. Of a
-    limit with one end only MuJoCo takes none, and the others take 0 for the other end.
+    legged_gym let the joint turn without end, urdfdom refuses the file, others lock the joint. A
+    limit with one end only is an error, too: URDF takes 0 for the other end, but MuJoCo takes no
+    limit at all, whichever end is there, and says nothing.
 
     Fix:
         Give <limit> the lower and upper end of the real joint, in radians or metres. A joint that
@@ -246,14 +248,9 @@ def missing_limit(robot: Facts) -> Iterator[Defect]:
             yield Defect(
                 subject=joint.name,
                 source=joint.limit.source if joint.limit else joint.source,
-                severity="warning" if what in _ONE_END else "error",
                 message=f"the {joint.kind} joint {joint.name} {what}; wanted lower and upper, one "
                 "below the other",
             )
-
-
-_ONE_END = ("has no lower", "has no upper")
-"""What URDF allows, and simulators read in two ways."""
 
 
 def _lacking(joint: Joint, mjcf: bool) -> str:
@@ -268,8 +265,17 @@ def _lacking(joint: Joint, mjcf: bool) -> str:
     if len(missing) == 2:
         return "" if mjcf else "has neither lower nor upper"
     if lower == upper:
-        return f"has lower = upper = {lower:g}"
-    return f"has no {missing[0]}" if missing and lower < upper else ""
+        return f"has lower = upper = {lower:g} {position_unit(joint)}"
+    if not missing or lower > upper:
+        return ""  # JNT007
+    there = "upper" if missing == ["lower"] else "lower"
+    end = f"{getattr(limit, there):g} {position_unit(joint)}"
+    return f"has {there} = {end} but no {missing[0]}, and so no limit in MuJoCo"
+
+
+def position_unit(joint: Joint) -> str:
+    """Return the unit of where a joint is."""
+    return "m" if joint.kind == "prismatic" else "rad"
 
 
 def _ends(limit: Limit) -> tuple[float, float]:
@@ -299,8 +305,8 @@ def inverted_limit(robot: Facts) -> Iterator[Defect]:
             yield Defect(
                 subject=joint.name,
                 source=joint.limit.source,
-                message=f"the limits of joint {joint.name} are {lower:g} to {upper:g}; wanted "
-                "lower below upper",
+                message=f"the limits of joint {joint.name} are {lower:g} to {upper:g} "
+                f"{position_unit(joint)}; wanted lower below upper",
                 measured={"lower": lower, "upper": upper},
             )
 
@@ -356,8 +362,8 @@ def no_effort(robot: Facts) -> Iterator[Defect]:
             yield Defect(
                 subject=joint.name,
                 source=joint.limit.source,
-                message=f"the effort of joint {joint.name} is {effort:g} {_unit(joint)}; wanted "
-                "what its motor can give",
+                message=f"the effort of joint {joint.name} is {effort:g} {effort_unit(joint)}; "
+                "wanted what its motor can give",
                 measured={"effort": effort},
             )
         elif effort is None and not unread.has(joint.name, "effort"):
@@ -366,7 +372,7 @@ def no_effort(robot: Facts) -> Iterator[Defect]:
                 source=joint.limit.source,
                 severity="warning",
                 message=f"the limit of joint {joint.name} has no effort; wanted what its motor "
-                f"can give [{_unit(joint)}]",
+                f"can give [{effort_unit(joint)}]",
             )
 
 
@@ -387,11 +393,13 @@ def _is_blank(joint: Joint) -> bool:
     return joint.kind != "continuous" and not any(numbers)
 
 
-def _unit(joint: Joint) -> str:
+def effort_unit(joint: Joint) -> str:
+    """Return the unit of what a joint gives."""
     return "N" if joint.kind == "prismatic" else "N m"
 
 
-def _speed(joint: Joint) -> str:
+def speed_unit(joint: Joint) -> str:
+    """Return the unit of how fast a joint moves."""
     return "m/s" if joint.kind == "prismatic" else "rad/s"
 
 
@@ -416,12 +424,12 @@ def no_velocity(robot: Facts) -> Iterator[Defect]:
             continue
         if speed is None and unread.has(joint.name, "velocity"):
             continue
-        what = "not given" if speed is None else f"{speed:g} {_speed(joint)}"
+        what = "not given" if speed is None else f"{speed:g} {speed_unit(joint)}"
         yield Defect(
             subject=joint.name,
             source=joint.limit.source,
             message=f"the velocity of joint {joint.name} is {what}; wanted what its motor reaches "
-            f"[{_speed(joint)}]",
+            f"[{speed_unit(joint)}]",
         )
 
 
@@ -448,8 +456,8 @@ def placeholder_limit(robot: Facts) -> Iterator[Defect]:
         assert joint.limit is not None
         fastest = _NO_SPIN if joint.kind == "continuous" else _NO_SPEED
         for name, number, limit, unit in (
-            ("effort", joint.limit.effort, most[_unit(joint)], _unit(joint)),
-            ("velocity", joint.limit.velocity, fastest, _speed(joint)),
+            ("effort", joint.limit.effort, most[effort_unit(joint)], effort_unit(joint)),
+            ("velocity", joint.limit.velocity, fastest, speed_unit(joint)),
         ):
             if number is not None and (number > limit or (name == "effort" and number == limit)):
                 yield Defect(
@@ -478,24 +486,27 @@ def zero_outside_limits(robot: Facts) -> Iterator[Defect]:
     started = [joint for joint in outside if joint.name in robot.model.home or robot.legs]
     if started:
         first = started[0]
-        names = ", ".join(joint.name for joint in started[:6]) + ", ..." * (len(started) > 6)
+        assert first.limit is not None
+        lower, upper = _ends(first.limit)
         yield Defect(
             subject=first.name,
-            source=first.limit.source if first.limit else first.source,
-            message=f"zero is outside the limits of {names}; there is a pose to start from",
-            measured={"joints": len(started)},
+            source=first.limit.source,
+            message=f"zero is outside the limits of {names(joint.name for joint in started)}, "
+            f"which for {first.name} are {lower:.5g} to {upper:.5g} {position_unit(first)}; there "
+            "is a pose to start from",
+            measured={"joints": len(started), "lower": lower, "upper": upper},
         )
     for joint in outside:
         if joint not in started:
             assert joint.limit is not None
             lower, upper = _ends(joint.limit)
-            unit = "m" if joint.kind == "prismatic" else "rad"
             yield Defect(
                 subject=joint.name,
                 source=joint.limit.source,
                 severity="warning",
-                message=f"the limits of joint {joint.name} are {lower:.5g} to {upper:.5g} {unit}; "
-                f"wanted {joint.reference:g} between them, or a pose to start from",
+                message=f"the limits of joint {joint.name} are {lower:.5g} to {upper:.5g} "
+                f"{position_unit(joint)}; wanted {joint.reference:g} between them, or a pose to "
+                "start from",
                 measured={"lower": lower, "upper": upper},
             )
 
@@ -571,12 +582,12 @@ def safety_controller(robot: Facts) -> Iterator[Defect]:
     joints = [j for j in robot.model.joints if j.safety_controller is not None and j.moves]
     if joints:
         assert joints[0].safety_controller is not None
-        names = ", ".join(joint.name for joint in joints[:6]) + ", ..." * (len(joints) > 6)
+        have = "has" if len(joints) == 1 else "have"
         yield Defect(
             subject=joints[0].name,
             source=joints[0].safety_controller,
-            message=f"{names} has a safety_controller with k_position; Genesis takes that for the "
-            "gain of a position controller",
+            message=f"{names(joint.name for joint in joints)} {have} a safety_controller with "
+            "k_position; Genesis takes that for the gain of a position controller",
             measured={"joints": len(joints)},
         )
 
@@ -613,14 +624,14 @@ def too_weak(robot: Facts) -> Iterator[Defect]:
             raise CannotCheckError(f"how {defect.subject} moves is in doubt")
     sure = any(leg.limb.words for leg in robot.legs)
     for joint, torque, effort in weak:
-        share = torque / effort
+        share, unit = torque / effort, effort_unit(joint)
         yield Defect(
             subject=joint.name,
             source=joint.limit.source if joint.limit else joint.source,
             severity="error" if share > _TOO_WEAK and sure else "warning",
             certainty="likely",
-            message=f"joint {joint.name} holds {torque:.3g} {_unit(joint)} in the standing pose, "
-            f"{share:.0%} of its effort of {effort:.4g} {_unit(joint)}; wanted {_WEAK:.0%} at most",
+            message=f"joint {joint.name} holds {torque:.3g} {unit} in the standing pose, "
+            f"{share:.0%} of its effort of {effort:.4g} {unit}; wanted {_WEAK:.0%} at most",
             measured={"torque": torque, "effort": effort, "share": share},
         )
 

@@ -175,7 +175,11 @@ def foot_merged_away(robot: Facts) -> Iterator[Defect]:
         fix = None
         if joint.source.element is not None:
             edit = SetAttribute(source=joint.source, name="dont_collapse", value="true")
-            fix = Fix(safety="safe", description='add dont_collapse="true"', edits=(edit,))
+            fix = Fix(
+                safety="safe",
+                description=f'Add dont_collapse="true" to joint {joint.name}.',
+                edits=(edit,),
+            )
         yield Defect(
             subject=leg.foot,
             source=joint.source,
@@ -217,7 +221,12 @@ def forward(robot: Facts) -> Iterator[Defect]:
             )
             return
     if robot.mirror.normal[0] == 1:
-        yield _turned(robot, "most legs bend about x; wanted y, so that they stride along x")
+        about_x = sum(abs(leg.pitch[0]) > abs(leg.pitch[1]) for leg in robot.legs)
+        yield _turned(
+            robot,
+            f"{about_x} of {len(robot.legs)} legs bend about x; wanted y for half of them or more, "
+            "so that they stride along x",
+        )
 
 
 def _places(robot: Facts, words: set[str], axis: int) -> list[float]:
@@ -297,13 +306,16 @@ def leg_points_up(robot: Facts) -> Iterator[Defect]:
         start = _root(limb, robot)
         leaf = robot.bodies[limb.chain[-1]]
         first = limb.joints[0]
+        rise = float(limb.tip[2] - start[2])
+        reach = float(np.linalg.norm(limb.tip - start))
         yield Defect(
             subject=leaf.name,
             source=first.source,
             message=(
-                f"the leg of {leaf.name} ends {float(limb.tip[2] - start[2]):.3f} m above its "
-                f"joint {first.name} with all joints at zero; the others end below"
+                f"the leg of {leaf.name} ends {rise:.3f} m above its joint {first.name} with all "
+                f"joints at zero, {rise / reach:.0%} of the {reach:.3f} m between them; wanted "
+                f"less than {_UPWARD:.0%}, and below as the others"
             ),
             certainty="likely",
-            measured={"rise": round(float(limb.tip[2] - start[2]), 4)},
+            measured={"rise": round(rise, 4), "reach": round(reach, 4)},
         )

@@ -10,7 +10,7 @@ from terrainkit_robots.facts import Facts
 from terrainkit_robots.fix import Edit, Fix
 from terrainkit_robots.mesh_header import MUJOCO_SUFFIXES
 from terrainkit_robots.mesh_scale import HUGE, LARGE, TINY, Misfit, Scales
-from terrainkit_robots.mesh_surface import binary_stl, clustered
+from terrainkit_robots.mesh_surface import FLAT, binary_stl, clustered, thickness
 from terrainkit_robots.mesh_uses import (
     MeshUse,
     UsedMesh,
@@ -25,6 +25,7 @@ from terrainkit_robots.mesh_uses import (
 from terrainkit_robots.meshes import MeshError, Meshes, TooLargeError
 from terrainkit_robots.packages import is_absolute, names_package, right_letters
 from terrainkit_robots.rule import CannotCheckError, Defect, Severity, rule
+from terrainkit_robots.wording import names
 from terrainkit_robots.xml_document import read_bytes
 
 _MOST_FACES = 200_000
@@ -175,13 +176,15 @@ def package_path(robot: Facts) -> Iterator[Defect]:
         groups.setdefault(key, []).append((used, fix))
     for (place, _), alike in groups.items():
         first, fix = alike[0]
-        more = f", and {len(alike) - 1} more" if len(alike) > 1 else ""
         edits = [edit for _, each in alike if each is not None for edit in each.edits]
-        text = fix.description if fix and not more else "Refer to them relative to this file."
+        text = (
+            fix.description if fix and len(alike) == 1 else "Refer to them relative to this file."
+        )
         yield Defect(
             subject=first.name,
             source=first.source,
-            message=f"{first.name}{more}: named by {place}, which MuJoCo cannot load",
+            message=f"{names((each.name for each, _ in alike), 2)}: named by {place}, which MuJoCo "
+            "cannot load",
             measured={"meshes": len(alike)},
             fix=None if fix is None else _fix(fix.safety, text, edits),
         )
@@ -489,13 +492,15 @@ def flat_mesh(robot: Facts) -> Iterator[Defect]:
         for use in used.collisions:
             if not robot.meshes.readable(use.mesh) or not robot.meshes.is_flat(use.mesh):
                 continue
-            corners = len(robot.meshes.vertices(use.mesh))
+            corners = robot.meshes.vertices(use.mesh)
+            flat = thickness(corners)
             yield Defect(
                 subject=used.name,
                 source=use.mesh.source,
-                message=f"{_words(used)} is flat: its {corners:,} corners lie in a plane, on a "
-                "line or in one point, and have no hull",
-                measured={"corners": corners},
+                message=f"{_words(used)} is flat: where its {len(corners):,} corners are "
+                f"closest together they span {flat:.2g} of its diagonal; wanted {FLAT:g} or more, "
+                "or there is no hull",
+                measured={"corners": len(corners), "thickness": flat},
             )
             break
 
@@ -640,7 +645,7 @@ def far_from_convex(robot: Facts) -> Iterator[Defect]:
                 subject=used.name,
                 source=first.mesh.source,
                 message=f"{_words(used)} encloses {solid:.3g} m3, and its hull {hull:.3g} m3: "
-                f"{hull / solid:.3g} times as much",
+                f"{hull / solid:.3g} times as much; wanted {_BLOATED:g} times or less",
                 measured={"solid": solid, "hull": hull},
             )
 

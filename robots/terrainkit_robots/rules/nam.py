@@ -10,6 +10,7 @@ from functools import cached_property
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.model import Joint, Link
 from terrainkit_robots.rule import Defect, rule
+from terrainkit_robots.wording import names, short
 
 _FEWEST_TWINS = 4
 """Of fewer mirrored names nobody could tell a pattern."""
@@ -25,26 +26,10 @@ _ALIKE = 0.75
 """Share of common letters from which on two names are the same with a slip, rather than two names.
 Left and right hands may well hold two tools."""
 
-_MOST = 20
-"""So many defects of one rule are told; more names that clash were made by a program."""
-
-_MOST_NAMES = 5
-"""So many names are listed in a message."""
-
 _MOST_LETTERS = 100
-"""Longer names are cut in messages, and not looked into."""
+"""Longer names are not looked into."""
 
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^A-Za-z\d]+")
-
-
-def _short(name: str) -> str:
-    return name if len(name) <= _MOST_LETTERS else f"{name[:_MOST_LETTERS]}..."
-
-
-def _listed(names: Sequence[str]) -> str:
-    shown = [_short(name) for name in names[:_MOST_NAMES]]
-    more = len(names) - len(shown)
-    return ", ".join(shown) + (f" and {more} more" if more else "")
 
 
 # Siblings.
@@ -112,7 +97,7 @@ def sibling_pattern(robot: Facts) -> Iterator[Defect]:
     """
     twins = [t for t in _twins(robot) if len(t.left.name + t.right.name) <= 2 * _MOST_LETTERS]
     sides = _Sides(twins)
-    names = _Names(robot, sides)
+    known = _Names(robot, sides)
     for what in ("joint", "link"):
         kind = [each for each in twins if each.what == what]
         odd = [each for each in kind if not sides.explain(each)]
@@ -121,7 +106,7 @@ def sibling_pattern(robot: Facts) -> Iterator[Defect]:
         if what == "link":
             odd += _carried(robot, sides)
         for each in odd:
-            yield from names.odd(each)
+            yield from known.odd(each)
 
 
 def _twins(robot: Facts) -> Iterator[_Twins]:
@@ -193,9 +178,9 @@ class _Names:
             "joint": {joint.name for joint in robot.model.joints},
         }
         every = set.union(*self._taken.values())
-        names = [name for name in every if len(name) <= _MOST_LETTERS]
-        self._forms = Counter(sides.form(name) for name in names)
-        self._words = Counter(word for name in names for word in set(_words(name)))
+        brief = [name for name in every if len(name) <= _MOST_LETTERS]
+        self._forms = Counter(sides.form(name) for name in brief)
+        self._words = Counter(word for name in brief for word in set(_words(name)))
 
     def odd(self, twins: _Twins) -> Iterator[Defect]:
         """Yield the one of two twins whose name has a slip, if one has."""
@@ -276,7 +261,7 @@ def identifier(robot: Facts) -> Iterator[Defect]:
     every: tuple[tuple[str, Sequence[Link | Joint]], ...] = (("links", links), ("joints", joints))
     for what, items in every:
         clashing = _clashing(items)
-        for valid, same in list(clashing.items())[:_MOST]:
+        for valid, same in clashing.items():
             yield _clash(what, valid, same)
         told = {item.name for same in clashing.values() for item in same}
         for item in items:
@@ -289,7 +274,7 @@ def identifier(robot: Facts) -> Iterator[Defect]:
             subject=first.name,
             source=first.source,
             message=f"{count} other characters than letters, digits and underscores: "
-            f"{_listed(list(renamed))}; USD would call the first {_short(_valid(first.name))}",
+            f"{names(renamed)}; USD would call the first {short(_valid(first.name))}",
             measured={"names": len(renamed)},
         )
 
@@ -308,11 +293,10 @@ def _clashing(items: Sequence[Link | Joint]) -> dict[str, list[Link | Joint]]:
 
 
 def _clash(what: str, valid: str, same: Sequence[Link | Joint]) -> Defect:
-    names = _listed([item.name for item in same])
     return Defect(
         subject=same[1].name,
         source=same[1].source,
-        message=f"{what} {names} would all be {_short(valid)} in USD, "
+        message=f"{what} {names(item.name for item in same)} would all be {short(valid)} in USD, "
         "which takes letters, digits and underscores; wanted names that stay different",
         severity="error",
         measured={"names": len(same)},
@@ -358,11 +342,11 @@ def _said_of_feet(robot: Facts) -> Iterator[str]:
     word = _exact_word(feet, others)
     instead = f" ({word} matches the feet and nothing else)" if word else ""
     if len(missed) == len(feet) and not extra:
-        yield f"foot matches no link, the feet are {_listed(feet)}{instead}"
+        yield f"foot matches no link, the feet are {names(feet)}{instead}"
     elif missed:
-        yield f"foot does not match {_listed(missed)}, on which the robot stands{instead}"
+        yield f"foot does not match {names(missed)}, on which the robot stands{instead}"
     elif extra:
-        yield f"foot matches {_listed(extra)}, too, besides the feet{instead}"
+        yield f"foot matches {names(extra)}, too, besides the feet{instead}"
 
 
 def _exact_word(feet: Sequence[str], others: Sequence[str]) -> str | None:
@@ -380,14 +364,14 @@ def _said_of_others(robot: Facts) -> Iterator[str]:
     trunk = {link.name for link in robot.bodies[0].links}
     legs = {index for leg in robot.legs for index in leg.limb.chain}
     in_legs = {link.name for index in legs for link in robot.bodies[index].links}
-    names = [link.name for link in robot.links]
-    matches = [name for name in names if "base" in name]
+    every = [link.name for link in robot.links]
+    matches = [name for name in every if "base" in name]
     astray = [name for name in matches if name not in trunk]
     if not matches:
-        yield f"base matches no link, the trunk is {_short(robot.bodies[0].top.name)}"
+        yield f"base matches no link, the trunk is {short(robot.bodies[0].top.name)}"
     elif astray:
-        yield f"base matches {_listed(astray)}, too, which is not of the trunk"
+        yield f"base matches {names(astray)}, too, which is not of the trunk"
     for word in _LEG_WORDS:
-        astray = [name for name in names if word in name and name not in in_legs | trunk]
+        astray = [name for name in every if word in name and name not in in_legs | trunk]
         if astray:
-            yield f"{word} matches {_listed(astray)}, too, which is not of a leg"
+            yield f"{word} matches {names(astray)}, too, which is not of a leg"

@@ -9,6 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from terrainkit_robots.asymmetry import (
+    LIMIT,
+    LIMIT_SHARE,
     PLACE,
     PLACE_SHARE,
     TURNED,
@@ -37,7 +39,15 @@ from terrainkit_robots.rules.inr import (
     too_spread_inertia,
     triangle_inequality,
 )
-from terrainkit_robots.rules.jnt import placeholder_limit, unknown_type, wide_range, zero_axis
+from terrainkit_robots.rules.jnt import (
+    effort_unit,
+    placeholder_limit,
+    position_unit,
+    speed_unit,
+    unknown_type,
+    wide_range,
+    zero_axis,
+)
 from terrainkit_robots.twins import Twin, odd_one_first, twins
 
 _MASS = 0.02
@@ -150,8 +160,8 @@ def center_differs(robot: Facts) -> Iterator[Defect]:
             yield _differ(
                 odd,
                 other,
-                f"has its centre of mass at {_millimetres(odd.body.center)} mm, {{other}} at "
-                f"{_millimetres(other.body.center)} mm, each in its own frame: {1000 * gap:.3g} mm "
+                f"has its centre of mass at {_millimeters(odd.body.center)} mm, {{other}} at "
+                f"{_millimeters(other.body.center)} mm, each in its own frame: {1000 * gap:.3g} mm "
                 f"from mirrored; wanted {1000 * allowed:.2g} mm at most",
                 {"gap": gap, "allowed": allowed},
                 mass_source(main_link(odd.body)),
@@ -201,7 +211,7 @@ def _allowed_gap(left: Twin, right: Twin) -> float:
     return _CENTER + _CENTER_SHARE * min(radii)
 
 
-def _millimetres(vector: Matrix) -> str:
+def _millimeters(vector: Matrix) -> str:
     return "(" + ", ".join(f"{1000 * x + 0.0:.1f}" for x in vector) + ")"
 
 
@@ -305,14 +315,17 @@ def limits_differ(robot: Facts) -> Iterator[Defect]:
         if opposed(left, right) and limits_match(a, b, -pair.sign):
             continue  # the axis is what is wrong
         odd, other = odd_one_first(robot, left, right, _sizes_of_limits)
-        own, its = _written(limits_of(odd.joint)), _written(limits_of(other.joint))
+        own, its = (a, b) if odd is left else (b, a)
+        unit = position_unit(odd.joint)
         wanted = "the same" if pair.sign > 0 else "the same with exchanged signs"
         alike = "equal" if pair.sign > 0 else "opposite"
         yield _differ(
             odd,
             other,
-            f"has limits {own}, {{other}} {its}; wanted {wanted}, as {alike} positions mirror",
-            {},
+            f"has limits {_written(own)} {unit}, {{other}} {_written(its)} {unit}; wanted {wanted} "
+            f"within {LIMIT:g} {unit} and {LIMIT_SHARE:.0%} of the range, as {alike} positions "
+            "mirror",
+            {"lower": own[0], "upper": own[1], "other_lower": its[0], "other_upper": its[1]},
             odd.joint.limit.source if odd.joint.limit else odd.joint.source,
             joint=True,
         )
@@ -323,8 +336,8 @@ def _sizes_of_limits(body: Body) -> Matrix | None:
     return None if ends is None else np.sort(np.abs(ends))
 
 
-def _written(ends: tuple[float, float] | None) -> str:
-    return "none" if ends is None else f"{ends[0]:.5g} to {ends[1]:.5g}"
+def _written(ends: tuple[float, float]) -> str:
+    return f"{ends[0]:.5g} to {ends[1]:.5g}"
 
 
 @rule("SYM005", "strength-differs", "warning")
@@ -341,7 +354,10 @@ def strength_differs(robot: Facts) -> Iterator[Defect]:
     """
     told = _Told(robot, placeholder_limit)
     for _, left, right in twins(robot):
-        for name, of in (("effort", effort_of), ("velocity", _velocity_of)):
+        for name, of, unit_of in (
+            ("effort", effort_of, effort_unit),
+            ("velocity", _velocity_of, speed_unit),
+        ):
             a, b = of(robot, left.joint), of(robot, right.joint)
             if a is None or b is None or min(a, b) <= 0 or not _apart(a, b, _STRENGTH):
                 continue
@@ -354,10 +370,12 @@ def strength_differs(robot: Facts) -> Iterator[Defect]:
 
             odd, other = odd_one_first(robot, left, right, value)
             own, its = (b, a) if odd is right else (a, b)
+            unit = unit_of(odd.joint)
             yield _differ(
                 odd,
                 other,
-                f"has {name} {own:g}, {{other}} {its:g}; wanted the same",
+                f"has {name} {own:g} {unit}, {{other}} {its:g} {unit}: {_share(a, b):.1%} apart; "
+                f"wanted {_STRENGTH:.0%} at most",
                 {name: own, "other": its},
                 odd.joint.limit.source if odd.joint.limit else odd.joint.source,
                 joint=True,
@@ -410,7 +428,8 @@ def joint_axis_differs(robot: Facts) -> Iterator[Defect]:
         if slip.axis:
             yield _slip_defect(robot, slip)
     told = {defect.subject for defect in zero_axis(robot)}
-    for joint, others in against_the_rest(robot):
+    for stray in against_the_rest(robot):
+        joint = stray.joint
         if joint.name in told:
             continue
         told.add(joint.name)
@@ -418,8 +437,11 @@ def joint_axis_differs(robot: Facts) -> Iterator[Defect]:
             subject=joint.name,
             source=joint.axis_source or joint.source,
             certainty="likely",
-            message=f"the axis of joint {joint.name} points the other way than those of the same "
-            f"joint of all {others} other legs; wanted the same way, or mirrored on each side",
+            message=f"the axis of joint {joint.name} is {_axis(stray.axis)} in the frame of the "
+            f"trunk, and points the other way than those of the same joint of all {stray.others} "
+            f"other legs, such as {_axis(stray.usual)}; wanted the same way, or mirrored on each "
+            "side",
+            measured={"others": stray.others},
         )
     for pair, left, right in twins(robot):
         a, b = limits_of(left.joint), limits_of(right.joint)
@@ -431,9 +453,11 @@ def joint_axis_differs(robot: Facts) -> Iterator[Defect]:
             yield _differ(
                 right,
                 left,
-                f"turns the other way than {{other}}, and yet its limits are {_written(b)}, those "
-                f"of the other {_written(a)}; wanted its axis or its limits turned around",
-                {},
+                f"turns about {_axis(right.axis)}, the other way than {{other}}, which turns about "
+                f"{_axis(left.axis)} in the frame of the trunk, and yet its limits are "
+                f"{_written(b)} {position_unit(right.joint)}, those of the other {_written(a)}; "
+                "wanted its axis or its limits turned around",
+                {"lower": b[0], "upper": b[1], "other_lower": a[0], "other_upper": a[1]},
                 right.joint.axis_source or right.joint.source,
                 joint=True,
             )
@@ -442,12 +466,17 @@ def joint_axis_differs(robot: Facts) -> Iterator[Defect]:
             yield _differ(
                 right,
                 left,
-                f"turns the other way than {{other}}, unlike the {others} other pairs with such an "
-                "axis; wanted one way for all",
+                f"turns about {_axis(right.axis)}, the other way than {{other}}, which turns about "
+                f"{_axis(left.axis)} in the frame of the trunk, unlike the {others} other pairs "
+                "with such an axis; wanted one way for all",
                 {"others": others},
                 right.joint.axis_source or right.joint.source,
                 joint=True,
             )
+
+
+def _axis(axis: Matrix) -> str:
+    return "(" + ", ".join(f"{x:.3g}" for x in np.round(axis, 3) + 0.0) + ")"
 
 
 def _slip_defect(robot: Facts, slip: Slip) -> Defect:
@@ -464,8 +493,8 @@ def _slip_defect(robot: Facts, slip: Slip) -> Defect:
     odd, other = odd_one_first(robot, slip.left, slip.right, value)
     if slip.gap:
         what = (
-            f"is at {_millimetres(odd.offset)} mm from the joint above it, {{other}} at "
-            f"{_millimetres(other.offset)} mm, in the frame of the trunk: {1000 * slip.gap:.3g} mm "
+            f"is at {_millimeters(odd.offset)} mm from the joint above it, {{other}} at "
+            f"{_millimeters(other.offset)} mm, in the frame of the trunk: {1000 * slip.gap:.3g} mm "
             "from mirrored"
         )
         wanted = f"{1000 * PLACE:g} mm and {PLACE_SHARE:.0%} of the distance at most"

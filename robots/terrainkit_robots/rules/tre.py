@@ -1,67 +1,28 @@
 """The tree: whether the joints hang the links into one."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from difflib import SequenceMatcher
 
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.fix import Fix, InsertChild
 from terrainkit_robots.model import Joint, Link
 from terrainkit_robots.rule import CannotCheckError, Defect, find, rule
 from terrainkit_robots.tree import Tree
+from terrainkit_robots.wording import closest, names, short
 
-_MOST = 20
-"""So many defects of one rule are told one by one; a generated file may have thousands."""
-
-_MOST_NAMES = 6
-"""So many names are listed in one message."""
+_MOST_MEANT = 20
+"""Of so many names that are not there it is looked up which one was meant; a generated file may
+have thousands."""
 
 _ALIKE = 0.6
 """From this share of common letters on, a name is suggested for another; as difflib does."""
-
-_MOST_LETTERS = 100
-"""Longer names are cut in messages, and compared with no other."""
 
 _MOST_COMPARED = 20_000
 """With more links than this a name is not compared: it would take seconds."""
 
 
-def _first(robot: Facts, defects: Sequence[Defect], what: str) -> Iterator[Defect]:
-    """Yield the first of many defects, and one that counts the others."""
-    yield from defects[:_MOST]
-    more = len(defects) - _MOST
-    if more > 0:
-        yield Defect(
-            subject=robot.model.name or robot.model.file.name,
-            source=defects[_MOST].source,
-            message=f"and {more} more {what}",
-            measured={"more": more},
-        )
-
-
-def _short(name: str) -> str:
-    return name if len(name) <= _MOST_LETTERS else f"{name[:_MOST_LETTERS]}..."
-
-
-def _listed(names: Sequence[str], separator: str = ", ") -> str:
-    """Return names as text; of many the first and the last ones."""
-    shown = [_short(name) for name in names]
-    if len(shown) > _MOST_NAMES:
-        shown = [*shown[: _MOST_NAMES - 2], f"({len(names) - _MOST_NAMES + 1} more)", shown[-1]]
-    return separator.join(shown)
-
-
-def _most_alike(name: str, others: Sequence[str]) -> str | None:
+def _most_alike(name: str, others: Sequence[str]) -> str:
     """Return the one of `others` that is the most like `name`, if any is."""
-    if len(name) > _MOST_LETTERS or len(others) > _MOST_COMPARED:
-        return None
-    matcher, best, score = SequenceMatcher(b=name, autojunk=False), None, _ALIKE
-    for other in others:
-        matcher.set_seq1(other[: _MOST_LETTERS + 1])
-        if matcher.real_quick_ratio() <= score or matcher.quick_ratio() <= score:
-            continue
-        if matcher.ratio() > score:
-            best, score = other, matcher.ratio()
-    return best
+    return "" if len(others) > _MOST_COMPARED else closest(name, others, _ALIKE)
 
 
 def _repeated(items: Sequence[Link] | Sequence[Joint]) -> Mapping[str, list[Link | Joint]]:
@@ -88,23 +49,22 @@ def duplicate_name(robot: Facts) -> Iterator[Defect]:
         urdfdom: `joint '...' is not unique`; MuJoCo: `repeated URDF name`, for links only.
     """
     model = robot.model
-    defects = []
+    for problem in model.problems:
+        if problem.code == "TRE001":
+            yield Defect(subject=problem.subject, source=problem.source, message=problem.message)
     for what, items in (
         ("links", [link for link in model.links if not link.virtual]),
         ("joints", model.joints),
     ):
         for name, same in _repeated(items).items():
-            lines = _listed([str(item.source.line) for item in same])
-            defects.append(
-                Defect(
-                    subject=name,
-                    source=same[1].source,
-                    message=f"{len(same)} {what} are called {_short(name)}, on lines {lines}; "
-                    "wanted a name of its own for each",
-                    measured={"count": len(same)},
-                )
+            lines = names(str(item.source.line) for item in same)
+            yield Defect(
+                subject=name,
+                source=same[1].source,
+                message=f"{len(same)} {what} are called {short(name)}, on lines {lines}; "
+                "wanted a name of its own for each",
+                measured={"count": len(same)},
             )
-    yield from _first(robot, defects, "names that are not unique")
 
 
 @rule("TRE002", "unknown-link", "error")
@@ -128,29 +88,24 @@ def unknown_link(robot: Facts) -> Iterator[Defect]:
             # One without any name is told as an attribute that is missing.
             if reason == "unknown-link" and name and name not in links:
                 missing.setdefault(name, []).append((role, joint))
-    defects = [
-        Defect(
+    for place, (name, uses) in enumerate(missing.items()):
+        joints = names(f"{role} of joint {joint.name}" for role, joint in uses)
+        yield Defect(
             subject=uses[0][1].name,
             source=uses[0][1].source,
-            message=f"link {_short(name)} is not there, but is the "
-            + _listed([f"{role} of joint {joint.name}" for role, joint in uses])
-            + "; wanted a link of the file",
+            message=f"link {short(name)} is not there, but is the {joints}; wanted a link of the "
+            "file",
+            hint=_suggestion(robot, name) if place < _MOST_MEANT else "",
         )
-        for name, uses in missing.items()
-    ]
-    for place, name in enumerate(list(missing)[:_MOST]):
-        defects[place] = _with_suggestion(robot, defects[place], name)
-    yield from _first(robot, defects, "links that joints name are not there")
 
 
-def _with_suggestion(robot: Facts, defect: Defect, name: str) -> Defect:
-    """Return the defect with the name that was meant, if there is one like it."""
+def _suggestion(robot: Facts, name: str) -> str:
+    """Return a hint at the link that was meant, if there is one with a name like it."""
     loose = _most_alike(name, robot.tree.roots[1:])
     meant = loose or _most_alike(name, list(robot.tree.links))
-    if meant is None:
-        return defect
-    hint = f"Is link {meant} meant? Names are compared letter by letter, case included."
-    return Defect(subject=defect.subject, source=defect.source, message=defect.message, hint=hint)
+    if not meant:
+        return ""
+    return f"Is link {meant} meant? Names are compared letter by letter, case included."
 
 
 @rule("TRE003", "two-parents", "error")
@@ -172,18 +127,15 @@ def two_parents(robot: Facts) -> Iterator[Defect]:
         if reason == "second-parent":
             extra.setdefault(joint.child, []).append(joint)
     first = {joint.child: joint for joint in reversed(robot.model.joints)}
-    defects = [
-        Defect(
+    for child, joints in extra.items():
+        listed = names(joint.name for joint in (first[child], *joints))
+        yield Defect(
             subject=child,
             source=joints[0].source,
-            message=f"link {_short(child)} is the child of {len(joints) + 1} joints, "
-            + _listed([joint.name for joint in (first[child], *joints)])
-            + "; wanted one",
+            message=f"link {short(child)} is the child of {len(joints) + 1} joints, {listed}; "
+            "wanted one",
             measured={"joints": len(joints) + 1},
         )
-        for child, joints in extra.items()
-    ]
-    yield from _first(robot, defects, "links with two parents")
 
 
 @rule("TRE004", "cycle", "error")
@@ -203,22 +155,18 @@ def cycle(robot: Facts) -> Iterator[Defect]:
     # Where a link has a second parent, the joint that closes the circle is told as that.
     two_parents = {j.child for j, reason in robot.tree.left_out if reason == "second-parent"}
     closing = {joint.child: joint for joint, why in robot.tree.left_out if why == "cycle"}
-    defects = []
     for circle in robot.tree.cycles:
         if two_parents.isdisjoint(circle):
-            names = [circle[0], *circle[:0:-1], circle[0]]
+            around = [circle[0], *circle[:0:-1], circle[0]]
             what = (
                 f"{len(circle)} links hang in a circle" if circle[1:] else "a link hangs on itself"
             )
-            defects.append(
-                Defect(
-                    subject=circle[0],
-                    source=closing[circle[0]].source,
-                    message=f"{what}: {_listed(names, ' > ')}; wanted a tree",
-                    measured={"links": len(circle)},
-                )
+            yield Defect(
+                subject=circle[0],
+                source=closing[circle[0]].source,
+                message=f"{what}: {names(around, separator=' > ')}; wanted a tree",
+                measured={"links": len(circle)},
             )
-    yield from _first(robot, defects, "circles of links")
 
 
 @rule("TRE005", "several-roots", "error")
@@ -237,16 +185,13 @@ def several_roots(robot: Facts) -> Iterator[Defect]:
     if robot.model.kind == "mjcf":
         return  # bodies beside the robot are its surroundings
     root, loose = _roots(robot.tree)
-    defects = [
-        Defect(
+    for name in loose:
+        yield Defect(
             subject=name,
             source=robot.tree.links[name].source,
-            message=f"link {_short(name)} is the child of no joint, and is not the root either, "
-            f"which is {_short(root)}; wanted one root",
+            message=f"link {short(name)} is the child of no joint, and is not the root either, "
+            f"which is {short(root)}; wanted one root",
         )
-        for name in loose
-    ]
-    yield from _first(robot, defects, "links that hang on nothing")
 
 
 def _roots(tree: Tree) -> tuple[str, list[str]]:
@@ -260,10 +205,10 @@ def _roots(tree: Tree) -> tuple[str, list[str]]:
     root, *loose = [n for n in tree.roots if group[n] == n and n not in told] or [""]
     # A joint whose child is not there holds one of these, under another name.
     misnamed = [joint.child for joint, _ in tree.left_out if joint.child not in tree.links]
-    for child in misnamed[:_MOST]:
+    for child in misnamed[:_MOST_MEANT]:
         if loose:
             loose.remove(_most_alike(child, loose) or loose[0])
-    return root, loose[len(misnamed[_MOST:]) :]
+    return root, loose[len(misnamed[_MOST_MEANT:]) :]
 
 
 def _groups(tree: Tree) -> dict[str, str]:
@@ -340,7 +285,7 @@ def no_free_joint(robot: Facts) -> Iterator[Defect]:
     fix = None
     if root.source.element is not None and not model.home:
         edit = InsertChild(source=root.source, xml="<freejoint/>", first=True)
-        fix = Fix(safety="safe", description=f"put <freejoint/> into {root.name}", edits=(edit,))
+        fix = Fix(safety="safe", description=f"Put <freejoint/> into {root.name}.", edits=(edit,))
     yield Defect(
         subject=root.name,
         source=root.source,
@@ -367,18 +312,15 @@ def inner_floating(robot: Facts) -> Iterator[Defect]:
         wiki.ros.org/urdf/XML/joint; MuJoCo: `free joint can only be used on top level`.
     """
     tree = robot.tree
-    defects = [
-        Defect(
-            subject=joint.name,
-            source=joint.source,
-            message=f"joint {_short(joint.name)} between {_short(joint.parent)} and "
-            f"{_short(joint.child)} is {joint.kind}, which connects the two by nothing; wanted a "
-            "fixed joint, or one with a single axis",
-        )
-        for joint in tree.above.values()
-        if joint.kind in ("floating", "planar") and not _stands_for_world(robot, joint.parent)
-    ]
-    yield from _first(robot, defects, "floating and planar joints inside the robot")
+    for joint in tree.above.values():
+        if joint.kind in ("floating", "planar") and not _stands_for_world(robot, joint.parent):
+            yield Defect(
+                subject=joint.name,
+                source=joint.source,
+                message=f"joint {short(joint.name)} between {short(joint.parent)} and "
+                f"{short(joint.child)} is {joint.kind}, which connects the two by nothing; wanted "
+                "a fixed joint, or one with a single axis",
+            )
 
 
 def _stands_for_world(robot: Facts, name: str) -> bool:
@@ -422,8 +364,8 @@ def dummy_root(robot: Facts) -> Iterator[Defect]:
     yield Defect(
         subject=root.name,
         source=root.source,
-        message=f"root link {_short(root.name)} has no mass and no collision shape; the trunk is "
-        f"{_short(trunk)}, on the fixed joint {_short(joint.name)}"
+        message=f"root link {short(root.name)} has no mass and no collision shape; the trunk is "
+        f"{short(trunk)}, on the fixed joint {short(joint.name)}"
         + (", and is bolted to the world; wanted a floating joint, or none" if bolted else ""),
         severity="warning" if bolted else None,
     )

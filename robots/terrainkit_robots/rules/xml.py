@@ -8,12 +8,9 @@ from terrainkit_robots.model import Problem
 from terrainkit_robots.rule import Defect, Severity, rule
 from terrainkit_robots.xml_document import without_mark
 
-_MOST = 20
-"""So many defects of one rule are told; a file that is broken throughout has more."""
 
-
-def _problems(robot: Facts, code: str) -> list[Problem]:
-    return [problem for problem in robot.model.problems if problem.code == code][:_MOST]
+def _problems(robot: Facts, code: str) -> Iterator[Problem]:
+    return (problem for problem in robot.model.problems if problem.code == code)
 
 
 def _defect(
@@ -80,7 +77,7 @@ def unnamed_robot(robot: Facts) -> Iterator[Defect]:
         name = "".join(c if c.isalnum() and c.isascii() else "_" for c in robot.model.file.stem)
         name = name if name[:1].isalpha() else f"robot_{name}"
         edit = SetAttribute(source=problem.source, name="name", value=name)
-        fix = Fix(safety="safe", description=f"call it {name}, after its file", edits=(edit,))
+        fix = Fix(safety="safe", description=f"Call it {name}, after its file.", edits=(edit,))
         yield _defect(robot, problem, fix if problem.source.element is not None else None)
 
 
@@ -137,7 +134,7 @@ def bad_number(robot: Facts) -> Iterator[Defect]:
         fix = None
         if meant and problem.source.element is not None:
             edit = SetAttribute(source=problem.source, name=name, value=meant)
-            fix = Fix(safety="safe", description=f'write {name}="{meant}"', edits=(edit,))
+            fix = Fix(safety="safe", description=f'Write {name}="{meant}".', edits=(edit,))
         yield _defect(robot, problem, fix)
 
 
@@ -177,7 +174,7 @@ def repeated_material(robot: Facts) -> Iterator[Defect]:
         fix = None
         if problem.source.element is not None:
             edit = RemoveElement(source=problem.source)
-            fix = Fix(safety="safe", description="take the second away", edits=(edit,))
+            fix = Fix(safety="safe", description="Take the second material away.", edits=(edit,))
         yield _defect(robot, problem, fix)
 
 

@@ -8,7 +8,7 @@ from terrainkit_robots.facts import Facts
 from terrainkit_robots.meshes import Meshes
 from terrainkit_robots.physical_inertia import triangle_ratio
 from terrainkit_robots.robot_file import read_robot
-from terrainkit_robots.rule import rules
+from terrainkit_robots.rule import find, rules
 
 HEALTHY = [
     "a1/urdf/a1.urdf",
@@ -180,3 +180,30 @@ def test_the_mass_that_is_added_is_what_mujoco_adds(arm):
     (defect,) = rule.check(facts)
     assert defect.measured["added"] == pytest.approx(compiled.body_mass.sum() - 1.0)
     assert re.search(r"adds 0\.316 kg .* 31\.6% of the declared 1 kg", defect.message)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (' iyy="0.0136"', "", "an <inertia> without iyy; wanted all of ixx, iyy and izz"),
+        (' ixx="0.014"', "", "an <inertia> without ixx; wanted all of"),
+        ("<inertia ", "<unknown ", "no <inertia>; wanted an <inertia>"),
+    ],
+)
+def test_what_an_inertia_lacks_is_named(arm, old, new, words):
+    path = arm()
+    path.write_text(path.read_text().replace(old, new))
+    (defect,) = find("INR003").check(Facts(read_robot(path)))
+    assert f"link tip has a mass of 1 kg, but {words}" in defect.message
+
+
+def test_of_mjcf_its_own_attributes_are_named(tmp_path):
+    path = tmp_path / "robot.xml"
+    path.write_text(
+        '<mujoco><worldbody><body name="a"><freejoint/><inertial pos="0 0 0" mass="1"/>'
+        '<body name="b"><joint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>'
+        '<body name="c"><joint/><inertial pos="0 0 0" mass="1"/></body></body></worldbody></mujoco>'
+    )
+    told = {defect.subject: defect for defect in find("INR003").check(Facts(read_robot(path)))}
+    assert "c" in told
+    assert "neither diaginertia nor fullinertia" in told["c"].message

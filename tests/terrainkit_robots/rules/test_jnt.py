@@ -1,8 +1,9 @@
+import mujoco
 import pytest
 
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.robot_file import read_robot
-from terrainkit_robots.rule import rules
+from terrainkit_robots.rule import find, rules
 
 HEALTHY = [
     "a1/urdf/a1.urdf",
@@ -77,3 +78,30 @@ def test_what_leads_into_a_circle_is_no_circle(tmp_path):
 def test_a_long_chain_of_mimics_does_not_take_long(tmp_path):
     names = {f"j{k}": f"j{k + 1}" for k in range(300)} | {"j300": ""}
     assert mimics(tmp_path, **names) == []
+
+
+def told(tmp_path, code, text):
+    """Return the messages of one rule."""
+    path = tmp_path / "r.urdf"
+    path.write_text(text)
+    return [defect.message for defect in find(code).check(Facts(read_robot(path)))]
+
+
+@pytest.mark.parametrize(("count", "words"), [(1, "a has a"), (2, "a, b have a")])
+def test_one_joint_has_and_more_have_a_safety_controller(tmp_path, count, words):
+    safety = '<safety_controller k_position="100" k_velocity="1"/>'
+    joints = "".join(MIMIC.format(name=name, mimic=safety) for name in "ab"[:count])
+    (message,) = told(tmp_path, "JNT014", CHAIN.format(joints=joints))
+    assert message.startswith(words)
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+@pytest.mark.parametrize("limit", ['lower="-1"', 'upper="1"', 'lower="0"', 'upper="0"'])
+def test_a_limit_with_one_end_is_none_in_mujoco(tmp_path, kind, limit):
+    """MuJoCo takes one end for no limit, wherever it is: so it is an error wherever it is."""
+    joint = MIMIC.format(name="a", mimic="").replace('lower="-1" upper="1"', limit)
+    text = CHAIN.format(joints=joint.replace("revolute", kind))
+    assert not mujoco.MjModel.from_xml_string(text).jnt_limited.any()
+    (message,) = told(tmp_path, "JNT006", text)
+    assert message.startswith(f"the {kind} joint a has ")
+    assert [code for code, *_ in found(tmp_path / "r.urdf")] == ["JNT006"]

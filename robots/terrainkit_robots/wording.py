@@ -1,0 +1,58 @@
+"""Wording: names and words from a file, as messages give them back."""
+
+import math
+from collections.abc import Iterable, Sequence
+
+_MOST_LETTERS = 100
+"""Longer names are cut, and compared with no other: they come from a program, or are no names."""
+
+
+def short(text: str, most: int = _MOST_LETTERS) -> str:
+    """Return `text`, cut if it has more than `most` characters."""
+    return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
+def names(words: Iterable[str], most: int = 6, separator: str = ", ") -> str:
+    """Return words as `a, b, c`, and of more than `most` the first: `a, b, c, ...`."""
+    listed = list(words)
+    shown = [short(word) for word in listed[:most]]
+    return separator.join(shown + ["..."] * (len(listed) > most))
+
+
+def closest(word: str, known: Iterable[str], near: float) -> str:
+    """Return the known word that `word` is likely to be meant for; nothing if none is close.
+
+    A word that differs in capitals only comes first, then one with letters exchanged.
+
+    Args:
+        word: What is written.
+        known: What could have been meant.
+        near: Share of common letters from which on a word is close.
+    """
+    if len(word) > _MOST_LETTERS:
+        return ""
+    others = sorted((other for other in known if len(other) <= _MOST_LETTERS), reverse=True)
+    lower = word.lower()
+    same = [other for other in others if len(other) == len(lower)]
+    for other in same:
+        if other.lower() == lower:
+            return other
+    if not any(letter.isdigit() for letter in lower):  # 12 is not 21
+        for other in same:
+            if sorted(other.lower()) == sorted(lower):
+                return other
+    return _most_alike(lower, others, near)
+
+
+def _most_alike(lower: str, others: Sequence[str], near: float) -> str:
+    from difflib import SequenceMatcher
+
+    matcher, best = SequenceMatcher(b=lower, autojunk=False), ""
+    score = math.nextafter(near, 0.0)
+    for other in others:
+        matcher.set_seq1(other.lower())
+        if matcher.real_quick_ratio() <= score or matcher.quick_ratio() <= score:
+            continue
+        if matcher.ratio() > score:
+            best, score = other, matcher.ratio()
+    return best
