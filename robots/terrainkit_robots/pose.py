@@ -278,10 +278,10 @@ def _closest_in(bending: _Bending, starts: Matrix, limits: Matrix) -> Matrix:
         width = width / 5
         lower, upper = (np.clip(best + side * width / 2, *limits.T) for side in (-1, 1))
         axes = np.linspace(lower, upper, _GRID, axis=-1)
-        grid = np.broadcast_arrays(axes[:, 0, :, None], axes[:, 1, None, :])
-        cost = bending.cost(*grid).reshape(len(starts), -1)
-        place = cost.argmin(axis=1)
-        best = np.stack([q.reshape(len(starts), -1)[rows, place] for q in grid], axis=1)
+        # Not as a grid, but as its two sides: what only one of them turns is worked out once.
+        cost = bending.cost(axes[:, 0, :, None], axes[:, 1, None, :]).reshape(len(starts), -1)
+        hip, knee = np.divmod(cost.argmin(axis=1), _GRID)
+        best = np.stack([axes[rows, 0, hip], axes[rows, 1, knee]], axis=1)
     return np.asarray(best[cost.min(axis=1).argmin()])
 
 

@@ -233,7 +233,7 @@ def test_limits_without_sense_still_give_a_pose(limits):
     assert robot.stance.height == pytest.approx(0.75 * 0.62, abs=0.02)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(
     thigh=st.floats(0.1, 1),
     ratio=st.floats(0.6, 1.6),

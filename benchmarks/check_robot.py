@@ -1,0 +1,25 @@
+"""A static check of a robot against importing what it needs."""
+
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from clock import process, ratio
+
+from terrainkit_robots import bundled
+
+_SHARED = Path(__file__).resolve().parents[2] / "shared" / "robots"
+
+
+def run() -> Iterator[tuple[str, float]]:
+    imports = process([sys.executable, "-c", "import mujoco, lxml.etree, numpy"])
+    robots = Path(os.environ.get("TERRAINKIT_ROBOTS", _SHARED))
+    for name, path in {
+        "go2": robots / "go2" / "urdf" / "go2.urdf",
+        "quadruped": bundled.find("quadruped"),
+    }.items():
+        if path is None or not path.exists():
+            continue
+        command = [str(Path(sys.executable).with_name("terrainkit")), "check-robot", str(path)]
+        yield f"{name}_over_imports (at most 2)", ratio(process(command), imports, 15)
