@@ -34,7 +34,7 @@ from lxml import etree
 from terrainkit_robots import bundled
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.lint import Finding, lint
-from terrainkit_robots.meshes import Meshes
+from terrainkit_robots.mesh.meshes import Meshes
 from terrainkit_robots.robot_file import read_robot
 
 ROBOTS = Path(

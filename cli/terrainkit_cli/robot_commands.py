@@ -174,7 +174,7 @@ def _tried(name: str, command: CheckRobot, options: "Settings") -> _Checked | No
 def _check(name: str, command: CheckRobot, options: "Settings") -> _Checked:
     from terrainkit_robots import bundled
     from terrainkit_robots.facts import Facts
-    from terrainkit_robots.meshes import Meshes
+    from terrainkit_robots.mesh.meshes import Meshes
     from terrainkit_robots.robot_file import read_robot
     from terrainkit_robots.selection import lint_selected
     from terrainkit_robots.settings import read_settings
@@ -210,7 +210,7 @@ def _repaired(
     command: CheckRobot,
 ) -> "tuple[Report, str]":
     """Return the report once the fixes are written; what was found and a diff, if none is to be."""
-    from terrainkit_robots.apply_fixes import fix_robot, unified_diff, write_fixes
+    from terrainkit_robots.edit.apply import fix_robot, unified_diff, write_fixes
     from terrainkit_robots.report.repaired import Repaired
 
     result = fix_robot(

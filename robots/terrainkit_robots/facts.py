@@ -4,17 +4,17 @@ import math
 from collections.abc import Mapping
 from functools import cached_property
 
-from terrainkit_robots.bodies import Body, merge_bodies
-from terrainkit_robots.kinematics import body_poses
-from terrainkit_robots.legs import Leg, find_legs
-from terrainkit_robots.limbs import Limb, find_limbs
-from terrainkit_robots.meshes import Meshes
-from terrainkit_robots.mirror import Mirror, find_mirror
+from terrainkit_robots.body.bodies import Body, merge_bodies
+from terrainkit_robots.body.kinematics import body_poses
+from terrainkit_robots.body.overlap import OverlapScene
+from terrainkit_robots.body.tree import Tree, build_tree
+from terrainkit_robots.leg.legs import Leg, find_legs
+from terrainkit_robots.leg.limbs import Limb, find_limbs
+from terrainkit_robots.leg.pose import nearest, solve_positions
+from terrainkit_robots.leg.stance import Stance, stand
+from terrainkit_robots.mesh.meshes import Meshes
 from terrainkit_robots.model import Joint, Link, Matrix, RobotModel
-from terrainkit_robots.overlap import OverlapScene
-from terrainkit_robots.pose import nearest, solve_positions
-from terrainkit_robots.stance import Stance, stand
-from terrainkit_robots.tree import Tree, build_tree
+from terrainkit_robots.symmetry.mirror import Mirror, find_mirror
 
 
 class Facts:

@@ -8,7 +8,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from terrainkit_robots.facts import Facts
-    from terrainkit_robots.legs import Leg
+    from terrainkit_robots.leg.legs import Leg
 
 _DIGITS = 6
 """Significant digits of each number: more than any robot is built to."""

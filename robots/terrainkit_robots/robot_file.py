@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from terrainkit_robots.markup.document import XmlDocument, parse_xml, read_bytes
 from terrainkit_robots.model import Problem, RobotModel, Source
-from terrainkit_robots.xml_document import XmlDocument, parse_xml, read_bytes
 
 XACRO = "xacro"
 
@@ -34,17 +34,17 @@ def read_robot(
         return _nothing(document)
     tag = document.root.tag
     if tag == "mujoco" or tag == "mujocoinclude":
-        from terrainkit_robots.read_mjcf import read_mjcf
+        from terrainkit_robots.mjcf.reader import read_mjcf
 
         return read_mjcf(document, contents=contents)
     if tag != "robot":
         message = f"the root element is <{tag}>; wanted <robot> (URDF) or <mujoco> (MJCF)"
         source = document.source(document.root)
         return _nothing(document, Problem(code="XML002", message=message, source=source))
-    from terrainkit_robots.read_urdf import read_urdf
+    from terrainkit_robots.urdf.reader import read_urdf
 
     if path.suffix == f".{XACRO}":
-        from terrainkit_robots.read_xacro import read_xacro
+        from terrainkit_robots.xacro_file.reader import read_xacro
 
         return read_xacro(document, arguments=xacro_arguments or {}, packages=packages)
     return read_urdf(document, packages=packages)

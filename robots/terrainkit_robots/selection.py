@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from terrainkit_robots.ignore_comment import IgnoreComment, read_comments
 from terrainkit_robots.lint import Finding, Report, Skipped, lint
+from terrainkit_robots.markup.ignore_comment import IgnoreComment, read_comments
 from terrainkit_robots.rule import Rule, rules
 from terrainkit_robots.settings import Settings, matching
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from terrainkit_robots import bundled
+from terrainkit_robots.body.kinematics import body_poses
 from terrainkit_robots.facts import Facts
-from terrainkit_robots.kinematics import body_poses
 from terrainkit_robots.lint import lint
 from terrainkit_robots.robot_file import read_robot
 

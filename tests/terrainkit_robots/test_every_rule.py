@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import terrainkit_robots
-from terrainkit_robots.apply_fixes import fix_robot, write_fixes
+from terrainkit_robots.edit.apply import fix_robot, write_fixes
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.lint import lint
-from terrainkit_robots.meshes import Meshes
+from terrainkit_robots.mesh.meshes import Meshes
 from terrainkit_robots.robot_file import read_robot
 from terrainkit_robots.rule import FAMILIES, find, rules
 

@@ -7,7 +7,7 @@ import pytest
 from terrainkit_robots import bundled
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.lint import lint
-from terrainkit_robots.meshes import Meshes
+from terrainkit_robots.mesh.meshes import Meshes
 from terrainkit_robots.robot_file import read_robot
 
 URDF, MJCF = Path("/robots/robot.urdf"), Path("/robots/robot.xml")

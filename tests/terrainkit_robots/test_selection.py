@@ -195,7 +195,7 @@ def test_a_comment_on_a_rule_that_is_not_asked_is_not_told(file):
 
 
 def test_a_file_without_comments_is_not_parsed_again(file, monkeypatch):
-    import terrainkit_robots.xml_document as xml_document
+    import terrainkit_robots.markup.document as xml_document
 
     file.write_text(f'<robot name="r">{A}</robot>')
     facts = Facts(read_robot(file))

@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from terrainkit_robots.effort import effort_of
 from terrainkit_robots.facts_record import facts_record
+from terrainkit_robots.leg.effort import effort_of
 from terrainkit_robots.report.tally import count
 
 if TYPE_CHECKING:

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terrainkit_robots.bodies import Body, Placed
+from terrainkit_robots.body.bodies import Body, Placed
+from terrainkit_robots.body.shapes import has_extent, lowest
 from terrainkit_robots.facts import Facts
-from terrainkit_robots.legs import Leg
+from terrainkit_robots.leg.legs import Leg
+from terrainkit_robots.leg.pose import range_of
 from terrainkit_robots.model import Matrix
-from terrainkit_robots.pose import range_of
 from terrainkit_robots.rule import CannotCheckError, Defect, rule
-from terrainkit_robots.shapes import has_extent, lowest
 
 if TYPE_CHECKING:
-    from terrainkit_robots.overlap import Overlap
+    from terrainkit_robots.body.overlap import Overlap
 
 _SLIGHT = 0.001
 """Overlap from which simulators push bodies apart: MuJoCo's solver starts at contact [m]."""

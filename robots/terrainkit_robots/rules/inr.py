@@ -5,20 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from terrainkit_robots.bodies import Body
-from terrainkit_robots.body_extent import extents_of, half_diagonal
-from terrainkit_robots.density import (
+from terrainkit_robots.body.bodies import Body
+from terrainkit_robots.body.extent import extents_of, half_diagonal
+from terrainkit_robots.body.main_link import inertia_source, main_link, mass_source
+from terrainkit_robots.facts import Facts
+from terrainkit_robots.inertia.density import (
     is_derived,
     too_dense,
     too_light,
     volume_of,
 )
-from terrainkit_robots.facts import Facts
-from terrainkit_robots.inertia_repair import repair
-from terrainkit_robots.main_link import inertia_source, main_link, mass_source
-from terrainkit_robots.model import Inertial, Link, Matrix
-from terrainkit_robots.per_robot import per_robot
-from terrainkit_robots.physical_inertia import (
+from terrainkit_robots.inertia.physical import (
     LARGEST,
     NOTHING,
     gyration_radius,
@@ -27,9 +24,12 @@ from terrainkit_robots.physical_inertia import (
     principal_moments,
     triangle_ratio,
 )
-from terrainkit_robots.placeholder import is_identity, placeholders
+from terrainkit_robots.inertia.placeholder import is_identity, placeholders
+from terrainkit_robots.inertia.repair import repair
+from terrainkit_robots.markup.unread import Unread
+from terrainkit_robots.model import Inertial, Link, Matrix
+from terrainkit_robots.per_robot import per_robot
 from terrainkit_robots.rule import Defect, Severity, rule
-from terrainkit_robots.unread import Unread
 from terrainkit_robots.wording import names
 
 _IMPOSSIBLE = 0.99

@@ -5,11 +5,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from terrainkit_robots.body_extent import extents_of
-from terrainkit_robots.effort import effort_of
+from terrainkit_robots.body.extent import extents_of
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.fix import Fix, SetAttribute
-from terrainkit_robots.joint_uses import bodies_by_joint, is_wheel, leg_joints, own_joints
+from terrainkit_robots.leg.effort import effort_of
+from terrainkit_robots.leg.joint_uses import bodies_by_joint, is_wheel, leg_joints, own_joints
+from terrainkit_robots.leg.stance import GRAVITY
+from terrainkit_robots.markup.unread import Unread
 from terrainkit_robots.model import JOINT_TYPES, Joint, Limit, Matrix
 from terrainkit_robots.rule import CannotCheckError, Defect, rule
 from terrainkit_robots.rules.inr import (
@@ -17,8 +19,6 @@ from terrainkit_robots.rules.inr import (
     implausible_density,
     negative_mass,
 )
-from terrainkit_robots.stance import GRAVITY
-from terrainkit_robots.unread import Unread
 from terrainkit_robots.wording import closest, names, short
 
 _TINY = 1e-6

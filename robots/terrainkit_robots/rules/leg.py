@@ -7,12 +7,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from terrainkit_robots.contact import margin
+from terrainkit_robots.body.contact import margin
+from terrainkit_robots.body.kinematics import axis_in_trunk
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.fix import Fix, SetAttribute
-from terrainkit_robots.kinematics import axis_in_trunk
-from terrainkit_robots.legs import Leg
-from terrainkit_robots.limbs import Limb
+from terrainkit_robots.leg.legs import Leg
+from terrainkit_robots.leg.limbs import Limb
 from terrainkit_robots.model import Matrix
 from terrainkit_robots.rule import CannotCheckError, Defect, rule
 

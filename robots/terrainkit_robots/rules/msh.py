@@ -8,10 +8,12 @@ from typing import Literal
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.fix import Edit, Fix
-from terrainkit_robots.mesh_header import MUJOCO_SUFFIXES
-from terrainkit_robots.mesh_scale import HUGE, LARGE, TINY, Misfit, Scales
-from terrainkit_robots.mesh_surface import FLAT, binary_stl, clustered, thickness
-from terrainkit_robots.mesh_uses import (
+from terrainkit_robots.markup.document import read_bytes
+from terrainkit_robots.mesh.header import MUJOCO_SUFFIXES
+from terrainkit_robots.mesh.meshes import MeshError, Meshes, TooLargeError
+from terrainkit_robots.mesh.scale import HUGE, LARGE, TINY, Misfit, Scales
+from terrainkit_robots.mesh.surface import FLAT, binary_stl, clustered, thickness
+from terrainkit_robots.mesh.uses import (
     MeshUse,
     UsedMesh,
     is_elsewhere,
@@ -22,11 +24,9 @@ from terrainkit_robots.mesh_uses import (
     renamed,
     replaced,
 )
-from terrainkit_robots.meshes import MeshError, Meshes, TooLargeError
 from terrainkit_robots.packages import is_absolute, names_package, right_letters
 from terrainkit_robots.rule import CannotCheckError, Defect, Severity, rule
 from terrainkit_robots.wording import names
-from terrainkit_robots.xml_document import read_bytes
 
 _MOST_FACES = 200_000
 """MuJoCo's reader of STL refuses more."""

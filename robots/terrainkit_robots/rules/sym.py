@@ -8,24 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from terrainkit_robots.asymmetry import (
-    LIMIT,
-    LIMIT_SHARE,
-    PLACE,
-    PLACE_SHARE,
-    TURNED,
-    Slip,
-    against_its_kind,
-    against_the_rest,
-    limits_match,
-    limits_of,
-    opposed,
-    slips,
-)
-from terrainkit_robots.bodies import Body
-from terrainkit_robots.effort import effort_of
+from terrainkit_robots.body.bodies import Body
+from terrainkit_robots.body.main_link import inertia_source, main_link, mass_source
 from terrainkit_robots.facts import Facts
-from terrainkit_robots.main_link import inertia_source, main_link, mass_source
+from terrainkit_robots.leg.effort import effort_of
 from terrainkit_robots.model import Joint, Matrix, Source
 from terrainkit_robots.rule import CannotCheckError, Check, Defect, Measured, rule
 from terrainkit_robots.rules.inr import (
@@ -48,7 +34,21 @@ from terrainkit_robots.rules.jnt import (
     wide_range,
     zero_axis,
 )
-from terrainkit_robots.twins import Twin, odd_one_first, twins
+from terrainkit_robots.symmetry.asymmetry import (
+    LIMIT,
+    LIMIT_SHARE,
+    PLACE,
+    PLACE_SHARE,
+    TURNED,
+    Slip,
+    against_its_kind,
+    against_the_rest,
+    limits_match,
+    limits_of,
+    opposed,
+    slips,
+)
+from terrainkit_robots.symmetry.twins import Twin, odd_one_first, twins
 
 _MASS = 0.02
 """Share by which masses may differ: cables and screws that CAD puts on one side only."""

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from terrainkit_robots.body.tree import Tree
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.fix import Fix, InsertChild
 from terrainkit_robots.model import Joint, Link
 from terrainkit_robots.rule import CannotCheckError, Defect, find, rule
-from terrainkit_robots.tree import Tree
 from terrainkit_robots.wording import closest, names, short
 
 _MOST_MEANT = 20

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.fix import Fix, RemoveElement, SetAttribute
+from terrainkit_robots.markup.document import without_mark
 from terrainkit_robots.model import Problem
 from terrainkit_robots.rule import Defect, Severity, rule
-from terrainkit_robots.xml_document import without_mark
 
 
 def _problems(robot: Facts, code: str) -> Iterator[Problem]:

@@ -6,8 +6,8 @@ import pytest
 
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.fix import Fix
-from terrainkit_robots.ignore_comment import read_comments
 from terrainkit_robots.lint import Finding, Report, Skipped
+from terrainkit_robots.markup.ignore_comment import read_comments
 from terrainkit_robots.model import RobotModel, Source
 from terrainkit_robots.report.repaired import Repaired
 from terrainkit_robots.selection import IdleComment, Ignored

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from terrainkit_robots.facts import Facts
-from terrainkit_robots.meshes import Meshes
-from terrainkit_robots.physical_inertia import triangle_ratio
+from terrainkit_robots.inertia.physical import triangle_ratio
+from terrainkit_robots.mesh.meshes import Meshes
 from terrainkit_robots.robot_file import read_robot
 from terrainkit_robots.rule import find, rules
 

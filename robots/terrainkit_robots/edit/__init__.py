@@ -1,0 +1,1 @@
+"""Edits: fixes, made in the text without touching the rest of it."""

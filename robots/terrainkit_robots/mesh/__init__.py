@@ -1,0 +1,1 @@
+"""Mesh files: what is in them, each opened only when something asks."""

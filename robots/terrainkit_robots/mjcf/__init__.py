@@ -1,0 +1,1 @@
+"""MJCF: read by MuJoCo's own parser, with files and lines from ours."""

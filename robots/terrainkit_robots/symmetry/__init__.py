@@ -1,0 +1,1 @@
+"""Left and right: the mirror, and what differs between its two sides."""

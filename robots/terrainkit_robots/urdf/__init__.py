@@ -1,0 +1,1 @@
+"""URDF: its words, and its reader."""

@@ -1,0 +1,179 @@
+import contextlib
+import struct
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from terrainkit_robots.mesh.header import header_of
+from terrainkit_robots.mesh.reader import read_mesh
+from terrainkit_robots.mesh.surface import MeshError, binary_stl
+
+BOX = trimesh.creation.box(
+    [1, 2, 3], transform=trimesh.transformations.rotation_matrix(1, [1, 2, 3])
+)
+TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], "<f4")
+
+
+def exported(kind):
+    data = BOX.export(file_type=kind)
+    return data.encode() if isinstance(data, str) else data
+
+
+def msh(points, faces=(), normals=0, textures=0):
+    counts = struct.pack("<4i", len(points), normals, textures, len(faces))
+    rest = bytes(12 * normals + 8 * textures)
+    return counts + np.asarray(points, "<f4").tobytes() + rest + np.asarray(faces, "<i4").tobytes()
+
+
+def triangles(kind, data):
+    surface = read_mesh(kind, data)
+    return surface.points[surface.faces]
+
+
+SUFFIXES = {"ascii-stl": ".stl"}
+SAMPLES = {
+    "stl": exported("stl"),
+    "ascii-stl": exported("stl_ascii"),
+    "obj": exported("obj"),
+    "ply": exported("ply"),
+    "glb": exported("glb"),
+    "msh": msh(BOX.vertices, BOX.faces),
+    "dae": b"""<COLLADA><library_geometries><geometry id="g"><mesh><source id="p">
+      <float_array>0 0 0 1 0 0 0 1 0</float_array><technique_common><accessor stride="3"/>
+      </technique_common></source><vertices><input semantic="POSITION" source="#p"/></vertices>
+      <polylist><input semantic="VERTEX" offset="0"/><vcount>3</vcount><p>0 1 2</p></polylist>
+      </mesh></geometry></library_geometries><library_visual_scenes><visual_scene><node>
+      <scale>1 2 3</scale><instance_geometry url="#g"/></node></visual_scene>
+      </library_visual_scenes></COLLADA>""",
+}
+
+
+@pytest.mark.parametrize(
+    ("kind", "data"),
+    [
+        pytest.param("stl", exported("stl"), id="binary STL"),
+        pytest.param("ascii-stl", exported("stl_ascii"), id="ASCII STL"),
+        pytest.param("obj", exported("obj"), id="OBJ"),
+        pytest.param("ply", exported("ply"), id="PLY"),
+        pytest.param("glb", exported("glb"), id="GLB"),
+        pytest.param("msh", msh(BOX.vertices, BOX.faces, 3, 5), id="MSH"),
+    ],
+)
+def test_a_box_in_every_format(kind, data):
+    assert np.allclose(triangles(kind, data), BOX.triangles, atol=1e-6)
+
+
+def test_what_is_written_is_read():
+    surface = read_mesh("stl", binary_stl(read_mesh("stl", exported("stl"))))
+    assert np.allclose(surface.points[surface.faces], BOX.triangles, atol=1e-6)
+
+
+def test_a_mesh_of_nothing_but_points_is_their_hull():
+    surface = read_mesh("msh", msh(TETRAHEDRON))
+    assert len(surface.faces) == 4
+    with pytest.raises(MeshError, match="is flat"):
+        read_mesh("msh", msh(TETRAHEDRON[:3]))
+
+
+class TestObj:
+    POINTS = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+
+    def faces(self, text):
+        return read_mesh("obj", self.POINTS + text).faces.tolist()
+
+    def test_indices_of_textures_and_normals(self):
+        assert self.faces(b"f 1/9/9 2//9 3/9\n") == [[0, 1, 2]]
+
+    def test_indices_from_the_end(self):
+        assert self.faces(b"f -4 -3 -2\n") == [[0, 1, 2]]
+
+    def test_polygons_become_triangles(self):
+        assert self.faces(b"f 1 2 3 4\nf 1 2\nf 4 3 2\n") == [[0, 1, 2], [0, 2, 3], [3, 2, 1]]
+
+    def test_lines_that_go_on_and_ends_of_windows(self):
+        assert self.faces(b"f 1 2 \\\r\n 3\r\n") == [[0, 1, 2]]
+
+    def test_weights_and_colors_are_left(self):
+        data = b"v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 2 0 1 0 0\nvn 1 2 3\nvt 1 1\nf 1 2 3\n"
+        assert read_mesh("obj", data).points.tolist() == [[0, 0, 0], [1, 0, 0], [0, 2, 0]]
+
+    @pytest.mark.parametrize(
+        ("text", "problem"),
+        [
+            pytest.param(POINTS, "no triangles", id="no faces"),
+            pytest.param(b"f 1 2 3\n", "no corners", id="no points"),
+            pytest.param(POINTS + b"f 1 2 5\n", "has 4 corners, and names number 4", id="beyond"),
+            pytest.param(POINTS + b"f 1 2 -5\n", "names number -1", id="before"),
+            pytest.param(POINTS + b"f 0 1 2\n", "names number -1", id="counted from 0"),
+            pytest.param(POINTS + b"f 1 2 1e300\n", "index", id="far beyond"),
+            pytest.param(POINTS + b"f one two three\n", "text where numbers", id="words"),
+            pytest.param(b"v 0 0\nv 1 1\nf 1 2 1\n", "three numbers", id="two numbers"),
+            pytest.param(b"v 0 0 0\nv 1 1\nf 1 2 1\n", "three numbers", id="once two numbers"),
+            pytest.param(b"v nan 0 0\nv 1e999 1 1\nf 1 2 1\n", "2 corners that are not", id="nan"),
+        ],
+    )
+    def test_broken(self, text, problem):
+        with pytest.raises(MeshError, match=problem):
+            read_mesh("obj", text)
+
+
+@pytest.mark.parametrize(
+    ("kind", "data", "problem"),
+    [
+        pytest.param("ascii-stl", b"vertex 0 0 0\n" * 2, "three a face", id="two corners"),
+        pytest.param("ascii-stl", b"vertex 0 0 x\n" * 3, "text where", id="a word"),
+        pytest.param("ascii-stl", b"facet\n", "no triangles", id="none"),
+        pytest.param("stl", bytes(84), "no triangles", id="no faces"),
+        pytest.param("stl", bytes(84) + b"\xff" * 50, "3 corners that are not numbers", id="NaN"),
+        pytest.param("msh", msh(TETRAHEDRON, [[0, 1, 4]]), "names number 4", id="beyond"),
+        pytest.param("other", b"", "format that is not read", id="another format"),
+        pytest.param("ply", b"ply\n", "cannot be read", id="an empty PLY"),
+        pytest.param(
+            "ply",
+            b"ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\n"
+            b"property float y\nproperty float z\nend_header\n",
+            "cannot be read",
+            id="a PLY that claims 4 billion corners",
+        ),
+    ],
+)
+def test_broken_files(kind, data, problem):
+    with pytest.raises(MeshError, match=problem):
+        read_mesh(kind, data)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    kind=st.sampled_from(["stl", "ascii-stl", "obj", "dae", "msh", "ply", "glb"]),
+    where=st.floats(0, 1),
+    noise=st.binary(max_size=12) | st.sampled_from([b"", b"-1", b"1e999", b"nan", b"99999999999"]),
+)
+def test_no_damage_is_too_much(kind, where, noise):
+    data = SAMPLES[kind]
+    at = int(where * len(data))
+    data = data[:at] + noise + data[at + len(noise) :]
+    header = header_of(SUFFIXES.get(kind, f".{kind}"), data)
+    assert header.state in ("fine", "broken")
+    with contextlib.suppress(MeshError), np.errstate(all="ignore"):
+        surface = read_mesh(header.format, data)
+        assert np.isfinite(surface.points[surface.faces]).all()
+
+
+def test_other_files_are_not_followed(tmp_path, monkeypatch):
+    # A GLB may name its data by another file.
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "data.bin").write_bytes(TETRAHEDRON.tobytes())
+    text = (
+        b'{"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],'
+        b'"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],'
+        b'"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],'
+        b'"bufferViews":[{"buffer":0,"byteLength":36}],'
+        b'"buffers":[{"uri":"data.bin","byteLength":36}]}'
+    )
+    text += b" " * (-len(text) % 4)
+    chunk = struct.pack("<II", len(text), 0x4E4F534A) + text
+    with pytest.raises(MeshError):
+        read_mesh("glb", b"glTF" + struct.pack("<II", 2, 12 + len(chunk)) + chunk)

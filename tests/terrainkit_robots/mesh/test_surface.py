@@ -1,0 +1,157 @@
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from terrainkit_robots.mesh.surface import (
+    MeshError,
+    Surface,
+    binary_stl,
+    clustered,
+    fan,
+    is_closed,
+    is_flat,
+    numbers,
+    signed_volume,
+    thickness,
+    unique_points,
+    welded,
+    whole_numbers,
+)
+
+
+def surface_of(mesh):
+    return Surface(points=np.asarray(mesh.vertices), faces=np.asarray(mesh.faces))
+
+
+def loose(surface):
+    """Return the same triangles, none of which share a corner: what an STL holds."""
+    points = surface.points[surface.faces].reshape(-1, 3)
+    return Surface(points=points, faces=np.arange(len(points)).reshape(-1, 3))
+
+
+BOX = surface_of(trimesh.creation.box([1, 2, 3]))
+SPHERE = surface_of(trimesh.creation.icosphere(subdivisions=3, radius=0.1))
+
+
+class TestNumbers:
+    def test_white_space_of_all_kinds(self):
+        assert list(numbers(b" 1\t2\n3.5\r\n-1e3 ")) == [1, 2, 3.5, -1000]
+        assert numbers(b"").size == 0
+
+    @pytest.mark.parametrize("text", [b"1 two 3", b"1,2", b"0x10", b"1 2 -"])
+    def test_text(self, text):
+        with pytest.raises(MeshError, match="text where numbers"):
+            numbers(text)
+
+    @pytest.mark.parametrize("text", [b"nan", b"1e300", b"-inf"])
+    def test_indices_that_are_none(self, text):
+        with pytest.raises(MeshError, match="index"):
+            whole_numbers(text)
+
+
+def test_polygons_as_triangles():
+    triangles = fan(np.array([0, 1, 2, 3, 9, 8, 7, 5, 4]), np.array([4, 3, 2]))
+    assert triangles.tolist() == [[0, 1, 2], [0, 2, 3], [9, 8, 7]]
+    assert fan(np.array([1, 2, 3]), np.array([3])).tolist() == [[1, 2, 3]]
+    assert fan(np.zeros(0, int), np.zeros(0, int)).shape == (0, 3)
+
+
+@settings(max_examples=50, deadline=None)
+@given(arrays(np.float32, (30, 3), elements=st.sampled_from([0.0, -0.0, 0.1, 0.3, -7.0, 1e-30])))
+def test_unique_points_are_those_of_numpy(points):
+    different, which = unique_points(points)
+    assert len(different) == len(np.unique(points, axis=0))
+    assert (different[which] == points).all()
+
+
+class TestVolume:
+    def test_of_a_box(self):
+        assert signed_volume(BOX) == pytest.approx(6.0)
+
+    def test_inside_out(self):
+        assert signed_volume(Surface(points=BOX.points, faces=BOX.faces[:, ::-1])) == pytest.approx(
+            -6.0
+        )
+
+    def test_far_from_the_origin(self):
+        away = Surface(points=BOX.points + np.array([1e4, 0, 0]), faces=BOX.faces)
+        assert signed_volume(away) == pytest.approx(6.0)
+
+
+class TestClosed:
+    def test_a_box_of_loose_triangles(self):
+        assert not is_closed(loose(BOX))
+        assert is_closed(welded(loose(BOX)))
+        assert len(welded(loose(BOX)).points) == 8
+
+    def test_a_face_left_out(self):
+        assert not is_closed(Surface(points=BOX.points, faces=BOX.faces[1:]))
+
+    def test_a_face_turned_over(self):
+        faces = BOX.faces.copy()
+        faces[0] = faces[0, ::-1]
+        assert not is_closed(Surface(points=BOX.points, faces=faces))
+
+    def test_a_triangle_that_is_a_point_does_not_count(self):
+        faces = np.concatenate([BOX.faces, [[0, 0, 0]]])
+        assert is_closed(Surface(points=BOX.points, faces=faces))
+
+    def test_nothing(self):
+        assert not is_closed(Surface(points=BOX.points, faces=np.zeros((0, 3), int)))
+
+
+class TestFlat:
+    TURN = trimesh.transformations.rotation_matrix(1.0, [1, 2, 3])[:3, :3]
+
+    @pytest.mark.parametrize(("height", "flat"), [(1e-3, False), (1e-5, True), (0.0, True)])
+    @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+    @pytest.mark.parametrize("count", [4, 5000])
+    def test_a_sheet_however_it_lies(self, height, flat, size, count):
+        corners = trimesh.creation.box([1, 1, height]).vertices
+        points = np.resize(corners, (2 * count, 3)) @ self.TURN * size + size
+        assert is_flat(points) == flat
+
+    def test_few_points_in_one_place_or_line(self):
+        assert is_flat(np.zeros((100, 3)))
+        assert is_flat(np.outer(np.arange(9.0), [1, 2, 3]))
+        assert is_flat(np.eye(3))
+
+    def test_thickness_of_a_box(self):
+        assert thickness(BOX.points) == pytest.approx(1 / 14**0.5)
+
+
+class TestClustered:
+    def test_a_sphere_keeps_its_shape(self):
+        coarse = clustered(SPHERE, 8)
+        assert len(coarse.faces) < len(SPHERE.faces)
+        assert np.linalg.norm(coarse.points, axis=1).max() < 0.1001
+        assert np.ptp(coarse.points, axis=0) == pytest.approx(0.2, rel=0.1)
+        assert signed_volume(coarse) == pytest.approx(signed_volume(SPHERE), rel=0.15)
+
+    def test_no_triangle_comes_twice_or_is_a_line(self):
+        faces = clustered(SPHERE, 6).faces
+        assert len(np.unique(np.sort(faces, axis=1), axis=0)) == len(faces)
+        assert (faces != np.roll(faces, 1, axis=1)).all()
+
+    def test_all_in_one_place(self):
+        assert not len(clustered(Surface(points=np.ones((3, 3)), faces=BOX.faces[:0]), 4).faces)
+
+
+class TestBinaryStl:
+    def test_read_by_somebody_else(self, tmp_path):
+        (tmp_path / "a.stl").write_bytes(binary_stl(BOX))
+        mesh = trimesh.load(tmp_path / "a.stl")
+        assert mesh.is_watertight
+        assert mesh.volume == pytest.approx(6.0)
+        assert np.allclose(mesh.triangles, BOX.points[BOX.faces])
+
+    def test_normals_are_of_length_one_or_none(self):
+        faces = np.concatenate([BOX.faces, [[0, 0, 0]]])
+        data = binary_stl(Surface(points=BOX.points, faces=faces))
+        assert len(data) == 84 + 50 * 13
+        normals = np.frombuffer(data, np.dtype((np.void, 50)), offset=84)
+        lengths = [np.linalg.norm(np.frombuffer(n.tobytes()[:12], "<f4")) for n in normals]
+        assert lengths == pytest.approx([1.0] * 12 + [0.0])
