@@ -22,6 +22,10 @@ TURNED = math.radians(1.0)
 """Angle by which axes may be from mirrored [rad]."""
 
 
+_SHORT = 0.005
+"""A centre of mass closer than this to its joint does not tell how the body is turned [m]."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Slip:
     """A pair of joints that are not mirrored."""
@@ -93,9 +97,10 @@ def _slip(robot: Facts, left: Twin, right: Twin, above: tuple[Twin, Twin] | None
     lengths = [float(np.linalg.norm(twin.offset)) for twin in (left, right)]
     allowed = PLACE + PLACE_SHARE * min(lengths)
     if gap > allowed:
-        if above is not None and abs(lengths[0] - lengths[1]) <= allowed:
+        angle = 2 * math.asin(min(1.0, gap / (lengths[0] + lengths[1])))
+        same = abs(lengths[0] - lengths[1]) <= allowed
+        if above is not None and same and _is_turned(robot, *above, angle):
             # As far away, but elsewhere: the frame of the joint above is turned about its axis.
-            angle = 2 * math.asin(min(1.0, gap / (lengths[0] + lengths[1])))
             return Slip(left=above[0], right=above[1], axis=False, gap=0.0, angle=angle)
         return Slip(left=left, right=right, axis=False, gap=gap, angle=0.0)
     angle = math.acos(min(1.0, abs(float(image(left.axis) @ right.axis))))
@@ -104,6 +109,16 @@ def _slip(robot: Facts, left: Twin, right: Twin, above: tuple[Twin, Twin] | None
         axis = bool(np.abs(written[0] - written[1]).max() > math.sin(TURNED))
         return Slip(left=left, right=right, axis=axis, gap=0.0, angle=angle)
     return None
+
+
+def _is_turned(robot: Facts, left: Twin, right: Twin, angle: float) -> bool:
+    """Return whether the mass of a body is turned like what hangs from it.
+
+    If it is not, the joint below is out of place, and not the frame of this one.
+    """
+    arm = float(np.linalg.norm(right.arm))
+    gap = float(np.linalg.norm(robot.mirror.image(left.arm) - right.arm))
+    return arm < _SHORT or gap > 0.5 * 2 * math.sin(angle / 2) * arm
 
 
 def limits_of(joint: Joint) -> tuple[float, float] | None:

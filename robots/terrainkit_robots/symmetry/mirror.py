@@ -19,25 +19,24 @@ _NEAR = 0.02
 
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Za-z][a-z]*|\d+")
 
-_SIDES = {
-    a: b
-    for left, right in (
-        ("left", "right"),
-        ("l", "r"),
-        ("fl", "fr"),
-        ("rl", "rr"),
-        ("hl", "hr"),
-        ("bl", "br"),
-        ("lf", "rf"),
-        ("lh", "rh"),
-        ("lm", "rm"),
-        ("ml", "mr"),
-        ("lb", "rb"),
-        ("larm", "rarm"),
-        ("lleg", "rleg"),
-    )
-    for a, b in ((left, right), (right, left))
+_LEFTS = {
+    "left": "right",
+    "l": "r",
+    "fl": "fr",
+    "rl": "rr",
+    "hl": "hr",
+    "bl": "br",
+    "lf": "rf",
+    "lh": "rh",
+    "lm": "rm",
+    "ml": "mr",
+    "lb": "rb",
+    "larm": "rarm",
+    "lleg": "rleg",
 }
+"""Words for the left side, and those for the right that go with them."""
+
+_SIDES = _LEFTS | {right: left for left, right in _LEFTS.items()}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -157,13 +156,18 @@ def _by_name(
             other = named.get(swap_sides(name)) if name else None
             if other is None or other == index:
                 continue
+            # Where a sign was lost both may be on one side; the pair is the same.
             sides = points[[index, other]] @ mirror.normal
-            if sides[0] > 0 > sides[1]:
+            if sides[0] >= sides[1] and _is_left(name):
                 yield index, other
 
 
 def _body_name(body: Body) -> str:
     return body.name
+
+
+def _is_left(name: str) -> bool:
+    return any(word.lower() in _LEFTS for word in _TOKEN.findall(name))
 
 
 def _joint_name(body: Body) -> str:
