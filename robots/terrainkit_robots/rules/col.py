@@ -13,7 +13,7 @@ from terrainkit_robots.facts import Facts
 from terrainkit_robots.leg.legs import Leg
 from terrainkit_robots.leg.pose import range_of
 from terrainkit_robots.model import Matrix
-from terrainkit_robots.rule import CannotCheckError, Defect, rule
+from terrainkit_robots.rule import CannotCheckError, Defect, Severity, rule
 
 if TYPE_CHECKING:
     from terrainkit_robots.body.overlap import Overlap
@@ -191,8 +191,8 @@ def overlap(robot: Facts) -> Iterator[Defect]:
     Simulators filter contacts between a body and its parent, and no others. Every other overlap is
     pushed apart from the first step on: the robot jumps, jitters, or explodes. Primitives are
     compared as they are, meshes by their convex hull, as most simulators do. Over 1 mm is a
-    warning, over 10 mm an error on a robot with legs; mesh hulls are a warning at most, since other
-    simulators may use the mesh itself, or pieces of it.
+    warning, over 10 mm an error on a robot with legs. Where a hull takes part it is one step less,
+    since other simulators may use the mesh itself, or pieces of it.
 
     Fix:
         Shrink or move one of the shapes, or switch the contact of this pair off (<exclude> in MJCF,
@@ -207,7 +207,7 @@ def overlap(robot: Facts) -> Iterator[Defect]:
         if worst.depth <= _SLIGHT:
             continue
         # An arm is bolted down, and its drivers keep pairs that always touch out of the check.
-        severe = worst.depth > _DEEP and not worst.hulls and bool(robot.legs)
+        steps: tuple[Severity, ...] = ("info", "warning", "error" if robot.legs else "warning")
         what = "the convex hulls of " if worst.hulls else ""
         first, second = worst.first.link, worst.second.link
         yield Defect(
@@ -217,7 +217,7 @@ def overlap(robot: Facts) -> Iterator[Defect]:
                 f"{what}{first} and {second} are {1000 * worst.depth:.1f} mm inside each other at "
                 f"the default pose; wanted at most {1000 * _SLIGHT:.0f} mm"
             ),
-            severity="error" if severe else "warning",
+            severity=steps[1 + (worst.depth > _DEEP) - worst.hulls],
             certainty="likely" if worst.hulls else "proven",
             measured={"depth": round(worst.depth, 5)},
         )

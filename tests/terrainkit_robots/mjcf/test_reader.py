@@ -2,7 +2,6 @@
 
 import random
 import re
-import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -992,13 +991,6 @@ def test_a_default_that_renames_all_is_read_as_the_default_of_all() -> None:
 # Bounds
 
 
-def timed(text: str | bytes, seconds: float = 4.0) -> RobotModel:
-    began = time.monotonic()
-    robot = read(text)
-    assert time.monotonic() - began < seconds
-    return robot
-
-
 @pytest.mark.parametrize(
     "text",
     [
@@ -1023,12 +1015,12 @@ def timed(text: str | bytes, seconds: float = 4.0) -> RobotModel:
     ],
 )
 def test_what_would_fill_the_memory_is_not_made(text: str) -> None:
-    robot = timed(text)
+    robot = read(text)
     assert "a" in [each.name.rstrip("0") for each in robot.links]
 
 
 def test_more_elements_than_mujoco_reads_in_time_are_told() -> None:
-    robot = timed(in_world("<body/>" * (MOST_ELEMENTS + 1)))
+    robot = read(in_world("<body/>" * (MOST_ELEMENTS + 1)))
     assert only(robot).code == "XML011"
     assert robot.links == ()
 
@@ -1043,16 +1035,14 @@ def test_models_that_attach_models_do_not_multiply(tmp_path: Path) -> None:
         )
     files["m30.xml"] = in_world('<body name="b"/>')
     file = write_all(tmp_path, files)
-    began = time.monotonic()
     robot = read_file(file)
-    assert time.monotonic() - began < 4
     assert codes(robot) == ["XML011"]
 
 
 def test_a_deep_chain_is_read_as_far_as_it_goes() -> None:
-    robot = timed(in_world("<body>" * 10_000 + "</body>" * 10_000))
+    robot = read(in_world("<body>" * 10_000 + "</body>" * 10_000))
     assert "XML001" in codes(robot)
-    robot = timed(in_world("<body>" * 200 + "</body>" * 200))
+    robot = read(in_world("<body>" * 200 + "</body>" * 200))
     assert robot.problems == ()
     assert len(robot.links) == 200
 

@@ -1,5 +1,3 @@
-import time
-
 import pytest
 
 from terrainkit_robots.facts import Facts
@@ -83,9 +81,7 @@ MANY = 6000
     ],
 )
 def test_of_thousands_the_first_are_told_and_that_there_are_more(report, code, parts):
-    start = time.perf_counter()
     said = report(code, *parts)
-    assert time.perf_counter() - start < 5
     assert len(said.findings) == MOST_FINDINGS
     assert [each.code for each in said.skipped] == [code]
     assert str(MOST_FINDINGS) in said.skipped[0].reason
