@@ -6,7 +6,7 @@ import numpy as np
 
 from terrainkit_robots.model import Matrix
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 _LARGEST = 1e30
 """A larger number is told as one that cannot be meant, and would overflow in the first square."""

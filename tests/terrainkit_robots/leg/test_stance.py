@@ -72,7 +72,8 @@ def compiled(path):
     drawn = [g for g in spec.geoms if not (g.contype or g.conaffinity)]
     for geom in drawn if not text else []:
         spec.delete(geom)
-    for mesh in [m for m in spec.meshes if m.name not in {g.meshname for g in spec.geoms}]:
+    used = {geom.meshname for geom in spec.geoms} - {""}
+    for mesh in [m for m in spec.meshes if m.name not in used]:
         spec.delete(mesh)
     floors = [g for g in spec.geoms if g.type == mujoco.mjtGeom.mjGEOM_PLANE]
     for geom in floors:
