@@ -86,6 +86,18 @@ class Facts:
         return find_legs(self)
 
     @cached_property
+    def leg_bodies(self) -> frozenset[int]:
+        """Indices of the bodies of all legs, those that carry several of them included."""
+        return frozenset(index for leg in self.legs for index in leg.limb.chain)
+
+    def carrier_of(self, body: Body) -> Body | None:
+        """Return the body that carries another, past those that only stand between two joints."""
+        at = body.parent
+        while at is not None and self.bodies[at].virtual:
+            at = self.bodies[at].parent
+        return None if at is None else self.bodies[at]
+
+    @cached_property
     def mirror(self) -> Mirror:
         """Which bodies and joints are mirror images of which."""
         return find_mirror(self)

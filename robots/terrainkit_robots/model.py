@@ -256,6 +256,16 @@ class Joint:
         return self.kind in MOVING
 
     @property
+    def range(self) -> tuple[float, float] | None:
+        """Return lower and upper [rad] or [m]; None where they are not limits that make sense."""
+        limit = self.limit
+        if self.kind == "continuous" or limit is None or None in (limit.lower, limit.upper):
+            return None
+        assert limit.lower is not None
+        assert limit.upper is not None
+        return (limit.lower, limit.upper) if limit.lower < limit.upper else None
+
+    @property
     def direction(self) -> Matrix:
         """Return the axis as a unit vector, shape (3,); (1, 0, 0) where there is none to be had."""
         axis = np.array([1.0, 0, 0]) if self.axis is None else self.axis
@@ -311,3 +321,8 @@ class RobotModel:
 
     sources: tuple[Path, ...] = ()
     """Every file that was read as text: the file itself and what it includes."""
+
+    @property
+    def title(self) -> str:
+        """Return what to call the robot: its name, or that of its file."""
+        return self.name or self.file.name

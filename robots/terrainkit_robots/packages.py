@@ -199,16 +199,6 @@ class Packages:
 _MESH_FOLDERS = {"meshes", "mesh", "assets", "stl", "dae", "obj", "visual", "collision"}
 
 
-def resolve(filename: str, file: Path, packages: Mapping[str, Path]) -> tuple[Path, FoundBy]:
-    """Return where a file is that `file` calls `filename`; see `Packages.resolve`."""
-    return Packages(file, packages).resolve(filename)
-
-
-def find_package(name: str, file: Path, packages: Mapping[str, Path]) -> Path | None:
-    """Return the folder of a package that `file` names, or None if it is not found."""
-    return Packages(file, packages).find(name)
-
-
 def resolve_in(folders: Iterable[Path], filename: str) -> tuple[Path, FoundBy]:
     """Return where a file is that one of these folders has, and how that was found.
 

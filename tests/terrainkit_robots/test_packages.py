@@ -7,13 +7,19 @@ from hypothesis import strategies as st
 
 from terrainkit_robots.packages import (
     Packages,
-    find_package,
     is_absolute,
     names_package,
-    resolve,
     resolve_in,
     right_letters,
 )
+
+
+def resolve(name, file, packages):
+    return Packages(file, packages).resolve(name)
+
+
+def find_package(name, file, packages):
+    return Packages(file, packages).find(name)
 
 
 @pytest.fixture(autouse=True)

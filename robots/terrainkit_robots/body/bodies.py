@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from terrainkit_robots.body.tree import Tree
+from terrainkit_robots.inertia.physical import LARGEST
 from terrainkit_robots.model import Geometry, Inertial, Joint, Link, Matrix
 
 
@@ -118,17 +119,13 @@ class Body:
 
 def _mass_of(link: Link) -> float:
     mass = link.inertial.mass if link.inertial else None
-    return mass if mass is not None and abs(mass) < _LARGEST else 0.0
+    return mass if mass is not None and abs(mass) < LARGEST else 0.0
 
 
 def _inertia_of(inertial: Inertial) -> Matrix:
     inertia = inertial.inertia
-    sound = inertia is not None and (np.abs(inertia) < _LARGEST).all()
+    sound = inertia is not None and (np.abs(inertia) < LARGEST).all()
     return inertia if inertia is not None and sound else np.zeros((3, 3))
-
-
-_LARGEST = 1e12
-"""Beyond this a number is no mass or inertia of anything, and would only overflow further on."""
 
 
 def merge_bodies(tree: Tree) -> tuple[Body, ...]:

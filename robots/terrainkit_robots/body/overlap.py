@@ -183,14 +183,7 @@ class OverlapScene:
         return bool((g.contype & h.conaffinity) or (h.contype & g.conaffinity))
 
     def _neighbors(self, a: Body, b: Body) -> bool:
-        return self._above(a) == b.index or self._above(b) == a.index
-
-    def _above(self, body: Body) -> int | None:
-        """Return the parent of a body, looked for through bodies that only stand between joints."""
-        at = body.parent
-        while at is not None and self._facts.bodies[at].virtual:
-            at = self._facts.bodies[at].parent
-        return at
+        return self._facts.carrier_of(a) is b or self._facts.carrier_of(b) is a
 
 
 def _solid(placed: Placed, facts: "Facts") -> bool:

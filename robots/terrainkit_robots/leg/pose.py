@@ -94,10 +94,7 @@ def nearest(joint: Joint, position: float) -> float:
 
 def range_of(joint: Joint) -> tuple[float, float]:
     """Return the limits of a joint [rad] or [m]; infinite where there are none that make sense."""
-    limit = joint.limit
-    if limit is None or joint.kind == "continuous" or limit.lower is None or limit.upper is None:
-        return -np.inf, np.inf
-    return (limit.lower, limit.upper) if limit.lower < limit.upper else (-np.inf, np.inf)
+    return joint.range or (-np.inf, np.inf)
 
 
 def _alike(facts: "Facts") -> list[tuple[Leg, Leg | None, Sequence[int]]]:

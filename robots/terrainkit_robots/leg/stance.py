@@ -112,7 +112,7 @@ def _torques(
     """Return what holds each joint of the legs against gravity and the ground's push."""
     up = np.array([0.0, 0.0, 1.0])
     torques: dict[str, float] = {}
-    for index in sorted({index for leg in facts.legs for index in leg.limb.chain}):
+    for index in sorted(facts.leg_bodies):
         joint = facts.bodies[index].joint
         if joint is None or not joint.moves:
             continue

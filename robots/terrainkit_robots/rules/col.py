@@ -148,7 +148,7 @@ def no_collision(robot: Facts) -> Iterator[Defect]:
     """
     if robot.bodies and not any(_has_contacts(body) for body in robot.bodies):
         yield Defect(
-            subject=robot.model.name or robot.model.file.name,
+            subject=robot.model.title,
             source=robot.model.source,
             message=f"none of the {len(robot.links)} links has a collision shape; wanted 1 or more",
         )

@@ -524,7 +524,7 @@ def mass_ratio(robot: Facts) -> Iterator[Defect]:
     """
     apart = []
     for body in robot.bodies:
-        parent = _real_parent(robot, body)
+        parent = robot.carrier_of(body)
         if body.virtual or parent is None or _mass_unknown(body) or _mass_unknown(parent):
             continue
         light, heavy = sorted((body, parent), key=lambda b: b.mass)
@@ -542,14 +542,6 @@ def mass_ratio(robot: Facts) -> Iterator[Defect]:
             f"{heavy.mass:.4g} kg: a ratio of {ratio:.0f}; wanted {_RATIO:.0f} at most",
             measured={"ratio": ratio, "mass": light.mass, "neighbor": heavy.mass},
         )
-
-
-def _real_parent(robot: Facts, body: Body) -> Body | None:
-    """Return the body that carries this one, past those that only stand between two joints."""
-    at = body.parent
-    while at is not None and robot.bodies[at].virtual:
-        at = robot.bodies[at].parent
-    return None if at is None else robot.bodies[at]
 
 
 @rule("INR010", "implausible-density", "warning")

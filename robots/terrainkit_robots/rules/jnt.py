@@ -657,7 +657,7 @@ def no_actuator(robot: Facts) -> Iterator[Defect]:
     if not robot.model.actuators:
         if robot.joints:
             yield Defect(
-                subject=robot.model.name or robot.model.file.name,
+                subject=robot.model.title,
                 source=robot.model.source,
                 severity="info",
                 message=f"the file has no actuator for any of its {len(robot.joints)} joints; "

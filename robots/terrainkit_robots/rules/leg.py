@@ -8,12 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from terrainkit_robots.body.contact import margin
-from terrainkit_robots.body.kinematics import axis_in_trunk
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.fix import Fix, SetAttribute
 from terrainkit_robots.leg.legs import Leg
 from terrainkit_robots.leg.limbs import Limb
-from terrainkit_robots.model import Matrix
 from terrainkit_robots.rule import CannotCheckError, Defect, rule
 
 _USUAL = (2, 4, 6, 8)
@@ -34,23 +32,17 @@ _RIGHT = {"right", "fr", "hr", "br", "rf", "rh", "rb", "rm", "mr"}
 """Words of names that tell where a leg is. RR is either rear right, or nothing."""
 
 
-def _root(leg: Limb, robot: Facts) -> Matrix:
-    """Return where a limb starts: a point of its first joint's axis at zero, shape (3,) [m]."""
-    first = next(i for i in leg.chain if (j := robot.bodies[i].joint) is not None and j.moves)
-    return axis_in_trunk(robot.bodies[first], robot.at_zero[first])[0]
-
-
 def _upward(robot: Facts) -> list[Limb]:
     """Return limbs that look like legs in all but where they end."""
     legs = [leg.limb for leg in robot.legs]
     kinds = {_kinds(limb) for limb in legs}
     found = []
     for limb in robot.limbs:
-        start = _root(limb, robot)
+        start = limb.points[0]
         rise = float(limb.tip[2] - start[2])
         if limb in legs or rise < _UPWARD * float(np.linalg.norm(limb.tip - start)):
             continue
-        beside = any(abs(float(_root(leg, robot)[2] - start[2])) < rise / 2 for leg in legs)
+        beside = any(abs(float(leg.points[0][2] - start[2])) < rise / 2 for leg in legs)
         if limb.words and _kinds(limb) in kinds and beside:
             found.append(limb)
     return found
@@ -82,7 +74,7 @@ def legs(robot: Facts) -> Iterator[Defect]:
         else "; ".join(f"{foot}: {roles}" for foot, roles in words.items())
     )
     yield Defect(
-        subject=robot.model.name or robot.model.file.name,
+        subject=robot.model.title,
         source=robot.model.source,
         message=f"{len(found)} legs of {_mean_length(found):.3f} m; {listed}",
         certainty="likely",
@@ -111,7 +103,7 @@ def leg_count(robot: Facts) -> Iterator[Defect]:
     if count + len(_upward(robot)) in _USUAL:
         return
     yield Defect(
-        subject=robot.model.name or robot.model.file.name,
+        subject=robot.model.title,
         source=robot.model.source,
         message=(
             f"{count} legs were found ({', '.join(leg.foot for leg in robot.legs)}); "
@@ -236,7 +228,7 @@ def _places(robot: Facts, words: set[str], axis: int) -> list[float]:
         names = [robot.bodies[leg.limb.chain[-1]].name, leg.foot, leg.joints[-1].name]
         tokens = {t.lower() for n in names for t in re.findall(r"[A-Z]?[a-z]+|[A-Z]+", n)}
         if tokens & words:
-            found.append(float(_root(leg.limb, robot)[axis]))
+            found.append(float(leg.limb.points[0][axis]))
     return found
 
 
@@ -303,7 +295,7 @@ def leg_points_up(robot: Facts) -> Iterator[Defect]:
         Comparison of where limbs of the same make end, all joints at zero.
     """
     for limb in _upward(robot):
-        start = _root(limb, robot)
+        start = limb.points[0]
         leaf = robot.bodies[limb.chain[-1]]
         first = limb.joints[0]
         rise = float(limb.tip[2] - start[2])

@@ -111,7 +111,7 @@ def sibling_pattern(robot: Facts) -> Iterator[Defect]:
 
 def _twins(robot: Facts) -> Iterator[_Twins]:
     """Yield the joints and links whose bodies are mirrored."""
-    legs = {index for leg in robot.legs for index in leg.limb.chain}
+    legs = robot.leg_bodies
     for pair in robot.mirror.pairs:
         left, right = robot.bodies[pair.left], robot.bodies[pair.right]
         sure = pair.left in legs and pair.right in legs
@@ -327,7 +327,7 @@ def substring_traps(robot: Facts) -> Iterator[Defect]:
     said = [*_said_of_feet(robot), *_said_of_others(robot)]
     if said:
         yield Defect(
-            subject=robot.model.name or robot.model.file.name,
+            subject=robot.model.title,
             source=robot.model.source,
             message="; ".join(said),
             certainty="likely",
@@ -362,7 +362,7 @@ def _exact_word(feet: Sequence[str], others: Sequence[str]) -> str | None:
 
 def _said_of_others(robot: Facts) -> Iterator[str]:
     trunk = {link.name for link in robot.bodies[0].links}
-    legs = {index for leg in robot.legs for index in leg.limb.chain}
+    legs = robot.leg_bodies
     in_legs = {link.name for index in legs for link in robot.bodies[index].links}
     every = [link.name for link in robot.links]
     matches = [name for name in every if "base" in name]

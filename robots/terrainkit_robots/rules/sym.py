@@ -44,7 +44,6 @@ from terrainkit_robots.symmetry.asymmetry import (
     against_its_kind,
     against_the_rest,
     limits_match,
-    limits_of,
     opposed,
     slips,
 )
@@ -307,7 +306,7 @@ def limits_differ(robot: Facts) -> Iterator[Defect]:
     """
     told = _Told(robot, wide_range)
     for pair, left, right in twins(robot):
-        a, b = limits_of(left.joint), limits_of(right.joint)
+        a, b = left.joint.range, right.joint.range
         if pair.sign == 0 or a is None or b is None or limits_match(a, b, pair.sign):
             continue
         if told.any_of(left, right):
@@ -332,7 +331,7 @@ def limits_differ(robot: Facts) -> Iterator[Defect]:
 
 
 def _sizes_of_limits(body: Body) -> Matrix | None:
-    ends = limits_of(body.joint) if body.joint else None
+    ends = body.joint.range if body.joint else None
     return None if ends is None else np.sort(np.abs(ends))
 
 
@@ -444,7 +443,7 @@ def joint_axis_differs(robot: Facts) -> Iterator[Defect]:
             measured={"others": stray.others},
         )
     for pair, left, right in twins(robot):
-        a, b = limits_of(left.joint), limits_of(right.joint)
+        a, b = left.joint.range, right.joint.range
         if pair.sign == 0 or a is None or b is None or {left.joint.name, right.joint.name} & told:
             continue
         flipped = not limits_match(a, b, pair.sign) and limits_match(a, b, -pair.sign)

@@ -252,7 +252,7 @@ def no_links(robot: Facts) -> Iterator[Defect]:
         raise CannotCheckError("the file could not be read")
     what = "bodies" if model.kind == "mjcf" else "links"
     yield Defect(
-        subject=model.name or model.file.name,
+        subject=model.title,
         source=model.source,
         message=f"the robot has 0 {what} and {len(model.joints)} joints; wanted at least 1 of them",
     )

@@ -49,7 +49,7 @@ def slips(robot: Facts) -> tuple[list[Slip], set[int]]:
     displaced: set[int] = set()
     above: dict[int, tuple[Twin, Twin]] = {}
     paired = partners(robot)
-    in_legs = {index for leg in robot.legs for index in leg.limb.chain}
+    in_legs = robot.leg_bodies
     for pair, left, right in twins(robot):
         above[pair.left] = left, right
         if _points_nowhere(left.joint) or _points_nowhere(right.joint):
@@ -121,14 +121,6 @@ def _is_turned(robot: Facts, left: Twin, right: Twin, angle: float) -> bool:
     return arm < _SHORT or gap > 0.5 * 2 * math.sin(angle / 2) * arm
 
 
-def limits_of(joint: Joint) -> tuple[float, float] | None:
-    """Return lower and upper; None where JNT tells what is wrong with them."""
-    limit = joint.limit
-    if joint.kind == "continuous" or limit is None or limit.lower is None or limit.upper is None:
-        return None
-    return (limit.lower, limit.upper) if limit.lower < limit.upper else None
-
-
 def limits_match(a: tuple[float, float], b: tuple[float, float], sign: int) -> bool:
     """Return whether limits are mirrored: the same, or with a negative sign, turned around."""
     mirrored = b if sign > 0 else (-b[1], -b[0])
@@ -185,7 +177,7 @@ def against_its_kind(robot: Facts) -> Iterator[tuple[Twin, Twin, int]]:
     """
     if len(robot.legs) != 2:
         return
-    in_legs = {index for leg in robot.legs for index in leg.limb.chain}
+    in_legs = robot.leg_bodies
     pairs = [(left, right) for pair, left, right in twins(robot) if pair.left in in_legs]
     for bends in (True, False):
         kind = [
@@ -205,7 +197,7 @@ _FEWEST_OTHERS = 2
 
 def _either_way(left: Twin, right: Twin) -> bool:
     """Return whether the limits of two joints are the same whichever way these turn."""
-    a, b = limits_of(left.joint), limits_of(right.joint)
+    a, b = left.joint.range, right.joint.range
     return a is None or b is None or (limits_match(a, b, 1) and limits_match(a, b, -1))
 
 

@@ -43,7 +43,7 @@ def twins(robot: Facts) -> tuple[tuple[Pair, Twin, Twin], ...]:
 
 def _twins(robot: Facts) -> Iterator[tuple[Pair, Twin, Twin]]:
     paired = set(partners(robot))
-    in_legs = {index for leg in robot.legs for index in leg.limb.chain}
+    in_legs = robot.leg_bodies
     for pair in robot.mirror.pairs:
         left, right = _twin(robot, pair.left, paired), _twin(robot, pair.right, paired)
         if left is None or right is None:
