@@ -135,7 +135,7 @@ def _healthy(path: Path) -> tuple[Healthy, tuple[Finding, ...], Clean, Meshes]:
         meshes = Meshes()
         start = time.perf_counter()
         facts = Facts(read_robot(file), meshes)
-        report = lint(facts)
+        report = lint(facts, simulate=False)
         times.append(time.perf_counter() - start)
     loud = Counter(finding.severity for finding in report.findings)
     clean = Clean(
@@ -199,7 +199,7 @@ def _check(
     signal.alarm(_LONGEST)
     try:
         model = read_robot(file, contents={file: text})
-        findings = lint(Facts(model, meshes)).findings
+        findings = lint(Facts(model, meshes), simulate=False).findings
     except Exception as error:  # a crash or a hang is a miss, and is told
         crash = f"{type(error).__name__}: {error}"
         return Outcome(kind=kind.title, robot=robot, found=False, names=names, crash=crash)

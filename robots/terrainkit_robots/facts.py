@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 from terrainkit_robots.body.bodies import Body, merge_bodies
 from terrainkit_robots.body.kinematics import body_poses
@@ -16,13 +17,29 @@ from terrainkit_robots.mesh.meshes import Meshes
 from terrainkit_robots.model import Joint, Link, Matrix, RobotModel
 from terrainkit_robots.symmetry.mirror import Mirror, find_mirror
 
+if TYPE_CHECKING:
+    from terrainkit_robots.spec.robot_spec import RobotSpec
+
 
 class Facts:
     """A robot's facts. Units are SI and radians; the trunk's frame is the robot's."""
 
-    def __init__(self, model: RobotModel, meshes: Meshes | None = None) -> None:
+    def __init__(
+        self,
+        model: RobotModel,
+        meshes: Meshes | None = None,
+        *,
+        against: "Facts | None" = None,
+        spec: "RobotSpec | None" = None,
+    ) -> None:
         self.model: RobotModel = model
         """The description."""
+
+        self.against: Facts | None = against
+        """Another description of the same robot, to be compared with this one."""
+
+        self.spec: RobotSpec | None = spec
+        """What is known of the robot beyond its description: its robot.toml."""
 
         self.meshes: Meshes = meshes or Meshes()
         """Its mesh files; each is opened when something asks for it, and then once."""

@@ -82,24 +82,29 @@ _OF_WHOLE_ROBOTS = ("LEG", "SYM")
 """Families that compare limbs, and would tell again what a broken tree has lost."""
 
 
-def lint(facts: Facts, chosen: Sequence[Rule] | None = None) -> Report:
+def lint(
+    facts: Facts, chosen: Sequence[Rule] | None = None, *, simulate: bool = True
+) -> Report:
     """Return what the rules find on a robot.
 
     Args:
         facts: The robot.
-        chosen: Rules to ask; all of them unless told.
+        chosen: Rules to ask; unless told all of those for which there is what they need.
+        simulate: Whether the rules that simulate may do so, which takes a second or two.
     """
     findings: list[Finding] = []
     skipped: list[Skipped] = []
-    chosen = rules() if chosen is None else chosen
+    if chosen is None:
+        chosen = [rule for rule in rules() if not unasked(rule, facts, simulate=simulate)]
     if not facts.model.links and any(p.code in _UNREADABLE for p in facts.model.problems):
         chosen = [rule for rule in chosen if rule.family == "XML"]  # there is no robot to look at
     for each in chosen:
         try:
             if each.family in _OF_WHOLE_ROBOTS and facts.tree.left_out:
                 raise CannotCheckError("links or joints are missing from the tree")
-            if each.legged and not facts.legs:
-                raise CannotCheckError("no legs were found")
+            missing = _missing(each, facts, simulate=simulate)
+            if missing:
+                raise CannotCheckError(missing)
             defects = list(islice(each.check(facts), MOST_FINDINGS + 1))
             findings += [_finding(each, defect) for defect in defects[:MOST_FINDINGS]]
             if len(defects) > MOST_FINDINGS:
@@ -117,6 +122,31 @@ def lint(facts: Facts, chosen: Sequence[Rule] | None = None) -> Report:
     order = {"error": 0, "warning": 1, "info": 2}
     findings.sort(key=lambda f: (order[f.severity], str(f.file), f.line, f.code))
     return Report(facts=facts, findings=tuple(findings), skipped=tuple(skipped))
+
+
+def unasked(rule: Rule, facts: Facts, *, simulate: bool) -> bool:
+    """Return whether nobody asks for a rule who does not name it: there is nothing for it to do."""
+    missing = _missing(rule, facts, simulate=simulate)
+    return missing in (_NO_OTHER, _NO_SPEC, _NO_SIMULATION)
+
+
+_NO_LEGS = "no legs were found"
+_NO_OTHER = "there is no other file to compare with; --against names one"
+_NO_SPEC = "there is no robot.toml to compare with; --spec names one"
+_NO_SIMULATION = "nothing is simulated here"
+
+
+def _missing(rule: Rule, facts: Facts, *, simulate: bool) -> str:
+    """Return which of its needs a rule lacks, as a reason; empty if it can be asked."""
+    if "simulation" in rule.needs and not simulate:
+        return _NO_SIMULATION
+    if "against" in rule.needs and facts.against is None:
+        return _NO_OTHER
+    if "spec" in rule.needs and facts.spec is None:
+        return _NO_SPEC
+    if "legs" in rule.needs and not facts.legs:
+        return _NO_LEGS
+    return ""
 
 
 def _finding(rule: Rule, defect: Defect) -> Finding:

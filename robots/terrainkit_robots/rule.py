@@ -37,6 +37,10 @@ Severity = Literal["error", "warning", "info"]
 Certainty = Literal["proven", "likely"]
 Measured = Mapping[str, float | int | str]
 
+Need = Literal["legs", "simulation", "against", "spec"]
+"""What a rule cannot be asked without: legs that were found, leave to simulate, another description
+of the robot, its robot.toml."""
+
 FAMILIES = {
     "XML": "what is written",
     "MSH": "mesh files",
@@ -47,6 +51,9 @@ FAMILIES = {
     "LEG": "legs",
     "SYM": "left and right",
     "NAM": "names",
+    "XRF": "the robot against another file of it, or its spec",
+    "SIM": "what simulators make of it",
+    "DYN": "the robot simulated",
 }
 
 
@@ -104,8 +111,8 @@ class Rule:
     fixes: Literal["safe", "unsafe", "no"] = "no"
     """Whether it repairs what it finds, or some of that."""
 
-    legged: bool = False
-    """Whether it only makes sense for a robot with legs."""
+    needs: tuple[Need, ...] = ()
+    """What it cannot be asked without."""
 
     @property
     def family(self) -> str:
@@ -159,7 +166,7 @@ def rule(
     severity: Severity,
     *,
     fixes: Literal["safe", "unsafe", "no"] = "no",
-    legged: bool = False,
+    needs: tuple[Need, ...] = (),
 ) -> Callable[[Check], Check]:
     """Return a decorator that makes a function the rule `code`."""
 
@@ -167,7 +174,7 @@ def rule(
         if code in _RULES and _RULES[code].check.__module__ != check.__module__:
             raise ConfigError(f"two rules are called {code}")
         _RULES[code] = Rule(
-            code=code, name=name, severity=severity, check=check, fixes=fixes, legged=legged
+            code=code, name=name, severity=severity, check=check, fixes=fixes, needs=needs
         )
         return check
 

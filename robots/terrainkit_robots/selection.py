@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from terrainkit_robots.lint import Finding, Report, Skipped, lint
+from terrainkit_robots.lint import Finding, Report, Skipped, lint, unasked
 from terrainkit_robots.markup.ignore_comment import IgnoreComment, read_comments
 from terrainkit_robots.rule import Rule, rules
 from terrainkit_robots.settings import Settings, matching
@@ -61,7 +61,9 @@ def lint_selected(
         ConfigError: if the settings name a rule that there is not.
     """
     chosen, left_out = choose(settings)
-    report = lint(facts, chosen)
+    if not settings.select:
+        chosen = tuple(r for r in chosen if not unasked(r, facts, simulate=settings.simulate))
+    report = lint(facts, chosen, simulate=settings.simulate)
     comments = [
         comment
         for file in facts.model.sources

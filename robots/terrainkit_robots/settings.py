@@ -6,6 +6,7 @@ ignore = { JNT009 = "the gripper is passive" }
 package = { my_robot = "." }
 xacro-arg = { arm = false }
 strict = true
+simulation = false                     # as --no-simulation
 """
 
 import os
@@ -37,6 +38,9 @@ class Settings:
     strict: bool = False
     """Whether warnings count as errors in the exit code."""
 
+    simulate: bool = True
+    """Whether rules that simulate are asked."""
+
     def over(self, other: "Settings") -> "Settings":
         """Return both, where these go before the `other` ones."""
         return Settings(
@@ -45,6 +49,7 @@ class Settings:
             packages={**other.packages, **self.packages},
             xacro_arguments={**other.xacro_arguments, **self.xacro_arguments},
             strict=self.strict or other.strict,
+            simulate=self.simulate and other.simulate,
         )
 
 
@@ -70,7 +75,7 @@ _FILES = {
 }
 """Where settings are kept, and in which table."""
 
-_KEYS = ("select", "ignore", "package", "xacro-arg", "strict")
+_KEYS = ("select", "ignore", "package", "xacro-arg", "strict", "simulation")
 
 _LARGEST = 1 << 20
 """No configuration is larger [bytes]."""
@@ -137,8 +142,9 @@ def _refuse_unknown(table: Mapping[str, Any], known: Sequence[str]) -> None:
 
 def _settings(table: Mapping[str, Any], folder: Path) -> Settings:
     _refuse_unknown(table, _KEYS)
-    if not isinstance(table.get("strict", False), bool):
-        raise ConfigError(f"strict is {table['strict']!r}; wanted true or false")
+    for key in ("strict", "simulation"):
+        if not isinstance(table.get(key, False), bool):
+            raise ConfigError(f"{key} is {table[key]!r}; wanted true or false")
     packages = _texts(table, "package", "a folder")
     settings = Settings(
         select=_words(table.get("select", [])),
@@ -146,6 +152,7 @@ def _settings(table: Mapping[str, Any], folder: Path) -> Settings:
         packages={name: package_folder(name, folder / path) for name, path in packages.items()},
         xacro_arguments=_arguments(table),
         strict=table.get("strict", False),
+        simulate=table.get("simulation", True),
     )
     for word in (*settings.select, *settings.ignore):
         matching(word)

@@ -186,7 +186,7 @@ def every_case(chosen):
 
 def look_at(path, contents=None, chosen=None):
     """Return the report on a robot."""
-    return lint(Facts(read_robot(path, contents=contents), Meshes(contents)), chosen)
+    return lint(Facts(read_robot(path, contents=contents), Meshes(contents)), chosen, simulate=chosen is not None)
 
 
 def what(report):

@@ -21,7 +21,7 @@ def defect(subject="a", line=1, **more):
     return Defect(subject=subject, source=Source(file=FILE, line=line), message="m", **more)
 
 
-def rule(check, code="INR099", severity="error", *, legged=False):
+def rule(check, code="INR099", severity="error", *, needs=()):
     """Return a rule that finds what `check` yields; a list is found on every robot."""
 
     def found(robot):
@@ -37,7 +37,7 @@ def rule(check, code="INR099", severity="error", *, legged=False):
         """
         yield from check(robot) if callable(check) else check
 
-    return Rule(code=code, name="a-rule", severity=severity, check=found, legged=legged)
+    return Rule(code=code, name="a-rule", severity=severity, check=found, needs=needs)
 
 
 def report(*chosen, robot=None):
@@ -110,11 +110,11 @@ def test_what_cannot_be_checked_is_told():
 
 
 def test_a_rule_for_legs_is_not_asked_of_a_robot_without():
-    made = report(rule([defect()], legged=True))
+    made = report(rule([defect()], needs=("legs",)))
     assert made.findings == ()
     assert made.skipped[0].reason == "no legs were found"
     robot = Facts(read_robot(bundled.find("biped")))
-    assert len(report(rule([defect()], legged=True), robot=robot).findings) == 1
+    assert len(report(rule([defect()], needs=("legs",)), robot=robot).findings) == 1
 
 
 @pytest.mark.parametrize("family", ["LEG", "SYM"])

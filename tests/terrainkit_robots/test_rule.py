@@ -39,19 +39,19 @@ def check(text=PAGE):
 
 
 def test_a_rule_has_a_page(empty):
-    rule("INR099", "negative-mass", "error", fixes="safe", legged=True)(check())
+    rule("INR099", "negative-mass", "error", fixes="safe", needs=("legs",))(check())
     made = empty["INR099"]
     assert (made.code, made.name, made.severity) == ("INR099", "negative-mass", "error")
-    assert (made.fixes, made.legged, made.family) == ("safe", True, "INR")
+    assert (made.fixes, made.needs, made.family) == ("safe", ("legs",), "INR")
     assert made.title == "A mass is negative."
     assert made.why == "Simulators divide by it.\n\nAnd it is not physical."
     assert made.how_to_fix == "Write the mass of the part."
     assert made.reference == "A book, chapter 3."
 
 
-def test_a_rule_fixes_nothing_and_needs_no_legs_unless_told(empty):
+def test_a_rule_fixes_nothing_and_needs_nothing_unless_told(empty):
     rule("INR099", "n", "error")(check())
-    assert (empty["INR099"].fixes, empty["INR099"].legged) == ("no", False)
+    assert (empty["INR099"].fixes, empty["INR099"].needs) == ("no", ())
 
 
 def test_the_function_stays_as_it_is(empty):

@@ -54,7 +54,7 @@ def _silent(body: Body) -> list[Placed]:
     ]
 
 
-@rule("COL001", "no-foot-collision", "error", legged=True)
+@rule("COL001", "no-foot-collision", "error", needs=("legs",))
 def no_foot_collision(robot: Facts) -> Iterator[Defect]:
     """A leg has nothing to stand on: no collision shape on its foot.
 
@@ -105,7 +105,7 @@ def _bare(leg: Leg, body: Body, robot: Facts) -> bool:
     return floor > float(place[2])
 
 
-@rule("COL002", "no-trunk-collision", "warning", legged=True)
+@rule("COL002", "no-trunk-collision", "warning", needs=("legs",))
 def no_trunk_collision(robot: Facts) -> Iterator[Defect]:
     """The trunk has no collision shape.
 
@@ -280,7 +280,7 @@ def _spread(dimension: int) -> Matrix:
     return np.asarray(np.arange(1, _SAMPLES + 1) * math.sqrt(prime) % 1)
 
 
-@rule("COL007", "foot-contacts-off", "error", legged=True)
+@rule("COL007", "foot-contacts-off", "error", needs=("legs",))
 def foot_contacts_off(robot: Facts) -> Iterator[Defect]:
     """The shape of a foot is there, but its contacts are switched off.
 

@@ -99,7 +99,7 @@ def _meant(kind: str, known: frozenset[str]) -> str:
     return _OTHER_NAMES.get(word) or closest(word, known, _ALIKE)
 
 
-@rule("JNT002", "prismatic-leg", "warning", legged=True)
+@rule("JNT002", "prismatic-leg", "warning", needs=("legs",))
 def prismatic_leg(robot: Facts) -> Iterator[Defect]:
     """A leg has a joint that slides.
 
@@ -123,7 +123,7 @@ def prismatic_leg(robot: Facts) -> Iterator[Defect]:
             )
 
 
-@rule("JNT003", "continuous-leg", "warning", legged=True)
+@rule("JNT003", "continuous-leg", "warning", needs=("legs",))
 def continuous_leg(robot: Facts) -> Iterator[Defect]:
     """A leg has a joint without end stops.
 
@@ -592,7 +592,7 @@ def safety_controller(robot: Facts) -> Iterator[Defect]:
         )
 
 
-@rule("JNT015", "too-weak", "warning", legged=True)
+@rule("JNT015", "too-weak", "warning", needs=("legs",))
 def too_weak(robot: Facts) -> Iterator[Defect]:
     """A joint needs most of its effort for standing still.
 

@@ -52,7 +52,7 @@ def _kinds(limb: Limb) -> tuple[str, ...]:
     return tuple(joint.kind for joint in limb.joints)
 
 
-@rule("LEG001", "legs", "info", legged=True)
+@rule("LEG001", "legs", "info", needs=("legs",))
 def legs(robot: Facts) -> Iterator[Defect]:
     """These are the legs that were found, and what their joints do.
 
@@ -86,7 +86,7 @@ def _mean_length(found: tuple[Leg, ...]) -> float:
     return float(np.mean([leg.length for leg in found]))
 
 
-@rule("LEG002", "leg-count", "warning", legged=True)
+@rule("LEG002", "leg-count", "warning", needs=("legs",))
 def leg_count(robot: Facts) -> Iterator[Defect]:
     """The number of legs is not 2, 4, 6 or 8.
 
@@ -114,7 +114,7 @@ def leg_count(robot: Facts) -> Iterator[Defect]:
     )
 
 
-@rule("LEG003", "uneven-legs", "warning", legged=True)
+@rule("LEG003", "uneven-legs", "warning", needs=("legs",))
 def uneven_legs(robot: Facts) -> Iterator[Defect]:
     """A leg has fewer joints than the others.
 
@@ -143,7 +143,7 @@ def uneven_legs(robot: Facts) -> Iterator[Defect]:
             )
 
 
-@rule("LEG004", "foot-merged-away", "warning", fixes="safe", legged=True)
+@rule("LEG004", "foot-merged-away", "warning", fixes="safe", needs=("legs",))
 def foot_merged_away(robot: Facts) -> Iterator[Defect]:
     """A foot hangs on a fixed joint, and nothing tells Isaac Gym to keep it.
 
@@ -184,7 +184,7 @@ def foot_merged_away(robot: Facts) -> Iterator[Defect]:
         )
 
 
-@rule("LEG005", "forward", "warning", legged=True)
+@rule("LEG005", "forward", "warning", needs=("legs",))
 def forward(robot: Facts) -> Iterator[Defect]:
     """The robot does not look along +x.
 
@@ -242,7 +242,7 @@ def _turned(robot: Facts, message: str) -> Defect:
     )
 
 
-@rule("LEG006", "falls-over", "error", legged=True)
+@rule("LEG006", "falls-over", "error", needs=("legs",))
 def falls_over(robot: Facts) -> Iterator[Defect]:
     """The centre of mass is not above the feet.
 
@@ -281,7 +281,7 @@ def falls_over(robot: Facts) -> Iterator[Defect]:
     )
 
 
-@rule("LEG007", "leg-points-up", "error", legged=True)
+@rule("LEG007", "leg-points-up", "error", needs=("legs",))
 def leg_points_up(robot: Facts) -> Iterator[Defect]:
     """A leg points up where its siblings point down.
 

@@ -309,7 +309,7 @@ _LEG_WORDS = ("thigh", "calf", "shank", "knee", "hip")
 """What configurations penalize contacts of."""
 
 
-@rule("NAM003", "substring-traps", "info", legged=True)
+@rule("NAM003", "substring-traps", "info", needs=("legs",))
 def substring_traps(robot: Facts) -> Iterator[Defect]:
     """Words that configurations look for match other links than one would think.
 

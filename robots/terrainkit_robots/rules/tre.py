@@ -258,7 +258,7 @@ def no_links(robot: Facts) -> Iterator[Defect]:
     )
 
 
-@rule("TRE007", "no-free-joint", "error", fixes="safe", legged=True)
+@rule("TRE007", "no-free-joint", "error", fixes="safe", needs=("legs",))
 def no_free_joint(robot: Facts) -> Iterator[Defect]:
     """A MJCF robot with legs has no free joint: it is welded to the world.
 

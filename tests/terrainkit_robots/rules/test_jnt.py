@@ -23,7 +23,7 @@ def found(path):
     return [
         (rule.code, defect.severity or rule.severity, defect.subject)
         for rule in rules()
-        if rule.family == "JNT" and (facts.legs or not rule.legged)
+        if rule.family == "JNT" and (facts.legs or "legs" not in rule.needs)
         for defect in rule.check(facts)
         if (defect.severity or rule.severity) != "info"
     ]

@@ -1,0 +1,1 @@
+"""Comparison: two descriptions of one robot, side by side."""

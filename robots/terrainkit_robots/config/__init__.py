@@ -1,0 +1,1 @@
+"""Configurations: the robot as the class that a training framework wants."""

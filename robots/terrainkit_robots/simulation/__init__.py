@@ -1,0 +1,1 @@
+"""Simulation: the robot in MuJoCo, dropped, standing, swept through its joints."""

@@ -1,0 +1,1 @@
+"""Simulators: what each makes of a robot's joints and links."""
