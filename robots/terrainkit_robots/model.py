@@ -151,6 +151,9 @@ class Geometry:
     fitted: bool = False
     """Whether MuJoCo fits the primitive to the mesh, whose shape this is not; MJCF only."""
 
+    color: tuple[float, float, float, float] | None = None
+    """Red, green, blue and opacity that it is drawn with, in 0..1; None if the file gives none."""
+
     @property
     def contacts(self) -> bool:
         """Whether it can touch anything at all."""
@@ -312,6 +315,9 @@ class RobotModel:
 
     home: Mapping[str, float] = field(default_factory=dict)
     """Joint positions [rad] or [m] of the first keyframe, by joint; MJCF only."""
+
+    floating: bool | None = None
+    """Whether the base moves freely; None where that has to be found out."""
 
     excluded: frozenset[frozenset[str]] = frozenset()
     """Pairs of links whose contacts are switched off; MJCF only."""

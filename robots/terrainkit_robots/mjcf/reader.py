@@ -26,6 +26,7 @@ from terrainkit_robots.mjcf.shapes import (
     SIZES,
     Scale,
     between,
+    color_of,
     in_frames,
     mesh_file,
     mesh_geometry,
@@ -97,6 +98,7 @@ class _Reader:
         self._spec = spec
         self._lines = lines
         self._meshes = {mesh_name(mesh): mesh for mesh in spec.meshes}
+        self._materials = {material.name: material for material in spec.materials}
         self._paired = {name for p in spec.pairs for name in (p.geomname1, p.geomname2)} - {""}
         self._bodies = _Names(body.name for body in spec.bodies)
         self._joints = _Names(joint.name for joint in spec.joints)
@@ -276,6 +278,7 @@ class _Reader:
             origin=pose,
             contype=contype,
             conaffinity=conaffinity,
+            color=color_of(geom, self._materials),
         )
         if shape == "mesh" or fitted:
             geometry = replace(self._meshed(geometry, geom, scale), fitted=fitted)

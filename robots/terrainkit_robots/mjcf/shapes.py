@@ -203,6 +203,25 @@ def shape_of(geom: Any) -> ShapeKind:
     return kinds.get(geom.type, "unknown")
 
 
+_PLAIN = np.array([0.5, 0.5, 0.5, 1], dtype=np.float32)
+"""Color of a geom that nobody gave one: MuJoCo takes the material's instead, where there is one."""
+
+
+def color_of(geom: Any, materials: Mapping[str, Any]) -> tuple[float, float, float, float] | None:
+    """Return what a geom is drawn with: its own color, or that of its material.
+
+    None if it has neither, or numbers beyond 0..1.
+    """
+    rgba = geom.rgba
+    if (rgba == _PLAIN).all():
+        if geom.material not in materials:
+            return None
+        rgba = materials[geom.material].rgba
+    red, green, blue, opacity = (round(float(each), 6) for each in rgba)
+    color = (red, green, blue, opacity)
+    return color if all(0 <= each <= 1 for each in color) else None
+
+
 def mesh_name(mesh: Any) -> str:
     """Return the name of a mesh asset, which is that of its file if it has none of its own."""
     return mesh.name or Path(str(mesh.file).replace("\\", "/")).stem

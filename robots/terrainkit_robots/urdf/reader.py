@@ -6,6 +6,7 @@ given there, and what is wrong is recorded and read around.
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ from terrainkit_robots.model import (
     RobotModel,
 )
 from terrainkit_robots.packages import Packages
+from terrainkit_robots.urdf.colors import Color, color_of, named_colors
 from terrainkit_robots.urdf.words import has_variable, misspelt, unexpanded
 from terrainkit_robots.wording import short
 
@@ -47,6 +49,7 @@ class _Reader:
         self._document = document
         self._packages = Packages(document.file, packages)
         self._problems = list(document.problems)
+        self._colors: Mapping[str, Color] = {}
 
     def robot(self) -> RobotModel:
         """Return the robot."""
@@ -56,6 +59,7 @@ class _Reader:
         if not root.get("name", "").strip():
             self._tell("XML003", root, "the robot has no name; wanted <robot name=...>")
         self._words(root)
+        self._colors = named_colors(root)
         links = tuple(self._link(element) for element in root.iterchildren("link"))
         joints = tuple(self._joint(element) for element in root.iterchildren("joint"))
         return RobotModel(
@@ -180,7 +184,9 @@ class _Reader:
         for element in link.iterchildren(tag):
             for again in element.findall("material")[1:]:
                 self._tell("XML008", again, f"<{tag}> has two materials; wanted one")
-            yield self._geometry(element)
+            geometry = self._geometry(element)
+            color = color_of(element, self._colors) if tag == "visual" else None
+            yield geometry if color is None else replace(geometry, color=color)
 
     def _geometry(self, element: "etree._Element") -> Geometry:
         source, name = self._document.source(element), element.get("name", "")

@@ -1,14 +1,25 @@
 """The normal form: a robot as both formats can hold it, whatever file it came from.
 
-Links are those of the main tree, each after its parent. Positions of joints count from where the
-file has its zero, axes are unit vectors, masses are numbers. What a format cannot say is left out
-and told in `notes`, never silently.
+Links are those of the main tree, each after its parent. Axes are unit vectors, joints move from
+where the file has its zero, masses are numbers. What neither format can say is left out and told in
+`notes`, never silently.
 """
 
-from dataclasses import dataclass
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from terrainkit_robots.model import RobotModel
+import numpy as np
+
+from terrainkit_robots.body.bodies import Body
+from terrainkit_robots.body.kinematics import joint_motion
+from terrainkit_robots.leg.effort import effort_of
+from terrainkit_robots.leg.joint_uses import is_wheel
+from terrainkit_robots.markup.document import RobotFileError
+from terrainkit_robots.model import Actuator, Inertial, Joint, Limit, Link, RobotModel
+from terrainkit_robots.wording import names
 
 if TYPE_CHECKING:
     from terrainkit_robots.facts import Facts
@@ -21,10 +32,8 @@ class NormalForm:
     model: RobotModel
     """Its links and joints, depth first; of joints only fixed ones and those with one degree of
     freedom. `reference` of every joint is 0. `anchor` may be set, and links may be virtual: MJCF
-    holds both, and URDF gets frames for them."""
-
-    floating: bool
-    """Whether the base moves freely."""
+    holds both, and URDF gets frames for them. Efforts are in the limits, whatever the format, and
+    there is an actuator for each joint that is driven. `floating` is known."""
 
     notes: tuple[str, ...] = ()
     """What was left out or changed, a sentence each."""
@@ -40,4 +49,181 @@ def normal_form(facts: "Facts", *, floating: bool | None = None) -> NormalForm:
     Raises:
         RobotFileError: if there is no robot to be written.
     """
-    raise NotImplementedError
+    if not facts.bodies:
+        raise RobotFileError(f"{facts.model.file}: there is no link; wanted a robot")
+    notes: list[str] = []
+    links = _links(facts, notes)
+    joints = _joints(facts, notes)
+    floating = floats(facts) if floating is None else floating
+    driven = {joint.name for joint in facts.actuated}
+    kept = {link.name for link in links}
+    model = RobotModel(
+        name=_plain(facts.model.name or facts.model.file.stem),
+        kind="urdf",
+        file=facts.model.file,
+        source=facts.model.source,
+        links=tuple(links),
+        joints=tuple(joint for joint, _ in joints),
+        actuators=tuple(
+            Actuator(
+                name=joint.name,
+                source=joint.source,
+                joint=joint.name,
+                effort=joint.limit.effort if joint.limit else None,
+            )
+            for joint, name_before in joints
+            if joint.moves and name_before in driven
+        ),
+        floating=floating,
+        home={name: q for name, q in facts.model.home.items() if name in facts.positions},
+        excluded=frozenset(pair for pair in facts.model.excluded if pair <= kept),
+        sources=facts.model.sources,
+    )
+    return NormalForm(model=model, notes=tuple(notes))
+
+
+def floats(facts: "Facts") -> bool:
+    """Return whether the base of a robot moves freely.
+
+    It does if the file says so or the robot has legs or wheels, and if nothing of it has a limit,
+    as with a drone. An arm or a hand is bolted down.
+    """
+    if facts.model.floating is not None:
+        return facts.model.floating
+    base = facts.bodies[0].top.name
+    if any(joint.kind == "floating" and joint.child == base for joint in facts.model.joints):
+        return True
+    if facts.legs:
+        return True
+    if facts.model.kind == "mjcf" or not facts.bodies[0].mass:
+        return False
+    wheels = any(b.joint is not None and b.joint.range is None for b in _turning(facts))
+    return wheels or not facts.joints
+
+
+def _turning(facts: "Facts") -> list[Body]:
+    return [body for body in facts.bodies if is_wheel(facts, body)]
+
+
+def _plain(name: str) -> str:
+    """Return a name that is one in every format and on every disk."""
+    return re.sub(r"[^A-Za-z0-9_.-]+", "_", name).strip("._-") or "robot"
+
+
+def _links(facts: "Facts", notes: list[str]) -> list[Link]:
+    order = {name: place for place, name in enumerate(facts.tree.order)}
+    links = [link for body in facts.bodies for link in body.links]
+    links.sort(key=lambda link: order[link.name])
+    left = [name for name in facts.tree.links if name not in facts.body_of]
+    if left:
+        notes.append(f"left out {names(left)}: not part of the robot's tree")
+    unknown = [link for link in links if _is_nan(link.inertial)]
+    return _with_mesh_inertia(facts, links) if unknown else links
+
+
+def _is_nan(inertial: Inertial | None) -> bool:
+    return inertial is not None and (
+        (inertial.mass is not None and np.isnan(inertial.mass))
+        or (inertial.inertia is not None and bool(np.isnan(inertial.inertia).any()))
+    )
+
+
+def _with_mesh_inertia(facts: "Facts", links: Sequence[Link]) -> list[Link]:
+    """Return links with the inertia that MuJoCo takes from their meshes."""
+    import mujoco
+
+    from terrainkit_robots.quiet_mujoco import quiet_mujoco
+
+    file = facts.model.file
+    try:
+        with quiet_mujoco():
+            model = mujoco.MjModel.from_xml_path(str(file))
+    except ValueError as error:
+        reason = " ".join(str(error).split())
+        raise RobotFileError(
+            f"{file}: masses are to come from meshes, and MuJoCo does not load it: {reason}"
+        ) from None
+    found = []
+    for link in links:
+        if _is_nan(link.inertial):
+            assert link.inertial is not None
+            body = model.body(link.name)
+            origin = np.eye(4)
+            origin[:3, 3] = body.ipos
+            turn = np.zeros(9)
+            mujoco.mju_quat2Mat(turn, body.iquat)
+            origin[:3, :3] = turn.reshape(3, 3)
+            inertial = replace(
+                link.inertial,
+                mass=float(body.mass[0]),
+                origin=origin,
+                inertia=np.diag(body.inertia),
+            )
+            link = replace(link, inertial=inertial)
+        found.append(link)
+    return found
+
+
+def _joints(facts: "Facts", notes: list[str]) -> list[tuple[Joint, str]]:
+    """Return the joint above each link but the first, and what it was called before."""
+    order = {name: place for place, name in enumerate(facts.tree.order)}
+    base = facts.bodies[0].top.name
+    bodies = {body.top.name: body for body in facts.bodies}
+    inside = sorted((n for n in facts.body_of if n != base), key=lambda n: order[n])
+    above = [facts.tree.above[name] for name in inside]
+    uses = Counter(joint.name for joint in above)
+    taken, found = set[str](), []
+    for joint in above:
+        name = joint.name or f"{joint.child}_joint"
+        if uses[joint.name] > 1 and name in taken:
+            name = _free_name(f"{joint.child}_joint", taken)
+            notes.append(f"named the joint above {joint.child} {name}: there are two {joint.name}")
+        taken.add(name)
+        moved = _normal_joint(facts, joint, bodies.get(joint.child), notes)
+        found.append((replace(moved, name=name), joint.name))
+    return found
+
+
+def _free_name(name: str, taken: set[str]) -> str:
+    number = 2
+    wanted = name
+    while wanted in taken:
+        wanted, number = f"{name}_{number}", number + 1
+    return wanted
+
+
+def _normal_joint(facts: "Facts", joint: Joint, body: Body | None, notes: list[str]) -> Joint:
+    if not joint.moves or body is None:
+        if joint.kind != "fixed":
+            notes.append(f"fixed {joint.name}: a joint of type {joint.kind!r} has no motor")
+        return replace(joint, kind="fixed", limit=None, mimic=None, anchor=np.zeros(3))
+    mimic = joint.mimic
+    if mimic is not None and mimic.joint not in {j.name for j in facts.joints} - {joint.name}:
+        notes.append(f"{joint.name} follows no other joint: there is no {mimic.joint!r}")
+        mimic = None
+    limits = joint.range
+    if limits is None and joint.kind == "revolute":
+        notes.append(f"{joint.name} has no limits")
+    kind = "prismatic" if joint.kind == "prismatic" else "revolute" if limits else "continuous"
+    lower, upper = limits or (None, None)
+    return replace(
+        joint,
+        kind=kind,
+        origin=joint.origin @ joint_motion(body, np.float64(0.0)),
+        reference=0.0,
+        axis=joint.direction,
+        mimic=mimic,
+        limit=Limit(
+            source=joint.limit.source if joint.limit else joint.source,
+            lower=lower,
+            upper=upper,
+            effort=_positive(effort_of(facts, joint)),
+            velocity=_positive(joint.limit.velocity if joint.limit else None),
+        ),
+        damping=max(joint.damping, 0.0),
+        armature=max(joint.armature, 0.0),
+    )
+
+
+def _positive(value: float | None) -> float | None:
+    return value if value is not None and 0 < value < np.inf else None

@@ -554,6 +554,35 @@ def test_contacts_that_are_switched_off_for_all() -> None:
     assert [shape.contacts for shape in link(robot, "a").collisions] == [False]
 
 
+@pytest.mark.parametrize(
+    ("attributes", "color"),
+    [
+        ("", None),
+        ('rgba="0.5 0.5 0.5 1"', None),
+        ('rgba="1 0 0 0.25"', (1, 0, 0, 0.25)),
+        ('material="blue"', (0, 0, 1, 1)),
+        ('material="blue" rgba="1 0 0 1"', (1, 0, 0, 1)),
+        ('material="nothing"', None),
+        ('class="painted"', (0, 0, 1, 1)),
+        ('class="painted" rgba="0.5 0.5 0.5 1"', (0, 0, 1, 1)),
+        ('class="red"', (1, 0, 0, 1)),
+        ('material="new"', (1, 1, 1, 1)),
+        ('rgba="2 0 0 1"', None),
+        ('rgba="-1 0 0 1"', None),
+    ],
+)
+def test_a_shape_has_its_own_color_or_that_of_its_material(
+    attributes: str, color: tuple[float, ...] | None
+) -> None:
+    rest = (
+        '<default><default class="painted"><geom material="blue"/></default>'
+        '<default class="red"><geom rgba="1 0 0 1"/></default></default>'
+        '<asset><material name="blue" rgba="0 0 1 1"/><material name="new"/></asset>'
+    )
+    robot = read(in_world(f'<body name="b"><geom size="1" {attributes}/></body>', rest))
+    assert link(robot, "b").collisions[0].color == color
+
+
 # Joints and actuators
 
 

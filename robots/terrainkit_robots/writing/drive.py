@@ -1,0 +1,20 @@
+"""Drives: how the motor of a joint is controlled in a MJCF."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drive:
+    """A position controller: torque = stiffness * (target - q) - damping * dq, up to effort."""
+
+    stiffness: float
+    """[N m/rad] or [N/m]."""
+
+    damping: float
+    """[N m s/rad] or [N s/m]."""
+
+    effort: float | None = None
+    """Largest torque [N m] or force [N]; None if it is not limited."""
+
+    armature: float = 0.0
+    """Inertia of the rotor, reflected to the joint [kg m2] or [kg]."""

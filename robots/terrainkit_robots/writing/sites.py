@@ -1,0 +1,60 @@
+"""Sites: where a robot's feet touch the ground, and where its IMU is."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from terrainkit_robots.body.bodies import Body, Placed
+from terrainkit_robots.body.contact import SOLE
+from terrainkit_robots.body.kinematics import body_poses
+from terrainkit_robots.body.shapes import bounds, has_extent, lowest
+from terrainkit_robots.model import Matrix
+from terrainkit_robots.writing.mjcf_text import Site
+
+if TYPE_CHECKING:
+    from terrainkit_robots.facts import Facts
+    from terrainkit_robots.leg.legs import Leg
+
+_AROUND = 0.002
+"""A foot's site is larger than its shapes by this on each side, so that contacts lie within [m]."""
+
+
+def foot_sites(facts: "Facts") -> tuple[Site, ...]:
+    """Return a site for each leg, around the shapes that touch the ground at the standing pose."""
+    poses = body_poses(facts.bodies, facts.positions)
+    return tuple(_foot_site(leg, facts, poses) for leg in facts.legs)
+
+
+def _foot_site(leg: "Leg", facts: "Facts", poses: Sequence[Matrix]) -> Site:
+    body = facts.bodies[leg.limb.chain[-1]]
+    local = _pose_in_body(body, leg.foot)
+    box = bounds(_touching(body, poses[body.index], facts), facts.meshes)
+    if box is None:
+        return Site(name=leg.foot, body=leg.foot, pose=np.eye(4))
+    place = np.eye(4)
+    place[:3, 3] = box.mean(axis=0)
+    half = np.ptp(box, axis=0) / 2 + _AROUND
+    pose = np.linalg.inv(local) @ place
+    return Site(name=leg.foot, body=leg.foot, pose=pose, half_size=tuple(half.tolist()))
+
+
+def _touching(body: Body, pose: Matrix, facts: "Facts") -> list[Placed]:
+    """Return the shapes of a body that reach as far down as any of them."""
+    shapes = [s for s in body.collisions if has_extent(s.geometry, facts.meshes)]
+    depths = [lowest(shape, pose, facts.meshes) for shape in shapes]
+    return [s for s, depth in zip(shapes, depths, strict=True) if depth <= min(depths) + SOLE]
+
+
+def imu_site(facts: "Facts") -> Site:
+    """Return the site of the IMU: at the base's link of that name, else at the base's origin."""
+    base = facts.bodies[0]
+    for link, pose in zip(base.links, base.poses, strict=True):
+        if "imu" in link.name.lower():
+            return Site(name="imu", body=base.top.name, pose=pose)
+    return Site(name="imu", body=base.top.name, pose=np.eye(4))
+
+
+def _pose_in_body(body: Body, link: str) -> Matrix:
+    names = [each.name for each in body.links]
+    return body.poses[names.index(link)]

@@ -1,0 +1,23 @@
+from terrainkit_robots import bundled
+from terrainkit_robots.robot_file import read_robot
+from terrainkit_robots.writing.leftovers import leftovers
+
+MJCF = """<mujoco><worldbody><body name="a"><geom size="0.1"/>
+  <body name="b"><joint name="j" stiffness="5" frictionloss="0"/><geom size="0.1"/></body></body>
+</worldbody>
+<equality><joint joint1="j" polycoef="0.5 0 0 0 0"/></equality>
+<tendon><fixed name="t"><joint joint="j" coef="1"/></fixed></tendon></mujoco>"""
+
+
+def test_what_is_left_out_of_a_mjcf_is_told(tmp_path):
+    path = tmp_path / "robot.xml"
+    path.write_text(MJCF)
+    assert leftovers(read_robot(path)) == (
+        "left out the 1 elements of <tendon>",
+        "left out the 1 elements of <equality>",
+        "left out stiffness of joints, which 1 elements set",
+    )
+
+
+def test_nothing_is_left_out_of_a_urdf():
+    assert leftovers(read_robot(bundled.find("quadruped"))) == ()
