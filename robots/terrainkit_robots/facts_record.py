@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from terrainkit_robots.simulators.orders import simulator_orders
+
 if TYPE_CHECKING:
     from terrainkit_robots.facts import Facts
     from terrainkit_robots.leg.legs import Leg
@@ -20,6 +22,9 @@ def facts_record(facts: "Facts") -> dict[str, Any]:
     The keys are the same for every robot: one without legs has no feet and no standing pose.
     `observation_size` counts what legged_gym's policies see without the terrain: velocities,
     gravity and command (12 numbers), and position, speed and last action of each actuated joint.
+    `joint_orders` has the joints in the order of the file under `file`, those outside the main tree
+    included, and under each simulator its `joints` and `bodies`, whether that is `certain`, and the
+    `reason`.
     """
     legs, actuated = facts.legs, len(facts.actuated)
     return {
@@ -33,7 +38,7 @@ def facts_record(facts: "Facts") -> dict[str, Any]:
         "legs": [_leg(leg) for leg in legs],
         "feet": [leg.foot for leg in legs],
         "leg_length": number(sum(leg.length for leg in legs) / len(legs)) if legs else None,
-        "joint_orders": {"file": [joint.name for joint in facts.model.joints if joint.moves]},
+        "joint_orders": _orders(facts),
         "mirror_plane": {
             "normal": [number(float(x)) for x in facts.mirror.normal],
             "offset": number(facts.mirror.offset),
@@ -48,6 +53,18 @@ def facts_record(facts: "Facts") -> dict[str, Any]:
 def number(value: float) -> float | None:
     """Return `value` rounded to the digits that mean something; None if it is not finite."""
     return float(f"{value:.{_DIGITS}g}") if math.isfinite(value) else None
+
+
+def _orders(facts: "Facts") -> dict[str, Any]:
+    orders: dict[str, Any] = {"file": [joint.name for joint in facts.model.joints if joint.moves]}
+    for order in simulator_orders(facts):
+        orders[order.key] = {
+            "joints": list(order.joints),
+            "bodies": list(order.bodies),
+            "certain": order.certain,
+            "reason": order.reason,
+        }
+    return orders
 
 
 def _leg(leg: "Leg") -> dict[str, Any]:

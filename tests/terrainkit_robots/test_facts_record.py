@@ -44,6 +44,19 @@ def test_a_robot_without_legs_has_the_same_keys(robot_file, tmp_path):
     assert facts["standing_pose"] is facts["spawn_height"] is facts["holding_torques"] is None
 
 
+def test_joint_orders_by_simulator(robot_file):
+    orders = record(robot_file("a1/urdf/a1.urdf"))["joint_orders"]
+    assert list(orders) == ["file", "mujoco", "isaac_gym", "isaac_lab", "genesis"]
+    legs = {name: [joint[:2] for joint in orders[name]["joints"]] for name in list(orders)[1:]}
+    assert [joint[:2] for joint in orders["file"]][::3] == ["FR", "FL", "RR", "RL"]
+    assert legs["mujoco"][::3] == legs["genesis"][::3] == ["FR", "FL", "RR", "RL"]
+    assert legs["isaac_gym"][::3] == legs["isaac_lab"][:4] == ["FL", "FR", "RL", "RR"]
+    assert orders["mujoco"]["bodies"][:5] == ["base", "FR_hip", "FR_thigh", "FR_calf", "FL_hip"]
+    assert orders["mujoco"]["certain"] is True
+    assert orders["isaac_lab"]["certain"] is False
+    assert all(orders[name]["reason"] for name in legs)
+
+
 @pytest.mark.parametrize("mass", ["1e308", "1e400", "nan", "-1"])
 def test_numbers_beyond_all_bounds_are_none_or_finite(tmp_path, mass):
     file = tmp_path / "robot.urdf"

@@ -82,9 +82,13 @@ class Meshes:
 
         return self._once(("header", path), read)
 
+    def is_held(self, path: Path) -> bool:
+        """Return whether something else is read instead of the file, such as what a fix makes."""
+        return self._held(path) is not None
+
     def exists(self, path: Path) -> bool:
         """Return whether there is something under that name, be it a mesh or not; opens nothing."""
-        return self._held(path) is not None or exists(path)
+        return self.is_held(path) or exists(path)
 
     def surface(self, path: Path) -> Surface:
         """Return the triangles, as they are in the file.

@@ -117,6 +117,9 @@ def _links(facts: "Facts", notes: list[str]) -> list[Link]:
     left = [name for name in facts.tree.links if name not in facts.body_of]
     if left:
         notes.append(f"left out {names(left)}: not part of the robot's tree")
+    held = [j.name for j in facts.model.joints if j.moves and j.parent not in facts.body_of]
+    if held:
+        notes.append(f"left out {names(held)}: a joint between the world and the robot")
     unknown = [link for link in links if _is_nan(link.inertial)]
     return _with_mesh_inertia(facts, links) if unknown else links
 

@@ -21,9 +21,8 @@ def test_the_folder_is_there_whole(tmp_path):
 
 
 def test_or_not_at_all(tmp_path):
-    with pytest.raises(RuntimeError), new_folder(tmp_path / "robot") as folder:
-        write_files(folder, {"robot.toml": b"new"})
-        raise RuntimeError
+    with pytest.raises(ExportError, match="outside"), new_folder(tmp_path / "robot") as folder:
+        write_files(folder, {"robot.toml": b"new", "../outside": b""})
     assert names_in(tmp_path) == []
 
 
