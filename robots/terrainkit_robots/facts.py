@@ -11,10 +11,10 @@ from terrainkit_robots.body.overlap import OverlapScene
 from terrainkit_robots.body.tree import Tree, build_tree
 from terrainkit_robots.leg.legs import Leg, find_legs
 from terrainkit_robots.leg.limbs import Limb, find_limbs
-from terrainkit_robots.leg.pose import nearest, solve_positions
 from terrainkit_robots.leg.stance import Stance, stand
 from terrainkit_robots.mesh.meshes import Meshes
 from terrainkit_robots.model import Joint, Link, Matrix, RobotModel
+from terrainkit_robots.spec.default_pose import starting_positions
 from terrainkit_robots.symmetry.mirror import Mirror, find_mirror
 
 if TYPE_CHECKING:
@@ -121,22 +121,20 @@ class Facts:
 
     @cached_property
     def stance(self) -> Stance | None:
-        """How it stands: at its first keyframe, else as the search finds; None without legs."""
-        return stand(self, solve_positions(self)) if self.legs else None
+        """How it stands: at the pose of its spec, of its first keyframe, or as the search finds.
+
+        None without legs.
+        """
+        return stand(self, starting_positions(self)) if self.legs else None
 
     @cached_property
     def positions(self) -> Mapping[str, float]:
         """Joint positions that the robot starts from [rad] or [m], by name.
 
-        Those of its stance, of its first keyframe, or the closest to zero that the limits allow.
+        Those of its stance, of its spec, of its first keyframe, or the closest to zero that the
+        limits allow.
         """
-        if self.stance is not None:
-            return self.stance.positions
-        home = self.model.home
-        return {
-            joint.name: home.get(joint.name, nearest(joint, joint.reference))
-            for joint in self.joints
-        }
+        return starting_positions(self) if self.stance is None else self.stance.positions
 
     @cached_property
     def overlaps(self) -> OverlapScene:

@@ -82,9 +82,7 @@ _OF_WHOLE_ROBOTS = ("LEG", "SYM")
 """Families that compare limbs, and would tell again what a broken tree has lost."""
 
 
-def lint(
-    facts: Facts, chosen: Sequence[Rule] | None = None, *, simulate: bool = True
-) -> Report:
+def lint(facts: Facts, chosen: Sequence[Rule] | None = None, *, simulate: bool = True) -> Report:
     """Return what the rules find on a robot.
 
     Args:

@@ -38,9 +38,16 @@ class Case:
     line: int | None = None
     severity: str | None = None
     only: bool = False
+    against: str | None = None
+    against_of: str | None = None
+    against_replace: tuple[tuple[str, str], ...] = ()
+    spec: str | None = None
 
     def __post_init__(self):
         assert (self.robot is None) != (self.of is None), f"{self}: wanted either robot or of"
+        assert None in (self.against, self.against_of), f"{self}: two robots to compare with"
+        assert not self.replace or self.of, f"{self}: replace is for of"
+        assert not self.against_replace or self.against_of, f"{self}: against_of is missing"
 
     def __str__(self):
         return f"{self.code} {'fails' if self.fails else 'passes'}: {self.title}"
@@ -48,19 +55,26 @@ class Case:
     @property
     def text(self):
         """Return the robot's file."""
-        text = bundled(self.of) if self.robot is None else self.robot
-        for old, new in self.replace:
-            assert old in text, f"{self}: {old!r} is not in {self.of}"
+        return self._edited(self.of, self.replace) if self.robot is None else self.robot
+
+    @property
+    def other_text(self):
+        """Return the file that the robot is compared with; None if there is none."""
+        if self.against_of is None:
+            return self.against
+        return self._edited(self.against_of, self.against_replace)
+
+    def _edited(self, of, replace):
+        text = bundled(of)
+        for old, new in replace:
+            assert old in text, f"{self}: {old!r} is not in {of}"
             text = text.replace(old, new, 1)
         return text
 
     def write(self, folder):
         """Return the path of the robot, with all of its files in `folder`."""
         text = self.text
-        path = folder / (
-            self.name
-            or ("robot.urdf" if "<robot" in text or "<mujoco" not in text else "robot.xml")
-        )
+        path = folder / (self.name or f"robot{suffix_of(text)}")
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(text.encode())
         for name, content in self.files.items():
@@ -72,6 +86,25 @@ class Case:
             else:
                 file.write_bytes(bytes_of(**content))
         return path
+
+    def facts(self, path, contents=None):
+        """Return the facts of the robot that was written to `path`, with all that it goes with."""
+        other = spec = None
+        if self.other_text is not None:
+            file = path.parent / f"other{suffix_of(self.other_text)}"
+            file.write_bytes(self.other_text.encode())
+            other = Facts(read_robot(file))
+        if self.spec is not None:
+            from terrainkit_robots.spec.spec_file import from_toml
+
+            spec = from_toml(self.spec)
+        model = read_robot(path, contents=contents)
+        return Facts(model, Meshes(contents), against=other, spec=spec)
+
+
+def suffix_of(text):
+    """Return what the name of a file with this text ends with."""
+    return ".urdf" if "<robot" in text or "<mujoco" not in text else ".xml"
 
 
 @cache
@@ -158,14 +191,16 @@ def cases_of(code):
     table = tomllib.loads(path.read_text(encoding="utf-8"))
     assert set(table) <= {"fails", "passes"}, f"{path.name} has {sorted(table)}"
     return [
-        Case(code=code, fails=kind == "fails", **each | {"replace": pairs_of(each)})
+        Case(code=code, fails=kind == "fails", **each | pairs_of(each))
         for kind in ("fails", "passes")
         for each in table.get(kind, [])
     ]
 
 
 def pairs_of(case):
-    return tuple((old, new) for old, new in case.get("replace", []))
+    """Return the edits of a case, as pairs."""
+    names = ("replace", "against_replace")
+    return {name: tuple((old, new) for old, new in case.get(name, [])) for name in names}
 
 
 def sound_cases_of(code):
@@ -184,9 +219,12 @@ def every_case(chosen):
     return pytest.mark.parametrize("case", [pytest.param(c, id=str(c)) for c in chosen])
 
 
-def look_at(path, contents=None, chosen=None):
-    """Return the report on a robot."""
-    return lint(Facts(read_robot(path, contents=contents), Meshes(contents)), chosen, simulate=chosen is not None)
+def look_at(case, path, contents=None, chosen=None):
+    """Return the report on the robot of a case, which was written to `path`.
+
+    Only a rule that is asked by itself may simulate.
+    """
+    return lint(case.facts(path, contents), chosen, simulate=chosen is not None)
 
 
 def what(report):
@@ -196,7 +234,7 @@ def what(report):
 @every_case([case for case in ALL_CASES if case.fails])
 def test_what_is_wrong_is_found(case, tmp_path):
     path = case.write(tmp_path)
-    report = look_at(path, chosen=None if case.only else [find(case.code)])
+    report = look_at(case, path, chosen=None if case.only else [find(case.code)])
     found = [f for f in report.findings if f.code == case.code]
     assert found, f"nothing was found; skipped: {report.skipped}"
     for finding in found:
@@ -219,12 +257,12 @@ def check_text(case, finding):
     assert finding.subject
     assert finding.hint
     assert finding.message == " ".join(finding.message.split())
-    assert finding.message.isascii() or not case.text.isascii()
+    assert finding.message.isascii() or not (case.text + (case.other_text or "")).isascii()
 
 
 @every_case([case for case in ALL_CASES if not case.fails])
 def test_what_is_right_is_left_in_peace(case, tmp_path):
-    report = look_at(case.write(tmp_path), chosen=[find(case.code)])
+    report = look_at(case, case.write(tmp_path), chosen=[find(case.code)])
     assert not report.findings, what(report)
 
 
@@ -243,7 +281,8 @@ def test_every_rule_is_asked_on_a_case_that_passes(code, tmp_path):
     reasons = []
     for number, case in enumerate(case for case in cases_of(code) if not case.fails):
         (tmp_path / str(number)).mkdir()
-        skipped = look_at(case.write(tmp_path / str(number)), chosen=[find(code)]).skipped
+        path = case.write(tmp_path / str(number))
+        skipped = look_at(case, path, chosen=[find(code)]).skipped
         if not skipped:
             return
         reasons += [each.reason for each in skipped]
@@ -287,7 +326,7 @@ def test_a_fix_removes_the_finding_and_brings_no_other(case, tmp_path):
     reports = []
 
     def look(contents):
-        reports.append(look_at(path, contents))
+        reports.append(look_at(case, path, contents))
         return reports[-1]
 
     result = fix_robot(path, look, unsafe=unsafe)
@@ -313,6 +352,6 @@ def test_every_rule_with_fixes_has_a_case_with_one(code, tmp_path):
     safeties = set()
     for number, case in enumerate(case for case in cases_of(code) if case.fails):
         (tmp_path / str(number)).mkdir()
-        report = look_at(case.write(tmp_path / str(number)), chosen=[find(code)])
+        report = look_at(case, case.write(tmp_path / str(number)), chosen=[find(code)])
         safeties |= {finding.fix.safety for finding in report.findings if finding.fix}
     assert find(code).fixes in safeties

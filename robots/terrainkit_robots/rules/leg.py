@@ -4,6 +4,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +13,12 @@ from terrainkit_robots.facts import Facts
 from terrainkit_robots.fix import Fix, SetAttribute
 from terrainkit_robots.leg.legs import Leg
 from terrainkit_robots.leg.limbs import Limb
+from terrainkit_robots.leg.stance import Stance
+from terrainkit_robots.model import Joint
 from terrainkit_robots.rule import CannotCheckError, Defect, rule
+from terrainkit_robots.spec.per_joint import match_joints
+from terrainkit_robots.spec.robot_spec import RobotSpec
+from terrainkit_robots.wording import names
 
 _USUAL = (2, 4, 6, 8)
 
@@ -24,6 +30,21 @@ _EDGE = 0.01
 
 _EDGE_SHARE = 0.25
 """The same as a share of what the support allows at best, for feet narrower than that."""
+
+_INSIDE = 0.001
+"""A robot let go this far inside of the ground is not thrown up [m]."""
+
+_DROP = 0.06
+"""A robot let go this far above the ground lands at 1.1 m/s, which is no start [m]."""
+
+_OFF = 0.1
+"""Share by which a target height may differ from how high the robot stands."""
+
+_LOW = 0.3
+"""A base lower than this share of the leg's length has its origin at its feet."""
+
+_SLACK = 1e-3
+"""A position this far outside of a limit was rounded [rad] or [m]."""
 
 _FRONT = {"front", "fore", "fl", "fr", "lf", "rf"}
 _HIND = {"rear", "hind", "back", "rl", "hl", "hr", "bl", "br", "lh", "rh", "lb", "rb"}
@@ -311,3 +332,136 @@ def leg_points_up(robot: Facts) -> Iterator[Defect]:
             certainty="likely",
             measured={"rise": round(rise, 4), "reach": round(reach, 4)},
         )
+
+
+def _standing(robot: Facts) -> tuple[RobotSpec, Stance]:
+    """Return the spec of a robot with legs, and how it stands at the spec's default pose."""
+    spec, stance = robot.spec, robot.stance
+    assert spec is not None
+    assert stance is not None
+    actuated = {joint.name for joint in robot.actuated}
+    joints = [j.name for leg in robot.legs for j in leg.joints if j.name in actuated]
+    told = match_joints(spec.default_pose, [joint.name for joint in robot.actuated]).values
+    missing = [name for name in joints if name not in told]
+    if missing:
+        raise CannotCheckError(f"default_pose of the spec says nothing clear of {names(missing)}")
+    return spec, stance
+
+
+def _of_trunk(robot: Facts, message: str, measured: dict[str, float]) -> Defect:
+    trunk = robot.bodies[0].top
+    return Defect(
+        subject=trunk.name,
+        source=trunk.source,
+        message=message,
+        certainty="likely",
+        measured={name: round(value, 5) for name, value in measured.items()},
+    )
+
+
+@rule("LEG008", "spec-spawn-height", "error", needs=("spec", "legs"))
+def spec_spawn_height(robot: Facts) -> Iterator[Defect]:
+    """The spec lets the robot go inside of the ground, or high above it.
+
+    Inside the ground contacts throw it up at the first step. From high above it falls, and an
+    episode begins with a crash.
+
+    Fix:
+        Set spawn_height to the height at which the feet touch at the default pose, plus 1 cm.
+
+    Source:
+        Lowest point of the collision shapes at the spec's default pose, with the trunk level.
+    """
+    spec, stance = _standing(robot)
+    if spec.spawn_height is None:
+        raise CannotCheckError("the spec has no spawn_height")
+    air = spec.spawn_height - stance.height
+    measured = {"spawn_height": spec.spawn_height, "contact_height": stance.height}
+    touch = f"at its default pose the robot touches the ground at {stance.height:.4f} m"
+    if air < -_INSIDE:
+        message = (
+            f"spawn_height is {spec.spawn_height:.4f} m, but {touch}: it starts "
+            f"{1000 * -air:.0f} mm inside"
+        )
+        yield _of_trunk(robot, message, measured)
+    elif air > _DROP:
+        message = (
+            f"spawn_height is {spec.spawn_height:.4f} m, and {touch}: it falls {air:.3f} m; wanted "
+            f"at most {_DROP:g} m"
+        )
+        yield replace(_of_trunk(robot, message, measured), severity="warning")
+
+
+@rule("LEG009", "spec-target-height", "warning", needs=("spec", "legs"))
+def spec_target_height(robot: Facts) -> Iterator[Defect]:
+    """The height that rewards ask for is not the one at which the robot stands.
+
+    The reward for the height and the default pose, to which all actions are added, then pull
+    against each other: the robot learns to crouch or to stretch all the time.
+
+    Fix:
+        Set base_height_target to the height of the standing robot, or bend the default pose.
+
+    Source:
+        legged_gym, reward for base height; lowest collision shape at the spec's default pose.
+    """
+    spec, stance = _standing(robot)
+    target = spec.base_height_target
+    if target is None:
+        raise CannotCheckError("the spec has no base_height_target")
+    off = target - stance.height
+    # Of a base whose origin is at the ground the height says nothing; the length of the legs does.
+    size = max(abs(stance.height), _LOW * _mean_length(robot.legs))
+    if abs(off) <= _OFF * size:
+        return
+    message = (
+        f"base_height_target is {target:.4f} m, but the robot stands at {stance.height:.4f} m at "
+        f"its default pose, {abs(off):.3f} m {'lower' if off > 0 else 'higher'};"
+        f" wanted at most {_OFF * size:.3f} m"
+    )
+    yield _of_trunk(robot, message, {"target": target, "standing": stance.height})
+
+
+@rule("LEG010", "spec-reset-range", "warning", needs=("spec", "legs"))
+def spec_reset_range(robot: Facts) -> Iterator[Defect]:
+    """Joints start an episode outside of their limits.
+
+    The default pose times a factor of the reset range is where a joint starts. Beyond a limit the
+    simulator throws it back, and the robot jumps at its first step.
+
+    Fix:
+        Narrow reset_range, or move the default pose away from the limit.
+
+    Source:
+        legged_gym, reset of joints: the default pose times a random factor, 0.5 to 1.5.
+    """
+    spec = robot.spec
+    assert spec is not None
+    found = {joint.name: joint for joint in robot.actuated}
+    outside: dict[str, float] = {}
+    for name, position in match_joints(spec.default_pose, list(found)).values.items():
+        limits = found[name].range
+        if limits is None or not limits[0] - _SLACK <= position <= limits[1] + _SLACK:
+            continue  # a pose that is outside itself is told by another rule
+        ends = [factor * position for factor in spec.reset_range]
+        over = max(limits[0] - min(ends), max(ends) - limits[1])
+        if over > _SLACK:
+            outside[name] = over
+    if not outside:
+        return
+    worst = max(outside, key=lambda name: outside[name])
+    listed = names(f"{name} by {over:.3g} {_unit(found[name])}" for name, over in outside.items())
+    lower, upper = spec.reset_range
+    yield Defect(
+        subject=worst,
+        source=found[worst].source,
+        message=(
+            f"{lower:g} to {upper:g} times the default pose leaves the limits of {len(outside)} "
+            f"joints: {listed}"
+        ),
+        measured={"joints": len(outside), "farthest": round(outside[worst], 5)},
+    )
+
+
+def _unit(joint: Joint) -> str:
+    return "m" if joint.kind == "prismatic" else "rad"

@@ -1,0 +1,73 @@
+"""Frameworks: which there are, and the configuration of a robot for each."""
+
+import importlib
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from terrainkit.errors import ConfigError, listing
+from terrainkit_robots.config.robot import ConfiguredRobot
+from terrainkit_robots.spec.named_bodies import body_name, feet
+from terrainkit_robots.spec.robot_spec import RobotSpec
+
+if TYPE_CHECKING:
+    from terrainkit_robots.facts import Facts
+
+_MODULES = ("legged_gym", "leggedgym_ex", "isaaclab", "mjlab", "genesis")
+
+
+def names() -> tuple[str, ...]:
+    """Return what `--config` takes."""
+    return _MODULES
+
+
+def file_name(framework: str) -> str:
+    """Return what to call the file; not as the framework, which it would hide from Python."""
+    _check(framework)
+    return f"{framework}_config.py"
+
+
+def config_text(
+    framework: str,
+    spec: RobotSpec,
+    *,
+    bodies: Sequence[str] = (),
+    ranges: Mapping[str, tuple[float, float]] | None = None,
+) -> str:
+    """Return the configuration of a robot, a Python file that lies beside its `robot.toml`.
+
+    Args:
+        framework: One of `names()`.
+        spec: The robot.
+        bodies: Every body there is once fixed joints are merged; legged_gym finds bodies by
+            substrings, which must not hit others. If empty, those that the spec names.
+        ranges: Lower and upper limit of each joint, as the URDF has them; without them the
+            share that soft limits leave is the usual one.
+
+    Raises:
+        ConfigError: if there is no such framework, or it cannot have such a robot.
+    """
+    _check(framework)
+    module = importlib.import_module(f"terrainkit_robots.config.{framework}")
+    write: Callable[[ConfiguredRobot], str] = module.config_text
+    return write(ConfiguredRobot(spec=spec, bodies=bodies, ranges=ranges))
+
+
+def config_of(framework: str, facts: "Facts", spec: RobotSpec) -> str:
+    """Return the configuration of a robot of which the facts are at hand, too.
+
+    Args:
+        framework: One of `names()`.
+        facts: The robot as its `robot.urdf` is written.
+        spec: The robot.
+
+    Raises:
+        ConfigError: if there is no such framework, or it cannot have such a robot.
+    """
+    bodies = (*(body_name(body) for body in facts.bodies), *feet(facts))
+    ranges = {joint.name: joint.range for joint in facts.model.joints if joint.range is not None}
+    return config_text(framework, spec, bodies=bodies, ranges=ranges)
+
+
+def _check(framework: str) -> None:
+    if framework not in _MODULES:
+        raise ConfigError(f"no framework {framework!r}; there are: {listing(_MODULES)}")

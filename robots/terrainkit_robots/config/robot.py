@@ -1,0 +1,117 @@
+"""The robot that is configured: its spec, and what the frameworks ask of it."""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from statistics import median
+from typing import TypeVar
+
+from terrainkit.errors import ConfigError, listing
+from terrainkit_robots.config.source import comment, number
+from terrainkit_robots.spec.per_joint import by_joint, match_joints
+from terrainkit_robots.spec.robot_spec import RobotSpec, unit_of
+from terrainkit_robots.wording import short
+
+_Value = TypeVar("_Value")
+
+USUAL_SOFT_FACTOR = 0.9
+"""Share of a joint's range that rewards leave free, where the ranges are not given; what
+legged_gym and Isaac Lab use for their own robots."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConfiguredRobot:
+    """A robot, as a configuration is written of it."""
+
+    spec: RobotSpec
+
+    bodies: Sequence[str] = ()
+    """Every body there is once fixed joints are merged; if empty, those that the spec names."""
+
+    ranges: Mapping[str, tuple[float, float]] | None = None
+    """Lower and upper limit of joints, as the URDF has them; None if they are not known."""
+
+    @property
+    def title(self) -> str:
+        """Return what to call the robot in a message or a sentence."""
+        return short(re.sub(r"[^\w .+-]", "_", self.spec.name).strip() or "the robot", 60)
+
+    @cached_property
+    def all_bodies(self) -> tuple[str, ...]:
+        """Return every body."""
+        spec = self.spec
+        named = (spec.base, *spec.feet, *spec.shanks, *spec.thighs)
+        contacts = (*spec.termination_contacts, *spec.penalized_contacts)
+        return tuple(dict.fromkeys(self.bodies or (*named, *contacts)))
+
+    @cached_property
+    def soft_factor(self) -> float:
+        """Return the share of the joints' ranges that rewards leave free, between 0 and 1."""
+        soft = self._matched("soft_limits", self.spec.soft_limits)
+        shares = []
+        for joint, (lower, upper) in (self.ranges or {}).items():
+            if joint in soft and upper > lower:
+                shares.append((soft[joint][1] - soft[joint][0]) / (upper - lower))
+        share = median(shares) if shares else USUAL_SOFT_FACTOR
+        return round(share, 4) if 0 < share <= 1 else 1.0
+
+    def by_joint(self, name: str) -> dict[str, float]:
+        """Return the table `name` of the spec by joint, in their order; joints may be missing.
+
+        Raises:
+            ConfigError: if two keys match a joint, or one matches none.
+        """
+        return self._matched(name, getattr(self.spec, name))
+
+    def of_every_joint(self, name: str) -> dict[str, float]:
+        """Return the table `name` of the spec by joint, which has to have them all.
+
+        Raises:
+            ConfigError: if a joint is not matched exactly once, or a key matches none.
+        """
+        return by_joint(getattr(self.spec, name), self.spec.joint_order, name)
+
+    def _matched(self, name: str, table: Mapping[str, _Value]) -> dict[str, _Value]:
+        matching = match_joints(table, self.spec.joint_order)
+        for clash in matching.clashes(name, partial=True):
+            raise ConfigError(clash.message)
+        return dict(matching.values)
+
+    def origin(self, name: str, *, depth: int = 0, what: str = "") -> list[str]:
+        """Return a comment on the field `name`: its unit, and where its value came from."""
+        unit, source = unit_of(name), self.spec.provenance.get(name)
+        text = " ".join(part for part in (what, unit and f"[{unit}]") if part)
+        if source is not None:
+            text += f"; {source.origin}" + (f": {source.reason}" if source.reason else "")
+        return comment(text, depth=depth)
+
+    def soft_limits(self, *, depth: int = 0) -> list[str]:
+        """Return a comment on `soft_factor`."""
+        text = "Share of each joint's range that rewards leave free"
+        more = ", the median" if self.ranges else ""
+        return comment(f"{text}{more}; limits by joint are in robot.toml.", depth=depth)
+
+    def median_of(self, name: str, *, depth: int = 0) -> tuple[float, list[str]]:
+        """Return the median of the table `name`, and a comment if the joints differ."""
+        values = list(self.by_joint(name).values()) or [0.0]
+        lowest, middle, highest = min(values), median(values), max(values)
+        remark = f"One number for all joints, the median: they have {number(lowest)} to "
+        if number(lowest) == number(highest):
+            return middle, []
+        return middle, comment(f"{remark}{number(highest)}.", depth=depth)
+
+    def known(self, names: Iterable[str], what: str) -> tuple[str, ...]:
+        """Return the names, which have to be bodies.
+
+        Raises:
+            ConfigError: if one is not a body.
+        """
+        listed = tuple(dict.fromkeys(names))
+        unknown = [name for name in listed if name not in self.all_bodies]
+        if unknown:
+            raise ConfigError(
+                f"{what} of {self.title} are no bodies: {listing(map(repr, unknown))}; "
+                f"there are: {listing(map(repr, self.all_bodies))}"
+            )
+        return listed

@@ -1,0 +1,38 @@
+"""Runs in an environment with mjlab: builds the robot of mjlab_config.py and steps it."""
+
+import sys
+
+sys.path.insert(0, sys.argv[1])
+
+import mjlab_config
+import mujoco
+import numpy as np
+
+entity = mjlab_config.get_robot_cfg().build()
+model = entity.spec.compile()
+joints = [
+    f"{leg}_{part}_joint" for leg in ("FL", "FR", "RL", "RR") for part in ("hip", "thigh", "calf")
+]
+assert list(entity.joint_names) == joints
+assert [model.actuator(number).name for number in range(model.nu)] == joints
+
+
+def by_part(calf, other):
+    return [calf if "calf" in joint else other for joint in joints]
+
+
+np.testing.assert_allclose(model.actuator_gainprm[:, 0], by_part(30.0, 20.0))
+np.testing.assert_allclose(model.actuator_biasprm[:, 1], by_part(-30.0, -20.0))
+np.testing.assert_allclose(model.actuator_biasprm[:, 2], by_part(-0.75, -0.5))
+np.testing.assert_allclose(model.actuator_forcerange[:, 1], by_part(45.43, 23.7))
+np.testing.assert_allclose(model.dof_armature[6:], by_part(0.04, 0.01))
+assert model.nkey == 1
+np.testing.assert_allclose(model.key_qpos[0], [0, 0, 0.3, 1, 0, 0, 0, *[0, 0.9, -1.8] * 4])
+np.testing.assert_allclose(model.key_ctrl[0], [0, 0.9, -1.8] * 4)
+
+data = mujoco.MjData(model)
+mujoco.mj_resetDataKeyframe(model, data, 0)
+for _ in range(50):
+    mujoco.mj_step(model, data)
+assert np.isfinite(data.qpos).all()
+assert abs(data.qpos[7:] - model.key_qpos[0][7:]).max() < 0.5

@@ -1,0 +1,174 @@
+"""The configuration for Isaac Lab, read as that reads it."""
+
+import re
+from types import SimpleNamespace
+
+import pytest
+
+
+@pytest.fixture
+def modules(stand_in):
+    """Return the modules of Isaac Lab 2, with the fields that it has."""
+    refusing = stand_in.refusing
+    actuator = refusing(
+        "ImplicitActuatorCfg",
+        "joint_names_expr",
+        **dict.fromkeys(("effort_limit", "velocity_limit", "effort_limit_sim", "armature")),
+        **dict.fromkeys(("velocity_limit_sim", "stiffness", "damping", "friction")),
+    )
+    articulation = refusing(
+        "ArticulationCfg",
+        spawn=None,
+        init_state=None,
+        actuators={},
+        soft_joint_pos_limit_factor=1.0,
+        prim_path="",
+    )
+    articulation.InitialStateCfg = refusing(
+        "InitialStateCfg", pos=(0.0, 0.0, 0.0), rot=(1.0, 0.0, 0.0, 0.0), joint_pos={}, joint_vel={}
+    )
+    articulation.replace = lambda self, **more: articulation(**(vars(self) | more))
+    drive = refusing("JointDriveCfg", "gains", drive_type="force", target_type="position")
+    drive.PDGainsCfg = refusing("PDGainsCfg", "stiffness", damping=None)
+    urdf = (
+        refusing(
+            "UrdfFileCfg",
+            "asset_path",
+            "fix_base",
+            "joint_drive",
+            merge_fixed_joints=True,
+            replace_cylinders_with_capsules=False,
+            activate_contact_sensors=False,
+            rigid_props=None,
+            articulation_props=None,
+        ),
+    )[0]
+    sim = stand_in.module(
+        "isaaclab.sim",
+        UrdfFileCfg=urdf,
+        UrdfConverterCfg=SimpleNamespace(JointDriveCfg=drive),
+        RigidBodyPropertiesCfg=refusing(
+            "RigidBodyPropertiesCfg", disable_gravity=None, max_depenetration_velocity=None
+        ),
+        ArticulationRootPropertiesCfg=refusing(
+            "ArticulationRootPropertiesCfg",
+            enabled_self_collisions=None,
+            solver_position_iteration_count=None,
+            solver_velocity_iteration_count=None,
+        ),
+    )
+    task = "isaaclab_tasks.manager_based.locomotion.velocity.velocity_env_cfg"
+    made = {
+        "isaaclab": stand_in.module("isaaclab", sim=sim),
+        "isaaclab.sim": sim,
+        "isaaclab.actuators": stand_in.module("actuators", ImplicitActuatorCfg=actuator),
+        "isaaclab.assets": stand_in.module("assets", ArticulationCfg=articulation),
+        task: stand_in.module(task, LocomotionVelocityRoughEnvCfg=lambda: velocity_task(stand_in)),
+    }
+    parents = task.split(".")[:-1]
+    for place in range(len(parents)):
+        name = ".".join(parents[: place + 1])
+        made[name] = stand_in.module(name)
+    return made
+
+
+def velocity_task(stand_in):
+    """Return what Isaac Lab's velocity task has, as far as robots change it."""
+    strict = stand_in.Strict
+
+    def term(key):
+        return strict(params={key: strict(body_names="base")})
+
+    return strict(
+        scene=strict(robot=None, height_scanner=strict(prim_path="")),
+        actions=strict(joint_pos=strict(scale=0.5)),
+        events=strict(
+            add_base_mass=term("asset_cfg"),
+            base_external_force_torque=term("asset_cfg"),
+            reset_robot_joints=strict(params={"position_range": (0.5, 1.5)}),
+        ),
+        rewards=strict(feet_air_time=term("sensor_cfg"), undesired_contacts=term("sensor_cfg")),
+        terminations=strict(base_contact=term("sensor_cfg")),
+    )
+
+
+def resolved(value, names):
+    """Return a value by joint; each pattern has to match, and each name one pattern at most."""
+    if not isinstance(value, dict):
+        return dict.fromkeys(names, value)
+    found = {name: [p for p in value if re.fullmatch(p, name)] for name in names}
+    assert all(len(patterns) <= 1 for patterns in found.values())
+    assert {p for patterns in found.values() for p in patterns} == set(value)
+    return {name: value[patterns[0]] for name, patterns in found.items() if patterns}
+
+
+def test_a_quadruped(load, modules, robots, tmp_path):
+    spec = robots.quadruped()
+    config = load("isaaclab", spec, modules, bodies=robots.bodies).QUAD_4_CFG
+    names = (*spec.joint_order, "FL_hip_joint_2", "tail")  # others that must not be matched
+    assert config.spawn.asset_path == str(tmp_path / "robot.urdf")
+    assert config.spawn.fix_base is False
+    assert config.spawn.activate_contact_sensors
+    assert config.init_state.pos == (0.0, 0.0, 0.3)
+    assert resolved(config.init_state.joint_pos, names) == {
+        joint: -1.8 if "calf" in joint else 0.9 if "thigh" in joint else 0.0
+        for joint in spec.joint_order
+    }
+    (actuator,) = config.actuators.values()
+    driven = [n for n in names if any(re.fullmatch(p, n) for p in actuator.joint_names_expr)]
+    assert tuple(driven) == spec.joint_order
+    for field, calf, other in (
+        ("effort_limit_sim", 45.43, 23.7),
+        ("velocity_limit_sim", 15.7, 30.1),
+        ("stiffness", 30.0, 20.0),
+        ("damping", 0.75, 0.5),
+        ("armature", 0.04, 0.01),
+    ):
+        values = resolved(getattr(actuator, field), spec.joint_order)
+        assert values == robots.of(spec, calf=calf, other=other)
+    assert config.soft_joint_pos_limit_factor == 0.9
+
+
+def test_the_velocity_task(load, modules, robots):
+    spec = robots.quadruped()
+    loaded = load("isaaclab", spec, modules, bodies=robots.bodies)
+    task = loaded.rough_env_cfg()
+    assert task.scene.robot.prim_path == "{ENV_REGEX_NS}/Robot"
+    assert task.scene.height_scanner.prim_path == "{ENV_REGEX_NS}/Robot/base"
+    scale = resolved(task.actions.joint_pos.scale, spec.joint_order)
+    assert scale == robots.of(spec, calf=0.2, other=0.25)
+    assert task.events.reset_robot_joints.params["position_range"] == (0.6, 1.4)
+    assert task.events.add_base_mass.params["asset_cfg"].body_names == "base"
+    assert task.rewards.feet_air_time.params["sensor_cfg"].body_names == list(spec.feet)
+    penalized = task.rewards.undesired_contacts.params["sensor_cfg"].body_names
+    assert penalized == list(spec.penalized_contacts)
+    assert task.terminations.base_contact.params["sensor_cfg"].body_names == ["base"]
+
+
+def test_a_task_without_contacts_that_cost(load, modules, robots):
+    spec = robots.quadruped(penalized_contacts=(), termination_contacts=())
+    task = load("isaaclab", spec, modules).rough_env_cfg()
+    assert task.rewards.undesired_contacts is None
+    assert task.terminations.base_contact is None
+
+
+def test_an_arm(load, modules, robots):
+    spec = robots.plain(("joint1", "joint10"), effort={"joint1": 5.0})
+    loaded = load("isaaclab", spec, modules)
+    actuator = loaded.ARM_CFG.actuators["joints"]
+    assert loaded.ARM_CFG.spawn.fix_base is True
+    assert loaded.ARM_CFG.init_state.pos == (0.0, 0.0, 0.0)
+    assert actuator.effort_limit_sim == {"joint1": 5.0}
+    assert actuator.velocity_limit_sim is None  # none is known: that of the URDF holds
+    assert actuator.stiffness == {"joint1": 0.5, "joint10": 1.5}
+    assert loaded.ACTION_SCALE == 0.25
+    assert not hasattr(loaded, "rough_env_cfg")
+
+
+def test_hostile_names_match_themselves(load, modules, robots):
+    spec = robots.hostile()
+    loaded = load("isaaclab", spec, modules)
+    (config,) = (value for name, value in vars(loaded).items() if name.endswith("_CFG"))
+    names = [robots.in_usd(joint) for joint in spec.joint_order]
+    stiffness = resolved(config.actuators["joints"].stiffness, names)
+    assert list(stiffness.values()) == list(spec.stiffness.values())

@@ -1,0 +1,191 @@
+"""The configurations for legged_gym and LeggedGym-Ex, read as these read them."""
+
+from pathlib import Path
+
+import pytest
+
+CLASSES = {
+    "init_state": {"pos": [], "rot": [], "lin_vel": [], "ang_vel": [], "default_joint_angles": {}},
+    "env": {"num_envs": 4096, "num_observations": 235, "num_privileged_obs": None}
+    | {"num_actions": 12, "episode_length_s": 20},
+    "control": {"control_type": "P", "stiffness": {}, "damping": {}}
+    | {"action_scale": 0.5, "decimation": 4},
+    "asset": {"file": "", "name": "", "foot_name": "None", "penalize_contacts_on": []}
+    | {"terminate_after_contacts_on": [], "disable_gravity": False, "collapse_fixed_joints": True}
+    | {"fix_base_link": False, "default_dof_drive_mode": 3, "self_collisions": 0}
+    | {"replace_cylinder_with_capsule": True, "flip_visual_attachments": True, "armature": 0.0},
+    "rewards": {"soft_dof_pos_limit": 1.0, "soft_dof_vel_limit": 1.0, "base_height_target": 1.0}
+    | {"max_contact_force": 100.0},
+}
+"""The parts of legged_gym's LeggedRobotCfg that robots set, and what is in them."""
+
+MORE = {
+    "control": {"dt": 0.02},
+    "asset": {"xml_file": "", "base_link_name": "", "dof_names": [], "dof_armature": []}
+    | {"links_to_keep": [], "dof_vel_limits": []},
+}
+"""What LeggedGym-Ex has in addition."""
+
+SCALES = ("tracking_lin_vel", "tracking_ang_vel", "lin_vel_z", "ang_vel_xy", "torques", "dof_acc")
+SCALES += ("dof_pos_limits", "action_rate", "feet_air_time", "collision")
+"""Rewards that LeggedGym-Ex has functions for, among others."""
+
+
+@pytest.fixture
+def frameworks(stand_in):
+    """Return the modules of legged_gym, or of LeggedGym-Ex."""
+
+    def make(more):
+        parts = {
+            name: stand_in.part(name, **fields, **more.get(name, {}))
+            for name, fields in CLASSES.items()
+        }
+        scales = stand_in.part("scales", **dict.fromkeys(SCALES, 0.0))
+        parts["rewards"] = stand_in.part("rewards", scales=scales, **CLASSES["rewards"])
+        runner = stand_in.part("runner", run_name="", experiment_name="test", max_iterations=1500)
+        config = stand_in.module(
+            "legged_gym.envs.base.legged_robot_config",
+            LeggedRobotCfg=stand_in.part("LeggedRobotCfg", **parts),
+            LeggedRobotCfgPPO=stand_in.part("LeggedRobotCfgPPO", runner=runner),
+        )
+        modules = {
+            "legged_gym": stand_in.module("legged_gym", SIMULATOR="genesis"),
+            "legged_gym.envs": stand_in.module("envs"),
+            "legged_gym.envs.base": stand_in.module("base"),
+        }
+        return {**modules, config.__name__: config}
+
+    return make
+
+
+def gains_of(control, joint):
+    """Return the gains that legged_gym gives a joint: of the keys in its name, the last."""
+    keys = [key for key in control.stiffness if key in joint]
+    return control.stiffness[keys[-1]], control.damping[keys[-1]]
+
+
+def bodies_of(asset, attribute, bodies):
+    """Return the bodies that legged_gym finds, some perhaps twice."""
+    return [body for key in getattr(asset, attribute) for body in bodies if key in body]
+
+
+def check_contacts(asset, spec, bodies):
+    assert [body for body in bodies if asset.foot_name in body] == list(spec.feet)
+    assert sorted(bodies_of(asset, "penalize_contacts_on", bodies)) == sorted(
+        spec.penalized_contacts
+    )
+    assert bodies_of(asset, "terminate_after_contacts_on", bodies) == ["base"]
+    assert asset.self_collisions == 1
+    assert asset.collapse_fixed_joints
+    assert not asset.flip_visual_attachments
+
+
+def check_joints(config, robots, spec):
+    assert config.init_state.default_joint_angles == {
+        joint: -1.8 if "calf" in joint else 0.9 if "thigh" in joint else 0.0
+        for joint in spec.joint_order
+    }
+    stiffness, damping = (
+        robots.of(spec, calf=30.0, other=20.0),
+        robots.of(spec, calf=0.75, other=0.5),
+    )
+    for joint in spec.joint_order:
+        assert gains_of(config.control, joint) == (stiffness[joint], damping[joint])
+    assert config.control.control_type == "P"
+    assert config.control.action_scale == 0.25
+    assert config.control.decimation == 4
+    assert config.init_state.pos == [0.0, 0.0, 0.3]
+    assert config.rewards.base_height_target == 0.287
+    assert config.rewards.soft_dof_pos_limit == 0.75
+
+
+RANGES = {f"{leg}_calf_joint": (-2.75, -0.75) for leg in ("FL", "FR", "RL", "RR")}
+
+
+def test_a_quadruped_in_legged_gym(load, frameworks, robots, tmp_path):
+    spec = robots.quadruped()
+    loaded = load("legged_gym", spec, frameworks({}), bodies=robots.bodies, ranges=RANGES)
+    config = loaded.Quad4RoughCfg
+    check_joints(config, robots, spec)
+    check_contacts(config.asset, spec, robots.bodies)
+    assert config.env.num_observations == 235
+    assert config.env.num_actions == 12
+    assert config.asset.file.format(LEGGED_GYM_ROOT_DIR="/x") == str(tmp_path / "robot.urdf")
+    assert config.asset.name == "quad_4"
+    assert config.asset.armature == 0.01
+    assert loaded.Quad4RoughCfgPPO.runner.experiment_name == "rough_quad_4"
+    assert "_get_noise_scale_vec" not in loaded.__doc__
+
+
+def test_a_quadruped_in_leggedgym_ex(load, frameworks, robots, tmp_path):
+    spec = robots.quadruped(velocity={".*_calf_joint": 15.7})
+    loaded = load("leggedgym_ex", spec, frameworks(MORE), bodies=robots.bodies, ranges=RANGES)
+    config = loaded.Quad4Cfg
+    check_joints(config, robots, spec)
+    check_contacts(config.asset, spec, robots.bodies)
+    assert config.env.num_observations == 48
+    assert config.control.dt == config.control.decimation * 0.005
+    assert Path(config.asset.file.format()) == tmp_path / "robot.urdf"
+    assert Path(config.asset.xml_file.format()) == tmp_path / "robot.xml"
+    assert config.asset.base_link_name == "base"
+    assert config.asset.dof_names == list(spec.joint_order)
+    assert config.asset.dof_armature == list(robots.of(spec, calf=0.04, other=0.01).values())
+    speeds = robots.of(spec, calf=15.7, other=float("inf"))
+    assert config.asset.dof_vel_limits == list(speeds.values())
+    assert config.asset.links_to_keep == list(spec.feet)
+    assert config.rewards.scales.tracking_lin_vel == 1.0
+    assert loaded.Quad4CfgPPO.runner.run_name == "genesis"
+    # On Genesis every key that fits gives a gain: there has to be one for each joint.
+    for joint in spec.joint_order:
+        assert sum(key in joint for key in config.control.stiffness) == 1
+
+
+def test_stand_ins_refuse_what_the_framework_does_not_have(frameworks, load, robots):
+    """What LeggedGym-Ex alone has is refused by legged_gym, so that a slip would be too."""
+    with pytest.raises(AttributeError, match="has no"):
+        load("leggedgym_ex", robots.quadruped(), frameworks({}))
+
+
+def test_a_robot_of_another_count_of_joints_is_told_about_the_noise(load, frameworks, robots):
+    spec = robots.quadruped()
+    fewer = robots.quadruped(
+        joint_order=spec.joint_order[:6], feet=spec.feet[:2], default_pose={".*": 0.5}
+    )
+    changed = {"stiffness": {".*": 1.0}, "damping": {".*": 1.0}, "action_scale": {".*": 1.0}}
+    fewer = type(fewer)(**(vars(fewer) | changed | {"soft_limits": {}}))
+    loaded = load("legged_gym", fewer, frameworks({}))
+    assert loaded.Quad4RoughCfg.env.num_observations == 12 + 18 + 187
+    assert "_get_noise_scale_vec is laid out for 12 joints" in " ".join(loaded.__doc__.split())
+
+
+@pytest.mark.parametrize("framework", ["legged_gym", "leggedgym_ex"])
+def test_joints_whose_names_contain_others(load, frameworks, robots, framework):
+    joints = tuple(f"joint{number}" for number in (10, 1, 2, 11))
+    gains = dict(zip(joints, (4.0, 1.0, 2.0, 1.0), strict=True))
+    tables = dict.fromkeys(("stiffness", "damping", "action_scale", "default_pose"), gains)
+    spec = robots.quadruped(
+        joint_order=joints, effort={}, velocity={}, armature={}, soft_limits={}, **tables
+    )
+    loaded = load(framework, spec, frameworks(MORE))
+    config = loaded.Quad4RoughCfg if framework == "legged_gym" else loaded.Quad4Cfg
+    for joint in joints:
+        assert gains_of(config.control, joint) == (gains[joint], gains[joint])
+    text = " ".join(Path(loaded.__file__).read_text().replace("#", "").split())
+    assert "joint10 contains joint1: " in text
+    assert config.control.action_scale == 1.5
+
+
+def test_a_folder_with_braces_is_found(load, frameworks, robots):
+    spec = robots.quadruped(urdf="{my}.urdf")
+    loaded = load("legged_gym", spec, frameworks({}))
+    assert loaded.Quad4RoughCfg.asset.file.format().endswith("/{my}.urdf")
+
+
+def test_hostile_names_arrive_as_they_are(load, frameworks, robots):
+    spec = robots.hostile()
+    loaded = load("leggedgym_ex", spec, frameworks(MORE))
+    (config,) = (c for n, c in vars(loaded).items() if n.endswith("Cfg") and n != "LeggedRobotCfg")
+    assert config.asset.dof_names == list(spec.joint_order)
+    assert set(config.init_state.default_joint_angles) == set(spec.joint_order)
+    assert config.asset.base_link_name == spec.base
+    assert config.asset.file.format().endswith(spec.urdf)
