@@ -6,11 +6,13 @@ import shutil
 import sys
 import time
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TextIO
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, TextIO, TypeVar
 
 if TYPE_CHECKING:
     from terrainkit_robots.report.text import Span
+
+_T = TypeVar("_T")
 
 _PATIENCE = 0.5
 """How long a walk may take before it shows a progress bar [s]."""
@@ -97,12 +99,13 @@ def show_warning(
         print(text, end="", file=file or sys.stderr)
 
 
-def progress(walk: Iterator[Any], total: int) -> Iterator[Any]:
+def progress(walk: Iterable[_T], total: int, *, of: str = "patches") -> Iterator[_T]:
     """Return `walk` with a bar on stderr, if that is a terminal and the walk takes long."""
-    return _with_bar_when_slow(walk, total) if sys.stderr.isatty() else walk
+    steps = iter(walk)
+    return _with_bar_when_slow(steps, total, of) if sys.stderr.isatty() else steps
 
 
-def _with_bar_when_slow(walk: Iterator[Any], total: int) -> Iterator[Any]:
+def _with_bar_when_slow(walk: Iterator[_T], total: int, of: str) -> Iterator[_T]:
     start = time.monotonic()
     done = 0
     for item in walk:
@@ -116,7 +119,7 @@ def _with_bar_when_slow(walk: Iterator[Any], total: int) -> Iterator[Any]:
     from rich.progress import Progress
 
     with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("patches", total=total, completed=done)
+        task = bar.add_task(of, total=total, completed=done)
         for item in walk:
             yield item
             bar.advance(task)

@@ -10,26 +10,25 @@ import tyro
 from terrainkit.errors import ConfigError, TerrainkitError
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
+from terrainkit_cli.robot_options import (
+    Output,
+    Packages,
+    Text,
+    Words,
+    XacroArguments,
+    find_robot,
+    listed,
+    packages,
+    reasons,
+    repeated,
+    xacro_arguments,
+)
 
 if TYPE_CHECKING:
+    from terrainkit_robots.facts import Facts
     from terrainkit_robots.lint import Report
     from terrainkit_robots.rule import Rule as RobotRule
     from terrainkit_robots.settings import Settings
-
-    Words = list[str]
-else:
-    # tyro would look at list[str] through typeguard, whose import takes a quarter of the time of a
-    # whole `terrainkit check-robot`.
-    Words = list
-
-Files = Annotated[
-    Words, tyro.conf.Positional, tyro.conf.arg(metavar="FILE [FILE ...]", help_behavior_hint="")
-]
-
-
-def _repeated(metavar: str) -> tuple[object, ...]:
-    hint = "(may be repeated)"
-    return tyro.conf.UseAppendAction, tyro.conf.arg(metavar=metavar, help_behavior_hint=hint)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,32 +40,44 @@ class CheckRobot(Command):
 
     Options are also read from [tool.terrainkit.check-robot] in pyproject.toml or [check-robot] in
     terrainkit.toml, in the folder of the robot or above it: select, ignore, package, xacro-arg,
-    strict. A comment in the robot's file ignores a rule for the element that it is on, in or above:
+    strict, simulation. A comment in the robot's file ignores a rule for the element that it is on,
+    in or above:
     <!-- terrainkit: ignore INR004 the reason -->
     """
 
-    files: Files = field(default_factory=list)
+    files: Annotated[
+        Words,
+        tyro.conf.Positional,
+        tyro.conf.arg(metavar="FILE [FILE ...]", help_behavior_hint=""),
+    ] = field(default_factory=list)
     """Files to check, or names of bundled robots: quadruped, biped."""
 
     format: Literal["text", "json", "sarif", "github", "markdown"] = "text"
     """How to report. Of several files, json writes one document on a line each."""
 
-    output: Annotated[str, tyro.conf.arg(aliases=["-o"], metavar="PATH", help_behavior_hint="")] = (
-        ""
-    )
+    output: Output = ""
     """Write the report to this file; one that is there is replaced."""
 
-    select: Annotated[Words, *_repeated("CODES")] = field(default_factory=list)
+    select: Annotated[Words, *repeated("CODES")] = field(default_factory=list)
     """Ask only these rules: codes, starts of codes, or names, with commas between."""
 
-    ignore: Annotated[Words, *_repeated("CODES=REASON")] = field(default_factory=list)
+    ignore: Annotated[Words, *repeated("CODES=REASON")] = field(default_factory=list)
     """Do not ask these rules; the reason goes into the report."""
 
-    package: Annotated[Words, *_repeated("NAME=DIR")] = field(default_factory=list)
+    package: Packages = field(default_factory=list)
     """Folder of a ROS package, for package:// and $(find ...)."""
 
-    xacro_arg: Annotated[Words, *_repeated("NAME:=VALUE")] = field(default_factory=list)
+    xacro_arg: XacroArguments = field(default_factory=list)
     """Value of a xacro argument."""
+
+    against: Text = ""
+    """Another file of the same robot, to compare with: URDF, xacro or MJCF."""
+
+    spec: Text = ""
+    """The robot.toml of the robot, to check against it."""
+
+    no_simulation: bool = False
+    """Simulate nothing: neither drop the robot, nor let it stand, nor move its joints."""
 
     strict: bool = False
     """Let warnings count as errors in the exit code."""
@@ -86,6 +97,10 @@ class CheckRobot(Command):
             raise ConfigError("no FILE to check; wanted one or more, or quadruped, or biped")
         if self.diff and self.format != "text":
             raise ConfigError(f"--diff shows a diff, not a report as {self.format}; wanted one")
+        if len(self.files) > 1 and (self.against or self.spec):
+            raise ConfigError(
+                f"--against and --spec compare one robot, and there are {len(self.files)} files"
+            )
         options = self._settings()
         output = Path(self.output) if self.output else None
         if output is not None:
@@ -101,17 +116,15 @@ class CheckRobot(Command):
 
     def _settings(self) -> "Settings":
         from terrainkit_robots.selection import choose
-        from terrainkit_robots.settings import Settings, package_folder
+        from terrainkit_robots.settings import Settings
 
         settings = Settings(
-            select=tuple(word for words in self.select for word in _listed(words)),
-            ignore=_reasons(self.ignore),
-            packages={
-                name: package_folder(name, Path(folder))
-                for name, folder in _pairs("--package", self.package, "=", "NAME=DIR").items()
-            },
-            xacro_arguments=_pairs("--xacro-arg", self.xacro_arg, ":=", "NAME:=VALUE"),
+            select=tuple(word for words in self.select for word in listed(words)),
+            ignore=reasons(self.ignore),
+            packages=packages(self.package),
+            xacro_arguments=xacro_arguments(self.xacro_arg),
             strict=self.strict,
+            simulate=not self.no_simulation,
         )
         choose(settings)
         return settings
@@ -178,10 +191,13 @@ def _check(name: str, command: CheckRobot, options: "Settings") -> _Checked:
     from terrainkit_robots.robot_file import read_robot
     from terrainkit_robots.selection import lint_selected
     from terrainkit_robots.settings import read_settings
+    from terrainkit_robots.spec.spec_file import read_spec
 
-    path = _find(name)
+    path = find_robot(name)
     ours = path == bundled.find(name)
     settings = options.over(read_settings(Path() if ours else path.parent))
+    other = _other(command.against, settings)
+    spec = read_spec(Path(command.spec)) if command.spec else None
 
     def look(contents: Mapping[Path, bytes]) -> "Report":
         model = read_robot(
@@ -190,7 +206,8 @@ def _check(name: str, command: CheckRobot, options: "Settings") -> _Checked:
             xacro_arguments=settings.xacro_arguments,
             contents=contents,
         )
-        return lint_selected(Facts(model, Meshes(contents)), settings, contents)
+        facts = Facts(model, Meshes(contents), against=other, spec=spec)
+        return lint_selected(facts, settings, contents)
 
     report, diff = look({}), ""
     if command.fix or command.unsafe_fixes or command.diff:
@@ -201,6 +218,21 @@ def _check(name: str, command: CheckRobot, options: "Settings") -> _Checked:
         report, diff = _repaired(path, report, look, command)
     bad = ("fail", "warn") if settings.strict else ("fail",)
     return _Checked(report=report, bad=report.verdict in bad, diff=diff)
+
+
+def _other(name: str, settings: "Settings") -> "Facts | None":
+    """Return the robot to compare with; None without one."""
+    from terrainkit_robots.facts import Facts
+    from terrainkit_robots.robot_file import read_robot
+
+    if not name:
+        return None
+    model = read_robot(
+        find_robot(name),
+        packages=settings.packages,
+        xacro_arguments=settings.xacro_arguments,
+    )
+    return Facts(model)
 
 
 def _repaired(
@@ -235,25 +267,6 @@ def _repaired(
     ), ""
 
 
-def _find(name: str) -> Path:
-    """Return the file of that name, or else the bundled robot."""
-    from terrainkit_robots import bundled
-
-    path = Path(name)
-    try:
-        if path.is_file():
-            return path
-        found = bundled.find(name)
-        if found is None and not path.exists():
-            raise ConfigError(
-                f"there is no file {name}, nor is a bundled robot called so; "
-                f"there are: {', '.join(bundled.names())}"
-            )
-    except OSError as error:
-        raise ConfigError(f"cannot read {name}: {error.strerror or error}") from error
-    return found or path
-
-
 def _check_output(output: Path, inputs: Sequence[Path]) -> None:
     """Raise an error if the report cannot be written, or would replace what it is about."""
     from terrainkit.atomic import check_target
@@ -269,28 +282,6 @@ def _write(output: Path, text: str) -> None:
 
     with atomic_write(output, overwrite=True) as path:
         path.write_bytes(text.encode("utf-8", "backslashreplace"))
-
-
-def _listed(words: str) -> list[str]:
-    return [word.strip() for word in words.split(",") if word.strip()]
-
-
-def _reasons(words: Sequence[str]) -> dict[str, str]:
-    """Return the reason for each rule that is not asked."""
-    pairs = _pairs("--ignore", words, "=", "CODES=REASON")
-    return {code: reason for codes, reason in pairs.items() for code in _listed(codes)}
-
-
-def _pairs(option: str, words: Sequence[str], sign: str, wanted: str) -> dict[str, str]:
-    pairs: dict[str, str] = {}
-    for word in words:
-        name, found, value = (part.strip() for part in word.partition(sign))
-        if not name or not found or not (value or sign == ":="):
-            raise ConfigError(f"{option} {word!r}; wanted {wanted}")
-        if name in pairs:
-            raise ConfigError(f"{option} has {name} twice; wanted it once")
-        pairs[name] = value
-    return pairs
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,32 +16,34 @@ def write(reports: Sequence[Report]) -> str:
 
 
 def _section(report: Report) -> Iterator[str]:
-    yield f"## {_cell(str(report.facts.model.file))}\n"
+    yield f"## {cell(str(report.facts.model.file))}\n"
     repairs = fixable(report.findings)
     yield f"**{tally([report])}**{f' ({repairs})' if repairs else ''}\n"
     yield "| | |\n|---|---|"
     for label, text in robot_summary(report.facts):
-        yield f"| {label.strip()} | {_cell(text)} |"
+        yield f"| {label.strip()} | {cell(text)} |"
     yield ""
-    yield from _list("Fixed", [(f.code, f"{f.name}: {f.message}") for f in fixed(report)])
+    yield from titled_list("Fixed", [(f.code, f"{f.name}: {f.message}") for f in fixed(report)])
     left = [(f.code, f"{f.subject or f.name}: {reason}") for f, reason in unfixed(report)]
-    yield from _list("Could not be fixed", left)
+    yield from titled_list("Could not be fixed", left)
     if report.findings:
         yield "| | rule | where | what | what to do |\n|---|---|---|---|---|"
-        yield from (_row(finding) for finding in report.findings)
+        yield from (finding_row(finding) for finding in report.findings)
         yield ""
     skipped = [(codes, reason) for _, codes, reason in grouped(report.skipped)]
-    yield from _list("Not checked, or ignored", skipped)
+    yield from titled_list("Not checked, or ignored", skipped)
 
 
-def _list(title: str, items: Sequence[tuple[str, str]]) -> Iterator[str]:
+def titled_list(title: str, items: Sequence[tuple[str, str]]) -> Iterator[str]:
+    """Yield a list under a title; nothing without items."""
     if items:
         yield f"{title}:\n"
-        yield from (f"- {_cell(head)}: {_cell(text)}" for head, text in items)
+        yield from (f"- {cell(head)}: {cell(text)}" for head, text in items)
         yield ""
 
 
-def _row(finding: Finding) -> str:
+def finding_row(finding: Finding) -> str:
+    """Return the row of a finding in the table of findings."""
     likely = " (likely)" if finding.certainty == "likely" else ""
     cells = (
         WORDS[finding.severity],
@@ -50,10 +52,10 @@ def _row(finding: Finding) -> str:
         finding.message + likely,
         finding.hint,
     )
-    return f"| {' | '.join(map(_cell, cells))} |"
+    return f"| {' | '.join(map(cell, cells))} |"
 
 
-def _cell(text: str) -> str:
+def cell(text: str) -> str:
     """Return `text` so that it shows as it is: no markup, no mention of people, one line."""
     escaped = re.sub(r"([\\`*_{}\[\]|~#$])", r"\\\1", plain(text))
     return (
