@@ -17,6 +17,7 @@ COMMANDS = {
     "check": "terrain_commands",
     "check-robot": "robot_commands",
     "rule": "robot_commands",
+    "onboard": "onboard_command",
 }
 """Module of each command, so that only the one in use is imported."""
 

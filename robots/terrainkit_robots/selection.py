@@ -70,8 +70,8 @@ def lint_selected(
         for comment in read_comments(file, (contents or {}).get(file))
     ]
     kept, ignored = _quieted(report, comments)
-    unasked = {skipped.code for skipped in report.skipped}
-    asked = {rule.code for rule in chosen} - unasked
+    unable = {skipped.code for skipped in report.skipped}
+    asked = {rule.code for rule in chosen} - unable
     idle = _idle(comments, asked, ignored)
     return replace(
         report, findings=tuple(kept), skipped=(*report.skipped, *left_out, *ignored, *idle)

@@ -5,12 +5,10 @@ The source is followed by our own kinematics, the two files by MuJoCo's readers 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from terrainkit.errors import ExportError
 from terrainkit_robots.body.kinematics import body_poses, position_of
 from terrainkit_robots.leg.pose import range_of
 from terrainkit_robots.model import Matrix
@@ -43,20 +41,19 @@ class Agreement:
     """The link that is farthest away."""
 
 
-def agreement(source: "Facts", written: "Facts", files: Sequence[Path]) -> tuple[Agreement, ...]:
+def agreement(
+    source: "Facts", written: "Facts", models: Mapping[str, Any]
+) -> tuple[Agreement, ...]:
     """Return how far written files are from their source, over POSES seeded poses.
 
     Args:
         source: The robot as it was read.
         written: The robot as it is written, whose joints may have other names.
-        files: URDF and MJCF files of it.
-
-    Raises:
-        ExportError: if MuJoCo does not load one.
+        models: What MuJoCo made of its files, by their names.
     """
     draws = _draws(written)
     places = _places(source, _renamed(source, written, draws))
-    return tuple(_compared(source, places, draws, path) for path in files)
+    return tuple(_compared(source, places, draws, each) for each in models.items())
 
 
 def _draws(facts: "Facts") -> dict[str, Matrix]:
@@ -88,27 +85,25 @@ def _places(facts: "Facts", positions: Mapping[str, Matrix]) -> dict[str, Matrix
 
 
 def _compared(
-    source: "Facts", places: Mapping[str, Matrix], draws: Mapping[str, Matrix], path: Path
+    source: "Facts",
+    places: Mapping[str, Matrix],
+    draws: Mapping[str, Matrix],
+    named: tuple[str, Any],
 ) -> Agreement:
     import mujoco
 
+    file, model = named
+    base, kind = source.bodies[0].top.name, mujoco.mjtObj.mjOBJ_BODY
+    shared = [name for name in places if mujoco.mj_name2id(model, kind, name) >= 0]
     with quiet_mujoco():
-        try:
-            model = mujoco.MjModel.from_xml_path(str(path))
-        except ValueError as error:
-            reason = " ".join(str(error).split())
-            raise ExportError(f"MuJoCo does not load the {path.name} made: {reason}") from None
-        mass = float(model.body_mass.sum())
-        base = source.bodies[0].top.name
-        kind = mujoco.mjtObj.mjOBJ_BODY
-        shared = [name for name in places if mujoco.mj_name2id(model, kind, name) >= 0]
         here = _followed(model, draws, base, shared)
+    mass = float(model.body_mass.sum())
     apart = {
         name: float(np.linalg.norm(places[name] - here[name], axis=1).max()) for name in shared
     }
     worst = max(apart, key=apart.__getitem__, default="")
     return Agreement(
-        file=path.name,
+        file=file,
         mass=mass / source.total_mass - 1 if source.total_mass else 0.0,
         distance=apart.get(worst, 0.0),
         link=worst,

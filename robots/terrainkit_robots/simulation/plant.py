@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from terrainkit.errors import ExportError
+from terrainkit_robots.body.bodies import merge_bodies
+from terrainkit_robots.body.tree import build_tree
 from terrainkit_robots.facts import Facts
+from terrainkit_robots.markup.document import RobotFileError
 from terrainkit_robots.mesh.meshes import MeshError
 from terrainkit_robots.mesh.surface import binary_stl
-from terrainkit_robots.model import Geometry, Link, RobotModel
+from terrainkit_robots.model import Geometry, Inertial, Link, RobotModel
 from terrainkit_robots.per_robot import per_robot
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rule import CannotCheckError
@@ -31,7 +33,9 @@ _MOST_BODIES = 300
 _HULL_CORNERS = 64
 """Corners of a collision mesh's hull; more cost time at every contact, and change little."""
 
-_FLOOR = '<geom name="floor" type="plane" size="0 0 1"/>'
+_FLOOR = (
+    '<geom name="floor" type="plane" size="0 0 1" contype="2147483647" conaffinity="2147483647"/>'
+)
 
 _PRIMITIVES = frozenset({"box", "sphere", "cylinder", "capsule", "ellipsoid"})
 
@@ -72,13 +76,14 @@ def plant(facts: Facts) -> Plant:
     Raises:
         CannotCheckError: if it cannot be simulated, with the reason.
     """
-    import mujoco
-
     if len(facts.bodies) > _MOST_BODIES:
         raise CannotCheckError(
             f"it has {len(facts.bodies)} bodies, and of more than {_MOST_BODIES} none is simulated"
         )
-    model, assets = _lean(normal_form(facts).model, facts)
+    try:
+        model, assets = _lean(normal_form(facts).model, facts)
+    except RobotFileError as error:
+        raise CannotCheckError(str(error)) from None
     drives = {motor.joint: Drive(stiffness=0, damping=0) for motor in model.actuators}
     for joint in model.joints:
         if joint.name in drives:
@@ -94,39 +99,35 @@ def plant(facts: Facts) -> Plant:
         height=height,
         time_step=TIME_STEP,
     )
+    try:
+        compiled = _compile(model, extras, assets)
+    except ValueError as error:
+        reason = " ".join(str(error).split())
+        try:
+            compiled = _compile(_lumped(model), extras, assets)
+        except ValueError:
+            raise CannotCheckError(f"MuJoCo does not simulate it: {reason}") from None
+        compiled.body_ipos[compiled.body_mass == 0] = 0  # contacts are scaled by what moves here
+    return plant_of(compiled, base=model.links[0].name)
+
+
+def _compile(model: RobotModel, extras: Extras, assets: Mapping[str, bytes]) -> Any:
+    import mujoco
+
     text = mjcf_text(model, extras)
     if model.floating:
         text = text.replace("<worldbody>", f"<worldbody>{_FLOOR}", 1)
-    try:
-        with quiet_mujoco():
-            compiled = mujoco.MjModel.from_xml_string(text, assets)
-    except ValueError as error:
-        reason = " ".join(str(error).split())
-        raise CannotCheckError(f"MuJoCo does not simulate it: {reason}") from None
-    return _plant(compiled, base=model.links[0].name)
+    with quiet_mujoco():
+        return mujoco.MjModel.from_xml_string(text, assets)
 
 
-def read_plant(path: Path, *, base: str) -> Plant:
-    """Return the plant in a MJCF that onboarding wrote.
+def plant_of(model: Any, *, base: str) -> Plant:
+    """Return the plant that a MuJoCo model is.
 
     Args:
-        path: The MJCF, with a floor.
+        model: The `mujoco.MjModel` of a robot and a floor, with an actuator for each driven joint.
         base: Body that carries the limbs.
-
-    Raises:
-        ExportError: if MuJoCo does not load it.
     """
-    import mujoco
-
-    try:
-        with quiet_mujoco():
-            return _plant(mujoco.MjModel.from_xml_path(str(path)), base=base)
-    except ValueError as error:
-        reason = " ".join(str(error).split())
-        raise ExportError(f"MuJoCo does not load the {path.name} made: {reason}") from None
-
-
-def _plant(model: Any, *, base: str) -> Plant:
     import mujoco
 
     free = mujoco.mjtJoint.mjJNT_FREE
@@ -139,6 +140,25 @@ def _plant(model: Any, *, base: str) -> Plant:
         base=base,
         home=model.key_qpos[0].copy() if model.nkey else model.qpos0.copy(),
     )
+
+
+def _lumped(model: RobotModel) -> RobotModel:
+    """Return a robot whose masses are on the links below its moving joints.
+
+    Of the frames and sensors that are fixed to them many have an inertia that MuJoCo refuses.
+    """
+    bodies = {body.top.name: body for body in merge_bodies(build_tree(model))}
+
+    def lumped(link: Link) -> Link:
+        body = bodies.get(link.name)
+        if body is None or body.mass <= 0:
+            return replace(link, inertial=None)
+        origin = np.eye(4)
+        origin[:3, 3] = body.center
+        inertial = Inertial(source=link.source, mass=body.mass, origin=origin, inertia=body.inertia)
+        return replace(link, inertial=inertial)
+
+    return replace(model, links=tuple(lumped(link) for link in model.links))
 
 
 def _lean(model: RobotModel, facts: Facts) -> tuple[RobotModel, dict[str, bytes]]:

@@ -105,7 +105,7 @@ def refused_by_yourdfpy(facts: "Facts") -> Refusal | None:
     from lxml import etree
 
     data = etree.tostring(document.root)
-    import yourdfpy  # type: ignore[import-untyped]
+    import yourdfpy
 
     log = logging.getLogger("yourdfpy")
     level = log.level

@@ -1,0 +1,197 @@
+"""Bringing a robot in: read, repair, write, and prove, in the order that a newcomer would."""
+
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from terrainkit.errors import TerrainkitError
+from terrainkit_robots.facts import Facts
+from terrainkit_robots.lint import Report
+from terrainkit_robots.onboard.folder import check_folder, new_folder, write_files
+from terrainkit_robots.onboard.onboarding import Onboarded, Progress, onboard
+from terrainkit_robots.settings import Settings, read_settings
+
+if TYPE_CHECKING:
+    from terrainkit_robots.lint import Finding
+    from terrainkit_robots.onboard.proof import Proof
+    from terrainkit_robots.writing.collision import How
+
+
+def _unwrapped(items: Any, _total: int) -> Any:
+    return items
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wishes:
+    """How a robot is to be brought in."""
+
+    target: Path | None = None
+    """Folder to write; None for one with the robot's name in the current folder."""
+
+    settings: Settings = field(default_factory=Settings)
+    """Packages, xacro arguments and rules that are not asked; those of files above the robot's own
+    are added."""
+
+    collision: "How" = "keep"
+    """What becomes of collision meshes."""
+
+    configs: tuple[str, ...] = ()
+    """Frameworks to write a configuration for."""
+
+    floating: bool | None = None
+    """Whether the base moves freely; None to find out."""
+
+    spec: Path | None = None
+    """A robot.toml whose values go before what would be suggested."""
+
+    unsafe: bool = False
+    """Whether repairs that change a number, a shape or a mesh are made, too."""
+
+    force: bool = False
+    """Whether to go on although parts, meshes or masses are not sound."""
+
+    overwrite: bool = False
+    """Whether a folder that is an onboarded robot may be replaced."""
+
+    pictures: bool = True
+    """Whether pictures are drawn."""
+
+    cache: Path | None = None
+    """Folder that keeps convex parts from one run to the next."""
+
+    progress: Progress = _unwrapped
+    """Draws a bar while collision meshes are worked on."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BroughtIn:
+    """What became of a robot."""
+
+    report: Report
+    """What is found in it after the repairs."""
+
+    repaired: tuple["Finding", ...] = ()
+    """What was found before, and repaired in what is written."""
+
+    folder: Path | None = None
+    """The folder that was written; None if errors kept the robot out."""
+
+    made: Onboarded | None = None
+    """What was written to it."""
+
+    proof: "Proof | None" = None
+    """Whether that is the robot that was read, and whether it stands."""
+
+    configs: tuple[str, ...] = ()
+    """Configuration files."""
+
+    pictures: tuple[str, ...] = ()
+    """Picture files."""
+
+    no_pictures: str = ""
+    """Why there are no pictures."""
+
+
+def bring_in(file: Path, wishes: Wishes) -> BroughtIn:
+    """Bring a robot in; its own file is not changed.
+
+    Raises:
+        TerrainkitError: if a file cannot be read or written, or an option is wrong.
+    """
+    from terrainkit_robots.config.frameworks import config_of, file_name
+    from terrainkit_robots.onboard.proof import prove
+    from terrainkit_robots.onboard.report_page import report_page
+    from terrainkit_robots.spec.spec_file import read_spec
+
+    config_files = {framework: file_name(framework) for framework in wishes.configs}
+    if wishes.target is not None:
+        check_folder(wishes.target, overwrite=wishes.overwrite)
+    spec = read_spec(wishes.spec) if wishes.spec else None
+    report, repaired = _repaired(file, wishes)
+    for crash in report.crashed:
+        raise TerrainkitError(f"{file}: {crash.code}: {crash.reason}")
+    if not wishes.force and any(map(_unsound, report.findings)):
+        return BroughtIn(report=report, repaired=repaired)
+    made = onboard(
+        report.facts,
+        collision=wishes.collision,
+        floating=wishes.floating,
+        spec=spec,
+        cache=wishes.cache,
+        progress=wishes.progress,
+    )
+    configs = {
+        file: config_of(framework, made.facts, made.spec)
+        for framework, file in config_files.items()
+    }
+    target = wishes.target or Path(made.facts.model.name)
+    with new_folder(target, overwrite=wishes.overwrite) as folder:
+        write_files(folder, made.files)
+        write_files(folder, {name: text.encode() for name, text in configs.items()})
+        # The pictures are drawn by another process, which there is no need to wait for.
+        with ThreadPoolExecutor(1) as beside:
+            drawing = beside.submit(_pictures, folder, made) if wishes.pictures else None
+            proof = prove(report.facts, made, folder)
+        pictures, no_pictures = drawing.result() if drawing else ({}, "not wanted")
+        write_files(folder, pictures)
+        done = BroughtIn(
+            report=report,
+            repaired=repaired,
+            folder=target,
+            made=made,
+            proof=proof,
+            configs=tuple(configs),
+            pictures=tuple(pictures),
+            no_pictures=no_pictures,
+        )
+        write_files(folder, {"report.md": report_page(done).encode()})
+    return done
+
+
+_SOUND = ("XML", "MSH", "TRE", "INR")
+"""Families whose errors mean that what would be written is not the robot that was meant. With other
+errors, such as joints without limits, it is that robot, and not yet one to train."""
+
+
+def _unsound(finding: "Finding") -> bool:
+    return finding.severity == "error" and finding.code[:3] in _SOUND
+
+
+def _repaired(file: Path, wishes: Wishes) -> tuple[Report, tuple["Finding", ...]]:
+    """Return what is found in a robot once it is repaired in memory, and what was repaired."""
+    from terrainkit_robots.edit.apply import fix_robot
+    from terrainkit_robots.mesh.meshes import Meshes
+    from terrainkit_robots.robot_file import read_robot
+    from terrainkit_robots.selection import lint_selected
+
+    # What is simulated is what will be written, not what was read.
+    settings = replace(wishes.settings.over(read_settings(file.parent)), simulate=False)
+
+    def look(contents: Mapping[Path, bytes]) -> Report:
+        model = read_robot(
+            file,
+            packages=settings.packages,
+            xacro_arguments=settings.xacro_arguments,
+            contents=contents,
+        )
+        return lint_selected(Facts(model, Meshes(contents)), settings, contents)
+
+    found = look({})
+    fixable = [f for f in found.findings if f.fix is not None]
+    if found.facts.model.kind == "xacro" or not fixable:
+        return found, ()
+    result = fix_robot(file, lambda c: look(c) if c else found, unsafe=wishes.unsafe)
+    return result.report, result.fixed
+
+
+def _pictures(folder: Path, made: Onboarded) -> tuple[dict[str, bytes], str]:
+    """Return pictures by the names of their files, and why there are none."""
+    from terrainkit_robots.onboard.pictures import PicturesError, draw
+
+    try:
+        drawn = draw(folder / made.spec.mjcf)
+    except PicturesError as error:
+        return {}, str(error)
+    return {f"report/{name}.png": data for name, data in drawn.items()}, ""

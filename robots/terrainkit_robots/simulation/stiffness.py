@@ -1,0 +1,205 @@
+"""Stiffness: what each joint needs to hold itself and what it carries, and may have for that.
+
+A need is capped by the effort of the motor, which is not to be spent on a small error, and by the
+time step: a joint that is too light for what it needs is suggested an armature.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from terrainkit_robots.facts import Facts
+from terrainkit_robots.leg.stance import GRAVITY
+from terrainkit_robots.rule import CannotCheckError
+from terrainkit_robots.simulation.plant import TIME_STEP, Plant
+from terrainkit_robots.simulation.step_size import (
+    JointInertia,
+    needed_inertia,
+    stable_stiffness,
+)
+
+Inertias = Mapping[str, JointInertia]
+"""Inertia of each joint in the standing pose, by name."""
+
+_UPRIGHT = 1.5
+"""Stiffness of a leg over m g l / n: weight times leg length over the number of legs is the rate at
+which gravity tips a leg over, and a spring that is weaker does not hold it upright."""
+
+_FULL_EFFORT_LEG = 1.0
+"""Error at which a joint of a leg gives all of its effort [rad]. What people train with is close to
+it on all robots; a stiffer leg saturates in every step."""
+
+_FULL_EFFORT = 0.5
+"""The same for arms, hands and waists, which are to be where they are told [rad]."""
+
+_STANDS_ALONE = 3
+"""Robots with so many legs stand by the springs of their joints; those with fewer balance."""
+
+_SAG_LEG = 0.09
+"""How far a joint may give way in the standing pose [rad]. Legs that are bent bend on as they sag:
+a1, go2 and the quadruped that comes along sit down from 0.13 rad on, however they are damped."""
+
+_FULL_EFFORT_HOLDING = 0.3
+"""What holding asks for may take more of the motor [rad]; anymal_c and b1 need it."""
+
+_SAG = 0.02
+"""How far a stretched limb may sag under its own weight [rad]: 1 degree."""
+
+_BANDWIDTH = 20.0
+"""Least natural frequency of a joint that holds no weight, such as a steering [rad/s]."""
+
+_LEVER = 0.1
+"""Lever at which a sliding joint does the same as a turning one [m]: what is said of 1 rad goes for
+0.1 m."""
+
+_LIGHT = 0.75
+"""A joint that bears less than this share of the stiffness it needs is given an armature."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wish:
+    """What joints that are alike should have, before it is rounded."""
+
+    joints: tuple[str, ...]
+    stiffness: float
+    reason: str
+
+    inertia: float
+    """Smallest of the joints, when all others give way, armature included."""
+
+    armature: float
+    """What is declared, or suggested."""
+
+    too_light: bool = False
+    """Whether the armature is suggested."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Need:
+    """A stiffness that a task asks for, and how much of the motor it may take."""
+
+    stiffness: float
+    why: str
+
+    error: float
+    """Error at which the joint gives all of its effort, at least [rad]."""
+
+
+def leg_wish(facts: Facts, scene: Plant, inertias: Inertias, joints: Sequence[str]) -> Wish:
+    """Return what joints of legs need that are for the same."""
+    count = len(facts.legs)
+    weight = float(scene.model.body_subtreemass[0]) * GRAVITY
+    length = float(np.mean([leg.length for leg in facts.legs]))
+    if slides(scene, joints[0]):
+        sinking = weight / count / (_SAG_LEG * length)
+        why = f"to sink in by {_SAG_LEG:.0%} of the leg under the weight = {sinking:.3g}"
+        return _wish(
+            scene, inertias, joints, [_Need(stiffness=sinking, why=why, error=_FULL_EFFORT)]
+        )
+    upright = _UPRIGHT * weight * length / count
+    why = f"{_UPRIGHT:g} x weight x leg length / {count} legs = {upright:.3g}"
+    needs = [_Need(stiffness=upright, why=why, error=_FULL_EFFORT_LEG)]
+    if facts.stance is not None and count >= _STANDS_ALONE:
+        held = max((abs(torque) for torque in facts.stance.torques.values()), default=0.0)
+        why = f"to hold {held:.2g} N m in the standing pose within {_SAG_LEG:g} rad"
+        needs.append(
+            _Need(
+                stiffness=held / _SAG_LEG,
+                why=f"{why} = {held / _SAG_LEG:.3g}",
+                error=_FULL_EFFORT_HOLDING,
+            )
+        )
+    return _wish(scene, inertias, joints, needs)
+
+
+def other_wish(scene: Plant, inertias: Inertias, joints: Sequence[str]) -> Wish:
+    """Return what a joint needs that is none of a leg, and its mirror image."""
+    sliding = slides(scene, joints[0])
+    sag, force, shift = (_SAG * _LEVER, "N", "m") if sliding else (_SAG, "N m", "rad")
+    held = max(_gravity(scene, name) for name in joints)
+    brisk = _BANDWIDTH**2 * max(inertias[name].locked for name in joints)
+    holding = f"to hold its own {held:.2g} {force} within {sag:g} {shift} = {held / sag:.3g}"
+    turning = f"for a natural frequency of {_BANDWIDTH:g} rad/s = {brisk:.3g}"
+    needs = [
+        _Need(stiffness=held / sag, why=holding, error=_FULL_EFFORT),
+        _Need(stiffness=brisk, why=turning, error=_FULL_EFFORT),
+    ]
+    return _wish(scene, inertias, joints, needs)
+
+
+def slides(scene: Plant, name: str) -> bool:
+    """Return whether a joint slides, and does not turn."""
+    import mujoco
+
+    return int(scene.model.joint(name).type[0]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
+
+
+def effort_in(scene: Plant, name: str) -> float:
+    """Return the effort of an actuated joint [N m] or [N]; infinite if it is not limited."""
+    actuator = scene.drives.index(name)
+    limited = scene.model.actuator_forcelimited[actuator]
+    return float(scene.model.actuator_forcerange[actuator, 1]) if limited else math.inf
+
+
+def _wish(scene: Plant, inertias: Inertias, joints: Sequence[str], needs: Sequence[_Need]) -> Wish:
+    """Return the most that is needed, as far as the motor and the time step bear it."""
+    effort = min(effort_in(scene, name) for name in joints)
+    lever = _LEVER if slides(scene, joints[0]) else 1.0
+    needed, why = max(_within_effort(need, effort, lever) for need in needs)
+    if not math.isfinite(needed):
+        raise CannotCheckError(f"what {joints[0]} carries is too heavy for any number")
+    inertia = min(inertias[name].free for name in joints)
+    armature = max(float(scene.model.joint(name).armature[0]) for name in joints)
+    borne = stable_stiffness(inertia)
+    too_light = borne < _LIGHT * needed
+    if too_light:
+        more = _rounded_up(armature + needed_inertia(needed) - inertia) - armature
+        inertia, armature = inertia + more, armature + more
+    elif borne < needed:
+        needed = borne
+        why = f"what a time step of {1000 * TIME_STEP:g} ms bears at {inertia:.2g} kg m2"
+    return Wish(
+        joints=tuple(joints),
+        stiffness=needed,
+        reason=why,
+        inertia=inertia,
+        armature=armature,
+        too_light=too_light,
+    )
+
+
+def _within_effort(need: _Need, effort: float, lever: float) -> tuple[float, str]:
+    most = effort / (need.error * lever)
+    if need.stiffness <= most:
+        return need.stiffness, need.why
+    return most, f"all of its effort of {effort:.3g} at an error of {need.error * lever:g}"
+
+
+def _gravity(scene: Plant, name: str) -> float:
+    """Return a bound of gravity's torque on a joint [N m], or force [N], in any pose.
+
+    Each mass pulls at most with its weight times the length of the chain from the joint to it.
+    """
+    model = scene.model
+    body = int(model.joint(name).bodyid[0])
+    if slides(scene, name):
+        return float(model.body_subtreemass[body]) * GRAVITY
+    reach = {body: float(np.linalg.norm(model.joint(name).pos))}
+    total = 0.0
+    for index in range(body, model.nbody):
+        parent = int(model.body_parentid[index])
+        if index != body and parent not in reach:
+            continue
+        if index != body:
+            reach[index] = reach[parent] + float(np.linalg.norm(model.body_pos[index]))
+        lever = reach[index] + float(np.linalg.norm(model.body_ipos[index]))
+        total += float(model.body_mass[index]) * lever
+    return total * GRAVITY
+
+
+def _rounded_up(value: float) -> float:
+    """Return the next number that starts with 1, 2 or 5."""
+    scale = 10.0 ** math.floor(math.log10(value))
+    return next(float(f"{s * scale:.1g}") for s in (1, 2, 5, 10) if s * scale >= 0.999 * value)

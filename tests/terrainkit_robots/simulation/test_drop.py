@@ -1,0 +1,68 @@
+import math
+
+import numpy as np
+import pytest
+
+from terrainkit_robots import bundled
+from terrainkit_robots.facts import Facts
+from terrainkit_robots.robot_file import read_robot
+from terrainkit_robots.simulation.drop import let_fall
+from terrainkit_robots.simulation.plant import plant
+
+PENDULUM = """
+<robot name="pendulum">
+  <link name="pole"/>
+  <link name="bob">
+    <inertial><origin xyz="0.5 0 0"/><mass value="2"/>
+      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <joint name="j" type="revolute">
+    <parent link="pole"/><child link="bob"/><axis xyz="0 1 0"/>
+    <limit lower="-4" upper="4" effort="10" velocity="10"/>
+  </joint>
+</robot>
+"""
+
+
+def read(folder, text):
+    path = folder / "robot.urdf"
+    path.write_text(text)
+    return plant(Facts(read_robot(path)))
+
+
+def test_a_pendulum_is_fastest_at_the_bottom(tmp_path):
+    drop = let_fall(read(tmp_path, PENDULUM))
+    inertia = 0.01 + 2 * 0.5**2
+    assert drop.top_speed == pytest.approx(math.sqrt(2 * 2 * 9.81 * 0.5 / inertia), rel=0.02)
+    assert (drop.fastest, drop.blew_up, drop.seconds) == ("j", False, pytest.approx(1.5))
+
+
+@pytest.mark.parametrize("name", bundled.names())
+def test_healthy_robots_come_down_gently_and_alike_each_time(name):
+    scene = plant(Facts(read_robot(bundled.find(name))))
+    before = scene.home.copy(), scene.model.geom_contype.copy()
+    drop = let_fall(scene)
+    assert not drop.blew_up
+    assert 2 < drop.top_speed < 40
+    assert drop == let_fall(scene)
+    np.testing.assert_array_equal(scene.home, before[0])
+    np.testing.assert_array_equal(scene.model.geom_contype, before[1])
+
+
+def test_a_robot_that_blows_up_is_noticed(tmp_path):
+    scene = read(tmp_path, PENDULUM)
+    scene.model.opt.gravity[2] = -1e12
+    drop = let_fall(scene)
+    assert drop.blew_up
+    assert drop.seconds < 1.5
+
+
+def test_a_robot_without_joints_falls_as_one(tmp_path):
+    text = """<robot name="stone"><link name="stone">
+      <inertial><mass value="1"/>
+        <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+      <collision><geometry><sphere radius="0.1"/></geometry></collision></link></robot>"""
+    drop = let_fall(read(tmp_path, text))
+    assert drop.fastest == "base"
+    assert drop.top_speed < 0.1
+    assert not drop.blew_up

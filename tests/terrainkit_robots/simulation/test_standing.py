@@ -1,0 +1,140 @@
+import math
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from terrainkit_robots import bundled
+from terrainkit_robots.edit.apply import fix_robot
+from terrainkit_robots.facts import Facts
+from terrainkit_robots.lint import lint
+from terrainkit_robots.mesh.meshes import Meshes
+from terrainkit_robots.robot_file import read_robot
+from terrainkit_robots.rule import CannotCheckError
+from terrainkit_robots.simulation.gains import suggest_gains
+from terrainkit_robots.simulation.plant import plant
+from terrainkit_robots.simulation.standing import footholds, stand_still
+
+BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]
+QUADRUPEDS = ["a1/urdf/a1.urdf", "go2/urdf/go2.urdf", "go2_mjcf/go2.xml"]
+BIPEDS = ["h1/h1.xml", "g1/g1_29dof.urdf"]
+
+
+@cache
+def read(path):
+    return Facts(read_robot(path))
+
+
+def facts_of(name, robot_file):
+    stem, suffix = Path(name).stem, Path(name).suffix
+    return read(bundled.find(stem).with_suffix(suffix) if name in BUNDLED else robot_file(name))
+
+
+def stand(facts, **keys):
+    keys = {"positions": facts.positions, "feet": footholds(facts)} | keys
+    return stand_still(plant(facts), suggest_gains(facts), **keys)
+
+
+def check(standing):
+    assert not standing.blew_up
+    assert standing.seconds == pytest.approx(5)
+    assert standing.tilt <= standing.largest_tilt < math.radians(3)
+    assert standing.touching == ()
+
+
+@pytest.mark.parametrize("name", [*QUADRUPEDS, "quadruped.urdf", "quadruped.xml"])
+def test_quadrupeds_stand_for_five_seconds(name, robot_file):
+    facts = facts_of(name, robot_file)
+    standing = stand(facts, seconds=5)
+    check(standing)
+    assert 0 < standing.sink < 0.1 * facts.stance.height
+    assert standing.drift < 0.05
+    assert 0 < standing.saturation < 0.5
+    assert standing.height + standing.sink == pytest.approx(facts.stance.height, abs=1e-3)
+
+
+def test_anymal_c_stands_once_it_is_repaired(robot_file):
+    path = robot_file("anymal_c/urdf/anymal_c.urdf")
+
+    def look(contents):
+        return lint(Facts(read_robot(path, contents=contents), Meshes(contents)), simulate=False)
+
+    check(stand(fix_robot(path, look, unsafe=True).report.facts, seconds=5))
+
+
+@pytest.mark.parametrize("name", [*BIPEDS, "biped.urdf", "biped.xml"])
+def test_bipeds_stand_with_their_joints_locked(name, robot_file):
+    standing = stand(facts_of(name, robot_file), seconds=5, joints_locked=True)
+    check(standing)
+    assert standing.joint_error < 1e-4
+    assert standing.saturation == 0
+
+
+def test_a_biped_falls_under_position_control():
+    standing = stand(read(bundled.find("biped")))
+    assert standing.tilt > 0.5
+    assert "pelvis" in standing.touching
+
+
+def test_it_is_the_same_each_time():
+    facts = read(bundled.find("quadruped"))
+    model = plant(facts).model
+    before = model.actuator_gainprm.copy(), model.dof_armature.copy()
+    first = stand(facts)
+    assert first == stand(facts)
+    assert first.seconds == pytest.approx(2)
+    assert (model.actuator_gainprm == before[0]).all()
+    assert (model.dof_armature == before[1]).all()
+
+
+def test_a_stiffer_robot_sinks_less():
+    facts = read(bundled.find("quadruped"))
+    stiff = {
+        name: type(gain)(
+            stiffness=3 * gain.stiffness, damping=2 * gain.damping, armature=0.02, reason=""
+        )
+        for name, gain in suggest_gains(facts).items()
+    }
+    standing = stand_still(plant(facts), stiff, positions=facts.positions, feet=footholds(facts))
+    assert standing.sink < 0.5 * stand(facts).sink
+    largest = max(abs(torque) for torque in facts.stance.torques.values())
+    assert standing.joint_error == pytest.approx(
+        largest / stiff["FL_calf_joint"].stiffness, rel=0.3
+    )
+
+
+def test_knees_on_the_ground_are_no_feet():
+    facts = read(bundled.find("quadruped").with_suffix(".xml"))
+    limp = {
+        name: type(gain)(stiffness=1.0, damping=1.0, armature=gain.armature, reason="")
+        for name, gain in suggest_gains(facts).items()
+    }
+    standing = stand_still(plant(facts), limp, positions=facts.positions, feet=footholds(facts))
+    assert standing.sink > 0.15
+    assert {"FL_calf", "RR_calf"} & set(standing.touching)
+    assert not {"FL_foot", "RR_foot"} & set(standing.touching)
+
+
+def test_without_footholds_feet_are_told_as_well():
+    facts = read(bundled.find("quadruped"))
+    assert "FL_foot" in stand(facts, feet=()).touching
+
+
+def test_a_foot_may_touch_anywhere_and_a_shank_with_its_tip():
+    facts = read(bundled.find("quadruped"))
+    holds = {hold.body: hold for hold in footholds(facts)}
+    assert math.isinf(holds["FL_foot"].reach)
+    assert 0.05 < holds["FL_calf"].reach < 0.213
+    assert holds["FL_calf"].tip == pytest.approx((0, 0, -0.22), abs=0.03)
+
+
+def test_what_is_bolted_down_does_not_stand(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(
+        """<robot name="arm"><link name="pole"/><link name="arm"><inertial><mass value="1"/>
+        <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+        <joint name="j" type="revolute"><parent link="pole"/><child link="arm"/>
+        <limit lower="-1" upper="1" effort="10" velocity="10"/></joint></robot>"""
+    )
+    with pytest.raises(CannotCheckError, match="does not stand"):
+        stand(Facts(read_robot(path)))
