@@ -107,7 +107,6 @@ def plant(facts: Facts) -> Plant:
             compiled = _compile(_lumped(model), extras, assets)
         except ValueError:
             raise CannotCheckError(f"MuJoCo does not simulate it: {reason}") from None
-        compiled.body_ipos[compiled.body_mass == 0] = 0  # contacts are scaled by what moves here
     return plant_of(compiled, base=model.links[0].name)
 
 

@@ -200,6 +200,6 @@ def _gravity(scene: Plant, name: str) -> float:
 
 
 def _rounded_up(value: float) -> float:
-    """Return the next number that starts with 1, 2 or 5."""
+    """Return the next number that starts with 1, 2, 3 or 5."""
     scale = 10.0 ** math.floor(math.log10(value))
-    return next(float(f"{s * scale:.1g}") for s in (1, 2, 5, 10) if s * scale >= 0.999 * value)
+    return next(float(f"{s * scale:.1g}") for s in (1, 2, 3, 5, 10) if s * scale >= 0.999 * value)

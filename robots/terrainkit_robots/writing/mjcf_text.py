@@ -214,6 +214,11 @@ def _body(
     _place(body, place)
     if link.inertial is not None and link.inertial.mass:
         _inertial(body, link.inertial)
+    elif link.collisions:
+        # MuJoCo makes contacts as soft as what is felt at the place of the mass, which it would
+        # take to be elsewhere.
+        middle = np.mean([shape.origin[:3, 3] for shape in link.collisions], axis=0)
+        etree.SubElement(body, "inertial", pos=_text(middle), mass="0", diaginertia="0 0 0")
     for index, joint in enumerate(joints):
         if joint.moves:
             # Axes of several joints are all given in the frame of the body, at zero.

@@ -57,6 +57,11 @@ def normal_form(facts: "Facts", *, floating: bool | None = None) -> NormalForm:
     floating = floats(facts) if floating is None else floating
     driven = {joint.name for joint in facts.actuated}
     kept = {link.name for link in links}
+    if _WORLD in kept:
+        other = _free_name(f"{_WORLD}_link", kept)
+        notes.append(f"named the link {_WORLD} {other}: MuJoCo has a world of its own")
+        links = [replace(each, name=other) if each.name == _WORLD else each for each in links]
+        joints = [(_moved(joint, other), before) for joint, before in joints]
     model = RobotModel(
         name=_plain(facts.model.name or facts.model.file.stem),
         kind="urdf",
@@ -82,6 +87,15 @@ def normal_form(facts: "Facts", *, floating: bool | None = None) -> NormalForm:
     return NormalForm(model=model, notes=tuple(notes))
 
 
+_WORLD = "world"
+
+
+def _moved(joint: Joint, other: str) -> Joint:
+    """Return a joint that is on the link `other` instead of the world."""
+    parent = other if joint.parent == _WORLD else joint.parent
+    return replace(joint, parent=parent, child=other if joint.child == _WORLD else joint.child)
+
+
 def floats(facts: "Facts") -> bool:
     """Return whether the base of a robot moves freely.
 
@@ -95,7 +109,7 @@ def floats(facts: "Facts") -> bool:
         return True
     if facts.legs:
         return True
-    if facts.model.kind == "mjcf" or not facts.bodies[0].mass:
+    if facts.model.kind == "mjcf" or base == _WORLD or not facts.bodies[0].mass:
         return False
     wheels = any(b.joint is not None and b.joint.range is None for b in _turning(facts))
     return wheels or not facts.joints

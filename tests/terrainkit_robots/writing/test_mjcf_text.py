@@ -190,3 +190,20 @@ def test_a_quaternion_turns_as_its_matrix_does(angle):
     back = np.zeros(9)
     mujoco.mju_quat2Mat(back, quat)
     np.testing.assert_allclose(back.reshape(3, 3), turn, atol=1e-12)
+
+
+def test_contacts_of_a_foot_without_mass_are_as_stiff_as_of_one_with_next_to_none(quadruped):
+    def weighs(mass):
+        def foot(link):
+            if link.name != "FL_foot":
+                return link
+            light = dataclasses.replace(link.inertial, mass=mass, inertia=1e-3 * mass * np.eye(3))
+            return dataclasses.replace(link, inertial=light if mass else None)
+
+        links = tuple(map(foot, quadruped.model.links))
+        model = written(dataclasses.replace(quadruped.model, links=links))
+        return model.body("FL_foot")
+
+    none, next_to_none = weighs(0.0), weighs(1e-9)
+    assert none.mass[0] == 0
+    np.testing.assert_allclose(none.invweight0, next_to_none.invweight0, rtol=1e-4)

@@ -185,3 +185,14 @@ def test_two_joints_of_one_name_get_two(tmp_path):
 def test_the_name_is_one_on_every_disk(tmp_path, name, wanted):
     form = normal_form(facts(tmp_path, f'<robot name="{name}"><link name="a"/></robot>'))
     assert form.model.name == wanted
+
+
+def test_a_link_called_world_gets_another_name(tmp_path):
+    text = """<robot name="r"><link name="world"/><link name="world_link"/>
+      <joint name="j" type="fixed"><parent link="world"/><child link="world_link"/></joint>
+      </robot>"""
+    form = normal_form(facts(tmp_path, text))
+    assert [link.name for link in form.model.links] == ["world_link_2", "world_link"]
+    assert form.model.joints[0].parent == "world_link_2"
+    assert form.model.floating is False
+    assert form.notes == ("named the link world world_link_2: MuJoCo has a world of its own",)
