@@ -21,5 +21,6 @@ def run() -> Iterator[tuple[str, float]]:
     }.items():
         if path is None or not path.exists():
             continue
-        command = [str(Path(sys.executable).with_name("terrainkit")), "check-robot", str(path)]
+        command = [str(Path(sys.executable).with_name("terrainkit")), "check-robot"]
+        command += [str(path), "--no-simulation"]
         yield f"{name}_over_imports (at most 2)", ratio(process(command), imports, 15)

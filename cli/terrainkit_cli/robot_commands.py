@@ -171,7 +171,8 @@ def _tried(name: str, command: CheckRobot, options: "Settings") -> _Checked | No
 
     try:
         check = _check(name, command, options)
-        facts_record(check.report.facts)  # so that what fails in it fails here
+        # So that what fails in it fails here.
+        facts_record(check.report.facts, simulated=check.report.simulated)
         return check
     except TerrainkitError as error:
         render.error(str(error))
@@ -262,6 +263,7 @@ def _repaired(
         facts=report.facts,
         findings=report.findings,
         skipped=report.skipped,
+        simulated=report.simulated,
         fixed=result.fixed,
         unfixed=left,
     ), ""

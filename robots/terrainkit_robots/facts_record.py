@@ -16,7 +16,7 @@ _DIGITS = 6
 """Significant digits of each number: more than any robot is built to."""
 
 
-def facts_record(facts: "Facts") -> dict[str, Any]:
+def facts_record(facts: "Facts", *, simulated: bool = False) -> dict[str, Any]:
     """Return the facts as JSON has them: SI units and radians, and None for what is not known.
 
     The keys are the same for every robot: one without legs has no feet and no standing pose.
@@ -25,6 +25,7 @@ def facts_record(facts: "Facts") -> dict[str, Any]:
     `joint_orders` has the joints in the order of the file under `file`, those outside the main tree
     included, and under each simulator its `joints` and `bodies`, whether that is `certain`, and the
     `reason`.
+    `suggested_gains` take a model in MuJoCo, and are None unless the robot was simulated.
     """
     legs, actuated = facts.legs, len(facts.actuated)
     return {
@@ -45,6 +46,7 @@ def facts_record(facts: "Facts") -> dict[str, Any]:
         },
         "mirrored_joints": _mirrored(facts),
         **_standing(facts),
+        "suggested_gains": _gains(facts) if simulated else None,
         "action_size": actuated,
         "observation_size": 12 + 3 * actuated,
     }
@@ -53,6 +55,26 @@ def facts_record(facts: "Facts") -> dict[str, Any]:
 def number(value: float) -> float | None:
     """Return `value` rounded to the digits that mean something; None if it is not finite."""
     return float(f"{value:.{_DIGITS}g}") if math.isfinite(value) else None
+
+
+def _gains(facts: "Facts") -> dict[str, Any] | None:
+    """Return what a position controller of each actuated joint may have; None where none can be."""
+    from terrainkit_robots.rule import CannotCheckError
+    from terrainkit_robots.simulation.gains import suggest_gains
+
+    try:
+        gains = suggest_gains(facts)
+    except CannotCheckError:
+        return None
+    return {
+        name: {
+            "stiffness": number(gain.stiffness),
+            "damping": number(gain.damping),
+            "armature": number(gain.armature),
+            "reason": gain.reason,
+        }
+        for name, gain in gains.items()
+    }
 
 
 def _orders(facts: "Facts") -> dict[str, Any]:

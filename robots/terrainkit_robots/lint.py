@@ -60,6 +60,9 @@ class Report:
 
     skipped: tuple[Skipped, ...] = ()
 
+    simulated: bool = False
+    """Whether the robot was simulated where a rule wanted that."""
+
     @property
     def crashed(self) -> tuple[Skipped, ...]:
         """The rules that raised what they should not have."""
@@ -119,7 +122,7 @@ def lint(facts: Facts, chosen: Sequence[Rule] | None = None, *, simulate: bool =
             skipped.append(Skipped(code=each.code, reason=reason))
     order = {"error": 0, "warning": 1, "info": 2}
     findings.sort(key=lambda f: (order[f.severity], str(f.file), f.line, f.code))
-    return Report(facts=facts, findings=tuple(findings), skipped=tuple(skipped))
+    return Report(facts=facts, findings=tuple(findings), skipped=tuple(skipped), simulated=simulate)
 
 
 def unasked(rule: Rule, facts: Facts, *, simulate: bool) -> bool:

@@ -72,3 +72,18 @@ def test_numbers_beyond_all_bounds_are_none_or_finite(tmp_path, mass):
 )
 def test_six_digits_are_kept(value, kept):
     assert number(value) == kept
+
+
+def test_gains_need_a_simulation(robot_file):
+    robot = Facts(read_robot(robot_file("go2/urdf/go2.urdf")))
+    assert facts_record(robot)["suggested_gains"] is None
+    gains = facts_record(robot, simulated=True)["suggested_gains"]
+    assert list(gains) == [joint.name for joint in robot.actuated]
+    assert gains["FL_calf_joint"]["stiffness"] == 60
+    assert gains["FL_calf_joint"]["reason"]
+
+
+def test_a_robot_that_cannot_be_simulated_gets_no_gains(tmp_path):
+    path = tmp_path / "robot.urdf"
+    path.write_text('<robot name="r"/>')
+    assert facts_record(Facts(read_robot(path)), simulated=True)["suggested_gains"] is None

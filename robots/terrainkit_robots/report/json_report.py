@@ -32,7 +32,7 @@ def record(report: Report) -> dict[str, Any]:
         "file": str(model.file),
         "kind": model.kind,
         "verdict": report.verdict,
-        "facts": facts_record(report.facts),
+        "facts": facts_record(report.facts, simulated=report.simulated),
         "findings": [finding_record(finding) for finding in report.findings],
         "fixed": [finding_record(finding) for finding in fixed(report)],
         "unfixed": [{**finding_record(f), "reason": reason} for f, reason in unfixed(report)],

@@ -20,7 +20,7 @@ def _section(report: Report) -> Iterator[str]:
     repairs = fixable(report.findings)
     yield f"**{tally([report])}**{f' ({repairs})' if repairs else ''}\n"
     yield "| | |\n|---|---|"
-    for label, text in robot_summary(report.facts):
+    for label, text in robot_summary(report):
         yield f"| {label.strip()} | {cell(text)} |"
     yield ""
     yield from titled_list("Fixed", [(f.code, f"{f.name}: {f.message}") for f in fixed(report)])

@@ -9,11 +9,13 @@ from terrainkit_robots.report.tally import count
 
 if TYPE_CHECKING:
     from terrainkit_robots.facts import Facts
+    from terrainkit_robots.lint import Report
 
 
-def robot_summary(facts: "Facts") -> Iterator[tuple[str, str]]:
+def robot_summary(report: "Report") -> Iterator[tuple[str, str]]:
     """Yield labels and what is to be said of them."""
-    record = facts_record(facts)
+    facts = report.facts
+    record = facts_record(facts, simulated=report.simulated)
     kind = {"urdf": "URDF", "xacro": "xacro", "mjcf": "MJCF"}[facts.model.kind]
     yield "robot", f"{record['name'] or 'without a name'} ({kind})"
     yield "size", ", ".join(_size(record))
@@ -79,8 +81,21 @@ def _joints(record: Mapping[str, Any], efforts: Mapping[str, float]) -> Iterator
         unit = "m" if label.startswith("slide") else "rad"
         positions = [record["standing_pose"].get(name) for name in names]
         holding = {name: record["holding_torques"].get(name) for name in names}
-        parts = [f"{_values(positions)} {unit}", *_torque(holding, efforts, unit)]
+        parts = [
+            f"{_values(positions)} {unit}",
+            *_torque(holding, efforts, unit),
+            *_gains(record, names),
+        ]
         yield f"  {label}", f"{', '.join(parts)}: {', '.join(names)}"
+
+
+def _gains(record: Mapping[str, Any], names: Sequence[str]) -> Iterator[str]:
+    """Yield what is suggested for the controllers of some joints."""
+    gains = [gain for name, gain in (record["suggested_gains"] or {}).items() if name in names]
+    for key, word in (("stiffness", "kp"), ("damping", "kd")):
+        values = sorted({gain[key] for gain in gains} - {None})
+        if values:
+            yield f"{word} {' and '.join(f'{value:g}' for value in values)}"
 
 
 def _values(numbers: Sequence[float | None]) -> str:

@@ -44,7 +44,12 @@ def _run(reports: Sequence[Report]) -> dict[str, Any]:
         "tool": {"driver": driver},
         "invocations": [invocation],
         "results": results,
-        "properties": {"facts": {str(r.facts.model.file): facts_record(r.facts) for r in reports}},
+        "properties": {
+            "facts": {
+                str(r.facts.model.file): facts_record(r.facts, simulated=r.simulated)
+                for r in reports
+            }
+        },
     }
 
 

@@ -57,7 +57,7 @@ def _robot(report: Report, width: int) -> Iterator[Line]:
     file = plain(str(report.facts.model.file))
     yield (Span(file, "bold"),)
     model = report.facts.model  # of a file that is no robot there is nothing to sum up
-    for label, text in robot_summary(report.facts) if model.links or not model.problems else ():
+    for label, text in robot_summary(report) if model.links or not model.problems else ():
         first = f"  {label:<9} "
         yield from _wrapped(Span(first, "dim"), plain(text), width, indent=len(first))
     yield ()

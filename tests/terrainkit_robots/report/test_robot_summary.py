@@ -2,12 +2,13 @@ import pytest
 
 from terrainkit_robots import bundled
 from terrainkit_robots.facts import Facts
+from terrainkit_robots.lint import lint
 from terrainkit_robots.report.robot_summary import robot_summary
 from terrainkit_robots.robot_file import read_robot
 
 
 def summary(path):
-    return dict(robot_summary(Facts(read_robot(path))))
+    return dict(robot_summary(lint(Facts(read_robot(path)), [])))
 
 
 def test_a_quadruped():
@@ -42,3 +43,12 @@ def test_numbers_out_of_all_proportion_stay_short(tmp_path, words, value):
     (tmp_path / "robot.urdf").write_text(f"{head}{start}{value}{rest[rest.index(chr(34)) :]}")
     for line in summary(tmp_path / "robot.urdf").values():
         assert max(map(len, line.split())) < 25
+
+
+def test_gains_are_suggested_once_a_robot_may_be_simulated():
+    report = lint(Facts(read_robot(bundled.find("quadruped"))), [])
+    assert report.simulated
+    told = dict(robot_summary(report))
+    assert "kp 60, kd 2: FL_hip_joint" in told["  roll"]
+    static = lint(Facts(read_robot(bundled.find("quadruped"))), [], simulate=False)
+    assert "kp" not in dict(robot_summary(static))["  roll"]
