@@ -9,7 +9,6 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 from lxml import etree
 
@@ -417,6 +416,8 @@ def _cost_of(document: MjcfDocument, root: Node, models: Mapping[str, int]) -> i
 
 def _text(root: Node, lines: list[Node]) -> str:
     """Return a tree as text, one element on each line, and add the node of each to `lines`."""
+    from xml.sax.saxutils import quoteattr  # it brings urllib along
+
     parts: list[str] = []
     stack: list[Node | str] = [root]
     while stack:
