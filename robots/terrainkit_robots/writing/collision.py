@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from terrainkit_robots.mesh.hull import convex_hull
 from terrainkit_robots.mesh.meshes import MeshError, Meshes
 from terrainkit_robots.mesh.surface import (
     Surface,
@@ -209,7 +210,10 @@ class _Work:
         return Geometry(source=mesh.source, shape="mesh", mesh=file)
 
     def _hull(self, mesh: MeshFile, most_corners: int | None) -> Surface:
-        return scaled(self._meshes.hull(mesh.path, most_corners), mesh.scale)
+        surface = self._welded(mesh.path)
+        # files have corners that no triangle is made of
+        used = surface.points[np.unique(surface.faces)]
+        return scaled(convex_hull(used, most_corners), mesh.scale)
 
     def _welded(self, path: Path) -> Surface:
         surface = self._meshes.surface(path)
@@ -225,7 +229,7 @@ class _Work:
         """
         x, y, z = mesh.scale
         enclosed = abs(signed_volume(self._welded(mesh.path)) * x * y * z)
-        return self._meshes.hull_volume(mesh) > _FAR_FROM_CONVEX * enclosed
+        return abs(signed_volume(self._hull(mesh, None))) > _FAR_FROM_CONVEX * enclosed
 
 
 def _instead(shape: Geometry, other: Geometry) -> Geometry:

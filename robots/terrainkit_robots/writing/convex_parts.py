@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from terrainkit.errors import TerrainkitError
 from terrainkit_robots.mesh.surface import MeshError, Surface
 from terrainkit_robots.writing.coarser import coarser
 from terrainkit_robots.writing.part_cache import PartCache, packed, unpacked
@@ -52,6 +53,7 @@ def convex_parts(surface: Surface, cache: Path | None) -> tuple[Surface, ...]:
 
     Raises:
         MeshError: if CoACD fails at it.
+        TerrainkitError: if CoACD is not installed.
     """
     kept = PartCache(cache)
     key = _key(surface)
@@ -64,13 +66,22 @@ def convex_parts(surface: Surface, cache: Path | None) -> tuple[Surface, ...]:
 
 def _key(surface: Surface) -> str:
     """Return what the parts follow from: corners, faces, parameters and the version of CoACD."""
-    what = json.dumps([dict(PARAMETERS), _MOST_FACES, metadata.version("coacd")], sort_keys=True)
+    what = json.dumps([dict(PARAMETERS), _MOST_FACES, _version()], sort_keys=True)
     points = np.ascontiguousarray(surface.points, dtype="<f8")
     faces = np.ascontiguousarray(surface.faces, dtype="<i8")
     digest = hashlib.sha256(f"{what} {len(points)} {len(faces)} ".encode())
     digest.update(points.tobytes())
     digest.update(faces.tobytes())
     return digest.hexdigest()
+
+
+def _version() -> str:
+    try:
+        return metadata.version("coacd")
+    except metadata.PackageNotFoundError:
+        raise TerrainkitError(
+            "convex parts need the package coacd, which is not installed; hulls do not"
+        ) from None
 
 
 def _decomposed(surface: Surface) -> tuple[Surface, ...]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from terrainkit_robots.mesh.meshes import Meshes
-from terrainkit_robots.mesh.surface import MeshError, Surface, binary_stl
+from terrainkit_robots.mesh.surface import MeshError, Surface, binary_stl, is_flat
 from terrainkit_robots.model import MeshFile
 from terrainkit_robots.writing.coarser import coarser
 
@@ -68,9 +68,10 @@ def has_no_volume(meshes: Meshes, mesh: MeshFile) -> bool:
     Raises:
         MeshError: if it cannot be read.
     """
-    if meshes.is_flat(mesh):
-        return True
+    # only corners of triangles count: files have others that nothing is made of
     corners = meshes.vertices(mesh)[meshes.surface(mesh.path).faces]
+    if is_flat(corners.reshape(-1, 3)):
+        return True
     corners = corners - corners.mean(axis=(0, 1))
     cross = np.cross(corners[:, 1], corners[:, 2])
     return float(np.abs(np.einsum("ij,ij->i", corners[:, 0], cross)).sum()) / 6 < _SMALLEST
