@@ -90,6 +90,18 @@ class Meshes:
         """Return whether there is something under that name, be it a mesh or not; opens nothing."""
         return self.is_held(path) or exists(path)
 
+    def data(self, path: Path) -> bytes:
+        """Return the content of a file.
+
+        Raises:
+            MeshError: if it cannot be read.
+        """
+        return self._bytes_of(path, self.header(path).size)
+
+    def beside(self, contents: Mapping[Path, bytes]) -> "Meshes":
+        """Return the same files and others that are not on disk."""
+        return Meshes({**self._contents, **contents})
+
     def surface(self, path: Path) -> Surface:
         """Return the triangles, as they are in the file.
 
@@ -126,7 +138,8 @@ class Meshes:
     def glance(self, mesh: MeshFile) -> float | None:
         """Return the diagonal of a part of the mesh, scaled [m], from the beginning of its file.
 
-        The whole is at least as large, unless the file itself scales it. None where the beginning
+        The whole is at least as large, unless the file itself scales it, or begins with points that
+        are a corner of nothing. None where the beginning
         does not tell, and where the whole was read already.
         """
         if ("surface", mesh.path) in self._answers:

@@ -21,7 +21,7 @@ from terrainkit_robots.mesh.surface import (
 
 
 def read_mesh(kind: Format, data: bytes) -> Surface:
-    """Return the triangles in a file.
+    """Return the triangles in a file, without the points that are a corner of none.
 
     Raises:
         MeshError: if it holds none, or is not what it claims to be.
@@ -36,10 +36,19 @@ def read_mesh(kind: Format, data: bytes) -> Surface:
     if faces.min() < 0 or faces.max() >= len(points):
         wrong = faces.min() if faces.min() < 0 else faces.max()
         raise MeshError(f"has {len(points):,} corners, and names number {wrong}, counted from 0")
-    finite = np.isfinite(points).all(axis=1)
+    surface = _used(surface)
+    finite = np.isfinite(surface.points).all(axis=1)
     if not finite.all():
         raise MeshError(f"has {np.count_nonzero(~finite):,} corners that are not numbers")
     return surface
+
+
+def _used(surface: Surface) -> Surface:
+    if len(surface.points) == surface.faces.size:
+        return surface  # corners of their own for each triangle, as in STL
+    used = np.bincount(surface.faces.ravel(), minlength=len(surface.points)) > 0
+    place = np.cumsum(used) - 1
+    return Surface(points=surface.points[used], faces=place[surface.faces])
 
 
 def _binary_stl(data: bytes) -> Surface:

@@ -123,7 +123,7 @@ def treat(
     return Treated(
         model=replace(model, links=links),
         contents=contents,
-        meshes=Meshes({**meshes._contents, **contents}),
+        meshes=meshes.beside(contents),
         errors=tuple(work.errors),
         notes=tuple(work.notes),
     )
@@ -211,9 +211,7 @@ class _Work:
 
     def _hull(self, mesh: MeshFile, most_corners: int | None) -> Surface:
         surface = self._welded(mesh.path)
-        # files have corners that no triangle is made of
-        used = surface.points[np.unique(surface.faces)]
-        return scaled(convex_hull(used, most_corners), mesh.scale)
+        return scaled(convex_hull(surface.points, most_corners), mesh.scale)
 
     def _welded(self, path: Path) -> Surface:
         surface = self._meshes.surface(path)

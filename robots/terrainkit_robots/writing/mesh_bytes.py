@@ -53,7 +53,7 @@ def mesh_bytes(meshes: Meshes, mesh: MeshFile) -> MeshBytes:
         surface = coarser(surface, MOST_FACES)
         note = f"was simplified from {before:,} to {len(surface.faces):,} faces"
     elif header.format == "stl" and not mirrored:
-        data = meshes._bytes_of(mesh.path, header.size)
+        data = meshes.data(mesh.path)
         if not data.startswith(b"solid"):  # which some readers take for an STL of text
             return MeshBytes(data=data, scale=mesh.scale)
     if mirrored:

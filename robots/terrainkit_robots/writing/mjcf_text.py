@@ -146,8 +146,8 @@ _MeshKey = tuple[str, tuple[float, ...]]
 
 def _assets(root: Any, model: RobotModel) -> dict[_MeshKey, str]:
     """Write the meshes, and return the name of each."""
-    colliding = {_mesh_key(g) for link in model.links for g in link.collisions if g.mesh}
-    seen = {_mesh_key(g) for link in model.links for g in link.visuals if g.mesh}
+    colliding = {_mesh_key(g) for link in model.links for g in link.collisions if g.shape == "mesh"}
+    seen = {_mesh_key(g) for link in model.links for g in link.visuals if g.shape == "mesh"}
     if not (colliding or seen):
         return {}
     asset, names, taken = etree.SubElement(root, "asset"), dict[_MeshKey, str](), set[str]()
@@ -288,7 +288,7 @@ def _geom(
     if kind == "collision" and shape.name and shape.name not in taken:
         geom.set("name", shape.name)
         taken.add(shape.name)
-    if shape.mesh is not None:
+    if shape.shape == "mesh":
         geom.set("type", "mesh")
         geom.set("mesh", meshes[_mesh_key(shape)])
     else:

@@ -132,7 +132,7 @@ class TestContents:
 
 
 class TestGlance:
-    OBJ = b"".join(b"v %d 0 0\n" % x for x in range(10_000)) + b"f 1 2 3\n"
+    OBJ = b"".join(b"v %d 0 0\n" % x for x in range(10_000)) + b"f 1 2 10000\n"
 
     def test_a_part_of_a_long_file(self, mesh):
         meshes, use = Meshes(), mesh(self.OBJ, "a.obj", (0.1, 1, 1))
@@ -236,3 +236,13 @@ class TestRobots:
         assert len(facts.meshes.opened) == 7
         assert set(facts.meshes.opened.values()) == {2}
         assert facts.meshes._bytes == 0
+
+
+def test_files_that_are_not_on_disk_can_be_added(tmp_path):
+    (tmp_path / "here.stl").write_bytes(b"here")
+    held = Meshes({tmp_path / "held.stl": b"held"})
+    more = held.beside({tmp_path / "more.stl": b"more"})
+    for name in ("here", "held", "more"):
+        assert more.data(tmp_path / f"{name}.stl") == name.encode()
+    assert more.is_held(tmp_path / "more.stl")
+    assert not held.is_held(tmp_path / "more.stl")

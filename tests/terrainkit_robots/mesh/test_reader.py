@@ -177,3 +177,11 @@ def test_other_files_are_not_followed(tmp_path, monkeypatch):
     chunk = struct.pack("<II", len(text), 0x4E4F534A) + text
     with pytest.raises(MeshError):
         read_mesh("glb", b"glTF" + struct.pack("<II", 2, 12 + len(chunk)) + chunk)
+
+
+def test_points_that_are_a_corner_of_nothing_are_dropped():
+    """Modelers leave them behind; a1's hip.dae reaches 2 cm farther with them."""
+    points = [[9, 9, 9], *TETRAHEDRON[:2], [np.nan, 0, 0], *TETRAHEDRON[2:]]
+    surface = read_mesh("msh", msh(points, [[1, 2, 4], [1, 4, 5], [1, 5, 2], [2, 5, 4]]))
+    np.testing.assert_array_equal(surface.points, TETRAHEDRON)
+    assert surface.faces.tolist() == [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
