@@ -20,6 +20,8 @@ from terrainkit.describe import TerrainText, describe
 from terrainkit.grid import Grid
 from terrainkit.preview import write_preview
 from terrainkit_cli.main import COMMANDS
+from terrainkit_robots import bundled
+from terrainkit_robots.onboard.pictures import draw
 from terrainkit_robots.rule import FAMILIES, Rule, rules
 
 DOCS = Path(__file__).parent
@@ -143,6 +145,15 @@ def draw_pictures() -> None:
         cv2.imwrite(str(PICTURES / f"{name}.png"), cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
     terrain_map = terrainkit.generate(terrainkit.MapConfig())
     write_preview(terrain_map, PICTURES / "map.png", width=820, overwrite=True)
+    draw_robot("quadruped")
+
+
+def draw_robot(name: str) -> None:
+    found = bundled.find(name)
+    assert found is not None
+    views = draw(found.with_suffix(".xml"), size=(400, 340)).values()
+    pictures = [cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR) for png in views]
+    cv2.imwrite(str(PICTURES / f"{name}.png"), np.hstack(pictures))
 
 
 def written(name: str) -> str:
@@ -159,7 +170,7 @@ def main() -> int:
     pages = {"terrains.md": terrains_page(), "rules.md": rules_page(), "cli.md": cli_page()}
     if sys.argv[1:] == ["--check"]:
         stale = [n for n, text in pages.items() if words(written(n)) != words(text)]
-        wanted = [f"{name}.png" for name in (*registry.names(), "map")]
+        wanted = [f"{name}.png" for name in (*registry.names(), "map", "quadruped")]
         stale += [name for name in wanted if not (PICTURES / name).exists()]
         if stale:
             print(f"out of date: {', '.join(stale)}; run python docs/build.py")

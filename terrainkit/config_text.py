@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from terrainkit.choice import TerrainChoice
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError, listing
+from terrainkit.toml_text import parsed
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -36,14 +37,7 @@ def from_toml(text: str) -> MapConfig:
     Raises:
         ConfigError: if it is not TOML, or names a key or holds a value that is not known.
     """
-    import tomllib
-
-    try:
-        table = tomllib.loads(text)
-    except ValueError as error:  # TOMLDecodeError is one; so is a number of 5000 digits
-        raise ConfigError(f"not a TOML file: {error}") from error
-    except RecursionError:
-        raise ConfigError("not a TOML file of a map: nested too deeply") from None
+    table = parsed(text)
     known = [field.name for field in dataclasses.fields(MapConfig)]
     _refuse_unknown("config", table, known)
     if table.get("slope_threshold") == _NO_WALLS:

@@ -1,6 +1,7 @@
 """The entry point: find the command, run it, and turn every expected error into one line."""
 
 import importlib
+import os
 import signal
 import sys
 import warnings
@@ -28,6 +29,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     0: done. 1: a check found something. 2: bad input; one line on stderr says what and why.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
+    _put_aside(DRAWING)
     warnings.showwarning = render.show_warning
     from terrainkit.errors import TerrainkitError
 
@@ -53,6 +55,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         render.error("interrupted")
         return 130
+
+
+DRAWING = "MUJOCO_GL"
+"""The graphics library that MuJoCo draws with."""
+
+
+def _put_aside(name: str) -> None:
+    """Move a variable of the environment out of MuJoCo's sight.
+
+    MuJoCo asks for the graphics library when it is imported, and fails where there is none, even
+    for work that draws nothing. What draws asks for the other name.
+    """
+    if name in os.environ:
+        os.environ[f"TERRAINKIT_{name}"] = os.environ.pop(name)
 
 
 def _run(arguments: list[str]) -> int:

@@ -65,8 +65,8 @@ class Onboard(Command):
     """Repair more: also where a number, a shape or a mesh changes. The file stays as it is."""
 
     force: bool = False
-    """Go on although errors are left that make another robot of it: in the text, the tree, meshes
-    or masses."""
+    """Go on although errors are left that make another robot of it: in the text, the tree, joints,
+    meshes or masses."""
 
     overwrite: bool = False
     """Replace the folder, if it is an onboarded robot."""
@@ -90,22 +90,21 @@ class Onboard(Command):
 
         if not self.file:
             raise ConfigError("no FILE to onboard; wanted one, or quadruped, or biped")
-        done = bring_in(find_robot(self.file), self._wishes())
+        with render.steps() as steps:
+            done = bring_in(find_robot(self.file), self._wishes(steps))
         if done.folder is None:
             render.report(_refusal(done))
             render.error(f"{self.file}: errors are left{_advice(done, self)}; nothing was written")
             return 1
         render.table([(f"  {word}", text) for word, text in summary(done)])
-        render.result(f"wrote {done.folder}; look at it: {_viewer(done.folder)}")
-        left = [f for f in done.report.findings if f.severity == "error"]
-        if left:
-            codes = ", ".join(dict.fromkeys(finding.code for finding in left))
-            render.error(
-                f"{self.file}: {len(left)} errors are left ({codes}); report.md has them all"
-            )
-        return int(bool(left) or (done.proof is not None and not done.proof.stood))
+        render.result(f"wrote {done.folder}; look at it, from its keyframe `home` on:")
+        render.result(f"  {_viewer(done.folder)}")
+        faults = _faults(done)
+        for fault in faults:
+            render.error(f"{self.file}: {fault}")
+        return int(bool(faults))
 
-    def _wishes(self) -> "Wishes":
+    def _wishes(self, steps: render.Steps) -> "Wishes":
         from functools import partial
 
         from terrainkit_robots.onboard.bringing_in import Wishes
@@ -128,7 +127,8 @@ class Onboard(Command):
             force=self.force,
             overwrite=self.overwrite,
             pictures=not self.no_pictures,
-            progress=partial(render.progress, of="collision meshes"),
+            say=steps.say,
+            progress=partial(steps.bar, of="collision meshes"),
         )
 
 
@@ -143,11 +143,28 @@ def _refusal(done: "BroughtIn") -> str:
 
 
 def _advice(done: "BroughtIn", command: Onboard) -> str:
+    """Return what to do about errors that keep a robot out."""
+    if not done.report.facts.bodies:
+        return ""
     unsafe = sum(f.severity == "error" and f.fix is not None for f in done.report.findings)
     if unsafe and not command.unsafe_fixes:
-        return f", of which --unsafe-fixes repairs {unsafe}; --force goes on in spite of them"
-    return "; --force goes on in spite of them"
+        return f", of which --unsafe-fixes repairs {unsafe}"
+    return "; --force goes on as far as MuJoCo does"
 
 
 def _viewer(folder: Path) -> str:
-    return f"python -m mujoco.viewer --mjcf={folder / 'scene.xml'}"
+    from shlex import quote
+
+    return f"python -m mujoco.viewer --mjcf={quote(str(folder / 'scene.xml'))}"
+
+
+def _faults(done: "BroughtIn") -> list[str]:
+    """Return why a robot that was written is not yet one to train."""
+    from terrainkit_robots.report.tally import count
+
+    left = [finding for finding in done.report.findings if finding.severity == "error"]
+    codes = ", ".join(dict.fromkeys(finding.code for finding in left))
+    faults = [f"{count(len(left), 'error')} left ({codes}); see report.md"] if left else []
+    if done.proof is not None and not done.proof.stood:
+        faults.append(f"it does not stand: {'; '.join(done.proof.faults)}")
+    return faults

@@ -7,9 +7,12 @@ import sys
 import time
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, TextIO, TypeVar
 
 if TYPE_CHECKING:
+    from rich.status import Status
+
     from terrainkit_robots.report.text import Span
 
 _T = TypeVar("_T")
@@ -123,6 +126,39 @@ def _with_bar_when_slow(walk: Iterator[_T], total: int, of: str) -> Iterator[_T]
         for item in walk:
             yield item
             bar.advance(task)
+
+
+class Steps:
+    """What is done next, shown on stderr while it is done, if that is a terminal."""
+
+    def __init__(self, status: "Status | None") -> None:
+        self._status = status
+
+    def say(self, step: str) -> None:
+        """Show a step."""
+        if self._status is not None:
+            self._status.update(step)
+
+    def bar(self, walk: Iterable[_T], total: int, *, of: str) -> Iterator[_T]:
+        """Yield what `walk` does, with a bar in the place of the step."""
+        if self._status is None:
+            yield from walk
+            return
+        self._status.stop()  # only one thing at a time can move on a terminal
+        yield from progress(walk, total, of=of)
+        self._status.start()
+
+
+@contextmanager
+def steps() -> Iterator[Steps]:
+    """Yield what shows the steps of a work."""
+    if not sys.stderr.isatty():
+        yield Steps(None)
+        return
+    from rich.console import Console
+
+    with Console(stderr=True).status("reading") as status:
+        yield Steps(status)
 
 
 def drop_stdout() -> None:

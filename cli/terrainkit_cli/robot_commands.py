@@ -233,6 +233,9 @@ def _other(name: str, settings: "Settings") -> "Facts | None":
         packages=settings.packages,
         xacro_arguments=settings.xacro_arguments,
     )
+    if not model.links:
+        why = f": {model.problems[0].message}" if model.problems else ""
+        raise ConfigError(f"--against {name} is no robot{why}")
     return Facts(model)
 
 

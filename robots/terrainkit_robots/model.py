@@ -244,6 +244,9 @@ class Joint:
     damping: float = 0.0
     """Viscous friction [N m s/rad] or [N s/m]."""
 
+    friction: float = 0.0
+    """Dry friction [N m] or [N], the same at every speed."""
+
     armature: float = 0.0
     """Reflected inertia of the rotor [kg m2] or [kg]; MJCF only."""
 
@@ -257,6 +260,21 @@ class Joint:
     def moves(self) -> bool:
         """Whether it is a joint with one degree of freedom."""
         return self.kind in MOVING
+
+    @property
+    def unit(self) -> str:
+        """Return the unit of where it is."""
+        return "m" if self.kind == "prismatic" else "rad"
+
+    @property
+    def effort_unit(self) -> str:
+        """Return the unit of what drives it."""
+        return "N" if self.kind == "prismatic" else "N m"
+
+    @property
+    def speed_unit(self) -> str:
+        """Return the unit of how fast it moves."""
+        return "m/s" if self.kind == "prismatic" else "rad/s"
 
     @property
     def range(self) -> tuple[float, float] | None:
@@ -315,6 +333,10 @@ class RobotModel:
 
     home: Mapping[str, float] = field(default_factory=dict)
     """Joint positions [rad] or [m] of the first keyframe, by joint; MJCF only."""
+
+    imu: tuple[str, Matrix] | None = None
+    """Where turning and acceleration are sensed: a link, and the pose in its frame, shape (4, 4)
+    [m]; MJCF only."""
 
     floating: bool | None = None
     """Whether the base moves freely; None where that has to be found out."""

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from terrainkit.errors import ConfigError, listing
+from terrainkit.toml_text import parsed
 from terrainkit_robots.rule import FAMILIES, Rule, rules
 
 
@@ -113,14 +114,10 @@ def _table(path: Path, keys: Sequence[str]) -> dict[str, Any] | None:
         raise ConfigError(f"over {_LARGEST} bytes; wanted a TOML file of settings")
     if path.name == "pyproject.toml" and b"terrainkit" not in data:
         return None  # somebody else's, sound or not
-    import tomllib
-
     try:
-        table: dict[str, Any] = tomllib.loads(data.decode())
-    except ValueError as error:  # of the syntax, of the encoding, of a number of 5000 digits
+        table = parsed(data.decode())
+    except UnicodeDecodeError as error:
         raise ConfigError(f"not a TOML file: {error}") from error
-    except RecursionError:
-        raise ConfigError("not a TOML file of settings: nested too deeply") from None
     for key in keys[:-1]:
         table = _subtable(table, key)
     _refuse_unknown(table, keys[-1:])

@@ -19,6 +19,11 @@ def names(words: Iterable[str], most: int = 6, separator: str = ", ") -> str:
     return separator.join(shown + ["..."] * (len(listed) > most))
 
 
+def count(number: int, word: str) -> str:
+    """Return such as `1 leg` or `4 legs`."""
+    return f"{number:,} {word}{'' if number == 1 else 's'}"
+
+
 def closest(word: str, known: Iterable[str], near: float) -> str:
     """Return the known word that `word` is likely to be meant for; nothing if none is close.
 

@@ -222,6 +222,11 @@ def test_what_is_not_toml_is_said_to_be_none_in_one_line(text):
     assert "\n" not in str(caught.value)
 
 
+def test_a_key_of_many_dots_is_refused_at_once():
+    with pytest.raises(ConfigError, match="not a TOML file: line 1 has 500000 dots"):
+        from_toml("a" + ".a" * 500_000 + " = 1")
+
+
 def test_deep_nesting_is_refused():
     with pytest.raises(ConfigError, match="not a TOML file"):
         from_toml("rows = " + "[" * 100_000)

@@ -101,6 +101,7 @@ def test_a_fifo_is_not_waited_for(tmp_path):
         ("check-robot = 3", "check-robot is 3; wanted a table"),
         ("[check-robot", "not a TOML file"),
         ("x = " + "[" * 5000, "nested too deeply"),
+        ("x" + ".x" * 500_000 + " = 1", "500000 dots"),
         ("[check-robot]\nselect = [3]", "wanted a list of codes"),
         ("[check-robot]\nselect = ['XYZ']", "no rule 'XYZ'"),
         ("[check-robot]\nstrict = 'yes'", "strict is 'yes'; wanted true or false"),

@@ -1,6 +1,6 @@
 import pytest
 
-from terrainkit_robots.wording import closest, names, short
+from terrainkit_robots.wording import closest, count, names, short
 
 
 def test_a_long_text_is_cut_to_what_is_allowed():
@@ -17,6 +17,10 @@ def test_of_many_names_the_first_are_listed():
     assert names((name for name in "abc"), 2) == "a, b, ..."
     assert names("abc", separator=" > ") == "a > b > c"
     assert names(["x" * 1000, "y"]) == "x" * 97 + "..., y"
+
+
+def test_one_is_no_plural():
+    assert [count(n, "leg") for n in (0, 1, 2, 4000)] == ["0 legs", "1 leg", "2 legs", "4,000 legs"]
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from terrainkit_robots.body.bodies import Body
-from terrainkit_robots.model import Joint, Matrix
+from terrainkit_robots.body.followers import follower_positions
+from terrainkit_robots.model import Matrix
 
 
 def body_poses(
@@ -20,8 +21,10 @@ def body_poses(
     Args:
         bodies: The bodies, parents first.
         positions: Joint positions [rad] or [m], all of shape (...); joints that are not named are
-            at 0.
+            at 0, and those that follow another where that puts them.
     """
+    joints = [body.joint for body in bodies if body.joint is not None and body.joint.moves]
+    placed: Mapping[str, float | Matrix] = {**positions, **follower_positions(joints, positions)}
     poses: list[Matrix] = []
     for body in bodies:
         if body.parent is None:
@@ -29,24 +32,10 @@ def body_poses(
             continue
         local = body.mount
         if body.joint is not None and body.joint.moves:
-            q = np.asarray(position_of(body.joint, positions), dtype=float)
+            q = np.asarray(placed.get(body.joint.name, 0.0), dtype=float)
             local = local @ joint_motion(body, q)
         poses.append(poses[body.parent] @ local)
     return poses
-
-
-def position_of(
-    joint: Joint, positions: Mapping[str, float] | Mapping[str, Matrix]
-) -> float | Matrix:
-    """Return the position of a joint, which one that mimics another takes from that.
-
-    Args:
-        joint: The joint.
-        positions: Positions by name; joints that are not named are at 0.
-    """
-    if joint.mimic is None:
-        return positions.get(joint.name, 0.0)
-    return joint.mimic.multiplier * positions.get(joint.mimic.joint, 0.0) + joint.mimic.offset
 
 
 def joint_motion(body: Body, position: Matrix | np.float64) -> Matrix:

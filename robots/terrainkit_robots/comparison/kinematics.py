@@ -6,13 +6,14 @@ and by MuJoCo for MJCF: two programs that have nothing in common with each other
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from terrainkit_robots.body.followers import follower_positions
+from terrainkit_robots.body.rigid import apart, inverse
 from terrainkit_robots.comparison.mjcf_poses import mjcf_poses
 from terrainkit_robots.comparison.pairing import Pairing, pair_robots
-from terrainkit_robots.comparison.rigid import apart, inverse
 from terrainkit_robots.comparison.urdf_poses import urdf_poses
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.model import Joint, Matrix
@@ -114,10 +115,8 @@ def random_positions(
     for one, other in pairing.joints:
         drawn = generator.uniform(*_bounds(one, other), poses)
         ours[one.name] = np.zeros(poses) if one.name in held else drawn
-    for one, _ in pairing.joints:
-        if one.mimic is not None and one.name not in held:
-            followed = ours.get(one.mimic.joint, np.zeros(poses))
-            ours[one.name] = one.mimic.multiplier * followed + one.mimic.offset
+    moving = [replace(one, mimic=None) if one.name in held else one for one, _ in pairing.joints]
+    ours |= follower_positions(moving, ours)
     return ours, {other.name: ours[one.name] for one, other in pairing.joints}
 
 

@@ -32,8 +32,8 @@ def mjcf_poses(robot: Facts, positions: Mapping[str, Matrix]) -> dict[str, Matri
 
     Args:
         robot: A robot that was read from MJCF.
-        positions: Positions of joints [rad] or [m], shape (n,) each; others are where the file has
-            them at first.
+        positions: Positions of joints [rad] or [m], shape (n,) each; others are at 0, whatever
+            their `ref`. Free and ball joints are where the file has them.
 
     Raises:
         CannotCheckError: if MuJoCo cannot tell.
@@ -48,6 +48,7 @@ def mjcf_poses(robot: Facts, positions: Mapping[str, Matrix]) -> dict[str, Matri
     count = len(next(iter(positions.values()))) if positions else 1
     poses = {name: np.tile(np.eye(4), (count, 1, 1)) for name in bodies}
     data = mujoco.MjData(model)
+    data.qpos[[places[joint.name] for joint in robot.model.joints if joint.moves]] = 0.0
     for k in range(count):
         for name, values in positions.items():
             data.qpos[places[name]] = values[k]

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from terrainkit_robots.body.bodies import Body
+from terrainkit_robots.body.rigid import inverse
 from terrainkit_robots.comparison.name_pairs import NamePairs, pair_names
-from terrainkit_robots.comparison.rigid import inverse
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.model import Joint, Matrix
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from lxml import etree
 
+from terrainkit_robots.body.roll_pitch_yaw import roll_pitch_yaw
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.markup.document import RobotFileError, parse_xml, read_bytes
 from terrainkit_robots.markup.numbers import parse_numbers, without_commas
@@ -129,7 +130,7 @@ def _origin(joint: Joint, written: "etree._Element | None") -> Iterator[tuple[st
     """Yield xyz and rpy, as far as they are numbers."""
     if written is None:
         yield "xyz", _text(joint.origin[:3, 3])
-        yield "rpy", _text(_rpy(joint.origin[:3, :3]))
+        yield "rpy", _text(roll_pitch_yaw(joint.origin[:3, :3]))
         return
     origin = written.find("origin")
     for name in ("xyz", "rpy"):
@@ -152,12 +153,3 @@ def _axis(joint: Joint, written: "etree._Element | None") -> str:
 
 def _text(numbers: Matrix) -> str:
     return " ".join(repr(float(number)) for number in numbers)
-
-
-def _rpy(turn: Matrix) -> Matrix:
-    """Return roll, pitch and yaw [rad] of a rotation, shape (3,)."""
-    pitch = np.arctan2(-turn[2, 0], np.hypot(turn[0, 0], turn[1, 0]))
-    if np.hypot(turn[0, 0], turn[1, 0]) < 1e-9:  # roll and yaw are about one axis
-        return np.array([np.arctan2(-turn[1, 2], turn[1, 1]), pitch, 0.0])
-    roll = np.arctan2(turn[2, 1], turn[2, 2])
-    return np.array([roll, pitch, np.arctan2(turn[1, 0], turn[0, 0])])

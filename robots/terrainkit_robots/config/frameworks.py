@@ -1,10 +1,19 @@
-"""Frameworks: which there are, and the configuration of a robot for each."""
+"""Frameworks: which there are, and the configuration of a robot for each.
+
+A framework is a module of this package that says what it takes, `LEGGED_ONLY`, and writes the file,
+`config_text`.
+"""
 
 import importlib
+import pkgutil
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 from terrainkit.errors import ConfigError, listing
+from terrainkit_robots import config
+from terrainkit_robots.config.legged_robot import check_legs
 from terrainkit_robots.config.robot import ConfiguredRobot
 from terrainkit_robots.spec.named_bodies import body_name, feet
 from terrainkit_robots.spec.robot_spec import RobotSpec
@@ -12,12 +21,12 @@ from terrainkit_robots.spec.robot_spec import RobotSpec
 if TYPE_CHECKING:
     from terrainkit_robots.facts import Facts
 
-_MODULES = ("legged_gym", "leggedgym_ex", "isaaclab", "mjlab", "genesis")
 
-
+@cache
 def names() -> tuple[str, ...]:
-    """Return what `--config` takes."""
-    return _MODULES
+    """Return what `--config` takes, by the alphabet."""
+    found = [module.name for module in pkgutil.iter_modules(config.__path__)]
+    return tuple(sorted(name for name in found if hasattr(_module(name), "LEGGED_ONLY")))
 
 
 def file_name(framework: str) -> str:
@@ -47,9 +56,13 @@ def config_text(
         ConfigError: if there is no such framework, or it cannot have such a robot.
     """
     _check(framework)
-    module = importlib.import_module(f"terrainkit_robots.config.{framework}")
+    robot = ConfiguredRobot(spec=spec, bodies=bodies, ranges=ranges)
+    module = _module(framework)
+    if module.LEGGED_ONLY:
+        others = [name for name in names() if not _module(name).LEGGED_ONLY]
+        check_legs(robot, framework, others)
     write: Callable[[ConfiguredRobot], str] = module.config_text
-    return write(ConfiguredRobot(spec=spec, bodies=bodies, ranges=ranges))
+    return write(robot)
 
 
 def config_of(framework: str, facts: "Facts", spec: RobotSpec) -> str:
@@ -69,5 +82,9 @@ def config_of(framework: str, facts: "Facts", spec: RobotSpec) -> str:
 
 
 def _check(framework: str) -> None:
-    if framework not in _MODULES:
-        raise ConfigError(f"no framework {framework!r}; there are: {listing(_MODULES)}")
+    if framework not in names():
+        raise ConfigError(f"no framework {framework!r}; there are: {listing(names())}")
+
+
+def _module(name: str) -> ModuleType:
+    return importlib.import_module(f"{config.__name__}.{name}")

@@ -1,18 +1,24 @@
 """Genesis: the entity of a robot, its gains and its pose."""
 
+from collections.abc import Iterator
+
 from terrainkit_robots.config.naming import package_name
 from terrainkit_robots.config.robot import ConfiguredRobot
 from terrainkit_robots.config.source import (
     HERE,
+    WRITTEN,
     assign_sum,
     docstring,
-    keyed,
     literal,
     module,
     number,
     spread,
     strings,
+    table,
 )
+
+LEGGED_ONLY = False
+"""Whether it takes robots with legs only."""
 
 _TABLES = {
     "DEFAULT_POSE": "default_pose",
@@ -20,10 +26,9 @@ _TABLES = {
     "DAMPING": "damping",
     "EFFORT": "effort",
     "ARMATURE": "armature",
-    "ACTION_SCALE": "action_scale",
 }
 
-_REQUIRED = ("default_pose", "stiffness", "damping", "action_scale")
+_REQUIRED = ("default_pose", "stiffness", "damping")
 
 _FUNCTIONS = '''
 def add(scene):
@@ -55,9 +60,12 @@ def configure(robot):
         robot.set_dofs_force_range([-each for each in most], most, dofs(robot, EFFORT))
     if ARMATURE:
         robot.set_dofs_armature(list(ARMATURE.values()), dofs(robot, ARMATURE))
-    pose = list(DEFAULT_POSE.values())
-    robot.set_dofs_position(pose, dofs(robot, DEFAULT_POSE))
-    robot.control_dofs_position(pose, dofs(robot, DEFAULT_POSE))
+    robot.set_dofs_position(list(DEFAULT_POSE.values()), dofs(robot, DEFAULT_POSE))
+    if ACTION_SCALE:
+        targets = [DEFAULT_POSE[name] for name in ACTION_SCALE]
+        robot.control_dofs_position(targets, dofs(robot, ACTION_SCALE))
+    if SPEED_SCALE:
+        robot.control_dofs_velocity([0.0] * len(SPEED_SCALE), dofs(robot, SPEED_SCALE))
 
 
 def build(scene, n_envs=0):
@@ -91,6 +99,7 @@ def config_text(robot: ConfiguredRobot) -> str:
             ["", "# The order of actions and observations."],
             spread("JOINTS = ", strings(spec.joint_order)),
             *(["", *_table(robot, name, field)] for name, field in _TABLES.items()),
+            *_scales(robot),
             ["", *_functions(robot).rstrip().split("\n")],
         ]
     )
@@ -100,8 +109,7 @@ def _about(robot: ConfiguredRobot) -> list[str]:
     package = package_name(robot.spec.name)
     return [
         f"{robot.title} for Genesis: its entity, gains and pose.",
-        "Written by terrainkit from robot.toml; a comment before a value tells its unit and where "
-        "it came from. SI units and radians.",
+        WRITTEN,
         f"Put the whole folder into a package of yours, as {package}, and use",
         "\n".join(
             [
@@ -136,8 +144,17 @@ def _bodies(robot: ConfiguredRobot) -> list[str]:
 
 def _table(robot: ConfiguredRobot, name: str, field: str) -> list[str]:
     values = robot.of_every_joint(field) if field in _REQUIRED else robot.by_joint(field)
-    entries = keyed({joint: number(value) for joint, value in values.items()})
-    return [*robot.origin(field), *spread(f"{name} = ", entries, "{}")]
+    return [*robot.origin(field), *spread(f"{name} = ", table(values), "{}")]
+
+
+def _scales(robot: ConfiguredRobot) -> Iterator[list[str]]:
+    """Yield what an action of 1 changes: a position, or the speed of what has no stiffness."""
+    for name, joints, told, origin in (
+        ("ACTION_SCALE", robot.placed, "position", robot.origin("action_scale")),
+        ("SPEED_SCALE", robot.wheels, "speed", robot.speed_origin()),
+    ):
+        yield ["", f"# Change of the {told} that a joint is told, for an action of 1.", *origin]
+        yield spread(f"{name} = ", table(robot.scales(joints)), "{}")
 
 
 def _functions(robot: ConfiguredRobot) -> str:

@@ -3,23 +3,28 @@
 from collections.abc import Mapping, Sequence
 
 from terrainkit.errors import ConfigError
+from terrainkit_robots.config.initial_state import initial_state
 from terrainkit_robots.config.naming import class_name, constant_name, package_name
 from terrainkit_robots.config.patterns import usd_patterns
 from terrainkit_robots.config.robot import ConfiguredRobot
 from terrainkit_robots.config.source import (
     HERE,
+    WRITTEN,
     assign,
     assign_sum,
     docstring,
     indented,
-    keyed,
     literal,
     module,
     number,
     numbers,
     spread,
     strings,
+    table,
 )
+
+LEGGED_ONLY = False
+"""Whether it takes robots with legs only."""
 
 _LIMITS = {
     "effort_limit_sim": "effort",
@@ -49,7 +54,7 @@ def config_text(robot: ConfiguredRobot) -> str:
             ["from isaaclab.assets import ArticulationCfg", ""],
             [*assign_sum("ROBOT_URDF", HERE, "/", literal(robot.spec.urdf)), ""],
             _articulation(robot, name),
-            ["", *_by_pattern(robot, "ACTION_SCALE", "action_scale")],
+            _scales(robot),
             _task(robot, name) if walks else [],
         ]
     )
@@ -60,9 +65,8 @@ def _about(robot: ConfiguredRobot, name: str, walks: bool) -> list[str]:
     paragraphs = [
         f"{robot.title} for Isaac Lab 2: its articulation"
         + (", and its velocity task." if walks else "."),
-        "Written by terrainkit from robot.toml; a comment before a value tells its unit and where "
-        "it came from. SI units and radians. Patterns have to match the whole name of a joint or "
-        "body, and each name just one of them.",
+        f"{WRITTEN} Patterns have to match the whole name of a joint or body, and each name just "
+        "one of them.",
         f"Put the whole folder into a package of yours, as {package}, and use",
         f"    from {package}.isaaclab_config import {name}\n\n"
         f'    robot = {name}.replace(prim_path="{{ENV_REGEX_NS}}/Robot")',
@@ -83,6 +87,11 @@ def _about(robot: ConfiguredRobot, name: str, walks: bool) -> list[str]:
                 ]
             ),
         ]
+    if robot.wheels:
+        paragraphs.append(
+            "What has no stiffness is told a speed: it wants a JointVelocityActionCfg of WHEELS "
+            "and SPEED_SCALE."
+        )
     return [
         *paragraphs,
         "Isaac Lab orders joints breadth first, which need not be the order of robot.toml.",
@@ -95,14 +104,13 @@ def _articulation(robot: ConfiguredRobot, name: str) -> list[str]:
         *indented(_spawn(robot)),
         "),",
         "init_state=ArticulationCfg.InitialStateCfg(",
-        *indented(_init_state(robot)),
+        *indented(initial_state(robot, usd_patterns(robot.spec.joint_order), depth=2)),
         "),",
         *robot.soft_limits(depth=1),
         f"soft_joint_pos_limit_factor={number(robot.soft_factor)},",
         "actuators={",
-        '    "joints": ImplicitActuatorCfg(',
-        *indented(_actuator(robot), 2),
-        "    ),",
+        *indented(_actuator(robot, "joints", robot.placed)),
+        *indented(_actuator(robot, "wheels", robot.wheels)),
         "},",
     ]
     return [f"{name} = ArticulationCfg(", *indented(lines), ")"]
@@ -137,52 +145,53 @@ def _spawn(robot: ConfiguredRobot) -> list[str]:
     ]
 
 
-def _init_state(robot: ConfiguredRobot) -> list[str]:
+def _actuator(robot: ConfiguredRobot, name: str, joints: Sequence[str]) -> list[str]:
+    """Return the entry of an actuator of these joints; nothing without joints."""
+    if not joints:
+        return []
     patterns = usd_patterns(robot.spec.joint_order)
-    pose = robot.of_every_joint("default_pose")
-    entries = keyed({patterns[joint]: number(angle) for joint, angle in pose.items()})
-    return [
-        *robot.origin("spawn_height", depth=2, what="x, y, z"),
-        f"pos=(0.0, 0.0, {number(robot.spec.spawn_height or 0.0)}),",
-        *robot.origin("default_pose", depth=2),
-        *spread("joint_pos=", entries, "{}", depth=2, tail=","),
-        'joint_vel={".*": 0.0},',
-    ]
-
-
-def _actuator(robot: ConfiguredRobot) -> list[str]:
-    patterns = usd_patterns(robot.spec.joint_order)
-    names = strings(patterns.values())
+    names = strings(patterns[joint] for joint in joints)
     lines = spread("joint_names_expr=", names, depth=3, tail=",")
     for field, source in _LIMITS.items():
         required = field in ("stiffness", "damping")
-        values = robot.of_every_joint(source) if required else robot.by_joint(source)
+        known = robot.of_every_joint(source) if required else robot.by_joint(source)
+        values = {joint: known[joint] for joint in joints if joint in known}
         if values:
             lines += robot.origin(source, depth=3)
-            lines += _value(robot, f"{field}=", values, patterns, depth=3, tail=",")
+            complete = len(values) == len(joints)
+            lines += _value(f"{field}=", values, patterns, complete=complete, depth=3, tail=",")
+    return [f'"{name}": ImplicitActuatorCfg(', *indented(lines), "),"]
+
+
+def _scales(robot: ConfiguredRobot) -> list[str]:
+    """Return what an action of 1 changes: a position, or a wheel's speed."""
+    patterns = usd_patterns(robot.spec.joint_order)
+    lines = []
+    if robot.placed:
+        lines += ["", *robot.origin("action_scale")]
+        lines += _value("ACTION_SCALE = ", robot.scales(robot.placed), patterns)
+    if robot.wheels:
+        lines += ["", *robot.speed_origin()]
+        lines += _value("SPEED_SCALE = ", robot.scales(robot.wheels), patterns)
+        for name, joints in (("JOINTS", robot.placed), ("WHEELS", robot.wheels)):
+            lines += spread(f"{name} = ", strings(patterns[joint] for joint in joints))
     return lines
 
 
-def _by_pattern(robot: ConfiguredRobot, name: str, field: str) -> list[str]:
-    patterns = usd_patterns(robot.spec.joint_order)
-    values = robot.of_every_joint(field)
-    return [*robot.origin(field), *_value(robot, f"{name} = ", values, patterns)]
-
-
 def _value(
-    robot: ConfiguredRobot,
     head: str,
     values: Mapping[str, float],
     patterns: Mapping[str, str],
     *,
+    complete: bool = True,
     depth: int = 0,
     tail: str = "",
 ) -> list[str]:
     """Return a statement with one number, if all joints have it, else with one by pattern."""
-    numbers = {joint: number(value) for joint, value in values.items()}
-    if len(numbers) == len(robot.spec.joint_order) and len(set(numbers.values())) == 1:
-        return [f"{head}{next(iter(numbers.values()))}{tail}"]
-    entries = keyed({patterns[joint]: value for joint, value in numbers.items()})
+    different = set(numbers(values.values()))
+    if complete and len(different) == 1:
+        return [f"{head}{different.pop()}{tail}"]
+    entries = table({patterns[joint]: value for joint, value in values.items()})
     return spread(head, entries, "{}", depth=depth, tail=tail)
 
 
@@ -197,6 +206,7 @@ def _task(robot: ConfiguredRobot, name: str) -> list[str]:
         "",
         "def rough_env_cfg():",
         '    """Return Isaac Lab\'s velocity task on rough ground, with this robot in it."""',
+        *["    from isaaclab.envs.mdp import JointVelocityActionCfg"] * bool(robot.wheels),
         "    from isaaclab_tasks.manager_based.locomotion.velocity.velocity_env_cfg import (",
         "        LocomotionVelocityRoughEnvCfg,",
         "    )",
@@ -206,7 +216,7 @@ def _task(robot: ConfiguredRobot, name: str) -> list[str]:
         '        prim_path="{ENV_REGEX_NS}/Robot",',
         "    )",
         '    cfg.scene.height_scanner.prim_path = "{ENV_REGEX_NS}/Robot/" + BASE',
-        "    cfg.actions.joint_pos.scale = ACTION_SCALE",
+        *_actions(robot),
         "    # Factors on the default pose between which a joint starts an episode.",
         "    reset = cfg.events.reset_robot_joints.params",
         f'    reset["position_range"] = ({low}, {high})',
@@ -220,6 +230,23 @@ def _task(robot: ConfiguredRobot, name: str) -> list[str]:
         *_contact_term("terminations.base_contact", "TERMINATION", robot.spec.termination_contacts),
         "    return cfg",
     ]
+
+
+def _actions(robot: ConfiguredRobot) -> list[str]:
+    """Return what tells each joint a position, or a speed."""
+    lines = ["cfg.actions.joint_pos.scale = ACTION_SCALE"] if robot.placed else []
+    if robot.wheels:
+        lines += [
+            "cfg.actions.joint_pos.joint_names = JOINTS"
+            if robot.placed
+            else "cfg.actions.joint_pos = None",
+            "cfg.actions.joint_vel = JointVelocityActionCfg(",
+            '    asset_name="robot",',
+            "    joint_names=WHEELS,",
+            "    scale=SPEED_SCALE,",
+            ")",
+        ]
+    return indented(lines)
 
 
 def _contact_term(term: str, name: str, bodies: Sequence[str]) -> list[str]:

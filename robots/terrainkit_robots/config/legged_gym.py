@@ -3,7 +3,7 @@
 from terrainkit_robots.config import legged_robot
 from terrainkit_robots.config.naming import class_name, package_name
 from terrainkit_robots.config.robot import ConfiguredRobot
-from terrainkit_robots.config.source import docstring, literal, module, number
+from terrainkit_robots.config.source import WRITTEN, docstring, literal, module, number
 
 _HEIGHTS = 17 * 11
 """Heights around the robot that legged_gym adds to the observations on rough terrain."""
@@ -11,16 +11,16 @@ _HEIGHTS = 17 * 11
 _USUAL_JOINTS = 12
 """Joints that legged_gym's noise on observations is laid out for."""
 
-_OTHERS = ("isaaclab", "mjlab", "genesis")
+LEGGED_ONLY = True
+"""Whether it takes robots with legs only."""
 
 
 def config_text(robot: ConfiguredRobot) -> str:
     """Return the file `legged_gym_config.py` of a robot.
 
     Raises:
-        ConfigError: if the robot has no legs, or legged_gym cannot name its parts.
+        ConfigError: if legged_gym cannot name the robot's parts.
     """
-    legged_robot.check_legs(robot, "legged_gym", _OTHERS)
     name = class_name(robot.spec.name)
     return module(
         [
@@ -52,8 +52,7 @@ def _about(robot: ConfiguredRobot, name: str) -> list[str]:
     package = package_name(robot.spec.name)
     paragraphs = [
         f"{robot.title} for legged_gym: its configuration on rough terrain.",
-        "Written by terrainkit from robot.toml; a comment before a value tells its unit and where "
-        "it came from. SI units and radians.",
+        WRITTEN,
         f"Copy the whole folder to legged_gym/envs/{package} and register the robot in "
         "legged_gym/envs/__init__.py:",
         "\n".join(
@@ -94,7 +93,9 @@ def _control(robot: ConfiguredRobot) -> list[str]:
 
 
 def _asset(robot: ConfiguredRobot) -> list[str]:
-    armature, differ = robot.median_of("armature", depth=2)
+    # Too little shakes light joints; more than they need makes the others but a bit slower.
+    known = robot.by_joint("armature").values()
+    armature, differ = robot.one_for_all(known, "largest", depth=2)
     return [
         *legged_robot.path_in_folder("file", robot.spec.urdf),
         legged_robot.asset_name(robot),

@@ -1,5 +1,7 @@
 """The robot as legged_gym and its successors see it: found by substrings, standing on feet."""
 
+from collections.abc import Sequence
+
 from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.config.naming import package_name
 from terrainkit_robots.config.robot import ConfiguredRobot
@@ -8,11 +10,11 @@ from terrainkit_robots.config.source import (
     assign_sum,
     comment,
     indented,
-    keyed,
     literal,
     number,
     spread,
     strings,
+    table,
 )
 from terrainkit_robots.config.substrings import common_key, gain_keys, keys_for
 
@@ -26,7 +28,7 @@ HERE = [
 """How a configuration finds the robot that lies beside it."""
 
 
-def check_legs(robot: ConfiguredRobot, framework: str, others: tuple[str, ...]) -> None:
+def check_legs(robot: ConfiguredRobot, framework: str, others: Sequence[str]) -> None:
     """Refuse a robot that cannot walk.
 
     Raises:
@@ -55,7 +57,7 @@ def init_state(robot: ConfiguredRobot) -> list[str]:
     """Return where the robot starts, and the pose that actions are added to."""
     height = number(robot.spec.spawn_height or 0.0)
     angles = robot.of_every_joint("default_pose")
-    entries = keyed({joint: number(angle) for joint, angle in angles.items()})
+    entries = table(angles)
     return [
         *robot.origin("spawn_height", depth=2, what="x, y, z"),
         f"pos = [0.0, 0.0, {height}]",
@@ -69,7 +71,11 @@ def gains(robot: ConfiguredRobot, if_clashing: str) -> list[str]:
     stiffness, damping = robot.of_every_joint("stiffness"), robot.of_every_joint("damping")
     pairs = {joint: (stiffness[joint], damping[joint]) for joint in robot.spec.joint_order}
     found = gain_keys(robot.spec.joint_order, pairs)
-    scale, differ = _action_scale(robot)
+    scale, differ = robot.one_for_all(robot.scales(robot.placed).values(), "median", depth=2)
+    undriven = ""
+    if robot.wheels:
+        wants = "wants a speed, which P does not tell it"
+        undriven = f"What has no stiffness {wants}: {listing(robot.wheels)}."
     warning = ""
     if found.clashes:
         key, joint = found.clashes[0]
@@ -77,6 +83,7 @@ def gains(robot: ConfiguredRobot, if_clashing: str) -> list[str]:
     return [
         "# P: actions are targets of joint positions.",
         'control_type = "P"',
+        *comment(undriven, depth=2),
         "# A key stands for every joint whose name contains it.",
         *comment(warning, depth=2),
         *robot.origin("stiffness", depth=2),
@@ -147,13 +154,8 @@ def path_in_folder(attribute: str, name: str) -> list[str]:
     return assign_sum(attribute, "HERE", "+", literal("/" + escaped), depth=2)
 
 
-def _action_scale(robot: ConfiguredRobot) -> tuple[float, list[str]]:
-    robot.of_every_joint("action_scale")
-    return robot.median_of("action_scale", depth=2)
-
-
 def _table(name: str, values: dict[str, float], keys: tuple[str, ...]) -> list[str]:
-    entries = keyed({key: number(values[key]) for key in keys})
+    entries = table({key: values[key] for key in keys})
     return spread(f"{name} = ", entries, "{}", depth=2)
 
 

@@ -4,6 +4,7 @@ from terrainkit_robots.config import legged_robot
 from terrainkit_robots.config.naming import class_name, package_name
 from terrainkit_robots.config.robot import ConfiguredRobot
 from terrainkit_robots.config.source import (
+    WRITTEN,
     assign,
     comment,
     docstring,
@@ -15,7 +16,8 @@ from terrainkit_robots.config.source import (
     strings,
 )
 
-_OTHERS = ("isaaclab", "mjlab", "genesis")
+LEGGED_ONLY = True
+"""Whether it takes robots with legs only."""
 
 _SCALES = {
     "tracking_lin_vel": "1.0",
@@ -37,9 +39,8 @@ def config_text(robot: ConfiguredRobot) -> str:
     """Return the file `leggedgym_ex_config.py` of a robot.
 
     Raises:
-        ConfigError: if the robot has no legs, or LeggedGym-Ex cannot name its parts.
+        ConfigError: if LeggedGym-Ex cannot name the robot's parts.
     """
-    legged_robot.check_legs(robot, "leggedgym_ex", _OTHERS)
     name = class_name(robot.spec.name)
     return module(
         [
@@ -69,8 +70,7 @@ def _about(robot: ConfiguredRobot, name: str) -> list[str]:
     package = package_name(robot.spec.name)
     return [
         f"{robot.title} for LeggedGym-Ex: its configuration on flat ground.",
-        "Written by terrainkit from robot.toml; a comment before a value tells its unit and where "
-        "it came from. SI units and radians.",
+        WRITTEN,
         f"Copy the whole folder to legged_gym/envs/{package} and register the robot in "
         "legged_gym/envs/__init__.py:",
         "\n".join(

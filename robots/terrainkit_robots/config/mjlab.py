@@ -1,22 +1,27 @@
 """mjlab: the entity of a robot, with actuators of its own."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
+from terrainkit_robots.config.initial_state import initial_state
 from terrainkit_robots.config.naming import constant_name, package_name
 from terrainkit_robots.config.patterns import mjlab_patterns
 from terrainkit_robots.config.robot import ConfiguredRobot
 from terrainkit_robots.config.source import (
     HERE,
+    WRITTEN,
     assign_sum,
     docstring,
     indented,
-    keyed,
     literal,
     module,
     number,
     spread,
     strings,
+    table,
 )
+
+LEGGED_ONLY = False
+"""Whether it takes robots with legs only."""
 
 _FIELDS = {
     "stiffness": "stiffness",
@@ -24,7 +29,10 @@ _FIELDS = {
     "effort_limit": "effort",
     "armature": "armature",
 }
-"""Fields of BuiltinPositionActuatorCfg, and those of the spec that they hold."""
+"""Fields of BuiltinPositionActuatorCfg, and those of the spec that they hold. Those of
+BuiltinVelocityActuatorCfg are the same, but for the stiffness."""
+
+_POSITION, _VELOCITY = "BuiltinPositionActuatorCfg", "BuiltinVelocityActuatorCfg"
 
 
 def config_text(robot: ConfiguredRobot) -> str:
@@ -35,34 +43,42 @@ def config_text(robot: ConfiguredRobot) -> str:
     """
     name = constant_name(robot.spec.name)
     patterns = mjlab_patterns(robot.spec.joint_order)
+    kinds = [_POSITION] * bool(robot.placed) + [_VELOCITY] * bool(robot.wheels)
     return module(
         [
-            docstring(_about(robot)),
+            docstring(_about(robot, name)),
             ["", "from pathlib import Path", "", "import mujoco"],
-            ["from mjlab.actuator import BuiltinPositionActuatorCfg"] if patterns else [],
+            [f"from mjlab.actuator import {', '.join(kinds)}"] if kinds else [],
             ["from mjlab.entity import EntityArticulationInfoCfg, EntityCfg", ""],
             assign_sum("ROBOT_XML", HERE, "/", literal(robot.spec.mjcf)),
             _get_spec(),
-            _init_state(robot, name, patterns),
+            ["", f"{name}_INIT_STATE = EntityCfg.InitialStateCfg("],
+            [*indented(initial_state(robot, patterns, depth=1)), ")"],
             _articulation(robot, name, patterns),
-            _action_scale(robot, name, patterns),
+            _scales(robot, name, patterns),
             _robot_cfg(name),
         ]
     )
 
 
-def _about(robot: ConfiguredRobot) -> list[str]:
+def _about(robot: ConfiguredRobot, name: str) -> list[str]:
     package = package_name(robot.spec.name)
-    return [
+    paragraphs = [
         f"{robot.title} for mjlab: its entity.",
-        "Written by terrainkit from robot.toml; a comment before a value tells its unit and where "
-        "it came from. SI units and radians. Patterns have to match the whole name of a joint.",
+        f"{WRITTEN} Patterns have to match the whole name of a joint.",
         f"Put the whole folder into a package of yours, as {package}, and use",
         f"    from {package}.mjlab_config import get_robot_cfg\n\n"
         '    cfg.scene.entities = {"robot": get_robot_cfg()}',
         "mjlab orders actions by the joints of robot.xml. Its position actuators know no limit of "
         "speed; those are in robot.toml.",
     ]
+    if robot.wheels:
+        paragraphs.append(
+            "What has no stiffness is told a speed: it wants a JointVelocityActionCfg with "
+            f"actuator_names=tuple({name}_SPEED_SCALE), and the JointPositionActionCfg those of "
+            f"{name}_ACTION_SCALE."
+        )
+    return paragraphs
 
 
 def _get_spec() -> list[str]:
@@ -81,19 +97,6 @@ def _get_spec() -> list[str]:
     ]
 
 
-def _init_state(robot: ConfiguredRobot, name: str, patterns: Mapping[str, str]) -> list[str]:
-    pose = robot.of_every_joint("default_pose")
-    entries = keyed({patterns[joint]: number(angle) for joint, angle in pose.items()})
-    body = [
-        *robot.origin("spawn_height", depth=1, what="x, y, z"),
-        f"pos=(0.0, 0.0, {number(robot.spec.spawn_height or 0.0)}),",
-        *robot.origin("default_pose", depth=1),
-        *spread("joint_pos=", entries, "{}", depth=1, tail=","),
-        'joint_vel={".*": 0.0},',
-    ]
-    return ["", f"{name}_INIT_STATE = EntityCfg.InitialStateCfg(", *indented(body), ")"]
-
-
 def _articulation(robot: ConfiguredRobot, name: str, patterns: Mapping[str, str]) -> list[str]:
     """Return the actuators: joints that have the same numbers share one."""
     tables = {
@@ -104,16 +107,18 @@ def _articulation(robot: ConfiguredRobot, name: str, patterns: Mapping[str, str]
     }
     groups: dict[tuple[str, ...], list[str]] = {}
     for joint in robot.spec.joint_order:
-        values = tuple(
-            f"{field}={number(table[joint])}," for field, table in tables.items() if joint in table
-        )
-        groups.setdefault(values, []).append(joint)
+        rolls = joint in robot.wheels
+        arguments = [
+            f"{field}={number(values[joint])},"
+            for field, values in tables.items()
+            if joint in values and not (rolls and field == "stiffness")
+        ]
+        groups.setdefault((_VELOCITY if rolls else _POSITION, *arguments), []).append(joint)
     actuators = []
-    for values, joints in groups.items():
+    for (kind, *arguments), joints in groups.items():
         names = strings(patterns[joint] for joint in joints)
         expression = spread("target_names_expr=", names, "()", depth=3, tail=",")
-        body = indented([*expression, *values])
-        actuators += ["BuiltinPositionActuatorCfg(", *body, "),"]
+        actuators += [f"{kind}(", *indented([*expression, *arguments]), "),"]
     origins = [
         line
         for field, source in _FIELDS.items()
@@ -131,15 +136,20 @@ def _articulation(robot: ConfiguredRobot, name: str, patterns: Mapping[str, str]
     ]
 
 
-def _action_scale(robot: ConfiguredRobot, name: str, patterns: Mapping[str, str]) -> list[str]:
-    scales = robot.of_every_joint("action_scale")
-    entries = keyed({patterns[joint]: number(scale) for joint, scale in scales.items()})
-    return [
-        "",
-        "# For JointPositionActionCfg.scale.",
-        *robot.origin("action_scale"),
-        *spread(f"{name}_ACTION_SCALE = ", entries, "{}"),
-    ]
+def _scales(robot: ConfiguredRobot, name: str, patterns: Mapping[str, str]) -> list[str]:
+    """Return what an action of 1 changes: a position, or a wheel's speed."""
+
+    def entries(joints: Sequence[str]) -> list[str]:
+        return table({patterns[joint]: scale for joint, scale in robot.scales(joints).items()})
+
+    lines = []
+    if robot.placed or not robot.wheels:
+        lines += ["", "# For JointPositionActionCfg.scale.", *robot.origin("action_scale")]
+        lines += spread(f"{name}_ACTION_SCALE = ", entries(robot.placed), "{}")
+    if robot.wheels:
+        lines += ["", "# For JointVelocityActionCfg.scale.", *robot.speed_origin()]
+        lines += spread(f"{name}_SPEED_SCALE = ", entries(robot.wheels), "{}")
+    return lines
 
 
 def _robot_cfg(name: str) -> list[str]:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from statistics import median
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.config.source import comment, number
@@ -56,6 +56,23 @@ class ConfiguredRobot:
         share = median(shares) if shares else USUAL_SOFT_FACTOR
         return round(share, 4) if 0 < share <= 1 else 1.0
 
+    @cached_property
+    def wheels(self) -> tuple[str, ...]:
+        """Return the joints that are told a speed: what has damping alone stays nowhere.
+
+        Raises:
+            ConfigError: if a joint has no stiffness or damping, not even 0.
+        """
+        stiffness, damping = map(self.of_every_joint, ("stiffness", "damping"))
+        return tuple(
+            joint for joint in self.spec.joint_order if stiffness[joint] == 0 < damping[joint]
+        )
+
+    @cached_property
+    def placed(self) -> tuple[str, ...]:
+        """Return the joints that are told a position: all but wheels."""
+        return tuple(joint for joint in self.spec.joint_order if joint not in self.wheels)
+
     def by_joint(self, name: str) -> dict[str, float]:
         """Return the table `name` of the spec by joint, in their order; joints may be missing.
 
@@ -78,9 +95,16 @@ class ConfiguredRobot:
             raise ConfigError(clash.message)
         return dict(matching.values)
 
-    def origin(self, name: str, *, depth: int = 0, what: str = "") -> list[str]:
-        """Return a comment on the field `name`: its unit, and where its value came from."""
-        unit, source = unit_of(name), self.spec.provenance.get(name)
+    def origin(self, name: str, *, depth: int = 0, what: str = "", unit: str = "") -> list[str]:
+        """Return a comment on the field `name`: its unit, and where its value came from.
+
+        Args:
+            name: The field.
+            depth: How far the comment will be indented, in steps of four.
+            what: What comes first.
+            unit: The unit, if it is not that of the field.
+        """
+        unit, source = unit or unit_of(name), self.spec.provenance.get(name)
         text = " ".join(part for part in (what, unit and f"[{unit}]") if part)
         if source is not None:
             text += f"; {source.origin}" + (f": {source.reason}" if source.reason else "")
@@ -92,14 +116,26 @@ class ConfiguredRobot:
         more = ", the median" if self.ranges else ""
         return comment(f"{text}{more}; limits by joint are in robot.toml.", depth=depth)
 
-    def median_of(self, name: str, *, depth: int = 0) -> tuple[float, list[str]]:
-        """Return the median of the table `name`, and a comment if the joints differ."""
-        values = list(self.by_joint(name).values()) or [0.0]
-        lowest, middle, highest = min(values), median(values), max(values)
-        remark = f"One number for all joints, the median: they have {number(lowest)} to "
-        if number(lowest) == number(highest):
-            return middle, []
-        return middle, comment(f"{remark}{number(highest)}.", depth=depth)
+    def scales(self, joints: Iterable[str]) -> dict[str, float]:
+        """Return the action scale of joints: `placed` ones, or wheels."""
+        found = self.of_every_joint("action_scale")
+        return {joint: found[joint] for joint in joints}
+
+    def speed_origin(self, *, depth: int = 0) -> list[str]:
+        """Return a comment on the action scales of wheels."""
+        return self.origin("action_scale", depth=depth, unit=unit_of("velocity"))
+
+    def one_for_all(
+        self, values: Iterable[float], choice: Literal["median", "largest"], *, depth: int = 0
+    ) -> tuple[float, list[str]]:
+        """Return the median or the largest of the joints' values, and a comment if they differ."""
+        listed = list(values) or [0.0]
+        lowest, highest = number(min(listed)), number(max(listed))
+        chosen = max(listed) if choice == "largest" else median(listed)
+        if lowest == highest:
+            return chosen, []
+        remark = f"One number for all joints, the {choice}: they have {lowest} to {highest}."
+        return chosen, comment(remark, depth=depth)
 
     def known(self, names: Iterable[str], what: str) -> tuple[str, ...]:
         """Return the names, which have to be bodies.

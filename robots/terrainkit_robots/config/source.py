@@ -16,6 +16,12 @@ WIDTH = 88
 HERE = "Path(__file__).resolve().parent"
 """The folder of a configuration, where the robot lies too."""
 
+WRITTEN = (
+    "Written by terrainkit from robot.toml; a comment before a value tells its unit and where it "
+    "came from. SI units and radians."
+)
+"""What is said of every configuration."""
+
 _DIGITS = 6
 """Digits of a number that are written: no motor or ruler is more exact."""
 
@@ -53,9 +59,9 @@ def strings(texts: Iterable[str]) -> list[str]:
     return [literal(text) for text in texts]
 
 
-def keyed(values: Mapping[str, str]) -> list[str]:
-    """Return the entries of a dict: names, and values that are source already."""
-    return [f"{literal(name)}: {value}" for name, value in values.items()]
+def table(values: Mapping[str, float]) -> list[str]:
+    """Return the entries of a dict: names, and numbers."""
+    return [f"{literal(name)}: {number(value)}" for name, value in values.items()]
 
 
 def spread(

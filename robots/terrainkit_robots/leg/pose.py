@@ -13,11 +13,11 @@ import numpy as np
 
 from terrainkit_robots.body.bodies import Body
 from terrainkit_robots.body.contact import level_turn, sole
+from terrainkit_robots.body.followers import follower_positions
 from terrainkit_robots.body.kinematics import (
     axis_in_trunk,
     body_poses,
     joint_motion,
-    position_of,
     rotation,
 )
 from terrainkit_robots.leg.legs import Leg
@@ -82,8 +82,8 @@ def solve_positions(facts: "Facts") -> Mapping[str, float]:
             positions |= bent
             if twin is not None:
                 positions |= _copied(bent, leg, twin, signs)
-    followers = [joint for joint in facts.joints if joint.mimic is not None]
-    return positions | {joint.name: float(position_of(joint, positions)) for joint in followers}
+    followed = follower_positions(facts.joints, positions)
+    return positions | {name: float(position) for name, position in followed.items()}
 
 
 def nearest(joint: Joint, position: float) -> float:

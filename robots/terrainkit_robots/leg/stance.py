@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 GRAVITY = 9.81
 """Acceleration [m/s2], as MuJoCo has it."""
 
+_ENOUGH_LEGS = 3
+"""Robots with so many legs stand by the springs of their joints; those with fewer balance."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stance:
@@ -80,6 +83,14 @@ def stand(facts: "Facts", positions: Mapping[str, float]) -> Stance:
         margin=margin(center[:2], support) if known else math.nan,
         torques=_torques(facts, poses, pressures, forces) if known else {},
     )
+
+
+def stands_alone(facts: "Facts") -> bool:
+    """Return whether it has legs enough to stand by the stiffness of its joints alone.
+
+    One with fewer is held in balance by a policy, and stands for itself only with locked joints.
+    """
+    return len(facts.legs) >= _ENOUGH_LEGS
 
 
 def _pressures(soles: Sequence[Matrix], contacts: Matrix, forces: Matrix, center: Matrix) -> Matrix:

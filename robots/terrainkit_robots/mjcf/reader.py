@@ -19,6 +19,7 @@ import numpy as np
 from terrainkit_robots.markup.document import XmlDocument
 from terrainkit_robots.mjcf.actuators import Drive, actuators, force_limit, mimics
 from terrainkit_robots.mjcf.document import MjcfDocument, Node, read_document
+from terrainkit_robots.mjcf.imu import PlacedSite, find_imu
 from terrainkit_robots.mjcf.inertia import Solid, solid, sum_of_solids
 from terrainkit_robots.mjcf.parser import parse_mjcf, tell
 from terrainkit_robots.mjcf.references import dangling_references
@@ -108,6 +109,7 @@ class _Reader:
             self._drives.setdefault(drive.joint, []).append(drive)
         self._mimics = mimics(spec, self._node)
         self._factors: dict[str, float] = {}
+        self._sites: list[PlacedSite] = []
         self._told: set[str] = set()
 
     def filled(self, robot: RobotModel) -> RobotModel:
@@ -123,6 +125,7 @@ class _Reader:
             joints=joints,
             actuators=self._driving(joints),
             home=self._home(joints),
+            imu=self._imu(),
             excluded=frozenset(
                 frozenset((each.bodyname1, each.bodyname2))
                 for each in self._spec.excludes
@@ -156,16 +159,20 @@ class _Reader:
     def _tree(self) -> tuple[list[Link], tuple[Joint, ...]]:
         links: list[Link] = []
         joints: list[Joint] = []
-        stack = [(body, WORLD, Scale()) for body in reversed(self._spec.worldbody.bodies)]
+        stack = [(body, WORLD, Scale(), 0) for body in reversed(self._spec.worldbody.bodies)]
         while stack:
-            body, parent, outer = stack.pop()
+            body, parent, outer, depth = stack.pop()
             node = self._node(body)
             name = body.name or self._bodies.unused(node.invented or "unnamed_body")
             pose, scale = self._placed(body, node, outer)
             between, moving = self._moved(body, node, name, parent, pose, scale)
             links += [*between, self._link(body, node, name, scale)]
             joints += moving
-            stack += [(child, name, scale) for child in reversed(body.bodies)]
+            self._sites += [
+                PlacedSite(site=site, link=name, depth=depth, node=node, scale=scale)
+                for site in body.sites
+            ]
+            stack += [(child, name, scale, depth + 1) for child in reversed(body.bodies)]
         return links, tuple(joints)
 
     def _placed(self, element: Any, node: Node, outer: Scale) -> tuple[Matrix, Scale]:
@@ -241,6 +248,22 @@ class _Reader:
         except ValueError as error:
             self._tell(node, f"<inertial> has no orientation: {error}; MuJoCo refuses the file")
             return np.eye(3)
+
+    def _imu(self) -> tuple[str, Matrix] | None:
+        """Return the link of the IMU and its pose in the link's frame."""
+        found = find_imu(self._spec, self._sites)
+        if found is None:
+            return None
+        node = self._node(found.site, found.node)
+        ends = np.asarray(found.site.fromto)
+        if math.isnan(ends[0]):
+            return found.link, self._placed(found.site, node, found.scale)[0]
+        try:
+            pose, _ = between(ends)
+            return found.link, in_frames(pose, found.site.frame, found.scale, self._spec)[0]
+        except ValueError as error:
+            self._tell(node, f"<{node.tag}>: {error}; MuJoCo refuses the file")
+            return None
 
     # Shapes
 
@@ -369,6 +392,7 @@ class _Reader:
             limit=_limit(node.source, limits, unit, force_limit(joint, drives, force)),
             mimic=self._mimics.get(joint.name),
             damping=float(np.ravel(joint.damping)[0]) * rotor,
+            friction=float(joint.frictionloss) * force,
             armature=(float(joint.armature) + sum(drive.armature for drive in drives)) * rotor,
         )
 

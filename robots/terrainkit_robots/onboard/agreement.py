@@ -1,15 +1,19 @@
 """Agreement: whether what was written is the robot that was read.
 
 The source is followed by our own kinematics, the two files by MuJoCo's readers of URDF and MJCF.
+`check-robot --against` compares by yourdfpy, too, whose import takes as long as all of this.
 """
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from terrainkit_robots.body.kinematics import body_poses, position_of
+from terrainkit_robots.body.followers import follower_positions
+from terrainkit_robots.body.kinematics import body_poses
+from terrainkit_robots.inertia.carried import carried_inertias
 from terrainkit_robots.leg.pose import range_of
 from terrainkit_robots.model import Matrix
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -23,6 +27,12 @@ POSES = 100
 _WIDEST = np.pi
 """A joint without limits is turned by up to this [rad]."""
 
+_SAME_PLACE = 1e-4
+_SAME_TURN = 1e-3
+_SAME_MASS = 1e-3
+"""A written robot is the one that was read up to such a distance [m] and angle [rad] of its links,
+and such a share of its mass, and of the inertia that each joint carries."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Agreement:
@@ -34,11 +44,35 @@ class Agreement:
     mass: float
     """Its mass over that of the source, less 1."""
 
+    inertia: float
+    """Largest such difference of the inertia that a joint carries, all joints at 0."""
+
+    joint: str
+    """The joint that has it; empty without joints."""
+
     distance: float
     """Largest distance of a link's frame from where it is in the source [m]."""
 
     link: str
     """The link that is farthest away."""
+
+    angle: float
+    """Largest angle between a link's frame and that in the source [rad]."""
+
+    turned: str
+    """The link that is turned the most."""
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Return what makes it another robot; nothing if it is the same."""
+        found = {
+            f"{self.link} is {1000 * self.distance:.3g} mm away": self.distance <= _SAME_PLACE,
+            f"{self.turned} is turned by {math.degrees(self.angle):.3g} degrees": self.angle
+            <= _SAME_TURN,
+            f"the mass is off by {self.mass:.2%}": abs(self.mass) <= _SAME_MASS,
+            f"what {self.joint} carries is off by {self.inertia:.2%}": self.inertia <= _SAME_MASS,
+        }
+        return tuple(text for text, same in found.items() if not same)
 
 
 def agreement(
@@ -47,85 +81,139 @@ def agreement(
     """Return how far written files are from their source, over POSES seeded poses.
 
     Args:
-        source: The robot as it was read.
+        source: The robot as it was read, its masses known.
         written: The robot as it is written, whose joints may have other names.
         models: What MuJoCo made of its files, by their names.
     """
     draws = _draws(written)
-    places = _places(source, _renamed(source, written, draws))
-    return tuple(_compared(source, places, draws, each) for each in models.items())
+    renamed = _renamed(source, written)
+    places = _places(source, {renamed[name]: q for name, q in draws.items() if name in renamed})
+    carried = {
+        body.joint.name: inertia
+        for body, inertia in zip(source.bodies, carried_inertias(source), strict=True)
+        if body.joint is not None and math.isfinite(inertia)
+    }
+    found = []
+    for file, model in models.items():
+        with quiet_mujoco():
+            here = _followed(model, draws, written.bodies[0].top.name, places)
+            inertias = _carried(model, draws)
+        shares = {
+            name: abs(inertia / carried[renamed[name]] - 1)
+            for name, inertia in inertias.items()
+            if carried.get(renamed.get(name, ""), 0.0) > 0
+        }
+        found.append(_compared(file, model, source, (places, here), shares))
+    return tuple(found)
 
 
 def _draws(facts: "Facts") -> dict[str, Matrix]:
-    """Return positions of each joint within its limits, shape (POSES,); the first are zero."""
+    """Return positions of each joint within its limits, shape (POSES,), of followers as well."""
     rng = np.random.default_rng(0)
     drawn: dict[str, Matrix] = {}
     for joint in facts.joints:
         lower, upper = np.clip(range_of(joint), -_WIDEST, _WIDEST)
         drawn[joint.name] = rng.uniform(lower, upper, POSES)
-    for joint in facts.joints:
-        drawn[joint.name] = np.broadcast_to(position_of(joint, drawn), (POSES,))
-    return drawn
+    return drawn | follower_positions(facts.joints, drawn)
 
 
-def _renamed(source: "Facts", written: "Facts", draws: Mapping[str, Matrix]) -> dict[str, Matrix]:
-    """Return positions by the names that the source has for the same joints."""
+def _renamed(source: "Facts", written: "Facts") -> dict[str, str]:
+    """Return what the source calls each joint."""
     before = {joint.child: joint.name for joint in source.joints}
-    return {before[j.child]: draws[j.name] for j in written.joints if j.child in before}
+    return {joint.name: before[joint.child] for joint in written.joints if joint.child in before}
 
 
 def _places(facts: "Facts", positions: Mapping[str, Matrix]) -> dict[str, Matrix]:
-    """Return where each link is in the frame of the base, shapes (POSES, 3) [m]."""
+    """Return the pose of each link in the frame of the base, shapes (POSES, 4, 4) [m]."""
     poses = body_poses(facts.bodies, positions)
-    found = {}
-    for body, pose in zip(facts.bodies, poses, strict=True):
-        for link, local in zip(body.links, body.poses, strict=True):
-            found[link.name] = np.broadcast_to((pose @ local)[..., :3, 3], (POSES, 3))
-    return found
-
-
-def _compared(
-    source: "Facts",
-    places: Mapping[str, Matrix],
-    draws: Mapping[str, Matrix],
-    named: tuple[str, Any],
-) -> Agreement:
-    import mujoco
-
-    file, model = named
-    base, kind = source.bodies[0].top.name, mujoco.mjtObj.mjOBJ_BODY
-    shared = [name for name in places if mujoco.mj_name2id(model, kind, name) >= 0]
-    with quiet_mujoco():
-        here = _followed(model, draws, base, shared)
-    mass = float(model.body_mass.sum())
-    apart = {
-        name: float(np.linalg.norm(places[name] - here[name], axis=1).max()) for name in shared
+    return {
+        link.name: np.broadcast_to(pose @ local, (POSES, 4, 4))
+        for body, pose in zip(facts.bodies, poses, strict=True)
+        for link, local in zip(body.links, body.poses, strict=True)
     }
-    worst = max(apart, key=apart.__getitem__, default="")
-    return Agreement(
-        file=file,
-        mass=mass / source.total_mass - 1 if source.total_mass else 0.0,
-        distance=apart.get(worst, 0.0),
-        link=worst,
-    )
 
 
 def _followed(
-    model: Any, draws: Mapping[str, Matrix], base: str, links: Sequence[str]
+    model: Any, draws: Mapping[str, Matrix], base: str, links: Mapping[str, Matrix]
 ) -> dict[str, Matrix]:
-    """Return where MuJoCo has the links in the frame of the base, shapes (POSES, 3) [m]."""
+    """Return the poses of those links that MuJoCo has as bodies or sites, as `_places` does."""
     import mujoco
 
     data = mujoco.MjData(model)
+    kinds = (
+        (mujoco.mjtObj.mjOBJ_BODY, data.xpos, data.xmat),
+        (mujoco.mjtObj.mjOBJ_SITE, data.site_xpos, data.site_xmat),
+    )
     # The URDF reader makes the base a part of the world, at its origin.
     root = max(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, base), 0)
-    bodies = [model.body(name).id for name in links]
+    found: dict[str, tuple[Any, Any, int]] = {}
+    for name in links:
+        for kind, places, turns in kinds:
+            index = mujoco.mj_name2id(model, kind, name)
+            if index > 0 or (index == 0 and kind == mujoco.mjtObj.mjOBJ_SITE):
+                found.setdefault(name, (places, turns, index))
     address = {name: int(model.joint(name).qposadr[0]) for name in draws}
-    found = np.zeros((POSES, len(links), 3))
+    poses = {name: np.tile(np.eye(4), (POSES, 1, 1)) for name in found}
     for k in range(POSES):
         for name, positions in draws.items():
             data.qpos[address[name]] = positions[k]
         mujoco.mj_kinematics(model, data)
         turn = data.xmat[root].reshape(3, 3)
-        found[k] = (data.xpos[bodies] - data.xpos[root]) @ turn
-    return {name: found[:, index] for index, name in enumerate(links)}
+        for name, (places, turns, index) in found.items():
+            poses[name][k, :3, 3] = (places[index] - data.xpos[root]) @ turn
+            poses[name][k, :3, :3] = turn.T @ turns[index].reshape(3, 3)
+    return poses
+
+
+def _carried(model: Any, draws: Mapping[str, Matrix]) -> dict[str, float]:
+    """Return the inertia that each joint carries in MuJoCo, all joints at 0, without armature."""
+    import mujoco
+
+    data = mujoco.MjData(model)
+    dofs = {name: int(model.joint(name).dofadr[0]) for name in draws}
+    for name in draws:
+        data.qpos[int(model.joint(name).qposadr[0])] = 0.0
+    mujoco.mj_fwdPosition(model, data)
+    row, found = np.zeros(model.nv), {}
+    for name, dof in dofs.items():
+        mujoco.mj_mulM(model, data, row, np.eye(model.nv)[dof])
+        found[name] = float(row[dof] - model.dof_armature[dof])
+    return found
+
+
+def _compared(
+    file: str,
+    model: Any,
+    source: "Facts",
+    poses: tuple[Mapping[str, Matrix], Mapping[str, Matrix]],
+    shares: Mapping[str, float],
+) -> Agreement:
+    there, here = poses
+    apart = {
+        name: float(np.linalg.norm(there[name][:, :3, 3] - pose[:, :3, 3], axis=1).max())
+        for name, pose in here.items()
+    }
+    angles = {name: _angle(there[name], pose) for name, pose in here.items()}
+    farthest, turned, joint = (
+        max(d, key=d.__getitem__, default="") for d in (apart, angles, shares)
+    )
+    mass = float(model.body_mass.sum())
+    return Agreement(
+        file=file,
+        mass=mass / source.total_mass - 1 if source.total_mass else mass,
+        inertia=shares.get(joint, 0.0),
+        joint=joint,
+        distance=apart.get(farthest, 0.0),
+        link=farthest,
+        angle=angles.get(turned, 0.0),
+        turned=turned,
+    )
+
+
+def _angle(one: Matrix, other: Matrix) -> float:
+    """Return the largest angle between rotations, which are close, shapes (..., 4, 4) [rad]."""
+    apart = np.swapaxes(one[..., :3, :3], -1, -2) @ other[..., :3, :3]
+    # Of a small angle the sine is exact where the cosine is all rounding.
+    sine = np.linalg.norm(apart - np.swapaxes(apart, -1, -2), axis=(-2, -1)) / math.sqrt(8)
+    cosine = (np.trace(apart, axis1=-2, axis2=-1) - 1) / 2
+    return float(np.arctan2(sine, cosine).max())

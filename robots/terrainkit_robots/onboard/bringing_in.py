@@ -1,6 +1,6 @@
 """Bringing a robot in: read, repair, write, and prove, in the order that a newcomer would."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.lint import Report
-from terrainkit_robots.onboard.folder import check_folder, new_folder, write_files
-from terrainkit_robots.onboard.onboarding import Onboarded, Progress, onboard
+from terrainkit_robots.onboard.folder import KEPT, check_folder, new_folder, write_files
+from terrainkit_robots.onboard.onboarding import MJCF, SPEC, Given, Onboarded, Progress, onboard
 from terrainkit_robots.settings import Settings, read_settings
 
 if TYPE_CHECKING:
@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 
 def _unwrapped(items: Any, _total: int) -> Any:
     return items
+
+
+def _silent(_step: str) -> None:
+    pass
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +68,9 @@ class Wishes:
     progress: Progress = _unwrapped
     """Draws a bar while collision meshes are worked on."""
 
+    say: Callable[[str], None] = _silent
+    """Is told what is done next."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BroughtIn:
@@ -93,6 +100,9 @@ class BroughtIn:
     no_pictures: str = ""
     """Why there are no pictures."""
 
+    kept: bool = False
+    """Whether the robot.toml of the folder before is in this one, under another name."""
+
 
 def bring_in(file: Path, wishes: Wishes) -> BroughtIn:
     """Bring a robot in; its own file is not changed.
@@ -108,17 +118,19 @@ def bring_in(file: Path, wishes: Wishes) -> BroughtIn:
     config_files = {framework: file_name(framework) for framework in wishes.configs}
     if wishes.target is not None:
         check_folder(wishes.target, overwrite=wishes.overwrite)
-    spec = read_spec(wishes.spec) if wishes.spec else None
-    report, repaired = _repaired(file, wishes)
+    given = Given(spec=read_spec(wishes.spec), file=str(wishes.spec)) if wishes.spec else None
+    wishes.say(f"checking {file.name}")
+    report, repaired = _packed(*_repaired(file, wishes))
     for crash in report.crashed:
         raise TerrainkitError(f"{file}: {crash.code}: {crash.reason}")
     if not wishes.force and any(map(_unsound, report.findings)):
         return BroughtIn(report=report, repaired=repaired)
+    wishes.say("finding the pose and the gains")
     made = onboard(
         report.facts,
         collision=wishes.collision,
         floating=wishes.floating,
-        spec=spec,
+        given=given,
         cache=wishes.cache,
         progress=wishes.progress,
     )
@@ -127,15 +139,18 @@ def bring_in(file: Path, wishes: Wishes) -> BroughtIn:
         for framework, file in config_files.items()
     }
     target = wishes.target or Path(made.facts.model.name)
+    kept = _edited(target, made.files[SPEC])
     with new_folder(target, overwrite=wishes.overwrite) as folder:
+        wishes.say("proving that it stands")
         write_files(folder, made.files)
         write_files(folder, {name: text.encode() for name, text in configs.items()})
         # The pictures are drawn by another process, which there is no need to wait for.
         with ThreadPoolExecutor(1) as beside:
-            drawing = beside.submit(_pictures, folder, made) if wishes.pictures else None
+            drawing = beside.submit(_pictures, folder) if wishes.pictures else None
             proof = prove(report.facts, made, folder)
+            wishes.say("drawing pictures")
         pictures, no_pictures = drawing.result() if drawing else ({}, "not wanted")
-        write_files(folder, pictures)
+        write_files(folder, dict(pictures) | kept)
         done = BroughtIn(
             report=report,
             repaired=repaired,
@@ -145,18 +160,35 @@ def bring_in(file: Path, wishes: Wishes) -> BroughtIn:
             configs=tuple(configs),
             pictures=tuple(pictures),
             no_pictures=no_pictures,
+            kept=bool(kept),
         )
         write_files(folder, {"report.md": report_page(done).encode()})
     return done
 
 
-_SOUND = ("XML", "MSH", "TRE", "INR")
-"""Families whose errors mean that what would be written is not the robot that was meant. With other
-errors, such as joints without limits, it is that robot, and not yet one to train."""
+_SOUND = ("XML", "MSH", "TRE", "INR", "JNT001", "JNT004", "JNT007", "JNT013")
+"""Rules, or families of them, whose errors mean that what would be written is not the robot that
+was meant: a joint of an unknown type would be fixed, one with inverted limits have none. With other
+errors, such as limits that are missing, it is that robot, and not yet one to train."""
+
+
+_PACKED = frozenset({"MSH002", "MSH004", "MSH005", "MSH007", "MSH008"})
+"""Errors of mesh files that their copies do not have, whatever they were called and in whatever
+format: a copy that cannot be made of a collision mesh keeps the robot out."""
+
+
+def _packed(
+    report: Report, repaired: tuple["Finding", ...]
+) -> tuple[Report, tuple["Finding", ...]]:
+    """Return what is found and what is repaired, when mesh files are copied."""
+    gone = [f for f in report.findings if f.severity == "error" and f.code in _PACKED]
+    left = tuple(f for f in report.findings if f not in gone)
+    # What the fix would have done to the files is not what is done.
+    return replace(report, findings=left), (*repaired, *(replace(f, fix=None) for f in gone))
 
 
 def _unsound(finding: "Finding") -> bool:
-    return finding.severity == "error" and finding.code[:3] in _SOUND
+    return finding.severity == "error" and finding.code.startswith(_SOUND)
 
 
 def _repaired(file: Path, wishes: Wishes) -> tuple[Report, tuple["Finding", ...]]:
@@ -186,12 +218,21 @@ def _repaired(file: Path, wishes: Wishes) -> tuple[Report, tuple["Finding", ...]
     return result.report, result.fixed
 
 
-def _pictures(folder: Path, made: Onboarded) -> tuple[dict[str, bytes], str]:
+def _edited(target: Path, spec: bytes) -> dict[str, bytes]:
+    """Return the spec of a folder that is replaced, under another name, if it says other things."""
+    try:
+        before = (target / SPEC).read_bytes()
+    except OSError:
+        return {}
+    return {} if before == spec else {KEPT: before}
+
+
+def _pictures(folder: Path) -> tuple[dict[str, bytes], str]:
     """Return pictures by the names of their files, and why there are none."""
     from terrainkit_robots.onboard.pictures import PicturesError, draw
 
     try:
-        drawn = draw(folder / made.spec.mjcf)
+        drawn = draw(folder / MJCF)
     except PicturesError as error:
         return {}, str(error)
     return {f"report/{name}.png": data for name, data in drawn.items()}, ""

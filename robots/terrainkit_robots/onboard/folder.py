@@ -12,7 +12,12 @@ from terrainkit_robots.wording import names
 SPEC = "robot.toml"
 """A folder that holds this file is an onboarded robot."""
 
-_OURS = frozenset({SPEC, "robot.urdf", "robot.xml", "scene.xml", "report.md", "report", "meshes"})
+KEPT = "robot.toml.before"
+"""What the spec of a folder that is replaced is called in the new one."""
+
+_OURS = frozenset(
+    {SPEC, KEPT, "robot.urdf", "robot.xml", "scene.xml", "report.md", "report", "meshes"}
+)
 """What onboarding writes, beside configurations."""
 
 _CONFIG_ENDING = "_config.py"

@@ -1,30 +1,38 @@
 """Onboarding: from the facts of a robot to the files of its folder, in memory.
 
 What was read is brought into its normal form, its meshes are packed, gains and poses are suggested
-where the file has none, and everything is written as text. Nothing here touches the disk.
+where nobody gave them, and everything is written as text. Nothing here touches the disk.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from terrainkit.errors import ConfigError, ExportError
+from terrainkit_robots.body.kinematics import body_poses
+from terrainkit_robots.body.shapes import lowest
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.mesh.meshes import Meshes
 from terrainkit_robots.rule import CannotCheckError
 from terrainkit_robots.writing.drive import Drive
-from terrainkit_robots.writing.mjcf_text import Extras, mjcf_text, scene_text
+from terrainkit_robots.writing.fused import fused
+from terrainkit_robots.writing.mjcf_text import Extras, Site, mjcf_text, scene_text
 from terrainkit_robots.writing.normal_form import normal_form
-from terrainkit_robots.writing.sites import foot_sites, imu_site
+from terrainkit_robots.writing.sites import foot_sites, imu_notes, imu_site
 
 if TYPE_CHECKING:
+    from terrainkit_robots.model import RobotModel
     from terrainkit_robots.spec.robot_spec import RobotSpec
     from terrainkit_robots.writing.collision import How
+
+URDF, MJCF, SCENE, SPEC = "robot.urdf", "robot.xml", "scene.xml", "robot.toml"
+"""What the files of a folder are called."""
 
 _AT_REST = 1e-4
 """Shapes that are deeper than this inside each other at the standing pose push each other [m]."""
 
-_DRIVEN = ("stiffness", "damping", "effort", "armature")
+_DRIVEN = ("stiffness", "damping", "effort", "armature", "velocity")
 """What a motor takes from the spec."""
 
 Progress = Callable[[Iterable[Any], int], Iterable[Any]]
@@ -47,12 +55,22 @@ class Onboarded:
     """What was left out, changed or made on the way, a sentence each."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Given:
+    """A spec that somebody edited or measured, which goes before what would be suggested."""
+
+    spec: "RobotSpec"
+
+    file: str
+    """Where it was read from."""
+
+
 def onboard(
     source: Facts,
     *,
     collision: "How" = "keep",
     floating: bool | None = None,
-    spec: "RobotSpec | None" = None,
+    given: Given | None = None,
     cache: Path | None = None,
     progress: Progress = lambda items, _: items,
 ) -> Onboarded:
@@ -61,58 +79,139 @@ def onboard(
     Args:
         source: The robot as it was read.
         collision: What becomes of its collision meshes.
-        floating: Whether the base moves freely; unless told, as the file says or the legs suggest.
-        spec: Values that were edited or measured, which go before what would be suggested.
+        floating: Whether the base moves freely; unless told, as the spec that is given or the file
+            says, or the legs suggest.
+        given: Values that go before what would be suggested.
         cache: Folder that keeps convex parts from one run to the next.
         progress: Draws a bar while collision meshes are worked on.
 
     Raises:
-        TerrainkitError: if there is no robot, a mesh of it cannot be had, or MuJoCo refuses it.
+        TerrainkitError: if there is no robot, a mesh of it cannot be had, the spec that is given is
+            of another, or MuJoCo refuses it.
     """
-    from terrainkit_robots.simulation.gains import suggest_gains
-    from terrainkit_robots.spec.derive import derive_spec
     from terrainkit_robots.spec.spec_file import to_toml
     from terrainkit_robots.writing.collision import treat
     from terrainkit_robots.writing.leftovers import leftovers
     from terrainkit_robots.writing.packed import pack
     from terrainkit_robots.writing.urdf_text import urdf_text
 
+    if floating is None and given is not None:
+        floating = given.spec.floating
     form = normal_form(source, floating=floating)
     treated = treat(form.model, source.meshes, collision, cache=cache, progress=progress)
     packed = pack(treated.model, treated.meshes)
-    contents = {Path(name): data for name, data in packed.files.items()}
-    facts = Facts(packed.model, Meshes(contents), spec=spec)
-    if spec is None:
-        spec = derive_spec(facts, gains=suggest_gains(facts), floating=bool(form.model.floating))
-    excluded, said = _excluded(facts)
-    extras = Extras(
-        drives=_drives(spec),
-        feet=foot_sites(facts),
-        imu=imu_site(facts),
-        excluded=excluded,
-        home=facts.positions,
-        height=_height(facts),
-    )
+    meshes = Meshes({Path(name): data for name, data in packed.files.items()})
+    spec = _spec(Facts(packed.model, meshes), given)
+    excluded, said = _excluded(Facts(packed.model, meshes, spec=spec))
+    model = replace(_with_motors(packed.model, spec), excluded=excluded)
+    facts = Facts(model, meshes, spec=spec)
     texts = {
-        spec.urdf: urdf_text(packed.model, feet=spec.feet),
-        spec.mjcf: mjcf_text(packed.model, extras),
-        "scene.xml": scene_text(packed.model.name, height=max(extras.height, 0.1)),
-        "robot.toml": to_toml(spec),
+        URDF: urdf_text(model, feet=spec.feet),
+        MJCF: _mjcf(facts, spec),
+        SCENE: scene_text(model.name, MJCF, height=max(_height(facts), 0.1)),
+        SPEC: to_toml(spec),
     }
     return Onboarded(
         facts=facts,
         spec=spec,
         files={name: text.encode() for name, text in texts.items()} | dict(packed.files),
-        notes=(*form.notes, *leftovers(source.model), *treated.notes, *packed.notes, *said),
+        notes=(
+            *form.notes,
+            *leftovers(source.model),
+            *treated.notes,
+            *packed.notes,
+            *said,
+            *imu_notes(facts),
+        ),
     )
 
 
-def _drives(spec: "RobotSpec") -> dict[str, Drive]:
+def _spec(facts: Facts, given: Given | None) -> "RobotSpec":
+    """Return the spec of a robot: what is given, or derived.
+
+    Raises:
+        ConfigError: if the spec that is given is wrong for the robot.
+        ExportError: if no gains can be suggested, since the robot cannot be simulated.
+    """
+    from terrainkit_robots.simulation.gains import suggest_gains
+    from terrainkit_robots.spec.derive import derive_spec
+    from terrainkit_robots.spec.given import with_origins
+
+    if given is not None:
+        _check(Facts(facts.model, facts.meshes, spec=given.spec), given)
+    try:
+        gains = suggest_gains(facts)
+    except CannotCheckError as error:
+        raise ExportError(f"{facts.model.file}: no gains can be suggested: {error}") from None
+    floating = bool(facts.model.floating)
+    derived = derive_spec(facts, gains=gains, floating=floating, urdf=URDF, mjcf=MJCF)
+    if given is None:
+        return derived
+    mine = replace(given.spec, floating=floating, urdf=URDF, mjcf=MJCF)
+    return with_origins(mine, derived, given.file)
+
+
+def _check(facts: Facts, given: Given) -> None:
+    """Raise an error if a spec is wrong for a robot."""
+    from terrainkit_robots.lint import lint
+    from terrainkit_robots.rule import rules
+
+    others = set(given.spec.joint_order) - {joint.name for joint in facts.joints}
+    if others == set(given.spec.joint_order) and others:
+        raise ConfigError(
+            f"{given.file} is of {given.spec.name}: none of its joints is in {facts.model.title}"
+        )
+    asked = [rule for rule in rules() if "spec" in rule.needs]
+    wrong = [f for f in lint(facts, asked).findings if f.severity == "error"]
+    if wrong:
+        more = f" (and {len(wrong) - 1} more; check-robot --spec has all)" if wrong[1:] else ""
+        raise ConfigError(f"{given.file}: {wrong[0].code}: {wrong[0].message}{more}")
+
+
+def _with_motors(model: "RobotModel", spec: "RobotSpec") -> "RobotModel":
+    """Return a robot whose joints have the efforts and speeds of its spec."""
+    efforts, speeds = spec.per_joint("effort"), spec.per_joint("velocity")
+    joints = tuple(
+        replace(
+            joint,
+            limit=replace(joint.limit, effort=efforts[joint.name], velocity=speeds[joint.name]),
+        )
+        if joint.limit is not None and joint.name in efforts
+        else joint
+        for joint in model.joints
+    )
+    motors = (replace(motor, effort=efforts[motor.joint]) for motor in model.actuators)
+    return replace(model, joints=joints, actuators=tuple(motors))
+
+
+def _mjcf(facts: Facts, spec: "RobotSpec") -> str:
+    """Return the robot as MJCF."""
+    single = fused(facts.model, keep=spec.feet)
     columns = {name: spec.per_joint(name) for name in _DRIVEN}
-    return {
+    drives = {
         joint: Drive(**{name: values[joint] for name, values in columns.items()})
         for joint in spec.joint_order
     }
+    bodies = {link.name for link in single.model.links}
+    frames = [
+        Site(name=link, body=body, pose=pose)
+        for link, (body, pose) in single.frames.items()
+        if link not in bodies
+    ]
+    imu = imu_site(facts)
+    if imu.name in spec.feet:
+        imu = replace(imu, name=f"{imu.name}_site")
+    extras = Extras(
+        drives=drives,
+        feet=foot_sites(facts),
+        imu=imu,
+        frames=tuple(frames),
+        excluded=single.model.excluded,
+        home=facts.positions,
+        height=_height(facts),
+        height_at_zero=max(_height(facts), _clearance(facts, {})) if facts.stance else None,
+    )
+    return mjcf_text(single.model, extras)
 
 
 def _excluded(facts: Facts) -> tuple[frozenset[frozenset[str]], tuple[str, ...]]:
@@ -133,17 +232,21 @@ def _excluded(facts: Facts) -> tuple[frozenset[frozenset[str]], tuple[str, ...]]
 
 def _height(facts: Facts) -> float:
     """Return how high the base of a robot is that stands or lies on the ground [m]."""
+    if not facts.model.floating and facts.bodies[0].virtual:
+        return 0.0  # its base is the world
     if facts.stance is not None:
         return facts.stance.height
     if not facts.model.floating:
         return 0.0
-    from terrainkit_robots.body.kinematics import body_poses
-    from terrainkit_robots.body.shapes import lowest
+    return max(0.0, _clearance(facts, facts.positions))
 
-    poses = body_poses(facts.bodies, facts.positions)
+
+def _clearance(facts: Facts, positions: Mapping[str, float]) -> float:
+    """Return how high the base is when the lowest shape touches the ground [m]."""
+    poses = body_poses(facts.bodies, positions)
     depths = [
         lowest(shape, pose, facts.meshes)
         for body, pose in zip(facts.bodies, poses, strict=True)
         for shape in (*body.collisions, *body.visuals)
     ]
-    return max(0.0, -min(depths, default=0.0))
+    return -min(depths, default=0.0)

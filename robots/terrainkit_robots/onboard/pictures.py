@@ -73,16 +73,21 @@ def draw(
     raise PicturesError(f"MuJoCo cannot draw here ({'; '.join(complaints)}); {_advice()}")
 
 
+def _asked() -> str:
+    """Return the library that the environment names; the command line puts that variable aside."""
+    return (os.environ.get("TERRAINKIT_MUJOCO_GL") or os.environ.get("MUJOCO_GL", "")).strip()
+
+
 def _libraries() -> tuple[str, ...]:
     """Return what to try as MUJOCO_GL, in this order."""
-    asked = os.environ.get("MUJOCO_GL", "").strip()
+    asked = _asked()
     if asked:
         return (asked,)
     return ("egl", "osmesa") if sys.platform == "linux" else ("",)
 
 
 def _advice() -> str:
-    if os.environ.get("MUJOCO_GL", "").strip():
+    if _asked():
         return "MUJOCO_GL says so; unset it to have EGL and OSMesa tried"
     return "install EGL or OSMesa (Debian: libegl1 libgl1-mesa-dri, or libosmesa6)"
 

@@ -10,8 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from terrainkit.errors import ExportError
+from terrainkit_robots.leg.stance import stands_alone
 from terrainkit_robots.onboard.agreement import Agreement, agreement
+from terrainkit_robots.onboard.onboarding import MJCF, SCENE, URDF
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.rule import CannotCheckError
+from terrainkit_robots.simulation.verdict import judge
+from terrainkit_robots.writing.normal_form import normal_form
+from terrainkit_robots.writing.rooted import rooted
 
 if TYPE_CHECKING:
     from terrainkit_robots.facts import Facts
@@ -20,20 +26,8 @@ if TYPE_CHECKING:
     from terrainkit_robots.simulation.standing import Standing
     from terrainkit_robots.spec.robot_spec import RobotSpec
 
-_SAME_PLACE = 1e-4
-"""A written robot is the one that was read up to this distance of its links [m],"""
-
-_SAME_MASS = 1e-3
-"""and this share of its mass."""
-
 _SECONDS = 5.0
 """How long a robot has to stand [s]."""
-
-_STANDS_ALONE = 3
-"""Robots with so many legs stand by the springs of their joints; those with fewer balance."""
-
-_UPRIGHT = math.radians(3)
-"""How far it may tilt [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,11 +43,20 @@ class Proof:
     locked: bool = False
     """Whether its joints were held."""
 
+    unknown: str = ""
+    """Why a robot with legs could not be simulated."""
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Return why it does not stand; nothing if it does, or has no legs."""
+        if self.standing is None:
+            return (f"it could not be simulated: {self.unknown}",) if self.unknown else ()
+        return judge(self.standing).faults
+
     @property
     def stood(self) -> bool:
         """Whether it stood upright, on its feet alone; True without legs."""
-        seen = self.standing
-        return seen is None or (seen.tilt < _UPRIGHT and not seen.touching and not seen.blew_up)
+        return not self.faults
 
 
 def prove(source: "Facts", made: "Onboarded", folder: Path) -> Proof:
@@ -66,27 +69,37 @@ def prove(source: "Facts", made: "Onboarded", folder: Path) -> Proof:
     from terrainkit_robots.simulation.standing import footholds, stand_still
 
     # The scene includes the MJCF, which is compiled only once so.
-    scene = _loaded(folder / "scene.xml")
-    models = {made.spec.urdf: _loaded(folder / made.spec.urdf), made.spec.mjcf: scene}
-    agreements = agreement(source, made.facts, models)
+    scene = _loaded(folder / SCENE)
+    models = {URDF: _loaded(folder / URDF), MJCF: scene}
+    floating = bool(made.facts.model.floating)
+    agreements = agreement(_with_masses(source, floating), made.facts, models)
     for each in agreements:
-        if each.distance > _SAME_PLACE or abs(each.mass) > _SAME_MASS:
-            raise ExportError(
-                f"{each.file} would be another robot: {each.link} is {1000 * each.distance:.3g} mm "
-                f"away from where the source has it, the mass is off by {each.mass:.2%}"
-            )
-    if not made.facts.legs or not made.facts.model.floating:
+        if each.faults:
+            raise ExportError(f"{each.file} would be another robot: {'; '.join(each.faults)}")
+    if not made.facts.legs or not floating:
         return Proof(agreements=agreements)
-    locked = len(made.facts.legs) < _STANDS_ALONE
-    standing = stand_still(
-        plant_of(scene, base=made.facts.bodies[0].top.name),
-        _gains(made.spec),
-        positions=made.facts.positions,
-        feet=footholds(made.facts),
-        seconds=_SECONDS,
-        joints_locked=locked,
-    )
+    locked = not stands_alone(made.facts)
+    try:
+        standing = stand_still(
+            plant_of(scene, base=made.facts.bodies[0].top.name),
+            _gains(made.spec),
+            positions=made.facts.positions,
+            feet=footholds(made.facts),
+            seconds=_SECONDS,
+            joints_locked=locked,
+        )
+    except CannotCheckError as error:
+        return Proof(agreements=agreements, unknown=str(error))
     return Proof(agreements=agreements, standing=standing, locked=locked)
+
+
+def _with_masses(source: "Facts", floating: bool) -> "Facts":
+    """Return the source with its base and all of its masses, which may come from meshes."""
+    from terrainkit_robots.facts import Facts
+
+    if math.isfinite(source.total_mass):
+        return rooted(source, floating=floating)
+    return Facts(normal_form(source, floating=floating).model, source.meshes)
 
 
 def _loaded(path: Path) -> Any:

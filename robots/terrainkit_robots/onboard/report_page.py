@@ -6,13 +6,14 @@ from collections.abc import Iterator, Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING
 
-from terrainkit.errors import ConfigError
+from terrainkit_robots.body.joint_order import permutation
 from terrainkit_robots.onboard.joint_rows import joint_rows, shown
 from terrainkit_robots.report.markdown import cell, finding_row, titled_list
 from terrainkit_robots.report.plain import encodable, plain
-from terrainkit_robots.report.tally import count, grouped, tally
+from terrainkit_robots.report.tally import grouped, tally
 from terrainkit_robots.simulators.order_table import order_table
-from terrainkit_robots.simulators.orders import permutation, simulator_orders
+from terrainkit_robots.simulators.orders import simulator_orders
+from terrainkit_robots.wording import count
 
 if TYPE_CHECKING:
     from terrainkit_robots.lint import Finding
@@ -129,7 +130,8 @@ def _standing(proof: "Proof | None", made: "Onboarded") -> Iterator[str]:
         return
     yield "## Standing\n"
     if proof is None or proof.standing is None:
-        yield "It was not simulated.\n"
+        why = f": {cell(proof.unknown)}" if proof is not None and proof.unknown else ""
+        yield f"It was not simulated{why}.\n"
         return
     seen = proof.standing
     how = "with its joints locked" if proof.locked else "at its default pose, with the gains below"
@@ -161,10 +163,17 @@ def _agreement(proof: "Proof | None") -> Iterator[str]:
         return
     yield "## The files against their source\n"
     rows = [
-        (each.file, f"{each.mass:+.3%}", f"{1000 * each.distance:.3g} mm", each.link)
+        (
+            each.file,
+            f"{each.mass:+.3%}",
+            f"{each.inertia:.3%} at {each.joint}" if each.joint else "",
+            f"{1000 * each.distance:.2g} mm at {each.link}",
+            f"{math.degrees(each.angle):.2g} deg at {each.turned}",
+        )
         for each in proof.agreements
     ]
-    yield from _table([("file", "mass", "farthest link, over all poses", "which"), *rows])
+    head = ("file", "mass", "inertia that a joint carries", "farthest link", "most turned link")
+    yield from _table([head, *rows])
 
 
 # Joints
@@ -202,9 +211,8 @@ def _orders(made: "Onboarded") -> Iterator[str]:
     lines = []
     for order in orders:
         there = [name for name in order.joints if name in set(driven)]
-        try:
-            to, back = permutation(driven, there), permutation(there, driven)
-        except ConfigError:
+        to, back = permutation(driven, there), permutation(there, driven)
+        if to is None or back is None:
             continue  # a spec of the user's own may have other joints
         if to != back or to != list(range(len(to))):
             lines += [f"to_{order.key} = {to}", f"from_{order.key} = {back}"]

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.onboard.agreement import POSES
+from terrainkit_robots.onboard.folder import KEPT
 from terrainkit_robots.report.tally import count, tally
 from terrainkit_robots.wording import names
 
@@ -29,6 +30,11 @@ def summary(done: "BroughtIn") -> Iterator[tuple[str, str]]:
         yield "configs", names(done.configs)
     drawn = f"{count(len(done.pictures), 'picture')} in report.md"
     yield "pictures", drawn if done.pictures else f"none: {done.no_pictures}"
+    if done.kept:
+        yield "kept", f"the robot.toml of before as {KEPT}; --spec takes its values"
+    missing = sum(finding.code == "MSH001" for finding in done.report.findings)
+    if missing:
+        yield "missing", f"{count(missing, 'mesh')}; --package NAME=DIR tells where a package is"
     if done.made.notes:
         yield "noted", f"{count(len(done.made.notes), 'thing')} left out or changed: see report.md"
 
@@ -53,10 +59,13 @@ def _agreement(proof: "Proof") -> str:
 
 def _standing(proof: "Proof", made: "Onboarded") -> str:
     seen = proof.standing
+    if proof.unknown:
+        return f"not known: {proof.unknown}"
     if seen is None:
         return f"not asked: it has {'a fixed base' if made.facts.legs else 'no legs'}"
-    how = "with its joints held" if proof.locked else "with the gains of robot.toml"
+    held = "with its joints held, since two legs do not balance alone"
+    how = held if proof.locked else "with the gains of robot.toml"
     tilt = f"tilt {math.degrees(seen.tilt):.1f} degrees"
-    on = f"{names(seen.touching)} on the ground" if seen.touching else "only its feet touch"
-    verdict = "yes" if proof.stood else "NO"
-    return f"{verdict}: {seen.seconds:g} s {how}, {tilt}, {on}"
+    if proof.faults:
+        return f"NO: {seen.seconds:g} s {how}; {'; '.join(proof.faults)}"
+    return f"yes: {seen.seconds:g} s {how}, {tilt}, only its feet touch"

@@ -22,15 +22,14 @@ _TURNS = 32
 def visible_shapes(model: "mujoco.MjModel") -> list[int]:
     """Return the indices of the shapes to be drawn.
 
-    Those that MuJoCo draws unasked; of a body that has none of them, all. Floors are no part of a
-    robot, and what is wholly transparent is not seen, unless there is nothing else.
+    Those that MuJoCo draws unasked; of a robot that has none of them, all. Shapes that collide are
+    not mixed with those: of a link without visuals there is then nothing to be seen. Floors are no
+    part of a robot, and what is wholly transparent is not seen, unless there is nothing else.
     """
     solid = [i for i in range(model.ngeom) if not _is_ground(model, i)]
-    drawn = {i for i in solid if model.geom_group[i] < _DRAWN_GROUPS and _opacity(model, i) > 0}
-    dressed = {int(model.geom_bodyid[i]) for i in drawn}
-    rest = {i for i in solid if model.geom_bodyid[i] not in dressed and model.geom_group[i] >= 0}
-    seen = {i for i in rest if _opacity(model, i) > 0}
-    return sorted(drawn | seen) or solid
+    seen = [i for i in solid if model.geom_group[i] >= 0 and _opacity(model, i) > 0]
+    drawn = [i for i in seen if model.geom_group[i] < _DRAWN_GROUPS]
+    return drawn or seen or solid
 
 
 def clear_shapes(model: "mujoco.MjModel") -> list[int]:

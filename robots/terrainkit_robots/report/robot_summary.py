@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from terrainkit_robots.facts_record import facts_record
 from terrainkit_robots.leg.effort import effort_of
-from terrainkit_robots.report.tally import count
+from terrainkit_robots.wording import count
 
 if TYPE_CHECKING:
     from terrainkit_robots.facts import Facts

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from terrainkit_robots.lint import Finding, Report, Skipped
 from terrainkit_robots.rule import Severity
 from terrainkit_robots.selection import IdleComment
+from terrainkit_robots.wording import count as count
 
 WORDS: dict[Severity, str] = {"error": "error", "warning": "warning", "info": "note"}
 """What each severity is called; the order is that of reports."""
@@ -18,11 +19,6 @@ def tally(reports: Sequence[Report]) -> str:
     if not counts["error"] + counts["warning"]:
         parts.insert(0, "no problems found")
     return ", ".join(parts)
-
-
-def count(number: int, word: str) -> str:
-    """Return such as `1 leg` or `4 legs`."""
-    return f"{number:,} {word}{'' if number == 1 else 's'}"
 
 
 def fixable(findings: Sequence[Finding]) -> str:

@@ -9,8 +9,9 @@ from terrainkit_robots.lint import Finding, Report
 from terrainkit_robots.report.plain import plain
 from terrainkit_robots.report.repaired import fixed, unfixed
 from terrainkit_robots.report.robot_summary import robot_summary
-from terrainkit_robots.report.tally import WORDS, count, fixable, grouped, place, tally
+from terrainkit_robots.report.tally import WORDS, fixable, grouped, place, tally
 from terrainkit_robots.rule import Severity
+from terrainkit_robots.wording import count
 
 WIDTH = 100
 """Width of a line [characters]; only what cannot be broken is longer."""
@@ -70,7 +71,7 @@ def _robot(report: Report, width: int) -> Iterator[Line]:
         yield Span(WORDS[severity], _STYLES[severity]), Span(f" {code} {name}")
         yield from _rule(found, width)
         yield ()
-    told = list(_left_out(report, width))
+    told = [*_about_notes(report.findings), *_left_out(report, width)]
     yield from told
     if told:
         yield ()
@@ -93,11 +94,12 @@ def _rule(findings: Sequence[Finding], width: int) -> Iterator[Line]:
     for i, finding in enumerate(shown):
         likely = " (likely)" if finding.certainty == "likely" else ""
         yield from _item(finding, plain(finding.message) + likely, width)
-        if hints[i] and hints[i + 1 : i + 2] != [hints[i]]:
+        told = finding.severity != "info"  # `terrainkit rule` helps with notes
+        if told and hints[i] and hints[i + 1 : i + 2] != [hints[i]]:
             yield from _wrapped(Span("      help: ", "green"), hints[i], width, indent=12)
     if len(findings) > _MOST:
         more = count(len(findings) - _MOST, "more finding")
-        yield (Span(f"  and {more}; --format json has all of them", "dim"),)
+        yield (Span(f"  and {more}; check-robot --format json has all of them", "dim"),)
 
 
 def _item(finding: Finding, text: str, width: int) -> Iterator[Line]:
@@ -112,6 +114,14 @@ def _repair(finding: Finding) -> str:
     description = finding.fix.description if finding.fix is not None else finding.message
     subject = f"{plain(finding.subject)}: " if finding.subject else ""
     return f"{subject}{plain(description)}"
+
+
+def _about_notes(findings: Sequence[Finding]) -> Iterator[Line]:
+    """Yield where to read on about notes: a healthy robot has several, and nothing to be done."""
+    codes = sorted(finding.code for finding in findings if finding.severity == "info")
+    if codes:
+        how = f"terrainkit rule CODE, for example terrainkit rule {codes[0]}"
+        yield Span("about a note: ", "dim"), Span(how)
 
 
 def _left_out(report: Report, width: int) -> Iterator[Line]:

@@ -3,46 +3,33 @@
 MuJoCo is imported when a rule asks for it, so that what does not simulate does not wait for it.
 """
 
-import math
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.body.kinematics import ancestors
 from terrainkit_robots.facts import Facts
-from terrainkit_robots.rule import CannotCheckError, Defect, Severity, rule
+from terrainkit_robots.leg.stance import stands_alone
+from terrainkit_robots.rule import CannotCheckError, Defect, Measured, Severity, rule
+from terrainkit_robots.wording import count
 
 if TYPE_CHECKING:
+    from terrainkit_robots.simulation.drop import Drop
+    from terrainkit_robots.simulation.gains import Gain
+    from terrainkit_robots.simulation.plant import Plant
     from terrainkit_robots.simulation.standing import Standing
     from terrainkit_robots.simulation.sweep import Reach
 
 _WILD, _BROKEN = 100.0, 500.0
-"""Speed of a joint of a robot that drops [rad/s]: a healthy one stays under 75; a motor of a legged
-robot turns its joint at 30."""
+"""Speed of a joint of a robot that drops [rad/s] or [m/s]: a healthy one stays under 75; a motor of
+a legged robot turns its joint at 30."""
 
 _DROP_HEIGHT = 0.1
 """Height from which it drops [m]."""
 
-_STANDS_ALONE = 3
-"""Robots with so many legs are to stand by their motors' stiffness; others are held in balance by
-a policy, and are only asked to stand with their joints locked."""
-
 _SINGLE = 6
 """More legs than this are most often half as many, of two branches that a loop closes; URDF has no
 loops, so that it may stand all the same."""
-
-_TILTED, _FALLEN = 0.15, 0.5
-"""Tilt of a robot that sits or leans, and of one that fell [rad]: 9 and 29 degrees; healthy ones
-stay under 5."""
-
-_SUNK, _COLLAPSED = 0.25, 0.5
-"""Loss of height over leg length: from a quarter on it squats, from a half on it lies."""
-
-_DRIFTED = 0.25
-"""Way of the base over leg length; feet that hold let it move by a tenth."""
-
-_SATURATED = 0.95
-"""Share of its effort that a joint has to give all the time."""
 
 _STUCK = 0.1
 """A joint that can use less of its range than this is blocked where it stands."""
@@ -84,17 +71,12 @@ def wild_drop(robot: Facts) -> Iterator[Defect]:
 
     scene = plant(robot)
     drop = let_fall(scene, height=_DROP_HEIGHT)
-    if not drop.blew_up and drop.top_speed <= _WILD:
+    if not _is_wild(drop):
         return
     alone = let_fall(scene, height=_DROP_HEIGHT, self_collision=False)
-    calm = not alone.blew_up and alone.top_speed <= _WILD
-    how = f"dropped from {_DROP_HEIGHT:g} m" if scene.floating else "let go"
-    what = (
-        f"its state blew up after {drop.seconds:.2f} s"
-        if drop.blew_up
-        else f"{drop.fastest} reached {drop.top_speed:.0f} rad/s"
-    )
-    blame = f"; without self-collision {alone.top_speed:.0f} rad/s" if calm else ""
+    calm = not _is_wild(alone)
+    hulls = calm and _has_hulls(robot)
+    severe = 2 if drop.blew_up or drop.top_speed > _BROKEN else 1
     measured: dict[str, float | int | str] = {
         "speed": round(drop.top_speed, 1),
         "blew_up": int(drop.blew_up),
@@ -102,16 +84,36 @@ def wild_drop(robot: Facts) -> Iterator[Defect]:
     }
     if calm:
         measured["speed_without_self_collision"] = round(alone.top_speed, 1)
-    severe = 2 if drop.blew_up or drop.top_speed > _BROKEN else 1
-    hulls = calm and _has_hulls(robot)
     yield Defect(
         subject=robot.model.title,
         source=robot.model.source,
         severity=_SEVERITIES[severe - hulls],
         certainty="likely" if hulls else "proven",
-        message=f"{how} without torque, {what}; wanted at most {_WILD:.0f} rad/s{blame}",
+        message=_thrown(scene, drop, alone),
         hint=_OVERLAPS if calm else "",
         measured=measured,
+    )
+
+
+def _is_wild(drop: "Drop") -> bool:
+    return drop.blew_up or drop.top_speed > _WILD
+
+
+def _thrown(scene: "Plant", drop: "Drop", alone: "Drop") -> str:
+    """Return what a robot did that was dropped, and whether it did without self-collision."""
+    from terrainkit_robots.simulation.units import units_of
+
+    unit, unit_alone = (units_of(scene, each.fastest).speed for each in (drop, alone))
+    how = f"dropped from {_DROP_HEIGHT:g} m" if scene.floating else "let go"
+    what = (
+        f"its state blew up after {drop.seconds:.2f} s"
+        if drop.blew_up
+        else f"{drop.fastest} reached {drop.top_speed:.0f} {unit}"
+    )
+    blame = f"; without self-collision {alone.top_speed:.0f} {unit_alone}"
+    return (
+        f"{how} without torque, {what}; wanted at most {_WILD:.0f} {unit}"
+        f"{'' if _is_wild(alone) else blame}"
     )
 
 
@@ -127,8 +129,9 @@ def does_not_stand(robot: Facts) -> Iterator[Defect]:
 
     An episode starts like this: actions of zero, position control with the suggested gains. A robot
     that falls by itself in the first two seconds is reset before it has learned anything; one that
-    stands askew, on its shanks, or with a motor that gives all it has, learns to do that. One or
-    two legs are not asked to balance: their joints are locked, so that only feet and pose count.
+    stands askew, on its shanks, with a foot in the air or a motor that gives all it has, learns to
+    do that. Leaning by 3 to 9 degrees is a note. One or two legs are not asked to balance: their
+    joints are locked, so that only feet and pose count.
 
     Fix:
         The message says what is to blame. Otherwise look at the pose, the feet and the efforts.
@@ -136,51 +139,57 @@ def does_not_stand(robot: Facts) -> Iterator[Defect]:
     Source:
         MuJoCo for 2 s at a time step of 5 ms; gains as `terrainkit onboard` suggests them.
     """
-    from terrainkit_robots.simulation.gains import suggest_gains
-    from terrainkit_robots.simulation.plant import plant
-    from terrainkit_robots.simulation.standing import footholds, stand_still
+    from terrainkit_robots.simulation.verdict import judge
 
-    locked = len(robot.legs) < _STANDS_ALONE
+    locked = not stands_alone(robot)
     _ask_whether_it_can(robot, locked=locked)
-    scene, gains, feet = plant(robot), suggest_gains(robot), footholds(robot)
-
-    def stand(*, self_collision: bool) -> "Standing":
-        return stand_still(
-            scene,
-            gains,
-            positions=robot.positions,
-            feet=feet,
-            self_collision=self_collision,
-            joints_locked=locked,
-        )
-
-    standing = stand(self_collision=True)
-    verdict = _verdict(robot, standing)
-    if verdict is None:
+    standing = _stand(robot, locked=locked)
+    verdict = judge(standing)
+    if verdict.stands:
         return
-    severe, what = verdict
-    blame = not locked and _verdict(robot, stand(self_collision=False)) is None
+    blame = not locked and judge(_stand(robot, locked=locked, self_collision=False)).stands
+    severe = verdict.degree
     if locked or len(robot.legs) > _SINGLE:
-        severe = 1
+        severe = min(severe, 1)
     elif blame and _has_hulls(robot):
-        severe -= 1
+        severe = max(severe - 1, 0)
     held = "with its joints locked" if locked else "held by its motors"
     yield Defect(
         subject=robot.model.title,
         source=robot.model.source,
         severity=_SEVERITIES[severe],
         certainty="likely",
-        message=f"{held} at its standing pose, {what}"
+        message=f"{held} at its standing pose, {', '.join(verdict.faults)}"
         + ("; without self-collision it stands" if blame else ""),
         hint=_OVERLAPS if blame else "",
-        measured={
-            "tilt": round(standing.tilt, 4),
-            "sink": round(standing.sink, 4),
-            "drift": round(standing.drift, 4),
-            "saturation": round(standing.saturation, 3),
-            "touching": len(standing.touching),
-        },
+        measured=_numbers(standing),
     )
+
+
+def _stand(robot: Facts, *, locked: bool, self_collision: bool = True) -> "Standing":
+    from terrainkit_robots.simulation.gains import suggest_gains
+    from terrainkit_robots.simulation.plant import plant
+    from terrainkit_robots.simulation.standing import footholds, stand_still
+
+    return stand_still(
+        plant(robot),
+        suggest_gains(robot),
+        positions=robot.positions,
+        feet=footholds(robot),
+        self_collision=self_collision,
+        joints_locked=locked,
+    )
+
+
+def _numbers(standing: "Standing") -> Measured:
+    return {
+        "tilt": round(standing.tilt, 4),
+        "sink": round(standing.sink, 4),
+        "drift": round(standing.drift, 4),
+        "saturation": round(standing.saturation, 3),
+        "touching": len(standing.touching),
+        "lifted": len(standing.lifted),
+    }
 
 
 def _ask_whether_it_can(robot: Facts, *, locked: bool) -> None:
@@ -194,47 +203,6 @@ def _ask_whether_it_can(robot: Facts, *, locked: bool) -> None:
         joint = robot.bodies[index].joint
         if joint is not None and joint.moves and joint.mimic is None and joint.name not in driven:
             raise CannotCheckError(f"no motor drives {joint.name} of a leg, so it cannot be held")
-
-
-def _verdict(robot: Facts, standing: "Standing") -> tuple[int, str] | None:
-    """Return how bad it is that a robot stood like this, up to 2, and why; None if it is not."""
-    length = min(leg.length for leg in robot.legs)
-    if standing.blew_up:
-        return 2, f"its state blew up after {standing.seconds:.2f} s"
-    most = math.degrees(_TILTED)
-    found = [
-        text
-        for much, text in (
-            (
-                standing.tilt > _TILTED,
-                f"it tilts by {math.degrees(standing.tilt):.0f} degrees; wanted at most {most:.0f}",
-            ),
-            (
-                standing.sink > _SUNK * length,
-                f"its base sinks by {standing.sink:.3f} m; wanted at most {_SUNK * length:.3f}",
-            ),
-            (
-                standing.drift > _DRIFTED * length,
-                f"it drifts by {standing.drift:.3f} m; wanted at most {_DRIFTED * length:.3f}",
-            ),
-            (bool(standing.touching), _touching(standing)),
-            (
-                standing.saturation > _SATURATED,
-                f"{standing.saturated} gives {standing.saturation:.0%} of its effort; wanted at "
-                f"most {_SATURATED:.0%}",
-            ),
-        )
-        if much
-    ]
-    down = standing.tilt > _FALLEN or standing.sink > _COLLAPSED * length
-    return (1 + down, ", ".join(found)) if found else None
-
-
-def _touching(standing: "Standing") -> str:
-    count = len(standing.touching)
-    more = f" and {count - 4} more" if count > 4 else ""
-    touch = "touches" if count == 1 else "touch"
-    return f"{', '.join(standing.touching[:4])}{more} {touch} the ground; wanted feet alone"
 
 
 @rule("DYN003", "short-reach", "info", needs=("simulation",))
@@ -273,7 +241,8 @@ def short_reach(robot: Facts) -> Iterator[Defect]:
             )
     short = [reach for reach in reaches if reach.share < _SHORT_REACH]
     weak = [reach for reach in reaches if reach.largest_load > reach.effort]
-    told = [*_first_of(short, len(reaches)), *_weakest_of(weak, len(reaches))]
+    total = count(len(reaches), "joint")
+    told = [*_first_of(short, total), *_weakest_of(weak, total)]
     if told:
         yield Defect(
             subject=robot.model.title,
@@ -284,20 +253,26 @@ def short_reach(robot: Facts) -> Iterator[Defect]:
         )
 
 
-def _first_of(short: "list[Reach]", count: int) -> Iterator[str]:
+def _first_of(short: "list[Reach]", total: str) -> Iterator[str]:
     if short:
+        meet = "meets another body before its limits"
+        if len(short) > 1:
+            meet = "meet another body before their limits"
+        worst = _way(min(short, key=lambda reach: reach.share))
         yield (
-            f"{len(short)} of {count} joints meet something before their limits, the others at the "
-            f"default pose; worst {_way(min(short, key=lambda reach: reach.share))}"
+            f"{len(short)} of {total} {meet}, moved one at a time from the default pose; "
+            f"worst {worst}"
         )
 
 
-def _weakest_of(weak: "list[Reach]", count: int) -> Iterator[str]:
+def _weakest_of(weak: "list[Reach]", total: str) -> Iterator[str]:
     if weak:
         worst = max(weak, key=lambda reach: reach.largest_load / reach.effort)
+        them = "it" if len(weak) == 1 else "them"
         yield (
-            f"{len(weak)} of {count} joints cannot lift what hangs from them all the way; worst "
-            f"{worst.joint}, which needs {worst.largest_load:.3g} of {worst.effort:.3g}"
+            f"{len(weak)} of {total} cannot lift what hangs from {them} all the way; worst "
+            f"{worst.joint}, which needs {worst.largest_load:.3g} of {worst.effort:.3g} "
+            f"{worst.units.push}"
         )
 
 
@@ -305,7 +280,8 @@ def _way(reach: "Reach") -> str:
     pair = next(pair for pair in reach.blocked if pair is not None)
     return (
         f"{reach.joint}, which gets from {reach.reached[0]:.2f} to {reach.reached[1]:.2f} of "
-        f"{reach.limits[0]:.2f} to {reach.limits[1]:.2f}: {pair[0]} meets {pair[1]}"
+        f"{reach.limits[0]:.2f} to {reach.limits[1]:.2f} {reach.units.place}: {pair[0]} meets "
+        f"{pair[1]}"
     )
 
 
@@ -328,8 +304,8 @@ def _weak(reach: "Reach") -> str:
     if reach.load <= reach.effort:
         return ""
     return (
-        f"{reach.joint} needs {reach.load:.3g} to hold what hangs from it at the default pose; its "
-        f"effort is {reach.effort:.3g}"
+        f"{reach.joint} needs {reach.load:.3g} {reach.units.push} to hold what hangs from it at "
+        f"the default pose; its effort is {reach.effort:.3g}"
     )
 
 
@@ -351,44 +327,73 @@ def light_joint(robot: Facts) -> Iterator[Defect]:
         of 0.01 kg m2 is what Unitree's MJCF has.
     """
     from terrainkit_robots.simulation.gains import suggest_gains
-    from terrainkit_robots.simulation.plant import TIME_STEP, plant
-    from terrainkit_robots.simulation.step_size import (
-        joint_inertias,
-        longest_step,
-        stable_stiffness,
-    )
+    from terrainkit_robots.simulation.plant import plant
+    from terrainkit_robots.simulation.step_size import longest_step
 
     scene, gains = plant(robot), suggest_gains(robot)
-    inertias = joint_inertias(scene)
     declared = {name: float(scene.model.joint(name).armature[0]) for name in gains}
-    light = {
-        name: stable_stiffness(inertias[name].free) / gain.stiffness
-        for name, gain in gains.items()
-        if gain.armature > declared[name] and gain.stiffness > 0
-    }
+    light = _light(scene, gains, declared)
     if not light:
         return
-    lightest = min(light, key=lambda name: light[name])
+    lightest = min(light, key=lambda name: light[name].share)
     bare = {name: replace(gain, armature=declared[name]) for name, gain in gains.items()}
-    step = longest_step(scene, bare)
+    step = longest_step(scene, bare).seconds
     legged = {joint.name for leg in robot.legs for joint in leg.joints}
-    feather = lightest in legged and light[lightest] < _FEATHER
-    inertia, gain = inertias[lightest].free, gains[lightest]
+    feather = lightest in legged and light[lightest].share < _FEATHER
     yield Defect(
         subject=lightest,
         source=next((j.source for j in robot.joints if j.name == lightest), robot.model.source),
         severity="warning" if feather else "info",
         certainty="likely",
-        message=(
-            f"{lightest} turns {inertia:.2g} kg m2, so that explicit PD of kp {gain.stiffness:g} "
-            f"and kd {gain.damping:g} is stable up to {1000 * step.seconds:.2g} ms; wanted twice "
-            f"training's {1000 * TIME_STEP:g} ms: an armature of {gain.armature:g} kg m2 is "
-            f"suggested, and one for {len(light)} joints in all"
-        ),
+        message=_answers_too_fast(scene, gains[lightest], light[lightest], step, len(light) - 1),
         measured={
-            "inertia": inertia,
-            "stable_step": step.seconds,
-            "armature": gain.armature,
+            "inertia": light[lightest].inertia,
+            "stable_step": step,
+            "armature": gains[lightest].armature,
             "joints": len(light),
         },
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Light:
+    """A joint that is suggested more armature than it has."""
+
+    joint: str
+    inertia: float
+    share: float
+    """Of the stiffness it needs, what it bears without."""
+
+
+def _light(
+    scene: "Plant", gains: "Mapping[str, Gain]", declared: Mapping[str, float]
+) -> dict[str, _Light]:
+    """Return the joints that are too light, by name."""
+    from terrainkit_robots.simulation.step_size import joint_inertias, stable_stiffness
+
+    inertias = joint_inertias(scene)
+    return {
+        name: _Light(
+            joint=name,
+            inertia=inertias[name].free,
+            share=stable_stiffness(inertias[name].free) / gain.stiffness,
+        )
+        for name, gain in gains.items()
+        if gain.armature > declared[name] and gain.stiffness > 0
+    }
+
+
+def _answers_too_fast(scene: "Plant", gain: "Gain", light: _Light, step: float, others: int) -> str:
+    """Return what is wrong with a light joint, what it needs, and how many others do."""
+    from terrainkit_robots.simulation.plant import TIME_STEP
+    from terrainkit_robots.simulation.units import SLIDING, units_of
+
+    units = units_of(scene, light.joint)
+    moves = "moves" if units == SLIDING else "turns"
+    return (
+        f"{light.joint} {moves} {light.inertia:.2g} {units.inertia}, so that explicit PD of kp "
+        f"{gain.stiffness:g} and kd {gain.damping:g} is stable up to {1000 * step:.2g} ms; wanted "
+        f"twice training's {1000 * TIME_STEP:g} ms: an armature of {gain.armature:g} "
+        f"{units.inertia} is suggested"
+        + (f", and one for {count(others, 'other joint')}" if others else "")
     )

@@ -265,17 +265,12 @@ def _lacking(joint: Joint, mjcf: bool) -> str:
     if len(missing) == 2:
         return "" if mjcf else "has neither lower nor upper"
     if lower == upper:
-        return f"has lower = upper = {lower:g} {position_unit(joint)}"
+        return f"has lower = upper = {lower:g} {joint.unit}"
     if not missing or lower > upper:
         return ""  # JNT007
     there = "upper" if missing == ["lower"] else "lower"
-    end = f"{getattr(limit, there):g} {position_unit(joint)}"
+    end = f"{getattr(limit, there):g} {joint.unit}"
     return f"has {there} = {end} but no {missing[0]}, and so no limit in MuJoCo"
-
-
-def position_unit(joint: Joint) -> str:
-    """Return the unit of where a joint is."""
-    return "m" if joint.kind == "prismatic" else "rad"
 
 
 def _ends(limit: Limit) -> tuple[float, float]:
@@ -306,7 +301,7 @@ def inverted_limit(robot: Facts) -> Iterator[Defect]:
                 subject=joint.name,
                 source=joint.limit.source,
                 message=f"the limits of joint {joint.name} are {lower:g} to {upper:g} "
-                f"{position_unit(joint)}; wanted lower below upper",
+                f"{joint.unit}; wanted lower below upper",
                 measured={"lower": lower, "upper": upper},
             )
 
@@ -362,7 +357,7 @@ def no_effort(robot: Facts) -> Iterator[Defect]:
             yield Defect(
                 subject=joint.name,
                 source=joint.limit.source,
-                message=f"the effort of joint {joint.name} is {effort:g} {effort_unit(joint)}; "
+                message=f"the effort of joint {joint.name} is {effort:g} {joint.effort_unit}; "
                 "wanted what its motor can give",
                 measured={"effort": effort},
             )
@@ -372,7 +367,7 @@ def no_effort(robot: Facts) -> Iterator[Defect]:
                 source=joint.limit.source,
                 severity="warning",
                 message=f"the limit of joint {joint.name} has no effort; wanted what its motor "
-                f"can give [{effort_unit(joint)}]",
+                f"can give [{joint.effort_unit}]",
             )
 
 
@@ -391,16 +386,6 @@ def _is_blank(joint: Joint) -> bool:
     assert limit is not None
     numbers = (limit.lower, limit.upper, limit.effort, limit.velocity)
     return joint.kind != "continuous" and not any(numbers)
-
-
-def effort_unit(joint: Joint) -> str:
-    """Return the unit of what a joint gives."""
-    return "N" if joint.kind == "prismatic" else "N m"
-
-
-def speed_unit(joint: Joint) -> str:
-    """Return the unit of how fast a joint moves."""
-    return "m/s" if joint.kind == "prismatic" else "rad/s"
 
 
 @rule("JNT010", "no-velocity", "warning")
@@ -424,12 +409,12 @@ def no_velocity(robot: Facts) -> Iterator[Defect]:
             continue
         if speed is None and unread.has(joint.name, "velocity"):
             continue
-        what = "not given" if speed is None else f"{speed:g} {speed_unit(joint)}"
+        what = "not given" if speed is None else f"{speed:g} {joint.speed_unit}"
         yield Defect(
             subject=joint.name,
             source=joint.limit.source,
             message=f"the velocity of joint {joint.name} is {what}; wanted what its motor reaches "
-            f"[{speed_unit(joint)}]",
+            f"[{joint.speed_unit}]",
         )
 
 
@@ -456,8 +441,8 @@ def placeholder_limit(robot: Facts) -> Iterator[Defect]:
         assert joint.limit is not None
         fastest = _NO_SPIN if joint.kind == "continuous" else _NO_SPEED
         for name, number, limit, unit in (
-            ("effort", joint.limit.effort, most[effort_unit(joint)], effort_unit(joint)),
-            ("velocity", joint.limit.velocity, fastest, speed_unit(joint)),
+            ("effort", joint.limit.effort, most[joint.effort_unit], joint.effort_unit),
+            ("velocity", joint.limit.velocity, fastest, joint.speed_unit),
         ):
             if number is not None and (number > limit or (name == "effort" and number == limit)):
                 yield Defect(
@@ -492,7 +477,7 @@ def zero_outside_limits(robot: Facts) -> Iterator[Defect]:
             subject=first.name,
             source=first.limit.source,
             message=f"zero is outside the limits of {names(joint.name for joint in started)}, "
-            f"which for {first.name} are {lower:.5g} to {upper:.5g} {position_unit(first)}; there "
+            f"which for {first.name} are {lower:.5g} to {upper:.5g} {first.unit}; there "
             "is a pose to start from",
             measured={"joints": len(started), "lower": lower, "upper": upper},
         )
@@ -505,7 +490,7 @@ def zero_outside_limits(robot: Facts) -> Iterator[Defect]:
                 source=joint.limit.source,
                 severity="warning",
                 message=f"the limits of joint {joint.name} are {lower:.5g} to {upper:.5g} "
-                f"{position_unit(joint)}; wanted {joint.reference:g} between them, or a pose to "
+                f"{joint.unit}; wanted {joint.reference:g} between them, or a pose to "
                 "start from",
                 measured={"lower": lower, "upper": upper},
             )
@@ -624,7 +609,7 @@ def too_weak(robot: Facts) -> Iterator[Defect]:
             raise CannotCheckError(f"how {defect.subject} moves is in doubt")
     sure = any(leg.limb.words for leg in robot.legs)
     for joint, torque, effort in weak:
-        share, unit = torque / effort, effort_unit(joint)
+        share, unit = torque / effort, joint.effort_unit
         yield Defect(
             subject=joint.name,
             source=joint.limit.source if joint.limit else joint.source,

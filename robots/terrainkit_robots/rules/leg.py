@@ -14,7 +14,6 @@ from terrainkit_robots.fix import Fix, SetAttribute
 from terrainkit_robots.leg.legs import Leg
 from terrainkit_robots.leg.limbs import Limb
 from terrainkit_robots.leg.stance import Stance
-from terrainkit_robots.model import Joint
 from terrainkit_robots.rule import CannotCheckError, Defect, rule
 from terrainkit_robots.spec.per_joint import match_joints
 from terrainkit_robots.spec.robot_spec import RobotSpec
@@ -450,7 +449,7 @@ def spec_reset_range(robot: Facts) -> Iterator[Defect]:
     if not outside:
         return
     worst = max(outside, key=lambda name: outside[name])
-    listed = names(f"{name} by {over:.3g} {_unit(found[name])}" for name, over in outside.items())
+    listed = names(f"{name} by {over:.3g} {found[name].unit}" for name, over in outside.items())
     lower, upper = spec.reset_range
     yield Defect(
         subject=worst,
@@ -461,7 +460,3 @@ def spec_reset_range(robot: Facts) -> Iterator[Defect]:
         ),
         measured={"joints": len(outside), "farthest": round(outside[worst], 5)},
     )
-
-
-def _unit(joint: Joint) -> str:
-    return "m" if joint.kind == "prismatic" else "rad"

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator, Sequence
 
+from terrainkit_robots.body.joint_order import permutation
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.rule import CannotCheckError, Defect, rule
 from terrainkit_robots.simulators.armature import GENESIS_ARMATURE, moved_by_joints
@@ -16,7 +17,6 @@ from terrainkit_robots.simulators.loading import (
 from terrainkit_robots.simulators.orders import (
     SimulatorOrder,
     file_order,
-    permutation,
     simulator_orders,
 )
 from terrainkit_robots.wording import names, short
@@ -64,7 +64,7 @@ def joint_orders(robot: Facts) -> Iterator[Defect]:
     if not others:
         return
     same = [name for name in SIMULATORS if name not in {order.simulator for order in others}]
-    told = "; ".join(_order(order, permutation(file, order.joints)) for order in others)
+    told = "; ".join(_order(order, file) for order in others)
     rest = f"; {_listed(same)} as the file" if same else ""
     yield Defect(
         subject=robot.model.title,
@@ -75,8 +75,11 @@ def joint_orders(robot: Facts) -> Iterator[Defect]:
     )
 
 
-def _order(order: SimulatorOrder, places: list[int]) -> str:
+def _order(order: SimulatorOrder, file: Sequence[str]) -> str:
     doubt = "" if order.certain else " (to be verified)"
+    places = permutation(file, order.joints)
+    if places is None:
+        raise CannotCheckError("two joints have one name")
     if len(places) > _MOST_SHOWN:
         return f"{order.simulator}{doubt} another order of all {len(places)}"
     return f"{order.simulator}{doubt} {places}"

@@ -26,10 +26,7 @@ from terrainkit_robots.rules.inr import (
     triangle_inequality,
 )
 from terrainkit_robots.rules.jnt import (
-    effort_unit,
     placeholder_limit,
-    position_unit,
-    speed_unit,
     unknown_type,
     wide_range,
     zero_axis,
@@ -315,7 +312,7 @@ def limits_differ(robot: Facts) -> Iterator[Defect]:
             continue  # the axis is what is wrong
         odd, other = odd_one_first(robot, left, right, _sizes_of_limits)
         own, its = (a, b) if odd is left else (b, a)
-        unit = position_unit(odd.joint)
+        unit = odd.joint.unit
         wanted = "the same" if pair.sign > 0 else "the same with exchanged signs"
         alike = "equal" if pair.sign > 0 else "opposite"
         yield _differ(
@@ -353,9 +350,9 @@ def strength_differs(robot: Facts) -> Iterator[Defect]:
     """
     told = _Told(robot, placeholder_limit)
     for _, left, right in twins(robot):
-        for name, of, unit_of in (
-            ("effort", effort_of, effort_unit),
-            ("velocity", _velocity_of, speed_unit),
+        for name, of in (
+            ("effort", effort_of),
+            ("velocity", _velocity_of),
         ):
             a, b = of(robot, left.joint), of(robot, right.joint)
             if a is None or b is None or min(a, b) <= 0 or not _apart(a, b, _STRENGTH):
@@ -369,7 +366,7 @@ def strength_differs(robot: Facts) -> Iterator[Defect]:
 
             odd, other = odd_one_first(robot, left, right, value)
             own, its = (b, a) if odd is right else (a, b)
-            unit = unit_of(odd.joint)
+            unit = odd.joint.effort_unit if name == "effort" else odd.joint.speed_unit
             yield _differ(
                 odd,
                 other,
@@ -454,7 +451,7 @@ def joint_axis_differs(robot: Facts) -> Iterator[Defect]:
                 left,
                 f"turns about {_axis(right.axis)}, the other way than {{other}}, which turns about "
                 f"{_axis(left.axis)} in the frame of the trunk, and yet its limits are "
-                f"{_written(b)} {position_unit(right.joint)}, those of the other {_written(a)}; "
+                f"{_written(b)} {right.joint.unit}, those of the other {_written(a)}; "
                 "wanted its axis or its limits turned around",
                 {"lower": b[0], "upper": b[1], "other_lower": a[0], "other_upper": a[1]},
                 right.joint.axis_source or right.joint.source,

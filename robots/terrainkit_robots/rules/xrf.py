@@ -7,13 +7,13 @@ from typing import TypeVar
 
 import numpy as np
 
-from terrainkit_robots.comparison.body_masses import body_gap, dropped_mass, is_known, share
-from terrainkit_robots.comparison.joint_order import (
+from terrainkit_robots.body.joint_order import (
     actuator_order,
     is_moved,
     permutation,
     tree_order,
 )
+from terrainkit_robots.comparison.body_masses import body_gap, dropped_mass, is_known, share
 from terrainkit_robots.comparison.kinematics import (
     ANGLE,
     DISTANCE,
@@ -26,7 +26,6 @@ from terrainkit_robots.leg.effort import effort_of
 from terrainkit_robots.model import Joint, Matrix, Mimic, Source
 from terrainkit_robots.per_robot import per_robot
 from terrainkit_robots.rule import CannotCheckError, Defect, Severity, rule
-from terrainkit_robots.rules.jnt import effort_unit, position_unit, speed_unit
 from terrainkit_robots.wording import names, short
 
 _AXIS = 0.01
@@ -286,7 +285,7 @@ def limits_differ(robot: Facts) -> Iterator[Defect]:
     alike = [(a, b) for a, b in _joints(robot) if _alike(robot, a, b)]
     for group in _grouped(alike, _range_gap):
         one, other = group[0]
-        unit = position_unit(one)
+        unit = one.unit
         yield _joints_defect(
             group,
             f"{_range(one, unit)} here and {_range(other, unit)} in {there}; wanted the same to "
@@ -298,8 +297,8 @@ def limits_differ(robot: Facts) -> Iterator[Defect]:
         assert other.limit is not None
         yield _joints_defect(
             group,
-            f"velocity {one.limit.velocity:.6g} {speed_unit(one)} here and "
-            f"{other.limit.velocity:.6g} {speed_unit(one)} in {there}; wanted the same to "
+            f"velocity {one.limit.velocity:.6g} {one.speed_unit} here and "
+            f"{other.limit.velocity:.6g} {one.speed_unit} in {there}; wanted the same to "
             f"{_STRENGTH:.0%}",
         )
 
@@ -480,7 +479,7 @@ def effort_differs(robot: Facts) -> Iterator[Defect]:
         return None if bool(a) == bool(b) else (bool(a),)
 
     for group in _grouped(alike, gap):
-        one, unit = group[0][0], effort_unit(group[0][0])
+        one, unit = group[0][0], group[0][0].effort_unit
         a, b = (effort or 0.0 for effort in efforts[one.name])
         yield _joints_defect(
             group,

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from terrainkit_robots.comparison.joint_order import actuator_order, is_moved, permutation
+from terrainkit_robots.body.joint_order import actuator_order, is_moved, permutation
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.leg.effort import effort_of
 from terrainkit_robots.model import Joint
@@ -253,17 +253,13 @@ def spec_pose(robot: Facts) -> Iterator[Defect]:
         over, side = max((position - limits[1], "upper"), (limits[0] - position, "lower"))
         if over <= _SLACK:
             continue
-        unit = _unit(found[name])
+        unit = found[name].unit
         limit = limits[1] if side == "upper" else limits[0]
         message = (
             f"default_pose has {short(name)} at {position:.4g} {unit}, {over:.3g} {unit} outside "
             f"of its {side} limit of {limit:.4g} {unit}"
         )
         yield _at(robot, name, message, {"position": position, "limit": limit})
-
-
-def _unit(joint: Joint) -> str:
-    return "m" if joint.kind == "prismatic" else "rad"
 
 
 @rule("XRF016", "spec-motor-limits", "warning", needs=("spec",))
@@ -278,21 +274,26 @@ def spec_motor_limits(robot: Facts) -> Iterator[Defect]:
     Source:
         Limits of the description, and the force ranges of a MJCF's actuators.
     """
-    yield from _stronger(robot, "effort", lambda j: effort_of(robot, j), ("N m", "N"))
-    yield from _stronger(
-        robot, "velocity", lambda j: j.limit.velocity if j.limit else None, ("rad/s", "m/s")
-    )
+    yield from _stronger(robot, "effort", lambda j: effort_of(robot, j), lambda j: j.effort_unit)
+    yield from _stronger(robot, "velocity", _velocity_of, lambda j: j.speed_unit)
+
+
+def _velocity_of(joint: Joint) -> float | None:
+    return joint.limit.velocity if joint.limit else None
 
 
 def _stronger(
-    robot: Facts, table: str, declared: Callable[[Joint], float | None], units: tuple[str, str]
+    robot: Facts,
+    table: str,
+    declared: Callable[[Joint], float | None],
+    unit_of: Callable[[Joint], str],
 ) -> Iterator[Defect]:
     found = {joint.name: joint for joint in robot.actuated}
     for name, value in match_joints(getattr(_spec(robot), table), _joints(robot)).values.items():
         limit = declared(found[name])
         if limit is None or limit <= 0 or value <= _MORE * limit:
             continue
-        unit = units[found[name].kind == "prismatic"]
+        unit = unit_of(found[name])
         message = (
             f"{table} of {short(name)} is {value:.4g} {unit} in the spec, {value / limit:.3g} "
             f"times the {limit:.4g} {unit} of {robot.model.file.name}"

@@ -25,8 +25,8 @@ from terrainkit_robots.simulation.stiffness import (
     effort_in,
     leg_wish,
     other_wish,
-    slides,
 )
+from terrainkit_robots.simulation.units import TURNING, Units, units_of
 
 _QUICKEST = 20.0
 """Stiffness over damping, at least [1/s]: a joint that is damped more comes back too slowly."""
@@ -78,10 +78,10 @@ def suggest_gains(facts: Facts) -> Mapping[str, Gain]:
     for wish in _shared(leg_wishes):
         found |= dict.fromkeys(wish.joints, _gain(wish, wish.inertia))
     # Joints of arms that are equally stiff are damped alike.
-    alike: dict[tuple[float, float], list[Wish]] = defaultdict(list)
+    alike: dict[tuple[float, float, Units], list[Wish]] = defaultdict(list)
     for joints in rest.values():
         wish = other_wish(scene, inertias, joints)
-        alike[_rounded(wish.stiffness), wish.armature].append(wish)
+        alike[_rounded(wish.stiffness), wish.armature, wish.units].append(wish)
     for wishes in alike.values():
         lightest = min(wish.inertia for wish in wishes)
         for wish in wishes:
@@ -94,7 +94,7 @@ def _gain(wish: Wish, inertia: float) -> Gain:
     critical = 2 * math.sqrt(wish.stiffness * inertia)
     most = wish.stiffness / _QUICKEST
     reason = f"kp {wish.reason}; kd " + (
-        f"critical on the lightest inertia of such joints, {inertia:.2g} kg m2"
+        f"critical on the lightest inertia of such joints, {inertia:.2g} {wish.units.inertia}"
         if critical <= most
         else f"kp / {_QUICKEST:g}, less than critical, so that the joint is quick"
     )
@@ -211,7 +211,7 @@ def _wheels(facts: Facts, scene: Plant) -> frozenset[str]:
         if name in bodies
         and name not in legs
         and not scene.model.joint(name).limited[0]
-        and not slides(scene, name)
+        and units_of(scene, name) == TURNING
         and is_wheel(facts, bodies[name])
     )
 

@@ -4,6 +4,7 @@ It is compiled from what was read, not from the file, so that a robot can be sim
 does not load as it stands: with paths of packages, COLLADA meshes, or without a free joint.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -20,8 +21,9 @@ from terrainkit_robots.model import Geometry, Inertial, Link, RobotModel
 from terrainkit_robots.per_robot import per_robot
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rule import CannotCheckError
+from terrainkit_robots.wording import short
 from terrainkit_robots.writing.drive import Drive
-from terrainkit_robots.writing.mjcf_text import Extras, mjcf_text
+from terrainkit_robots.writing.mjcf_text import Extras, floor_text, mjcf_text
 from terrainkit_robots.writing.normal_form import normal_form
 
 if TYPE_CHECKING:
@@ -32,10 +34,6 @@ _MOST_BODIES = 300
 
 _HULL_CORNERS = 64
 """Corners of a collision mesh's hull; more cost time at every contact, and change little."""
-
-_FLOOR = (
-    '<geom name="floor" type="plane" size="0 0 1" contype="2147483647" conaffinity="2147483647"/>'
-)
 
 _PRIMITIVES = frozenset({"box", "sphere", "cylinder", "capsule", "ellipsoid"})
 
@@ -102,12 +100,20 @@ def plant(facts: Facts) -> Plant:
     try:
         compiled = _compile(model, extras, assets)
     except ValueError as error:
-        reason = " ".join(str(error).split())
         try:
             compiled = _compile(_lumped(model), extras, assets)
         except ValueError:
+            reason = _reason(str(error))
             raise CannotCheckError(f"MuJoCo does not simulate it: {reason}") from None
     return plant_of(compiled, base=model.links[0].name)
+
+
+def _reason(error: str) -> str:
+    """Return what MuJoCo said on one line, and of which element, but not where in our text."""
+    what, _, where = error.partition("\nElement ")
+    name = re.match(r"name '(.*?)(?:', id -?\d+(?:, line -?\d+)?)?$", where, re.DOTALL)
+    of = f"{short(' '.join(name[1].split()))}: " if name else ""
+    return of + " ".join(what.removeprefix("Error: ").split())
 
 
 def _compile(model: RobotModel, extras: Extras, assets: Mapping[str, bytes]) -> Any:
@@ -115,7 +121,7 @@ def _compile(model: RobotModel, extras: Extras, assets: Mapping[str, bytes]) -> 
 
     text = mjcf_text(model, extras)
     if model.floating:
-        text = text.replace("<worldbody>", f"<worldbody>{_FLOOR}", 1)
+        text = text.replace("<worldbody>", f"<worldbody>{floor_text()}", 1)
     with quiet_mujoco():
         return mujoco.MjModel.from_xml_string(text, assets)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from terrainkit_robots.body.kinematics import body_poses
+from terrainkit_robots.body.rigid import inverse
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rule import CannotCheckError
 from terrainkit_robots.simulation.gains import Gain
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 
 _LOOKS = 4
 """Contacts are looked at every so many steps: 20 ms."""
+
+_END = 0.1
+"""What touches in the last tenth of a second still touches at the end [s]."""
 
 _FOOT_SHARE = 0.3
 """Share of a leg's length around its tip that is still foot, where that is a part of the shank."""
@@ -37,6 +41,12 @@ class Foothold:
     reach: float
     """Distance from there within which it is the foot that touches [m]; infinite for a body that
     is nothing but a foot."""
+
+    foot: str
+    """The link that is the foot of this leg; one leg may have several footholds."""
+
+    leg_length: float
+    """Length of the leg [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,8 +68,14 @@ class Standing:
     drift: float
     """How far the base's origin moved over the ground [m]."""
 
+    leg_length: float
+    """Length of its shortest leg [m]; infinite without footholds."""
+
     touching: tuple[str, ...]
     """Bodies other than feet that touched the ground, in the order of the robot's bodies."""
+
+    lifted: tuple[str, ...]
+    """Feet that did not touch the ground at the end, in the order of the legs."""
 
     saturation: float
     """Largest torque over effort in the second half, in 0..1; 0 if no effort is limited."""
@@ -90,12 +106,20 @@ def footholds(facts: "Facts") -> tuple[Foothold, ...]:
     for leg, contact in zip(facts.legs, facts.stance.contacts, strict=True):
         body = facts.bodies[leg.limb.chain[-1]]
         whole = "knee" in leg.roles[:-1]  # past an ankle there is nothing but foot
-        place = np.linalg.inv(poses[body.index]) @ [*contact, 1.0]
+        place = inverse(poses[body.index]) @ [*contact, 1.0]
         for link, local in zip(body.links, body.poses, strict=True):
             only = whole or (link.name == leg.foot and link is not body.top)
-            x, y, z = (np.linalg.inv(local) @ place)[:3].tolist()
+            x, y, z = (inverse(local) @ place)[:3].tolist()
             reach = math.inf if only else _FOOT_SHARE * leg.length
-            found.append(Foothold(body=link.name, tip=(x, y, z), reach=reach))
+            found.append(
+                Foothold(
+                    body=link.name,
+                    tip=(x, y, z),
+                    reach=reach,
+                    foot=leg.foot,
+                    leg_length=leg.length,
+                )
+            )
     return tuple(found)
 
 
@@ -131,9 +155,9 @@ def stand_still(
             trial.lock()
         qpos = positions_in(plant, positions)
         trial.put(qpos, above=0.0)
-        watch = _Watch(trial, positions, feet)
+        watch = _Watch(trial, positions, feet, seconds)
         for step in trial.steps(seconds):
-            watch.look(step, late=2 * step * trial.model.opt.timestep >= seconds)
+            watch.look(step)
         return watch.result()
 
 
@@ -144,9 +168,11 @@ class _Watch:
     trial: Trial
     positions: Mapping[str, float]
     feet: Sequence[Foothold]
+    seconds: float
     tilt: float = 0.0
     largest_tilt: float = 0.0
     touched: set[int] = field(default_factory=set)
+    standing_on: set[str] = field(default_factory=set)
     steps: int = 0
 
     def __post_init__(self) -> None:
@@ -165,33 +191,37 @@ class _Watch:
             model.body(foot.body).id: foot for foot in self.feet if _has(model, foot.body)
         }
 
-    def look(self, step: int, *, late: bool) -> None:
+    def look(self, step: int) -> None:
         """See how it stands after a step."""
-        data = self.trial.data
+        data, time = self.trial.data, step * float(self.trial.model.opt.timestep)
         self.steps = step + 1
         self.tilt = math.acos(np.clip(self.up @ _up(data.qpos[3:7]), -1.0, 1.0))
         self.largest_tilt = max(self.largest_tilt, self.tilt)
-        if late:
+        if 2 * time >= self.seconds:
             shares = np.abs(data.actuator_force) / self.efforts
             np.maximum(self.shares, shares, out=self.shares)
         if step % _LOOKS == 0:
-            self._touch()
+            self._touch(ending=time >= self.seconds - _END)
 
-    def _touch(self) -> None:
-        """Note which bodies touch the floor with anything but a foot."""
+    def _touch(self, *, ending: bool) -> None:
+        """Note which bodies touch the floor with anything but a foot, and which feet in the end."""
         model, data = self.trial.model, self.trial.data
         pairs = model.geom_bodyid[data.contact.geom]
         for contact in np.flatnonzero((pairs == 0).any(axis=1)):
             body = int(pairs[contact].max())
             foot = self.holds.get(body)
-            if foot is not None and math.isinf(foot.reach):
-                continue
-            if foot is not None:
-                turn = data.xmat[body].reshape(3, 3)
-                tip = data.xpos[body] + turn @ foot.tip
-                if np.linalg.norm(data.contact.pos[contact] - tip) <= foot.reach:
-                    continue
-            self.touched.add(body)
+            if foot is None or not self._within(foot, body, data.contact.pos[contact]):
+                self.touched.add(body)
+            elif ending:
+                self.standing_on.add(foot.foot)
+
+    def _within(self, foot: Foothold, body: int, place: Any) -> bool:
+        """Return whether a place on a body is a part of its foot."""
+        if math.isinf(foot.reach):
+            return True
+        data = self.trial.data
+        tip = data.xpos[body] + data.xmat[body].reshape(3, 3) @ foot.tip
+        return bool(np.linalg.norm(place - tip) <= foot.reach)
 
     def result(self) -> Standing:
         """Return what was seen."""
@@ -200,13 +230,16 @@ class _Watch:
         moved = data.qpos[:3] - self.start
         most = int(np.argmax(self.shares)) if len(self.shares) else 0
         share = float(self.shares[most]) if len(self.shares) else 0.0
+        feet = dict.fromkeys(hold.foot for hold in self.holds.values())
         return Standing(
             tilt=self.tilt,
             largest_tilt=self.largest_tilt,
             height=float(data.qpos[2]),
             sink=-float(moved[2]),
             drift=float(np.hypot(moved[0], moved[1])),
+            leg_length=min((foot.leg_length for foot in self.feet), default=math.inf),
             touching=tuple(trial.model.body(body).name for body in sorted(self.touched)),
+            lifted=tuple(foot for foot in feet if foot not in self.standing_on),
             saturation=share,
             saturated=trial.plant.drives[most] if share > 0 else "",
             joint_error=float(error.max(initial=0.0)),

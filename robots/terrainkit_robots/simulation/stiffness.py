@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from terrainkit_robots.facts import Facts
-from terrainkit_robots.leg.stance import GRAVITY
+from terrainkit_robots.leg.stance import GRAVITY, stands_alone
 from terrainkit_robots.rule import CannotCheckError
 from terrainkit_robots.simulation.plant import TIME_STEP, Plant
 from terrainkit_robots.simulation.step_size import (
@@ -19,6 +19,7 @@ from terrainkit_robots.simulation.step_size import (
     needed_inertia,
     stable_stiffness,
 )
+from terrainkit_robots.simulation.units import SLIDING, Units, units_of
 
 Inertias = Mapping[str, JointInertia]
 """Inertia of each joint in the standing pose, by name."""
@@ -33,9 +34,6 @@ it on all robots; a stiffer leg saturates in every step."""
 
 _FULL_EFFORT = 0.5
 """The same for arms, hands and waists, which are to be where they are told [rad]."""
-
-_STANDS_ALONE = 3
-"""Robots with so many legs stand by the springs of their joints; those with fewer balance."""
 
 _SAG_LEG = 0.09
 """How far a joint may give way in the standing pose [rad]. Legs that are bent bend on as they sag:
@@ -72,6 +70,9 @@ class Wish:
     armature: float
     """What is declared, or suggested."""
 
+    units: Units
+    """What the numbers of the joints are in."""
+
     too_light: bool = False
     """Whether the armature is suggested."""
 
@@ -84,43 +85,47 @@ class _Need:
     why: str
 
     error: float
-    """Error at which the joint gives all of its effort, at least [rad]."""
+    """Error at which the joint gives all of its effort, at least [rad]; of one that slides, divided
+    by the lever."""
 
 
 def leg_wish(facts: Facts, scene: Plant, inertias: Inertias, joints: Sequence[str]) -> Wish:
-    """Return what joints of legs need that are for the same."""
+    """Return what joints of legs need that are for the same, and all turn or all slide."""
     count = len(facts.legs)
     weight = float(scene.model.body_subtreemass[0]) * GRAVITY
     length = float(np.mean([leg.length for leg in facts.legs]))
-    if slides(scene, joints[0]):
-        sinking = weight / count / (_SAG_LEG * length)
-        why = f"to sink in by {_SAG_LEG:.0%} of the leg under the weight = {sinking:.3g}"
-        return _wish(
-            scene, inertias, joints, [_Need(stiffness=sinking, why=why, error=_FULL_EFFORT)]
-        )
-    upright = _UPRIGHT * weight * length / count
-    why = f"{_UPRIGHT:g} x weight x leg length / {count} legs = {upright:.3g}"
-    needs = [_Need(stiffness=upright, why=why, error=_FULL_EFFORT_LEG)]
-    if facts.stance is not None and count >= _STANDS_ALONE:
-        held = max((abs(torque) for torque in facts.stance.torques.values()), default=0.0)
-        why = f"to hold {held:.2g} N m in the standing pose within {_SAG_LEG:g} rad"
-        needs.append(
-            _Need(
-                stiffness=held / _SAG_LEG,
-                why=f"{why} = {held / _SAG_LEG:.3g}",
-                error=_FULL_EFFORT_HOLDING,
-            )
-        )
+    units = units_of(scene, joints[0])
+    if units == SLIDING:
+        needed = weight / count / (_SAG_LEG * length)
+        why = f"to sink in by {_SAG_LEG:.0%} of the leg under the weight = {needed:.3g}"
+        needs = [_Need(stiffness=needed, why=why, error=_FULL_EFFORT)]
+    else:
+        needed = _UPRIGHT * weight * length / count
+        why = f"{_UPRIGHT:g} x weight x leg length / {count} legs = {needed:.3g}"
+        needs = [_Need(stiffness=needed, why=why, error=_FULL_EFFORT_LEG)]
+    if facts.stance is not None and stands_alone(facts):
+        needs.append(_holding(facts.stance.torques, scene, units))
     return _wish(scene, inertias, joints, needs)
+
+
+def _holding(torques: Mapping[str, float], scene: Plant, units: Units) -> _Need:
+    """Return what the standing pose asks of joints with these units: as much as of the worst."""
+    alike = (name for name in torques if units_of(scene, name) == units)
+    held = max((abs(torques[name]) for name in alike), default=0.0)
+    sag = _SAG_LEG * _lever(units)
+    why = f"to hold {held:.2g} {units.push} in the standing pose within {sag:g} {units.place}"
+    stiffness = held / sag
+    return _Need(stiffness=stiffness, why=f"{why} = {stiffness:.3g}", error=_FULL_EFFORT_HOLDING)
 
 
 def other_wish(scene: Plant, inertias: Inertias, joints: Sequence[str]) -> Wish:
     """Return what a joint needs that is none of a leg, and its mirror image."""
-    sliding = slides(scene, joints[0])
-    sag, force, shift = (_SAG * _LEVER, "N", "m") if sliding else (_SAG, "N m", "rad")
+    units = units_of(scene, joints[0])
+    sag = _SAG * _lever(units)
     held = max(_gravity(scene, name) for name in joints)
     brisk = _BANDWIDTH**2 * max(inertias[name].locked for name in joints)
-    holding = f"to hold its own {held:.2g} {force} within {sag:g} {shift} = {held / sag:.3g}"
+    load = f"{held:.2g} {units.push}"
+    holding = f"to hold its own {load} within {sag:g} {units.place} = {held / sag:.3g}"
     turning = f"for a natural frequency of {_BANDWIDTH:g} rad/s = {brisk:.3g}"
     needs = [
         _Need(stiffness=held / sag, why=holding, error=_FULL_EFFORT),
@@ -129,11 +134,9 @@ def other_wish(scene: Plant, inertias: Inertias, joints: Sequence[str]) -> Wish:
     return _wish(scene, inertias, joints, needs)
 
 
-def slides(scene: Plant, name: str) -> bool:
-    """Return whether a joint slides, and does not turn."""
-    import mujoco
-
-    return int(scene.model.joint(name).type[0]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
+def _lever(units: Units) -> float:
+    """Return by what to multiply an angle to have what is said of a joint [m/rad], or 1."""
+    return _LEVER if units == SLIDING else 1.0
 
 
 def effort_in(scene: Plant, name: str) -> float:
@@ -146,8 +149,8 @@ def effort_in(scene: Plant, name: str) -> float:
 def _wish(scene: Plant, inertias: Inertias, joints: Sequence[str], needs: Sequence[_Need]) -> Wish:
     """Return the most that is needed, as far as the motor and the time step bear it."""
     effort = min(effort_in(scene, name) for name in joints)
-    lever = _LEVER if slides(scene, joints[0]) else 1.0
-    needed, why = max(_within_effort(need, effort, lever) for need in needs)
+    units = units_of(scene, joints[0])
+    needed, why = max(_within_effort(need, effort, units) for need in needs)
     if not math.isfinite(needed):
         raise CannotCheckError(f"what {joints[0]} carries is too heavy for any number")
     inertia = min(inertias[name].free for name in joints)
@@ -159,22 +162,26 @@ def _wish(scene: Plant, inertias: Inertias, joints: Sequence[str], needs: Sequen
         inertia, armature = inertia + more, armature + more
     elif borne < needed:
         needed = borne
-        why = f"what a time step of {1000 * TIME_STEP:g} ms bears at {inertia:.2g} kg m2"
+        borne_by = f"{inertia:.2g} {units.inertia}"
+        why = f"what a time step of {1000 * TIME_STEP:g} ms bears at {borne_by}"
     return Wish(
         joints=tuple(joints),
         stiffness=needed,
         reason=why,
         inertia=inertia,
         armature=armature,
+        units=units,
         too_light=too_light,
     )
 
 
-def _within_effort(need: _Need, effort: float, lever: float) -> tuple[float, str]:
-    most = effort / (need.error * lever)
+def _within_effort(need: _Need, effort: float, units: Units) -> tuple[float, str]:
+    error = need.error * _lever(units)
+    most = effort / error
     if need.stiffness <= most:
         return need.stiffness, need.why
-    return most, f"all of its effort of {effort:.3g} at an error of {need.error * lever:g}"
+    all_of_it = f"all of its effort of {effort:.3g} {units.push}"
+    return most, f"{all_of_it} at an error of {error:g} {units.place}"
 
 
 def _gravity(scene: Plant, name: str) -> float:
@@ -184,7 +191,7 @@ def _gravity(scene: Plant, name: str) -> float:
     """
     model = scene.model
     body = int(model.joint(name).bodyid[0])
-    if slides(scene, name):
+    if units_of(scene, name) == SLIDING:
         return float(model.body_subtreemass[body]) * GRAVITY
     reach = {body: float(np.linalg.norm(model.joint(name).pos))}
     total = 0.0

@@ -14,6 +14,7 @@ from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.plant import Plant
 from terrainkit_robots.simulation.stiffness import effort_in
 from terrainkit_robots.simulation.trial import Trial
+from terrainkit_robots.simulation.units import Units, units_of
 
 _PLACES = 40
 """Places over the range of a joint."""
@@ -27,6 +28,9 @@ class Reach:
     """How far a joint gets."""
 
     joint: str
+
+    units: Units
+    """What its numbers are in."""
 
     limits: tuple[float, float]
     """Lower and upper limit [rad] or [m]."""
@@ -89,6 +93,7 @@ class _Around:
         up = self._go(name, home, upper, (upper - lower) / _PLACES)
         return Reach(
             joint=name,
+            units=units_of(self._trial.plant, name),
             limits=(lower, upper),
             reached=(down[0], up[0]),
             blocked=(down[1], up[1]),

@@ -25,7 +25,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from terrainkit.errors import ConfigError
 from terrainkit_robots.model import JOINT_TYPES, Joint
 from terrainkit_robots.simulators.fixed_joints import (
     SIMULATORS,
@@ -87,25 +86,6 @@ def file_order(facts: "Facts") -> _Names:
     """Return the joints that `simulator_orders` lists in the order of the file."""
     known = set(facts.joints)
     return tuple(joint.name for joint in facts.model.joints if joint in known)
-
-
-def permutation(from_order: Sequence[str], to_order: Sequence[str]) -> list[int]:
-    """Return where each joint of an order is in another: `there = [here[i] for i in permutation]`.
-
-    Args:
-        from_order: Names in the order that the values have.
-        to_order: The same names in the order that they shall have.
-
-    Raises:
-        ConfigError: if they are not the same names, each once.
-    """
-    place = {name: index for index, name in enumerate(from_order)}
-    if len(place) != len(from_order) or len(set(to_order)) != len(to_order):
-        raise ConfigError("a name is there twice; a permutation needs each once")
-    if place.keys() != set(to_order):
-        names = sorted(place.keys() ^ set(to_order))
-        raise ConfigError(f"{names[0]} is in one order only; wanted the same names in both")
-    return [place[name] for name in to_order]
 
 
 # Walks
@@ -246,11 +226,6 @@ def _mergings(facts: "Facts") -> Iterator[Merged]:
             tree = merge(facts, merges)
             if tree is not None:
                 yield tree
-
-
-def _massive(facts: "Facts", link: str) -> bool:
-    inertial = facts.tree.links[link].inertial
-    return inertial is not None and bool(inertial.mass)
 
 
 def _agree(

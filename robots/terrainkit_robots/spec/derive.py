@@ -180,6 +180,8 @@ def _lengths(facts: Facts) -> dict[str, tuple[float, Provenance]]:
         "stance_width": (width, _solved("between the contacts at the default pose")),
         "foot_radius": (foot_radius(facts), _measured(f"collision shapes of the feet, {count}")),
     }
+    if facts.bodies[0].virtual:  # of what the world holds, no height is that of its base
+        del found["base_height_target"], found["spawn_height"]
     return {
         name: (rounded(value), origin)
         for name, (value, origin) in found.items()

@@ -111,17 +111,13 @@ def _scale(joint: Joint, saturated: float) -> tuple[float, str]:
     """Return the action scale of a joint whose motor gives all it has at an error, and why."""
     widest = _WIDEST_ACTION.get(joint.kind, _WIDEST_ACTION_ELSE)
     scales = {
-        widest: f"{widest:g} {_unit(joint)}, the largest that is suggested",
+        widest: f"{widest:g} {joint.unit}, the largest that is suggested",
         _ACTION * saturated: f"{_ACTION:g} * effort / stiffness",
     }
     lower, upper = joint.range or (-math.inf, math.inf)
     if math.isfinite(upper - lower):
         scales[_RANGE_SHARE * (upper - lower)] = f"{_RANGE_SHARE:g} of the joint's range"
     return min(scales), scales[min(scales)]
-
-
-def _unit(joint: Joint) -> str:
-    return "m" if joint.kind == "prismatic" else "rad"
 
 
 def _sound(value: float | None) -> float | None:
@@ -149,7 +145,7 @@ def _guessed(joint: Joint, gain: "Gain", holding: Mapping[str, float]) -> tuple[
     """Return an effort for a joint of which none is declared on either side."""
     error = _SATURATED.get(joint.kind, _SATURATED_ELSE)
     held = _HOLDING * abs(holding.get(joint.name, 0.0))
-    value, reason = gain.stiffness * error, f"the stiffness at an error of {error:g} {_unit(joint)}"
+    value, reason = gain.stiffness * error, f"the stiffness at an error of {error:g} {joint.unit}"
     if math.isfinite(held) and held > value:
         value, reason = held, f"{_HOLDING:g} times what holds the robot"
     origin = Provenance(origin="suggested", reason=f"none is declared; {reason}")

@@ -14,9 +14,10 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.spec.checked import checked
 from terrainkit_robots.spec.per_joint import by_joint
 
-Origin = Literal["declared", "measured", "solved", "suggested"]
+Origin = Literal["declared", "measured", "solved", "suggested", "given"]
 """Where a value came from: written in the robot's file; measured on it, in geometry or simulation;
-solved, as the standing pose is; or suggested, by a rule that `reason` states."""
+solved, as the standing pose is; suggested, by a rule that `reason` states; or given, in a spec that
+somebody edited."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any, get_args, get_origin
 
 from terrainkit.errors import ConfigError, listing
+from terrainkit.toml_text import parsed
+from terrainkit_robots.mesh.header import open_regular
 from terrainkit_robots.spec.robot_spec import Provenance, RobotSpec, Twin, unit_of
 from terrainkit_robots.spec.toml_text import LINE, comment_text, key_text, value_text
 from terrainkit_robots.wording import closest, short
@@ -20,9 +22,6 @@ FORMAT_VERSION = 1
 
 _LARGEST = 1 << 20
 """No spec is larger [bytes]."""
-
-_MOST_DOTS = 10_000_000
-"""Sum of the squares of the dots on each line: `tomllib` takes so long for keys with dots."""
 
 _MESSAGE = 500
 """Errors are cut to so many characters: they may repeat what is in the file."""
@@ -104,7 +103,7 @@ def from_toml(text: str) -> RobotSpec:
             of another kind or out of its range.
     """
     try:
-        return _spec(_parsed(text))
+        return _spec(parsed(text))
     except ConfigError as error:
         raise ConfigError(short(" ".join(str(error).split()), _MESSAGE)) from error
 
@@ -113,10 +112,11 @@ def read_spec(path: Path) -> RobotSpec:
     """Return the spec in the TOML file `path`.
 
     Raises:
-        ConfigError: if it cannot be read, is over a megabyte, or as :func:`from_toml`.
+        ConfigError: if it cannot be read, is no plain file or over a megabyte, or as
+            :func:`from_toml`.
     """
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             data = file.read(_LARGEST + 1)
     except (OSError, ValueError) as error:  # ValueError for a path with NUL
         reason = error.strerror if isinstance(error, OSError) else None
@@ -127,19 +127,6 @@ def read_spec(path: Path) -> RobotSpec:
         return from_toml(data.decode())
     except (ConfigError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: {error}") from error
-
-
-def _parsed(text: str) -> dict[str, Any]:
-    import tomllib
-
-    if sum(line.count(".") ** 2 for line in text.splitlines()) > _MOST_DOTS:
-        raise ConfigError("too many dots on one line; wanted the TOML file of a robot's spec")
-    try:
-        return tomllib.loads(text)
-    except ValueError as error:  # TOMLDecodeError is one; so is a number of 5000 digits
-        raise ConfigError(f"not a TOML file: {error}") from error
-    except RecursionError:
-        raise ConfigError("not a TOML file of a robot's spec: nested too deeply") from None
 
 
 def _spec(table: dict[str, Any]) -> RobotSpec:

@@ -262,6 +262,7 @@ class _Reader:
             limit=self._limit(element.find("limit")),
             mimic=self._mimic(element.find("mimic")),
             damping=self._number(element.find("dynamics"), "damping") or 0.0,
+            friction=self._number(element.find("dynamics"), "friction") or 0.0,
             dont_collapse=element.get("dont_collapse", "").lower() == "true",
             safety_controller=None
             if safety is None or safety.get("k_position") is None

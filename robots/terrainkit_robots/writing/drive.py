@@ -5,7 +5,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Drive:
-    """A position controller: torque = stiffness * (target - q) - damping * dq, up to effort."""
+    """A position controller: torque = stiffness * (target - q) - damping * dq, up to effort.
+
+    Without stiffness it is one of speed: torque = damping * (target - dq).
+    """
 
     stiffness: float
     """[N m/rad] or [N/m]."""
@@ -18,3 +21,11 @@ class Drive:
 
     armature: float = 0.0
     """Inertia of the rotor, reflected to the joint [kg m2] or [kg]."""
+
+    velocity: float | None = None
+    """Largest speed that a wheel may be told [rad/s]; None if it is not limited."""
+
+    @property
+    def of_speed(self) -> bool:
+        """Return whether it is told a speed, as a wheel is."""
+        return self.stiffness == 0 and self.damping > 0

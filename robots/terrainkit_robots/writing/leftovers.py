@@ -1,37 +1,50 @@
 """Leftovers: what a MJCF says that neither the model of a robot nor a URDF can hold."""
 
+from collections import Counter
+from collections.abc import Sequence
+
 from terrainkit_robots.markup.document import parse_xml, read_bytes
 from terrainkit_robots.model import RobotModel
+from terrainkit_robots.wording import names
 
 _SECTIONS = ("tendon", "equality", "deformable", "extension", "custom")
 """Sections of a MJCF that are not carried over. Its sensors and motors are written anew."""
-
-_SPRINGS = ("stiffness", "frictionloss")
-"""Attributes of a joint that are not carried over."""
 
 
 def leftovers(model: RobotModel) -> tuple[str, ...]:
     """Return a sentence for each kind of thing that onboarding a MJCF leaves out."""
     if model.kind != "mjcf":
         return ()
-    counts: dict[str, int] = {}
+    sections, springs = Counter[str](), 0
     for file in model.sources:
         root = parse_xml(file, read_bytes(file)).root
         if root is None:
             continue
         for section in _SECTIONS:
-            found = sum(len(each) for each in root.iter(section))
-            counts[section] = counts.get(section, 0) + found
-        for attribute in _SPRINGS:
-            found = sum(_is_set(joint.get(attribute)) for joint in root.iter("joint"))
-            counts[attribute] = counts.get(attribute, 0) + found
-    notes = [f"left out the {counts[s]} elements of <{s}>" for s in _SECTIONS if counts.get(s, 0)]
-    notes += [
-        f"left out {attribute} of joints, which {counts[attribute]} elements set"
-        for attribute in _SPRINGS
-        if counts.get(attribute, 0)
-    ]
+            sections[section] += sum(len(each) for each in root.iter(section))
+        springs += sum(_is_set(joint.get("stiffness")) for joint in root.iter("joint"))
+    sections["equality"] -= sum(joint.mimic is not None for joint in model.joints)
+    notes = [_section(name, sections[name]) for name in _SECTIONS if sections[name] > 0]
+    if springs:
+        setting = "1 element sets" if springs == 1 else f"{springs} elements set"
+        notes.append(f"left out stiffness of joints, which {setting}")
+    idle = [motor.name for motor in model.actuators if not motor.joint]
+    if idle:
+        notes.append(f"left out {_counted(idle)}, which {_drive(idle)} no joint: {names(idle)}")
     return tuple(notes)
+
+
+def _section(name: str, number: int) -> str:
+    what = "the element" if number == 1 else f"{number} elements"
+    return f"left out {what} of <{name}>"
+
+
+def _counted(motors: Sequence[str]) -> str:
+    return "a motor" if len(motors) == 1 else f"{len(motors)} motors"
+
+
+def _drive(motors: Sequence[str]) -> str:
+    return "drives" if len(motors) == 1 else "drive"
 
 
 def _is_set(value: str | None) -> bool:

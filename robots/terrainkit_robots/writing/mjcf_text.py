@@ -4,18 +4,22 @@ The body that carries the robot is the only one in the world, so that the file c
 any scene. Shapes weigh nothing: all mass is in the `inertial` of each body, as declared.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from lxml import etree
 
+from terrainkit_robots.body.rigid import inverse
 from terrainkit_robots.model import Geometry, Inertial, Joint, Link, Matrix, RobotModel
 from terrainkit_robots.writing.drive import Drive
 
 _DIGITS = 10
 """Significant digits of each number: a nanometre on a robot of a metre."""
+
+FLOOR = "floor"
+"""What the ground is called in the scene."""
 
 _VISUAL_COLOR = "0.75 0.77 0.8 1"
 
@@ -46,6 +50,9 @@ class Extras:
     imu: Site | None = None
     """Where orientation, turning and acceleration are sensed."""
 
+    frames: tuple[Site, ...] = ()
+    """Frames that are kept for whoever looks for them by name."""
+
     excluded: Iterable[frozenset[str]] = ()
     """Pairs of bodies that do not touch each other."""
 
@@ -54,6 +61,10 @@ class Extras:
 
     height: float = 0.0
     """Height of the base in the keyframe [m]."""
+
+    height_at_zero: float | None = None
+    """Height of the base with all joints at 0, which is where MuJoCo begins unless it is told of
+    the keyframe [m]; as in the keyframe if None."""
 
     time_step: float = 0.005
     """[s]"""
@@ -76,9 +87,11 @@ def mjcf_text(model: RobotModel, extras: Extras) -> str:
     names = _assets(root, model)
     world = etree.SubElement(root, "worldbody")
     base = _bodies(world, model, names, extras)
-    base.set("pos", _text([0, 0, extras.height]))
+    at_zero = extras.height if extras.height_at_zero is None else extras.height_at_zero
+    base.set("pos", _text([0, 0, at_zero]))
     if model.floating:
-        base.insert(0, etree.Element("freejoint", name="root"))
+        name = _free("root", {joint.name for joint in model.joints})
+        base.insert(0, etree.Element("freejoint", name=name))
     _contact(root, extras)
     _equality(root, model)
     _actuators(root, model, extras)
@@ -89,15 +102,28 @@ def mjcf_text(model: RobotModel, extras: Extras) -> str:
     return text + "\n"
 
 
-def scene_text(name: str, *, height: float) -> str:
-    """Return a MJCF with a floor and a light that includes robot.xml.
+_EVERYTHING = str(2**31 - 1)
+"""All bits of contype and conaffinity: whatever touches anything touches the ground."""
+
+
+def floor_text() -> str:
+    """Return the ground by itself."""
+    return (
+        f'<geom name="{FLOOR}" type="plane" size="0 0 1" contype="{_EVERYTHING}" '
+        f'conaffinity="{_EVERYTHING}"/>'
+    )
+
+
+def scene_text(name: str, file: str, *, height: float) -> str:
+    """Return a MJCF with a floor and a light that includes the robot's.
 
     Args:
         name: What to call it.
+        file: The robot's MJCF, beside it.
         height: How tall the robot is, about [m].
     """
     root = etree.Element("mujoco", model=f"{name} scene")
-    etree.SubElement(root, "include", file="robot.xml")
+    etree.SubElement(root, "include", file=file)
     etree.SubElement(root, "statistic", center=_text([0, 0, height / 2]), extent=_text(2 * height))
     visual = etree.SubElement(root, "visual")
     etree.SubElement(visual, "headlight", diffuse="0.6 0.6 0.6", ambient="0.3 0.3 0.3")
@@ -120,10 +146,36 @@ def scene_text(name: str, *, height: float) -> str:
     etree.SubElement(
         world, "light", pos=_text([0, 0, 4 * height]), dir="0 0 -1", type="directional"
     )
-    etree.SubElement(world, "geom", name="floor", type="plane", size="0 0 0.05", material="grid")
+    etree.SubElement(
+        world,
+        "geom",
+        name=FLOOR,
+        type="plane",
+        size="0 0 0.05",
+        material="grid",
+        contype=_EVERYTHING,
+        conaffinity=_EVERYTHING,
+    )
     etree.indent(root)
     text: str = etree.tostring(root, encoding="unicode")
     return text + "\n"
+
+
+def _free(name: str, taken: Collection[str]) -> str:
+    """Return a name that is not taken, and begins like this."""
+    found, number = name, 2
+    while found in taken:
+        found, number = f"{name}_{number}", number + 1
+    return found
+
+
+def _named_once(extras: Extras) -> list[Site]:
+    """Return the sites to be written; a frame whose name another site has is left out."""
+    imu = () if extras.imu is None else (extras.imu,)
+    found = {site.name: site for site in (*extras.feet, *imu)}
+    for frame in extras.frames:
+        found.setdefault(frame.name, frame)
+    return list(found.values())
 
 
 def _text(value: float | Sequence[float] | Matrix) -> str:
@@ -179,13 +231,13 @@ def _bodies(world: Any, model: RobotModel, meshes: Mapping[_MeshKey, str], extra
     for joint in model.joints:
         below[joint.parent].append(joint)
     sites: dict[str, list[Site]] = {name: [] for name in links}
-    for site in (*extras.feet, *((extras.imu,) if extras.imu else ())):
+    for site in _named_once(extras):
         sites[site.body].append(site)
     # A stack, since a chain of links may be longer than Python's own.
     base = model.links[0]
     stack: list[tuple[Any, list[Joint], Link]] = [(world, [], base)]
     first = None
-    taken = set[str]()
+    taken = {FLOOR}
     while stack:
         parent, joints, link = stack.pop()
         if link.virtual and len(below[link.name]) == 1 and joints:
@@ -225,7 +277,7 @@ def _body(
             after = np.eye(4)
             for later in joints[index + 1 :]:
                 after = after @ later.origin
-            _joint(body, joint, np.asarray(np.linalg.inv(after)), extras.drives.get(joint.name))
+            _joint(body, joint, inverse(after), extras.drives.get(joint.name))
     for kind, shapes in (("visual", link.visuals), ("collision", link.collisions)):
         for shape in shapes:
             _geom(body, shape, kind, meshes, taken)
@@ -255,13 +307,14 @@ def _inertial(body: Any, inertial: Inertial) -> None:
     inertia = np.zeros((3, 3)) if inertial.inertia is None else inertial.inertia
     turn = inertial.origin[:3, :3]
     i = turn @ inertia @ turn.T
-    etree.SubElement(
-        body,
-        "inertial",
-        pos=_text(inertial.origin[:3, 3]),
-        mass=_text(inertial.mass),
-        fullinertia=_text([i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]),
+    element = etree.SubElement(
+        body, "inertial", pos=_text(inertial.origin[:3, 3]), mass=_text(inertial.mass)
     )
+    if inertia.any():
+        full = [i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
+        element.set("fullinertia", _text(full))
+    else:  # which MuJoCo takes on what does not move, written so
+        element.set("diaginertia", "0 0 0")
 
 
 def _joint(body: Any, joint: Joint, frame: Matrix, drive: Drive | None) -> None:
@@ -276,6 +329,8 @@ def _joint(body: Any, joint: Joint, frame: Matrix, drive: Drive | None) -> None:
         element.set("range", _text(joint.range))
     if joint.damping:
         element.set("damping", _text(joint.damping))
+    if joint.friction:
+        element.set("frictionloss", _text(joint.friction))
     armature = joint.armature if drive is None else drive.armature
     if armature:
         element.set("armature", _text(armature))
@@ -340,11 +395,17 @@ def _actuators(root: Any, model: RobotModel, extras: Extras) -> None:
     joints = {joint.name: joint for joint in model.joints}
     actuator = etree.SubElement(root, "actuator")
     for name, drive in extras.drives.items():
-        element = etree.SubElement(actuator, "position", name=name, joint=name)
-        element.set("kp", _text(drive.stiffness))
+        kind = "velocity" if drive.of_speed else "position"
+        element = etree.SubElement(actuator, kind, name=name, joint=name)
+        if not drive.of_speed:
+            element.set("kp", _text(drive.stiffness))
         element.set("kv", _text(drive.damping))
-        limits = joints[name].range
-        if limits is not None:
+        limits = (
+            drive.velocity and (-drive.velocity, drive.velocity)
+            if drive.of_speed
+            else joints[name].range
+        )
+        if limits:
             element.set("ctrlrange", _text(limits))
         if drive.effort is not None:
             element.set("forcerange", _text([-drive.effort, drive.effort]))
@@ -381,4 +442,8 @@ def _keyframe(root: Any, model: RobotModel, extras: Extras) -> None:
     base = [0.0, 0.0, extras.height, 1.0, 0.0, 0.0, 0.0] if model.floating else []
     key.set("qpos", _text([*base, *(extras.home.get(name, 0.0) for name in order)]))
     if extras.drives:
-        key.set("ctrl", _text([extras.home.get(name, 0.0) for name in extras.drives]))
+        targets = (
+            0.0 if drive.of_speed else extras.home.get(name, 0.0)
+            for name, drive in extras.drives.items()
+        )
+        key.set("ctrl", _text(list(targets)))

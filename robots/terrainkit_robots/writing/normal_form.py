@@ -7,19 +7,31 @@ where the file has its zero, masses are numbers. What neither format can say is 
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from terrainkit_robots.body.bodies import Body
+from terrainkit_robots.body.followers import followers
 from terrainkit_robots.body.kinematics import joint_motion
 from terrainkit_robots.leg.effort import effort_of
 from terrainkit_robots.leg.joint_uses import is_wheel
 from terrainkit_robots.markup.document import RobotFileError
-from terrainkit_robots.model import Actuator, Inertial, Joint, Limit, Link, RobotModel
+from terrainkit_robots.model import (
+    Actuator,
+    Inertial,
+    Joint,
+    Limit,
+    Link,
+    Matrix,
+    Mimic,
+    RobotModel,
+)
 from terrainkit_robots.wording import names
+from terrainkit_robots.writing.rooted import WORLD, rooted
+from terrainkit_robots.writing.sound_inertia import sound_inertias
 
 if TYPE_CHECKING:
     from terrainkit_robots.facts import Facts
@@ -52,15 +64,20 @@ def normal_form(facts: "Facts", *, floating: bool | None = None) -> NormalForm:
     if not facts.bodies:
         raise RobotFileError(f"{facts.model.file}: there is no link; wanted a robot")
     notes: list[str] = []
+    given, facts = facts, rooted(facts, floating=floating)
     links = _links(facts, notes)
     joints = _joints(facts, notes)
     floating = floats(facts) if floating is None else floating
     driven = {joint.name for joint in facts.actuated}
     kept = {link.name for link in links}
-    if _WORLD in kept:
-        other = _free_name(f"{_WORLD}_link", kept)
-        notes.append(f"named the link {_WORLD} {other}: MuJoCo has a world of its own")
-        links = [replace(each, name=other) if each.name == _WORLD else each for each in links]
+    if WORLD in kept:
+        other = _free_name(f"{WORLD}_link", kept)
+        notes.append(
+            f"named the link {WORLD} {other}: MuJoCo has a world of its own"
+            if WORLD in given.body_of
+            else f"its base is {other}, which stands for the world; {_hanging(joints)} on it"
+        )
+        links = [replace(each, name=other) if each.name == WORLD else each for each in links]
         joints = [(_moved(joint, other), before) for joint, before in joints]
     model = RobotModel(
         name=_plain(facts.model.name or facts.model.file.stem),
@@ -81,26 +98,33 @@ def normal_form(facts: "Facts", *, floating: bool | None = None) -> NormalForm:
         ),
         floating=floating,
         home={name: q for name, q in facts.model.home.items() if name in facts.positions},
+        imu=_imu(facts.model, kept),
         excluded=frozenset(pair for pair in facts.model.excluded if pair <= kept),
         sources=facts.model.sources,
     )
     return NormalForm(model=model, notes=tuple(notes))
 
 
-_WORLD = "world"
+def _imu(model: RobotModel, kept: Collection[str]) -> tuple[str, Matrix] | None:
+    return model.imu if model.imu is not None and model.imu[0] in kept else None
+
+
+def _hanging(joints: Sequence[tuple[Joint, str]]) -> str:
+    hanging = [joint.name for joint, _ in joints if joint.parent == WORLD]
+    return f"{names(hanging)} {'is' if len(hanging) == 1 else 'are'}"
 
 
 def _moved(joint: Joint, other: str) -> Joint:
     """Return a joint that is on the link `other` instead of the world."""
-    parent = other if joint.parent == _WORLD else joint.parent
-    return replace(joint, parent=parent, child=other if joint.child == _WORLD else joint.child)
+    parent = other if joint.parent == WORLD else joint.parent
+    return replace(joint, parent=parent, child=other if joint.child == WORLD else joint.child)
 
 
 def floats(facts: "Facts") -> bool:
     """Return whether the base of a robot moves freely.
 
     It does if the file says so or the robot has legs or wheels, and if nothing of it has a limit,
-    as with a drone. An arm or a hand is bolted down.
+    as with a drone. An arm or a hand is bolted down, even if its last joint turns without end.
     """
     if facts.model.floating is not None:
         return facts.model.floating
@@ -109,14 +133,23 @@ def floats(facts: "Facts") -> bool:
         return True
     if facts.legs:
         return True
-    if facts.model.kind == "mjcf" or base == _WORLD or not facts.bodies[0].mass:
+    if facts.model.kind == "mjcf" or base == WORLD or not facts.bodies[0].mass:
         return False
-    wheels = any(b.joint is not None and b.joint.range is None for b in _turning(facts))
-    return wheels or not facts.joints
+    return not facts.joints or any(_rolls(facts, body) for body in facts.bodies)
 
 
-def _turning(facts: "Facts") -> list[Body]:
-    return [body for body in facts.bodies if is_wheel(facts, body)]
+_ENDLESS = 4 * np.pi
+"""A wider range is that of no arm: exporters write 1e16 for a propeller [rad]."""
+
+
+def _rolls(facts: "Facts", body: Body) -> bool:
+    """Return whether a body is a wheel or a propeller: on the base, or on what steers it."""
+    carrier = facts.carrier_of(body)
+    if body.joint is None or body.joint.kind == "prismatic" or carrier is None:
+        return False
+    lower, upper = body.joint.range or (-np.inf, np.inf)
+    near = carrier.index == 0 or carrier.parent == 0
+    return near and upper - lower > _ENDLESS and is_wheel(facts, body)
 
 
 def _plain(name: str) -> str:
@@ -135,7 +168,8 @@ def _links(facts: "Facts", notes: list[str]) -> list[Link]:
     if held:
         notes.append(f"left out {names(held)}: a joint between the world and the robot")
     unknown = [link for link in links if _is_nan(link.inertial)]
-    return _with_mesh_inertia(facts, links) if unknown else links
+    known = _with_mesh_inertia(facts, links) if unknown else links
+    return sound_inertias(facts.bodies, known, notes)
 
 
 def _is_nan(inertial: Inertial | None) -> bool:
@@ -189,6 +223,7 @@ def _joints(facts: "Facts", notes: list[str]) -> list[tuple[Joint, str]]:
     inside = sorted((n for n in facts.body_of if n != base), key=lambda n: order[n])
     above = [facts.tree.above[name] for name in inside]
     uses = Counter(joint.name for joint in above)
+    following = {joint.name for joint in followers(facts.joints)}
     taken, found = set[str](), []
     for joint in above:
         name = joint.name or f"{joint.child}_joint"
@@ -196,7 +231,10 @@ def _joints(facts: "Facts", notes: list[str]) -> list[tuple[Joint, str]]:
             name = _free_name(f"{joint.child}_joint", taken)
             notes.append(f"named the joint above {joint.child} {name}: there are two {joint.name}")
         taken.add(name)
-        moved = _normal_joint(facts, joint, bodies.get(joint.child), notes)
+        mimic = joint.mimic if joint.name in following else None
+        if joint.mimic is not None and mimic is None and joint.moves:
+            notes.append(f"{joint.name} follows no other joint: {_lost(facts, joint.mimic)}")
+        moved = _normal_joint(facts, replace(joint, mimic=mimic), bodies.get(joint.child), notes)
         found.append((replace(moved, name=name), joint.name))
     return found
 
@@ -214,10 +252,6 @@ def _normal_joint(facts: "Facts", joint: Joint, body: Body | None, notes: list[s
         if joint.kind != "fixed":
             notes.append(f"fixed {joint.name}: a joint of type {joint.kind!r} has no motor")
         return replace(joint, kind="fixed", limit=None, mimic=None, anchor=np.zeros(3))
-    mimic = joint.mimic
-    if mimic is not None and mimic.joint not in {j.name for j in facts.joints} - {joint.name}:
-        notes.append(f"{joint.name} follows no other joint: there is no {mimic.joint!r}")
-        mimic = None
     limits = joint.range
     if limits is None and joint.kind == "revolute":
         notes.append(f"{joint.name} has no limits")
@@ -229,7 +263,6 @@ def _normal_joint(facts: "Facts", joint: Joint, body: Body | None, notes: list[s
         origin=joint.origin @ joint_motion(body, np.float64(0.0)),
         reference=0.0,
         axis=joint.direction,
-        mimic=mimic,
         limit=Limit(
             source=joint.limit.source if joint.limit else joint.source,
             lower=lower,
@@ -237,9 +270,17 @@ def _normal_joint(facts: "Facts", joint: Joint, body: Body | None, notes: list[s
             effort=_positive(effort_of(facts, joint)),
             velocity=_positive(joint.limit.velocity if joint.limit else None),
         ),
-        damping=max(joint.damping, 0.0),
-        armature=max(joint.armature, 0.0),
+        damping=_positive(joint.damping) or 0.0,
+        friction=_positive(joint.friction) or 0.0,
+        armature=_positive(joint.armature) or 0.0,
     )
+
+
+def _lost(facts: "Facts", mimic: Mimic) -> str:
+    """Return why a joint follows none."""
+    if any(mimic.joint == other.name for other in facts.joints):
+        return "it would follow itself in the end"
+    return f"there is no {mimic.joint!r}"
 
 
 def _positive(value: float | None) -> float | None:

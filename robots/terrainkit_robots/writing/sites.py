@@ -8,6 +8,7 @@ import numpy as np
 from terrainkit_robots.body.bodies import Body, Placed
 from terrainkit_robots.body.contact import SOLE
 from terrainkit_robots.body.kinematics import body_poses
+from terrainkit_robots.body.rigid import inverse
 from terrainkit_robots.body.shapes import bounds, has_extent, lowest
 from terrainkit_robots.model import Matrix
 from terrainkit_robots.writing.mjcf_text import Site
@@ -35,7 +36,7 @@ def _foot_site(leg: "Leg", facts: "Facts", poses: Sequence[Matrix]) -> Site:
     place = np.eye(4)
     place[:3, 3] = box.mean(axis=0)
     half = np.ptp(box, axis=0) / 2 + _AROUND
-    pose = np.linalg.inv(local) @ place
+    pose = inverse(local) @ place
     return Site(name=leg.foot, body=leg.foot, pose=pose, half_size=tuple(half.tolist()))
 
 
@@ -47,12 +48,37 @@ def _touching(body: Body, pose: Matrix, facts: "Facts") -> list[Placed]:
 
 
 def imu_site(facts: "Facts") -> Site:
-    """Return the site of the IMU: at the base's link of that name, else at the base's origin."""
-    base = facts.bodies[0]
+    """Return the site of the IMU: where the file has it, else at the base's link of that name.
+
+    Where nothing tells, it is at the base's origin, and `imu_notes` says so.
+    """
+    body, pose = _imu(facts) or (_base(facts), np.eye(4))
+    return Site(name="imu", body=body.top.name, pose=pose)
+
+
+def imu_notes(facts: "Facts") -> tuple[str, ...]:
+    """Return what to say of an IMU that nobody placed, on a robot that needs one."""
+    if _imu(facts) is not None or facts.model.floating is False:
+        return ()
+    base = _base(facts).top.name
+    return (f"the IMU is at the origin of {base}: no sensor, site or link says where it is",)
+
+
+def _imu(facts: "Facts") -> tuple[Body, Matrix] | None:
+    """Return the body of the IMU and the pose in its frame; None if nothing tells."""
+    told = facts.model.imu
+    if told is not None and told[0] in facts.body_of:
+        body = facts.body_of[told[0]]
+        return body, _pose_in_body(body, told[0]) @ told[1]
+    base = _base(facts)
     for link, pose in zip(base.links, base.poses, strict=True):
         if "imu" in link.name.lower():
-            return Site(name="imu", body=base.top.name, pose=pose)
-    return Site(name="imu", body=base.top.name, pose=np.eye(4))
+            return base, pose
+    return None
+
+
+def _base(facts: "Facts") -> Body:
+    return next((body for body in facts.bodies if not body.virtual), facts.bodies[0])
 
 
 def _pose_in_body(body: Body, link: str) -> Matrix:

@@ -6,15 +6,16 @@ cylinder and two spheres, and a joint whose axis does not pass through the origi
 a link without a shape, to which the child is fixed.
 """
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from lxml import etree
 
+from terrainkit_robots.body.roll_pitch_yaw import roll_pitch_yaw
 from terrainkit_robots.model import Geometry, Inertial, Joint, Link, Matrix, RobotModel
 from terrainkit_robots.writing.number_text import number_text, place_text
-from terrainkit_robots.writing.roll_pitch_yaw import roll_pitch_yaw
 from terrainkit_robots.writing.urdf_shapes import elements_of
 
 TINY_MASS = 1e-6
@@ -100,9 +101,8 @@ class _Writer:
     def _header(self) -> Iterator[str]:
         yield "Written by terrainkit onboard. SI units and radians."
         for said, joints in self._made_up.items():
-            # two hyphens would end the comment
-            listed = ", ".join(joints).replace("--", "- -")
-            yield f"{said}: {listed}."
+            # a comment holds no two hyphens in a row
+            yield re.sub("-(?=-)", "- ", f"{said}: {', '.join(joints)}.")
 
     def _make_up(self, what: str, number: float, joint: Joint) -> str:
         text = number_text(number)
@@ -183,8 +183,10 @@ class _Writer:
             return
         etree.SubElement(element, "axis", xyz=place_text(joint.direction))
         self._limit(element, joint)
-        if joint.damping > 0:
-            etree.SubElement(element, "dynamics", damping=number_text(joint.damping))
+        slowed = {"damping": joint.damping, "friction": joint.friction}
+        dynamics = {name: number_text(value) for name, value in slowed.items() if value > 0}
+        if dynamics:
+            etree.SubElement(element, "dynamics", dynamics)
         if joint.mimic is not None:
             etree.SubElement(
                 element,
@@ -241,7 +243,7 @@ def _colors(model: RobotModel) -> dict[tuple[float, float, float, float], str]:
 
 
 def _inertial(link: Any, inertial: Inertial, mass: float) -> None:
-    inertia = np.eye(3) * TINY_SQUARE * TINY_MASS if inertial.inertia is None else inertial.inertia
+    inertia = np.zeros((3, 3)) if inertial.inertia is None else inertial.inertia
     # what rounding leaves of zero, next to the largest of the six
     noise = 1e-12 * float(np.abs(inertia).max())
     _write_inertial(link, inertial.origin, mass, np.where(np.abs(inertia) < noise, 0.0, inertia))

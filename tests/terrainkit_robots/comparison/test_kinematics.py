@@ -71,6 +71,15 @@ def test_our_own_kinematics_agrees_on_bundled_robots(robot_of, name):
     assert worst(robot_of(name)) < 1e-9
 
 
+@pytest.mark.parametrize("off", [0.0, 1e-10, 9e-10, 1e-8])
+def test_a_joint_that_points_straight_up_is_exact(tmp_path, off):
+    path = tmp_path / "arm.xacro"  # whose angles are written anew
+    path.write_text(ARM.replace("0.2 -0.3 0.4", f"0.2 {math.pi / 2 - off!r} 0.4"))
+    robot = Facts(read_robot(path))
+    assert robot.model.kind == "xacro"
+    assert worst(robot) < 1e-11
+
+
 @pytest.mark.parametrize("kind", ["urdf", "xacro"])
 def test_a_slide_whose_axis_is_not_of_unit_length_goes_as_far_as_asked(tmp_path, kind):
     path = tmp_path / f"arm.{kind}"
@@ -144,6 +153,45 @@ def test_joints_that_follow_are_where_the_other_puts_them(robot_of):
     np.testing.assert_allclose(ours["turn"], 2 * ours["slide"] + 0.3)
     np.testing.assert_array_equal(ours["turn"], theirs["turn"])
     assert largest_difference(robot, robot).distance == 0.0
+
+
+def test_followers_of_followers_are_where_the_others_put_them(robot_of):
+    more = """<link name="d"/><joint name="last" type="continuous"><parent link="c"/>
+      <child link="d"/><mimic joint="turn" multiplier="-2"/></joint></robot>"""
+    follows = ("<limit lower", '<mimic joint="slide" offset="0.5"/><limit lower')
+    robot = robot_of(ARM, follows, ("</robot>", more))
+    pairing = pair_robots(robot, robot)
+    ours, _ = random_positions(pairing, poses=7, seed=3)
+    np.testing.assert_allclose(ours["turn"], ours["slide"] + 0.5)
+    np.testing.assert_allclose(ours["last"], -2 * ours["turn"])
+    held, _ = random_positions(pairing, poses=7, seed=3, held=("turn",))
+    assert not held["turn"].any()
+    assert not held["last"].any()
+
+
+REFERENCE = """<mujoco><compiler angle="radian"/><worldbody><body name="a"><freejoint/>
+  <geom size="0.1"/><body name="b" pos="1 0 0"><geom size="0.1"/>
+    <joint name="turn" axis="0 0 1" pos="0.1 0 0" ref="0.5"/>
+    <body name="c" pos="0 1 0"><geom size="0.1"/>
+      <joint name="slide" type="slide" axis="1 0 0" ref="0.2"/>
+      <body name="d" pos="0 0 1"><geom size="0.1"/><joint name="spin" type="ball"/></body>
+    </body></body></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("named", [{}, {"turn": np.array([0.3, -0.2])}])
+def test_joints_that_are_not_named_are_at_zero_in_mjcf_too(robot_of, named):
+    robot = robot_of(REFERENCE)
+    poses = mjcf_poses(robot, named)
+    for body, pose in zip(robot.bodies, body_poses(robot.bodies, named), strict=True):
+        theirs = poses[body.name]
+        np.testing.assert_allclose(np.broadcast_to(pose, theirs.shape), theirs, atol=1e-12)
+
+
+def test_a_joint_that_only_one_file_has_is_at_zero(robot_of):
+    fixed = REFERENCE.replace('<joint name="turn" axis="0 0 1" pos="0.1 0 0" ref="0.5"/>', "")
+    turned = f'pos="{1.1 - 0.1 * math.cos(0.5)!r} {0.1 * math.sin(0.5)!r} 0" euler="0 0 -0.5"'
+    fixed = fixed.replace('pos="1 0 0"', turned)
+    assert largest_difference(robot_of(fixed), robot_of(REFERENCE)).agrees
 
 
 def test_positions_are_within_the_limits_of_both(robot_of):

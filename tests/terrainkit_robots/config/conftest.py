@@ -46,6 +46,24 @@ def quadruped(**changes):
     return RobotSpec(**(given | changes))
 
 
+def wheeled(**changes):
+    """Return the spec of the robot with four legs, whose calves are wheels as far as gains go."""
+    rolling = {
+        "stiffness": {".*_(hip|thigh)_joint": 20.0, ".*_calf_joint": 0.0},
+        "action_scale": {".*_(hip|thigh)_joint": 0.25, ".*_calf_joint": 5.0},
+        "provenance": {"action_scale": Provenance(origin="suggested", reason="a share")},
+    }
+    return quadruped(**(rolling | changes))
+
+
+def wheels_of(spec):
+    """Return the joints of a `wheeled` robot that are told a speed, and those that are not."""
+    return (
+        tuple(joint for joint in spec.joint_order if "calf" in joint),
+        tuple(joint for joint in spec.joint_order if "calf" not in joint),
+    )
+
+
 def of(spec, **value):
     """Return the values that the patterns of `quadruped` give, by joint: calf, or else other."""
     calf, other = value["calf"], value["other"]
@@ -187,6 +205,8 @@ def robots():
     """Return the robots, and what makes more of them."""
     return SimpleNamespace(
         quadruped=quadruped,
+        wheeled=wheeled,
+        wheels_of=wheels_of,
         plain=plain_robot,
         hostile=hostile_robot,
         of=of,

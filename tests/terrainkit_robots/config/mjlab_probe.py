@@ -1,4 +1,7 @@
-"""Runs in an environment with mjlab: builds the robot of mjlab_config.py and steps it."""
+"""Runs in an environment with mjlab: builds the robot of mjlab_config.py and steps it.
+
+A second word says whether it has wheels: calves that are told a speed.
+"""
 
 import sys
 
@@ -21,8 +24,9 @@ def by_part(calf, other):
     return [calf if "calf" in joint else other for joint in joints]
 
 
-np.testing.assert_allclose(model.actuator_gainprm[:, 0], by_part(30.0, 20.0))
-np.testing.assert_allclose(model.actuator_biasprm[:, 1], by_part(-30.0, -20.0))
+rolls = sys.argv[2] == "wheeled"
+np.testing.assert_allclose(model.actuator_gainprm[:, 0], by_part(0.75 if rolls else 30.0, 20.0))
+np.testing.assert_allclose(model.actuator_biasprm[:, 1], by_part(0.0 if rolls else -30.0, -20.0))
 np.testing.assert_allclose(model.actuator_biasprm[:, 2], by_part(-0.75, -0.5))
 np.testing.assert_allclose(model.actuator_forcerange[:, 1], by_part(45.43, 23.7))
 np.testing.assert_allclose(model.dof_armature[6:], by_part(0.04, 0.01))
@@ -32,7 +36,18 @@ np.testing.assert_allclose(model.key_ctrl[0], [0, 0.9, -1.8] * 4)
 
 data = mujoco.MjData(model)
 mujoco.mj_resetDataKeyframe(model, data, 0)
-for _ in range(50):
-    mujoco.mj_step(model, data)
+if rolls:
+    calves = [number for number, joint in enumerate(joints) if "calf" in joint]
+    places = [model.joint(joints[number]).dofadr[0] for number in calves]
+    model.opt.gravity[:] = 0
+    data.qpos[2] = 5.0
+    data.ctrl[calves] = 3.0
+    for _ in range(20):
+        mujoco.mj_step(model, data)
+    assert (data.qvel[places] > 0.5).all()
+    assert {mjlab_config.QUAD_4_SPEED_SCALE[joints[number]] for number in calves} == {5.0}
+else:
+    for _ in range(50):
+        mujoco.mj_step(model, data)
+    assert abs(data.qpos[7:] - model.key_qpos[0][7:]).max() < 0.5
 assert np.isfinite(data.qpos).all()
-assert abs(data.qpos[7:] - model.key_qpos[0][7:]).max() < 0.5

@@ -5,6 +5,8 @@ import sys
 import pytest
 
 from terrainkit.errors import ConfigError
+from terrainkit_robots import config
+from terrainkit_robots.config import frameworks
 from terrainkit_robots.config.frameworks import config_of, config_text, file_name, names
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.mesh.meshes import Meshes
@@ -13,10 +15,26 @@ from terrainkit_robots.robot_file import read_robot
 LEGGED = ("legged_gym", "leggedgym_ex")
 
 
-def test_the_names_are_those_of_the_command_line():
-    assert names() == ("legged_gym", "leggedgym_ex", "isaaclab", "mjlab", "genesis")
+def test_a_module_that_is_added_is_a_framework(tmp_path, monkeypatch, robots):
+    (tmp_path / "brand_new.py").write_text(
+        "LEGGED_ONLY = False\ndef config_text(robot):\n    return f'# {robot.title}'\n"
+    )
+    (tmp_path / "mere_help.py").write_text("def config_text(robot):\n    return ''\n")
+    monkeypatch.setattr(config, "__path__", [*config.__path__, str(tmp_path)])
+    frameworks.names.cache_clear()
+    try:
+        assert set(names()) - {"brand_new"} == {*LEGGED, "isaaclab", "mjlab", "genesis"}
+        assert config_text("brand_new", robots.quadruped()) == "# quad 4"
+        with pytest.raises(ConfigError, match="for others there are: brand_new, genesis"):
+            config_text("legged_gym", robots.plain(()))
+    finally:
+        frameworks.names.cache_clear()
+
+
+def test_the_names_are_those_of_the_modules_in_their_order():
+    assert names() == ("genesis", "isaaclab", "legged_gym", "leggedgym_ex", "mjlab")
     assert file_name("mjlab") == "mjlab_config.py"
-    with pytest.raises(ConfigError, match="no framework 'gazebo'; there are: legged_gym, "):
+    with pytest.raises(ConfigError, match="no framework 'gazebo'; there are: genesis, isaaclab, "):
         config_text("gazebo", None)
     with pytest.raises(ConfigError, match="no framework"):
         file_name("../../evil")
@@ -26,7 +44,10 @@ def test_the_names_are_those_of_the_command_line():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"feet": ()}, "has no legs; .* trains legged robots; for others there are: isaaclab"),
+        (
+            {"feet": ()},
+            "has no legs; .* trains legged robots; for others there are: genesis, isaaclab, mjlab$",
+        ),
         ({"joint_order": ()}, "has no legs"),
         ({"floating": False}, "the base of quad 4 is fixed"),
         ({"spawn_height": None}, "lacks a spawn_height or a base_height_target"),
@@ -96,6 +117,7 @@ def test_files_are_formatted_and_the_same_every_time(robots, framework, tmp_path
     )
     specs = {
         "plain": robots.quadruped(),
+        "wheeled": robots.wheeled(),
         "long": robots.quadruped(**long),
         "hostile": robots.hostile(),
         "one": one_joint,

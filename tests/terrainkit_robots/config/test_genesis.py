@@ -47,6 +47,9 @@ class Robot:
     def control_dofs_position(self, position, dofs_idx_local):
         self._keep("target", position, dofs_idx_local)
 
+    def control_dofs_velocity(self, velocity, dofs_idx_local):
+        self._keep("speed", velocity, dofs_idx_local)
+
 
 class Scene:
     """A scene of Genesis."""
@@ -105,6 +108,28 @@ def test_a_quadruped(load, modules, robots, tmp_path):
     assert tuple(loaded.FEET) == spec.feet
 
 
+def test_wheels_are_told_a_speed(load, modules, robots):
+    spec = robots.wheeled()
+    loaded = load("genesis", spec, modules)
+    robot = loaded.build(Scene(Robot(spec.joint_order)))
+    wheels, others = robots.wheels_of(spec)
+    assert robot.told["speed"] == dict.fromkeys(wheels, 0.0)
+    assert set(robot.told["target"]) == set(others)
+    assert set(robot.told["position"]) == set(spec.joint_order)
+    assert robot.told["kp"] == robots.of(spec, calf=0.0, other=20.0)
+    assert dict.fromkeys(others, 0.25) == loaded.ACTION_SCALE
+    assert dict.fromkeys(wheels, 5.0) == loaded.SPEED_SCALE
+    text = Path(loaded.__file__).read_text()
+    assert "[rad/s or m/s]; suggested: a share\nSPEED_SCALE = {" in text
+
+
+def test_a_robot_of_wheels_alone(load, modules, robots):
+    spec = robots.plain(("left", "right"), stiffness={".*": 0.0})
+    robot = load("genesis", spec, modules).build(Scene(Robot(spec.joint_order)))
+    assert robot.told["speed"] == {"left": 0.0, "right": 0.0}
+    assert "target" not in robot.told
+
+
 def test_an_arm_of_which_little_is_known(load, modules, robots):
     spec = robots.plain(("a", "b"), effort={"b": 3.0}, armature={})
     robot = load("genesis", spec, modules).build(Scene(Robot(spec.joint_order)))
@@ -125,13 +150,15 @@ def test_hostile_names_arrive_as_they_are(load, modules, robots):
     assert scene.morph.file.endswith(spec.urdf)
 
 
-def test_in_genesis(robots, tmp_path, bundled_xml):
+@pytest.mark.parametrize("which", ["quadruped", "wheeled"])
+def test_in_genesis(robots, tmp_path, bundled_xml, which):
     """Set TERRAINKIT_GENESIS_PYTHON to the Python of an environment with genesis-world."""
     python = os.environ.get("TERRAINKIT_GENESIS_PYTHON")
     if not python:
         pytest.skip("TERRAINKIT_GENESIS_PYTHON names no Python with genesis-world")
     shutil.copy(bundled_xml.with_suffix(".urdf"), tmp_path / "robot.urdf")
-    text = config_text("genesis", robots.quadruped(), bodies=robots.bodies)
+    text = config_text("genesis", getattr(robots, which)(), bodies=robots.bodies)
     (tmp_path / "genesis_config.py").write_text(text)
-    done = subprocess.run([python, PROBE, tmp_path], capture_output=True, text=True, cwd=tmp_path)
+    command = [python, PROBE, tmp_path, which]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr

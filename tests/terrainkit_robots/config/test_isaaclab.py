@@ -1,6 +1,7 @@
 """The configuration for Isaac Lab, read as that reads it."""
 
 import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -65,6 +66,18 @@ def modules(stand_in):
         "isaaclab.assets": stand_in.module("assets", ArticulationCfg=articulation),
         task: stand_in.module(task, LocomotionVelocityRoughEnvCfg=lambda: velocity_task(stand_in)),
     }
+    made["isaaclab.envs"] = stand_in.module("envs")
+    made["isaaclab.envs.mdp"] = stand_in.module(
+        "mdp",
+        JointVelocityActionCfg=refusing(
+            "JointVelocityActionCfg",
+            "asset_name",
+            "joint_names",
+            scale=1.0,
+            preserve_order=False,
+            use_default_offset=True,
+        ),
+    )
     parents = task.split(".")[:-1]
     for place in range(len(parents)):
         name = ".".join(parents[: place + 1])
@@ -81,7 +94,7 @@ def velocity_task(stand_in):
 
     return strict(
         scene=strict(robot=None, height_scanner=strict(prim_path="")),
-        actions=strict(joint_pos=strict(scale=0.5)),
+        actions=SimpleNamespace(joint_pos=strict(scale=0.5, joint_names=[".*"])),
         events=strict(
             add_base_mass=term("asset_cfg"),
             base_external_force_torque=term("asset_cfg"),
@@ -163,6 +176,37 @@ def test_an_arm(load, modules, robots):
     assert actuator.stiffness == {"joint1": 0.5, "joint10": 1.5}
     assert loaded.ACTION_SCALE == 0.25
     assert not hasattr(loaded, "rough_env_cfg")
+
+
+def test_wheels_are_told_a_speed(load, modules, robots):
+    spec = robots.wheeled(velocity={})
+    loaded = load("isaaclab", spec, modules, bodies=robots.bodies)
+    wheels, others = robots.wheels_of(spec)
+    actuators = loaded.QUAD_4_CFG.actuators
+    assert set(actuators) == {"joints", "wheels"}
+    assert tuple(actuators["joints"].joint_names_expr) == others
+    assert tuple(actuators["wheels"].joint_names_expr) == wheels
+    assert (actuators["joints"].stiffness, actuators["wheels"].stiffness) == (20.0, 0.0)
+    assert (actuators["joints"].damping, actuators["wheels"].damping) == (0.5, 0.75)
+    assert resolved(actuators["wheels"].effort_limit_sim, wheels) == dict.fromkeys(wheels, 45.43)
+    assert (loaded.ACTION_SCALE, loaded.SPEED_SCALE) == (0.25, 5.0)
+    actions = loaded.rough_env_cfg().actions
+    assert tuple(actions.joint_pos.joint_names) == others
+    assert tuple(actions.joint_vel.joint_names) == wheels
+    assert (actions.joint_vel.asset_name, actions.joint_vel.scale) == ("robot", 5.0)
+    text = Path(loaded.__file__).read_text()
+    assert "[rad/s or m/s]; suggested: a share\nSPEED_SCALE = 5.0\n" in text
+    task = load("isaaclab", robots.quadruped(), modules).rough_env_cfg()
+    assert task.actions.joint_pos.joint_names == [".*"]
+    assert not hasattr(task.actions, "joint_vel")
+
+
+def test_a_robot_of_wheels_alone(load, modules, robots):
+    spec = robots.plain(("left", "right"), stiffness={".*": 0.0})
+    loaded = load("isaaclab", spec, modules)
+    assert list(loaded.ARM_CFG.actuators) == ["wheels"]
+    assert loaded.SPEED_SCALE == 0.25
+    assert not hasattr(loaded, "ACTION_SCALE")
 
 
 def test_hostile_names_match_themselves(load, modules, robots):

@@ -112,7 +112,7 @@ def test_a_quadruped_in_legged_gym(load, frameworks, robots, tmp_path):
     assert config.env.num_actions == 12
     assert config.asset.file.format(LEGGED_GYM_ROOT_DIR="/x") == str(tmp_path / "robot.urdf")
     assert config.asset.name == "quad_4"
-    assert config.asset.armature == 0.01
+    assert config.asset.armature == 0.04
     assert loaded.Quad4RoughCfgPPO.runner.experiment_name == "rough_quad_4"
     assert "_get_noise_scale_vec" not in loaded.__doc__
 
@@ -138,6 +138,27 @@ def test_a_quadruped_in_leggedgym_ex(load, frameworks, robots, tmp_path):
     # On Genesis every key that fits gives a gain: there has to be one for each joint.
     for joint in spec.joint_order:
         assert sum(key in joint for key in config.control.stiffness) == 1
+
+
+def test_no_joint_has_less_armature_than_it_needs(load, frameworks, robots):
+    """A light ankle shakes with the median of a robot, most of whose joints need none."""
+    spec = robots.quadruped(armature={".*_(hip|thigh)_joint": 0.0, ".*_calf_joint": 0.01})
+    loaded = load("legged_gym", spec, frameworks({}))
+    assert loaded.Quad4RoughCfg.asset.armature == 0.01
+    said = " ".join(Path(loaded.__file__).read_text().replace("#", "").split())
+    assert "One number for all joints, the largest: they have 0.0 to 0.01." in said
+
+
+@pytest.mark.parametrize("framework", ["legged_gym", "leggedgym_ex"])
+def test_wheels_are_not_driven_and_do_not_count(load, frameworks, robots, framework):
+    spec = robots.wheeled(joint_order=robots.quadruped().joint_order)
+    loaded = load(framework, spec, frameworks(MORE))
+    config = loaded.Quad4RoughCfg if framework == "legged_gym" else loaded.Quad4Cfg
+    assert config.control.action_scale == 0.25
+    said = " ".join(Path(loaded.__file__).read_text().replace("#", "").split())
+    assert "wants a speed, which P does not tell it: FL_calf_joint, FR_calf_joint, " in said
+    plain = load(framework, robots.quadruped(), frameworks(MORE))
+    assert "wants a speed" not in Path(plain.__file__).read_text()
 
 
 def test_stand_ins_refuse_what_the_framework_does_not_have(frameworks, load, robots):

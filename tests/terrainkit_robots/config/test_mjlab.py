@@ -24,6 +24,12 @@ def modules(stand_in):
         "damping",
         **dict.fromkeys(("effort_limit", "armature", "frictionloss", "viscous_damping")),
     )
+    rolling = refusing(
+        "BuiltinVelocityActuatorCfg",
+        "target_names_expr",
+        "damping",
+        **dict.fromkeys(("effort_limit", "armature", "frictionloss", "viscous_damping")),
+    )
     entity = refusing(
         "EntityCfg", init_state=None, spec_fn=None, articulation=None, sort_actuators=False
     )
@@ -39,7 +45,11 @@ def modules(stand_in):
     )
     return {
         "mjlab": stand_in.module("mjlab"),
-        "mjlab.actuator": stand_in.module("actuator", BuiltinPositionActuatorCfg=actuator),
+        "mjlab.actuator": stand_in.module(
+            "actuator",
+            BuiltinPositionActuatorCfg=actuator,
+            BuiltinVelocityActuatorCfg=rolling,
+        ),
         "mjlab.entity": stand_in.module(
             "entity", EntityCfg=entity, EntityArticulationInfoCfg=articulation
         ),
@@ -72,6 +82,34 @@ def test_a_quadruped(load, modules, robots):
     assert robots.of(spec, calf=0.2, other=0.25) == loaded.QUAD_4_ACTION_SCALE
 
 
+def test_wheels_are_told_a_speed(load, modules, robots):
+    spec = robots.wheeled()
+    loaded = load("mjlab", spec, modules)
+    wheels, others = robots.wheels_of(spec)
+    by_kind = {type(a).__name__: a for a in loaded.QUAD_4_ARTICULATION.actuators}
+    rolling = by_kind.pop("BuiltinVelocityActuatorCfg")
+    assert set(rolling.target_names_expr) == set(wheels)
+    assert (rolling.damping, rolling.effort_limit, rolling.armature) == (0.75, 45.43, 0.04)
+    (held,) = by_kind.values()
+    assert set(held.target_names_expr) == set(others)
+    assert dict.fromkeys(others, 0.25) == loaded.QUAD_4_ACTION_SCALE
+    assert dict.fromkeys(wheels, 5.0) == loaded.QUAD_4_SPEED_SCALE
+    text = Path(loaded.__file__).read_text()
+    assert "# For JointVelocityActionCfg.scale.\n# [rad/s or m/s]; suggested: a share\n" in text
+    assert "actuator_names=tuple(QUAD_4_SPEED_SCALE)" in loaded.__doc__
+    plain = load("mjlab", robots.quadruped(), modules)
+    assert "SPEED_SCALE" not in Path(plain.__file__).read_text()
+
+
+def test_a_robot_of_wheels_alone(load, modules, robots):
+    spec = robots.plain(("left", "right"), stiffness={".*": 0.0})
+    loaded = load("mjlab", spec, modules)
+    kinds = {type(actuator).__name__ for actuator in loaded.ARM_ARTICULATION.actuators}
+    assert kinds == {"BuiltinVelocityActuatorCfg"}
+    assert loaded.ARM_SPEED_SCALE == {"left": 0.25, "right": 0.25}
+    assert not hasattr(loaded, "ARM_ACTION_SCALE")
+
+
 @pytest.mark.parametrize("more", ["", '<actuatorfrc actuator="FL_calf"/>'])
 def test_the_actuators_of_the_file_make_way(load, modules, robots, tmp_path, bundled_xml, more):
     text = bundled_xml.read_text().replace("</sensor>", more + "</sensor>")
@@ -99,13 +137,15 @@ def test_a_robot_without_joints(load, modules, robots):
     assert loaded.get_robot_cfg().articulation.actuators == ()
 
 
-def test_in_mjlab(robots, tmp_path, bundled_xml):
+@pytest.mark.parametrize("which", ["quadruped", "wheeled"])
+def test_in_mjlab(robots, tmp_path, bundled_xml, which):
     """Set TERRAINKIT_MJLAB_PYTHON to the Python of an environment with mjlab."""
     python = os.environ.get("TERRAINKIT_MJLAB_PYTHON")
     if not python:
         pytest.skip("TERRAINKIT_MJLAB_PYTHON names no Python with mjlab")
     shutil.copy(bundled_xml, tmp_path / "robot.xml")
-    text = config_text("mjlab", robots.quadruped(), bodies=robots.bodies)
+    text = config_text("mjlab", getattr(robots, which)(), bodies=robots.bodies)
     (tmp_path / "mjlab_config.py").write_text(text)
-    done = subprocess.run([python, PROBE, tmp_path], capture_output=True, text=True, cwd=tmp_path)
+    command = [python, PROBE, tmp_path, which]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -126,6 +126,8 @@ def assert_joints(robot: RobotModel, model: mujoco.MjModel) -> None:
             model.dof_damping.reshape(model.nv, -1)[model.jnt_dofadr[k], 0], abs=EXACT
         )
         assert each.armature == pytest.approx(model.dof_armature[model.jnt_dofadr[k]], abs=EXACT)
+        lost = model.dof_frictionloss[model.jnt_dofadr[k]]
+        assert each.friction == pytest.approx(lost, abs=EXACT)
         if model.jnt_limited[k]:
             assert each.limit is not None
             bounds = (each.limit.lower, each.limit.upper)
@@ -196,6 +198,10 @@ def test_published_robots_are_read_as_mujoco_compiles_them(
 def test_go2_has_its_home_and_its_limits_of_torque(robot_file: Callable[[str], Path]) -> None:
     robot = read_file(robot_file("go2_mjcf/go2.xml"))
     assert robot.home["RR_calf_joint"] == -1.8
+    assert robot.imu is not None
+    name, place = robot.imu
+    assert name == "base_link"
+    np.testing.assert_allclose(place[:3, 3], [-0.02557, 0, 0.04232], atol=1e-12)
     assert [each.effort for each in robot.actuators] == [23.7, 23.7, 45.43] * 4
     limit = joint(robot, "FL_calf_joint").limit
     assert limit is not None
@@ -212,7 +218,7 @@ EVERYTHING = """
   <compiler angle="degree" eulerseq="ZYx" autolimits="true"/>
   <option><flag contact="enable"/></option>
   <default>
-    <joint damping="0.5" armature="0.01"/>
+    <joint damping="0.5" armature="0.01" frictionloss="0.2"/>
     <geom density="500"/>
     <default class="limb">
       <joint axis="0 1 0" range="-30 60" actuatorfrcrange="-20 20"/>
@@ -348,9 +354,9 @@ SCALED = """
     <frame pos="1 0 0" scale="2 2 2" {extra}>
       <body name="a" pos="1 0 0">
         <joint name="h" pos="0.1 0 0" range="-1 1" actuatorfrcrange="-1 1" damping="1"
-          armature="1"/>
+          armature="1" frictionloss="5"/>
         <joint name="s" type="slide" ref="0.1" range="-1 1" actuatorfrcrange="-2 2" damping="3"
-          armature="4"/>
+          armature="4" frictionloss="6"/>
         <inertial pos="1 1 1" mass="1" diaginertia="1 1 1"/>
         <geom type="box" size="1 2 3" pos="1 0 0"/>
         <body name="b" pos="0 1 0"><geom size="0.5"/>
@@ -1167,3 +1173,70 @@ def test_geometry_of_an_included_shape_is_typed() -> None:
     (shape,) = link(robot, "a").collisions
     assert isinstance(shape, Geometry)
     assert shape.shape == "unknown"
+
+
+# The IMU
+
+
+def imu_robot(sensors: str, *, base: str = "", arm: str = "", world: str = "") -> RobotModel:
+    return read(
+        f"""<mujoco><worldbody>{world}<body name="base"><geom size="1"/>
+          <body name="arm"><joint/><geom size="1"/>{arm}</body>{base}</body></worldbody>
+          <sensor>{sensors}</sensor></mujoco>"""
+    )
+
+
+def test_the_imu_is_the_site_that_a_gyro_names_wherever_another_is_called_imu() -> None:
+    robot = imu_robot(
+        '<gyro site="here"/>',
+        base='<site name="imu"/>',
+        arm='<site name="here" pos="1 2 3" euler="0 0 90"/>',
+    )
+    assert robot.problems == ()
+    assert robot.imu is not None
+    assert robot.imu[0] == "arm"
+    wanted = [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]
+    np.testing.assert_allclose(robot.imu[1], wanted, atol=1e-12)
+
+
+@pytest.mark.parametrize("sensor", ["gyro", "accelerometer"])
+def test_of_several_imus_it_is_the_one_closest_to_the_base(sensor: str) -> None:
+    robot = imu_robot(
+        f'<{sensor} site="far"/><{sensor} site="near"/>',
+        arm='<site name="far"/>',
+        base='<site name="near"/>',
+    )
+    assert robot.imu is not None
+    assert robot.imu[0] == "base"
+
+
+def test_without_a_sensor_the_imu_is_a_site_of_that_name() -> None:
+    robot = imu_robot('<framequat objtype="site" objname="other"/>', arm='<site name="IMU"/>')
+    assert robot.imu is not None
+    assert robot.imu[0] == "arm"
+
+
+def test_sites_in_frames_and_between_two_points_are_where_mujoco_has_them() -> None:
+    inside = '<frame pos="1 0 0" euler="0 90 0"><site name="imu" {}/></frame>'
+    for written in ('pos="0 0 1" euler="30 0 0"', 'type="capsule" size="1" fromto="0 0 1 1 0 2"'):
+        text = in_world(f'<body name="base"><geom size="1"/>{inside.format(written)}</body>')
+        robot, model = read(text), compiled(text)
+        assert robot.imu is not None
+        same_pose(robot.imu[1], pose(model.site_pos[0], model.site_quat[0]))
+
+
+@pytest.mark.parametrize(
+    "robot",
+    [
+        imu_robot(""),
+        imu_robot("", world='<site name="imu"/>'),  # of the world, on no body
+        imu_robot('<gyro site="nowhere"/>'),
+    ],
+)
+def test_an_imu_that_is_nowhere_is_none(robot: RobotModel) -> None:
+    assert robot.imu is None
+
+
+def test_a_site_without_an_orientation_is_told() -> None:
+    robot = imu_robot("", base='<site name="imu" axisangle="0 0 0 1"/>')
+    assert [problem.code for problem in robot.problems] == ["XML011"]

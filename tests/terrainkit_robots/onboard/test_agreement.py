@@ -7,7 +7,8 @@ from terrainkit_robots.facts import Facts
 from terrainkit_robots.onboard.agreement import agreement
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.robot_file import read_robot
-from terrainkit_robots.writing.mjcf_text import Extras, mjcf_text
+from terrainkit_robots.writing.fused import fused
+from terrainkit_robots.writing.mjcf_text import Extras, Site, mjcf_text
 from terrainkit_robots.writing.normal_form import normal_form
 
 
@@ -58,3 +59,39 @@ def test_a_lost_mass_is_seen(source, written):
     (found,) = agreement(source, written, compiled(text))
     assert found.mass == pytest.approx(0.1 / source.total_mass, rel=1e-6)
     assert np.isclose(found.distance, 0, atol=1e-8)
+
+
+def test_a_link_that_is_turned_is_seen(source, written):
+    text = mjcf_text(written.model, Extras())
+    before = '<body name="RR_foot" pos="0 0 -0.213">'
+    assert before in text
+    turned = '<body name="RR_foot" pos="0 0 -0.213" quat="0.9998 0 0.02 0">'
+    (found,) = agreement(source, written, compiled(text.replace(before, turned)))
+    assert found.turned == "RR_foot"
+    assert found.angle == pytest.approx(0.04, rel=1e-3)
+    assert found.faults == ("RR_foot is turned by 2.29 degrees",)
+
+
+def test_a_mass_that_is_elsewhere_is_seen(source, written):
+    """The same masses and frames, but a calf's centre of mass 1 cm off."""
+    text = mjcf_text(written.model, Extras())
+    before = '<inertial pos="0.00548 -0.000975 -0.115"'
+    assert before in text
+    text = text.replace(before, '<inertial pos="0.00548 -0.000975 -0.125"', 1)
+    (found,) = agreement(source, written, compiled(text))
+    assert (found.mass, found.distance) == (pytest.approx(0, abs=1e-9), pytest.approx(0, abs=1e-9))
+    assert found.joint == "FL_calf_joint"
+    assert any("what FL_calf_joint carries is off by" in fault for fault in found.faults)
+
+
+def test_fused_links_are_found_as_frames(source, written):
+    single = fused(written.model, keep=["FL_foot"])
+    sites = tuple(
+        Site(name=link, body=body, pose=pose)
+        for link, (body, pose) in single.frames.items()
+        if link != body
+    )
+    (found,) = agreement(source, written, compiled(mjcf_text(single.model, Extras(frames=sites))))
+    assert "RR_foot" in {site.name for site in sites}
+    assert found.faults == ()
+    assert found.distance < 1e-8

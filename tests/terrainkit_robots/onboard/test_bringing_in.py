@@ -1,6 +1,7 @@
 """Robots brought in, whole: the bundled ones always, the real ones where they are at hand."""
 
 import shutil
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -15,7 +16,7 @@ from terrainkit_robots.onboard.bringing_in import Wishes, bring_in
 from terrainkit_robots.onboard.summary import summary
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.robot_file import read_robot
-from terrainkit_robots.rule import rules
+from terrainkit_robots.rule import CannotCheckError, rules
 from terrainkit_robots.spec.spec_file import read_spec
 
 REAL = [
@@ -148,7 +149,10 @@ def test_a_spec_that_was_edited_goes_before(tmp_path):
         bundled.find("quadruped"),
         Wishes(target=tmp_path / "again", pictures=False, spec=edited),
     )
-    assert done.made.spec == wanted
+    made = done.made.spec
+    assert replace(made, provenance={}) == replace(wanted, provenance={})
+    assert made.provenance["default_pose.FL_thigh_joint"].origin == "given"
+    assert made.provenance["default_pose"].origin == "solved"
     model = mujoco.MjModel.from_xml_path(str(done.folder / "robot.xml"))
     joint = model.joint("FL_thigh_joint")
     assert model.key("home").qpos[joint.qposadr[0]] == wanted.default_pose["FL_thigh_joint"]
@@ -213,6 +217,42 @@ def test_what_mujoco_refuses_is_one_line_even_if_forced(tmp_path):
         bring_in(file, Wishes(target=tmp_path / "robot", force=True, pictures=False))
     assert "\n" not in str(error.value)
     assert not (tmp_path / "robot").exists()
+
+
+def test_what_cannot_be_simulated_is_one_line(tmp_path, monkeypatch):
+    def refuse(_facts):
+        raise CannotCheckError("it is too much")
+
+    monkeypatch.setattr("terrainkit_robots.simulation.gains.suggest_gains", refuse)
+    with pytest.raises(ExportError, match="no gains can be suggested: it is too much"):
+        bring_in(bundled.find("quadruped"), wishes(tmp_path))
+
+
+def test_what_takes_too_long_to_stand_is_written_and_told(tmp_path, monkeypatch):
+    def refuse(*_arguments, **_more):
+        raise CannotCheckError("300 contacts at once")
+
+    monkeypatch.setattr("terrainkit_robots.simulation.standing.stand_still", refuse)
+    done = bring_in(bundled.find("quadruped"), wishes(tmp_path))
+    assert not done.proof.stood
+    assert dict(summary(done))["stands"] == "not known: 300 contacts at once"
+    assert "It was not simulated: 300 contacts at once." in (done.folder / "report.md").read_text()
+
+
+def test_a_mesh_of_another_format_is_converted_wherever_it_is(tmp_path):
+    import trimesh
+
+    trimesh.creation.box((0.05, 0.05, 0.3)).export(tmp_path / "upper.ply")
+    folder = tmp_path / "robots" / "arm"
+    folder.mkdir(parents=True)
+    file = folder / "arm.urdf"
+    mesh = '<mesh filename="../../upper.ply"/></geometry></collision></link>\n  <joint'
+    before, after = ARM.split('<box size="0.05 0.05 0.3"/>')
+    file.write_text(before + mesh + after.split("<joint", 1)[1])
+    done = bring_in(file, Wishes(target=tmp_path / "robot", pictures=False))
+    assert "MSH005" in {f.code for f in done.repaired}
+    assert done.report.verdict != "fail"
+    assert (done.folder / "meshes/upper.stl").exists()
 
 
 def test_repairs_are_made_in_what_is_written_only(tmp_path):

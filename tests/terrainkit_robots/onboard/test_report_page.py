@@ -27,7 +27,9 @@ STOOD = Standing(
     height=0.3125,
     sink=0.004,
     drift=0.0012,
+    leg_length=0.4,
     touching=(),
+    lifted=(),
     saturation=0.413,
     saturated="FL_calf_joint",
     joint_error=0.02,
@@ -37,6 +39,19 @@ STOOD = Standing(
 
 ARM = """<robot name="arm"><link name="base"/><link name="tip"/>
 <joint name="j" type="continuous"><parent link="base"/><child link="tip"/></joint></robot>"""
+
+
+def agreement(file, *, mass=0.0, distance=1e-6, link="FL_foot"):
+    return Agreement(
+        file=file,
+        mass=mass,
+        inertia=2e-5,
+        joint="FL_calf_joint",
+        distance=distance,
+        link=link,
+        angle=1e-5,
+        turned="RR_foot",
+    )
 
 
 def facts_of(text=None):
@@ -98,7 +113,7 @@ def cells(row):
 
 def test_each_section_is_there_once_in_order(quadruped):
     proof = Proof(
-        agreements=(Agreement(file="robot.urdf", mass=0.0, distance=1e-6, link="FL_foot"),),
+        agreements=(agreement("robot.urdf"),),
         standing=STOOD,
     )
     assert headings(report_page(replace(quadruped, proof=proof))) == [
@@ -184,9 +199,12 @@ def test_that_it_was_not_simulated(quadruped):
 
 
 def test_how_far_the_files_are_from_their_source(quadruped):
-    off = Agreement(file="robot.urdf", mass=-0.0004, distance=2.5e-5, link="FL_foot")
+    off = agreement("robot.urdf", mass=-0.0004, distance=2.5e-5)
     text = report_page(replace(quadruped, proof=Proof(agreements=(off,))))
-    assert "| robot.urdf | -0.040% | 0.025 mm | FL\\_foot |" in text
+    assert (
+        "| robot.urdf | -0.040% | 0.002% at FL\\_calf\\_joint | 0.025 mm at FL\\_foot "
+        "| 0.00057 deg at RR\\_foot |"
+    ) in text
 
 
 def test_permutations_are_python_that_is_ready_to_be_pasted(quadruped):
@@ -259,7 +277,7 @@ def test_no_name_breaks_a_row_or_becomes_markup(quadruped):
         skipped=(Skipped(code="SYM001", reason=NASTY),),
     )
     proof = Proof(
-        agreements=(Agreement(file=NASTY, mass=0.0, distance=0.0, link=NASTY),),
+        agreements=(agreement(NASTY, link=NASTY),),
         standing=replace(STOOD, touching=(NASTY,), saturated=NASTY),
     )
     done = replace(

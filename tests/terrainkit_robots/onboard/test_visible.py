@@ -29,8 +29,10 @@ def test_what_is_drawn_hides_what_collides():
     assert named(body(("seen", 'group="2"'), ("touched", HIDDEN))) == ["seen"]
 
 
-def test_a_body_with_nothing_drawn_shows_what_collides():
-    assert named(body(("seen", ""), ("a", HIDDEN)) + body(("b", HIDDEN))) == ["seen", "b"]
+def test_what_collides_is_shown_only_of_a_robot_of_which_nothing_is_drawn():
+    dressed = body(("seen", ""), ("a", HIDDEN)) + body(("b", HIDDEN))
+    assert named(dressed) == ["seen"]
+    assert named(body(("a", HIDDEN)) + body(("b", HIDDEN))) == ["a", "b"]
 
 
 def test_floors_are_no_part_of_a_robot():

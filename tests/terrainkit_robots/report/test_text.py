@@ -36,11 +36,27 @@ def test_a_hint_that_several_findings_share_is_printed_once(report, finding):
     assert "help: Look." in write([differing])
 
 
+def test_notes_have_no_help_and_one_line_says_where_it_is(report, finding):
+    note = finding("LEG001", "legs", "info", hint="Look at the legs.")
+    both = dataclasses.replace(report, findings=(finding(), note))
+    text = write([both])
+    assert "Look at the legs." not in text
+    assert text.count("help: ") == 1
+    assert "\nabout a note: terrainkit rule CODE, for example terrainkit rule LEG001\n" in text
+    assert write([both, both]).count("about a note: ") == 2
+
+
+def test_without_notes_no_line_says_where_their_help_is(report, finding):
+    assert "about a note" not in write([dataclasses.replace(report, findings=(finding(),))])
+    unhelpful = finding("LEG001", "legs", "info", hint="")
+    assert "about a note" in write([dataclasses.replace(report, findings=(unhelpful,))])
+
+
 def test_of_a_thousand_findings_of_a_rule_ten_are_told(report, finding):
     many = dataclasses.replace(report, findings=tuple(finding(line=i) for i in range(1, 1001)))
     text = write([many])
     assert text.count("the mass is") == 10
-    assert "and 990 more findings; --format json has all of them" in text
+    assert "and 990 more findings; check-robot --format json has all of them\n" in text
     assert text.endswith("robot.urdf: 1,000 errors\n")
 
 

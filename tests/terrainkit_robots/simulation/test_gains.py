@@ -76,6 +76,29 @@ ARM = """
 </robot>
 """
 
+GANTRY = """
+<robot name="gantry">
+  <link name="frame"/>
+  <link name="slider">
+    <inertial><mass value="2"/>
+      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <joint name="rail" type="prismatic">
+    <parent link="frame"/><child link="slider"/><axis xyz="1 0 0"/>
+    <limit lower="-1" upper="1" effort="10" velocity="10"/>
+  </joint>
+  <!-- and -->
+  <link name="arm">
+    <inertial><origin xyz="0.1 0 0"/><mass value="4"/>
+      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <joint name="swing" type="revolute">
+    <parent link="frame"/><child link="arm"/><origin xyz="0 1 0"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" effort="100" velocity="10"/>
+  </joint>
+</robot>
+"""
+
 
 @cache
 def read(path):
@@ -178,13 +201,24 @@ def test_an_arm_holds_its_weight_within_a_degree(tmp_path):
 def test_a_weak_motor_is_not_asked_for_all_it_has_at_a_small_error(tmp_path):
     gain = suggest_gains(written(tmp_path, ARM.format(kind="revolute", effort="10")))["shoulder"]
     assert gain.stiffness == pytest.approx(20)
-    assert "effort of 10 at an error of 0.5" in gain.reason
+    assert "effort of 10 N m at an error of 0.5 rad" in gain.reason
 
 
-def test_a_slide_is_told_newtons_and_metres(tmp_path):
-    gain = suggest_gains(written(tmp_path, ARM.format(kind="prismatic", effort="1e5")))["shoulder"]
-    assert gain.stiffness == pytest.approx(2 * 9.81 / 0.002, rel=0.12)
-    assert "N within 0.002 m" in gain.reason
+@pytest.mark.parametrize(("effort", "why"), [("1e5", "N within 0.002 m"), ("10", "10 N at an err")])
+def test_a_slide_is_told_newtons_and_metres(tmp_path, effort, why):
+    gain = suggest_gains(written(tmp_path, ARM.format(kind="prismatic", effort=effort)))["shoulder"]
+    assert gain.stiffness == pytest.approx(min(2 * 9.81 / 0.002, float(effort) / 0.05), rel=0.12)
+    assert why in gain.reason
+    assert not re.search(r"N m|rad|kg m2", gain.reason)
+
+
+def test_slides_and_hinges_that_are_equally_stiff_are_not_damped_alike(tmp_path):
+    """What slides moves 2 kg, and what turns, equally stiff, 0.05 kg m2."""
+    found = suggest_gains(written(tmp_path, GANTRY))
+    assert found["rail"].stiffness == found["swing"].stiffness == 200
+    alone = written(tmp_path, GANTRY.split("<!-- and -->")[0] + "</robot>")
+    assert found["rail"].damping == suggest_gains(alone)["rail"].damping
+    assert found["rail"].damping > found["swing"].damping
 
 
 @pytest.mark.parametrize(

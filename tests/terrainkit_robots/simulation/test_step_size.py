@@ -63,7 +63,7 @@ def test_inertia_agrees_with_a_sudden_torque():
     data = mujoco.MjData(scene.model)
     model = scene.model.__copy__()
     model.opt.gravity[:] = 0
-    model.dof_damping[:] = 0
+    model.dof_damping[:] = model.dof_frictionloss[:] = 0
     model.geom_contype[:] = model.geom_conaffinity[:] = 0
     for name in ("FL_hip_joint", "RR_calf_joint"):
         dof = model.joint(name).dofadr[0]

@@ -1,19 +1,16 @@
-import re
 from pathlib import Path
 
 import mujoco
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lxml import etree
 
-from terrainkit.errors import ConfigError
 from terrainkit_robots import bundled
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.robot_file import read_robot
-from terrainkit_robots.simulators.orders import file_order, permutation, simulator_orders
+from terrainkit_robots.simulators.orders import file_order, simulator_orders
 
 SHARED = [
     "a1/urdf/a1.urdf",
@@ -258,25 +255,6 @@ def test_mujoco_orders_any_tree_as_is_said(tmp_path_factory, ends):
 
 
 # Permutations.
-
-
-@settings(deadline=None)
-@given(st.permutations(range(9)), st.permutations(range(9)))
-def test_a_permutation_takes_values_from_one_order_to_another(here, there):
-    names = [[f"j{k}" for k in order] for order in (here, there)]
-    places = permutation(*names)
-    assert [here[place] for place in places] == list(there)
-    back = permutation(*reversed(names))
-    assert np.array_equal(np.array(places)[back], np.arange(9))
-
-
-@pytest.mark.parametrize(
-    ("here", "there", "told"),
-    [("ab", "abc", "c is in one order only"), ("ab", "ac", "b is in one"), ("aab", "ab", "twice")],
-)
-def test_orders_of_different_joints_have_none(here, there, told):
-    with pytest.raises(ConfigError, match=re.escape(told)):
-        permutation(here, there)
 
 
 def test_nothing_to_order(tmp_path):

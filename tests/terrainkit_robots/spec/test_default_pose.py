@@ -58,3 +58,21 @@ def test_the_pose_that_was_derived_is_the_one_that_was_solved(bundled, gains, na
         list(plain.positions.values()),
         atol=1e-5,
     )
+
+
+CHAIN = """
+<robot name="r">
+  <link name="l0"/><link name="l1"/><link name="l2"/><link name="l3"/>
+  <joint name="jC" type="prismatic"><parent link="l0"/><child link="l1"/>
+    <limit lower="-9" upper="9" effort="1" velocity="1"/><mimic joint="jB" multiplier="-2"/></joint>
+  <joint name="jB" type="prismatic"><parent link="l1"/><child link="l2"/>
+    <limit lower="-9" upper="9" effort="1" velocity="1"/><mimic joint="jA" offset="0.5"/></joint>
+  <joint name="jA" type="prismatic"><parent link="l2"/><child link="l3"/>
+    <limit lower="1" upper="2" effort="1" velocity="1"/></joint>
+</robot>"""
+
+
+def test_followers_of_followers_are_where_they_are_put(robot, spec):
+    assert robot(CHAIN).positions == {"jA": 1.0, "jB": 1.5, "jC": -3.0}
+    told = robot(CHAIN, spec=spec(joint_order=("jA",), default_pose={"jA": 2.0}))
+    assert told.positions == {"jA": 2.0, "jB": 2.5, "jC": -5.0}

@@ -75,7 +75,8 @@ def test_a_joint_without_anything_that_may_be_left_out():
     assert read_joint.mimic is None
     assert read_joint.safety_controller is None
     assert read_joint.anchor.tolist() == [0, 0, 0]
-    assert (read_joint.reference, read_joint.damping, read_joint.armature) == (0, 0, 0)
+    assert (read_joint.reference, read_joint.armature) == (0, 0)
+    assert (read_joint.damping, read_joint.friction) == (0, 0)
     assert not read_joint.dont_collapse
 
 
@@ -98,9 +99,15 @@ def test_a_joint_with_everything():
     limit, mimic = read_joint.limit, read_joint.mimic
     assert (limit.lower, limit.upper, limit.effort, limit.velocity) == (-1, 2, 3, 4)
     assert (mimic.joint, mimic.multiplier, mimic.offset) == ("k", -2, 0.5)
-    assert read_joint.damping == 0.1
+    assert (read_joint.damping, read_joint.friction) == (0.1, 1)
     assert read_joint.safety_controller is not None
     assert read_joint.dont_collapse
+
+
+def test_friction_that_is_no_number_is_told_and_none():
+    read_joint, problems = joint(PARENTS + '<dynamics damping="0.1" friction="much"/>')
+    assert (read_joint.damping, read_joint.friction) == (0.1, 0)
+    assert [problem.code for problem in problems] == ["XML006"]
 
 
 def test_what_a_limit_lacks_is_not_there():

@@ -175,7 +175,7 @@ def test_an_arm_stands_still(tmp_path):
 
 def test_the_scene_holds_the_robot_and_a_floor(quadruped, tmp_path):
     (tmp_path / "robot.xml").write_text(mjcf_text(quadruped.model, Extras(height=0.3)))
-    (tmp_path / "scene.xml").write_text(scene_text("quadruped", height=0.3))
+    (tmp_path / "scene.xml").write_text(scene_text("quadruped", "robot.xml", height=0.3))
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "scene.xml"))
     assert model.geom("floor").type[0] == mujoco.mjtGeom.mjGEOM_PLANE
     assert model.body("base").pos[2] == 0.3
@@ -207,3 +207,14 @@ def test_contacts_of_a_foot_without_mass_are_as_stiff_as_of_one_with_next_to_non
     none, next_to_none = weighs(0.0), weighs(1e-9)
     assert none.mass[0] == 0
     np.testing.assert_allclose(none.invweight0, next_to_none.invweight0, rtol=1e-4)
+
+
+def test_dry_friction_of_joints_is_there(quadruped):
+    joints = [
+        dataclasses.replace(joint, friction=0.25) if joint.name == "FL_hip_joint" else joint
+        for joint in quadruped.model.joints
+    ]
+    model = written(dataclasses.replace(quadruped.model, joints=tuple(joints)))
+    for joint in quadruped.joints:
+        wanted = 0.25 if joint.name == "FL_hip_joint" else joint.friction
+        assert model.joint(joint.name).frictionloss[0] == wanted

@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -152,6 +154,36 @@ def test_an_arm_is_bolted_down_and_a_car_is_not(tmp_path):
     assert normal_form(facts(tmp_path, arm), floating=True).model.floating is True
 
 
+CHAIN = """<robot name="r">{}<joint name="a" type="{}"><parent link="base"/><child link="one"/>
+  <axis xyz="0 0 1"/><limit lower="{}" upper="{}" effort="5" velocity="5"/></joint>{}</robot>"""
+
+
+@pytest.mark.parametrize(
+    ("kind", "ends", "joints", "floating"),
+    [
+        ("revolute", (-1e16, 1e16), 1, True),  # a propeller, as exporters write it
+        ("continuous", (0, 0), 1, True),
+        ("revolute", (-1, 1), 2, True),  # a wheel that is steered
+        ("revolute", (-1, 1), 3, False),  # the wrist of an arm
+        ("prismatic", (-1e16, 1e16), 1, False),
+    ],
+)
+def test_a_wheel_is_on_the_base_or_on_what_steers_it(tmp_path, kind, ends, joints, floating):
+    names = ["base", "one", "two", "three"][: joints + 1]
+    links = "".join(
+        f'<link name="{name}"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" '
+        'ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        for name in names
+    )
+    more = [
+        f'<joint name="{name}" type="continuous"><parent link="{above}"/><child link="{name}"/>'
+        '<origin xyz="0.1 0 0"/><axis xyz="0 1 0"/></joint>'
+        for above, name in pairwise(names[1:])
+    ]
+    robot = facts(tmp_path, CHAIN.format(links, kind, *ends, "".join(more)))
+    assert normal_form(robot).model.floating is floating
+
+
 def test_a_mass_from_a_mesh_is_what_mujoco_makes_of_it(tmp_path):
     import trimesh
 
@@ -196,3 +228,33 @@ def test_a_link_called_world_gets_another_name(tmp_path):
     assert form.model.joints[0].parent == "world_link_2"
     assert form.model.floating is False
     assert form.notes == ("named the link world world_link_2: MuJoCo has a world of its own",)
+
+
+DYNAMICS = """<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous">
+  <parent link="a"/><child link="b"/><dynamics damping="{0}" friction="{0}"/></joint></robot>"""
+
+
+@pytest.mark.parametrize(("written", "wanted"), [("0.3", 0.3), ("-0.3", 0.0), ("nan", 0.0)])
+def test_friction_and_damping_are_kept_where_they_slow(tmp_path, written, wanted):
+    (joint,) = normal_form(facts(tmp_path, DYNAMICS.format(written))).model.joints
+    assert (joint.friction, joint.damping) == (wanted, wanted)
+
+
+@pytest.mark.parametrize(
+    ("leads", "notes"),
+    [
+        (("k", "j"), ("j", "k")),
+        (("j", "j"), ("j",)),
+        (("nobody", "j"), ("j",)),
+    ],
+)
+def test_a_joint_that_follows_itself_or_nobody_is_free_and_told(tmp_path, leads, notes):
+    joint = """<joint name="{}" type="continuous"><parent link="a"/><child link="{}"/>
+      <mimic joint="{}"/></joint>"""
+    joints = joint.format("j", "b", leads[0]) + joint.format("k", "c", leads[1])
+    text = f'<robot name="r"><link name="a"/><link name="b"/><link name="c"/>{joints}</robot>'
+    form = normal_form(facts(tmp_path, text))
+    free = [joint.name for joint in form.model.joints if joint.mimic is None]
+    assert free == list(notes)
+    why = {"nobody": "there is no 'nobody'"}.get(leads[0], "it would follow itself in the end")
+    assert form.notes == tuple(f"{name} follows no other joint: {why}" for name in notes)

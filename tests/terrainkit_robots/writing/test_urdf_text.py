@@ -5,6 +5,8 @@ import mujoco
 import numpy as np
 import pytest
 import yourdfpy
+from hypothesis import given
+from hypothesis import strategies as st
 from lxml import etree
 
 from terrainkit_robots import bundled
@@ -144,6 +146,7 @@ class TestJoints:
             axis=np.array([0.0, 2, 0]),
             limit=limits(-0.5, 1.5, 20, 30),
             damping=0.3,
+            friction=0.4,
         )
         mimic = Mimic(source=SOURCE, joint="hip", multiplier=-2.0, offset=0.1)
         follower = joint("knee", "revolute", "leg", "shin", mimic=mimic)
@@ -160,7 +163,8 @@ class TestJoints:
             "effort": "20",
             "velocity": "30",
         }
-        assert hip.find("dynamics").get("damping") == "0.3"
+        assert dict(hip.find("dynamics").attrib) == {"damping": "0.3", "friction": "0.4"}
+        assert knee.find("dynamics") is None
         assert dict(knee.find("mimic").attrib) == {
             "joint": "hip",
             "multiplier": "-2",
@@ -191,6 +195,29 @@ class TestJoints:
             link("base"), link("leg"), joint("a--b-", "continuous", "base", "leg", limit=None)
         )
         assert parsed(model).find("joint").get("name") == "a--b-"
+
+    @pytest.mark.parametrize("name", ["a---b", "-", "--", "a-----", "-- -- >", "->", "<!---->"])
+    def test_hyphens_do_not_end_the_comment(self, name):
+        model = robot(link("base"), link("leg"), joint(name, "revolute", "base", "leg", limit=None))
+        assert parsed(model).find("joint").get("name") == name
+
+    @given(
+        st.lists(
+            st.text("-a") | st.text(st.characters(exclude_categories=("C", "Z"))),
+            min_size=1,
+            max_size=4,
+        )
+    )
+    def test_any_names_go_into_the_comment(self, names):
+        links = [link(f"l{k}") for k in range(len(names) + 1)]
+        joints = [
+            joint(name, "revolute", "l0", f"l{k}", limit=None) for k, name in enumerate(names, 1)
+        ]
+        root = parsed(robot(*links, *joints))
+        assert [each.get("name") for each in root.iterfind("joint")] == names
+        (comment, *_) = [c.text for c in root.iter(etree.Comment) if "effort" in c.text]
+        told = ", ".join(names)
+        assert comment.replace(" ", "").endswith(f"{told}.".replace(" ", ""))
 
     def test_feet_are_kept_by_isaac_gym(self):
         model = robot(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from terrainkit_robots.body.kinematics import rotation
-from terrainkit_robots.comparison.rigid import apart, inverse
+from terrainkit_robots.body.rigid import apart, inverse
 
 
 def poses(count, seed=0):

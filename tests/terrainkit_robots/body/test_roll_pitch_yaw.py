@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from terrainkit_robots.body.kinematics import rotation
+from terrainkit_robots.body.roll_pitch_yaw import roll_pitch_yaw
 from terrainkit_robots.urdf.reader import rotation_of
-from terrainkit_robots.writing.roll_pitch_yaw import roll_pitch_yaw
 
 ANGLE = st.floats(-math.pi, math.pi)
 

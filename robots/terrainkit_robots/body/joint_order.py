@@ -1,4 +1,4 @@
-"""Joint order: the places at which one file has the joints of another.
+"""Joint order: the places at which one list of joints has those of another.
 
 A permutation p is one for arrays: `theirs = ours[p]`, so p[i] is the place in our order of what is
 at place i in theirs.
@@ -25,7 +25,7 @@ def actuator_order(robot: Facts) -> tuple[str, ...]:
 
 
 def permutation(ours: Sequence[str], theirs: Sequence[str]) -> list[int] | None:
-    """Return p such that theirs[i] is ours[p[i]]; None if they are not the same names."""
+    """Return p such that theirs[i] is ours[p[i]]; None unless both have the same names, once."""
     place = {name: index for index, name in enumerate(ours)}
     if len(place) != len(ours) or len(ours) != len(theirs) or set(theirs) != set(place):
         return None

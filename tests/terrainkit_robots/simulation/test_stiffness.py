@@ -1,0 +1,41 @@
+import re
+
+import pytest
+
+from terrainkit_robots.facts import Facts
+from terrainkit_robots.robot_file import read_robot
+from terrainkit_robots.simulation.gains import suggest_gains
+
+LEGS = ("FL", "FR", "RL", "RR")
+
+
+@pytest.fixture
+def sliding(sliding_shanks):
+    return Facts(read_robot(sliding_shanks))
+
+
+def test_what_turns_does_not_hold_the_newtons_of_what_slides(sliding):
+    held = {
+        joint.name: abs(sliding.stance.torques[joint.name])
+        for leg in sliding.legs
+        for joint in leg.joints
+    }
+    turning = max(force for name, force in held.items() if "calf" not in name)
+    pushed = max(force for name, force in held.items() if "calf" in name)
+    assert pushed > 5 * turning  # newtons, beside newton metres
+    weight, length = sliding.total_mass * 9.81, sliding.legs[0].length
+    needed = max(turning / 0.09, 1.5 * weight * length / 4)
+    found = suggest_gains(sliding)
+    for leg in LEGS:
+        for part in ("hip", "thigh"):
+            gain = found[f"{leg}_{part}_joint"]
+            assert gain.stiffness == pytest.approx(needed, rel=0.2)
+            assert f" {pushed:.2g} " not in gain.reason
+
+
+def test_what_slides_holds_its_newtons_within_millimetres(sliding):
+    pushed = max(abs(sliding.stance.torques[f"{leg}_calf_joint"]) for leg in LEGS)
+    gain = suggest_gains(sliding)["FL_calf_joint"]
+    assert gain.stiffness == pytest.approx(pushed / 0.009, rel=0.12)
+    assert f"to hold {pushed:.2g} N in the standing pose within 0.009 m" in gain.reason
+    assert not re.search(r"N m|rad|kg m2", gain.reason)
