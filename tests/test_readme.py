@@ -217,3 +217,47 @@ def test_the_comment_and_the_settings_of_the_example_ignore_what_they_say(my_rob
     Path("pyproject.toml").write_text(settings)
     assert main([*asked, "--strict"]) == 0
     assert "our reader divides" in capsys.readouterr().out
+
+
+def onboard_part():
+    return README.partition("## Bring a robot in")[2].partition("\n## ")[0]
+
+
+@pytest.fixture
+def healthy_robots():
+    """Write the robots of the lines that bring one in: each is the quadruped that comes along."""
+    from terrainkit_robots import bundled
+
+    path = bundled.find("quadruped")
+    assert path is not None
+    for name in ("my_robot.urdf", "go2.urdf"):
+        Path(name).write_text(path.read_text())
+    Path("go2.xml").write_text(path.with_suffix(".xml").read_text())
+
+
+@pytest.mark.usefixtures("healthy_robots")
+def test_the_lines_that_bring_a_robot_in_run(capsys):
+    (lines,) = re.findall(r"```sh\n(.*?)```", onboard_part(), re.DOTALL)
+    for line in lines.splitlines():
+        words = shlex.split(line, comments=True)
+        assert words.pop(0) == "terrainkit"
+        words += ["--no-pictures"] if words[0] == "onboard" else []
+        assert main(words) == 0, line
+    assert sorted(path.name for path in Path("quadruped").glob("*_config.py")) == [
+        "legged_gym_config.py",
+        "mjlab_config.py",
+    ]
+    assert "yes: 5 s with the gains of robot.toml" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("healthy_robots")
+def test_the_example_of_a_robot_brought_in_is_what_is_printed(capsys):
+    (example,) = re.findall(r"```text\n(.*?)```", onboard_part(), re.DOTALL)
+    main(["onboard", "my_robot.urdf", "-o", "my_robot"])
+    printed = [line.split() for line in capsys.readouterr().out.splitlines()]
+    for line in example.splitlines():
+        # Numbers of the last digit, and whether there are pictures, depend on the machine.
+        first = line.split()[0]
+        (same,) = (words for words in printed if words[:1] == [first])
+        if first not in ("agrees", "pictures"):
+            assert line.split() == same

@@ -136,9 +136,10 @@ def _refusal(done: "BroughtIn") -> str:
     """Return the errors of a robot that was not brought in."""
     from dataclasses import replace
 
+    from terrainkit_robots.onboard.bringing_in import keeps_out
     from terrainkit_robots.report import as_text
 
-    errors = tuple(f for f in done.report.findings if f.severity == "error")
+    errors = tuple(filter(keeps_out, done.report.findings))
     return as_text([replace(done.report, findings=errors)], "text")
 
 

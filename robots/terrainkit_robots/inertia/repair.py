@@ -10,6 +10,7 @@ from terrainkit_robots.fix import Edit, Fix, RemoveAttribute, SetAttribute
 from terrainkit_robots.inertia.physical import (
     box_inertia,
     gyration_radius,
+    is_zero,
     nearest_physical,
     principal_moments,
     triangle_ratio,
@@ -93,6 +94,8 @@ def _nearest(robot: Facts, link: Link, inertia: Matrix) -> Matrix | None:
 
     One number that is far too large makes the nearest of all six far too large.
     """
+    if is_zero(inertia):
+        return None  # nothing is near to it but nothing
     nearest, body, mass = nearest_physical(inertia), robot.body_of.get(link.name), _mass(link)
     box = None if body is None else bounds(body.collisions or body.visuals, robot.meshes)
     if nearest is None or box is None or not mass > 0:

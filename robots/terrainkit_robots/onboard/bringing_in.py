@@ -123,7 +123,7 @@ def bring_in(file: Path, wishes: Wishes) -> BroughtIn:
     report, repaired = _packed(*_repaired(file, wishes))
     for crash in report.crashed:
         raise TerrainkitError(f"{file}: {crash.code}: {crash.reason}")
-    if not wishes.force and any(map(_unsound, report.findings)):
+    if not wishes.force and any(map(keeps_out, report.findings)):
         return BroughtIn(report=report, repaired=repaired)
     wishes.say("finding the pose and the gains")
     made = onboard(
@@ -187,7 +187,8 @@ def _packed(
     return replace(report, findings=left), (*repaired, *(replace(f, fix=None) for f in gone))
 
 
-def _unsound(finding: "Finding") -> bool:
+def keeps_out(finding: "Finding") -> bool:
+    """Return whether a finding means that what would be written is another robot."""
     return finding.severity == "error" and finding.code.startswith(_SOUND)
 
 

@@ -4,7 +4,6 @@ Two legs fall unless they are balanced, so that of a biped it is asked whether i
 joints held.
 """
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +15,7 @@ from terrainkit_robots.onboard.onboarding import MJCF, SCENE, URDF
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rule import CannotCheckError
 from terrainkit_robots.simulation.verdict import judge
-from terrainkit_robots.writing.normal_form import normal_form
+from terrainkit_robots.writing.normal_form import has_unknown, normal_form
 from terrainkit_robots.writing.rooted import rooted
 
 if TYPE_CHECKING:
@@ -97,7 +96,7 @@ def _with_masses(source: "Facts", floating: bool) -> "Facts":
     """Return the source with its base and all of its masses, which may come from meshes."""
     from terrainkit_robots.facts import Facts
 
-    if math.isfinite(source.total_mass):
+    if not any(has_unknown(link.inertial) for link in source.links):
         return rooted(source, floating=floating)
     return Facts(normal_form(source, floating=floating).model, source.meshes)
 

@@ -167,12 +167,13 @@ def _links(facts: "Facts", notes: list[str]) -> list[Link]:
     held = [j.name for j in facts.model.joints if j.moves and j.parent not in facts.body_of]
     if held:
         notes.append(f"left out {names(held)}: a joint between the world and the robot")
-    unknown = [link for link in links if _is_nan(link.inertial)]
+    unknown = [link for link in links if has_unknown(link.inertial)]
     known = _with_mesh_inertia(facts, links) if unknown else links
     return sound_inertias(facts.bodies, known, notes)
 
 
-def _is_nan(inertial: Inertial | None) -> bool:
+def has_unknown(inertial: Inertial | None) -> bool:
+    """Return whether a mass or an inertia has to be taken from a mesh."""
     return inertial is not None and (
         (inertial.mass is not None and np.isnan(inertial.mass))
         or (inertial.inertia is not None and bool(np.isnan(inertial.inertia).any()))
@@ -196,7 +197,7 @@ def _with_mesh_inertia(facts: "Facts", links: Sequence[Link]) -> list[Link]:
         ) from None
     found = []
     for link in links:
-        if _is_nan(link.inertial):
+        if has_unknown(link.inertial):
             assert link.inertial is not None
             body = model.body(link.name)
             origin = np.eye(4)

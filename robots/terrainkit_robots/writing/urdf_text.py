@@ -18,15 +18,19 @@ from terrainkit_robots.model import Geometry, Inertial, Joint, Link, Matrix, Rob
 from terrainkit_robots.writing.number_text import number_text, place_text
 from terrainkit_robots.writing.urdf_shapes import elements_of
 
-TINY_MASS = 1e-6
-"""Mass of a link that has to have one and was given none [kg]: far below what is felt on any robot,
-and far above where simulators take it for zero and make up 1 kg or a density of water."""
+TINY_MASS = 1e-7
+"""Mass of a link that has to have one and was given none [kg]: far below what is felt on a robot,
+the tip of a dog's tail included, and far above where simulators take it for zero and make up 1 kg
+or the density of water."""
 
 TINY_SHARE = 1e-7
 """It is no more than this share of the robot's mass: a robot may be an insect."""
 
-TINY_SQUARE = 1e-3
-"""Its moment of inertia about each axis, by its mass [m2]: 1e-9 kg m2."""
+TINY_SQUARE = 1e-6
+"""Its moment of inertia about each axis, by its mass [m2]."""
+
+TINY_INERTIA = 1e-13
+"""Smallest moment of inertia [kg m2]: a hundred times what MuJoCo takes for nothing."""
 
 NO_EFFORT = 1000.0
 """What stands for an effort that is not known [N m] or [N]: ROS reads no joint without one, and
@@ -135,7 +139,7 @@ class _Writer:
                     self._shape(element, tag, shape)
 
     def _tiny_inertial(self, link: Any) -> None:
-        inertia = np.eye(3) * TINY_SQUARE * self._tiny
+        inertia = np.eye(3) * max(TINY_SQUARE * self._tiny, TINY_INERTIA)
         _write_inertial(link, np.eye(4), self._tiny, inertia)
 
     def _shape(self, link: Any, tag: str, shape: Geometry) -> None:

@@ -272,8 +272,8 @@ class TestMasses:
         masses = {each.get("name"): each.find("inertial/mass") for each in links}
         assert {name: mass is not None and mass.get("value") for name, mass in masses.items()} == {
             "base": "3",
-            "between": "3e-07",
-            "leg": "3e-07",
+            "between": "1e-07",
+            "leg": "1e-07",
             "tip": False,
         }
         assert mass_of(compiled(text)) == pytest.approx(3, rel=1e-6)
