@@ -258,6 +258,7 @@ def test_the_example_of_a_robot_brought_in_is_what_is_printed(capsys):
     for line in example.splitlines():
         # Numbers of the last digit, and whether there are pictures, depend on the machine.
         first = line.split()[0]
-        (same,) = (words for words in printed if words[:1] == [first])
+        same = [words for words in printed if words[:1] == [first]]
+        assert same
         if first not in ("agrees", "pictures"):
-            assert line.split() == same
+            assert line.split() in same

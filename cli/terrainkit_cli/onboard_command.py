@@ -107,9 +107,9 @@ class Onboard(Command):
     def _wishes(self, steps: render.Steps) -> "Wishes":
         from functools import partial
 
+        from terrainkit_robots.collision.part_cache import cache_folder
         from terrainkit_robots.onboard.bringing_in import Wishes
         from terrainkit_robots.settings import Settings
-        from terrainkit_robots.writing.part_cache import cache_folder
 
         return Wishes(
             target=Path(self.output) if self.output else None,

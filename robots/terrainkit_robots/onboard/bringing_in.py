@@ -14,9 +14,9 @@ from terrainkit_robots.onboard.onboarding import MJCF, SPEC, Given, Onboarded, P
 from terrainkit_robots.settings import Settings, read_settings
 
 if TYPE_CHECKING:
+    from terrainkit_robots.collision.treatment import How
     from terrainkit_robots.lint import Finding
     from terrainkit_robots.onboard.proof import Proof
-    from terrainkit_robots.writing.collision import How
 
 
 def _unwrapped(items: Any, _total: int) -> Any:

@@ -22,9 +22,9 @@ from terrainkit_robots.writing.normal_form import normal_form
 from terrainkit_robots.writing.sites import foot_sites, imu_notes, imu_site
 
 if TYPE_CHECKING:
+    from terrainkit_robots.collision.treatment import How
     from terrainkit_robots.model import RobotModel
     from terrainkit_robots.spec.robot_spec import RobotSpec
-    from terrainkit_robots.writing.collision import How
 
 URDF, MJCF, SCENE, SPEC = "robot.urdf", "robot.xml", "scene.xml", "robot.toml"
 """What the files of a folder are called."""
@@ -89,10 +89,10 @@ def onboard(
         TerrainkitError: if there is no robot, a mesh of it cannot be had, the spec that is given is
             of another, or MuJoCo refuses it.
     """
+    from terrainkit_robots.collision.treatment import treat
+    from terrainkit_robots.packing.packed import pack
     from terrainkit_robots.spec.spec_file import to_toml
-    from terrainkit_robots.writing.collision import treat
     from terrainkit_robots.writing.leftovers import leftovers
-    from terrainkit_robots.writing.packed import pack
     from terrainkit_robots.writing.urdf_text import urdf_text
 
     if floating is None and given is not None:

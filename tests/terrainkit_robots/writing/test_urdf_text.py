@@ -25,11 +25,11 @@ from terrainkit_robots.model import (
     RobotModel,
     Source,
 )
+from terrainkit_robots.packing.packed import pack
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.robot_file import read_robot
 from terrainkit_robots.rule import rules
 from terrainkit_robots.writing.normal_form import normal_form
-from terrainkit_robots.writing.packed import pack
 from terrainkit_robots.writing.urdf_text import NO_EFFORT, NO_RANGE, NO_VELOCITY, urdf_text
 
 SOURCE = Source(file=Path("robot.urdf"), line=1)

@@ -1,6 +1,6 @@
 import pytest
 
-from terrainkit_robots.writing.file_names import FileNames
+from terrainkit_robots.packing.file_names import FileNames
 
 
 def test_one_content_is_one_file():

@@ -7,8 +7,8 @@ import trimesh
 from terrainkit_robots.mesh.meshes import MeshError, Meshes
 from terrainkit_robots.mesh.surface import Surface, binary_stl, signed_volume, welded
 from terrainkit_robots.model import MeshFile, Source
-from terrainkit_robots.writing import mesh_bytes as module
-from terrainkit_robots.writing.mesh_bytes import has_no_volume, mesh_bytes, scaled
+from terrainkit_robots.packing import mesh_bytes as module
+from terrainkit_robots.packing.mesh_bytes import has_no_volume, mesh_bytes, scaled
 
 # a wedge: no two of its axes are alike, so that a mirror or a turn shows
 WEDGE = trimesh.convex.convex_hull(

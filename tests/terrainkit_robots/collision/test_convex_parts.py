@@ -6,9 +6,9 @@ import pytest
 import trimesh
 
 from terrainkit.errors import TerrainkitError
+from terrainkit_robots.collision import convex_parts as module
+from terrainkit_robots.collision.convex_parts import convex_parts
 from terrainkit_robots.mesh.surface import MeshError, Surface, signed_volume
-from terrainkit_robots.writing import convex_parts as module
-from terrainkit_robots.writing.convex_parts import convex_parts
 
 
 def surface_of(mesh):

@@ -12,6 +12,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from terrainkit_robots.collision.convex_parts import convex_parts
+from terrainkit_robots.collision.fitted_primitive import fitted_primitive
 from terrainkit_robots.mesh.hull import convex_hull
 from terrainkit_robots.mesh.meshes import MeshError, Meshes
 from terrainkit_robots.mesh.surface import (
@@ -21,11 +23,9 @@ from terrainkit_robots.mesh.surface import (
     welded,
 )
 from terrainkit_robots.model import Geometry, Link, Matrix, MeshFile, RobotModel
-from terrainkit_robots.writing.coarser import coarser
-from terrainkit_robots.writing.convex_parts import convex_parts
-from terrainkit_robots.writing.file_names import FileNames
-from terrainkit_robots.writing.fitted_primitive import fitted_primitive
-from terrainkit_robots.writing.mesh_bytes import has_no_volume, scaled
+from terrainkit_robots.packing.coarser import coarser
+from terrainkit_robots.packing.file_names import FileNames
+from terrainkit_robots.packing.mesh_bytes import has_no_volume, scaled
 
 How = Literal["keep", "hull", "coacd", "primitives"]
 

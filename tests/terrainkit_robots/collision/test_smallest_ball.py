@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit_robots.writing.smallest_ball import smallest_ball
+from terrainkit_robots.collision.smallest_ball import smallest_ball
 
 
 def test_by_hand():

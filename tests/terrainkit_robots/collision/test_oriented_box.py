@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from terrainkit_robots.collision.oriented_box import frame_about, oriented_box, principal_axes
 from terrainkit_robots.urdf.reader import rotation_of
-from terrainkit_robots.writing.oriented_box import frame_about, oriented_box, principal_axes
 
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1.0)])
 HALF = np.array([0.3, 0.1, 0.05])

@@ -5,13 +5,13 @@ import pytest
 import trimesh
 
 from terrainkit_robots.body.shapes import volume
+from terrainkit_robots.collision import treatment as module
+from terrainkit_robots.collision.treatment import VolumeError, treat
 from terrainkit_robots.mesh.meshes import Meshes
 from terrainkit_robots.mesh.surface import MeshError, Surface, binary_stl
 from terrainkit_robots.model import Geometry, Link, MeshFile, RobotModel, Source
+from terrainkit_robots.packing.packed import pack
 from terrainkit_robots.robot_file import read_robot
-from terrainkit_robots.writing import collision as module
-from terrainkit_robots.writing.collision import VolumeError, treat
-from terrainkit_robots.writing.packed import pack
 
 SOURCE = Source(file=Path("robot.urdf"), line=1)
 

@@ -7,7 +7,7 @@ import numpy as np
 from terrainkit_robots.mesh.meshes import Meshes
 from terrainkit_robots.mesh.surface import MeshError, Surface, binary_stl, is_flat
 from terrainkit_robots.model import MeshFile
-from terrainkit_robots.writing.coarser import coarser
+from terrainkit_robots.packing.coarser import coarser
 
 MOST_FACES = 200_000
 """MuJoCo refuses an STL with more."""

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from terrainkit_robots.collision.fitted_primitive import fitted_primitive
 from terrainkit_robots.urdf.reader import rotation_of
-from terrainkit_robots.writing.fitted_primitive import fitted_primitive
 
 TURN = rotation_of(np.array([0.3, -0.4, 0.5]))
 SOLIDS = {

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from terrainkit.errors import TerrainkitError
+from terrainkit_robots.collision.part_cache import PartCache, packed, unpacked
 from terrainkit_robots.mesh.surface import MeshError, Surface
-from terrainkit_robots.writing.coarser import coarser
-from terrainkit_robots.writing.part_cache import PartCache, packed, unpacked
+from terrainkit_robots.packing.coarser import coarser
 
 PARAMETERS: Mapping[str, float | int | bool] = {
     "threshold": 0.05,

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from terrainkit_robots.collision import part_cache as module
+from terrainkit_robots.collision.part_cache import PartCache, cache_folder, packed, unpacked
 from terrainkit_robots.mesh.surface import Surface
-from terrainkit_robots.writing import part_cache as module
-from terrainkit_robots.writing.part_cache import PartCache, cache_folder, packed, unpacked
 
 BOX = trimesh.creation.box([1, 2, 3])
 PART = Surface(points=np.asarray(BOX.vertices), faces=np.asarray(BOX.faces))

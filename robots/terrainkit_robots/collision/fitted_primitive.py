@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from terrainkit_robots.collision.oriented_box import frame_about, oriented_box, principal_axes
+from terrainkit_robots.collision.smallest_ball import smallest_ball
 from terrainkit_robots.model import Matrix, ShapeKind
-from terrainkit_robots.writing.oriented_box import frame_about, oriented_box, principal_axes
-from terrainkit_robots.writing.smallest_ball import smallest_ball
 
 _CLEARLY = 0.98
 """A shape that costs more to collide with is taken if it has less than this share of the volume."""

@@ -9,9 +9,9 @@ from terrainkit_robots.markup.document import RobotFileError
 from terrainkit_robots.mesh.meshes import Meshes
 from terrainkit_robots.mesh.surface import Surface, binary_stl, signed_volume, welded
 from terrainkit_robots.model import Geometry, Link, MeshFile, RobotModel, Source
+from terrainkit_robots.packing.packed import pack
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.robot_file import read_robot
-from terrainkit_robots.writing.packed import pack
 
 SOURCE = Source(file=Path("robot.urdf"), line=1)
 

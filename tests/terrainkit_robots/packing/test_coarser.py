@@ -3,7 +3,7 @@ import pytest
 import trimesh
 
 from terrainkit_robots.mesh.surface import MeshError, Surface, signed_volume
-from terrainkit_robots.writing.coarser import coarser
+from terrainkit_robots.packing.coarser import coarser
 
 
 def surface_of(mesh):

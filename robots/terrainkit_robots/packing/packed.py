@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from terrainkit_robots.body.shapes import has_extent
+from terrainkit_robots.collision.oriented_box import oriented_box
 from terrainkit_robots.markup.document import RobotFileError
 from terrainkit_robots.mesh.meshes import MeshError, Meshes
 from terrainkit_robots.mesh.surface import binary_stl
 from terrainkit_robots.model import Geometry, Link, Matrix, MeshFile, RobotModel
-from terrainkit_robots.writing.ellipsoid import ellipsoid
-from terrainkit_robots.writing.file_names import FileNames
-from terrainkit_robots.writing.mesh_bytes import MeshBytes, has_no_volume, mesh_bytes
-from terrainkit_robots.writing.oriented_box import oriented_box
+from terrainkit_robots.packing.ellipsoid import ellipsoid
+from terrainkit_robots.packing.file_names import FileNames
+from terrainkit_robots.packing.mesh_bytes import MeshBytes, has_no_volume, mesh_bytes
 
 _THIN = 0.001
 """Thickness of the box that stands for a flat mesh [m]: about that of the sheets that are drawn so,

@@ -1,0 +1,1 @@
+"""Collision: simpler shapes in the place of collision meshes."""
