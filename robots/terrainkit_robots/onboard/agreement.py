@@ -75,36 +75,57 @@ class Agreement:
         return tuple(text for text, same in found.items() if not same)
 
 
-def agreement(
-    source: "Facts", written: "Facts", models: Mapping[str, Any]
-) -> tuple[Agreement, ...]:
-    """Return how far written files are from their source, over POSES seeded poses.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Expected:
+    """What a written file has to show."""
+
+    mass: float
+    """Mass of the robot [kg]."""
+
+    base: str
+    """Its base, in the written files."""
+
+    draws: Mapping[str, Matrix]
+    """Positions of each joint, as it is written, shape (POSES,) [rad] or [m]."""
+
+    places: Mapping[str, Matrix]
+    """Pose of each link in the frame of the base, shapes (POSES, 4, 4) [m]."""
+
+    carried: Mapping[str, float]
+    """Inertia that each joint, as it is written, carries at 0 [kg m2] or [kg]."""
+
+
+def expected(source: "Facts", written: "Facts") -> Expected:
+    """Return what the files of a robot have to show, over POSES seeded poses.
 
     Args:
         source: The robot as it was read, its masses known.
         written: The robot as it is written, whose joints may have other names.
-        models: What MuJoCo made of its files, by their names.
     """
-    draws = _draws(written)
-    renamed = _renamed(source, written)
-    places = _places(source, {renamed[name]: q for name, q in draws.items() if name in renamed})
-    carried = {
+    draws, renamed = _draws(written), _renamed(source, written)
+    inertias = {
         body.joint.name: inertia
         for body, inertia in zip(source.bodies, carried_inertias(source), strict=True)
-        if body.joint is not None and math.isfinite(inertia)
+        if body.joint is not None and math.isfinite(inertia) and inertia > 0
     }
-    found = []
-    for file, model in models.items():
-        with quiet_mujoco():
-            here = _followed(model, draws, written.bodies[0].top.name, places)
-            inertias = _carried(model, draws)
-        shares = {
-            name: abs(inertia / carried[renamed[name]] - 1)
-            for name, inertia in inertias.items()
-            if carried.get(renamed.get(name, ""), 0.0) > 0
-        }
-        found.append(_compared(file, model, source, (places, here), shares))
-    return tuple(found)
+    return Expected(
+        mass=source.total_mass,
+        base=written.bodies[0].top.name,
+        draws=draws,
+        places=_places(source, {renamed[name]: q for name, q in draws.items() if name in renamed}),
+        carried={n: inertias[name] for n, name in renamed.items() if name in inertias},
+    )
+
+
+def agreement(wanted: Expected, models: Mapping[str, Any]) -> tuple[Agreement, ...]:
+    """Return how far written files are from their source.
+
+    Args:
+        wanted: What they have to show.
+        models: What MuJoCo made of them, by their names.
+    """
+    with quiet_mujoco():
+        return tuple(_compared(file, model, wanted) for file, model in models.items())
 
 
 def _draws(facts: "Facts") -> dict[str, Matrix]:
@@ -133,36 +154,32 @@ def _places(facts: "Facts", positions: Mapping[str, Matrix]) -> dict[str, Matrix
     }
 
 
-def _followed(
-    model: Any, draws: Mapping[str, Matrix], base: str, links: Mapping[str, Matrix]
-) -> dict[str, Matrix]:
+def _followed(model: Any, wanted: Expected) -> dict[str, Matrix]:
     """Return the poses of those links that MuJoCo has as bodies or sites, as `_places` does."""
     import mujoco
 
+    draws, links = wanted.draws, wanted.places
     data = mujoco.MjData(model)
-    kinds = (
-        (mujoco.mjtObj.mjOBJ_BODY, data.xpos, data.xmat),
-        (mujoco.mjtObj.mjOBJ_SITE, data.site_xpos, data.site_xmat),
-    )
+    body, site = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_SITE
     # The URDF reader makes the base a part of the world, at its origin.
-    root = max(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, base), 0)
-    found: dict[str, tuple[Any, Any, int]] = {}
-    for name in links:
-        for kind, places, turns in kinds:
-            index = mujoco.mj_name2id(model, kind, name)
-            if index > 0 or (index == 0 and kind == mujoco.mjtObj.mjOBJ_SITE):
-                found.setdefault(name, (places, turns, index))
-    address = {name: int(model.joint(name).qposadr[0]) for name in draws}
-    poses = {name: np.tile(np.eye(4), (POSES, 1, 1)) for name in found}
-    for k in range(POSES):
-        for name, positions in draws.items():
-            data.qpos[address[name]] = positions[k]
+    root = max(mujoco.mj_name2id(model, body, wanted.base), 0)
+    bodies = {name: mujoco.mj_name2id(model, body, name) for name in links}
+    sites = {name: mujoco.mj_name2id(model, site, name) for name in links}
+    bodies = {name: index for name, index in bodies.items() if index > 0}
+    sites = {n: index for n, index in sites.items() if index >= 0 and n not in bodies}
+    here, there = list(bodies.values()), list(sites.values())
+    address = [int(model.joint(name).qposadr[0]) for name in draws]
+    positions = np.array(list(draws.values())).reshape(len(draws), POSES).T
+    poses = np.tile(np.eye(4), (POSES, len(bodies) + len(sites), 1, 1))
+    for pose, q in zip(poses, positions, strict=True):
+        data.qpos[address] = q
         mujoco.mj_kinematics(model, data)
         turn = data.xmat[root].reshape(3, 3)
-        for name, (places, turns, index) in found.items():
-            poses[name][k, :3, 3] = (places[index] - data.xpos[root]) @ turn
-            poses[name][k, :3, :3] = turn.T @ turns[index].reshape(3, 3)
-    return poses
+        places = np.concatenate([data.xpos[here], data.site_xpos[there]])
+        turns = np.concatenate([data.xmat[here], data.site_xmat[there]]).reshape(-1, 3, 3)
+        pose[:, :3, 3] = (places - data.xpos[root]) @ turn
+        pose[:, :3, :3] = turn.T @ turns
+    return {name: poses[:, index] for index, name in enumerate([*bodies, *sites])}
 
 
 def _carried(model: Any, draws: Mapping[str, Matrix]) -> dict[str, float]:
@@ -181,14 +198,13 @@ def _carried(model: Any, draws: Mapping[str, Matrix]) -> dict[str, float]:
     return found
 
 
-def _compared(
-    file: str,
-    model: Any,
-    source: "Facts",
-    poses: tuple[Mapping[str, Matrix], Mapping[str, Matrix]],
-    shares: Mapping[str, float],
-) -> Agreement:
-    there, here = poses
+def _compared(file: str, model: Any, wanted: Expected) -> Agreement:
+    there, here = wanted.places, _followed(model, wanted)
+    shares = {
+        name: abs(inertia / wanted.carried[name] - 1)
+        for name, inertia in _carried(model, wanted.draws).items()
+        if name in wanted.carried
+    }
     apart = {
         name: float(np.linalg.norm(there[name][:, :3, 3] - pose[:, :3, 3], axis=1).max())
         for name, pose in here.items()
@@ -200,7 +216,7 @@ def _compared(
     mass = float(model.body_mass.sum())
     return Agreement(
         file=file,
-        mass=mass / source.total_mass - 1 if source.total_mass else mass,
+        mass=mass / wanted.mass - 1 if wanted.mass else mass,
         inertia=shares.get(joint, 0.0),
         joint=joint,
         distance=apart.get(farthest, 0.0),

@@ -1,6 +1,6 @@
 """Bringing a robot in: read, repair, write, and prove, in the order that a newcomer would."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -110,12 +110,11 @@ def bring_in(file: Path, wishes: Wishes) -> BroughtIn:
     Raises:
         TerrainkitError: if a file cannot be read or written, or an option is wrong.
     """
-    from terrainkit_robots.config.frameworks import config_of, file_name
     from terrainkit_robots.onboard.proof import prove
     from terrainkit_robots.onboard.report_page import report_page
     from terrainkit_robots.spec.spec_file import read_spec
 
-    config_files = {framework: file_name(framework) for framework in wishes.configs}
+    _check_frameworks(wishes.configs)
     if wishes.target is not None:
         check_folder(wishes.target, overwrite=wishes.overwrite)
     given = Given(spec=read_spec(wishes.spec), file=str(wishes.spec)) if wishes.spec else None
@@ -134,10 +133,7 @@ def bring_in(file: Path, wishes: Wishes) -> BroughtIn:
         cache=wishes.cache,
         progress=wishes.progress,
     )
-    configs = {
-        file: config_of(framework, made.facts, made.spec)
-        for framework, file in config_files.items()
-    }
+    configs = _configs(made, wishes.configs)
     target = wishes.target or Path(made.facts.model.name)
     kept = _edited(target, made.files[SPEC])
     with new_folder(target, overwrite=wishes.overwrite) as folder:
@@ -185,6 +181,24 @@ def _packed(
     left = tuple(f for f in report.findings if f not in gone)
     # What the fix would have done to the files is not what is done.
     return replace(report, findings=left), (*repaired, *(replace(f, fix=None) for f in gone))
+
+
+def _check_frameworks(frameworks: Sequence[str]) -> None:
+    """Raise an error if there is no such framework."""
+    if frameworks:
+        from terrainkit_robots.config.frameworks import file_name
+
+        for name in frameworks:
+            file_name(name)
+
+
+def _configs(made: Onboarded, frameworks: Sequence[str]) -> dict[str, str]:
+    """Return configurations by the names of their files."""
+    if not frameworks:
+        return {}
+    from terrainkit_robots.config.frameworks import config_of, file_name
+
+    return {file_name(name): config_of(name, made.facts, made.spec) for name in frameworks}
 
 
 def keeps_out(finding: "Finding") -> bool:

@@ -102,13 +102,12 @@ def onboard(
     packed = pack(treated.model, treated.meshes)
     meshes = Meshes({Path(name): data for name, data in packed.files.items()})
     spec = _spec(Facts(packed.model, meshes), given)
-    excluded, said = _excluded(Facts(packed.model, meshes, spec=spec))
-    model = replace(_with_motors(packed.model, spec), excluded=excluded)
-    facts = Facts(model, meshes, spec=spec)
+    facts = Facts(_with_motors(packed.model, spec), meshes, spec=spec)
+    excluded, said = _excluded(facts)
     texts = {
-        URDF: urdf_text(model, feet=spec.feet),
-        MJCF: _mjcf(facts, spec),
-        SCENE: scene_text(model.name, MJCF, height=max(_height(facts), 0.1)),
+        URDF: urdf_text(facts.model, feet=spec.feet),
+        MJCF: _mjcf(facts, spec, excluded),
+        SCENE: scene_text(facts.model.name, MJCF, height=max(_height(facts), 0.1)),
         SPEC: to_toml(spec),
     }
     return Onboarded(
@@ -184,9 +183,9 @@ def _with_motors(model: "RobotModel", spec: "RobotSpec") -> "RobotModel":
     return replace(model, joints=joints, actuators=tuple(motors))
 
 
-def _mjcf(facts: Facts, spec: "RobotSpec") -> str:
-    """Return the robot as MJCF."""
-    single = fused(facts.model, keep=spec.feet)
+def _mjcf(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[str]]) -> str:
+    """Return the robot as MJCF, in which pairs of links are not to touch."""
+    single = fused(replace(facts.model, excluded=excluded), keep=spec.feet)
     columns = {name: spec.per_joint(name) for name in _DRIVEN}
     drives = {
         joint: Drive(**{name: values[joint] for name, values in columns.items()})

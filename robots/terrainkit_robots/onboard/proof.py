@@ -4,13 +4,14 @@ Two legs fall unless they are balanced, so that of a biped it is asked whether i
 joints held.
 """
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from terrainkit.errors import ExportError
 from terrainkit_robots.leg.stance import stands_alone
-from terrainkit_robots.onboard.agreement import Agreement, agreement
+from terrainkit_robots.onboard.agreement import Agreement, agreement, expected
 from terrainkit_robots.onboard.onboarding import MJCF, SCENE, URDF
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rule import CannotCheckError
@@ -67,11 +68,13 @@ def prove(source: "Facts", made: "Onboarded", folder: Path) -> Proof:
     from terrainkit_robots.simulation.plant import plant_of
     from terrainkit_robots.simulation.standing import footholds, stand_still
 
-    # The scene includes the MJCF, which is compiled only once so.
-    scene = _loaded(folder / SCENE)
-    models = {URDF: _loaded(folder / URDF), MJCF: scene}
     floating = bool(made.facts.model.floating)
-    agreements = agreement(_with_masses(source, floating), made.facts, models)
+    # MuJoCo compiles without the interpreter's lock. The scene includes the MJCF, which is compiled
+    # only once so.
+    with quiet_mujoco(), ThreadPoolExecutor(2) as beside:
+        urdf, scene = (beside.submit(_loaded, folder / name) for name in (URDF, SCENE))
+        wanted = expected(_with_masses(source, floating), made.facts)
+    agreements = agreement(wanted, {URDF: urdf.result(), MJCF: scene.result()})
     for each in agreements:
         if each.faults:
             raise ExportError(f"{each.file} would be another robot: {'; '.join(each.faults)}")
@@ -80,7 +83,7 @@ def prove(source: "Facts", made: "Onboarded", folder: Path) -> Proof:
     locked = not stands_alone(made.facts)
     try:
         standing = stand_still(
-            plant_of(scene, base=made.facts.bodies[0].top.name),
+            plant_of(scene.result(), base=made.facts.bodies[0].top.name),
             _gains(made.spec),
             positions=made.facts.positions,
             feet=footholds(made.facts),
@@ -105,8 +108,7 @@ def _loaded(path: Path) -> Any:
     import mujoco
 
     try:
-        with quiet_mujoco():
-            return mujoco.MjModel.from_xml_path(str(path))
+        return mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         reason = " ".join(str(error).split())
         raise ExportError(f"MuJoCo does not load the {path.name} made: {reason}") from None

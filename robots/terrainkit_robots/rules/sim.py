@@ -2,24 +2,22 @@
 
 import re
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from terrainkit_robots.body.joint_order import permutation
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.rule import CannotCheckError, Defect, rule
 from terrainkit_robots.simulators.armature import GENESIS_ARMATURE, moved_by_joints
 from terrainkit_robots.simulators.fixed_joints import SIMULATORS, TO_KEEP, foot_merges
-from terrainkit_robots.simulators.loading import (
-    NotTriedError,
-    Refusal,
-    refused_by_mujoco,
-    refused_by_yourdfpy,
-)
 from terrainkit_robots.simulators.orders import (
     SimulatorOrder,
     file_order,
     simulator_orders,
 )
 from terrainkit_robots.wording import names, short
+
+if TYPE_CHECKING:
+    from terrainkit_robots.simulators.loading import Refusal
 
 _MOST_SHOWN = 40
 """Of more joints the permutation is no message; the JSON report has it."""
@@ -174,6 +172,8 @@ def mujoco_refuses(robot: Facts) -> Iterator[Defect]:
     Source:
         The file is compiled with the MuJoCo that is installed; nothing is simulated.
     """
+    from terrainkit_robots.simulators.loading import NotTriedError, refused_by_mujoco
+
     _check_unchanged(robot)
     try:
         refusal = refused_by_mujoco(robot)
@@ -195,6 +195,8 @@ def yourdfpy_refuses(robot: Facts) -> Iterator[Defect]:
     Source:
         The file is read with the yourdfpy that is installed; no meshes are opened.
     """
+    from terrainkit_robots.simulators.loading import NotTriedError, refused_by_yourdfpy
+
     if robot.model.kind == "mjcf":
         return
     _check_unchanged(robot)
@@ -233,7 +235,7 @@ def _more(robot: Facts, words: str) -> str:
     return "" if all(mesh.found_by == "path" for mesh in found) else "MSH002"
 
 
-def _refused(robot: Facts, reader: str, refusal: Refusal, code: str) -> Defect:
+def _refused(robot: Facts, reader: str, refusal: "Refusal", code: str) -> Defect:
     named = refusal.element
     sources = {each.name: each.source for each in robot.model.joints}
     sources |= {each.name: each.source for each in robot.model.links}

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -14,19 +14,17 @@ from terrainkit_robots.body.joint_order import (
     tree_order,
 )
 from terrainkit_robots.comparison.body_masses import body_gap, dropped_mass, is_known, share
-from terrainkit_robots.comparison.kinematics import (
-    ANGLE,
-    DISTANCE,
-    KinematicDifference,
-    largest_difference,
-)
-from terrainkit_robots.comparison.pairing import Pairing, from_link, pair_robots
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.leg.effort import effort_of
 from terrainkit_robots.model import Joint, Matrix, Mimic, Source
 from terrainkit_robots.per_robot import per_robot
 from terrainkit_robots.rule import CannotCheckError, Defect, Severity, rule
 from terrainkit_robots.wording import names, short
+
+if TYPE_CHECKING:
+    from terrainkit_robots.comparison.kinematics import KinematicDifference
+    from terrainkit_robots.comparison.pairing import Pairing
+
 
 _AXIS = 0.01
 """Angle by which axes may differ [rad]: two digits, as in 0.71 0.71 0."""
@@ -56,12 +54,14 @@ _T = TypeVar("_T")
 
 
 @per_robot
-def _pairing_or_none(robot: Facts) -> Pairing | None:
+def _pairing_or_none(robot: Facts) -> "Pairing | None":
+    from terrainkit_robots.comparison.pairing import pair_robots
+
     assert robot.against is not None
     return pair_robots(robot, robot.against)
 
 
-def _pairing(robot: Facts) -> Pairing:
+def _pairing(robot: Facts) -> "Pairing":
     pairing = _pairing_or_none(robot)
     if pairing is None:
         empty = robot if not robot.links else _other(robot)
@@ -247,6 +247,8 @@ def _axis_angle(robot: Facts, one: Joint, other: Joint) -> float:
 
 def _axis_from(link: str, robot: Facts, joint: Joint) -> Matrix:
     """Return the axis of a joint as a link sees it with all joints at 0."""
+    from terrainkit_robots.comparison.pairing import from_link
+
     pose = from_link(robot, link) @ robot.at_zero[robot.body_of[joint.child].index]
     return pose[:3, :3] @ joint.direction
 
@@ -533,7 +535,7 @@ def total_mass_differs(robot: Facts) -> Iterator[Defect]:
     yield from _as_it_stands(robot, other)
 
 
-def _heaviest_gaps(pairing: Pairing) -> str:
+def _heaviest_gaps(pairing: "Pairing") -> str:
     """Return the bodies that differ most in mass, as the end of a message."""
     gaps = sorted(pairing.bodies, key=lambda pair: -abs(pair[0].mass - pair[1].mass))
     told = [
@@ -578,6 +580,8 @@ def kinematics_differ(robot: Facts) -> Iterator[Defect]:
         Both robots are put into 20 random poses. yourdfpy says where the links of a URDF are then,
         MuJoCo where those of a MJCF are: two implementations that share nothing.
     """
+    from terrainkit_robots.comparison.kinematics import largest_difference
+
     held = [one.name for one, other in _joints(robot) if not _alike(robot, one, other)]
     gap = largest_difference(robot, _other(robot), held=held)
     if gap.agrees:
@@ -601,14 +605,16 @@ def kinematics_differ(robot: Facts) -> Iterator[Defect]:
     )
 
 
-def _severity(gap: KinematicDifference, same_base: bool) -> Severity | None:
+def _severity(gap: "KinematicDifference", same_base: bool) -> Severity | None:
     if gap.base_only and not same_base:
         return "info"
     return "warning" if gap.turned_only else None
 
 
-def _gap_message(gap: KinematicDifference, there: str) -> str:
+def _gap_message(gap: "KinematicDifference", there: str) -> str:
     """Return what is where, seen from the base."""
+    from terrainkit_robots.comparison.kinematics import ANGLE, DISTANCE
+
     ours, theirs = gap.base
     base = ours if ours == theirs else f"{ours} ({theirs} there)"
     turned = f"{math.degrees(gap.angle):.3g} deg"

@@ -2,16 +2,19 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from terrainkit_robots.body.joint_order import actuator_order, is_moved, permutation
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.leg.effort import effort_of
 from terrainkit_robots.model import Joint
 from terrainkit_robots.rule import Defect, rule
-from terrainkit_robots.spec.mirror_map import mirror_map
 from terrainkit_robots.spec.per_joint import match_joints
-from terrainkit_robots.spec.robot_spec import JOINT_TABLES, RobotSpec
 from terrainkit_robots.wording import closest, names, short
+
+if TYPE_CHECKING:
+    from terrainkit_robots.spec.robot_spec import RobotSpec
+
 
 _CLOSE = 0.75
 """Share of common letters from which a name is what another was meant for."""
@@ -25,7 +28,7 @@ _MORE = 1.01
 _BODIES = ("feet", "shanks", "thighs", "termination_contacts", "penalized_contacts")
 
 
-def _spec(robot: Facts) -> RobotSpec:
+def _spec(robot: Facts) -> "RobotSpec":
     assert robot.spec is not None  # what the rules need
     return robot.spec
 
@@ -139,6 +142,8 @@ def spec_tables(robot: Facts) -> Iterator[Defect]:
     Source:
         Isaac Lab and mjlab refuse such tables in the same way.
     """
+    from terrainkit_robots.spec.robot_spec import JOINT_TABLES
+
     joints = _joints(robot)
     for table in (*JOINT_TABLES, "soft_limits"):
         matching = match_joints(getattr(_spec(robot), table), joints)
@@ -314,6 +319,8 @@ def spec_mirror(robot: Facts) -> Iterator[Defect]:
     Source:
         A reflection turns a rotation by q about an axis a into one by -q about the reflected a.
     """
+    from terrainkit_robots.spec.mirror_map import mirror_map
+
     mirror, measured = _spec(robot).mirror, mirror_map(robot)
     known = [joint.name for joint in robot.actuated]
     for name, twin in mirror.items():

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from terrainkit_robots.facts import Facts
 
 _LOOKS = 4
-"""Contacts are looked at every so many steps: 20 ms."""
+"""The robot is looked at every so many steps: 20 ms."""
 
 _END = 0.1
 """What touches in the last tenth of a second still touches at the end [s]."""
@@ -169,7 +169,6 @@ class _Watch:
     positions: Mapping[str, float]
     feet: Sequence[Foothold]
     seconds: float
-    tilt: float = 0.0
     largest_tilt: float = 0.0
     touched: set[int] = field(default_factory=set)
     standing_on: set[str] = field(default_factory=set)
@@ -193,15 +192,18 @@ class _Watch:
 
     def look(self, step: int) -> None:
         """See how it stands after a step."""
-        data, time = self.trial.data, step * float(self.trial.model.opt.timestep)
         self.steps = step + 1
-        self.tilt = math.acos(np.clip(self.up @ _up(data.qpos[3:7]), -1.0, 1.0))
-        self.largest_tilt = max(self.largest_tilt, self.tilt)
+        if step % _LOOKS:
+            return
+        data, time = self.trial.data, step * float(self.trial.model.opt.timestep)
+        self.largest_tilt = max(self.largest_tilt, self._tilt())
         if 2 * time >= self.seconds:
             shares = np.abs(data.actuator_force) / self.efforts
             np.maximum(self.shares, shares, out=self.shares)
-        if step % _LOOKS == 0:
-            self._touch(ending=time >= self.seconds - _END)
+        self._touch(ending=time >= self.seconds - _END)
+
+    def _tilt(self) -> float:
+        return math.acos(np.clip(self.up @ _up(self.trial.data.qpos[3:7]), -1.0, 1.0))
 
     def _touch(self, *, ending: bool) -> None:
         """Note which bodies touch the floor with anything but a foot, and which feet in the end."""
@@ -232,8 +234,8 @@ class _Watch:
         share = float(self.shares[most]) if len(self.shares) else 0.0
         feet = dict.fromkeys(hold.foot for hold in self.holds.values())
         return Standing(
-            tilt=self.tilt,
-            largest_tilt=self.largest_tilt,
+            tilt=self._tilt(),
+            largest_tilt=max(self.largest_tilt, self._tilt()),
             height=float(data.qpos[2]),
             sink=-float(moved[2]),
             drift=float(np.hypot(moved[0], moved[1])),

@@ -214,8 +214,6 @@ def _assets(root: Any, model: RobotModel) -> dict[_MeshKey, str]:
         mesh = etree.SubElement(asset, "mesh", name=name, file=file)
         if scale != (1.0, 1.0, 1.0):
             mesh.set("scale", _text(scale))
-        if key not in colliding:
-            mesh.set("inertia", "shell")  # what is only drawn may be open or flat
     return names
 
 
