@@ -12,6 +12,7 @@ from terrainkit_robots.lint import Report
 from terrainkit_robots.onboard.folder import KEPT, check_folder, new_folder, write_files
 from terrainkit_robots.onboard.onboarding import MJCF, SPEC, Given, Onboarded, Progress, onboard
 from terrainkit_robots.settings import Settings, read_settings
+from terrainkit_robots.writing.normal_form import plain_name
 
 if TYPE_CHECKING:
     from terrainkit_robots.collision.treatment import How
@@ -124,6 +125,8 @@ def bring_in(file: Path, wishes: Wishes) -> BroughtIn:
         raise TerrainkitError(f"{file}: {crash.code}: {crash.reason}")
     if not wishes.force and any(map(keeps_out, report.findings)):
         return BroughtIn(report=report, repaired=repaired)
+    target = wishes.target or Path(plain_name(report.facts.model))
+    check_folder(target, overwrite=wishes.overwrite)
     wishes.say("finding the pose and the gains")
     made = onboard(
         report.facts,
@@ -134,7 +137,6 @@ def bring_in(file: Path, wishes: Wishes) -> BroughtIn:
         progress=wishes.progress,
     )
     configs = _configs(made, wishes.configs)
-    target = wishes.target or Path(made.facts.model.name)
     kept = _edited(target, made.files[SPEC])
     with new_folder(target, overwrite=wishes.overwrite) as folder:
         wishes.say("proving that it stands")

@@ -101,6 +101,7 @@ def onboard(
     treated = treat(form.model, source.meshes, collision, cache=cache, progress=progress)
     packed = pack(treated.model, treated.meshes)
     meshes = Meshes({Path(name): data for name, data in packed.files.items()})
+    doubts = _doubts(Facts(packed.model, meshes, spec=given.spec), given) if given else ()
     spec = _spec(Facts(packed.model, meshes), given)
     facts = Facts(_with_motors(packed.model, spec), meshes, spec=spec)
     excluded, said = _excluded(facts)
@@ -115,6 +116,7 @@ def onboard(
         spec=spec,
         files={name: text.encode() for name, text in texts.items()} | dict(packed.files),
         notes=(
+            *doubts,
             *form.notes,
             *leftovers(source.model),
             *treated.notes,
@@ -129,15 +131,12 @@ def _spec(facts: Facts, given: Given | None) -> "RobotSpec":
     """Return the spec of a robot: what is given, or derived.
 
     Raises:
-        ConfigError: if the spec that is given is wrong for the robot.
         ExportError: if no gains can be suggested, since the robot cannot be simulated.
     """
     from terrainkit_robots.simulation.gains import suggest_gains
     from terrainkit_robots.spec.derive import derive_spec
     from terrainkit_robots.spec.given import with_origins
 
-    if given is not None:
-        _check(Facts(facts.model, facts.meshes, spec=given.spec), given)
     try:
         gains = suggest_gains(facts)
     except CannotCheckError as error:
@@ -150,8 +149,12 @@ def _spec(facts: Facts, given: Given | None) -> "RobotSpec":
     return with_origins(mine, derived, given.file)
 
 
-def _check(facts: Facts, given: Given) -> None:
-    """Raise an error if a spec is wrong for a robot."""
+def _doubts(facts: Facts, given: Given) -> tuple[str, ...]:
+    """Return what is odd about the spec that is given.
+
+    Raises:
+        ConfigError: if it is wrong for the robot.
+    """
     from terrainkit_robots.lint import lint
     from terrainkit_robots.rule import rules
 
@@ -161,10 +164,13 @@ def _check(facts: Facts, given: Given) -> None:
             f"{given.file} is of {given.spec.name}: none of its joints is in {facts.model.title}"
         )
     asked = [rule for rule in rules() if "spec" in rule.needs]
-    wrong = [f for f in lint(facts, asked).findings if f.severity == "error"]
+    found = lint(facts, asked).findings
+    wrong = [finding for finding in found if finding.severity == "error"]
     if wrong:
         more = f" (and {len(wrong) - 1} more; check-robot --spec has all)" if wrong[1:] else ""
         raise ConfigError(f"{given.file}: {wrong[0].code}: {wrong[0].message}{more}")
+    odd = (finding for finding in found if finding.severity == "warning")
+    return tuple(f"{given.file}: {finding.code}: {finding.message}" for finding in odd)
 
 
 def _with_motors(model: "RobotModel", spec: "RobotSpec") -> "RobotModel":

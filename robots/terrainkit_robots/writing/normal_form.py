@@ -9,7 +9,7 @@ import re
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -80,7 +80,7 @@ def normal_form(facts: "Facts", *, floating: bool | None = None) -> NormalForm:
         links = [replace(each, name=other) if each.name == WORLD else each for each in links]
         joints = [(_moved(joint, other), before) for joint, before in joints]
     model = RobotModel(
-        name=_plain(facts.model.name or facts.model.file.stem),
+        name=plain_name(facts.model),
         kind="urdf",
         file=facts.model.file,
         source=facts.model.source,
@@ -152,8 +152,9 @@ def _rolls(facts: "Facts", body: Body) -> bool:
     return near and upper - lower > _ENDLESS and is_wheel(facts, body)
 
 
-def _plain(name: str) -> str:
-    """Return a name that is one in every format and on every disk."""
+def plain_name(model: RobotModel) -> str:
+    """Return a name for a robot that is one in every format and on every disk."""
+    name = model.name or model.file.stem
     return re.sub(r"[^A-Za-z0-9_.-]+", "_", name).strip("._-") or "robot"
 
 
@@ -180,25 +181,23 @@ def has_unknown(inertial: Inertial | None) -> bool:
     )
 
 
+_MOST_BODIES = 600
+"""Of a MJCF with more bodies MuJoCo is not asked for masses."""
+
+
 def _with_mesh_inertia(facts: "Facts", links: Sequence[Link]) -> list[Link]:
     """Return links with the inertia that MuJoCo takes from their meshes."""
     import mujoco
 
-    from terrainkit_robots.quiet_mujoco import quiet_mujoco
-
-    file = facts.model.file
-    try:
-        with quiet_mujoco():
-            model = mujoco.MjModel.from_xml_path(str(file))
-    except ValueError as error:
-        reason = " ".join(str(error).split())
-        raise RobotFileError(
-            f"{file}: masses are to come from meshes, and MuJoCo does not load it: {reason}"
-        ) from None
+    model = _compiled(facts)
     found = []
     for link in links:
         if has_unknown(link.inertial):
             assert link.inertial is not None
+            if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, link.name) < 0:
+                raise RobotFileError(
+                    f"{facts.model.file}: a body without a name has its mass from a mesh; name it"
+                )
             body = model.body(link.name)
             origin = np.eye(4)
             origin[:3, 3] = body.ipos
@@ -214,6 +213,33 @@ def _with_mesh_inertia(facts: "Facts", links: Sequence[Link]) -> list[Link]:
             link = replace(link, inertial=inertial)
         found.append(link)
     return found
+
+
+def _compiled(facts: "Facts") -> Any:
+    """Return what MuJoCo makes of the file, without textures, which may be as large as they like.
+
+    Raises:
+        RobotFileError: if it does not load it.
+    """
+    import mujoco
+
+    from terrainkit_robots.quiet_mujoco import quiet_mujoco
+
+    file = facts.model.file
+    wanted = f"{file}: masses are to come from meshes"
+    if len(facts.model.links) > _MOST_BODIES:
+        raise RobotFileError(f"{wanted}, and it has more than {_MOST_BODIES} bodies")
+    try:
+        with quiet_mujoco():
+            spec = mujoco.MjSpec.from_file(str(file))
+            for material in spec.materials:
+                material.textures = [""] * len(material.textures)
+            for texture in list(spec.textures):
+                spec.delete(texture)
+            return spec.compile()
+    except (ValueError, mujoco.FatalError, mujoco.UnexpectedError) as error:
+        reason = " ".join(str(error).split())
+        raise RobotFileError(f"{wanted}, and MuJoCo does not load it: {reason}") from None
 
 
 def _joints(facts: "Facts", notes: list[str]) -> list[tuple[Joint, str]]:

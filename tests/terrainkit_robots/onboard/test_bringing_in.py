@@ -281,3 +281,16 @@ def test_a_robot_with_meshes_is_whole_wherever_its_folder_goes(robot_file, tmp_p
         with quiet_mujoco():
             model = mujoco.MjModel.from_xml_path(str(moved / name))
         assert np.isclose(model.body_mass.sum(), done.made.facts.total_mass, rtol=1e-3), name
+
+
+def test_what_is_odd_about_a_spec_is_noted(tmp_path):
+    first = bring_in(bundled.find("quadruped"), wishes(tmp_path))
+    text = (first.folder / "robot.toml").read_text()
+    assert "base_height_target = 0.33" in text
+    edited = tmp_path / "mine.toml"
+    edited.write_text(text.replace("base_height_target = 0.33", "base_height_target = 0.23"))
+    done = bring_in(
+        bundled.find("quadruped"),
+        Wishes(target=tmp_path / "again", pictures=False, spec=edited),
+    )
+    assert any("LEG009" in note for note in done.made.notes)

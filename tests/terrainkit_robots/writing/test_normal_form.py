@@ -258,3 +258,31 @@ def test_a_joint_that_follows_itself_or_nobody_is_free_and_told(tmp_path, leads,
     assert free == list(notes)
     why = {"nobody": "there is no 'nobody'"}.get(leads[0], "it would follow itself in the end")
     assert form.notes == tuple(f"{name} follows no other joint: {why}" for name in notes)
+
+
+MESH = '<mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/>'
+
+
+def test_a_texture_without_end_costs_nothing(tmp_path):
+    """It would take 2.4 GB, for a mass."""
+    text = f"""<mujoco><asset>{MESH}
+      <texture name="t" type="2d" builtin="flat" width="20000" height="20000"/>
+      <material name="p" texture="t"/></asset>
+      <worldbody><body name="base"><geom type="mesh" mesh="m" material="p"/></body></worldbody>
+    </mujoco>"""
+    (link,) = normal_form(facts(tmp_path, text)).model.links
+    assert link.inertial.mass == pytest.approx(1000 / 6)
+
+
+def test_a_body_without_a_name_is_told(tmp_path):
+    text = f"""<mujoco><asset>{MESH}</asset><worldbody><body>
+      <geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
+    with pytest.raises(RobotFileError, match="a body without a name has its mass from a mesh"):
+        normal_form(facts(tmp_path, text))
+
+
+def test_a_mesh_that_mujoco_does_not_find_is_told(tmp_path):
+    text = """<mujoco><asset><mesh name="m" file="no.stl"/></asset><worldbody><body name="base">
+      <geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
+    with pytest.raises(RobotFileError, match="masses are to come from meshes, and MuJoCo does not"):
+        normal_form(facts(tmp_path, text))
