@@ -1,6 +1,8 @@
 """MapConfig as TOML, and back."""
 
 import dataclasses
+import os
+import stat
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -56,7 +58,9 @@ def read_config(path: "str | Path") -> MapConfig:
         ConfigError: if it cannot be read, is over a megabyte, or as :func:`from_toml`.
     """
     try:
-        with open(path, "rb") as file:  # noqa: PTH123 (importing pathlib is slow, and needless here)
+        if not stat.S_ISREG(os.stat(path).st_mode):  # noqa: PTH116 (pathlib is slow to import)
+            raise ConfigError(f"cannot read {path}: not a plain file; wanted a TOML file of a map")
+        with open(path, "rb") as file:  # noqa: PTH123
             data = file.read(_LARGEST + 1)
     except OSError as error:
         raise ConfigError(f"cannot read {path}: {error.strerror or error}") from error

@@ -1,4 +1,5 @@
 import dataclasses
+import os
 
 import numpy as np
 import pytest
@@ -272,3 +273,10 @@ def test_a_file_of_a_megabyte_is_read_and_one_byte_more_is_not(tmp_path):
     path.write_bytes(b"rows = 3\n" + b"\n" * (2**20 - 8))
     with pytest.raises(ConfigError, match=r"map\.toml: over 1048576 bytes; wanted a TOML file"):
         read_config(path)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+def test_a_pipe_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(ConfigError, match="not a plain file"):
+        read_config(tmp_path / "pipe")

@@ -11,11 +11,15 @@ _SECTIONS = ("tendon", "equality", "deformable", "extension", "custom")
 """Sections of a MJCF that are not carried over. Its sensors and motors are written anew."""
 
 
+_CONTACT = ("friction", "condim", "priority", "solref", "solimp", "solmix", "margin", "gap")
+"""Attributes of shapes that are not carried over: how they feel to what they touch."""
+
+
 def leftovers(model: RobotModel) -> tuple[str, ...]:
     """Return a sentence for each kind of thing that onboarding a MJCF leaves out."""
     if model.kind != "mjcf":
         return ()
-    sections, springs = Counter[str](), 0
+    sections, springs, felt = Counter[str](), 0, 0
     for file in model.sources:
         root = parse_xml(file, read_bytes(file)).root
         if root is None:
@@ -23,15 +27,21 @@ def leftovers(model: RobotModel) -> tuple[str, ...]:
         for section in _SECTIONS:
             sections[section] += sum(len(each) for each in root.iter(section))
         springs += sum(_is_set(joint.get("stiffness")) for joint in root.iter("joint"))
+        felt += sum(any(name in geom.attrib for name in _CONTACT) for geom in root.iter("geom"))
     sections["equality"] -= sum(joint.mimic is not None for joint in model.joints)
     notes = [_section(name, sections[name]) for name in _SECTIONS if sections[name] > 0]
     if springs:
-        setting = "1 element sets" if springs == 1 else f"{springs} elements set"
-        notes.append(f"left out stiffness of joints, which {setting}")
+        notes.append(f"left out stiffness of joints, which {_setting(springs)}")
+    if felt:
+        notes.append(f"left out friction and contact parameters of shapes, which {_setting(felt)}")
     idle = [motor.name for motor in model.actuators if not motor.joint]
     if idle:
         notes.append(f"left out {_counted(idle)}, which {_drive(idle)} no joint: {names(idle)}")
     return tuple(notes)
+
+
+def _setting(number: int) -> str:
+    return "1 element sets" if number == 1 else f"{number} elements set"
 
 
 def _section(name: str, number: int) -> str:

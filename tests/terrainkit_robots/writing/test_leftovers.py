@@ -35,3 +35,15 @@ def test_motors_of_tendons_are_told_and_followers_are_none(tmp_path):
 
 def test_nothing_is_left_out_of_a_urdf():
     assert leftovers(read_robot(bundled.find("quadruped"))) == ()
+
+
+def test_how_shapes_feel_is_left_out_and_told(tmp_path):
+    path = tmp_path / "robot.xml"
+    path.write_text(
+        """<mujoco><default><geom condim="6"/></default><worldbody><body name="a">
+        <geom size="0.1" friction="0.4 0.02 0.01" priority="1"/><geom size="0.1"/>
+        </body></worldbody></mujoco>"""
+    )
+    assert leftovers(read_robot(path)) == (
+        "left out friction and contact parameters of shapes, which 2 elements set",
+    )
