@@ -1,7 +1,7 @@
 """Wording: names and words from a file, as messages give them back."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 
 _MOST_LETTERS = 100
 """Longer names are cut, and compared with no other: they come from a program, or are no names."""
@@ -22,6 +22,19 @@ def names(words: Iterable[str], most: int = 6, separator: str = ", ") -> str:
 def count(number: int, word: str) -> str:
     """Return such as `1 leg` or `4 legs`."""
     return f"{number:,} {word}{'' if number == 1 else 's'}"
+
+
+def one_line(text: str) -> str:
+    """Return `text` on one line, without what cannot be printed."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
+
+
+def free_name(name: str, taken: Container[str]) -> str:
+    """Return `name`, or the first of name_2, name_3, ... if it is taken."""
+    free, number = name, 2
+    while free in taken:
+        free, number = f"{name}_{number}", number + 1
+    return free
 
 
 def closest(word: str, known: Iterable[str], near: float) -> str:

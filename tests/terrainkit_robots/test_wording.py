@@ -1,6 +1,6 @@
 import pytest
 
-from terrainkit_robots.wording import closest, count, names, short
+from terrainkit_robots.wording import closest, count, free_name, names, one_line, short
 
 
 def test_a_long_text_is_cut_to_what_is_allowed():
@@ -60,3 +60,12 @@ def test_the_order_of_the_known_words_does_not_count():
 def test_many_long_names_do_not_take_long():
     known = [f"link_{number:095d}" for number in range(5000)]
     assert closest("y" * 100, known, 0.6) == ""
+
+
+def test_one_line_holds_what_can_be_printed():
+    assert one_line("a\n\t b\u202e ") == "a b"
+
+
+def test_a_name_that_is_taken_gets_a_number():
+    assert free_name("a", ()) == "a"
+    assert free_name("a", {"a", "a_2"}) == "a_3"

@@ -9,6 +9,7 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 
 from terrainkit.errors import ConfigError
+from terrainkit_robots.wording import one_line
 
 WIDTH = 88
 """Columns of a line; what ruff and black take where nothing is set."""
@@ -104,7 +105,7 @@ def assign_sum(name: str, left: str, operator: str, right: str, *, depth: int = 
 def comment(text: str, *, depth: int = 0) -> list[str]:
     """Return `text` as comment lines, of printable characters only."""
     lines = textwrap.wrap(
-        plain(text), WIDTH - 4 * depth - 2, break_long_words=False, break_on_hyphens=False
+        one_line(text), WIDTH - 4 * depth - 2, break_long_words=False, break_on_hyphens=False
     )
     return [f"# {line}" for line in lines]
 
@@ -122,11 +123,6 @@ def docstring(paragraphs: Iterable[str]) -> list[str]:
 def indented(lines: Iterable[str], depth: int = 1) -> list[str]:
     """Return the lines, each `depth` steps of four further in; empty ones stay empty."""
     return [" " * 4 * depth + line if line else line for line in lines]
-
-
-def plain(text: str) -> str:
-    """Return `text` on one line, without what cannot be printed."""
-    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
 def module(parts: Iterable[Sequence[str]]) -> str:

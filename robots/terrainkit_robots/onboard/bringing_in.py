@@ -10,12 +10,12 @@ from terrainkit.errors import TerrainkitError
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.lint import Report
 from terrainkit_robots.onboard.folder import KEPT, check_folder, new_folder, write_files
-from terrainkit_robots.onboard.onboarding import MJCF, SPEC, Given, Onboarded, Progress, onboard
+from terrainkit_robots.onboard.onboarding import MJCF, SPEC, Given, Onboarded, onboard
 from terrainkit_robots.settings import Settings, read_settings
 from terrainkit_robots.writing.normal_form import plain_name
 
 if TYPE_CHECKING:
-    from terrainkit_robots.collision.treatment import How
+    from terrainkit_robots.collision.treatment import How, Progress
     from terrainkit_robots.lint import Finding
     from terrainkit_robots.onboard.proof import Proof
 
@@ -66,7 +66,7 @@ class Wishes:
     cache: Path | None = None
     """Folder that keeps convex parts from one run to the next."""
 
-    progress: Progress = _unwrapped
+    progress: "Progress" = _unwrapped
     """Draws a bar while collision meshes are worked on."""
 
     say: Callable[[str], None] = _silent

@@ -4,10 +4,10 @@ What was read is brought into its normal form, its meshes are packed, gains and 
 where nobody gave them, and everything is written as text. Nothing here touches the disk.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots.body.kinematics import body_poses
@@ -22,7 +22,7 @@ from terrainkit_robots.writing.normal_form import normal_form
 from terrainkit_robots.writing.sites import foot_sites, imu_notes, imu_site
 
 if TYPE_CHECKING:
-    from terrainkit_robots.collision.treatment import How
+    from terrainkit_robots.collision.treatment import How, Progress
     from terrainkit_robots.model import RobotModel
     from terrainkit_robots.spec.robot_spec import RobotSpec
 
@@ -34,9 +34,6 @@ _AT_REST = 1e-4
 
 _DRIVEN = ("stiffness", "damping", "effort", "armature", "velocity")
 """What a motor takes from the spec."""
-
-Progress = Callable[[Iterable[Any], int], Iterable[Any]]
-"""Draws a bar while it passes on so many things."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,7 +69,7 @@ def onboard(
     floating: bool | None = None,
     given: Given | None = None,
     cache: Path | None = None,
-    progress: Progress = lambda items, _: items,
+    progress: "Progress" = lambda items, _: items,
 ) -> Onboarded:
     """Return a robot's files: robot.toml, robot.urdf, robot.xml, scene.xml and its meshes.
 

@@ -4,6 +4,8 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 
+from terrainkit_robots.wording import one_line
+
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 LINE = 100
@@ -46,10 +48,5 @@ def value_text(value: object, room: int = LINE) -> str:
 
 def comment_text(*parts: str) -> str:
     """Return the parts that are not empty as one comment, with two spaces before it."""
-    told = "; ".join(plain for part in parts if (plain := _plain(part)))
+    told = "; ".join(plain for part in parts if (plain := one_line(part)))
     return f"  # {told}" if told else ""
-
-
-def _plain(text: str) -> str:
-    """Return a text on one line, without what a comment must not hold."""
-    return " ".join("".join(c if c.isprintable() else " " for c in text).split())

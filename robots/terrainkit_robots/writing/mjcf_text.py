@@ -4,7 +4,7 @@ The body that carries the robot is the only one in the world, so that the file c
 any scene. Shapes weigh nothing: all mass is in the `inertial` of each body, as declared.
 """
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,6 +13,7 @@ from lxml import etree
 
 from terrainkit_robots.body.rigid import inverse
 from terrainkit_robots.model import Geometry, Inertial, Joint, Link, Matrix, RobotModel
+from terrainkit_robots.wording import free_name
 from terrainkit_robots.writing.drive import Drive
 
 _DIGITS = 10
@@ -90,7 +91,7 @@ def mjcf_text(model: RobotModel, extras: Extras) -> str:
     at_zero = extras.height if extras.height_at_zero is None else extras.height_at_zero
     base.set("pos", _text([0, 0, at_zero]))
     if model.floating:
-        name = _free("root", {joint.name for joint in model.joints})
+        name = free_name("root", {joint.name for joint in model.joints})
         base.insert(0, etree.Element("freejoint", name=name))
     _contact(root, extras)
     _equality(root, model)
@@ -161,14 +162,6 @@ def scene_text(name: str, file: str, *, height: float) -> str:
     return text + "\n"
 
 
-def _free(name: str, taken: Collection[str]) -> str:
-    """Return a name that is not taken, and begins like this."""
-    found, number = name, 2
-    while found in taken:
-        found, number = f"{name}_{number}", number + 1
-    return found
-
-
 def _named_once(extras: Extras) -> list[Site]:
     """Return the sites to be written; a frame whose name another site has is left out."""
     imu = () if extras.imu is None else (extras.imu,)
@@ -205,10 +198,7 @@ def _assets(root: Any, model: RobotModel) -> dict[_MeshKey, str]:
     asset, names, taken = etree.SubElement(root, "asset"), dict[_MeshKey, str](), set[str]()
     for key in sorted(colliding | seen):
         file, scale = key
-        name = wanted = file.rsplit("/", 1)[-1].rsplit(".", 1)[0]
-        number = 2
-        while name in taken:
-            name, number = f"{wanted}_{number}", number + 1
+        name = free_name(file.rsplit("/", 1)[-1].rsplit(".", 1)[0], taken)
         taken.add(name)
         names[key] = name
         mesh = etree.SubElement(asset, "mesh", name=name, file=file)

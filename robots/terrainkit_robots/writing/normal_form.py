@@ -29,7 +29,7 @@ from terrainkit_robots.model import (
     Mimic,
     RobotModel,
 )
-from terrainkit_robots.wording import names
+from terrainkit_robots.wording import free_name, names
 from terrainkit_robots.writing.rooted import WORLD, rooted
 from terrainkit_robots.writing.sound_inertia import sound_inertias
 
@@ -71,7 +71,7 @@ def normal_form(facts: "Facts", *, floating: bool | None = None) -> NormalForm:
     driven = {joint.name for joint in facts.actuated}
     kept = {link.name for link in links}
     if WORLD in kept:
-        other = _free_name(f"{WORLD}_link", kept)
+        other = free_name(f"{WORLD}_link", kept)
         notes.append(
             f"named the link {WORLD} {other}: MuJoCo has a world of its own"
             if WORLD in given.body_of
@@ -255,7 +255,7 @@ def _joints(facts: "Facts", notes: list[str]) -> list[tuple[Joint, str]]:
     for joint in above:
         name = joint.name or f"{joint.child}_joint"
         if uses[joint.name] > 1 and name in taken:
-            name = _free_name(f"{joint.child}_joint", taken)
+            name = free_name(f"{joint.child}_joint", taken)
             notes.append(f"named the joint above {joint.child} {name}: there are two {joint.name}")
         taken.add(name)
         mimic = joint.mimic if joint.name in following else None
@@ -264,14 +264,6 @@ def _joints(facts: "Facts", notes: list[str]) -> list[tuple[Joint, str]]:
         moved = _normal_joint(facts, replace(joint, mimic=mimic), bodies.get(joint.child), notes)
         found.append((replace(moved, name=name), joint.name))
     return found
-
-
-def _free_name(name: str, taken: set[str]) -> str:
-    number = 2
-    wanted = name
-    while wanted in taken:
-        wanted, number = f"{name}_{number}", number + 1
-    return wanted
 
 
 def _normal_joint(facts: "Facts", joint: Joint, body: Body | None, notes: list[str]) -> Joint:

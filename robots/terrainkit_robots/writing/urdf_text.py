@@ -15,6 +15,7 @@ from lxml import etree
 
 from terrainkit_robots.body.roll_pitch_yaw import roll_pitch_yaw
 from terrainkit_robots.model import Geometry, Inertial, Joint, Link, Matrix, RobotModel
+from terrainkit_robots.wording import free_name
 from terrainkit_robots.writing.number_text import number_text, place_text
 from terrainkit_robots.writing.urdf_shapes import elements_of
 
@@ -116,14 +117,9 @@ class _Writer:
         return text
 
     def _free(self, name: str) -> str:
-        free, number = name, 1
-        while free in self._taken:
-            number += 1
-            free = f"{name}_{number}"
+        free = free_name(name, self._taken)
         self._taken.add(free)
         return free
-
-    # Links
 
     def _link(self, root: Any, link: Link) -> None:
         element = etree.SubElement(root, "link", name=link.name)

@@ -11,7 +11,6 @@ from terrainkit_robots.config.source import (
     docstring,
     literal,
     number,
-    plain,
     spread,
 )
 
@@ -77,7 +76,6 @@ def test_comments_stay_comments():
     lines = comment("x\nraise SystemExit\r\x0c\u2028y " + "word " * 30)
     assert all(line.startswith("# ") and len(line) <= 88 for line in lines)
     assert compile("\n".join(lines), "comment", "exec").co_names == ()
-    assert plain("a\n\t b\u202e ") == "a b"
 
 
 def test_docstrings_stay_docstrings():
