@@ -58,7 +58,7 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
     collision = coerce("collision", collision, Collision)
     samples = terrain_map.heights.size
     require_memory(samples * BYTES_PER_SAMPLE, f"a MuJoCo model of {samples} samples")
-    cover = _cover(terrain_map, collision)
+    cover = box_cover_of(terrain_map, collision)
     root = ET.Element("mujoco", model="terrain")
     _add_class(root, terrain_map)
     asset = ET.SubElement(root, "asset")
@@ -76,8 +76,8 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
     ET.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
 
 
-def _cover(terrain_map: "TerrainMap", collision: Collision) -> BoxCover | None:
-    """Return the boxes to use, or None for a heightfield."""
+def box_cover_of(terrain_map: "TerrainMap", collision: Collision) -> BoxCover | None:
+    """Return the boxes that stand for the ground, or None for a heightfield; see `export`."""
     if collision == "hfield":
         return None
     if collision == "auto":

@@ -1,0 +1,398 @@
+"""The environment: n robots on one ground, as rsl-rl's `VecEnv`.
+
+Each step: act, let the physics run, look, judge, reward, begin anew what has ended, observe. All is
+numpy until the border, where arrays become fresh tensors.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from rsl_rl.env import VecEnv
+from tensordict import TensorDict
+
+from terrainkit.errors import ConfigError
+from terrainkit_robots.rl.careers import Careers
+from terrainkit_robots.rl.commands import draw_commands, turning_to, widened
+from terrainkit_robots.rl.control import control_of
+from terrainkit_robots.rl.ground import Ground
+from terrainkit_robots.rl.observations import observe, policy_group, privileged_group
+from terrainkit_robots.rl.physics import Physics
+from terrainkit_robots.rl.randomization import apply_differences, draw_differences
+from terrainkit_robots.rl.rewards import chosen
+from terrainkit_robots.rl.robot import Robot
+from terrainkit_robots.rl.rotation import gravity_in_body, to_body, yaw_of
+from terrainkit_robots.rl.scene import build_scene
+from terrainkit_robots.rl.start import draw_start
+from terrainkit_robots.rl.state import State
+from terrainkit_robots.rl.task import Task
+from terrainkit_robots.rl.terminations import outside, tilted, touched
+
+FloatArray = NDArray[np.float32]
+Ids = NDArray[np.int64]
+
+_CONTACT = 1.0
+"""Force from which a foot is on the ground [N]: legged_gym's."""
+
+
+class LeggedEnv(VecEnv):
+    """Legged robots that follow commands; see :mod:`.task` for what they are paid for."""
+
+    def __init__(self, task: Task, robot: Robot, ground: Ground, device: str = "cpu") -> None:
+        """Build it, and begin the first episodes.
+
+        Raises:
+            ConfigError: if the robot or the task does not fit.
+            CapacityError: if so many environments do not fit in memory.
+        """
+        self.cfg, self.robot, self.ground = task, robot, ground
+        self.num_envs, self.num_actions = task.env.num_envs, len(robot.default_pose)
+        self.max_episode_length = task.max_episode_length
+        self.device = device
+        self.scene = build_scene(robot, ground, task)
+        self.physics = Physics(self.scene, self.num_envs, task.env.num_threads)
+        self.control = control_of(robot, task)
+        self.rng = np.random.default_rng(task.runner.seed)
+        self.rewards = chosen(task.rewards)
+        wanted = task.terrain.measure_heights
+        scan = not ground.level if wanted is None else wanted
+        weight = float(self.scene.model.body_mass.sum() * 9.81)
+        self.groups = {
+            "policy": policy_group(robot, task, scan=scan),
+            "privileged": privileged_group(robot, task, scan=scan, weight=weight),
+        }
+        self._scan = _scan_points(task) if scan else np.zeros((2, 0), np.float32)
+        self.differences = draw_differences(self.rng, self.num_envs, self.physics, task.domain_rand)
+        apply_differences(self.physics, self.differences)
+        self.careers = Careers(ground, self.num_envs, task.terrain.max_init_level, task.runner.seed)
+        self.lin_vel_x = task.commands.lin_vel_x
+        self._allocate()
+        self.begin_all()
+
+    def _allocate(self) -> None:
+        """Make what each robot remembers from step to step."""
+        n, joints, feet = self.num_envs, self.num_actions, len(self.robot.spec.feet)
+        self.episode_length_buf = torch.zeros(n, dtype=torch.long)
+        self.commands = np.zeros((n, 3), np.float32)
+        self.held: FloatArray | None = None
+        self.heading = np.zeros(n, np.float32)
+        self.actions = np.zeros((3, n, joints), np.float32)  # of this step, and of two before
+        self.last_dof_vel = np.zeros((n, joints), np.float32)
+        self.joint_offset = np.zeros((n, joints), np.float32)
+        self.push_vel = np.zeros((n, 3), np.float32)
+        self.air_time = np.zeros((n, feet), np.float32)
+        self.steps = np.zeros(n, np.int64)  # of this episode, whatever the runner says
+        self.start = np.zeros((n, 2))
+        self.sums = {name: np.zeros(n, np.float32) for name in self.rewards}
+
+    def hold_commands(self, commands: FloatArray | None) -> None:
+        """Ask for the same all the time, shape (n, 3); None to draw commands again."""
+        self.held = commands
+        if commands is not None:
+            self.commands[:] = commands
+            np.copyto(self.state.commands, commands)
+            self._observed = self._observe()
+
+    def begin_all(self) -> None:
+        """Begin every episode anew."""
+        everyone = np.arange(self.num_envs)
+        self._begin(everyone)
+        self.state = self._look(everyone, fresh=True)
+        self._observed = self._observe()
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return all that changes from step to step, so that a run can go on as if unbroken."""
+        arrays = {name: torch.from_numpy(value.copy()) for name, value in self._arrays().items()}
+        return {
+            "arrays": arrays,
+            "rng": self.rng.bit_generator.state,
+            "lin_vel_x": self.lin_vel_x,
+            "careers": self.careers.state_dict(),
+        }
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Go on from a state; with another number of environments only the curriculum does.
+
+        Raises:
+            ConfigError: if the state is of another robot or map.
+        """
+        self.careers.load_state_dict(state["careers"])
+        self.lin_vel_x = tuple(state["lin_vel_x"])
+        mine, theirs = self._arrays(), state["arrays"]
+        if len(theirs["episode_length"]) != self.num_envs:
+            self.begin_all()
+            return
+        for name, value in mine.items():
+            if name not in theirs or tuple(theirs[name].shape) != value.shape:
+                raise ConfigError(f"the checkpoint's {name} is of another robot or task")
+        for name, value in mine.items():
+            value[...] = theirs[name].numpy()
+        apply_differences(self.physics, self.differences)
+        self.rng.bit_generator.state = state["rng"]
+        self.state = self._look(np.arange(self.num_envs))
+        self._observed = self._observe()
+
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        """Return what each robot remembers, by name; live."""
+        own = {
+            "physics": self.physics.batch.state,
+            "episode_length": self.episode_length_buf.numpy(),
+            "commands": self.commands,
+            "heading": self.heading,
+            "actions": self.actions,
+            "last_dof_vel": self.last_dof_vel,
+            "joint_offset": self.joint_offset,
+            "push_vel": self.push_vel,
+            "air_time": self.air_time,
+            "steps": self.steps,
+            "start": self.start,
+        }
+        sums = {f"rew_{name}": value for name, value in self.sums.items()}
+        return own | sums | vars(self.differences)
+
+    def get_observations(self) -> TensorDict:
+        """Return what is observed now, as tensors that later steps do not change."""
+        return self._observed
+
+    def step(
+        self, actions: torch.Tensor
+    ) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict[str, Any]]:
+        """Act for one step of the policy.
+
+        Args:
+            actions: Shape (n, j).
+
+        Returns:
+            Observations, rewards (n,), dones (n,), and `time_outs` and `log`.
+
+        Raises:
+            ConfigError: if an action is not a number.
+        """
+        self._act(actions)
+        self._push()
+        bad = self.physics.step(self.cfg.control.decimation)
+        self.episode_length_buf += 1
+        self.steps += 1
+        self.state = state = self._look(np.arange(self.num_envs), bad)
+        self.last_dof_vel[:] = state.dof_vel
+        rewards = self._reward(state)
+        lengths = self.episode_length_buf.cpu().numpy()
+        time_out = (lengths >= self.max_episode_length) & ~state.fallen
+        done = state.fallen | time_out
+        self.careers.ask(self.commands, yaw_of(state.base_quat), self.cfg.dt)
+        extras: dict[str, Any] = {"time_outs": torch.from_numpy(time_out).to(self.device)}
+        ended = np.flatnonzero(done)
+        if len(ended):
+            extras["log"] = self._end(ended, state)
+            self._begin(ended)
+        self._command(ended)
+        if len(ended):
+            state.put(ended, self._look(ended, fresh=True))
+        np.copyto(state.commands, self.commands)
+        self._observed = self._observe()
+        tensor = torch.from_numpy
+        return self._observed, tensor(rewards).to(self.device), tensor(done).to(self.device), extras
+
+    def _act(self, actions: torch.Tensor) -> None:
+        wanted = actions.detach().to("cpu", torch.float32).numpy()
+        if wanted.shape != (self.num_envs, self.num_actions):
+            raise ConfigError(
+                f"actions have shape {wanted.shape}; wanted {(self.num_envs, self.num_actions)}"
+            )
+        if not np.isfinite(wanted).all():
+            first = int(np.flatnonzero(~np.isfinite(wanted).all(axis=1))[0])
+            raise ConfigError(
+                f"actions of environment {first} are not numbers; the policy has diverged"
+            )
+        most = self.cfg.normalization.clip_actions
+        self.actions[1:] = self.actions[:-1]
+        np.clip(wanted, -most, most, out=self.actions[0])
+        self.physics.ctrl[:] = self.control.told(self.actions[0], self.joint_offset)
+
+    def _look(
+        self, ids: Ids, bad: NDArray[np.bool_] | None = None, *, fresh: bool = False
+    ) -> State:
+        """Return the state of robots `ids`; what has just begun has no contacts yet."""
+        physics, scene, dt = self.physics, self.scene, self.cfg.dt
+        rows: Any = slice(None) if len(ids) == self.num_envs else ids
+        qpos, qvel = physics.qpos[rows].astype(np.float32), physics.qvel[rows].astype(np.float32)
+        quat, pos = qpos[:, 3:7], qpos[:, :3]
+        gravity = gravity_in_body(quat)
+        dof_vel = qvel[:, scene.joint_qvel]
+        feet = physics.block("foot_position", rows)
+        force = -physics.block("foot_force", rows)
+        penalized = physics.block("penalized_force", rows)
+        ending = physics.block("termination_force", rows)
+        if fresh:
+            force[:] = penalized[:] = ending[:] = 0
+        radius = np.float32(self.robot.spec.foot_radius or 0.0)
+        first, air_time = self._steps_taken(rows, force)
+        fallen = (
+            touched(ending, self.cfg.termination)
+            | tilted(gravity, self.cfg.termination)
+            | outside(pos, self.ground)
+        )
+        return State(
+            base_pos=pos,
+            base_quat=quat,
+            base_lin_vel=to_body(quat, qvel[:, :3]),
+            base_ang_vel=qvel[:, 3:6],
+            projected_gravity=gravity,
+            base_height=pos[:, 2] - self.ground.height(pos[:, 0], pos[:, 1]),
+            dof_pos=qpos[:, scene.joint_qpos],
+            dof_vel=dof_vel,
+            dof_acc=(dof_vel - self.last_dof_vel[rows]) / np.float32(dt),
+            torques=physics.torque[rows].astype(np.float32),
+            actions=self.actions[0, rows].copy(),
+            last_actions=self.actions[1, rows].copy(),
+            last_last_actions=self.actions[2, rows].copy(),
+            commands=self.commands[rows].copy(),
+            foot_height=feet[..., 2] - self.ground.height(feet[..., 0], feet[..., 1]) - radius,
+            foot_vel=physics.block("foot_velocity", rows),
+            foot_force=force,
+            first_contact=first,
+            air_time=air_time,
+            penalized_force=np.sqrt(np.einsum("npi,npi->np", penalized, penalized)),
+            height_scan=self._scanned(pos, quat),
+            push_vel=self.push_vel[rows].copy(),
+            friction=self.differences.friction[rows],
+            added_mass=self.differences.added_mass[rows],
+            com_shift=self.differences.com_shift[rows],
+            joint_offset=self.joint_offset[rows].copy(),
+            fallen=fallen if bad is None else fallen | bad,
+        )
+
+    def _steps_taken(self, rows: Any, force: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
+        """Return which feet came down, and how long each was in the air; count on."""
+        down = force[..., 2] > _CONTACT
+        air_time = self.air_time[rows] + np.float32(self.cfg.dt)
+        first = down & (self.air_time[rows] > 0)
+        self.air_time[rows] = np.where(down, 0, air_time)
+        return first, air_time
+
+    def _scanned(self, pos: FloatArray, quat: FloatArray) -> FloatArray:
+        """Return the height of the base above the points of the scan [m], shape (n, k)."""
+        if not self._scan.size:
+            return np.zeros((len(pos), 0), np.float32)
+        yaw = yaw_of(quat)
+        c, s = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
+        x, y = self._scan
+        height = self.ground.height(pos[:, :1] + c * x - s * y, pos[:, 1:2] + s * x + c * y)
+        return pos[:, 2:3] - height
+
+    def _reward(self, state: State) -> FloatArray:
+        dt, total = np.float32(self.cfg.dt), np.zeros(self.num_envs, np.float32)
+        settings = self.cfg.rewards
+        for name, (function, scale) in self.rewards.items():
+            earned = function(state, self.robot, settings) * np.float32(scale) * dt
+            self.sums[name] += earned
+            if name != "termination":
+                total += earned
+        if settings.only_positive_rewards:
+            np.maximum(total, 0, out=total)
+        if "termination" in self.rewards:
+            function, scale = self.rewards["termination"]
+            total += function(state, self.robot, settings) * np.float32(scale) * dt
+        return total
+
+    def _end(self, ids: Ids, state: State) -> dict[str, float]:
+        """Close the episodes of robots `ids`, and return what is to be logged of them."""
+        lived = self.steps[ids] * self.cfg.dt
+        log = {
+            f"Episode/rew_{name}": float((total[ids] / lived).mean())
+            for name, total in self.sums.items()
+        }
+        fallen = state.fallen[ids]
+        log["Episode/falls"] = float(fallen.mean())
+        if "tracking_lin_vel" in self.rewards:
+            scale = self.rewards["tracking_lin_vel"][1]
+            followed = log["Episode/rew_tracking_lin_vel"] / scale
+            self.lin_vel_x = widened(self.lin_vel_x, followed, self.cfg.commands)
+            log["Curriculum/lin_vel_x"] = self.lin_vel_x[1]
+        # The runner may have cut the first episodes to random lengths, which says nothing.
+        lengths = self.episode_length_buf.numpy()[ids]
+        whole = lengths == self.steps[ids]
+        distance = np.linalg.norm(state.base_pos[ids, :2] - self.start[ids], axis=1)
+        self.careers.end(
+            ids[whole], distance[whole], fallen[whole], move=self.cfg.terrain.curriculum
+        )
+        if not self.ground.level:
+            log["Curriculum/level"] = float(self.careers.levels.mean())
+            for name, (level, success) in self.careers.by_terrain().items():
+                log[f"Curriculum/level_{name}"] = level
+                if not np.isnan(success):
+                    log[f"Curriculum/success_{name}"] = success
+        return log
+
+    def _begin(self, ids: Ids) -> None:
+        """Begin new episodes."""
+        origins = self.careers.origins[ids]
+        qpos, qvel = draw_start(
+            self.rng, origins, self.scene, self.robot, self.ground, self.cfg.init_state
+        )
+        self.physics.reset(ids, qpos, qvel)
+        self.start[ids] = qpos[:, :2]
+        self.careers.begin(ids)
+        self.episode_length_buf[torch.from_numpy(ids)] = 0
+        self.steps[ids] = 0
+        self.actions[:, ids] = 0
+        self.last_dof_vel[ids] = 0
+        self.push_vel[ids] = 0
+        self.air_time[ids] = 0
+        most = self.cfg.domain_rand.joint_offset
+        self.joint_offset[ids] = self.rng.uniform(-most, most, (len(ids), self.num_actions))
+        for total in self.sums.values():
+            total[ids] = 0
+        self._draw_commands(ids)
+
+    def _draw_commands(self, ids: Ids) -> None:
+        self.commands[ids], self.heading[ids] = draw_commands(
+            self.rng, len(ids), self.cfg.commands, self.lin_vel_x
+        )
+
+    def _command(self, ended: Ids) -> None:
+        """Give new commands to those whose time has come, and turn towards headings."""
+        every = max(1, round(self.cfg.commands.resampling_time / self.cfg.dt))
+        due = self.steps % every == 0
+        due[ended] = False
+        ids = np.flatnonzero(due)
+        if len(ids):
+            self._draw_commands(ids)
+        if self.held is not None:
+            self.commands[:] = self.held
+        elif self.cfg.commands.heading_command:
+            yaw = yaw_of(self.physics.qpos[:, 3:7].astype(np.float32))
+            self.commands[:, 2] = turning_to(self.heading, yaw, self.cfg.commands)
+
+    def _push(self) -> None:
+        """Push those whose time has come."""
+        settings = self.cfg.domain_rand
+        if settings.push_interval_s <= 0:
+            return
+        every = max(1, round(settings.push_interval_s / self.cfg.dt))
+        ids = np.flatnonzero((self.steps % every == 0) & (self.steps > 0))
+        if len(ids):
+            most = settings.max_push_vel_xy
+            self.push_vel[ids, :2] = self.rng.uniform(-most, most, (len(ids), 2))
+            self.physics.qvel[ids, :2] += self.push_vel[ids, :2]
+
+    def _observe(self) -> TensorDict:
+        clip = self.cfg.normalization.clip_observations
+        noisy = {"policy": self.rng, "privileged": None}
+        return TensorDict(
+            {
+                name: torch.from_numpy(observe(group, self.state, clip, noisy[name]))
+                for name, group in self.groups.items()
+            },
+            batch_size=[self.num_envs],
+        ).to(self.device)
+
+
+def _scan_points(task: Task) -> FloatArray:
+    """Return where the height scan looks, x and y in the base's frame [m], shape (2, k)."""
+    x, y = np.meshgrid(
+        task.terrain.measured_points_x, task.terrain.measured_points_y, indexing="ij"
+    )
+    return np.stack([x.ravel(), y.ravel()]).astype(np.float32)

@@ -1,0 +1,79 @@
+"""The randomization: what differs from robot to robot, so that a policy bears the real one."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit_robots.rl.physics import Physics
+from terrainkit_robots.rl.task import DomainRand
+
+FloatArray = NDArray[np.float32]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Differences:
+    """How n robots differ from their model."""
+
+    friction: FloatArray
+    """Friction of the contacts, shape (n, 1)."""
+
+    added_mass: FloatArray
+    """Mass added to the base [kg], shape (n, 1)."""
+
+    com_shift: FloatArray
+    """Shift of the base's center of mass [m], shape (n, 3)."""
+
+    stiffness: FloatArray
+    """Factor on the stiffness of each joint, shape (n, j)."""
+
+    damping: FloatArray
+    """Factor on the damping of each joint, shape (n, j)."""
+
+    strength: FloatArray
+    """Factor on all torques, shape (n, 1)."""
+
+
+def draw_differences(
+    rng: np.random.Generator, count: int, physics: Physics, settings: DomainRand
+) -> Differences:
+    """Return how `count` robots differ."""
+    joints, scene = physics.scene.model.nu, physics.scene
+    own = float(scene.model.geom_friction[scene.geoms, 0].mean()) if len(scene.geoms) else 1.0
+
+    def within(span: tuple[float, float] | None, width: int, nominal: float) -> FloatArray:
+        low, high = span or (nominal, nominal)
+        return rng.uniform(low, high, (count, width)).astype(np.float32)
+
+    shift = settings.com_shift
+    return Differences(
+        friction=within(settings.friction, 1, own),
+        added_mass=within(settings.added_mass, 1, 0.0),
+        com_shift=rng.uniform(-shift, shift, (count, 3)).astype(np.float32),
+        stiffness=within(settings.gains, joints, 1.0),
+        damping=within(settings.gains, joints, 1.0),
+        strength=within(settings.motor_strength, 1, 1.0),
+    )
+
+
+def apply_differences(physics: Physics, differences: Differences) -> None:
+    """Give each simulation a robot of its own."""
+    batch, scene, model = physics.batch, physics.scene, physics.scene.model
+    base = scene.base
+    mass = batch.expand("body_mass")
+    mass[:, base] = model.body_mass[base] + differences.added_mass[:, 0]
+    # A heavier base of the same shape: its inertia grows alike.
+    batch.expand("body_inertia")[:, base] = (
+        model.body_inertia[base] * (mass[:, base] / model.body_mass[base])[:, None]
+    )
+    batch.expand("body_ipos")[:, base] = model.body_ipos[base] + differences.com_shift
+    batch.expand("geom_friction")[:, scene.geoms, 0] = differences.friction
+    # kp and kv of MuJoCo's affine actuators: force = gain * ctrl + bias . (1, q, dq).
+    gain, bias = batch.expand("actuator_gainprm"), batch.expand("actuator_biasprm")
+    k, d, s = differences.stiffness, differences.damping, differences.strength
+    positional, damped = model.actuator_biasprm[:, 1] != 0, model.actuator_biasprm[:, 2] != 0
+    factor = np.where(positional, k, np.where(damped, d, 1))
+    gain[:, :, 0] = model.actuator_gainprm[:, 0] * factor * s
+    bias[:, :, 1] = model.actuator_biasprm[:, 1] * k * s
+    bias[:, :, 2] = model.actuator_biasprm[:, 2] * d * s
+    batch.set_const()
