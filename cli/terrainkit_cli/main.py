@@ -14,11 +14,14 @@ COMMANDS = {
     "list": "terrain_commands",
     "info": "terrain_commands",
     "preview": "terrain_commands",
-    "export": "terrain_commands",
+    "export": "export_command",
     "check": "terrain_commands",
     "check-robot": "robot_commands",
     "rule": "robot_commands",
     "onboard": "onboard_command",
+    "train": "train_command",
+    "evaluate": "evaluate_command",
+    "play": "play_command",
 }
 """Module of each command, so that only the one in use is imported."""
 
@@ -84,7 +87,8 @@ def _run(arguments: list[str]) -> int:
     if name not in COMMANDS:
         render.error(f"no command {name!r}; there are: {', '.join(COMMANDS)}")
         return 2
-    parsed = parse.parse(command(name), f"terrainkit {name}", arguments[1:])
+    wanted = command(name).options(arguments[1:])
+    parsed = parse.parse(wanted, f"terrainkit {name}", arguments[1:])
     return parsed.run()
 
 

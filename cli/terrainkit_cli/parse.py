@@ -4,15 +4,24 @@ import contextlib
 import io
 import re
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from terrainkit.errors import TerrainkitError
+
+if TYPE_CHECKING:
+    from typing import Self
 
 
 @dataclass(frozen=True, kw_only=True)
 class Command(ABC):
     """A command of `terrainkit`: its fields are the options."""
+
+    @classmethod
+    def options(cls, arguments: Sequence[str]) -> "type[Self]":  # noqa: ARG003
+        """Return the command with all its options, which may depend on what is given."""
+        return cls
 
     @abstractmethod
     def run(self) -> int:

@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, TextIO, TypeVar
 
 if TYPE_CHECKING:
     from rich.status import Status
+    from rich.table import Table
 
     from terrainkit_robots.report.text import Span
+    from terrainkit_robots.rl.progress import Progress, Watch
 
 _T = TypeVar("_T")
 
@@ -164,3 +166,72 @@ def steps() -> Iterator[Steps]:
 def drop_stdout() -> None:
     """Let the interpreter close stdout in peace once its reader has gone."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+_LINE_EVERY = 10
+"""Iterations of training between lines, where there is no terminal to show each on."""
+
+
+@contextmanager
+def training() -> "Iterator[Watch]":
+    """Yield what shows the progress of training on stderr: live, or as a line now and then."""
+    if not sys.stderr.isatty():
+        yield _training_line
+        return
+    from rich.console import Console
+    from rich.live import Live
+
+    with Live(console=Console(stderr=True), auto_refresh=False) as live:
+        yield lambda progress: live.update(_training_table(progress), refresh=True)
+
+
+def _training_line(progress: "Progress") -> None:
+    done = progress.iteration
+    if done % _LINE_EVERY and done != progress.last:
+        return
+    facts = ", ".join(f"{name} {value}" for name, value in _training_facts(progress))
+    print(f"iteration {done}/{progress.last}: {facts}", file=sys.stderr, flush=True)
+
+
+def _training_facts(progress: "Progress") -> list[tuple[str, str]]:
+    """Return what is said of training in both ways."""
+    facts = [
+        ("env steps/s", f"{progress.steps_per_second:.0f}"),
+        ("to go", _clock(progress.remaining)),
+        ("noise std", f"{progress.noise_std:.2f}"),
+    ]
+    if progress.reward is not None and progress.episode_length is not None:
+        facts.insert(2, ("reward", f"{progress.reward:.2f}"))
+        facts.insert(3, ("episode", f"{progress.episode_length:.1f} s"))
+    return facts + [(f"level {name}", f"{level:.1f}") for name, level in progress.levels.items()]
+
+
+def _training_table(progress: "Progress") -> "Table":
+    from rich.table import Table
+
+    title = f"iteration {progress.iteration}/{progress.last}"
+    where = None if progress.folder is None else str(progress.folder)
+    table = Table(title=title, caption=where, show_header=False, title_justify="left")
+    table.add_column()
+    table.add_column(justify="right")
+    for name, value in _training_facts(progress):
+        rate = progress.success.get(name.removeprefix("level "))
+        reached = "" if rate is None or not name.startswith("level ") else f"  {rate:.0%} succeed"
+        table.add_row(name, value + reached)
+    table.add_row("time learning", f"{progress.learning:.0%}")
+    table.add_section()
+    for name, reward in progress.rewards.items():
+        table.add_row(name, f"{reward:+.3f} /s")
+    return table
+
+
+def _clock(seconds: float) -> str:
+    """Return a time such as 1:02:03."""
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes // 60}:{minutes % 60:02}:{rest:02}"
+
+
+def headline(text: str) -> None:
+    """Print what a result comes to on stderr, if that is a terminal and the result is elsewhere."""
+    if sys.stderr.isatty():
+        print(text, file=sys.stderr)

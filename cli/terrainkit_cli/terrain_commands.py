@@ -3,7 +3,7 @@
 import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import tyro
 
@@ -52,7 +52,7 @@ class Generate(Command):
         export.check(self.output, samples, overwrite=self.overwrite)  # before the wait
         terrain_map = generate(config, progress=render.progress)
         terrain_map.save(self.output, overwrite=self.overwrite)
-        render.result(_written(terrain_map, self.output))
+        render.result(written(terrain_map, self.output))
         if self.output.suffix == ".npz":
             render.result(
                 f"next: terrainkit preview {self.output} -o preview.png  (look at it)\n"
@@ -231,56 +231,7 @@ class Preview(Command):
 
         terrain_map = TerrainMap.load(self.map)
         write_preview(terrain_map, self.output, width=self.width, overwrite=self.overwrite)
-        render.result(_written(terrain_map, self.output))
-        return 0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Export(Command):
-    """Write a map in another format: .xml (MuJoCo), .stl, .ply, .obj, .glb or .png (heightmap)."""
-
-    map: MapFile
-    """The map."""
-
-    output: Output
-    """Where to write; the suffix names the format."""
-
-    collision: Annotated[
-        Literal["auto", "hfield", "boxes"] | None,
-        tyro.conf.arg(metavar="{auto,hfield,boxes}", help_behavior_hint="(default: auto)"),
-    ] = None
-    """For .xml: one heightfield, or boxes with vertical walls where the ground is level. auto takes
-    boxes where they hold all of the ground and are few."""
-
-    full: bool = False
-    """For meshes: two triangles for every cell, instead of joining coplanar faces."""
-
-    closed: bool = False
-    """For meshes: add a skirt and a bottom, for a watertight solid."""
-
-    y_up: bool = False
-    """For meshes: turn the map so that y is up, as glTF viewers and game engines expect."""
-
-    overwrite: bool = False
-    """Replace an existing file."""
-
-    def run(self) -> int:
-        """Write the file."""
-        given = {
-            "collision": self.collision,
-            "full": self.full or None,
-            "closed": self.closed or None,
-            "y_up": self.y_up or None,
-        }
-        options = {name: value for name, value in given.items() if value is not None}
-        terrain_map = TerrainMap.load(self.map)
-        terrain_map.save(self.output, overwrite=self.overwrite, **options)
-        render.result(_written(terrain_map, self.output))
-        if self.output.suffix == ".xml" and "<hfield" in self.output.read_text():
-            render.result(
-                "on its heightfield, walls lean over one cell; "
-                "--collision boxes keeps them vertical where the ground is level"
-            )
+        render.result(written(terrain_map, self.output))
         return 0
 
 
@@ -307,7 +258,8 @@ class Check(Command):
         return 0
 
 
-def _written(terrain_map: TerrainMap, path: Path) -> str:
+def written(terrain_map: TerrainMap, path: Path) -> str:
+    """Return what to say of a map that was written."""
     config, grid = terrain_map.config, terrain_map.grid
     return (
         f"wrote {path}: {config.rows} x {config.cols} patches of {_metres(*config.patch_size)}, "

@@ -69,7 +69,7 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
             _add_box(body, *box)
     else:
         if not cover.complete:
-            _add_hfield(asset, body, terrain_map, _without_boxes(terrain_map.heights, cover))
+            _add_hfield(asset, body, terrain_map, without_boxes(terrain_map.heights, cover))
         for box in zip(cover.centers, cover.half_sizes, strict=True):
             _add_box(body, *box)
     ET.indent(root)
@@ -163,7 +163,7 @@ def _border_boxes(
     return boxes
 
 
-def _without_boxes(heights: NDArray[np.float32], cover: BoxCover) -> NDArray[np.float32]:
+def without_boxes(heights: NDArray[np.float32], cover: BoxCover) -> NDArray[np.float32]:
     """Return the heights with those samples sunk into their boxes that have no say elsewhere."""
     sunk = np.logical_and.reduce(around(cover.covered))
     return np.where(sunk, heights.min() - np.float32(THICKNESS / 2), heights)

@@ -1,4 +1,6 @@
+import dataclasses
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -8,7 +10,10 @@ from terrainkit_robots import bundled
 from terrainkit_robots.body.kinematics import body_poses
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.lint import lint
+from terrainkit_robots.onboard.onboarding import onboard
 from terrainkit_robots.robot_file import read_robot
+from terrainkit_robots.spec.robot_spec import RobotSpec
+from terrainkit_robots.spec.spec_file import read_spec, to_toml
 
 every_robot = pytest.mark.parametrize("name", bundled.names())
 every_format = pytest.mark.parametrize("suffix", [".urdf", ".xml"])
@@ -319,3 +324,52 @@ def test_check_robot_has_nothing_to_say(name, suffix):
     report = lint(facts(name, suffix))
     loud = [f for f in report.findings if f.severity != "info"]
     assert not loud, "\n".join(f"{f.code} {f.subject}: {f.message}" for f in loud)
+
+
+@every_robot
+def test_the_spec_is_what_onboarding_would_derive_but_for_what_was_edited(name):
+    spec = read_spec(bundled.find(name).with_name("robot.toml"))
+    derived = onboard(facts(name, ".urdf")).spec
+    edited = {key for key, told in spec.provenance.items() if told.origin == "given"}
+    for each in dataclasses.fields(RobotSpec):
+        own, other = getattr(spec, each.name), getattr(derived, each.name)
+        if each.name in ("urdf", "mjcf"):
+            assert own == bundled.find(name).with_suffix(Path(other).suffix).name
+        elif each.name == "provenance":
+            assert {k: v for k, v in own.items() if k.partition(".")[0] not in edited} == {
+                k: v for k, v in other.items() if k.partition(".")[0] not in edited
+            }
+        elif each.name not in edited:
+            assert own == other, each.name
+
+
+@every_robot
+@every_format
+def test_check_robot_has_nothing_to_say_of_the_spec(name, suffix):
+    path = bundled.find(name)
+    spec = read_spec(path.with_name("robot.toml"))
+    robot = Facts(read_robot(path.with_suffix(suffix)), spec=spec)
+    loud = [f for f in lint(robot).findings if f.severity != "info"]
+    assert not loud, "\n".join(f"{f.code} {f.subject}: {f.message}" for f in loud)
+
+
+@every_robot
+def test_the_spec_names_bodies_and_joints_of_the_model(name):
+    spec = read_spec(bundled.find(name).with_name("robot.toml"))
+    model = compiled(name)
+    assert (bundled.find(name).parent / spec.mjcf).is_file()
+    assert list(spec.joint_order) == hinges(model)
+    named = {spec.base, *spec.feet, *spec.shanks, *spec.thighs}
+    named |= {*spec.termination_contacts, *spec.penalized_contacts}
+    assert named <= set(bodies(model))
+    for joint, (lower, upper) in spec.soft_limits.items():
+        low, high = model.joint(joint).range
+        assert low < lower < spec.default_pose[joint] < upper < high
+    for joint, effort in spec.per_joint("effort").items():
+        assert model.actuator(joint.removesuffix("_joint")).ctrlrange[1] == effort
+
+
+@every_robot
+def test_the_spec_is_as_it_would_be_written(name):
+    path = bundled.find(name).with_name("robot.toml")
+    assert path.read_text() == to_toml(read_spec(path))

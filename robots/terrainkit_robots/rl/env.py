@@ -58,7 +58,7 @@ class LeggedEnv(VecEnv):
         self.rewards = chosen(task.rewards)
         wanted = task.terrain.measure_heights
         scan = not ground.level if wanted is None else wanted
-        weight = float(self.scene.model.body_mass.sum() * 9.81)
+        weight = float(self.scene.model.body_subtreemass[self.scene.base] * 9.81)
         self.groups = {
             "policy": policy_group(robot, task, scan=scan),
             "privileged": privileged_group(robot, task, scan=scan, weight=weight),
@@ -68,6 +68,7 @@ class LeggedEnv(VecEnv):
         apply_differences(self.physics, self.differences)
         self.careers = Careers(ground, self.num_envs, task.terrain.max_init_level, task.runner.seed)
         self.lin_vel_x = task.commands.lin_vel_x
+        self.followed = np.zeros(2)  # reward for tracking, and the time that it was earned in [s]
         self._allocate()
         self.begin_all()
 
@@ -99,6 +100,7 @@ class LeggedEnv(VecEnv):
         """Begin every episode anew."""
         everyone = np.arange(self.num_envs)
         self._begin(everyone)
+        self._steer()
         self.state = self._look(everyone, fresh=True)
         self._observed = self._observe()
 
@@ -110,6 +112,8 @@ class LeggedEnv(VecEnv):
             "rng": self.rng.bit_generator.state,
             "lin_vel_x": self.lin_vel_x,
             "careers": self.careers.state_dict(),
+            "state": {k: torch.from_numpy(v.copy()) for k, v in vars(self.state).items()},
+            "observed": dict(self._observed.clone().items()),
         }
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
@@ -131,8 +135,9 @@ class LeggedEnv(VecEnv):
             value[...] = theirs[name].numpy()
         apply_differences(self.physics, self.differences)
         self.rng.bit_generator.state = state["rng"]
-        self.state = self._look(np.arange(self.num_envs))
-        self._observed = self._observe()
+        # To look again would count time and draw noise once more.
+        self.state = State(**{k: v.numpy().copy() for k, v in state["state"].items()})
+        self._observed = TensorDict(state["observed"], batch_size=[self.num_envs]).to(self.device)
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         """Return what each robot remembers, by name; live."""
@@ -148,6 +153,7 @@ class LeggedEnv(VecEnv):
             "air_time": self.air_time,
             "steps": self.steps,
             "start": self.start,
+            "followed": self.followed,
         }
         sums = {f"rew_{name}": value for name, value in self.sums.items()}
         return own | sums | vars(self.differences)
@@ -185,7 +191,7 @@ class LeggedEnv(VecEnv):
         extras: dict[str, Any] = {"time_outs": torch.from_numpy(time_out).to(self.device)}
         ended = np.flatnonzero(done)
         if len(ended):
-            extras["log"] = self._end(ended, state)
+            extras["log"] = self._end(ended, state, bad)
             self._begin(ended)
         self._command(ended)
         if len(ended):
@@ -222,13 +228,13 @@ class LeggedEnv(VecEnv):
         gravity = gravity_in_body(quat)
         dof_vel = qvel[:, scene.joint_qvel]
         feet = physics.block("foot_position", rows)
+        under = self.ground.height(feet[..., 0], feet[..., 1])
         force = -physics.block("foot_force", rows)
         penalized = physics.block("penalized_force", rows)
         ending = physics.block("termination_force", rows)
         if fresh:
             force[:] = penalized[:] = ending[:] = 0
-        radius = np.float32(self.robot.spec.foot_radius or 0.0)
-        first, air_time = self._steps_taken(rows, force)
+        first, air_time = self._steps_taken(rows, force, 0.0 if fresh else dt)
         fallen = (
             touched(ending, self.cfg.termination)
             | tilted(gravity, self.cfg.termination)
@@ -244,12 +250,12 @@ class LeggedEnv(VecEnv):
             dof_pos=qpos[:, scene.joint_qpos],
             dof_vel=dof_vel,
             dof_acc=(dof_vel - self.last_dof_vel[rows]) / np.float32(dt),
-            torques=physics.torque[rows].astype(np.float32),
+            torques=physics.torque[rows].astype(np.float32) * np.float32(not fresh),
             actions=self.actions[0, rows].copy(),
             last_actions=self.actions[1, rows].copy(),
             last_last_actions=self.actions[2, rows].copy(),
             commands=self.commands[rows].copy(),
-            foot_height=feet[..., 2] - self.ground.height(feet[..., 0], feet[..., 1]) - radius,
+            foot_height=feet[..., 2] - under - scene.sole_depth,
             foot_vel=physics.block("foot_velocity", rows),
             foot_force=force,
             first_contact=first,
@@ -257,17 +263,19 @@ class LeggedEnv(VecEnv):
             penalized_force=np.sqrt(np.einsum("npi,npi->np", penalized, penalized)),
             height_scan=self._scanned(pos, quat),
             push_vel=self.push_vel[rows].copy(),
-            friction=self.differences.friction[rows],
-            added_mass=self.differences.added_mass[rows],
-            com_shift=self.differences.com_shift[rows],
+            friction=self.differences.friction[rows].copy(),
+            added_mass=self.differences.added_mass[rows].copy(),
+            com_shift=self.differences.com_shift[rows].copy(),
             joint_offset=self.joint_offset[rows].copy(),
             fallen=fallen if bad is None else fallen | bad,
         )
 
-    def _steps_taken(self, rows: Any, force: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
-        """Return which feet came down, and how long each was in the air; count on."""
+    def _steps_taken(
+        self, rows: Any, force: FloatArray, dt: float
+    ) -> tuple[NDArray[np.bool_], FloatArray]:
+        """Return which feet came down, and how long each was in the air; count on by `dt`."""
         down = force[..., 2] > _CONTACT
-        air_time = self.air_time[rows] + np.float32(self.cfg.dt)
+        air_time = self.air_time[rows] + np.float32(dt)
         first = down & (self.air_time[rows] > 0)
         self.air_time[rows] = np.where(down, 0, air_time)
         return first, air_time
@@ -297,7 +305,7 @@ class LeggedEnv(VecEnv):
             total += function(state, self.robot, settings) * np.float32(scale) * dt
         return total
 
-    def _end(self, ids: Ids, state: State) -> dict[str, float]:
+    def _end(self, ids: Ids, state: State, bad: NDArray[np.bool_]) -> dict[str, float]:
         """Close the episodes of robots `ids`, and return what is to be logged of them."""
         lived = self.steps[ids] * self.cfg.dt
         log = {
@@ -306,25 +314,36 @@ class LeggedEnv(VecEnv):
         }
         fallen = state.fallen[ids]
         log["Episode/falls"] = float(fallen.mean())
-        if "tracking_lin_vel" in self.rewards:
-            scale = self.rewards["tracking_lin_vel"][1]
-            followed = log["Episode/rew_tracking_lin_vel"] / scale
-            self.lin_vel_x = widened(self.lin_vel_x, followed, self.cfg.commands)
+        self._widen(ids, lived)
+        if self.cfg.commands.curriculum:
             log["Curriculum/lin_vel_x"] = self.lin_vel_x[1]
         # The runner may have cut the first episodes to random lengths, which says nothing.
         lengths = self.episode_length_buf.numpy()[ids]
         whole = lengths == self.steps[ids]
         distance = np.linalg.norm(state.base_pos[ids, :2] - self.start[ids], axis=1)
+        distance[bad[ids]] = 0  # MuJoCo has put these at the world's origin
         self.careers.end(
             ids[whole], distance[whole], fallen[whole], move=self.cfg.terrain.curriculum
         )
         if not self.ground.level:
             log["Curriculum/level"] = float(self.careers.levels.mean())
             for name, (level, success) in self.careers.by_terrain().items():
-                log[f"Curriculum/level_{name}"] = level
+                if not np.isnan(level):
+                    log[f"Curriculum/level_{name}"] = level
                 if not np.isnan(success):
                     log[f"Curriculum/success_{name}"] = success
         return log
+
+    def _widen(self, ids: Ids, lived: NDArray[np.floating[Any]]) -> None:
+        """Ask for more, once what is asked was followed well over as long as an episode of all."""
+        if "tracking_lin_vel" not in self.rewards:
+            return
+        self.followed += float(self.sums["tracking_lin_vel"][ids].sum()), float(lived.sum())
+        earned, time = self.followed
+        if time >= self.num_envs * self.cfg.env.episode_length_s:
+            scale = self.rewards["tracking_lin_vel"][1]
+            self.lin_vel_x = widened(self.lin_vel_x, earned / time / scale, self.cfg.commands)
+            self.followed[:] = 0
 
     def _begin(self, ids: Ids) -> None:
         """Begin new episodes."""
@@ -333,6 +352,7 @@ class LeggedEnv(VecEnv):
             self.rng, origins, self.scene, self.robot, self.ground, self.cfg.init_state
         )
         self.physics.reset(ids, qpos, qvel)
+        self._lift(ids)
         self.start[ids] = qpos[:, :2]
         self.careers.begin(ids)
         self.episode_length_buf[torch.from_numpy(ids)] = 0
@@ -347,6 +367,14 @@ class LeggedEnv(VecEnv):
             total[ids] = 0
         self._draw_commands(ids)
 
+    def _lift(self, ids: Ids) -> None:
+        """Lift those with a foot in the ground: legs that are bent at random may be too long."""
+        x, y, z = np.moveaxis(self.physics.block("foot_position", ids), 2, 0)
+        deep = (self.ground.height(x, y) + self.scene.sole_depth - z).max(axis=1)
+        if (deep > 0).any():
+            self.physics.qpos[ids, 2] += np.maximum(deep, 0)
+            self.physics.refresh(ids)
+
     def _draw_commands(self, ids: Ids) -> None:
         self.commands[ids], self.heading[ids] = draw_commands(
             self.rng, len(ids), self.cfg.commands, self.lin_vel_x
@@ -360,6 +388,10 @@ class LeggedEnv(VecEnv):
         ids = np.flatnonzero(due)
         if len(ids):
             self._draw_commands(ids)
+        self._steer()
+
+    def _steer(self) -> None:
+        """Ask for what is held, or for turning towards the headings."""
         if self.held is not None:
             self.commands[:] = self.held
         elif self.cfg.commands.heading_command:

@@ -89,9 +89,9 @@ class HeightGrid:
     cell: float
     """Distance between samples [m]."""
 
-    steps: NDArray[np.bool_] | None = None
-    """Samples that are level all over their cell, with vertical walls around: the tops of boxes.
-    Shape (nx, ny); None for none."""
+    tops: FloatArray | None = None
+    """Tops of the boxes that stand in the cells of the samples, -inf where there is none [m], shape
+    (nx, ny); they count where they are higher. None for no boxes."""
 
     def at(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Return the height at points [m]; beyond the outermost samples it goes on level.
@@ -104,17 +104,17 @@ class HeightGrid:
         v = np.clip((y - np.float32(self.first[1])) / np.float32(self.cell), 0, ny - 1)
         i = np.minimum(u.astype(np.int32), nx - 2)
         j = np.minimum(v.astype(np.int32), ny - 2)
-        u, v = u - i, v - j
+        u, v = u - i.astype(np.float32), v - j.astype(np.float32)
         flat, corner = self.heights.reshape(-1), i * ny + j
         near, far = flat[corner], flat[corner + (ny + 1)]
         # The third corner of the triangle: beside the diagonal, on the point's side.
         side = flat[corner + np.where(u > v, ny, 1)]
         most, least = np.maximum(u, v), np.minimum(u, v)
         height = near + most * (side - near) + least * (far - side)
-        if self.steps is None:
+        if self.tops is None:
             return height
         nearest = (i + (u >= 0.5)) * ny + j + (v >= 0.5)
-        return np.where(self.steps.reshape(-1)[nearest], flat[nearest], height)
+        return np.maximum(self.tops.reshape(-1)[nearest], height)
 
 
 class MapGround(Ground):
@@ -155,14 +155,15 @@ class MapGround(Ground):
         return self._grid.at(x, y)
 
     def _looked_up(self) -> HeightGrid:
-        from terrainkit.export.mjcf import box_cover_of
+        from terrainkit.export.mjcf import box_cover_of, without_boxes
 
+        heights, tops = np.ascontiguousarray(self._map.heights), None
         cover = box_cover_of(self._map, self._collision)
+        if cover is not None:
+            tops = np.where(cover.covered, heights, np.float32(-np.inf))
+            heights = without_boxes(heights, cover)
         return HeightGrid(
-            heights=np.ascontiguousarray(self._map.heights),
-            first=self._map.first_sample,
-            cell=self._map.grid.cell,
-            steps=None if cover is None else cover.covered,
+            heights=heights, first=self._map.first_sample, cell=self._map.grid.cell, tops=tops
         )
 
 
@@ -230,15 +231,20 @@ def _rays_down(model: Any, along: FloatArray) -> NDArray[np.float64]:
     """Return the height under each point of a grid, NaN for nothing, shape (n, n)."""
     import mujoco
 
+    # Rays meet what is seen, robots what is solid. The extent in a file is for its cameras.
+    solid = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    model.geom_group[:] = np.where(solid, 0, 1)
+    model.geom_matid[:], model.geom_rgba[:, 3] = -1, 1
+    only_solid = np.array([1, 0, 0, 0, 0, 0], np.uint8)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    top = 2 * float(model.stat.extent) + float(abs(model.stat.center[2])) + 1
+    top = float((data.geom_xpos[:, 2] + model.geom_rbound).max(initial=0.0)) + 1
     down, geom = np.array([0.0, 0.0, -1.0]), np.zeros(1, np.int32)
     heights = np.full((len(along), len(along)), np.nan)
     for i, x in enumerate(along):
         for j, y in enumerate(along):
             above = np.array([x, y, top], float)
-            far = mujoco.mj_ray(model, data, above, down, None, 1, -1, geom, None)
+            far = mujoco.mj_ray(model, data, above, down, only_solid, 1, -1, geom, None)
             if far >= 0:
                 heights[i, j] = top - far
     return heights

@@ -42,7 +42,6 @@ class Physics:
         self.ctrl: NDArray[np.float64] = self.batch.bind("ctrl")
         self.torque: NDArray[np.float64] = self.batch.bind("actuator_force")
         self.sensors: NDArray[np.float64] = self.batch.bind("sensordata")
-        self._warnings = self.batch.warning[:, :, 1].copy()
 
     def step(self, count: int) -> NDArray[np.bool_]:
         """Step every simulation `count` times.
@@ -52,11 +51,12 @@ class Physics:
         """
         import mujoco
 
+        # MuJoCo sets the counts back with the state, so only those from 0 can be relied on.
+        counts = self.batch.warning[:, _UNSTABLE, 1]
+        counts[:] = 0
         with quiet_mujoco():
             self.batch.step(nstep=count, stage=mujoco.mjtStage.mjSTAGE_VEL)
-        now = self.batch.warning[:, :, 1]
-        bad: NDArray[np.bool_] = (now[:, _UNSTABLE] > self._warnings[:, _UNSTABLE]).any(axis=1)
-        self._warnings[:] = now
+        bad: NDArray[np.bool_] = (counts > 0).any(axis=1)
         return bad
 
     def reset(self, ids: Ids, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> None:
@@ -72,6 +72,14 @@ class Physics:
         self.batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
         self.qpos[ids] = qpos
         self.qvel[ids] = qvel
+        self.refresh(ids)
+
+    def refresh(self, ids: Ids) -> None:
+        """Let sensors tell of the states of `ids` as they were written, but for contacts."""
+        import mujoco
+
+        with quiet_mujoco():
+            self.batch.forward(ids, stage=mujoco.mjtStage.mjSTAGE_VEL)
 
     def block(self, name: str, ids: Any = slice(None)) -> NDArray[np.float32]:
         """Return a copy of the sensor data of a kind, shape (n, bodies, 3)."""

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.errors import ConfigError
+from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.physics import Physics
 from terrainkit_robots.rl.task import DomainRand
 
@@ -16,7 +18,10 @@ class Differences:
     """How n robots differ from their model."""
 
     friction: FloatArray
-    """Friction of the contacts, shape (n, 1)."""
+    """Friction of the contacts, of several kinds their mean, shape (n, 1)."""
+
+    geom_friction: FloatArray
+    """Friction of each geom that touches, shape (n, g)."""
 
     added_mass: FloatArray
     """Mass added to the base [kg], shape (n, 1)."""
@@ -39,15 +44,17 @@ def draw_differences(
 ) -> Differences:
     """Return how `count` robots differ."""
     joints, scene = physics.scene.model.nu, physics.scene
-    own = float(scene.model.geom_friction[scene.geoms, 0].mean()) if len(scene.geoms) else 1.0
+    own = scene.model.geom_friction[scene.geoms, 0].astype(np.float32)
 
     def within(span: tuple[float, float] | None, width: int, nominal: float) -> FloatArray:
         low, high = span or (nominal, nominal)
         return rng.uniform(low, high, (count, width)).astype(np.float32)
 
+    friction = within(settings.friction, 1, float(own.mean()) if len(own) else 1.0)
     shift = settings.com_shift
     return Differences(
-        friction=within(settings.friction, 1, own),
+        friction=friction,
+        geom_friction=_spread(own, friction, given=settings.friction is not None),
         added_mass=within(settings.added_mass, 1, 0.0),
         com_shift=rng.uniform(-shift, shift, (count, 3)).astype(np.float32),
         stiffness=within(settings.gains, joints, 1.0),
@@ -57,9 +64,19 @@ def draw_differences(
 
 
 def apply_differences(physics: Physics, differences: Differences) -> None:
-    """Give each simulation a robot of its own."""
+    """Give each simulation a robot of its own.
+
+    Raises:
+        ConfigError: if a base would weigh nothing.
+    """
     batch, scene, model = physics.batch, physics.scene, physics.scene.model
     base = scene.base
+    least = float(model.body_mass[base] + differences.added_mass.min())
+    if least <= 0:
+        raise ConfigError(
+            f"domain_rand.added_mass leaves a base of {least:.3g} kg; it weighs "
+            f"{model.body_mass[base]:.3g} kg"
+        )
     mass = batch.expand("body_mass")
     mass[:, base] = model.body_mass[base] + differences.added_mass[:, 0]
     # A heavier base of the same shape: its inertia grows alike.
@@ -67,7 +84,7 @@ def apply_differences(physics: Physics, differences: Differences) -> None:
         model.body_inertia[base] * (mass[:, base] / model.body_mass[base])[:, None]
     )
     batch.expand("body_ipos")[:, base] = model.body_ipos[base] + differences.com_shift
-    batch.expand("geom_friction")[:, scene.geoms, 0] = differences.friction
+    batch.expand("geom_friction")[:, scene.geoms, 0] = differences.geom_friction
     # kp and kv of MuJoCo's affine actuators: force = gain * ctrl + bias . (1, q, dq).
     gain, bias = batch.expand("actuator_gainprm"), batch.expand("actuator_biasprm")
     k, d, s = differences.stiffness, differences.damping, differences.strength
@@ -76,4 +93,11 @@ def apply_differences(physics: Physics, differences: Differences) -> None:
     gain[:, :, 0] = model.actuator_gainprm[:, 0] * factor * s
     bias[:, :, 1] = model.actuator_biasprm[:, 1] * k * s
     bias[:, :, 2] = model.actuator_biasprm[:, 2] * d * s
-    batch.set_const()
+    with quiet_mujoco():
+        batch.set_const()
+
+
+def _spread(own: FloatArray, friction: FloatArray, *, given: bool) -> FloatArray:
+    """Return the friction of each geom, shape (n, g): that of its robot if given, else its own."""
+    shape = (len(friction), len(own))
+    return np.broadcast_to(friction if given else own, shape).copy()

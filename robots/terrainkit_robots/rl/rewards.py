@@ -159,7 +159,7 @@ def torque_limits(state: State, robot: Robot, settings: Rewards) -> FloatArray:
 
 @reward
 def feet_air_time(state: State, robot: Robot, settings: Rewards) -> FloatArray:
-    """Return the time in the air beyond the target of feet that come down, where asked to move."""
+    """Return the air time beyond its target of feet that come down, where asked to move [s]."""
     over = (state.air_time - np.float32(settings.air_time_target)) * state.first_contact
     return over.sum(axis=1) * _asked(state)
 

@@ -18,6 +18,9 @@ from terrainkit_robots.rl.task import Task
 _CONTACT_FORCE = 2
 """What a contact sensor tells: its bit in `intprm[0]`, as MuJoCo's `mjtConDataField` counts."""
 
+_MOTOR_DEFAULTS = ("gear", "ctrllimited", "ctrlrange", "actlimited", "actrange")
+"""What a new motor would take over from the defaults in the robot's file."""
+
 _ANY = 0x7FFFFFFF
 """Every bit of `conaffinity`: whatever the ground's `contype` is, it is touched."""
 
@@ -50,6 +53,9 @@ class Scene:
 
     home: Any
     """qpos of the default pose with the base at height 0, shape (nq,)."""
+
+    sole_depth: Any
+    """How far below its sensor the lowest point of each foot is in the default pose [m], (f,)."""
 
     blocks: dict[str, slice]
     """Sensor data of: `foot_position`, `foot_velocity`, `foot_force`, `penalized_force`,
@@ -92,6 +98,11 @@ def _attached(robot: Robot, ground: Ground, task: Task) -> tuple[Any, Any]:
     for spec in (own, below):
         _options(spec, task)  # both, or MuJoCo warns of what they disagree on
     # The ground to the robot, so that it is the robot's names that stay as they are.
+    for element in (*below.actuators, *below.sensors, *below.keys):
+        below.delete(element)  # they would come before the robot's
+    for geom in below.geoms:
+        if geom.conaffinity:
+            geom.contype |= 1  # a robot that does not touch itself touches what has a contype
     own.attach(below, frame=own.worldbody.add_frame(), prefix="ground/")
     base = own.body(robot.spec.base)
     if base is None:
@@ -116,6 +127,8 @@ def _fits(robot: Robot, whole: Any, base: Any) -> None:
     free = [j for j in base.joints if j.type == mujoco.mjtJoint.mjJNT_FREE]
     if len(free) != 1 or len(base.joints) != 1:
         raise ConfigError(f"{robot.mjcf}: {spec.base} is not free to move; wanted a freejoint")
+    if whole.joints[0].name != free[0].name or whole.joints[0].parent.name != spec.base:
+        raise ConfigError(f"{robot.mjcf}: something moves before {spec.base}; wanted it first")
     joints = [j.name for j in whole.joints if j.type != mujoco.mjtJoint.mjJNT_FREE]
     unknown = [name for name in spec.joint_order if name not in joints]
     if unknown:
@@ -150,6 +163,7 @@ def _joints(robot: Robot, base: Any, task: Task) -> None:
     for joint in base.find_all("joint"):
         if joint.name in armature:
             joint.armature = armature[joint.name]
+            joint.actfrclimited = False  # the spec's effort counts
             if not task.asset.joint_friction:
                 joint.frictionloss = 0
 
@@ -159,6 +173,7 @@ def _actuators(robot: Robot, whole: Any, task: Task) -> None:
     import mujoco
 
     spec, control = robot.spec, task.control
+    plain = mujoco.MjSpec().default.actuator
     stiffness, damping = spec.per_joint("stiffness"), spec.per_joint("damping")
     for name, effort in spec.per_joint("effort").items():
         kp, kd = stiffness[name], damping[name]
@@ -169,6 +184,8 @@ def _actuators(robot: Robot, whole: Any, task: Task) -> None:
         motor = whole.add_actuator(
             name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, forcelimited=True
         )
+        for what in _MOTOR_DEFAULTS:
+            setattr(motor, what, getattr(plain, what))
         motor.forcerange = [-effort, effort]
         if control.control_type == "T":
             motor.set_to_motor()
@@ -207,9 +224,12 @@ def _sole(whole: Any, foot: str) -> str:
     """Add a site at the middle of what a foot touches the ground with, and return its name."""
     touching = [g for g in whole.body(foot).geoms if g.contype or g.conaffinity]
     where = np.mean([g.pos for g in touching], axis=0) if touching else np.zeros(3)
-    name = f"sole of {foot}"
-    whole.body(foot).add_site(name=name, pos=where, group=4)
-    return name
+    whole.body(foot).add_site(name=_sole_name(foot), pos=where, group=4)
+    return _sole_name(foot)
+
+
+def _sole_name(foot: str) -> str:
+    return f"sole of {foot}"
 
 
 def _options(spec: Any, task: Task) -> None:
@@ -242,5 +262,38 @@ def _scene(robot: Robot, model: Any, blocks: dict[str, slice]) -> Scene:
         base=base,
         geoms=np.flatnonzero(touching & own),
         home=home,
+        sole_depth=_sole_depth(robot, model, home),
         blocks=blocks,
     )
+
+
+def _sole_depth(robot: Robot, model: Any, home: Any) -> Any:
+    import mujoco
+
+    data = mujoco.MjData(model)
+    data.qpos[:] = home
+    mujoco.mj_kinematics(model, data)
+    depths = []
+    for foot in robot.spec.feet:
+        geoms = np.flatnonzero(
+            (model.geom_bodyid == model.body(foot).id)
+            & ((model.geom_contype != 0) | (model.geom_conaffinity != 0))
+        )
+        at = data.site(_sole_name(foot)).xpos[2]
+        depths.append(max((at - _lowest(model, data, int(geom)) for geom in geoms), default=0.0))
+    return np.array(depths, np.float32)
+
+
+def _lowest(model: Any, data: Any, geom: int) -> float:
+    """Return the height of the lowest point of a geom [m]; of a mesh that of its box."""
+    import mujoco
+
+    z, axes = data.geom_xpos[geom][2], data.geom_xmat[geom].reshape(3, 3)[2]
+    radius, half = model.geom_size[geom, :2]
+    kind = model.geom_type[geom]
+    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+        return float(z - radius)
+    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+        return float(z - radius - abs(axes[2]) * half)
+    middle, size = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
+    return float(z + axes @ middle - np.abs(axes) @ size)

@@ -5,26 +5,45 @@ and compared with `==`. Make your own by subclassing `Task` or a section of it; 
 docs/adding_a_robot.md.
 """
 
+import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
+
+from terrainkit.errors import ConfigError
+from terrainkit_robots.rl.section import (
+    Count,
+    Factors,
+    Limits,
+    NotNegative,
+    Points,
+    Positive,
+    Section,
+    Share,
+    Span,
+    Widths,
+)
+
+Activation = Literal[
+    "elu", "selu", "relu", "crelu", "lrelu", "tanh", "sigmoid", "softplus", "gelu", "swish", "mish"
+]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Env:
+class Env(Section):
     """How many environments there are, and how long an episode lasts."""
 
-    num_envs: int = 1024
+    num_envs: Count = 1024
     """Environments that are stepped together; on a CPU 512 to 1024 pay best."""
 
-    episode_length_s: float = 20.0
+    episode_length_s: Annotated[float, Limits(least=0.0, most=1e6, zero=False)] = 20.0
     """Longest episode [s]; a longer one is cut off, which is no fall."""
 
-    num_threads: int = 0
+    num_threads: Annotated[int, Limits(least=0, most=4096)] = 0
     """Threads that step the physics; 0 for as many as there are processors."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Terrain:
+class Terrain(Section):
     """The ground, and the curriculum on it."""
 
     collision: Literal["auto", "hfield", "boxes", "plane"] = "auto"
@@ -34,62 +53,78 @@ class Terrain:
     curriculum: bool = True
     """Whether robots that do well move to harder rows of the map."""
 
-    max_init_level: int = 5
+    max_init_level: Annotated[int, Limits(least=0)] = 5
     """Hardest row to start on; the map's last one if it has fewer."""
 
     measure_heights: bool | None = None
     """Whether the policy sees the heights around it; unless given, on any ground but a plane."""
 
-    measured_points_x: tuple[float, ...] = tuple(round(-0.8 + 0.1 * k, 1) for k in range(17))
+    measured_points_x: Points = tuple(round(-0.8 + 0.1 * k, 1) for k in range(17))
     """Where the height scan looks, along the robot's heading [m]."""
 
-    measured_points_y: tuple[float, ...] = tuple(round(-0.5 + 0.1 * k, 1) for k in range(11))
+    measured_points_y: Points = tuple(round(-0.5 + 0.1 * k, 1) for k in range(11))
     """Where the height scan looks, to the left [m]."""
+
+    def __post_init__(self) -> None:
+        """Check the values, and that the scan is no map.
+
+        Raises:
+            ConfigError: if there is something wrong.
+        """
+        super().__post_init__()
+        points = len(self.measured_points_x) * len(self.measured_points_y)
+        if points > _MOST_POINTS:
+            raise ConfigError(
+                f"measured_points_x and _y make {points} points; wanted {_MOST_POINTS} or less"
+            )
+
+
+_MOST_POINTS = 10_000
 
 
 @dataclass(frozen=True, kw_only=True)
-class InitState:
+class InitState(Section):
     """How an episode starts. Heights and the default pose are those of the robot's spec."""
 
-    reset_range: tuple[float, float] | None = None
+    reset_range: Factors | None = None
     """Factors on the default pose between which each joint starts; unless given, the spec's."""
 
-    position: float = 0.5
+    position: NotNegative = 0.5
     """Distance from the spawn origin along x and along y, at most, where the ground allows [m]."""
 
-    yaw: float = 3.14159
+    yaw: NotNegative = 3.14159
     """Heading, at most, to either side [rad]."""
 
-    lin_vel: float = 0.5
+    lin_vel: NotNegative = 0.5
     """Speed of the base along each axis, at most [m/s]."""
 
-    ang_vel: float = 0.5
+    ang_vel: NotNegative = 0.5
     """Speed of the base around each axis, at most [rad/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Control:
+class Control(Section):
     """From actions to torques; the gains are those of the robot's spec unless given."""
 
     control_type: Literal["P", "V", "T"] = "P"
     """What an action asks for: a position, a velocity or a torque of each joint."""
 
-    stiffness: float | None = None
+    stiffness: NotNegative | None = None
     """Proportional gain of every joint with one [N m/rad]."""
 
-    damping: float | None = None
+    damping: NotNegative | None = None
     """Derivative gain of every joint [N m s/rad]."""
 
-    action_scale: float | None = None
+    action_scale: Positive | None = None
     """Change for an action of 1: of the position [rad], the velocity [rad/s] or the torque [N m].
     Unless given, the spec's for P, the largest velocity for V, the largest torque for T."""
 
-    decimation: int = 4
+    decimation: Annotated[int, Limits(least=1, most=1000)] = 4
     """Steps of the physics for one of the policy."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Asset:
+class Asset(Section):
     """What of the robot takes part."""
 
     self_collisions: bool = False
@@ -100,74 +135,74 @@ class Asset:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Commands:
+class Commands(Section):
     """What the robot is asked to do."""
 
-    lin_vel_x: tuple[float, float] = (-1.0, 1.0)
+    lin_vel_x: Span = (-1.0, 1.0)
     """Forward speed [m/s]."""
 
-    lin_vel_y: tuple[float, float] = (-1.0, 1.0)
+    lin_vel_y: Span = (-0.5, 0.5)
     """Speed to the left [m/s]."""
 
-    ang_vel_yaw: tuple[float, float] = (-1.0, 1.0)
+    ang_vel_yaw: Span = (-1.0, 1.0)
     """Turning speed to the left [rad/s]; with a heading, its limits."""
 
-    heading: tuple[float, float] = (-3.14159, 3.14159)
+    heading: Span = (-3.14159, 3.14159)
     """Direction to turn to, in the world [rad]."""
 
     heading_command: bool = False
     """Whether a heading is asked for, in place of a turning speed."""
 
-    heading_stiffness: float = 0.5
+    heading_stiffness: NotNegative = 0.5
     """Turning speed for an error of heading [1/s]."""
 
-    resampling_time: float = 10.0
+    resampling_time: Positive = 10.0
     """Time after which there is a new command [s]."""
 
-    min_norm: float = 0.2
+    min_norm: NotNegative = 0.2
     """Linear commands below it become zero, and so do turning speeds [m/s, rad/s]."""
 
-    standing: float = 0.1
+    standing: Share = 0.1
     """Share of commands that ask to stand still."""
 
     curriculum: bool = False
     """Whether the range of `lin_vel_x` widens once it is followed well."""
 
-    max_curriculum: float = 1.0
+    max_curriculum: NotNegative = 1.0
     """Widest range of `lin_vel_x`, to either side [m/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class DomainRand:
+class DomainRand(Section):
     """What differs from robot to robot, and from time to time."""
 
-    friction: tuple[float, float] | None = (0.5, 1.25)
+    friction: Factors | None = (0.5, 1.25)
     """Friction of the robot's contacts; none: as the robot has it."""
 
-    added_mass: tuple[float, float] | None = (-1.0, 1.0)
+    added_mass: Span | None = (-1.0, 1.0)
     """Mass added to the base [kg]."""
 
-    com_shift: float = 0.03
+    com_shift: NotNegative = 0.03
     """Shift of the base's center of mass along each axis, at most [m]."""
 
-    gains: tuple[float, float] | None = (0.9, 1.1)
+    gains: Factors | None = (0.9, 1.1)
     """Factors on stiffness and on damping, for each joint."""
 
-    motor_strength: tuple[float, float] | None = (0.9, 1.1)
+    motor_strength: Factors | None = (0.9, 1.1)
     """Factor on all torques of a robot."""
 
-    joint_offset: float = 0.02
+    joint_offset: NotNegative = 0.02
     """Error of each joint's zero, at most, drawn at each reset [rad]."""
 
-    push_interval_s: float = 15.0
+    push_interval_s: NotNegative = 15.0
     """Time between pushes [s]; 0: no pushes."""
 
-    max_push_vel_xy: float = 1.0
+    max_push_vel_xy: NotNegative = 1.0
     """Speed that a push adds along x and along y, at most [m/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rewards:
+class Rewards(Section):
     """What is rewarded, each per second: the scale of every term, and what the terms need.
 
     A term with the scale 0 is not computed.
@@ -224,7 +259,7 @@ class Rewards:
     torque_limits: float = 0.0
     """Torques beyond their soft limits."""
 
-    feet_air_time: float = 0.5
+    feet_air_time: float = 1.0
     """Long steps."""
 
     foot_clearance: float = 0.0
@@ -239,127 +274,127 @@ class Rewards:
     feet_contact_forces: float = 0.0
     """Feet that hit hard."""
 
-    tracking_sigma: float = 0.25
+    tracking_sigma: Positive = 0.25
     """Tracking is rewarded by exp(-error squared / sigma) [m2/s2]."""
 
     only_positive_rewards: bool = False
     """Whether the sum of a step is kept at 0 or above, but for `termination`."""
 
-    soft_dof_vel_limit: float = 0.9
+    soft_dof_vel_limit: NotNegative = 0.9
     """Part of each joint's largest speed that is free of cost."""
 
-    soft_torque_limit: float = 0.9
+    soft_torque_limit: NotNegative = 0.9
     """Part of each joint's largest torque that is free of cost."""
 
     base_height_target: float | None = None
     """Height of the base above the ground [m]; unless given, the spec's."""
 
-    air_time_target: float = 0.25
+    air_time_target: NotNegative = 0.15
     """Time in the air of a step that neither costs nor pays [s]."""
 
-    foot_clearance_target: float = 0.08
+    foot_clearance_target: NotNegative = 0.08
     """Height of a swinging foot above the ground [m]."""
 
-    max_contact_force: float = 100.0
+    max_contact_force: NotNegative = 100.0
     """Force on a foot that is free of cost [N]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Termination:
+class Termination(Section):
     """What ends an episode as a fall."""
 
-    contact_force: float = 1.0
+    contact_force: NotNegative = 1.0
     """Force on a termination body [N]."""
 
-    tilt: float = 1.3
+    tilt: Annotated[float, Limits(least=0.0, most=math.pi, zero=False)] = 1.3
     """Angle between the base's up and the world's [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class ObsScales:
+class ObsScales(Section):
     """Factors on observations."""
 
-    lin_vel: float = 2.0
+    lin_vel: NotNegative = 2.0
     """Of linear velocity, and of its commands."""
 
-    ang_vel: float = 0.25
+    ang_vel: NotNegative = 0.25
     """Of angular velocity, and of its command."""
 
-    dof_pos: float = 1.0
+    dof_pos: NotNegative = 1.0
     """Of joint positions."""
 
-    dof_vel: float = 0.05
+    dof_vel: NotNegative = 0.05
     """Of joint speeds."""
 
-    height_measurements: float = 5.0
+    height_measurements: NotNegative = 5.0
     """Of the height scan."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Normalization:
+class Normalization(Section):
     """What keeps numbers in a range."""
 
     obs_scales: ObsScales = field(default_factory=ObsScales)
     """Factors on observations."""
 
-    clip_observations: float = 100.0
+    clip_observations: Positive = 100.0
     """Largest observation."""
 
-    clip_actions: float = 100.0
+    clip_actions: Positive = 100.0
     """Largest action."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Noise:
+class Noise(Section):
     """Uniform noise on what the policy observes, to either side, before the scale."""
 
-    noise_level: float = 1.0
+    noise_level: NotNegative = 1.0
     """Factor on all of it; 0: none."""
 
-    dof_pos: float = 0.01
+    dof_pos: NotNegative = 0.01
     """Of joint positions [rad]."""
 
-    dof_vel: float = 1.5
+    dof_vel: NotNegative = 1.5
     """Of joint speeds [rad/s]."""
 
-    ang_vel: float = 0.2
+    ang_vel: NotNegative = 0.2
     """Of the base's angular velocity [rad/s]."""
 
-    gravity: float = 0.05
+    gravity: NotNegative = 0.05
     """Of the direction of gravity."""
 
-    height_measurements: float = 0.1
+    height_measurements: NotNegative = 0.1
     """Of the height scan [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sim:
+class Sim(Section):
     """The physics."""
 
-    dt: float = 0.005
+    dt: Annotated[float, Limits(least=0.0, most=0.1, zero=False)] = 0.005
     """Time step [s]."""
 
-    iterations: int = 10
+    iterations: Count = 10
     """Iterations of the solver, at most."""
 
-    ls_iterations: int = 10
+    ls_iterations: Count = 10
     """Iterations of its line search, at most."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Policy:
+class Policy(Section):
     """The networks of actor and critic."""
 
-    init_noise_std: float = 1.0
+    init_noise_std: Positive = 1.0
     """Standard deviation of actions at the start."""
 
-    actor_hidden_dims: tuple[int, ...] = (128, 128, 128)
+    actor_hidden_dims: Widths = (128, 128, 128)
     """Widths of the actor's hidden layers."""
 
-    critic_hidden_dims: tuple[int, ...] = (128, 128, 128)
+    critic_hidden_dims: Widths = (128, 128, 128)
     """Widths of the critic's hidden layers."""
 
-    activation: str = "elu"
+    activation: Activation = "elu"
     """Activation of the hidden layers, by rsl-rl's name."""
 
     obs_normalization: bool = True
@@ -367,63 +402,63 @@ class Policy:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Algorithm:
+class Algorithm(Section):
     """PPO."""
 
-    value_loss_coef: float = 1.0
+    value_loss_coef: NotNegative = 1.0
     """Weight of the critic's loss."""
 
-    clip_param: float = 0.2
+    clip_param: Positive = 0.2
     """How far an update may go."""
 
-    entropy_coef: float = 0.005
+    entropy_coef: NotNegative = 0.005
     """Weight of the entropy."""
 
-    num_learning_epochs: int = 5
+    num_learning_epochs: Count = 5
     """Passes over each batch."""
 
-    num_mini_batches: int = 4
+    num_mini_batches: Count = 4
     """Parts that a batch is learned in."""
 
-    learning_rate: float = 1e-3
+    learning_rate: Positive = 1e-3
     """Learning rate at the start."""
 
     schedule: Literal["adaptive", "fixed"] = "adaptive"
     """Whether the learning rate follows the divergence of the policy."""
 
-    gamma: float = 0.99
+    gamma: Share = 0.99
     """Discount of a step."""
 
-    lam: float = 0.95
+    lam: Share = 0.95
     """Lambda of generalized advantage estimation."""
 
-    desired_kl: float = 0.01
+    desired_kl: Positive = 0.02
     """Divergence of an update that the learning rate is adapted to."""
 
-    max_grad_norm: float = 1.0
+    max_grad_norm: Positive = 1.0
     """Largest gradient."""
 
     symmetry: Literal["none", "augmentation", "loss"] = "none"
     """Whether mirror images are learned from too, or differing from them costs."""
 
-    mirror_loss_coeff: float = 0.5
+    mirror_loss_coeff: NotNegative = 0.5
     """Weight of that cost."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Runner:
+class Runner(Section):
     """How long training takes, and what is written on the way."""
 
-    num_steps_per_env: int = 24
+    num_steps_per_env: Count = 24
     """Steps of each environment between updates."""
 
-    max_iterations: int = 1500
+    max_iterations: Count = 1500
     """Updates."""
 
-    save_interval: int = 100
+    save_interval: Count = 100
     """Updates between checkpoints."""
 
-    seed: int = 1
+    seed: Annotated[int, Limits(least=0, most=2**32 - 1)] = 1
     """Start of all random numbers."""
 
     logger: Literal["tensorboard", "wandb"] = "tensorboard"
@@ -431,7 +466,7 @@ class Runner:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task:
+class Task(Section):
     """A task. SI units and radians."""
 
     env: Env = field(default_factory=Env)
@@ -478,6 +513,25 @@ class Task:
 
     runner: Runner = field(default_factory=Runner)
     """How long training takes."""
+
+    def __post_init__(self) -> None:
+        """Check the sections, and what they say together.
+
+        Raises:
+            ConfigError: if there is something wrong.
+        """
+        super().__post_init__()
+        if self.max_episode_length < 1:
+            raise ConfigError(
+                f"env.episode_length_s is {self.env.episode_length_s:g}; wanted one step of the "
+                f"policy or more, {self.dt:g} s"
+            )
+        samples = self.env.num_envs * self.runner.num_steps_per_env
+        if samples < self.algorithm.num_mini_batches:
+            raise ConfigError(
+                f"algorithm.num_mini_batches is {self.algorithm.num_mini_batches}; wanted no more "
+                f"than samples, env.num_envs * runner.num_steps_per_env = {samples}"
+            )
 
     @property
     def dt(self) -> float:

@@ -1,0 +1,80 @@
+"""The environment against bare `Batch.step`, and where the time of training goes.
+
+Each step is taken twice from the same states with the same controls: once by MuJoCo alone, once by
+the environment with its observations, rewards and resets. The speed of the environment as a part of
+MuJoCo's is what is printed.
+"""
+
+import statistics
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+
+import mujoco
+import torch
+from clock import seconds
+
+import terrainkit
+from terrainkit_robots.rl import registry
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.ground import Ground, MapGround, Plane
+from terrainkit_robots.rl.robot import read_robot
+from terrainkit_robots.rl.runner import LeggedRunner
+
+_ENVS = 512
+_STEPS = 60
+_ITERATIONS = 5
+
+
+def run() -> Iterator[tuple[str, float]]:
+    found = registry.find("quadruped")
+    task = replace(found.task, env=replace(found.task.env, num_envs=_ENVS))
+    robot = read_robot(found.folder)
+    grounds: dict[str, tuple[Ground, str]] = {
+        "plane": (Plane(), "at least 0.75"),
+        "default_map_with_scan": (MapGround(terrainkit.generate()), "at least 0.7"),
+    }
+    for name, (ground, limit) in grounds.items():
+        env = LeggedEnv(task, robot, ground)
+        yield f"{name} ({limit})", _part_of_bare(env)
+        for part, share in _shares(env):
+            yield f"{name}_share_of_{part}", share
+
+
+def _part_of_bare(env: LeggedEnv) -> float:
+    """Return the speed of the environment over that of MuJoCo alone."""
+    draw = torch.Generator().manual_seed(0)
+    batch, count = env.physics.batch, env.cfg.control.decimation
+    bare, whole = [], []
+    for _ in range(_STEPS):
+        actions = 0.3 * torch.randn(env.num_envs, env.num_actions, generator=draw)
+        before = batch.state.copy()
+        env.physics.ctrl[:] = env.control.told(actions.numpy(), env.joint_offset)
+        bare.append(seconds(lambda: batch.step(nstep=count, stage=mujoco.mjtStage.mjSTAGE_VEL)))
+        batch.state[:] = before
+        whole.append(seconds(lambda actions=actions: env.step(actions)))  # type: ignore[misc]
+    return statistics.median(bare) / statistics.median(whole)
+
+
+def _shares(env: LeggedEnv) -> Iterator[tuple[str, float]]:
+    """Yield which part of training physics, environment and networks take."""
+    spent = {"physics": 0.0, "step": 0.0}
+    runner = LeggedRunner(env)
+    env.physics.step = _timed(env.physics.step, spent, "physics")  # type: ignore[method-assign]
+    env.step = _timed(env.step, spent, "step")  # type: ignore[method-assign]
+    begin = time.perf_counter()
+    runner.learn(_ITERATIONS)
+    total = time.perf_counter() - begin
+    yield "physics", spent["physics"] / total
+    yield "environment", (spent["step"] - spent["physics"]) / total
+    yield "networks", 1 - spent["step"] / total
+
+
+def _timed(function, spent, name):  # type: ignore[no-untyped-def]
+    def timed(*arguments):  # type: ignore[no-untyped-def]
+        begin = time.perf_counter()
+        result = function(*arguments)
+        spent[name] += time.perf_counter() - begin
+        return result
+
+    return timed

@@ -1,0 +1,276 @@
+"""The run: what training leaves on disk, and all that is needed to go on from it.
+
+A folder with `task.toml` (every number), `robot.toml` (the spec as it was trained), `run.toml`
+(which robot, which ground), `map.toml` (the config of its map, if it was one), and a
+`model_<iteration>.pt` for each checkpoint. Beside them are TensorBoard's files.
+"""
+
+import re
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from terrainkit.errors import ConfigError, ExportError, listing
+from terrainkit.toml_text import parsed
+from terrainkit_robots.mesh.header import open_regular
+from terrainkit_robots.onboard.folder import new_folder, write_files
+from terrainkit_robots.rl import registry
+from terrainkit_robots.rl.robot import SPEC_FILE, Robot, robot_of
+from terrainkit_robots.rl.task import Task
+from terrainkit_robots.rl.task_file import read_task, to_toml
+from terrainkit_robots.spec.spec_file import read_spec
+from terrainkit_robots.wording import free_name
+
+if TYPE_CHECKING:
+    from terrainkit.config import MapConfig
+
+RUN_FILE, TASK_FILE, MAP_FILE = "run.toml", "task.toml", "map.toml"
+
+SHIPPED = "trained"
+"""Folder of a robot that holds the run of its shipped policy."""
+
+FORMAT_VERSION = 1
+"""Version of a run's files; it changes when an old one would be read wrongly."""
+
+_CHECKPOINT = re.compile(r"model_([0-9]{1,12})\.pt")
+_LARGEST = 1 << 20
+"""No file of text in a run is larger [bytes]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Run:
+    """A training run."""
+
+    folder: Path
+    """Where it is."""
+
+    task: Task
+    """What is trained."""
+
+    robot: Robot
+    """The robot, with the spec that it was trained with."""
+
+    robot_name: str
+    """Name of a registered robot, or the absolute path of its folder."""
+
+    terrain: str
+    """The ground, as `read_ground` takes it: `plane`, or a path."""
+
+    checkpoint: Path | None
+    """The checkpoint that was asked for, or else the last one; None if there is none yet."""
+
+
+def checkpoint_name(iteration: int) -> str:
+    """Return the file name of the checkpoint after so many updates."""
+    return f"model_{iteration}.pt"
+
+
+def checkpoints(folder: Path) -> dict[int, Path]:
+    """Return the checkpoints in a folder by their iteration, in order."""
+    found = {}
+    for path in folder.glob("model_*.pt"):
+        if match := _CHECKPOINT.fullmatch(path.name):
+            found[int(match[1])] = path
+    return dict(sorted(found.items()))
+
+
+def default_folder(robot: str) -> Path:
+    """Return where a new run goes unless told: `logs/<robot>/<date-time>`."""
+    # The name may come from a file of other people's.
+    parent = Path("logs") / (re.sub(r"[^\w.-]+", "_", robot).strip(".") or "robot")
+    now = datetime.now().strftime("%Y-%m-%d_%H-%M-%S")
+    taken = {path.name for path in parent.iterdir()} if parent.is_dir() else set()
+    return parent / free_name(now, taken)
+
+
+def located_terrain(terrain: str | Path) -> str:
+    """Return the ground as a run notes it: `plane`, or an absolute path."""
+    return str(terrain) if str(terrain) == "plane" else str(Path(terrain).resolve())
+
+
+def located_robot(robot: str | Path) -> str:
+    """Return the robot as a run notes it: a registered name, or the absolute path of its folder.
+
+    Raises:
+        ConfigError: if there is no such robot.
+    """
+    found = registry.find(robot)
+    return str(robot) if str(robot) in registry.names() else str(found.folder.resolve())
+
+
+def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | Path) -> Run:
+    """Write a new run, without checkpoints.
+
+    Args:
+        folder: Where; folders above it are made.
+        task: What will be trained.
+        robot_name: A registered robot, or the folder of an onboarded one.
+        terrain: The ground, as `read_ground` takes it.
+
+    Raises:
+        ConfigError: if there is no such robot, or the ground's file cannot be read.
+        ExportError: if the folder exists and holds something, or cannot be written.
+    """
+    name, ground = located_robot(robot_name), located_terrain(terrain)
+    files = {
+        RUN_FILE: _about(name, ground, task),
+        TASK_FILE: to_toml(task),
+        SPEC_FILE: _text(registry.find(robot_name).folder / SPEC_FILE),
+    }
+    if (config := _map_config(ground)) is not None:
+        from terrainkit import config_text
+
+        files[MAP_FILE] = config_text.to_toml(config)
+    _refuse_existing(folder)
+    with new_folder(folder) as made:
+        write_files(made, {file: text.encode() for file, text in files.items()})
+    return open_run(folder)
+
+
+def _refuse_existing(folder: Path) -> None:
+    """Refuse to write where something is; make the folders above."""
+    try:
+        if folder.is_dir() and any(folder.iterdir()):
+            raise ExportError(
+                f"{folder} exists; another folder would do, or --resume {folder} to go on with it"
+            )
+        folder.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ExportError(f"cannot write {folder}: {error.strerror or error}") from error
+
+
+def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
+    """Return a run.
+
+    Args:
+        name: Its folder, one of its checkpoints, or a robot whose policy is shipped.
+        checkpoint: Iteration of the checkpoint to take; unless given, the one that is named, or
+            else the last.
+
+    Raises:
+        ConfigError: if there is no such run or checkpoint, or what it needs is gone.
+    """
+    folder, named = _located(name)
+    about = _read_about(folder / RUN_FILE)
+    robot_name, terrain = about["robot"], about["terrain"]
+    found = registry.find(robot_name)
+    robot = robot_of(read_spec(folder / SPEC_FILE), found.folder)
+    if not robot.mjcf.is_file():
+        raise ConfigError(f"the robot of {folder} is gone: there is no file {robot.mjcf}")
+    if terrain != "plane":
+        # A map whose file is gone is made again from its config.
+        own, again = folder / terrain, folder / MAP_FILE
+        terrain = located_terrain(again if again.is_file() and not own.is_file() else own)
+    return Run(
+        folder=folder,
+        task=read_task(folder / TASK_FILE, default=found.task),
+        robot=robot,
+        robot_name=robot_name,
+        terrain=terrain,
+        checkpoint=_chosen(folder, checkpoint, named),
+    )
+
+
+def rewrite_task(run: Run, task: Task) -> None:
+    """Note in a run's folder that it goes on with another task."""
+    from terrainkit.atomic import atomic_write
+
+    with atomic_write(run.folder / TASK_FILE, overwrite=True) as path:
+        path.write_text(to_toml(task), encoding="utf-8")
+
+
+def _located(name: str | Path) -> tuple[Path, Path | None]:
+    """Return the folder of a run, and the checkpoint in it that `name` is, if it is one."""
+    path = Path(name)
+    try:
+        if path.is_dir():
+            return path, None
+        if path.is_file():
+            return path.parent, path
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"cannot read {name}: {error}") from error
+    if str(name) not in registry.names():
+        raise ConfigError(
+            f"no run {name}: neither a folder that terrainkit train wrote, nor a checkpoint in "
+            f"one, nor a robot; the robots are: {listing(registry.names())}"
+        )
+    shipped = registry.find(str(name)).folder / SHIPPED
+    if not shipped.is_dir():
+        raise ConfigError(
+            f"no policy is shipped with {name}; wanted the folder of a run: "
+            f"terrainkit train {name} makes one"
+        )
+    return shipped, None
+
+
+def _chosen(folder: Path, iteration: int | None, named: Path | None) -> Path | None:
+    if iteration is None and named is not None:
+        return named
+    there = checkpoints(folder)
+    if iteration is None:
+        return there[max(there)] if there else None
+    if iteration not in there:
+        raise ConfigError(
+            f"{folder} has no checkpoint {iteration}; there are: {listing(map(str, there))}"
+        )
+    return there[iteration]
+
+
+def _about(robot: str, terrain: str, task: Task) -> str:
+    """Return `run.toml`."""
+    from importlib.metadata import version
+
+    import tomli_w
+
+    packages = ("terrainkit", "mujoco", "rsl-rl-lib", "torch")
+    return tomli_w.dumps(
+        {
+            "format_version": FORMAT_VERSION,
+            "robot": robot,
+            "terrain": terrain,
+            "seed": task.runner.seed,
+            "begun": datetime.now().astimezone().isoformat(timespec="seconds"),
+            "versions": {name: version(name) for name in packages},
+        }
+    )
+
+
+def _read_about(path: Path) -> dict[str, str]:
+    if not path.is_file():
+        raise ConfigError(
+            f"{path.parent} has no {RUN_FILE}; wanted a folder that terrainkit train wrote"
+        )
+    table = parsed(_text(path))
+    if table.get("format_version") != FORMAT_VERSION:
+        got = table.get("format_version", "missing")
+        raise ConfigError(f"{path}: format_version is {got!r}; wanted {FORMAT_VERSION}")
+    for key in ("robot", "terrain"):
+        if not isinstance(table.get(key), str):
+            raise ConfigError(f"{path}: {key} is {table.get(key, 'missing')!r}; wanted a text")
+    return {key: table[key] for key in ("robot", "terrain")}
+
+
+def _text(path: Path) -> str:
+    try:
+        with open_regular(path) as file:
+            data = file.read(_LARGEST + 1)
+        if len(data) > _LARGEST:
+            raise ConfigError(f"{path}: over {_LARGEST} bytes; wanted a file of a run")
+        return data.decode()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else None
+        raise ConfigError(f"cannot read {path}: {reason or error}") from error
+
+
+def _map_config(terrain: str) -> "MapConfig | None":
+    """Return the config of the map, if the ground is one."""
+    if terrain.endswith(".toml"):
+        from terrainkit.config_text import read_config
+
+        return read_config(terrain)
+    if terrain.endswith(".npz"):
+        from terrainkit.terrain_map import TerrainMap
+
+        return TerrainMap.load(terrain).config
+    return None

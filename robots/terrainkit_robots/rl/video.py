@@ -1,0 +1,462 @@
+"""The video: robots on their ground, drawn by MuJoCo without a window, as an mp4.
+
+It is drawn in a process of its own, as the pictures of onboarding are: which graphics library
+MuJoCo takes is settled when it is imported, and a broken one may crash. `python -m` this module is
+that process: a request on stdin, an answer and a video as files.
+"""
+
+import json
+import math
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.atomic import atomic_write
+from terrainkit.errors import ConfigError
+from terrainkit_robots.onboard import pictures
+from terrainkit_robots.onboard.pictures import PicturesError
+from terrainkit_robots.wording import short
+
+FloatArray = NDArray[np.float32]
+
+SUFFIX = ".mp4"
+
+SIZE = (800, 450)
+"""Width and height of a video unless told [pixels]; without a graphics card a frame takes 0.2 s."""
+
+CODEC = "vp09"
+"""VP9, which browsers play in an mp4. OpenCV's wheels cannot write H.264, and no browser plays the
+`mp4v` that most programs write with it."""
+
+_REQUEST, _ANSWER, _DONE, _VIDEO = "request.json", "answer.json", "done", "video.mp4"
+"""Files of the other process: what it is asked, its answer, a byte for each frame that is drawn,
+and the video."""
+
+_PATIENCE = 120.0
+"""A frame that takes longer will never come [s]."""
+
+_MOST_WORDS = 160
+
+_SKY = np.array([0.93, 0.95, 0.97], np.float32)
+"""Color of what is far away."""
+
+_HAZE = (3.0, 10.0)
+"""From where to where things fade into it, in distances of the camera."""
+
+_FAR = 150.0
+"""How far the picture reaches, in distances of the camera. The tolerance with which shadows are
+told from light grows with it; with less, slopes are speckled."""
+
+_FIELD_OF_VIEW = 35.0
+"""Angle between the lower and the upper edge of a picture [deg]."""
+
+_AWAY = 7.0
+"""Distance of the camera, in sizes of the robot."""
+
+_NEAR_BY = 14.0
+"""Other robots are drawn so far from the one that is followed [m]."""
+
+_CROWD = 24
+"""So many robots are drawn, at most."""
+
+_SUN = np.array([-0.45, 0.6, -1.2])
+"""Direction of the light that casts shadows."""
+
+_INK, _PAPER = (50, 60, 70), (238, 242, 247)
+"""Colors of captions and of the rim around their letters: red, green and blue."""
+
+_CALM = 0.4
+"""Time over which the way of the camera is smoothed [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shot:
+    """A part of a video, in which the camera follows a robot."""
+
+    robot: int
+    """Which it follows."""
+
+    start: int
+    """First of the recorded frames."""
+
+    stop: int
+    """The one after the last."""
+
+    captions: tuple[str, ...]
+    """What is written below each frame, shape (stop - start,)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Film:
+    """What is to be drawn."""
+
+    model: Any
+    """The `mujoco.MjModel` of the scene, with one robot."""
+
+    poses: FloatArray
+    """qpos of each robot in each frame, shape (frames, n, nq)."""
+
+    shots: tuple[Shot, ...]
+    """What is shown, in this order."""
+
+    fps: float
+    """Frames per second."""
+
+    size: tuple[int, int] = SIZE
+    """Width and height [pixels]."""
+
+    def __post_init__(self) -> None:
+        check_size(self.size)
+        if not len(self):
+            raise ConfigError("the video has no frames; wanted one or more")
+
+    def __len__(self) -> int:
+        """Return how many frames there will be."""
+        return sum(shot.stop - shot.start for shot in self.shots)
+
+
+def check_size(size: tuple[int, int]) -> None:
+    """Raise a ConfigError if a video cannot be so large; odd numbers do not fit its colors."""
+    if any(n % 2 or not 64 <= n <= 4096 for n in size):
+        raise ConfigError(f"size is {size}; wanted two even numbers from 64 to 4096")
+
+
+def check_video(path: Path, *, overwrite: bool = False) -> None:
+    """Raise an error if a video cannot or may not be written at `path`.
+
+    Raises:
+        ConfigError: if it is not an mp4.
+        ExportError: if the file is there and `overwrite` is not set, or cannot be written.
+    """
+    from terrainkit.atomic import check_target
+
+    if path.suffix != SUFFIX:
+        raise ConfigError(f"a video {path.name}; wanted a name that ends in {SUFFIX}")
+    check_target(path, overwrite=overwrite)
+
+
+def film_frames(film: Film, path: Path, *, overwrite: bool = False) -> Iterator[int]:
+    """Draw a video and write it, and yield the number of each frame once it is drawn.
+
+    Raises:
+        ConfigError: if it is not an mp4.
+        ExportError: if the file is there and `overwrite` is not set, or cannot be written.
+        PicturesError: if MuJoCo cannot draw here.
+    """
+    check_video(path, overwrite=overwrite)
+    with (
+        tempfile.TemporaryDirectory(prefix="terrainkit-", ignore_cleanup_errors=True) as name,
+        atomic_write(path, overwrite=overwrite) as target,
+    ):
+        folder = Path(name)
+        _ask(film, folder)
+        complaints = []
+        for library in pictures._libraries():
+            yield from _drawn(library, folder, len(film))
+            answer = _answer(folder)
+            if "frames" in answer:
+                shutil.copyfile(folder / _VIDEO, target)
+                return
+            complaints.append(f"{library or 'its default'}: {answer['failed']}")
+        raise PicturesError(
+            f"MuJoCo cannot draw here ({'; '.join(complaints)}); {pictures._advice()}"
+        )
+
+
+def _ask(film: Film, folder: Path) -> None:
+    """Write what the other process needs."""
+    import mujoco
+
+    mujoco.mj_saveModel(film.model, str(folder / "scene.mjb"))
+    np.save(folder / "poses.npy", film.poses)
+    request = {
+        "folder": str(folder),
+        "shots": [vars(shot) for shot in film.shots],
+        "fps": film.fps,
+        "size": list(film.size),
+    }
+    (folder / _REQUEST).write_text(json.dumps(request))
+
+
+def _drawn(library: str, folder: Path, frames: int) -> Iterator[int]:
+    """Let the other process draw, and yield the number of each frame once it is done."""
+    with (folder / _REQUEST).open("rb") as request:
+        process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "terrainkit_robots.rl.video"],
+            stdin=request,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env=pictures._environment(library),
+            cwd=folder,
+        )
+    try:
+        done, last = 0, time.monotonic()
+        while process.poll() is None:
+            time.sleep(0.05)
+            now = _size(folder / _DONE)
+            yield from range(done, min(now, frames))
+            if now > done:
+                done, last = now, time.monotonic()
+            elif time.monotonic() - last > _PATIENCE:
+                raise PicturesError(f"MuJoCo did not draw in time ({library or 'its default'})")
+        yield from range(done, min(_size(folder / _DONE), frames))
+    finally:
+        process.kill()
+        process.wait()
+        (folder / _DONE).unlink(missing_ok=True)
+
+
+def _size(file: Path) -> int:
+    try:
+        return file.stat().st_size
+    except OSError:
+        return 0
+
+
+def _answer(folder: Path) -> dict[str, Any]:
+    try:
+        answer: dict[str, Any] = json.loads((folder / _ANSWER).read_bytes())
+    except (OSError, ValueError):
+        return {"failed": "it crashed"}
+    (folder / _ANSWER).unlink()
+    if "failed" in answer:
+        answer["failed"] = short(" ".join(answer["failed"].split()), _MOST_WORDS)
+    return answer
+
+
+def main() -> None:
+    """Answer one request: the other process."""
+    request = json.load(sys.stdin)
+    folder = Path(request["folder"])
+    try:
+        answer: dict[str, Any] = {"frames": _draw(request, folder)}
+    except Exception as error:  # graphics libraries raise whatever they like
+        answer = {"failed": f"{type(error).__name__}: {error}"}
+    (folder / _ANSWER).write_text(json.dumps(answer))
+
+
+def _draw(request: Mapping[str, Any], folder: Path) -> int:
+    """Draw the video, and return how many frames it has."""
+    import cv2
+    import mujoco
+
+    from terrainkit_robots.quiet_mujoco import quiet_mujoco
+
+    width, height = request["size"]
+    fps, poses = float(request["fps"]), np.load(folder / "poses.npy", mmap_mode="r")
+    shots = [Shot(**shot) for shot in request["shots"]]
+    with quiet_mujoco(), (folder / _DONE).open("wb", buffering=0) as done:
+        stage = Stage(mujoco.MjModel.from_binary_path(str(folder / "scene.mjb")), (width, height))
+        file = str(folder / _VIDEO)
+        writer = cv2.VideoWriter(file, cv2.VideoWriter.fourcc(*CODEC), fps, (width, height))
+        if not writer.isOpened():
+            raise RuntimeError(f"OpenCV {cv2.__version__} cannot write {CODEC} video")
+        frames = 0
+        for shot in shots:
+            for picture in stage.frames(poses, shot, fps):
+                writer.write(np.ascontiguousarray(picture[:, :, ::-1]))
+                done.write(b".")
+                frames += 1
+        writer.release()
+    return frames
+
+
+class Stage:
+    """The scene, with any number of robots in it."""
+
+    def __init__(self, model: Any, size: tuple[int, int]) -> None:
+        """Set it up; what the model looks like is changed.
+
+        Args:
+            model: The `mujoco.MjModel` of the scene, with one robot.
+            size: Width and height of the pictures.
+        """
+        import mujoco
+
+        self._model, self._size = model, size
+        self._main, self._other = mujoco.MjData(model), mujoco.MjData(model)
+        self._own = np.flatnonzero(model.body_weldid[model.geom_bodyid] != 0)
+        self._radius = _radius(model, self._own)
+        width, height = size
+        visual = model.vis
+        visual.global_.offwidth, visual.global_.offheight = width, height
+        visual.global_.fovy = _FIELD_OF_VIEW
+        visual.quality.shadowsize, visual.quality.offsamples = 2048, 4
+        _unpaint(model)
+        # Near, far and the reach of shadows are told in extents.
+        model.stat.extent = _AWAY * self._radius
+        visual.map.znear, visual.map.zfar = 0.02, _FAR
+        visual.map.shadowclip = 1.0
+        self._options = mujoco.MjvOption()
+        self._options.sitegroup[:] = 0
+        if not (model.geom_group[self._own] < 3).any():
+            self._options.geomgroup[:] = 1
+        self._library = mujoco.GLContext(width, height)
+        self._library.make_current()
+        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
+        self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
+        self._scene = mujoco.MjvScene(model, maxgeom=model.ngeom + _CROWD * len(self._own) + 1000)
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = False
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_HAZE] = False
+
+    def frames(self, poses: FloatArray, shot: Shot, fps: float) -> Iterator[NDArray[np.uint8]]:
+        """Yield the pictures of a shot in red, green and blue, shape (height, width, 3).
+
+        Args:
+            poses: qpos of each robot in each frame, shape (frames, n, nq).
+            shot: What is shown.
+            fps: Frames per second.
+        """
+        targets = _smooth(poses[shot.start : shot.stop, shot.robot, :3], _CALM * fps)
+        for k, target in enumerate(targets):
+            now = poses[shot.start + k]
+            azimuth = 128 + 10 * math.sin(0.4 * k / fps)
+            picture = self._picture(now, shot.robot, target, azimuth)
+            yield self._captioned(picture, shot.captions[k])
+
+    def _picture(
+        self, poses: FloatArray, followed: int, target: FloatArray, azimuth: float
+    ) -> NDArray[np.uint8]:
+        import mujoco
+
+        model, scene, camera = self._model, self._scene, mujoco.MjvCamera()
+        camera.lookat[:], camera.distance = target, _AWAY * self._radius
+        camera.azimuth, camera.elevation = azimuth, -18
+        self._posed(self._main, poses[followed])
+        category = mujoco.mjtCatBit
+        everything = category.mjCAT_STATIC | category.mjCAT_DYNAMIC
+        untouched = mujoco.MjvPerturb()
+        mujoco.mjv_updateScene(
+            model, self._main, self._options, untouched, camera, everything, scene
+        )
+        far = np.hypot(*(poses[:, :2] - poses[followed, :2]).T)
+        for robot in np.argsort(far, kind="stable")[:_CROWD]:
+            if robot != followed and far[robot] < _NEAR_BY:
+                self._posed(self._other, poses[robot])
+                mujoco.mjv_addGeoms(
+                    model, self._other, self._options, untouched, category.mjCAT_DYNAMIC, scene
+                )
+        self._light(target)
+        self._hang_sky()
+        return self._rendered(camera.distance)
+
+    def _posed(self, data: Any, qpos: FloatArray) -> None:
+        import mujoco
+
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(self._model, data)
+        mujoco.mj_camlight(self._model, data)
+
+    def _light(self, target: FloatArray) -> None:
+        """Put two lights into the scene: a sun with shadows, and the sky."""
+        import mujoco
+
+        sun = _SUN / np.linalg.norm(_SUN)
+        down = np.array([0.0, 0.0, -1.0])
+        lights = [(down, 0.38, 0.22, 0.0, False), (sun, 0.0, 0.55, 0.08, True)]
+        self._scene.nlight = len(lights)
+        for light, (toward, ambient, diffuse, specular, shadow) in zip(
+            self._scene.lights, lights, strict=False
+        ):
+            light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+            light.pos, light.dir = target - _AWAY * self._radius * toward, toward
+            light.ambient[:], light.diffuse[:], light.specular[:] = ambient, diffuse, specular
+            light.castshadow, light.headlight = shadow, False
+            light.attenuation[:] = [1, 0, 0]
+
+    def _hang_sky(self) -> None:
+        """Put a wall of the sky's color behind all, without which the edges of ground are black."""
+        import mujoco
+
+        camera, geom = self._scene.camera[0], self._scene.geoms[self._scene.ngeom]
+        forward, up = np.array(camera.forward, float), np.array(camera.up, float)
+        far = 0.9 * float(camera.frustum_far)
+        mujoco.mjv_initGeom(
+            geom,
+            mujoco.mjtGeom.mjGEOM_BOX,
+            np.array([far, far, 0.01 * far]),
+            np.array(camera.pos, float) + far * forward,
+            np.column_stack([np.cross(forward, up), up, -forward]).ravel(),
+            np.array([*_SKY, 1], np.float32),
+        )
+        geom.category = mujoco.mjtCatBit.mjCAT_DECOR
+        geom.matid = geom.objid = geom.segid = -1  # which the function leaves as they were
+        geom.emission, geom.specular, geom.reflectance = 1.0, 0.0, 0.0
+        self._scene.ngeom += 1
+
+    def _rendered(self, distance: float) -> NDArray[np.uint8]:
+        """Return the scene as a picture, in which what is far away fades into the sky."""
+        import mujoco
+
+        width, height = self._size
+        rectangle = mujoco.MjrRect(0, 0, width, height)
+        pixels = np.empty((height, width, 3), np.uint8)
+        depths = np.empty((height, width), np.float32)
+        mujoco.mjr_render(rectangle, self._scene, self._context)
+        mujoco.mjr_readPixels(pixels, depths, rectangle, self._context)
+        near, far = (float(getattr(self._scene.camera[0], f"frustum_{k}")) for k in ("near", "far"))
+        # Depth is 0 at `far` and 1 at `near`.
+        away = near * far / (near + depths * (far - near))
+        start, end = (each * distance for each in _HAZE)
+        haze = np.clip((away - start) / (end - start), 0, 1)
+        haze = (haze * haze * (3 - 2 * haze))[..., None]
+        mixed = pixels * (1 - haze) + (255 * _SKY) * haze
+        return np.round(mixed[::-1]).astype(np.uint8)
+
+    def _captioned(self, picture: NDArray[np.uint8], caption: str) -> NDArray[np.uint8]:
+        import cv2
+
+        height = len(picture)
+        x, y, scale = round(0.03 * height), round(0.955 * height), height / 900
+        font, smooth = cv2.FONT_HERSHEY_SIMPLEX, cv2.LINE_AA
+        picture = np.ascontiguousarray(picture)
+        rim = [((x + i, y + j), _PAPER) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
+        for place, color in [*rim, ((x, y), _INK)]:
+            cv2.putText(picture, caption, place, font, scale, color, 1, smooth)
+        return picture
+
+
+def _unpaint(model: Any) -> None:
+    """Let ground of ours have the color of its material, which that of its shape would darken."""
+    import mujoco
+
+    ground = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_MATERIAL, "ground/ground")
+    model.geom_rgba[(model.geom_matid == ground) & (ground >= 0)] = 1
+
+
+def _radius(model: Any, own: NDArray[np.int64]) -> float:
+    """Return how far a robot reaches from its base in the pose of the model [m]."""
+    import mujoco
+
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    away = np.linalg.norm(data.geom_xpos[own] - data.qpos[:3], axis=1) + model.geom_rbound[own]
+    return max(0.05, float(away.max(initial=0.05)))
+
+
+def _smooth(path: FloatArray, sigma: float) -> FloatArray:
+    """Return a path without its shaking, shape (frames, 3)."""
+    reach = max(1, round(3 * sigma))
+    weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) / max(sigma, 1e-3)) ** 2)
+    weights /= weights.sum()
+    # Beyond its ends a path goes on straight, so that the camera neither lags nor hurries there.
+    before = 2 * path[0] - path[np.minimum(np.arange(reach, 0, -1), len(path) - 1)]
+    after = 2 * path[-1] - path[np.maximum(len(path) - 1 - np.arange(1, reach + 1), 0)]
+    whole = np.concatenate([before, path, after])
+    return np.stack([np.convolve(axis, weights, "valid") for axis in whole.T], axis=1).astype(
+        np.float32
+    )
+
+
+if __name__ == "__main__":
+    main()

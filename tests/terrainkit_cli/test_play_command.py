@@ -1,0 +1,132 @@
+from types import SimpleNamespace
+
+import pytest
+
+pytest.importorskip("torch", reason="the extra `train` is not installed")
+
+import torch
+
+from terrainkit import MapConfig, TerrainChoice, generate
+from terrainkit_cli.main import main
+from terrainkit_robots.onboard.pictures import PicturesError
+from terrainkit_robots.rl import play, run_folder, runner, video
+from terrainkit_robots.rl.registry import find
+from terrainkit_robots.rl.robot import read_robot
+from terrainkit_robots.rl.task import Env, Task
+
+QUICK = ("--seconds", "0.04", "--num-envs", "1")
+SMALL = ("--size", "96", "64")
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch, capsys):
+    """Run `terrainkit play` in this process, in an empty folder with a run `walk`."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "walk").mkdir()
+    made = SimpleNamespace(
+        folder=tmp_path / "walk",
+        task=Task(env=Env(num_threads=1)),
+        robot=read_robot(find("quadruped").folder),
+        terrain="plane",
+        checkpoint=tmp_path / "walk/model_7.pt",
+    )
+    monkeypatch.setattr(run_folder, "open_run", lambda *_: made)
+    monkeypatch.setattr(
+        runner, "policy_of", lambda _, env: lambda _: torch.zeros(env.num_envs, env.num_actions)
+    )
+
+    def run(*words):
+        capsys.readouterr()
+        code = main(["play", *words])
+        said = capsys.readouterr()
+        return code, said.out, said.err
+
+    return run
+
+
+def one_line(err):
+    assert err.startswith("terrainkit: error: ")
+    assert err.count("\n") == 1
+    return err
+
+
+def test_it_writes_a_video_called_as_the_run(here, tmp_path):
+    code, out, err = here("walk", *QUICK, *SMALL)
+    if "MuJoCo cannot draw here" in err:
+        pytest.skip(err)
+    assert (code, err) == (0, "")
+    assert "quadruped, model_7.pt, on plane: 1 robots, 0 fell" in out
+    assert "wrote walk.mp4: 0.0 s, 0.0 MB" in out
+    import cv2
+
+    reader = cv2.VideoCapture(str(tmp_path / "walk.mp4"))
+    more, frame = reader.read()
+    assert more
+    assert frame.shape == (64, 96, 3)
+
+
+def test_a_table_for_a_map(here, tmp_path):
+    terrains = (TerrainChoice(terrain="flat"), TerrainChoice(terrain="stairs"))
+    config = MapConfig(rows=2, cols=2, patch_size=(6, 6), border=1, terrains=terrains)
+    generate(config).save(tmp_path / "map.npz")
+    code, out, _ = here("walk", "--terrain", "map.npz", "--no-video", "--seconds", "0.1")
+    assert code == 0
+    lines = [line.split() for line in out.splitlines()[1:]]
+    assert lines[0] == ["terrain", "robots", "fell", "m/s", "rad/s", "success", "level", "0", "1"]
+    assert lines[1] == ["flat", "2", "0", "-", "-", "0%", "0%", "0%"]
+    assert [line[0] for line in lines[1:]] == ["flat", "stairs"]
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["map.npz", "walk"]
+
+
+def test_no_video_on_a_plane_is_a_line(here):
+    code, out, _ = here("walk", *QUICK, "--no-video")
+    assert code == 0
+    assert out.count("\n") == 1
+
+
+def test_the_table_is_there_even_if_nothing_can_be_drawn(here, tmp_path, monkeypatch):
+    def broken(*_, **__):
+        raise PicturesError("MuJoCo cannot draw here")
+
+    monkeypatch.setattr(video, "film_frames", broken)
+    code, out, err = here("walk", *QUICK)
+    assert code == 2
+    assert "1 robots" in out
+    assert "cannot draw" in one_line(err)
+    assert [each.name for each in tmp_path.iterdir()] == ["walk"]
+
+
+def test_an_existing_video_is_told_before_the_wait(here, tmp_path, monkeypatch):
+    monkeypatch.setattr(play, "play", None)
+    (tmp_path / "walk.mp4").write_bytes(b"mine")
+    code, out, err = here("walk", *QUICK)
+    assert (code, out) == (2, "")
+    assert "walk.mp4 exists" in one_line(err)
+    assert (tmp_path / "walk.mp4").read_bytes() == b"mine"
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ((), "no RUN; wanted"),
+        (("walk", "-o", "film.avi"), "ends in .mp4"),
+        (("walk", "--size", "99", "64"), "wanted two even numbers"),
+        (("walk", "--robots", "0"), "robots is 0"),
+        (("walk", "--seconds", "0"), "seconds is 0"),
+        (("walk", "--viewer", "--no-video"), "--viewer writes no video"),
+        (("walk", "--viewer", "-o", "a.mp4"), "--viewer writes no video"),
+    ],
+)
+def test_what_cannot_be_is_one_line(here, words, told):
+    code, out, err = here(*words)
+    assert (code, out) == (2, "")
+    assert told in one_line(err)
+
+
+def test_a_viewer_without_a_display_is_one_line(here, monkeypatch):
+    monkeypatch.setattr(play.sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    code, _, err = here("walk", "--viewer")
+    assert code == 2
+    assert "--viewer needs a display" in one_line(err)

@@ -1,0 +1,224 @@
+"""The command runs in this process: importing torch anew for each test takes seconds."""
+
+import io
+import resource
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch", reason="the extra `train` is not installed")
+
+from terrainkit import MapConfig, TerrainChoice, generate
+from terrainkit_cli import render
+from terrainkit_cli.main import main
+from terrainkit_robots.rl.progress import Progress
+from terrainkit_robots.rl.run_folder import checkpoints, open_run
+
+Train = Callable[..., int]
+
+QUICK = (
+    *("--env.num-threads", "1", "--env.episode-length-s", "0.3", "--runner.num-steps-per-env", "8"),
+    *("--policy.actor-hidden-dims", "16", "--policy.critic-hidden-dims", "16"),
+)
+
+
+@pytest.fixture
+def train(tmp_path, monkeypatch) -> Iterator[Train]:
+    """Run `terrainkit train` on very few robots, in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("warnings.showwarning", render.show_warning)
+    before = signal.getsignal(signal.SIGTERM)
+
+    def run(*words: object, quick: tuple[str, ...] = QUICK) -> int:
+        return main(["train", *map(str, words), *quick])
+
+    yield run
+    signal.signal(signal.SIGTERM, before)
+
+
+def run_of(folder: Path) -> Path:
+    (found,) = folder.glob("logs/*/*")
+    return found
+
+
+def make_map(folder: Path) -> Path:
+    terrains = (TerrainChoice(terrain="stairs"),)
+    config = MapConfig(rows=2, cols=1, patch_size=(6.0, 6.0), border=1.0, terrains=terrains)
+    return generate(config).save(folder / "map.npz")
+
+
+def test_the_headline_of_the_project(train, tmp_path, capsys):
+    make_map(tmp_path)
+    words = ("--num-envs", 4, "--max-iterations", 2, "--rewards.tracking-lin-vel", 1.25)
+    assert train("--robot", "quadruped", "--terrain", "map.npz", *words) == 0
+    run = open_run(run_of(tmp_path))
+    assert run.robot_name == "quadruped"
+    assert run.terrain == str(tmp_path / "map.npz")
+    assert run.task.rewards.tracking_lin_vel == 1.25
+    assert run.task.env.num_envs == 4
+    assert run.checkpoint.name == "model_2.pt"
+    said = capsys.readouterr()
+    assert said.out.startswith("trained 2 iterations: logs/quadruped/")
+    assert said.err.startswith("iteration 2/2: env steps/s ")
+    assert "level stairs" in said.err
+
+
+def test_a_run_is_gone_on_with(train, tmp_path, capsys):
+    words = ("--num-envs", 4, "--seed", 3, "--log-dir", "run")
+    assert train("quadruped", "--max-iterations", 1, *words) == 0
+    assert train("--resume", "run", "--max-iterations", 2, quick=()) == 0
+    assert list(checkpoints(tmp_path / "run")) == [1, 2]
+    task = open_run(tmp_path / "run").task
+    assert (task.runner.seed, task.env.num_envs, task.env.episode_length_s) == (3, 4, 0.3)
+    capsys.readouterr()
+    assert train("--resume", "run", quick=()) == 2
+    assert capsys.readouterr().err.endswith("runner.max_iterations is 2, wanted more\n")
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_interrupting_writes_a_checkpoint_and_says_how_to_go_on(
+    train, tmp_path, capsys, monkeypatch, number, code
+):
+    @contextmanager
+    def interrupting():
+        yield lambda progress: signal.raise_signal(number) if progress.iteration == 2 else None
+
+    monkeypatch.setattr(render, "training", interrupting)
+    assert train("quadruped", "--num-envs", 4, "--max-iterations", 9, "--log-dir", "my run") == code
+    assert list(checkpoints(tmp_path / "my run")) == [2]
+    assert capsys.readouterr().out == (
+        "stopped after 2 of 9 iterations: 'my run'\ngo on: terrainkit train --resume 'my run'\n"
+    )
+
+
+def test_a_full_disk_is_one_line(train, tmp_path, capsys):
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
+    try:
+        code = train("quadruped", "--num-envs", 4, "--max-iterations", 2, "--log-dir", "run")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    lines = capsys.readouterr().err.splitlines()
+    assert code == 2
+    assert [line for line in lines if not line.startswith("iteration")] == [
+        "terrainkit: error: cannot write run/model_2.pt: File too large; there is no checkpoint"
+    ]
+    assert checkpoints(tmp_path / "run") == {}
+
+
+def another_version(folder: Path) -> None:
+    path = make_map(folder)
+    arrays = dict(np.load(path))
+    np.savez(path, **(arrays | {"format_version": np.int64(2)}))
+
+
+def without_origins(folder: Path) -> None:
+    path = make_map(folder)
+    arrays = dict(np.load(path))
+    del arrays["env_origins"]
+    np.savez(path, **arrays)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "no ROBOT to train; wanted a folder that terrainkit onboard wrote, or one of: biped,"),
+        (("rover",), "no robot 'rover'"),
+        (("quadruped", "--robot", "biped"), "two robots, quadruped and --robot biped; wanted one"),
+        (("quadruped", "--terrain", "moon"), "terrain 'moon'; wanted plane, a map (.npz)"),
+        (("quadruped", "--terrain", "gone.npz"), "no file gone.npz"),
+        (("quadruped", "--num-envs", "many"), "--num-envs is 'many'; wanted a whole number"),
+        (("quadruped", "--num-envs", "0"), "env.num_envs is 0; wanted 1 or more"),
+        (("quadruped", "--num-envs", "100000000"), "would fit"),
+        (("quadruped", "--device", "tpu"), "device 'tpu'; here there is: cpu"),
+        (("quadruped", "--resume", "nowhere"), "no run nowhere"),
+        (("quadruped", "--rewards.torque", "1"), "did you mean --rewards.torques?"),
+        (("quadruped", "--rewards.torques", "much"), "rewards.torques is 'much'; wanted a number"),
+        (("quadruped", "--config", "gone.toml"), "cannot read gone.toml"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(train, tmp_path, capsys, words, said):
+    assert train(*words) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("terrainkit: error: ")
+    assert error.count("\n") == 1
+    assert said in error
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("make", "said"), [(another_version, "version"), (without_origins, "env_origins")]
+)
+def test_a_map_that_is_wrong_is_said_in_one_line(train, tmp_path, capsys, make, said):
+    make(tmp_path)
+    assert train("quadruped", "--terrain", "map.npz") == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert said in error
+    assert [path.name for path in tmp_path.iterdir()] == ["map.npz"]
+
+
+def test_a_missing_extra_says_what_to_install(train, capsys, monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
+    assert train("quadruped") == 2
+    assert "pip install 'terrainkit[train]'" in capsys.readouterr().err
+
+
+def test_a_task_file_comes_before_options(train, tmp_path):
+    (tmp_path / "task.toml").write_text("[rewards]\ntorques = -0.5\ndof_vel = -0.25\n")
+    words = ("--config", "task.toml", "--rewards.torques", "-0.125", "--num-envs", 4)
+    assert train("quadruped", *words, "--max-iterations", 1, "--log-dir", "run") == 0
+    rewards = open_run(tmp_path / "run").task.rewards
+    assert (rewards.torques, rewards.dof_vel) == (-0.125, -0.25)
+
+
+PROGRESS = Progress(
+    folder=Path("logs/rover"),
+    iteration=20,
+    last=400,
+    steps_per_second=1234.4,
+    learning=0.25,
+    remaining=3723.0,
+    reward=-1.5,
+    episode_length=4.25,
+    noise_std=0.875,
+    rewards={"tracking_lin_vel": 0.5, "torques": -0.0625},
+    levels={"stairs": 3.5},
+    success={"stairs": 0.75},
+)
+
+
+def test_without_a_terminal_progress_is_a_line_now_and_then(capsys):
+    with render.training() as watch:
+        for iteration in range(1, 24):
+            watch(Progress(**{**vars(PROGRESS), "iteration": iteration, "last": 23}))
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert [line.split(":")[0] for line in err.splitlines()] == [
+        "iteration 10/23",
+        "iteration 20/23",
+        "iteration 23/23",
+    ]
+    assert err.splitlines()[0].endswith(
+        "env steps/s 1234, to go 1:02:03, reward -1.50, episode 4.2 s, noise std 0.88, "
+        "level stairs 3.5"
+    )
+
+
+def test_on_a_terminal_progress_is_a_table(monkeypatch):
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    with render.training() as watch:
+        watch(PROGRESS)
+    shown = terminal.getvalue()
+    for text in ("iteration 20/400", "1:02:03", "tracking_lin_vel", "+0.500 /s", "75% succeed"):
+        assert text in shown

@@ -1,0 +1,188 @@
+"""Robots, grounds and environments that are small and quick.
+
+`calm` tasks leave out all that is drawn at random, so that values can be worked by hand. Fixtures
+that are changed by a test are made anew; what is only read lives as long as the session.
+"""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("torch", reason="the extra `train` is not installed")
+
+import torch
+
+from terrainkit import MapConfig, TerrainChoice, TerrainMap, generate
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.ground import Ground, MapGround, Plane
+from terrainkit_robots.rl.registry import find
+from terrainkit_robots.rl.robot import Robot, read_robot, robot_of
+from terrainkit_robots.rl.task import DomainRand, Env, InitState, Noise, Task
+from terrainkit_robots.spec.robot_spec import RobotSpec
+
+# The contract is a class that several test files share; there are no packages here to find it in.
+sys.path.append(str(Path(__file__).parent))
+pytest.register_assert_rewrite("vec_env_contract")
+
+torch.set_num_threads(1)
+
+CART = """
+<mujoco model="cart">
+  <compiler angle="radian"/>
+  <option gravity="0 0 -9.81"/>
+  <default>
+    <joint frictionloss="0.3" armature="0.5"/>
+    <motor ctrllimited="true" ctrlrange="-0.1 0.1" gear="7"/>
+    <geom friction="0.7"/>
+  </default>
+  <worldbody>
+    <light pos="0 0 3"/>
+    <body name="trunk" pos="0 0 1">
+      <freejoint/>
+      <geom name="hull" type="box" size="0.2 0.1 0.05" mass="4" friction="0.3"/>
+      <geom name="paint" type="box" size="0.2 0.1 0.06" mass="0" contype="0" conaffinity="0"/>
+      <site name="imu" pos="0 0 0"/>
+      <body name="front" pos="0.2 0 0">
+        <joint name="front_hinge" axis="0 1 0" range="-1 1" actuatorfrcrange="-1 1"/>
+        <geom name="front_leg" type="capsule" fromto="0 0 0 0 0 -0.2" size="0.02" mass="0.5"/>
+        <geom name="front_ball" type="sphere" pos="0 0 -0.2" size="0.03" mass="0.1"/>
+      </body>
+      <body name="rear" pos="-0.2 0 0">
+        <joint name="rear_hinge" axis="0 1 0" range="-1 1"/>
+        <geom name="rear_leg" type="capsule" fromto="0 0 0 0 0 -0.2" size="0.02" mass="0.5"/>
+        <body name="wheel" pos="0 0 -0.2">
+          <joint name="wheel_axle" axis="0 1 0"/>
+          <geom name="tire" type="sphere" size="0.03" mass="0.1"/>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <actuator>
+    <motor name="old" joint="front_hinge"/>
+  </actuator>
+  <sensor>
+    <gyro name="old" site="imu"/>
+  </sensor>
+  <keyframe>
+    <key name="old" qpos="0 0 1 1 0 0 0 0 0 0"/>
+  </keyframe>
+</mujoco>
+"""
+"""A robot with defaults, motors and sensors of its own, that training must not take over."""
+
+
+@pytest.fixture(scope="session")
+def quadruped() -> Robot:
+    return read_robot(find("quadruped").folder)
+
+
+@pytest.fixture(scope="session")
+def biped() -> Robot:
+    return read_robot(find("biped").folder)
+
+
+@pytest.fixture(scope="session")
+def cart_spec() -> RobotSpec:
+    """Return the spec of a cart whose joints are in another order than in its MJCF."""
+    return RobotSpec(
+        name="cart",
+        urdf="cart.urdf",
+        mjcf="cart.xml",
+        floating=True,
+        joint_order=("wheel_axle", "rear_hinge", "front_hinge"),
+        base="trunk",
+        feet=("wheel", "front"),
+        termination_contacts=("trunk",),
+        penalized_contacts=("rear",),
+        default_pose={"wheel_axle": 0.0, "rear_hinge": -0.2, "front_hinge": 0.3},
+        stiffness={"wheel_axle": 0.0, ".*_hinge": 20.0},
+        damping={"wheel_axle": 0.4, ".*_hinge": 1.5},
+        effort={"wheel_axle": 3.0, "rear_hinge": 5.0, "front_hinge": 6.0},
+        velocity={"wheel_axle": 30.0, ".*_hinge": 10.0},
+        armature={"wheel_axle": 0.001, "rear_hinge": 0.01, "front_hinge": 0.02},
+        action_scale={"wheel_axle": 12.0, "rear_hinge": 0.25, "front_hinge": 0.5},
+        soft_limits={".*_hinge": (-0.9, 0.9)},
+        base_height_target=0.22,
+        spawn_height=0.24,
+        leg_length=0.2,
+        stance_width=0.2,
+        foot_radius=0.03,
+    )
+
+
+@pytest.fixture(scope="session")
+def cart(cart_spec: RobotSpec, tmp_path_factory: pytest.TempPathFactory) -> Robot:
+    folder = tmp_path_factory.mktemp("cart")
+    (folder / "cart.xml").write_text(CART)
+    return robot_of(cart_spec, folder)
+
+
+@pytest.fixture(scope="session")
+def mixed_map() -> TerrainMap:
+    """Return a map of level and sloping ground on which x and y, and all patches, differ."""
+    return generate(
+        MapConfig(
+            rows=3,
+            cols=2,
+            patch_size=(6.0, 4.0),
+            border=1.2,
+            seed=7,
+            terrains=(
+                TerrainChoice(terrain="stairs", parameters={"step_height": (0.05, 0.2)}),
+                TerrainChoice(terrain="rough_slope", parameters={"platform": 1.5}),
+            ),
+        )
+    )
+
+
+@pytest.fixture(scope="session")
+def map_ground(mixed_map: TerrainMap) -> Ground:
+    return MapGround(mixed_map)
+
+
+@pytest.fixture(scope="session")
+def calm() -> Callable[..., Task]:
+    """Return tasks of four robots that start alike, stand still and are left alone."""
+
+    def make(num_envs: int = 4, **sections: Any) -> Task:
+        still = {
+            "env": Env(num_envs=num_envs, num_threads=1),
+            "init_state": InitState(
+                reset_range=(1.0, 1.0), position=0.0, yaw=0.0, lin_vel=0.0, ang_vel=0.0
+            ),
+            "domain_rand": DomainRand(
+                friction=None,
+                added_mass=None,
+                com_shift=0.0,
+                gains=None,
+                motor_strength=None,
+                joint_offset=0.0,
+                push_interval_s=0.0,
+            ),
+            "noise": Noise(noise_level=0.0),
+        }
+        return Task(**(still | sections))
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def lively() -> Callable[..., Task]:
+    """Return tasks with everything that is drawn at random, of few robots."""
+
+    def make(num_envs: int = 4, num_threads: int = 1, **sections: Any) -> Task:
+        return Task(**({"env": Env(num_envs=num_envs, num_threads=num_threads)} | sections))
+
+    return make
+
+
+@pytest.fixture
+def standing(quadruped: Robot, calm: Callable[..., Task]) -> LeggedEnv:
+    """Return four quadrupeds that have come to rest on a plane."""
+    env = LeggedEnv(calm(), quadruped, Plane())
+    for _ in range(50):
+        env.step(torch.zeros(4, 12))
+    return env

@@ -1,0 +1,278 @@
+"""The commands: what is drawn, how headings become turning speeds, when there are new ones."""
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from terrainkit_robots import bundled
+from terrainkit_robots.rl.commands import draw_commands, turning_to, widened
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.ground import Plane
+from terrainkit_robots.rl.rewards import REWARDS
+from terrainkit_robots.rl.robot import read_robot
+from terrainkit_robots.rl.task import Commands, Control, DomainRand, Env, InitState, Rewards, Task
+
+torch.set_num_threads(1)
+
+_MANY = 20_000
+_ALL = Commands(min_norm=0.0, standing=0.0)
+
+
+def draw(settings: Commands, count: int = _MANY, seed: int = 0) -> tuple[Any, Any]:
+    return draw_commands(np.random.default_rng(seed), count, settings, settings.lin_vel_x)
+
+
+class TestDraw:
+    def test_ranges_are_filled_and_kept(self) -> None:
+        settings = replace(
+            _ALL, lin_vel_x=(-0.5, 2), lin_vel_y=(0.25, 0.5), ang_vel_yaw=(-3, -1), heading=(-1, 2)
+        )
+        commands, heading = draw(settings)
+        values = np.column_stack([commands, heading])
+        low, high = np.array([(-0.5, 2), (0.25, 0.5), (-3, -1), (-1, 2)]).T
+        assert (values >= low).all()
+        assert (values <= high).all()
+        for share, quantile in enumerate((0.0, 0.25, 0.5, 0.75, 1.0)):
+            expected = low + (high - low) * share / 4
+            found = np.quantile(values, quantile, axis=0)
+            np.testing.assert_allclose(found, expected, atol=0.03 * (high - low).max())
+
+    def test_shapes_and_kinds(self) -> None:
+        for count in (0, 1, 5):
+            commands, heading = draw(Commands(), count)
+            assert commands.shape == (count, 3)
+            assert heading.shape == (count,)
+            assert commands.dtype == heading.dtype == np.float32
+
+    def test_range_of_the_time_is_what_counts(self) -> None:
+        rng = np.random.default_rng(0)
+        commands, _ = draw_commands(rng, _MANY, replace(_ALL, lin_vel_x=(-1, 1)), (2.0, 3.0))
+        assert commands[:, 0].min() >= 2
+        assert commands[:, 0].max() <= 3
+
+    def test_range_without_width_is_a_number(self) -> None:
+        settings = replace(_ALL, lin_vel_x=(0.5, 0.5), lin_vel_y=(0, 0), ang_vel_yaw=(0.3, 0.3))
+        commands, _ = draw(settings, 3)
+        np.testing.assert_allclose(commands, np.tile([0.5, 0, 0.3], (3, 1)), rtol=1e-6)
+
+    def test_small_ones_are_zero(self) -> None:
+        commands, _ = draw(replace(_ALL, lin_vel_y=(-1, 1), min_norm=0.4))
+        speed, turn = np.hypot(commands[:, 0], commands[:, 1]), np.abs(commands[:, 2])
+        assert (speed[speed > 0] >= 0.4).all()
+        assert (turn[turn > 0] >= 0.4).all()
+        # A disc of radius 0.4 in a square of 2, and 0.4 of 1: of each for itself.
+        assert (speed == 0).mean() == pytest.approx(np.pi * 0.16 / 4, abs=0.01)
+        assert (turn == 0).mean() == pytest.approx(0.4, abs=0.015)
+        assert ((speed == 0) & (turn > 0)).any()
+        assert ((commands[:, 0] != 0) & (np.abs(commands[:, 0]) < 0.1)).any()  # the norm counts
+
+    @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
+    def test_share_that_stands(self, share: float) -> None:
+        commands, heading = draw(replace(_ALL, standing=share))
+        stands = (commands == 0).all(axis=1)
+        assert stands.mean() == pytest.approx(share, abs=0.015)
+        # To stand is not to turn to a heading either.
+        np.testing.assert_array_equal(np.isnan(heading), stands)
+
+    def test_seed_decides(self) -> None:
+        one, other = draw(Commands(), seed=4), draw(Commands(), seed=4)
+        np.testing.assert_array_equal(one[0], other[0])
+        np.testing.assert_array_equal(one[1], other[1])
+        assert (draw(Commands(), seed=5)[0] != one[0]).any()
+
+
+class TestHeading:
+    def turn(self, heading: float, yaw: float, **settings: Any) -> float:
+        speed = turning_to(
+            np.array([heading], np.float32), np.array([yaw], np.float32), Commands(**settings)
+        )
+        assert speed.shape == (1,)
+        return float(speed[0])
+
+    def test_by_hand(self) -> None:
+        assert self.turn(1.0, 0.2) == pytest.approx(0.4)
+        assert self.turn(0.2, 1.0) == pytest.approx(-0.4)
+        assert self.turn(0.7, 0.7) == 0
+        assert self.turn(1.0, 0.2, heading_stiffness=1.0) == pytest.approx(0.8)
+
+    def test_turns_the_short_way(self) -> None:
+        # From 3 rad to -3 rad it is 0.2832 to the left.
+        assert self.turn(-3, 3) == pytest.approx(0.5 * 0.2832, abs=1e-4)
+        assert self.turn(3, -3) == pytest.approx(-0.5 * 0.2832, abs=1e-4)
+
+    def test_keeps_the_range(self) -> None:
+        assert self.turn(3, 0, ang_vel_yaw=(-0.5, 0.75)) == 0.75
+        assert self.turn(-3, 0, ang_vel_yaw=(-0.5, 0.75)) == -0.5
+
+    def test_none_is_no_turning(self) -> None:
+        assert self.turn(np.nan, 2) == 0
+
+    def test_gets_there(self) -> None:
+        yaw = np.array([-3.0, 0.1, 2.5], np.float32)
+        heading = np.array([3.0, -1.0, 0.0], np.float32)
+        for _ in range(1000):
+            yaw += np.float32(0.02) * turning_to(heading, yaw, Commands())
+        off = np.angle(np.exp(1j * (heading - yaw)))
+        np.testing.assert_allclose(off, 0, atol=1e-3)
+
+
+class TestWidening:
+    def test_by_hand(self) -> None:
+        settings = Commands(curriculum=True, max_curriculum=2.0)
+        assert widened((-1.0, 1.0), 0.79, settings) == (-1.0, 1.0)
+        assert widened((-1.0, 1.0), 0.81, settings) == pytest.approx((-1.1, 1.1))
+
+    def test_stops_at_the_widest(self) -> None:
+        settings, span = Commands(curriculum=True, max_curriculum=1.25), (-0.5, 0.75)
+        for _ in range(20):
+            before, span = span, widened(span, 0.9, settings)
+            assert span[0] <= before[0]
+            assert span[1] >= before[1]
+        assert span == (-1.25, 1.25)
+
+    def test_never_narrows(self) -> None:
+        settings = Commands(curriculum=True, max_curriculum=0.5)
+        assert widened((-1.0, 3.0), 0.9, settings) == (-1.0, 3.0)
+
+    def test_only_where_asked_for(self) -> None:
+        assert widened((-1.0, 1.0), 1.0, Commands(max_curriculum=5.0)) == (-1.0, 1.0)
+
+
+def make_env(num_envs: int = 4, **changes: Any) -> LeggedEnv:
+    """Return an environment in which nothing moves robots but gravity."""
+    task = Task(
+        env=changes.pop("env", Env(num_envs=num_envs, num_threads=1)),
+        init_state=InitState(lin_vel=0, ang_vel=0, reset_range=(1, 1)),
+        domain_rand=DomainRand(push_interval_s=0, joint_offset=0),
+        control=Control(decimation=changes.pop("decimation", 4)),
+    )
+    robot = read_robot(Path(str(bundled.find("quadruped"))).parent)
+    return LeggedEnv(replace(task, **changes), robot, Plane())
+
+
+def run(env: LeggedEnv, steps: int) -> list[Any]:
+    """Return the commands after each step."""
+    seen = []
+    for _ in range(steps):
+        env.step(torch.zeros(env.num_envs, env.num_actions))
+        seen.append(env.state.commands.copy())
+    return seen
+
+
+class TestEnvironment:
+    def test_new_ones_every_ten_seconds(self) -> None:
+        env = make_env(commands=Commands(standing=0))
+        first = env.state.commands.copy()
+        assert env.cfg.dt == pytest.approx(0.02)
+        seen = run(env, 3)
+        env.steps[:] = 497  # of the episode, as after 9.94 s
+        seen += run(env, 4)
+        assert not env.state.fallen.any()
+        for commands in seen[:5]:  # what is observed after step k is for step k + 1
+            np.testing.assert_array_equal(commands, first)
+        assert (seen[5] != first).any(axis=1).all()
+        np.testing.assert_array_equal(seen[6], seen[5])
+
+    def test_time_between_them_is_the_tasks(self) -> None:
+        env = make_env(commands=Commands(standing=0, resampling_time=0.1))
+        seen = [env.state.commands.copy(), *run(env, 12)]
+        new = [bool((a != b).any()) for a, b in pairwise(seen)]
+        assert [k + 1 for k, is_new in enumerate(new) if is_new] == [5, 10]
+
+    def test_new_ones_with_a_new_episode(self) -> None:
+        env = make_env(commands=Commands(standing=0, min_norm=0))
+        first = env.state.commands.copy()
+        env.physics.qpos[1, 3:7] = (0, 1, 0, 0)
+        [after] = run(env, 1)
+        assert (after != first).any(axis=1).tolist() == [False, True, False, False]
+
+    def test_observed_is_what_is_asked(self) -> None:
+        env = make_env()
+        run(env, 3)
+        scaled = env.commands * np.array([2, 2, 0.25], np.float32)
+        np.testing.assert_allclose(env.get_observations()["policy"][:, :3], scaled)
+
+    def test_rewarded_is_what_was_asked_when_acting(self) -> None:
+        """Not what has just been drawn for the next step."""
+        only = Rewards(**{**dict.fromkeys(REWARDS, 0.0), "tracking_lin_vel": 1.0})
+        env = make_env(commands=Commands(standing=0, resampling_time=0.02), rewards=only)
+        for _ in range(3):
+            asked = env.commands.copy()
+            _, rewards, *_ = env.step(torch.zeros(4, 12))
+            off = np.square(asked[:, :2] - env.state.base_lin_vel[:, :2]).sum(axis=1)
+            np.testing.assert_allclose(rewards, 0.02 * np.exp(-off / 0.25), rtol=1e-4)
+            assert (env.commands != asked).any()
+
+    def test_heading_becomes_turning(self) -> None:
+        env = make_env(commands=Commands(heading_command=True, standing=0))
+        run(env, 2)
+        quat = env.state.base_quat
+        yaw = 2 * np.arctan2(quat[:, 3], quat[:, 0])
+        off = np.angle(np.exp(1j * (env.heading - yaw)))
+        np.testing.assert_allclose(env.commands[:, 2], np.clip(0.5 * off, -1, 1), atol=2e-3)
+
+    def test_heading_is_heeded_from_the_start(self) -> None:
+        env = make_env(commands=Commands(heading_command=True, standing=0))
+        quat = env.state.base_quat
+        yaw = 2 * np.arctan2(quat[:, 3], quat[:, 0])
+        off = np.angle(np.exp(1j * (env.heading - yaw)))
+        np.testing.assert_allclose(env.commands[:, 2], np.clip(0.5 * off, -1, 1), atol=2e-3)
+
+    def test_held_ones_stay(self) -> None:
+        env = make_env(commands=Commands(resampling_time=0.06, heading_command=True))
+        held = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]], np.float32)
+        env.hold_commands(held)
+        scaled = held * np.array([2, 2, 0.25], np.float32)
+        np.testing.assert_array_equal(env.get_observations()["policy"][:, :3], scaled)
+        env.physics.qpos[1, 3:7] = (0, 1, 0, 0)  # a new episode changes nothing
+        for commands in run(env, 8):
+            np.testing.assert_array_equal(commands, held)
+
+    def test_held_ones_stay_when_all_begins_anew(self) -> None:
+        env = make_env(commands=Commands(standing=0))
+        held = np.tile(np.array([0.5, 0, 0], np.float32), (4, 1))
+        env.hold_commands(held)
+        env.begin_all()
+        np.testing.assert_array_equal(env.state.commands, held)
+        np.testing.assert_array_equal(env.get_observations()["policy"][:, 0], [1.0] * 4)
+
+    def test_held_ones_can_be_let_go(self) -> None:
+        env = make_env(commands=Commands(standing=0, resampling_time=0.04))
+        held = np.tile(np.array([5, 5, 5], np.float32), (4, 1))
+        env.hold_commands(held)
+        run(env, 1)
+        env.hold_commands(None)
+        assert np.abs(run(env, 3)[-1]).max() <= 1
+
+    def test_range_widens_only_after_as_long_as_an_episode_of_all(self) -> None:
+        """One robot that stood still as it was told to does not make all of them run."""
+        env = make_env(
+            num_envs=4,
+            env=Env(num_envs=4, num_threads=1, episode_length_s=0.2),
+            commands=Commands(curriculum=True, max_curriculum=1.15),
+            rewards=Rewards(tracking_sigma=1e9),
+        )
+        env.physics.qpos[0, 3:7] = (0, 1, 0, 0)
+        run(env, 1)
+        assert env.lin_vel_x == (-1.0, 1.0)
+        spans = []
+        for _ in range(5):
+            run(env, 10)
+            spans.append(env.lin_vel_x[1])
+        assert max(spans) == 1.15
+        assert spans == sorted(spans)
+        assert spans[0] <= 1.1 + 1e-6
+
+    def test_range_does_not_widen_where_commands_are_not_followed(self) -> None:
+        env = make_env(
+            env=Env(num_envs=4, num_threads=1, episode_length_s=0.2),
+            commands=Commands(curriculum=True, max_curriculum=2.0, standing=0, min_norm=0.9),
+            rewards=Rewards(tracking_sigma=0.01),
+        )
+        run(env, 30)
+        assert env.lin_vel_x == (-1.0, 1.0)

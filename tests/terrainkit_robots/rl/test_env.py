@@ -1,0 +1,405 @@
+import numpy as np
+import pytest
+import torch
+from vec_env_contract import VecEnvContract
+
+from terrainkit.errors import ConfigError
+from terrainkit_robots.rl.checkpoint import save_checkpoint
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.ground import MapGround, Plane
+from terrainkit_robots.rl.task import (
+    Commands,
+    Control,
+    DomainRand,
+    Env,
+    Rewards,
+    Runner,
+    Termination,
+    Terrain,
+)
+
+SHORT = Env(num_envs=5, num_threads=1, episode_length_s=0.4)
+
+
+class TestOnAPlane(VecEnvContract):
+    @pytest.fixture
+    def env(self, quadruped, lively):
+        return LeggedEnv(lively(env=SHORT), quadruped, Plane())
+
+
+class TestOnAMap(VecEnvContract):
+    @pytest.fixture
+    def env(self, quadruped, lively, map_ground):
+        return LeggedEnv(lively(env=SHORT), quadruped, map_ground)
+
+
+class TestTheBiped(VecEnvContract):
+    @pytest.fixture
+    def env(self, biped, lively, map_ground):
+        return LeggedEnv(lively(env=SHORT), biped, map_ground)
+
+
+class TestACartWithAWheel(VecEnvContract):
+    @pytest.fixture
+    def env(self, cart, lively):
+        task = lively(env=SHORT, commands=Commands(heading_command=True, resampling_time=0.1))
+        return LeggedEnv(task, cart, Plane())
+
+
+class TestTorqueControl(VecEnvContract):
+    @pytest.fixture
+    def env(self, quadruped, lively):
+        task = lively(env=SHORT, control=Control(control_type="T"))
+        return LeggedEnv(task, quadruped, Plane())
+
+
+def still(env):
+    return env.step(torch.zeros(env.num_envs, env.num_actions))
+
+
+def acts(env, count, seed=0):
+    made = torch.Generator().manual_seed(seed)
+    return [torch.randn(env.num_envs, env.num_actions, generator=made) for _ in range(count)]
+
+
+def record(env, actions):
+    """Return the bytes of all that steps return."""
+    found = []
+    for each in actions:
+        observed, rewards, dones, extras = env.step(each)
+        parts = (*observed.values(), rewards, dones, extras["time_outs"])
+        found.append([part.numpy().tobytes() for part in parts])
+    return found
+
+
+class TestObservations:
+    def test_widths(self, quadruped, biped, calm, map_ground):
+        env = LeggedEnv(calm(), quadruped, Plane())
+        assert env.get_observations()["policy"].shape == (4, 45)
+        # And 3 velocity, friction, mass, 3 center of mass, 12 offsets, 3 push, 12 forces.
+        assert env.get_observations()["privileged"].shape == (4, 45 + 3 + 1 + 1 + 3 + 12 + 3 + 12)
+        env = LeggedEnv(calm(), quadruped, map_ground)
+        assert env.get_observations()["policy"].shape == (4, 45 + 187)
+        env = LeggedEnv(calm(), biped, Plane())
+        joints = len(biped.default_pose)
+        assert env.get_observations()["policy"].shape == (4, 9 + 3 * joints)
+
+    def test_a_plane_may_be_scanned_and_a_map_not(self, quadruped, calm, map_ground):
+        seen = calm(terrain=Terrain(measure_heights=True))
+        assert LeggedEnv(seen, quadruped, Plane()).get_observations()["policy"].shape == (4, 232)
+        unseen = calm(terrain=Terrain(measure_heights=False))
+        env = LeggedEnv(unseen, quadruped, map_ground)
+        assert env.get_observations()["policy"].shape == (4, 45)
+
+    @pytest.mark.parametrize("on_map", [False, True])
+    def test_forces_on_feet_are_in_units_of_the_robots_weight(
+        self, quadruped, calm, map_ground, on_map
+    ):
+        # The ground has a mass too: thousands of tons.
+        env = LeggedEnv(calm(), quadruped, map_ground if on_map else Plane())
+        env.careers.levels[:] = 0
+        env.begin_all()
+        for _ in range(50):
+            observed, *_ = still(env)
+        up = observed["privileged"][:, -12:].reshape(4, 4, 3)[..., 2]
+        np.testing.assert_allclose(up.sum(axis=1), 1, atol=0.03)
+
+    def test_commands_are_those_that_the_next_step_is_rewarded_for(self, quadruped, lively):
+        task = lively(commands=Commands(resampling_time=0.06), num_envs=8)
+        env = LeggedEnv(task, quadruped, Plane())
+        for _ in range(10):
+            observed = env.get_observations()["policy"][:, :3] / torch.tensor([2, 2, 0.25])
+            np.testing.assert_allclose(observed, env.commands, atol=1e-6)
+            still(env)
+
+    def test_the_command_of_a_heading_is_observed_from_the_first_step(self, quadruped, lively):
+        commands = Commands(heading_command=True, standing=0.0, resampling_time=100.0)
+        env = LeggedEnv(lively(16, commands=commands), quadruped, Plane())
+        first = env.commands[:, 2].copy()
+        still(env)
+        # Robots hardly turn in 20 ms, so neither does what they are asked for.
+        np.testing.assert_allclose(env.commands[:, 2], first, atol=0.05)
+
+
+class TestEndings:
+    def test_twenty_seconds_are_a_time_out_and_no_fall(self, quadruped, calm):
+        env = LeggedEnv(calm(2), quadruped, Plane())
+        assert env.max_episode_length == 1000
+        for k in range(999):
+            _, _, dones, extras = still(env)
+            assert not dones.any(), k
+        _, _, dones, extras = still(env)
+        assert dones.all()
+        assert extras["time_outs"].all()
+        assert extras["log"]["Episode/falls"] == 0
+
+    @pytest.mark.parametrize("how", ["back", "side", "outside", "velocity", "position"])
+    def test_falls_end_an_episode_and_only_their_own(self, quadruped, calm, mixed_map, how):
+        env = LeggedEnv(calm(4), quadruped, MapGround(mixed_map))
+        twin = LeggedEnv(calm(4), quadruped, MapGround(mixed_map))
+        for each in (env, twin):
+            for _ in range(5):
+                still(each)
+        qpos, qvel = env.physics.qpos[2], env.physics.qvel[2]
+        if how == "back":
+            qpos[3:7] = (0, 1, 0, 0)
+            qpos[2] += 1
+        elif how == "side":
+            qpos[3:7] = (np.sqrt(0.5), np.sqrt(0.5), 0, 0)
+            qpos[2] += 1
+        elif how == "outside":
+            qpos[0] = -1.3
+        elif how == "velocity":
+            qvel[8] = 1e12
+        else:
+            qpos[9] = np.nan
+        observed, rewards, dones, extras = still(env)
+        expected, expected_rewards, *_ = still(twin)
+        assert dones.tolist() == [False, False, True, False]
+        assert not extras["time_outs"].any()
+        assert extras["log"]["Episode/falls"] == 1
+        assert env.episode_length_buf.tolist() == [6, 6, 0, 6]
+        assert torch.isfinite(rewards).all()
+        others = [0, 1, 3]
+        for name in ("policy", "privileged"):
+            assert torch.isfinite(observed[name]).all()
+            assert torch.equal(observed[name][others], expected[name][others])
+        assert torch.equal(rewards[others], expected_rewards[others])
+        np.testing.assert_array_equal(env.physics.qpos[others], twin.physics.qpos[others])
+
+    def test_tilt_counts_from_its_limit(self, quadruped, calm):
+        env = LeggedEnv(calm(3, termination=Termination(tilt=0.5)), quadruped, Plane())
+        for k, tilt in enumerate((0.0, 0.45, 0.55)):
+            env.physics.qpos[k, 2] = 2.0
+            env.physics.qpos[k, 3:7] = (np.cos(tilt / 2), 0, np.sin(tilt / 2), 0)
+        _, _, dones, _ = still(env)
+        assert dones.tolist() == [False, False, True]
+
+    def test_the_base_on_the_ground_is_a_fall(self, quadruped, calm):
+        env = LeggedEnv(calm(2, termination=Termination(tilt=3.1)), quadruped, Plane())
+        env.physics.qpos[1, 2:7] = (0.06, 0, 1, 0, 0)
+        fell = []
+        for _ in range(10):
+            _, _, dones, extras = still(env)
+            assert not extras["time_outs"].any()
+            fell.append(dones.tolist())
+            if dones.any():
+                break
+        assert fell[-1] == [False, True]
+
+    def test_bad_states_are_falls_every_time(self, quadruped, calm):
+        env = LeggedEnv(calm(3), quadruped, Plane())
+        for value in (np.nan, 1e12, np.nan, 1e9, np.inf):
+            env.physics.qvel[1, 7] = value
+            _, rewards, dones, _ = still(env)
+            assert dones.tolist() == [False, True, False], value
+            assert torch.isfinite(rewards).all()
+
+    def test_a_bad_state_is_no_progress_in_the_curriculum(self, quadruped, calm, map_ground):
+        # MuJoCo puts it at the world's origin, far from where the robot was.
+        env = LeggedEnv(calm(4), quadruped, map_ground)
+        env.careers.levels[:] = 1
+        env.begin_all()
+        env.physics.qvel[2, 7] = np.nan
+        _, _, dones, _ = still(env)
+        assert dones.tolist() == [False, False, True, False]
+        assert env.careers.levels[2] <= 1
+        assert np.nansum(env.careers.success) == 0
+
+    def test_a_fall_costs_what_the_task_says(self, quadruped, calm):
+        task = calm(2, rewards=Rewards(termination=-100.0, only_positive_rewards=True))
+        env = LeggedEnv(task, quadruped, Plane())
+        env.physics.qpos[1, 2:7] = (1.0, 0, 1, 0, 0)
+        _, rewards, dones, _ = still(env)
+        assert dones.tolist() == [False, True]
+        assert rewards[0] >= 0
+        assert rewards[1] == pytest.approx(-2.0, abs=0.1)
+
+    def test_who_falls_in_the_last_step_has_fallen(self, quadruped, calm):
+        env = LeggedEnv(calm(2), quadruped, Plane())
+        env.episode_length_buf = torch.tensor([999, 999])
+        env.physics.qpos[1, 2:7] = (1.0, 0, 1, 0, 0)
+        _, _, dones, extras = still(env)
+        assert dones.all()
+        assert extras["time_outs"].tolist() == [True, False]
+
+
+class TestLog:
+    def test_rewards_are_per_second_of_those_that_ended(self, quadruped, calm):
+        env = LeggedEnv(calm(2), quadruped, Plane())
+        total = sum(still(env)[1] for _ in range(9))
+        env.episode_length_buf = torch.tensor([0, 999])
+        _, rewards, _, extras = still(env)
+        total = total + rewards
+        logged = {k: v for k, v in extras["log"].items() if k.startswith("Episode/rew_")}
+        assert sum(logged.values()) == pytest.approx(float(total[1]) / (10 * 0.02), rel=1e-4)
+
+    def test_every_reward_is_logged(self, quadruped, calm):
+        env = LeggedEnv(calm(2), quadruped, Plane())
+        env.episode_length_buf = torch.tensor([0, 999])
+        log = still(env)[3]["log"]
+        assert {f"Episode/rew_{name}" for name in env.rewards} <= set(log)
+
+    def test_terrains_are_logged_on_a_map(self, quadruped, calm, map_ground):
+        env = LeggedEnv(calm(4), quadruped, map_ground)
+        env.episode_length_buf = torch.tensor([0, 999, 0, 0])
+        log = still(env)[3]["log"]
+        assert {"Curriculum/level_stairs", "Curriculum/level_rough_slope"} <= set(log)
+
+    def test_terrains_without_robots_are_left_out(self, quadruped, calm, map_ground):
+        # One robot on a map with two columns: nobody is on the second.
+        env = LeggedEnv(calm(1), quadruped, map_ground)
+        env.episode_length_buf = torch.tensor([999])
+        log = still(env)[3]["log"]
+        assert np.isfinite(list(log.values())).all()
+
+    def test_nothing_is_logged_while_nobody_ends(self, quadruped, calm):
+        assert "log" not in still(LeggedEnv(calm(2), quadruped, Plane()))[3]
+
+
+class TestSeeds:
+    def test_the_same_seed_is_the_same_run(self, quadruped, lively, map_ground):
+        task = lively(6, runner=Runner(seed=3))
+        first, second = (LeggedEnv(task, quadruped, map_ground) for _ in range(2))
+        actions = acts(first, 25)
+        assert record(first, actions) == record(second, actions)
+
+    def test_another_seed_is_another(self, quadruped, lively, map_ground):
+        first, second = (
+            LeggedEnv(lively(6, runner=Runner(seed=seed)), quadruped, map_ground) for seed in (3, 4)
+        )
+        assert not torch.equal(
+            first.get_observations()["policy"], second.get_observations()["policy"]
+        )
+        assert not np.array_equal(first.differences.friction, second.differences.friction)
+
+    def test_neither_numpys_nor_torchs_own_numbers_are_drawn(self, quadruped, lively):
+        np.random.seed(0)  # noqa: NPY002
+        torch.manual_seed(0)
+        before = np.random.get_state()[1].copy(), torch.get_rng_state().clone()  # noqa: NPY002
+        env = LeggedEnv(lively(3), quadruped, Plane())
+        still(env)
+        assert np.array_equal(np.random.get_state()[1], before[0])  # noqa: NPY002
+        assert torch.equal(torch.get_rng_state(), before[1])
+
+
+class TestGoingOn:
+    @pytest.mark.parametrize("on_map", [False, True])
+    def test_is_bit_for_bit_as_if_unbroken(self, quadruped, lively, map_ground, on_map):
+        ground = map_ground if on_map else Plane()
+        domain_rand = DomainRand(push_interval_s=0.3)
+        # Short commands and episodes, so that all that is drawn is drawn again.
+        task = lively(
+            env=Env(num_envs=6, num_threads=1, episode_length_s=0.7),
+            commands=Commands(resampling_time=0.2, heading_command=True, curriculum=True),
+            domain_rand=domain_rand,
+        )
+        env = LeggedEnv(task, quadruped, ground)
+        actions = acts(env, 80)
+        record(env, actions[:21])
+        saved, seen = env.state_dict(), env.get_observations()
+        expected = record(env, actions[21:])
+        other = LeggedEnv(task, quadruped, ground)
+        record(other, actions[40:50])  # another past
+        other.load_state_dict(saved)
+        for name, group in seen.items():
+            assert torch.equal(other.get_observations()[name], group), name
+        assert record(other, actions[21:]) == expected
+
+    def test_what_is_saved_does_not_change_later(self, quadruped, lively):
+        env = LeggedEnv(lively(3), quadruped, Plane())
+        actions = acts(env, 20)
+        record(env, actions[:5])
+        saved = env.state_dict()
+        expected = record(env, actions[5:])
+        env.load_state_dict(saved)
+        assert record(env, actions[5:]) == expected
+
+    def test_goes_through_a_checkpoint(self, quadruped, lively, map_ground, tmp_path):
+        env = LeggedEnv(lively(3), quadruped, map_ground)
+        actions = acts(env, 10)
+        record(env, actions[:5])
+        save_checkpoint(tmp_path / "model_5.pt", {"env": env.state_dict()})
+        expected = record(env, actions[5:])
+        env.load_state_dict(torch.load(tmp_path / "model_5.pt", weights_only=True)["env"])
+        assert record(env, actions[5:]) == expected
+
+    def test_loading_after_the_runner_replaced_the_lengths(self, quadruped, lively):
+        env = LeggedEnv(lively(3), quadruped, Plane())
+        env.episode_length_buf = torch.tensor([5, 6, 7])
+        still(env)
+        saved = env.state_dict()
+        other = LeggedEnv(lively(3), quadruped, Plane())
+        other.load_state_dict(saved)
+        assert other.episode_length_buf.tolist() == [6, 7, 8]
+
+    def test_another_number_of_robots_goes_on_with_the_curriculum(
+        self, quadruped, lively, map_ground
+    ):
+        env = LeggedEnv(lively(4), quadruped, map_ground)
+        env.careers.levels[:] = 2
+        env.lin_vel_x = (-1.3, 1.3)
+        other = LeggedEnv(lively(7), quadruped, map_ground)
+        other.load_state_dict(env.state_dict())
+        assert (other.careers.levels == 2).all()
+        assert other.lin_vel_x == (-1.3, 1.3)
+        assert (other.episode_length_buf == 0).all()
+        still(other)
+
+    def test_a_state_of_another_robot_or_map_is_refused(self, quadruped, biped, lively, map_ground):
+        saved = LeggedEnv(lively(3), quadruped, Plane()).state_dict()
+        with pytest.raises(ConfigError, match="another robot"):
+            LeggedEnv(lively(3), biped, Plane()).load_state_dict(saved)
+        with pytest.raises(ConfigError, match="the checkpoint's map has 1 x 1 patches"):
+            LeggedEnv(lively(3), quadruped, map_ground).load_state_dict(saved)
+
+
+class TestHeldCommands:
+    HELD = np.float32([[0.5, -0.3, 0.2]] * 4)
+
+    def test_are_asked_for_all_the_time(self, quadruped, lively):
+        task = lively(commands=Commands(resampling_time=0.04))
+        env = LeggedEnv(task, quadruped, Plane())
+        env.hold_commands(self.HELD)
+        for _ in range(10):
+            observed = env.get_observations()["policy"][:, :3] / torch.tensor([2, 2, 0.25])
+            np.testing.assert_allclose(observed, self.HELD, atol=1e-6)
+            still(env)
+            np.testing.assert_allclose(env.state.commands, self.HELD)
+
+    def test_also_of_episodes_that_begin(self, quadruped, lively):
+        env = LeggedEnv(lively(), quadruped, Plane())
+        env.hold_commands(self.HELD)
+        env.begin_all()
+        np.testing.assert_allclose(env.commands, self.HELD)
+        np.testing.assert_allclose(env.state.commands, self.HELD)
+
+    def test_until_they_are_let_go(self, quadruped, lively):
+        env = LeggedEnv(lively(commands=Commands(resampling_time=0.04)), quadruped, Plane())
+        env.hold_commands(self.HELD)
+        env.hold_commands(None)
+        for _ in range(3):
+            still(env)
+        assert not np.allclose(env.commands, self.HELD)
+
+
+class TestBeginning:
+    def test_everyone_begins_where_they_are_put(self, quadruped, calm, map_ground):
+        env = LeggedEnv(calm(6), quadruped, map_ground)
+        env.careers.levels[:] = [0, 1, 2, 0, 1, 2]
+        env.careers.columns[:] = [0, 0, 0, 1, 1, 1]
+        for _ in range(3):
+            still(env)
+        env.begin_all()
+        assert (env.episode_length_buf == 0).all()
+        expected = map_ground.env_origins[env.careers.levels, env.careers.columns]
+        np.testing.assert_allclose(env.state.base_pos[:, :2], expected[:, :2], atol=1e-5)
+        np.testing.assert_allclose(env.state.base_pos[:, 2] - expected[:, 2], 0.346, atol=0.07)
+
+    def test_robots_start_no_higher_than_they_may(self, quadruped, calm, map_ground):
+        env = LeggedEnv(calm(50), quadruped, map_ground)
+        assert env.careers.levels.max() <= 2
+
+    def test_the_first_level_is_the_tasks(self, quadruped, calm, map_ground):
+        env = LeggedEnv(calm(50, terrain=Terrain(max_init_level=0)), quadruped, map_ground)
+        assert (env.careers.levels == 0).all()

@@ -1,0 +1,315 @@
+import mujoco
+import numpy as np
+import pytest
+
+from terrainkit.errors import ConfigError, TerrainkitError
+from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.ground import HeightGrid, MapGround, Plane, ScannedGround, read_ground
+from terrainkit_robots.rl.task import InitState
+
+EXACT = 1e-3
+
+
+def rays(model, xy, group=None):
+    """Return the height of a model under points, by MuJoCo's own rays."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    hit, heights = np.zeros(1, np.int32), np.full(len(xy), np.nan)
+    for k, (x, y) in enumerate(xy):
+        start, down = np.array([x, y, 30.0]), np.array([0.0, 0.0, -1.0])
+        far = mujoco.mj_ray(model, data, start, down, group, 1, -1, hit, None)
+        if far >= 0:
+            heights[k] = 30.0 - far
+    return heights
+
+
+def compiled(ground):
+    with quiet_mujoco():
+        return ground.spec().compile()
+
+
+def anywhere(ground, count, seed=0):
+    low, high = np.array(ground.lower), np.array(ground.upper)
+    return (low + (high - low) * np.random.default_rng(seed).random((count, 2))).astype(np.float32)
+
+
+@pytest.fixture(scope="module")
+def scanned(tmp_path_factory):
+    """Return a level floor with a step and a slope, that is nowhere symmetric."""
+    path = tmp_path_factory.mktemp("scanned") / "ground.xml"
+    path.write_text("""
+        <mujoco>
+          <worldbody>
+            <geom type="plane" size="9 9 0.1" pos="0 0 -0.2"/>
+            <geom type="box" size="0.5 0.25 0.15" pos="0.5 0.25 -0.15"/>
+            <geom type="box" size="0.6 0.4 0.05" pos="-0.7 -0.5 -0.1" euler="0 10 0"/>
+          </worldbody>
+        </mujoco>
+    """)
+    return ScannedGround(path, cell=0.02, reach=1.5)
+
+
+class TestHeightGrid:
+    def test_by_hand_on_both_triangles(self):
+        # The diagonal goes from (0, 0) to (1, 1): the far corner at (0, 1) is on the upper side.
+        grid = HeightGrid(
+            heights=np.array([[0.0, 1.0], [2.0, 4.0]], np.float32), first=(10.0, 20.0), cell=0.5
+        )
+        x = np.array([10.0, 10.5, 10.0, 10.5, 10.25, 10.375, 10.125], np.float32)
+        y = np.array([20.0, 20.0, 20.5, 20.5, 20.25, 20.125, 20.375], np.float32)
+        # (0.75, 0.25): 0 + 0.75 * 2 + 0.25 * (4 - 2); (0.25, 0.75): 0 + 0.75 * 1 + 0.25 * (4 - 1)
+        np.testing.assert_allclose(grid.at(x, y), [0, 2, 1, 4, 2, 2.0, 1.5], atol=1e-6)
+
+    def test_goes_on_level_beyond_its_samples(self):
+        grid = HeightGrid(
+            heights=np.array([[0.0, 1.0], [2.0, 4.0]], np.float32), first=(0.0, 0.0), cell=1.0
+        )
+        x, y = np.float32([-5, 9, -5, 0.5]), np.float32([-5, 9, 9, 1e6])
+        np.testing.assert_allclose(grid.at(x, y), [0, 4, 1, 2.5])
+
+    def test_numbers_stay_single(self):
+        # Twice the width would cost twice the time.
+        grid = HeightGrid(heights=np.zeros((4, 5), np.float32), first=(0.0, 0.0), cell=1.0)
+        assert grid.at(np.ones((2, 3), np.float32), np.ones((2, 3), np.float32)).dtype == np.float32
+
+
+class TestPlane:
+    def test_is_level_and_endless(self):
+        xy = np.float32([[0, 0], [1e4, -1e4]])
+        assert (Plane().height(xy[:, 0], xy[:, 1]) == 0).all()
+        assert Plane().level
+        np.testing.assert_allclose(rays(compiled(Plane()), xy[:1]), [0], atol=1e-9)
+
+    def test_has_one_place_to_start(self):
+        assert Plane().env_origins.shape == (1, 1, 3)
+
+
+class TestMapGround:
+    @pytest.mark.parametrize("collision", ["hfield", "boxes", "auto"])
+    def test_is_as_high_as_what_mujoco_collides_with(self, terrain_map, collision):
+        # Two of its patches are stairs and obstacles, one is rough: boxes beside a heightfield.
+        ground = MapGround(terrain_map, collision)
+        xy = anywhere(ground, 4000)
+        found = ground.height(xy[:, 0], xy[:, 1])
+        off = np.abs(found - rays(compiled(ground), xy))
+        # A point on a wall is on either side of it, by rounding.
+        assert np.mean(off > EXACT) < 0.0005, xy[off > EXACT][:5]
+
+    @pytest.mark.parametrize("collision", ["hfield", "boxes", "auto"])
+    def test_and_so_where_all_ground_is_level(self, level_map, collision):
+        ground = MapGround(level_map, collision)
+        xy = anywhere(ground, 2000, seed=1)
+        found = ground.height(xy[:, 0], xy[:, 1])
+        off = np.abs(found - rays(compiled(ground), xy))
+        assert np.mean(off > EXACT) < 0.001, xy[off > EXACT][:5]
+
+    def test_boxes_are_level_up_to_their_walls(self, level_map):
+        # All ground is level, so each point is as high as the sample that it is nearest to.
+        ground = MapGround(level_map, "boxes")
+        xy = anywhere(ground, 2000, seed=2)
+        cell, (x, y) = level_map.grid.cell, level_map.first_sample
+        nearest = np.rint((xy - (x, y)) / cell).astype(int)
+        nearest = np.clip(nearest, 0, np.array(level_map.heights.shape) - 1)
+        found = ground.height(xy[:, 0], xy[:, 1])
+        np.testing.assert_array_equal(found, level_map.heights[nearest[:, 0], nearest[:, 1]])
+
+    def test_takes_points_of_any_shape(self, map_ground):
+        x = np.linspace(0, 5, 12, dtype=np.float32).reshape(3, 4)
+        assert map_ground.height(x, x).shape == (3, 4)
+        np.testing.assert_array_equal(
+            map_ground.height(x, x).ravel(), map_ground.height(x.ravel(), x.ravel())
+        )
+
+    def test_tells_its_rows_columns_and_size(self, mixed_map):
+        ground = MapGround(mixed_map)
+        assert ground.env_origins.shape == (3, 2, 3)
+        assert ground.terrain_names == ("stairs", "rough_slope")
+        assert ground.patch_length == 6.0
+        np.testing.assert_allclose(ground.lower, (-1.2, -1.2))
+        np.testing.assert_allclose(ground.upper, (3 * 6 + 1.2, 2 * 4 + 1.2))
+        assert not ground.level
+
+    def test_origins_stand_on_it(self, map_ground):
+        origins = map_ground.env_origins.reshape(-1, 3)
+        found = map_ground.height(origins[:, 0], origins[:, 1])
+        np.testing.assert_allclose(found, origins[:, 2], atol=EXACT)
+
+
+class TestScannedGround:
+    def test_is_as_high_as_rays_tell_away_from_edges(self, scanned):
+        xy = anywhere(scanned, 3000)
+        found = scanned.height(xy[:, 0], xy[:, 1])
+        near = np.stack(
+            [
+                scanned.height(xy[:, 0] + np.float32(dx), xy[:, 1] + np.float32(dy))
+                for dx, dy in np.random.default_rng(0).uniform(-0.03, 0.03, (12, 2))
+            ]
+        )
+        smooth = np.ptp(near, axis=0) < 0.02
+        off = np.abs(found - rays(compiled(scanned), xy))
+        assert smooth.mean() > 0.8
+        assert off[smooth].max() < EXACT
+
+    def test_is_as_wide_as_its_reach(self, scanned):
+        assert scanned.lower == (-1.5, -1.5)
+        assert scanned.upper == (1.5, 1.5)
+
+    def test_robots_start_on_what_is_at_the_origin(self, scanned):
+        np.testing.assert_allclose(scanned.env_origins, [[[0, 0, 0]]], atol=1e-6)
+
+    def test_nothing_under_a_point_is_far_below(self, tmp_path):
+        path = tmp_path / "slab.xml"
+        path.write_text(
+            '<mujoco><worldbody><geom type="box" size=".5 .5 .1"/></worldbody></mujoco>'
+        )
+        ground = ScannedGround(path, cell=0.1, reach=1.0)
+        found = ground.height(np.float32([0, 0.9]), np.float32([0, 0]))
+        np.testing.assert_allclose(found, [0.1, 0.1 - 10], atol=1e-6)
+
+    @pytest.mark.parametrize(
+        ("text", "message"),
+        [
+            ("<mujoco/>", "has no ground under the origin"),
+            ("<mujoco", "MuJoCo does not read"),
+            ("<robot name='x'/>", "MuJoCo does not read|has no ground under the origin"),
+            ("", "MuJoCo does not read"),
+            (
+                '<mujoco><worldbody><geom type="plane" size="1 1 1"/><body pos="0 0 1"><freejoint/>'
+                '<geom size="0.1"/></body></worldbody></mujoco>',
+                "has 6 degrees of freedom; wanted ground that stays",
+            ),
+            (
+                '<mujoco><worldbody><geom type="box" pos="3 0 0" size="1 1 1"/></worldbody>'
+                "</mujoco>",
+                "has no ground under the origin",
+            ),
+        ],
+    )
+    def test_what_is_no_ground_is_refused(self, tmp_path, text, message):
+        path = tmp_path / "ground.xml"
+        path.write_text(text)
+        with pytest.raises(ConfigError, match=message) as caught:
+            ScannedGround(path, cell=0.1, reach=0.5)
+        assert "\n" not in str(caught.value)
+        assert not (tmp_path / "MUJOCO_LOG.TXT").exists()
+
+    def test_a_view_that_the_file_sets_does_not_hide_tall_ground(self, tmp_path):
+        # The statistics of a scene are for its cameras: they do not say how high it is.
+        path = tmp_path / "tower.xml"
+        path.write_text(
+            '<mujoco><statistic extent="0.8" center="0 0 0.1"/><worldbody>'
+            '<geom type="plane" size="5 5 0.1" pos="0 0 -1"/>'
+            '<geom type="box" size="0.5 0.5 3"/></worldbody></mujoco>'
+        )
+        ground = ScannedGround(path, cell=0.1, reach=0.5)
+        np.testing.assert_allclose(ground.env_origins[0, 0], [0, 0, 3], atol=1e-6)
+
+    def test_what_is_only_seen_is_no_ground(self, tmp_path):
+        path = tmp_path / "carpet.xml"
+        path.write_text(
+            '<mujoco><worldbody><geom type="plane" size="5 5 0.1"/>'
+            '<geom type="box" size="3 3 0.1" pos="0 0 0.5" contype="0" conaffinity="0"/>'
+            "</worldbody></mujoco>"
+        )
+        ground = ScannedGround(path, cell=0.1, reach=0.5)
+        np.testing.assert_allclose(ground.env_origins[0, 0], [0, 0, 0], atol=1e-6)
+
+    def test_what_is_only_touched_is_ground(self, tmp_path):
+        # Rays of MuJoCo pass through what is fully transparent.
+        path = tmp_path / "glass.xml"
+        path.write_text(
+            '<mujoco><worldbody><geom type="plane" size="5 5 0.1" pos="0 0 -1"/>'
+            '<geom type="box" size="3 3 0.1" rgba="1 1 1 0"/></worldbody></mujoco>'
+        )
+        ground = ScannedGround(path, cell=0.1, reach=0.5)
+        np.testing.assert_allclose(ground.env_origins[0, 0], [0, 0, 0.1], atol=1e-6)
+
+
+class TestReadGround:
+    def test_every_kind(self, mixed_map, tmp_path):
+        mixed_map.save(tmp_path / "map.npz")
+        (tmp_path / "slab.xml").write_text(
+            '<mujoco><worldbody><geom type="plane" size="1 1 1"/></worldbody></mujoco>'
+        )
+        assert isinstance(read_ground("plane"), Plane)
+        assert isinstance(read_ground(tmp_path / "map.npz"), MapGround)
+        assert isinstance(read_ground(str(tmp_path / "map.npz")), MapGround)
+        assert isinstance(read_ground(tmp_path / "map.npz", "plane"), Plane)
+
+    def test_the_config_of_a_map_gives_the_same_ground(self, tmp_path):
+        config = tmp_path / "map.toml"
+        config.write_text(
+            "rows = 1\ncols = 1\npatch_size = [4.0, 3.0]\nborder = 0.5\nseed = 3\n"
+            '[[terrains]]\nterrain = "rough"\n'
+        )
+        first, second = read_ground(config), read_ground(config)
+        xy = anywhere(first, 100)
+        np.testing.assert_array_equal(
+            first.height(xy[:, 0], xy[:, 1]), second.height(xy[:, 0], xy[:, 1])
+        )
+        assert np.ptp(first.height(xy[:, 0], xy[:, 1])) > 0.01
+
+    @pytest.mark.parametrize(
+        ("name", "message"),
+        [
+            ("moon", "terrain 'moon'; wanted plane, a map"),
+            ("", "terrain ''; wanted plane, a map"),
+            ("map.obj", "wanted plane, a map"),
+            ("none.npz", "none.npz"),
+            ("none.toml", "none.toml"),
+            ("none.xml", "there is no file"),
+            ("folder.xml", "there is no file"),
+        ],
+    )
+    def test_what_is_no_ground_is_refused(self, tmp_path, name, message):
+        (tmp_path / "folder.xml").mkdir()
+        source = tmp_path / name if "." in name else name
+        with pytest.raises(TerrainkitError, match=message) as caught:
+            read_ground(source)
+        assert "\n" not in str(caught.value)
+
+
+class TestHeightScan:
+    @staticmethod
+    def cast(env, yaw):
+        """Return the scan of a robot, by rays at the points where it should look."""
+        points = env.cfg.terrain
+        x, y = np.meshgrid(points.measured_points_x, points.measured_points_y, indexing="ij")
+        x, y = x.ravel(), y.ravel()
+        base = env.physics.qpos[0]
+        # To the left of where it heads is a quarter of a turn further.
+        at = base[:2] + np.column_stack(
+            [x * np.cos(yaw) - y * np.sin(yaw), x * np.sin(yaw) + y * np.cos(yaw)]
+        )
+        only_ground = np.array([1, 0, 0, 0, 0, 0], np.uint8)
+        return base[2] - rays(compiled(env.ground), at, only_ground)
+
+    @pytest.mark.parametrize("yaw", [0.0, 0.7, 2.5, -1.6])
+    @pytest.mark.parametrize("tilt", [0.0, 0.2])
+    def test_is_what_rays_see_and_turns_with_the_robot(self, quadruped, calm, mixed_map, yaw, tilt):
+        env = LeggedEnv(calm(1, init_state=InitState(position=0)), quadruped, MapGround(mixed_map))
+        quat = np.zeros(4)
+        turn = np.array([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)])
+        pitch = np.array([np.cos(tilt / 2), 0, np.sin(tilt / 2), 0])
+        mujoco.mju_mulQuat(quat, turn, pitch)
+        env.physics.qpos[0, :2] += (0.83, 0.41)
+        env.physics.qpos[0, 3:7] = quat
+        state = env._look(np.arange(1))
+        assert state.height_scan.shape == (1, 187)
+        np.testing.assert_allclose(state.height_scan[0], self.cast(env, yaw), atol=EXACT)
+        assert np.ptp(state.height_scan) > 0.05
+
+    def test_base_height_is_that_above_the_ground_below(self, quadruped, calm, mixed_map):
+        env = LeggedEnv(calm(6), quadruped, MapGround(mixed_map))
+        env.physics.qpos[:, :2] += np.random.default_rng(0).uniform(-1, 1, (6, 2))
+        state = env._look(np.arange(6))
+        under = rays(
+            compiled(env.ground), env.physics.qpos[:, :2], np.array([1, 0, 0, 0, 0, 0], np.uint8)
+        )
+        np.testing.assert_allclose(state.base_height, env.physics.qpos[:, 2] - under, atol=EXACT)
+
+    def test_is_left_out_on_a_plane_unless_asked_for(self, quadruped, calm):
+        env = LeggedEnv(calm(1), quadruped, Plane())
+        assert env.get_observations()["policy"].shape == (1, 45)
+        assert env.state.height_scan.shape == (1, 0)

@@ -1,0 +1,341 @@
+"""The observations: each against numbers worked out by hand; their order, widths and noise."""
+
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from terrainkit_robots import bundled
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.ground import Plane
+from terrainkit_robots.rl.observations import Observation, observe, policy_group, privileged_group
+from terrainkit_robots.rl.robot import Robot, read_robot
+from terrainkit_robots.rl.state import State
+from terrainkit_robots.rl.task import Env, Noise, Normalization, ObsScales, Task, Terrain
+
+torch.set_num_threads(1)
+
+_WIDTHS = {
+    "base_pos": (3,),
+    "base_quat": (4,),
+    "base_lin_vel": (3,),
+    "base_ang_vel": (3,),
+    "projected_gravity": (3,),
+    "base_height": (),
+    "commands": (3,),
+    "foot_height": (4,),
+    "foot_vel": (4, 3),
+    "foot_force": (4, 3),
+    "first_contact": (4,),
+    "air_time": (4,),
+    "penalized_force": (8,),
+    "height_scan": (187,),
+    "push_vel": (3,),
+    "friction": (1,),
+    "added_mass": (1,),
+    "com_shift": (3,),
+    "fallen": (),
+}
+
+_TASK_TABLE = [
+    ("commands", 3),
+    ("projected_gravity", 3),
+    ("base_ang_vel", 3),
+    ("dof_pos", 12),
+    ("dof_vel", 12),
+    ("actions", 12),
+    ("height_scan", 187),
+]
+"""The policy's group in its order: 45 numbers for 12 joints, and the scan."""
+
+_SECRETS = [
+    ("base_lin_vel", 3),
+    ("friction", 1),
+    ("added_mass", 1),
+    ("com_shift", 3),
+    ("joint_offset", 12),
+    ("push_vel", 3),
+    ("foot_force", 12),
+]
+
+
+def state(n: int = 1, **arrays: Any) -> State:
+    """Return a state of n quadrupeds that is 0 everywhere but in what is given."""
+    made = {}
+    for each in fields(State):
+        shape = (n, *_WIDTHS.get(each.name, (12,)))
+        kind = bool if each.name in ("first_contact", "fallen") else np.float32
+        made[each.name] = np.zeros(shape, kind)
+        if each.name in arrays:
+            made[each.name][...] = arrays.pop(each.name)
+    assert not arrays, f"a state has no {list(arrays)}"
+    return State(**made)
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return read_robot(Path(str(bundled.find("quadruped"))).parent)
+
+
+def group_of(robot: Robot, task: Task | None = None) -> tuple[Observation, ...]:
+    return policy_group(robot, task or Task(), scan=True)
+
+
+def privileged_of(robot: Robot, task: Task | None = None) -> tuple[Observation, ...]:
+    return privileged_group(robot, task or Task(), scan=True, weight=100.0)
+
+
+def observed(group: tuple[Observation, ...], name: str, given: State) -> list[float]:
+    """Return what one observation adds to its group, without noise."""
+    [only] = [each for each in group if each.name == name]
+    values: list[float] = observe([only], given, 100.0)[0].tolist()
+    return values
+
+
+def slices(group: tuple[Observation, ...], given: State) -> dict[str, slice]:
+    found, start = {}, 0
+    for each in group:
+        stop = start + each.read(given).shape[1]
+        found[each.name], start = slice(start, stop), stop
+    return found
+
+
+class TestByHand:
+    """Each observation has its own test here; `test_every_observation_is_here` sees to that."""
+
+    def test_commands(self, robot: Robot) -> None:
+        given = state(commands=[[0.5, -1, 0.8]])
+        assert observed(group_of(robot), "commands", given) == pytest.approx([1, -2, 0.2])
+
+    def test_projected_gravity(self, robot: Robot) -> None:
+        given = state(projected_gravity=[[0.6, 0, -0.8]])
+        assert observed(group_of(robot), "projected_gravity", given) == pytest.approx(
+            [0.6, 0, -0.8]
+        )
+
+    def test_base_ang_vel(self, robot: Robot) -> None:
+        given = state(base_ang_vel=[[4, -2, 1]])
+        assert observed(group_of(robot), "base_ang_vel", given) == [1, -0.5, 0.25]
+
+    def test_dof_pos(self, robot: Robot) -> None:
+        # What is measured, with the error of the joint's zero, less the default.
+        given = state(dof_pos=robot.default_pose + np.float32(0.5), joint_offset=0.125)
+        assert observed(group_of(robot), "dof_pos", given) == pytest.approx([0.625] * 12)
+
+    def test_dof_vel(self, robot: Robot) -> None:
+        given = state(dof_vel=[[20, -10, *[0] * 10]])
+        assert observed(group_of(robot), "dof_vel", given) == pytest.approx([1, -0.5, *[0] * 10])
+
+    def test_actions(self, robot: Robot) -> None:
+        given = state(actions=[[3, -2, *[0] * 10]], last_actions=9)
+        assert observed(group_of(robot), "actions", given) == [3, -2, *[0] * 10]
+
+    def test_height_scan(self, robot: Robot) -> None:
+        # 0.5 m below the base is 0; 1 m more or less is the most.
+        heights = [0.5, 0.7, 0.3, 9, -9, *[0.5] * 182]
+        given = state(height_scan=[heights])
+        expected = [0, 1, -1, 5, -5, *[0] * 182]
+        assert observed(group_of(robot), "height_scan", given) == pytest.approx(expected, abs=1e-6)
+
+    def test_base_lin_vel(self, robot: Robot) -> None:
+        given = state(base_lin_vel=[[1, -0.5, 0.25]])
+        assert observed(privileged_of(robot), "base_lin_vel", given) == [2, -1, 0.5]
+
+    def test_friction(self, robot: Robot) -> None:
+        assert observed(privileged_of(robot), "friction", state(friction=0.75)) == [0.75]
+
+    def test_added_mass(self, robot: Robot) -> None:
+        assert observed(privileged_of(robot), "added_mass", state(added_mass=-0.5)) == [-0.5]
+
+    def test_com_shift(self, robot: Robot) -> None:
+        given = state(com_shift=[[0.02, -0.03, 0.01]])
+        expected = [0.2, -0.3, 0.1]
+        assert observed(privileged_of(robot), "com_shift", given) == pytest.approx(expected)
+
+    def test_joint_offset(self, robot: Robot) -> None:
+        given = state(joint_offset=0.25)
+        assert observed(privileged_of(robot), "joint_offset", given) == [0.25] * 12
+
+    def test_push_vel(self, robot: Robot) -> None:
+        # A base that looks to the left (+y): a push to +x comes from its left, to its right.
+        given = state(base_quat=[np.sqrt(0.5), 0, 0, np.sqrt(0.5)], push_vel=[1, 0, 0])
+        expected = [0, -1, 0]
+        assert observed(privileged_of(robot), "push_vel", given) == pytest.approx(
+            expected, abs=1e-6
+        )
+
+    def test_foot_force(self, robot: Robot) -> None:
+        # In parts of the weight, 100 N, in the base's frame: it looks to the left.
+        force = [[0, 0, 50], [10, 0, 0], [0, 20, 0], [0, 0, 0]]
+        given = state(base_quat=[np.sqrt(0.5), 0, 0, np.sqrt(0.5)], foot_force=[force])
+        expected = [0, 0, 0.5, 0, -0.1, 0, 0.2, 0, 0, 0, 0, 0]
+        seen = observed(privileged_of(robot), "foot_force", given)
+        assert seen == pytest.approx(expected, abs=1e-6)
+
+    def test_every_observation_is_here(self, robot: Robot) -> None:
+        here = {name.removeprefix("test_") for name in vars(TestByHand) if name.startswith("test_")}
+        names = {each.name for each in privileged_of(robot)}
+        assert names == here - {"every_observation_is_here"}
+
+
+class TestGroups:
+    def test_policy_is_what_the_task_table_says(self, robot: Robot) -> None:
+        group = group_of(robot)
+        found = [(each.name, each.read(state()).shape[1]) for each in group]
+        assert found == _TASK_TABLE
+        assert observe(group, state(2), 100.0).shape == (2, 232)
+        assert observe(policy_group(robot, Task(), scan=False), state(2), 100.0).shape == (2, 45)
+
+    def test_privileged_is_the_policys_and_more(self, robot: Robot) -> None:
+        group = privileged_of(robot)
+        found = [(each.name, each.read(state()).shape[1]) for each in group]
+        assert found == _TASK_TABLE + _SECRETS
+
+    def test_scales_of_the_task(self, robot: Robot) -> None:
+        scales = ObsScales(lin_vel=3, ang_vel=5, dof_pos=7, dof_vel=11, height_measurements=13)
+        task = Task(normalization=Normalization(obs_scales=scales))
+        given = state(
+            commands=1, base_lin_vel=1, base_ang_vel=1, dof_vel=1, dof_pos=robot.default_pose + 1
+        )
+        given.height_scan[:] = 1.5
+        seen = observe(privileged_of(robot, task), given, 100.0)[0]
+        here = slices(privileged_of(robot), given)
+        assert seen[here["commands"]].tolist() == [3, 3, 5]
+        assert seen[here["base_ang_vel"]].tolist() == [5] * 3
+        assert seen[here["dof_pos"]].tolist() == pytest.approx([7] * 12)
+        assert seen[here["dof_vel"]].tolist() == [11] * 12
+        assert seen[here["height_scan"]].tolist() == [13] * 187
+        assert seen[here["base_lin_vel"]].tolist() == [3] * 3
+
+    def test_clip(self, robot: Robot) -> None:
+        given = state(dof_vel=[[1e6, -1e6, 30, *[0] * 9]])
+        seen = observe(group_of(robot), given, 1.25)
+        assert seen[0, 21:24].tolist() == [1.25, -1.25, 1.25]
+        assert np.abs(seen).max() == 1.25
+
+    def test_state_is_left_as_it_is(self, robot: Robot) -> None:
+        given, twin = state(3, commands=2, height_scan=2), state(3, commands=2, height_scan=2)
+        seen = observe(privileged_of(robot), given, 100.0)
+        seen += 1
+        for each in fields(State):
+            np.testing.assert_array_equal(getattr(given, each.name), getattr(twin, each.name))
+
+
+_NOISE = {
+    "projected_gravity": 0.05,
+    "base_ang_vel": 0.2 * 0.25,
+    "dof_pos": 0.01,
+    "dof_vel": 1.5 * 0.05,
+    "height_scan": 0.1 * 5,
+}
+"""Half widths of the noise of the default task, after the scale."""
+
+
+class TestNoise:
+    @pytest.mark.parametrize("level", [1.0, 0.5])
+    def test_is_uniform_with_the_half_width_stated(self, robot: Robot, level: float) -> None:
+        group = group_of(robot, Task(noise=Noise(noise_level=level)))
+        given = state(4000, projected_gravity=[0, 0, -1], dof_pos=robot.default_pose)
+        given.height_scan[:] = 0.5
+        off = observe(group, given, 100.0, np.random.default_rng(0)) - observe(group, given, 100.0)
+        for name, here in slices(group, given).items():
+            drawn = off[:, here]
+            most = level * _NOISE.get(name, 0.0)
+            if most == 0:
+                assert (drawn == 0).all(), name
+                continue
+            # Uniform over [-most, most]: its ends, its quarters, and each number for itself.
+            assert most * 0.99 < drawn.max() <= most * 1.001, name
+            assert -most * 1.001 <= drawn.min() < -most * 0.99, name
+            quarters = np.quantile(drawn / most, [0.25, 0.5, 0.75])
+            np.testing.assert_allclose(quarters, [-0.5, 0, 0.5], atol=0.03, err_msg=name)
+            assert (drawn.std(axis=0) > 0.5 * most).all(), name
+            together = np.corrcoef(drawn[:, 0], drawn[:, 1])[0, 1]
+            assert abs(together) < 0.1, name
+
+    def test_is_on_every_noisy_number_of_the_task(self, robot: Robot) -> None:
+        noise = Noise(dof_pos=1, dof_vel=2, ang_vel=3, gravity=4, height_measurements=5)
+        found = {each.name: each.noise for each in group_of(robot, Task(noise=noise))}
+        assert found == {
+            "commands": 0,
+            "projected_gravity": 4,
+            "base_ang_vel": 3,
+            "dof_pos": 1,
+            "dof_vel": 2,
+            "actions": 0,
+            "height_scan": 5,
+        }
+
+    def test_level_of_zero_is_none(self, robot: Robot) -> None:
+        group = group_of(robot, Task(noise=Noise(noise_level=0)))
+        rng = np.random.default_rng(0)
+        seen = observe(group, state(5), 100.0, rng)
+        np.testing.assert_array_equal(seen, observe(group, state(5), 100.0))
+        # And nothing was drawn in vain.
+        assert rng.bit_generator.state == np.random.default_rng(0).bit_generator.state
+
+    def test_privileged_has_none(self, robot: Robot) -> None:
+        assert {each.noise for each in privileged_of(robot)} == {0.0}
+
+    def test_comes_before_the_clip(self, robot: Robot) -> None:
+        group = group_of(robot, Task(noise=Noise(dof_vel=1e6)))
+        seen = observe(group, state(50), 2.0, np.random.default_rng(0))
+        assert np.abs(seen).max() == 2.0
+
+
+class TestEnvironment:
+    def make(self, **changes: Any) -> LeggedEnv:
+        robot = read_robot(Path(str(bundled.find("quadruped"))).parent)
+        task = replace(Task(env=Env(num_envs=3, num_threads=1)), **changes)
+        return LeggedEnv(task, robot, Plane())
+
+    def test_groups_are_those_of_the_table(self) -> None:
+        obs = self.make().get_observations()
+        assert {name: tuple(value.shape) for name, value in obs.items()} == {
+            "policy": (3, 45),
+            "privileged": (3, 45 + 35),
+        }
+
+    def test_scan_where_asked_for(self) -> None:
+        env = self.make(terrain=Terrain(measure_heights=True))
+        assert env.get_observations()["policy"].shape == (3, 232)
+        # On a plane all of it is the height of the base.
+        scan = env.get_observations()["privileged"][:, 45:232].numpy()
+        height = env.state.base_pos[:, 2:]
+        np.testing.assert_allclose(scan, np.tile(5 * (height - 0.5), 187), atol=1e-5)
+
+    def test_policy_is_the_privileged_with_noise(self) -> None:
+        obs = self.make().get_observations()
+        policy, known = obs["policy"], obs["privileged"][:, :45]
+        quiet = [*range(3), *range(33, 45)]
+        noisy = [k for k in range(45) if k not in quiet]
+        assert torch.equal(policy[:, quiet], known[:, quiet])
+        assert (policy[:, noisy] != known[:, noisy]).float().mean() > 0.95
+        assert (policy - known).abs().max() <= 0.0751
+
+    def test_noise_is_new_at_each_step(self) -> None:
+        env = self.make()
+        noises = []
+        for _ in range(2):
+            env.step(torch.zeros(3, 12))
+            obs = env.get_observations()
+            noises.append(obs["policy"] - obs["privileged"][:, :45])
+        assert not torch.equal(*noises)
+
+    def test_known_state_by_hand(self) -> None:
+        """Standing upright at the default pose and told 1, 0, 0.5 it sees just this."""
+        env = self.make(noise=Noise(noise_level=0.0))
+        env.hold_commands(np.tile(np.array([1, 0, 0.5], np.float32), (3, 1)))
+        env.joint_offset[:] = 0
+        env.physics.qpos[:] = env.scene.home
+        env.physics.qpos[:, 2] = 0.4
+        env.physics.qvel[:] = 0
+        env.physics.qvel[:, 6 + 2] = 2.0
+        env.actions[0] = 0.25
+        env.state = env._look(np.arange(3), fresh=True)
+        seen = env._observe()["policy"][0]
+        expected = [2, 0, 0.125, 0, 0, -1, *[0] * 15, 0, 0, 0.1, *[0] * 9, *[0.25] * 12]
+        assert seen.tolist() == pytest.approx(expected, abs=1e-6)

@@ -1,0 +1,248 @@
+from dataclasses import fields
+
+import mujoco
+import numpy as np
+import pytest
+import torch
+
+from terrainkit.errors import ConfigError
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.ground import MapGround, Plane
+from terrainkit_robots.rl.physics import Physics
+from terrainkit_robots.rl.randomization import Differences
+from terrainkit_robots.rl.scene import build_scene
+from terrainkit_robots.rl.task import DomainRand
+
+
+@pytest.fixture
+def physics(cart, calm):
+    scene = build_scene(cart, Plane(), calm())
+    physics = Physics(scene, 3, 1)
+    start = np.tile(scene.home, (3, 1))
+    start[:, 2] = [0.3, 0.5, 0.7]
+    physics.reset(np.arange(3), start, np.zeros((3, scene.model.nv)))
+    return physics
+
+
+class TestStepping:
+    def test_is_mujocos_own(self, physics):
+        model = physics.scene.model
+        data = mujoco.MjData(model)
+        data.qpos[:] = physics.qpos[1]
+        for _ in range(5):
+            physics.ctrl[:] = 0.1
+            physics.step(4)
+            data.ctrl[:] = 0.1
+            for _ in range(4):
+                mujoco.mj_step(model, data)
+        np.testing.assert_array_equal(physics.qpos[1], data.qpos)
+        np.testing.assert_array_equal(physics.qvel[1], data.qvel)
+
+    def test_sensors_are_those_of_the_state_now(self, physics):
+        physics.step(4)
+        data = mujoco.MjData(physics.scene.model)
+        data.qpos[:], data.qvel[:] = physics.qpos[2], physics.qvel[2]
+        mujoco.mj_forward(physics.scene.model, data)
+        for name in ("foot_position", "foot_velocity"):
+            where = physics.scene.blocks[name]
+            found = physics.block(name)[2].ravel()
+            np.testing.assert_allclose(found, data.sensordata[where], atol=1e-5)
+
+    def test_simulations_know_nothing_of_each_other(self, physics):
+        physics.step(10)
+        heights = physics.qpos[:, 2].copy()
+        assert heights[0] < heights[1] < heights[2]
+
+    def test_blocks_are_copies(self, physics):
+        before = physics.block("foot_position")
+        kept = before.copy()
+        physics.step(10)
+        np.testing.assert_array_equal(before, kept)
+        assert not np.allclose(physics.block("foot_position"), kept)
+
+    def test_some_can_begin_anew(self, physics):
+        physics.step(10)
+        untouched = physics.qpos[[0, 2]].copy()
+        start = physics.scene.home.copy()
+        start[:3] = (1, 2, 3)
+        physics.ctrl[:] = 0.3
+        physics.reset(np.array([1]), start[None], np.full((1, physics.scene.model.nv), 0.1))
+        np.testing.assert_array_equal(physics.qpos[1], start)
+        np.testing.assert_array_equal(physics.qvel[1], 0.1)
+        np.testing.assert_array_equal(physics.ctrl[1], 0)
+        np.testing.assert_array_equal(physics.qpos[[0, 2]], untouched)
+
+
+class TestBadStates:
+    @pytest.mark.parametrize("value", [np.nan, np.inf, 1e12, -1e12])
+    @pytest.mark.parametrize("field", ["qvel", "qpos"])
+    def test_are_told(self, physics, field, value):
+        getattr(physics, field)[1, 7] = value
+        assert physics.step(4).tolist() == [False, True, False]
+        assert np.isfinite(physics.qpos).all()
+
+    def test_controls_that_are_no_numbers_are_told(self, physics):
+        physics.ctrl[2, 0] = np.nan
+        assert physics.step(4).tolist() == [False, False, True]
+
+    def test_are_told_every_time(self, physics):
+        for _ in range(3):
+            physics.qvel[1, 7] = np.nan
+            assert physics.step(4).tolist() == [False, True, False]
+            assert not physics.step(4).any()
+
+    def test_are_told_of_what_has_just_begun_anew(self, physics):
+        # A reset sets the counts of warnings back too.
+        for _ in range(3):
+            physics.qvel[1, 7] = np.nan
+            assert physics.step(4).tolist() == [False, True, False]
+            ids = np.array([1])
+            physics.reset(ids, physics.scene.home[None], np.zeros((1, physics.scene.model.nv)))
+
+    def test_leave_the_others_as_they_are(self, cart, calm):
+        def run(bad):
+            scene = build_scene(cart, Plane(), calm())
+            physics = Physics(scene, 3, 1)
+            physics.qpos[:] = scene.home + 0.3
+            if bad:
+                physics.qvel[1, 7] = np.nan
+            physics.step(8)
+            return physics.qpos[[0, 2]].copy()
+
+        np.testing.assert_array_equal(run(bad=True), run(bad=False))
+
+    def test_leave_no_log_behind(self, physics, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        physics.qvel[1, 7] = np.nan
+        physics.step(4)
+        assert list(tmp_path.iterdir()) == []
+
+
+def test_threads_do_not_matter(quadruped, lively, mixed_map):
+    def run(threads):
+        env = LeggedEnv(lively(9, num_threads=threads), quadruped, MapGround(mixed_map))
+        made = torch.Generator().manual_seed(0)
+        return [
+            (observed["privileged"].numpy().tobytes(), rewards.numpy().tobytes())
+            for observed, rewards, _, _ in (
+                env.step(torch.randn(9, 12, generator=made)) for _ in range(15)
+            )
+        ]
+
+    assert run(1) == run(2)
+
+
+class TestRandomization:
+    @pytest.fixture
+    def varied(self, cart, calm):
+        return LeggedEnv(
+            calm(
+                5,
+                domain_rand=DomainRand(
+                    friction=(0.2, 1.5),
+                    added_mass=(-1.0, 2.0),
+                    com_shift=0.05,
+                    gains=(0.5, 1.5),
+                    motor_strength=(0.7, 1.3),
+                ),
+            ),
+            cart,
+            Plane(),
+        )
+
+    def test_is_drawn_within_its_ranges(self, varied):
+        found = varied.differences
+        assert found.friction.shape == found.added_mass.shape == found.strength.shape == (5, 1)
+        assert found.stiffness.shape == found.damping.shape == found.com_shift.shape == (5, 3)
+        for values, low, high in (
+            (found.friction, 0.2, 1.5),
+            (found.added_mass, -1.0, 2.0),
+            (found.com_shift, -0.05, 0.05),
+            (found.stiffness, 0.5, 1.5),
+            (found.damping, 0.5, 1.5),
+            (found.strength, 0.7, 1.3),
+        ):
+            assert (low <= values).all()
+            assert (values <= high).all()
+            assert np.ptp(values) > 0.1 * (high - low)
+
+    def test_reaches_every_simulation(self, varied):
+        scene, found = varied.scene, varied.differences
+        nominal, base, hinge, wheel = scene.model, scene.base, 1, 0
+        for k in range(5):
+            model = varied.physics.batch.get_model(k)
+            mass = nominal.body_mass[base] + found.added_mass[k, 0]
+            assert model.body_mass[base] == pytest.approx(mass)
+            np.testing.assert_allclose(
+                model.body_inertia[base],
+                nominal.body_inertia[base] * mass / nominal.body_mass[base],
+            )
+            np.testing.assert_allclose(
+                model.body_ipos[base], nominal.body_ipos[base] + found.com_shift[k]
+            )
+            np.testing.assert_allclose(model.geom_friction[scene.geoms, 0], found.friction[k, 0])
+            kp = 20 * found.stiffness[k, hinge] * found.strength[k, 0]
+            kd = 1.5 * found.damping[k, hinge] * found.strength[k, 0]
+            np.testing.assert_allclose(model.actuator_gainprm[hinge, 0], kp, rtol=1e-6)
+            np.testing.assert_allclose(model.actuator_biasprm[hinge, :3], [0, -kp, -kd], rtol=1e-6)
+            kd = 0.4 * found.damping[k, wheel] * found.strength[k, 0]
+            np.testing.assert_allclose(model.actuator_gainprm[wheel, 0], kd, rtol=1e-6)
+            np.testing.assert_allclose(model.actuator_biasprm[wheel, :3], [0, 0, -kd], rtol=1e-6)
+
+    def test_what_follows_from_it_is_computed_anew(self, varied):
+        base = varied.scene.base
+        nominal = varied.scene.model.body_subtreemass[base]
+        for k, (added,) in enumerate(varied.differences.added_mass):
+            model = varied.physics.batch.get_model(k)
+            assert model.body_subtreemass[base] == pytest.approx(nominal + added)
+
+    def test_leaves_everything_else(self, varied):
+        nominal, base = varied.scene.model, varied.scene.base
+        others = np.arange(nominal.nbody) != base
+        model = varied.physics.batch.get_model(3)
+        np.testing.assert_array_equal(model.body_mass[others], nominal.body_mass[others])
+        ground = ~np.isin(np.arange(nominal.ngeom), varied.scene.geoms)
+        np.testing.assert_array_equal(model.geom_friction[ground], nominal.geom_friction[ground])
+        np.testing.assert_array_equal(model.geom_friction[:, 1:], nominal.geom_friction[:, 1:])
+
+    def test_none_leaves_the_robot_as_it_is(self, cart, calm):
+        env = LeggedEnv(calm(2), cart, Plane())
+        model = env.physics.batch.get_model(1)
+        for name in (
+            "body_mass",
+            "body_inertia",
+            "body_ipos",
+            "geom_friction",  # the hull is smoother than the legs
+            "actuator_gainprm",
+            "actuator_biasprm",
+        ):
+            np.testing.assert_allclose(
+                getattr(model, name), getattr(env.scene.model, name), rtol=1e-6, err_msg=name
+            )
+
+    def test_a_base_that_would_lose_all_of_its_mass_is_refused(
+        self, cart, calm, tmp_path, monkeypatch
+    ):
+        # It weighs 4 kg.
+        monkeypatch.chdir(tmp_path)
+        with pytest.raises(ConfigError, match="added_mass") as caught:
+            LeggedEnv(calm(2, domain_rand=DomainRand(added_mass=(-6.0, -5.0))), cart, Plane())
+        assert "\n" not in str(caught.value)
+        assert list(tmp_path.iterdir()) == []
+
+    def test_heavier_robots_press_harder(self, quadruped, calm):
+        task = calm(3, domain_rand=DomainRand(
+            friction=None, added_mass=(-2.0, 3.0), com_shift=0.0, gains=None,
+            motor_strength=None, joint_offset=0.0, push_interval_s=0.0,
+        ))  # fmt: skip
+        env = LeggedEnv(task, quadruped, Plane())
+        for _ in range(60):
+            env.step(torch.zeros(3, 12))
+        robot = env.scene.model.body_subtreemass[env.scene.base]
+        weight = (robot + env.differences.added_mass[:, 0]) * 9.81
+        np.testing.assert_allclose(env.state.foot_force.sum(axis=1)[:, 2], weight, rtol=0.02)
+        assert np.ptp(weight) > 1
+
+    def test_every_difference_has_a_row_for_each_robot(self, varied):
+        for field in fields(Differences):
+            assert len(getattr(varied.differences, field.name)) == 5

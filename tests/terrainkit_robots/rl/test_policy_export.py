@@ -1,0 +1,305 @@
+import json
+import shutil
+import sys
+import textwrap
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import onnx
+import onnxruntime
+import pytest
+import torch
+from tensordict import TensorDict
+
+from terrainkit.errors import ConfigError, ExportError
+from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.rl import policy_export
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.ground import Plane
+from terrainkit_robots.rl.policy_export import METADATA, description, export_policy
+from terrainkit_robots.rl.registry import find
+from terrainkit_robots.rl.run_folder import SHIPPED, create_run, open_run
+from terrainkit_robots.rl.runner import LeggedRunner, policy_of
+from terrainkit_robots.rl.task import Control, Env, Noise, Normalization, Policy, Task
+
+SMALL = Task(
+    env=Env(num_envs=4, num_threads=1),
+    policy=Policy(actor_hidden_dims=(16, 16), critic_hidden_dims=(16, 16)),
+    normalization=Normalization(clip_actions=0.3),  # so that the clip is at work
+)
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    """Return the folder of a run whose policy was updated once."""
+    folder = tmp_path_factory.mktemp("runs") / "run"
+    run = create_run(folder, SMALL, "quadruped", "plane")
+    LeggedRunner(LeggedEnv(run.task, run.robot, Plane()), folder).learn(1)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def exported(trained, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("exports") / "policy"
+    export_policy(open_run(trained), folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def asked(trained):
+    """Return observations of a rollout and random ones, and what the environment acts on."""
+    run = open_run(trained)
+    env = LeggedEnv(replace(run.task, env=Env(num_envs=20, num_threads=1)), run.robot, Plane())
+    policy = policy_of(run, env)
+    seen = []
+    for _ in range(20):
+        obs = env.get_observations()
+        seen.append(obs["policy"].numpy())
+        env.step(policy(obs))
+    rolled = np.concatenate(seen)
+    obs = np.concatenate([rolled, np.random.default_rng(3).normal(0, 3, rolled.shape)])
+    obs = obs.astype(np.float32)
+    answers = policy(TensorDict({"policy": torch.from_numpy(obs)}, [len(obs)])).numpy()
+    return obs, np.clip(answers, -0.3, 0.3)
+
+
+def session(folder):
+    return onnxruntime.InferenceSession(folder / "policy.onnx", providers=["CPUExecutionProvider"])
+
+
+@pytest.mark.parametrize("batch", [1, 7, 800])
+def test_the_onnx_file_acts_as_the_checkpoint_whatever_the_batch(exported, asked, batch):
+    obs, wanted = asked
+    run = session(exported)
+    assert [(i.name, i.shape) for i in run.get_inputs()] == [("obs", ["batch", 45])]
+    assert [(o.name, o.shape) for o in run.get_outputs()] == [("actions", ["batch", 12])]
+    assert 0.05 < (np.abs(wanted) == np.float32(0.3)).mean() < 0.95  # some are clipped, some not
+    for start in range(0, len(obs), max(batch, len(obs) // 8)):
+        got = run.run(None, {"obs": obs[start : start + batch]})[0]
+        np.testing.assert_allclose(got, wanted[start : start + batch], atol=1e-5, rtol=0)
+
+
+@pytest.mark.filterwarnings("ignore:.torch.jit:FutureWarning")
+@pytest.mark.parametrize("batch", [1, 7, 800])
+def test_the_torchscript_acts_as_the_checkpoint_whatever_the_batch(exported, asked, batch):
+    obs, wanted = asked
+    policy = torch.jit.load(exported / "policy.pt")
+    for start in range(0, len(obs), max(batch, len(obs) // 8)):
+        got = policy(torch.from_numpy(obs[start : start + batch])).detach().numpy()
+        np.testing.assert_allclose(got, wanted[start : start + batch], atol=1e-5, rtol=0)
+
+
+def test_the_onnx_file_is_sound_and_carries_the_json(exported):
+    model = onnx.load(exported / "policy.onnx")
+    onnx.checker.check_model(model, full_check=True)
+    inside = {each.key: each.value for each in model.metadata_props}[METADATA]
+    assert inside == (exported / "policy.json").read_text()
+    told = json.loads(inside)
+    assert told["format_version"] == 1
+    assert told["robot"]["name"] == "quadruped"
+    assert told["iteration"] == 1
+    assert told["timing"] == {"physics_dt": 0.005, "decimation": 4, "policy_dt": 0.02}
+    assert told["action"] == {"size": 12, "clip": 0.3}
+    assert [part["name"] for part in told["observation"]["parts"]] == [
+        "commands",
+        "projected_gravity",
+        "base_ang_vel",
+        "dof_pos",
+        "dof_vel",
+        "actions",
+    ]
+    assert told["observation"]["parts"][0]["scale"] == [2, 2, 0.25]
+    assert told["observation"]["parts"][-1]["stop"] == told["observation"]["size"] == 45
+    assert told["height_scan"] is None
+
+
+# What the JSON says is what the environment does.
+
+
+def raw(env, told):
+    """Return what is measured, from the state of the physics alone; one robot a row."""
+    qpos, qvel = np.array(env.physics.qpos), np.array(env.physics.qvel)
+    turns = np.zeros((len(qpos), 9))
+    for turn, pose in zip(turns, qpos, strict=True):
+        mujoco.mju_quat2Mat(turn, pose[3:7])
+    turns = turns.reshape(-1, 3, 3)
+    found = {
+        "commands": env.commands,
+        "projected_gravity": -turns[:, 2],
+        "base_ang_vel": qvel[:, 3:6],
+        "dof_pos": qpos[:, env.scene.joint_qpos],
+        "dof_vel": qvel[:, env.scene.joint_qvel],
+        "actions": env.actions[0],
+    }
+    if told["height_scan"]:
+        yaw = np.arctan2(turns[:, 1, 0], turns[:, 0, 0])[:, None]
+        x, y = np.array(told["height_scan"]["points"]).T
+        at_x = qpos[:, :1] + np.cos(yaw) * x - np.sin(yaw) * y
+        at_y = qpos[:, 1:2] + np.sin(yaw) * x + np.cos(yaw) * y
+        ground = env.ground.height(at_x.astype(np.float32), at_y.astype(np.float32))
+        found["height_scan"] = qpos[:, 2:3] - ground
+    return found
+
+
+@pytest.mark.parametrize("kind", ["plane", "map"])
+def test_observations_made_from_the_json_are_those_of_the_environment(quadruped, map_ground, kind):
+    task = replace(SMALL, noise=Noise(noise_level=0.0))
+    task = replace(task, domain_rand=replace(task.domain_rand, joint_offset=0.0))
+    env = LeggedEnv(task, quadruped, Plane() if kind == "plane" else map_ground)
+    told = json.loads(json.dumps(description(env)))
+    assert told["observation"]["size"] == {"plane": 45, "map": 45 + 187}[kind]
+    generator = torch.Generator().manual_seed(0)
+    for _ in range(30):
+        env.step(torch.randn(4, 12, generator=generator))
+        seen = []
+        for part in told["observation"]["parts"]:
+            value = raw(env, told)[part["name"]] - part["offset"]
+            seen.append(np.clip(value, *part.get("clip", (-np.inf, np.inf))) * part["scale"])
+            assert seen[-1].shape[1] == part["stop"] - part["start"]
+        clip = told["observation"]["clip"]
+        obs = np.clip(np.concatenate(seen, axis=1), -clip, clip)
+        np.testing.assert_allclose(obs, env.get_observations()["policy"], atol=1e-4)
+
+
+@pytest.mark.parametrize("name", ["quadruped", "cart"])
+@pytest.mark.parametrize("kind", ["P", "V", "T"])
+def test_torques_from_the_json_are_those_of_the_motors(request, name, kind):
+    robot = request.getfixturevalue(name)
+    task = replace(SMALL, control=Control(control_type=kind, damping=1.5))
+    env = LeggedEnv(task, robot, Plane())
+    told = description(env)
+    joints = {name: np.array(value) for name, value in told["joints"].items()}
+    assert told["control_type"] == kind
+    drives = {"P": "position", "V": "velocity", "T": "torque"}
+    assert list(joints["drive"]) == [
+        "velocity" if kind == "P" and joint == "wheel_axle" else drives[kind]
+        for joint in robot.spec.joint_order
+    ]
+    scene, model, data = env.scene, env.scene.model, mujoco.MjData(env.scene.model)
+    assert [model.actuator(k).name for k in range(model.nu)] == list(joints["name"])
+    rng = np.random.default_rng(1)
+    count, clipped = env.num_actions, 0
+    for _ in range(10):
+        action = rng.normal(0, 2, count).astype(np.float32)
+        data.qpos[scene.joint_qpos] = rng.normal(0, 0.5, count)
+        data.qvel[scene.joint_qvel] = rng.normal(0, 5, count)
+        data.ctrl[:] = env.control.told(action[None], np.zeros((1, count), np.float32))[0]
+        with quiet_mujoco():
+            mujoco.mj_forward(model, data)
+        target = joints["action_offset"] + joints["action_scale"] * action
+        torque = joints["gain"] * target
+        torque -= joints["stiffness"] * data.qpos[scene.joint_qpos]
+        torque -= joints["damping"] * data.qvel[scene.joint_qvel]
+        wanted = np.clip(torque, -joints["effort"], joints["effort"])
+        np.testing.assert_allclose(data.actuator_force, wanted, rtol=1e-5, atol=1e-4)
+        clipped += (wanted != torque).sum()
+    assert clipped > 0
+
+
+def example():
+    """Return the program in the module's docstring."""
+    lines = policy_export.__doc__.split("::\n\n", 1)[1].splitlines()
+    end = next(k for k, line in enumerate(lines) if line and not line.startswith("    "))
+    return textwrap.dedent("\n".join(lines[:end]))
+
+
+def follow_the_example(folder, robot, tmp_path, monkeypatch):
+    for path in folder.iterdir():
+        shutil.copy(path, tmp_path)
+    shutil.copy(robot.mjcf, tmp_path / "robot.xml")
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    with quiet_mujoco():
+        exec(example(), names)
+    assert not any(key.startswith("terrainkit") for key in names)
+    data, target = names["data"], robot.spec.base_height_target
+    assert data.qpos[2] > 0.7 * target, "it fell"
+    assert names["turn"].reshape(3, 3)[2, 2] > 0.9, "it is tilted"
+    assert data.time == pytest.approx(5)
+    return data
+
+
+def test_the_example_runs_a_policy_in_plain_mujoco(exported, quadruped, tmp_path, monkeypatch):
+    follow_the_example(exported, quadruped, tmp_path, monkeypatch)
+
+
+@pytest.mark.parametrize("name", ["quadruped", "biped"])
+def test_the_example_walks_with_the_policy_that_is_shipped(name, tmp_path, monkeypatch):
+    if not (find(name).folder / SHIPPED).is_dir():
+        pytest.skip(f"no policy of {name} is shipped")
+    run = open_run(name)
+    export_policy(run, tmp_path / "exported")
+    data = follow_the_example(tmp_path / "exported", run.robot, tmp_path, monkeypatch)
+    assert data.qpos[0] > 1.5  # of 2.5 m that are asked for, the start included
+
+
+# What goes wrong.
+
+
+def test_files_that_are_there_stay_unless_overwritten(trained, exported, tmp_path):
+    folder = tmp_path / "policy"
+    shutil.copytree(exported, folder)
+    (folder / "policy.pt").unlink()
+    (folder / "notes.txt").write_text("mine")
+    (folder / "policy.onnx").write_bytes(b"before")
+    with pytest.raises(ExportError, match=r"policy\.onnx exists; another name would do"):
+        export_policy(open_run(trained), folder)
+    assert (folder / "policy.onnx").read_bytes() == b"before"
+    assert not (folder / "policy.pt").exists()
+    export_policy(open_run(trained), folder, overwrite=True)
+    assert (folder / "policy.json").read_bytes() == (exported / "policy.json").read_bytes()
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "notes.txt",
+        "policy.json",
+        "policy.onnx",
+        "policy.pt",
+    ]
+
+
+@pytest.mark.parametrize("name", ["_write_onnx", "_write_script"])
+def test_a_file_that_answers_otherwise_is_not_written(trained, tmp_path, monkeypatch, name):
+    write = getattr(policy_export, name)
+
+    def wrong(live, *rest):
+        with torch.no_grad():
+            live.actor.mlp[-1].bias += 1e-3
+        write(live, *rest)
+        with torch.no_grad():
+            live.actor.mlp[-1].bias -= 1e-3
+
+    monkeypatch.setattr(policy_export, name, wrong)
+    with pytest.raises(ExportError, match=r"answers otherwise than the policy: up to 0\.001"):
+        export_policy(open_run(trained), tmp_path / "policy")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_onnxruntime_the_onnx_file_is_written_and_not_said_to_be_checked(
+    trained, tmp_path, monkeypatch
+):
+    monkeypatch.setitem(sys.modules, "onnxruntime", None)
+    done = export_policy(open_run(trained), tmp_path / "policy")
+    assert done.onnx_error is None
+    assert done.error <= 1e-5
+    assert (tmp_path / "policy" / "policy.onnx").is_file()
+
+
+def test_without_onnx_it_is_said_what_to_install(trained, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "onnx", None)
+    with pytest.raises(ConfigError, match=r"needs onnx.*pip install 'terrainkit\[train\]'"):
+        export_policy(open_run(trained), tmp_path / "policy")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_without_a_checkpoint_has_no_policy(tmp_path):
+    run = create_run(tmp_path / "run", SMALL, "quadruped", "plane")
+    with pytest.raises(ConfigError, match="no checkpoint"):
+        export_policy(run, tmp_path / "policy")
+    assert not (tmp_path / "policy").exists()
+
+
+def test_a_target_that_cannot_be_is_refused_before_the_work(trained, tmp_path):
+    (tmp_path / "file").write_text("")
+    for folder, said in ((tmp_path / "file", "exists"), (tmp_path / "a" / "b", "no folder")):
+        with pytest.raises(ExportError, match=said):
+            export_policy(open_run(trained), folder)

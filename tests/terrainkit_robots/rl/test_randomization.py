@@ -1,0 +1,303 @@
+"""The randomization: what differs, between which bounds, and what stays as the model has it."""
+
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+import torch
+
+from terrainkit_robots import bundled
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.ground import Plane
+from terrainkit_robots.rl.physics import Physics
+from terrainkit_robots.rl.randomization import Differences, apply_differences, draw_differences
+from terrainkit_robots.rl.robot import Robot, read_robot
+from terrainkit_robots.rl.scene import build_scene
+from terrainkit_robots.rl.task import Control, DomainRand, Env, InitState, Task
+
+torch.set_num_threads(1)
+
+_NONE = DomainRand(
+    friction=None,
+    added_mass=None,
+    com_shift=0.0,
+    gains=None,
+    motor_strength=None,
+    joint_offset=0.0,
+    push_interval_s=0.0,
+)
+
+
+def robot_named(name: str) -> Robot:
+    return read_robot(Path(str(bundled.find(name))).parent)
+
+
+def physics_of(kind: Literal["P", "V", "T"] = "P", n: int = 5) -> Physics:
+    task = Task(control=Control(control_type=kind))
+    return Physics(build_scene(robot_named("quadruped"), Plane(), task), n, 1)
+
+
+def draw(physics: Physics, settings: DomainRand, n: int = 5, seed: int = 0) -> Differences:
+    return draw_differences(np.random.default_rng(seed), n, physics, settings)
+
+
+class TestDraw:
+    def test_ranges_are_filled_and_kept(self) -> None:
+        settings = DomainRand(
+            friction=(0.2, 0.4),
+            added_mass=(-2, 3),
+            com_shift=0.05,
+            gains=(0.7, 1.1),
+            motor_strength=(0.8, 0.9),
+        )
+        drawn = draw(physics_of(), settings, n=4000)
+        for name, (low, high), width in [
+            ("friction", (0.2, 0.4), 1),
+            ("added_mass", (-2, 3), 1),
+            ("com_shift", (-0.05, 0.05), 3),
+            ("stiffness", (0.7, 1.1), 12),
+            ("damping", (0.7, 1.1), 12),
+            ("strength", (0.8, 0.9), 1),
+        ]:
+            values, near = getattr(drawn, name), 0.01 * (high - low)
+            assert values.shape == (4000, width), name
+            assert (values >= np.float32(low)).all(), name
+            assert (values <= np.float32(high)).all(), name
+            assert (values.min(axis=0) < low + near).all(), name
+            assert (values.max(axis=0) > high - near).all(), name
+            middle = np.full(width, (low + high) / 2)
+            np.testing.assert_allclose(values.mean(axis=0), middle, atol=3 * near, err_msg=name)
+
+    def test_joints_differ_each_for_itself(self) -> None:
+        drawn = draw(physics_of(), DomainRand(), n=500)
+        assert abs(np.corrcoef(drawn.stiffness[:, 0], drawn.stiffness[:, 1])[0, 1]) < 0.2
+        assert abs(np.corrcoef(drawn.stiffness[:, 0], drawn.damping[:, 0])[0, 1]) < 0.2
+
+    def test_none_is_nominal(self) -> None:
+        drawn = draw(physics_of(), _NONE)
+        assert (drawn.added_mass == 0).all()
+        assert (drawn.com_shift == 0).all()
+        for factor in (drawn.stiffness, drawn.damping, drawn.strength):
+            assert (factor == 1).all()
+
+    def test_seed_decides(self) -> None:
+        physics = physics_of()
+        one, other, third = (draw(physics, DomainRand(), seed=seed) for seed in (1, 1, 2))
+        for each in fields(Differences):
+            np.testing.assert_array_equal(getattr(one, each.name), getattr(other, each.name))
+            assert (getattr(one, each.name) != getattr(third, each.name)).any()
+
+
+_CHANGED = (
+    "body_mass",
+    "body_inertia",
+    "body_ipos",
+    "geom_friction",
+    "actuator_gainprm",
+    "actuator_biasprm",
+)
+
+
+class TestApply:
+    @pytest.mark.parametrize("kind", ["P", "V", "T"])
+    def test_none_leaves_the_model_as_it_is(self, kind: Literal["P", "V", "T"]) -> None:
+        physics = physics_of(kind)
+        apply_differences(physics, draw(physics, _NONE))
+        for field in _CHANGED:
+            found = physics.batch.expand(field)
+            expected = np.broadcast_to(getattr(physics.scene.model, field), found.shape)
+            np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9, err_msg=field)
+
+    def test_mass_and_its_inertia(self) -> None:
+        physics = physics_of()
+        base, model = physics.scene.base, physics.scene.model
+        drawn = draw(physics, replace(_NONE, added_mass=(1.5, 1.5)))
+        apply_differences(physics, drawn)
+        mass = physics.batch.expand("body_mass")
+        np.testing.assert_allclose(mass[:, base], model.body_mass[base] + 1.5)
+        others = np.delete(mass, base, axis=1)
+        np.testing.assert_array_equal(others[0], np.delete(model.body_mass, base))
+        heavier = 1 + 1.5 / model.body_mass[base]
+        inertia = physics.batch.expand("body_inertia")[:, base]
+        np.testing.assert_allclose(inertia, np.tile(heavier * model.body_inertia[base], (5, 1)))
+
+    def test_center_of_mass(self) -> None:
+        physics = physics_of()
+        base, model = physics.scene.base, physics.scene.model
+        drawn = draw(physics, replace(_NONE, com_shift=0.1))
+        apply_differences(physics, drawn)
+        shift = physics.batch.expand("body_ipos")[:, base] - model.body_ipos[base]
+        np.testing.assert_allclose(shift, drawn.com_shift, atol=1e-7)
+        assert np.abs(shift).max() > 0.05
+
+    def test_friction_of_all_that_touches(self) -> None:
+        physics = physics_of()
+        apply_differences(physics, draw(physics, replace(_NONE, friction=(0.3, 0.3))))
+        friction, own = physics.batch.expand("geom_friction"), physics.scene.geoms
+        np.testing.assert_allclose(friction[:, own, 0], 0.3, rtol=1e-6)
+        model = physics.scene.model
+        expected = np.delete(model.geom_friction[:, 0], own)
+        np.testing.assert_array_equal(np.delete(friction[0, :, 0], own), expected)
+        np.testing.assert_array_equal(friction[0, :, 1:], model.geom_friction[:, 1:])
+
+    def test_gains_of_position_control(self) -> None:
+        physics, model = physics_of("P"), physics_of("P").scene.model
+        drawn = draw(physics, DomainRand())
+        apply_differences(physics, drawn)
+        gain = physics.batch.expand("actuator_gainprm")
+        bias = physics.batch.expand("actuator_biasprm")
+        kp = model.actuator_gainprm[:, 0] * drawn.stiffness * drawn.strength
+        kd = -model.actuator_biasprm[:, 2] * drawn.damping * drawn.strength
+        assert (kp > 0).all()
+        assert (kd > 0).all()
+        np.testing.assert_allclose(gain[:, :, 0], kp, rtol=1e-6)
+        np.testing.assert_allclose(bias[:, :, 1], -kp, rtol=1e-6)
+        np.testing.assert_allclose(bias[:, :, 2], -kd, rtol=1e-6)
+
+    def test_gains_of_velocity_control(self) -> None:
+        physics, model = physics_of("V"), physics_of("V").scene.model
+        drawn = draw(physics, DomainRand())
+        apply_differences(physics, drawn)
+        kv = model.actuator_gainprm[:, 0] * drawn.damping * drawn.strength
+        assert (kv > 0).all()
+        np.testing.assert_allclose(physics.batch.expand("actuator_gainprm")[:, :, 0], kv, rtol=1e-6)
+        bias = physics.batch.expand("actuator_biasprm")
+        np.testing.assert_allclose(bias[:, :, 2], -kv, rtol=1e-6)
+        assert (bias[:, :, :2] == 0).all()
+
+    def test_torque_control_has_no_gains(self) -> None:
+        """Only the strength of the motors counts."""
+        physics = physics_of("T")
+        apply_differences(physics, draw(physics, replace(DomainRand(), motor_strength=None)))
+        model = physics.scene.model
+        for field in ("actuator_gainprm", "actuator_biasprm"):
+            found = physics.batch.expand(field)
+            expected = np.broadcast_to(getattr(model, field), found.shape)
+            np.testing.assert_array_equal(found, expected)
+        drawn = draw(physics, DomainRand())
+        apply_differences(physics, drawn)
+        gain = physics.batch.expand("actuator_gainprm")[:, :, 0]
+        np.testing.assert_allclose(gain, np.tile(drawn.strength, 12), rtol=1e-6)
+        assert (physics.batch.expand("actuator_biasprm") == 0).all()
+
+    def test_twice_is_once(self) -> None:
+        """A checkpoint's differences are applied over those of the start."""
+        physics = physics_of()
+        first, second = draw(physics, DomainRand(), seed=1), draw(physics, DomainRand(), seed=2)
+        apply_differences(physics, second)
+        once = {field: physics.batch.expand(field).copy() for field in _CHANGED}
+        apply_differences(physics, first)
+        apply_differences(physics, second)
+        for field in _CHANGED:
+            np.testing.assert_array_equal(physics.batch.expand(field), once[field], err_msg=field)
+
+
+def make_env(settings: DomainRand, n: int = 6, **changes: Any) -> LeggedEnv:
+    task = Task(
+        env=Env(num_envs=n, num_threads=1),
+        init_state=InitState(lin_vel=0, ang_vel=0, yaw=0, reset_range=(1, 1), position=0),
+        domain_rand=settings,
+        **changes,
+    )
+    return LeggedEnv(task, robot_named("quadruped"), Plane())
+
+
+class TestEnvironment:
+    def test_nothing_random_makes_all_alike(self) -> None:
+        env = make_env(_NONE)
+        for _ in range(5):
+            env.step(torch.full((6, 12), 0.1))
+        assert np.ptp(env.physics.qpos, axis=0).max() == 0
+
+    @pytest.mark.parametrize(
+        "change",
+        [
+            {"added_mass": (-1.0, 1.0)},
+            {"com_shift": 0.05},
+            {"gains": (0.8, 1.2)},
+            {"motor_strength": (0.8, 1.2)},
+            {"joint_offset": 0.05},
+        ],
+        ids=lambda change: next(iter(change)),
+    )
+    def test_each_makes_them_differ(self, change: dict[str, Any]) -> None:
+        env = make_env(replace(_NONE, **change))
+        for _ in range(5):
+            env.step(torch.full((6, 12), 0.1))
+        assert np.ptp(env.physics.qpos, axis=0).max() > 1e-5
+
+    def test_friction_holds_or_slips(self) -> None:
+        speeds = []
+        for friction in (0.05, 1.0):
+            env = make_env(replace(_NONE, friction=(friction, friction)), n=1)
+            for _ in range(15):
+                env.step(torch.zeros(1, 12))
+            env.physics.qvel[:, 0] = 1.0
+            for _ in range(10):
+                env.step(torch.zeros(1, 12))
+            feet = env.state.foot_vel[0, :, 0]
+            speeds.append(float(np.abs(feet).mean()))
+        assert speeds[0] > 5 * speeds[1]
+
+    def test_motors_keep_to_their_effort(self) -> None:
+        env = make_env(DomainRand(motor_strength=(2, 2), push_interval_s=0))
+        env.step(torch.full((6, 12), 50.0))
+        torque = np.abs(env.state.torques)
+        assert (torque <= env.robot.effort * 1.0001).all()
+        assert (torque.max(axis=0) > 0.99 * env.robot.effort).any()
+
+    def test_privileged_observations_tell_what_was_drawn(self) -> None:
+        env = make_env(DomainRand())
+        seen = env.get_observations()["privileged"].numpy()
+        here, start = {}, 0
+        for each in env.groups["privileged"]:
+            stop = start + each.read(env.state).shape[1]
+            here[each.name], start = seen[:, start:stop], stop
+        np.testing.assert_array_equal(here["friction"], env.differences.friction)
+        np.testing.assert_array_equal(here["added_mass"], env.differences.added_mass)
+        np.testing.assert_allclose(here["com_shift"], 10 * env.differences.com_shift)
+        np.testing.assert_array_equal(here["joint_offset"], env.joint_offset)
+
+    def test_joint_offsets_are_new_at_each_reset(self) -> None:
+        env = make_env(replace(_NONE, joint_offset=0.05))
+        before = env.joint_offset.copy()
+        assert 0.04 < np.abs(before).max() <= 0.05
+        env.physics.qpos[1, 3:7] = (0, 1, 0, 0)
+        env.step(torch.zeros(6, 12))
+        changed = (env.joint_offset != before).any(axis=1)
+        assert changed.tolist() == [False, True, False, False, False, False]
+
+    def test_robot_holds_what_it_measures(self) -> None:
+        """With zero action the measured pose, not the true one, goes to the default."""
+        env = make_env(replace(_NONE, joint_offset=0.05))
+        env.scene.model.opt.gravity[:] = 0
+        for _ in range(40):
+            env.physics.qpos[:, :7] = (0, 0, 1, 1, 0, 0, 0)
+            env.physics.qvel[:, :6] = 0
+            env.step(torch.zeros(6, 12))
+        off = env.state.dof_pos - env.robot.default_pose
+        np.testing.assert_allclose(off, -env.state.joint_offset, atol=1e-3)
+        assert np.abs(off).max() > 0.02
+
+    def test_pushes(self) -> None:
+        env = make_env(replace(_NONE, push_interval_s=0.06, max_push_vel_xy=0.5))
+        before = env.state.base_lin_vel.copy()
+        pushed = []
+        for _ in range(8):
+            env.step(torch.zeros(6, 12))
+            changed = np.abs(env.state.base_lin_vel[:, :2] - before[:, :2]).max() > 0.1
+            pushed.append(bool(changed))
+            before = env.state.base_lin_vel.copy()
+        # Every third step; the fourth and the seventh begin with one.
+        assert pushed == [False, False, False, True, False, False, True, False]
+        assert np.abs(env.push_vel).max() <= 0.5
+        assert (env.push_vel[:, 2] == 0).all()
+        np.testing.assert_array_equal(env.state.push_vel, env.push_vel)
+
+    def test_no_pushes(self) -> None:
+        env = make_env(replace(_NONE, push_interval_s=0.0))
+        for _ in range(5):
+            env.step(torch.zeros(6, 12))
+        assert (env.push_vel == 0).all()

@@ -1,0 +1,46 @@
+import numpy as np
+import pytest
+import torch
+
+from terrainkit_robots.onboard.bringing_in import Wishes, bring_in
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.ground import Plane
+from terrainkit_robots.rl.policy_export import export_policy
+from terrainkit_robots.rl.robot import read_robot
+from terrainkit_robots.rl.run_folder import create_run, open_run
+from terrainkit_robots.rl.runner import LeggedRunner
+from terrainkit_robots.rl.task import Env, Runner, Task
+
+TASK = Task(
+    env=Env(num_envs=16, num_threads=1), runner=Runner(num_steps_per_env=12, save_interval=100)
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "joints", "observed"), [("go2/urdf/go2.urdf", 12, 45), ("h1/urdf/h1.urdf", 10, 39)]
+)
+def test_a_real_robot_is_onboarded_and_trains(robot_file, tmp_path, name, joints, observed):
+    """Twenty updates show no walking: that nothing breaks, and that all numbers stay numbers."""
+    folder = tmp_path / "robot"
+    done = bring_in(robot_file(name), Wishes(target=folder, pictures=False))
+    assert done.folder == folder
+    robot = read_robot(folder)
+    assert len(robot.spec.joint_order) == joints
+    run = create_run(tmp_path / "run", TASK, folder, "plane")
+    torch.manual_seed(1)
+    env = LeggedEnv(TASK, robot, Plane())
+    assert env.get_observations()["policy"].shape == (16, observed)
+    runner = LeggedRunner(env, run.folder)
+    update, losses = runner.alg.update, []
+    runner.alg.update = lambda: losses.append(update()) or losses[-1]
+    before = [weight.detach().clone() for weight in runner.alg.actor.mlp.parameters()]
+    runner.learn(20)
+    assert len(losses) == 20
+    assert all(np.isfinite(list(each.values())).all() for each in losses)
+    after = list(runner.alg.actor.mlp.parameters())
+    assert all(not torch.equal(a, b) for a, b in zip(before, after, strict=True))
+    assert np.isfinite(env.physics.qpos).all()
+    exported = export_policy(open_run(run.folder), tmp_path / "policy")
+    assert exported.observations == observed
+    assert exported.error <= 1e-5
+    assert exported.onnx_error <= 1e-5

@@ -1,0 +1,57 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from terrainkit.errors import ConfigError
+from terrainkit_robots.rl.robot import read_robot, robot_of
+
+
+class TestArrays:
+    def test_are_in_the_order_of_the_spec(self, cart):
+        np.testing.assert_allclose(cart.default_pose, [0.0, -0.2, 0.3], rtol=1e-6)
+        np.testing.assert_allclose(cart.effort, [3.0, 5.0, 6.0])
+        np.testing.assert_allclose(cart.velocity, [30.0, 10.0, 10.0])
+        assert cart.default_pose.dtype == np.float32
+
+    def test_a_joint_without_limits_turns_for_ever(self, cart):
+        np.testing.assert_allclose(cart.lower, [-np.inf, -0.9, -0.9], rtol=1e-6)
+        np.testing.assert_allclose(cart.upper, [np.inf, 0.9, 0.9], rtol=1e-6)
+
+    def test_the_mjcf_lies_beside_the_spec(self, cart):
+        assert cart.mjcf.name == "cart.xml"
+        assert cart.mjcf.is_file()
+
+    @pytest.mark.parametrize("name", ["quadruped", "biped"])
+    def test_bundled_robots_can_be_trained(self, name, request):
+        robot = request.getfixturevalue(name)
+        assert len(robot.default_pose) == len(robot.spec.joint_order)
+        assert (robot.lower < robot.default_pose).all()
+        assert (robot.default_pose < robot.upper).all()
+        assert (robot.effort > 0).all()
+
+
+class TestRefused:
+    @pytest.mark.parametrize(
+        ("changes", "message"),
+        [
+            ({"floating": False}, "cart has a fixed base"),
+            ({"feet": ()}, "cart has no feet"),
+            ({"spawn_height": None}, "lacks spawn_height or base_height_target"),
+            ({"base_height_target": None}, "lacks spawn_height or base_height_target"),
+            ({"effort": {"wheel_axle": 3.0}}, "effort"),
+            ({"default_pose": {".*": 0.0, "ghost": 1.0}}, "ghost"),
+        ],
+    )
+    def test_what_training_needs_is_asked_for(self, cart_spec, tmp_path, changes, message):
+        with pytest.raises(ConfigError, match=message) as caught:
+            robot_of(replace(cart_spec, **changes), tmp_path)
+        assert "\n" not in str(caught.value)
+
+    def test_a_folder_without_a_spec(self, tmp_path):
+        with pytest.raises(ConfigError, match=r"has no robot\.toml; wanted a folder that terrain"):
+            read_robot(tmp_path)
+
+    def test_a_folder_that_is_not_there(self, tmp_path):
+        with pytest.raises(ConfigError, match=r"has no robot\.toml"):
+            read_robot(tmp_path / "nowhere")

@@ -1,0 +1,330 @@
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from terrainkit.errors import ConfigError
+from terrainkit_robots.rl.checkpoint import only_policy, read_checkpoint, save_checkpoint
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.ground import Ground, Plane
+from terrainkit_robots.rl.robot import Robot
+from terrainkit_robots.rl.run_folder import create_run, open_run
+from terrainkit_robots.rl.runner import LeggedRunner, policy_of, runner_config
+from terrainkit_robots.rl.task import Algorithm, Env, Policy, Rewards, Runner, Task
+
+Make = Callable[..., LeggedRunner]
+
+
+@pytest.fixture(scope="module")
+def task() -> Task:
+    """Return a task of short episodes, so that many end, and of small networks."""
+    return Task(
+        env=Env(num_envs=6, num_threads=1, episode_length_s=0.3),
+        policy=Policy(actor_hidden_dims=(16,), critic_hidden_dims=(16,)),
+        algorithm=Algorithm(num_learning_epochs=2, num_mini_batches=2),
+        runner=Runner(num_steps_per_env=8),
+    )
+
+
+@pytest.fixture
+def make(quadruped: Robot, task: Task, tmp_path: Path) -> Make:
+    """Make runners of the same seed."""
+
+    def made(
+        task: Task = task,
+        ground: Ground | None = None,
+        folder: Path | None = tmp_path,
+        robot: Robot = quadruped,
+        **options: Any,
+    ) -> LeggedRunner:
+        torch.manual_seed(task.runner.seed)
+        return LeggedRunner(LeggedEnv(task, robot, ground or Plane()), folder, **options)
+
+    return made
+
+
+def differences(a: Any, b: Any, path: str = "") -> list[str]:
+    """Return where two states differ; all but how long it took has to be the same."""
+    if isinstance(a, dict):
+        assert a.keys() == b.keys()
+        return [d for key in a for d in differences(a[key], b[key], f"{path}.{key}")]
+    if isinstance(a, list | tuple):
+        assert len(a) == len(b)
+        return [d for k in range(len(a)) for d in differences(a[k], b[k], f"{path}[{k}]")]
+    same = np.array_equal(a, b, equal_nan=np.asarray(a).dtype.kind == "f")
+    return [] if same or path == ".curves.total_time" else [path]
+
+
+def test_resuming_continues_exactly(make, tmp_path):
+    unbroken = make(folder=tmp_path / "unbroken")
+    unbroken.learn(4, init_at_random_ep_len=True)
+    make().learn(2, init_at_random_ep_len=True)
+    resumed = make()
+    resumed.load(tmp_path / "model_2.pt")
+    resumed.learn(2)
+    assert resumed.current_learning_iteration == 4
+    assert differences(unbroken.state_dict(), resumed.state_dict()) == []
+
+
+def test_resuming_continues_exactly_on_a_map(make, task, tmp_path, map_ground):
+    task = replace(task, commands=replace(task.commands, heading_command=True, curriculum=True))
+    unbroken = make(task, map_ground, folder=tmp_path / "unbroken")
+    unbroken.learn(4, init_at_random_ep_len=True)
+    make(task, map_ground).learn(2, init_at_random_ep_len=True)
+    resumed = make(task, map_ground)
+    resumed.load(tmp_path / "model_2.pt")
+    resumed.learn(2)
+    assert differences(unbroken.state_dict(), resumed.state_dict()) == []
+
+
+def test_the_same_seed_learns_the_same(make, task):
+    def learned(seed: int) -> dict[str, Any]:
+        runner = make(replace(task, runner=replace(task.runner, seed=seed)), folder=None)
+        runner.learn(10, init_at_random_ep_len=True)
+        return runner.state_dict()
+
+    first = learned(1)
+    assert differences(first, learned(1)) == []
+    assert differences(first["actor_state_dict"], learned(2)["actor_state_dict"])
+
+
+def test_another_number_of_environments_keeps_weights_and_curriculum(
+    make, task, tmp_path, map_ground
+):
+    before = make(task, map_ground)
+    before.env.careers.levels[:] = 2
+    before.env.careers.success[1, 0] = 0.75
+    before.env.lin_vel_x = (-2.0, 2.0)
+    before.save()
+    more = make(replace(task, env=replace(task.env, num_envs=9)), map_ground)
+    more.load(tmp_path / "model_0.pt")
+    assert (more.env.careers.levels == 2).all()
+    assert more.env.careers.success[1, 0] == 0.75
+    assert more.env.lin_vel_x == (-2.0, 2.0)
+    assert differences(before.alg.save(), more.alg.save()) == []
+    more.learn(1)
+
+
+def test_a_policy_alone_lends_its_networks(make, tmp_path):
+    before = make()
+    before.learn(1)
+    path = tmp_path / "model_1.pt"
+    save_checkpoint(path, only_policy(read_checkpoint(path)))
+    after = make()
+    after.load(path)
+    assert after.current_learning_iteration == 0
+    assert (
+        differences(before.alg.get_policy().state_dict(), after.alg.get_policy().state_dict()) == []
+    )
+
+
+def test_checkpoints_are_written_at_intervals_and_in_the_end(make, task, tmp_path):
+    task = replace(task, runner=replace(task.runner, save_interval=2))
+    make(task).learn(5)
+    assert {path.name for path in tmp_path.glob("*.pt")} == {
+        "model_2.pt",
+        "model_4.pt",
+        "model_5.pt",
+    }
+    assert len(list(tmp_path.glob("events.out.tfevents.*"))) == 1
+
+
+def test_curves_are_those_of_the_episodes_that_ended(make, tmp_path):
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    make().learn(4)
+    curves = EventAccumulator(str(tmp_path)).Reload()
+    tags = curves.Tags()["scalars"]
+    assert {"Episode/rew_tracking_lin_vel", "Train/mean_reward", "Loss/value"} <= set(tags)
+    assert [event.step for event in curves.Scalars("Loss/value")] == [1, 2, 3, 4]
+
+
+def test_nothing_is_printed(make, capfd):
+    make().learn(2)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_whoever_watches_is_told(make, task, map_ground):
+    seen: list[Any] = []
+    make(task, map_ground, watch=seen.append).learn(4)
+    last = seen[-1]
+    assert [progress.iteration for progress in seen] == [1, 2, 3, 4]
+    assert (last.last, last.remaining) == (4, 0)
+    assert last.reward is not None
+    assert 0 < last.episode_length <= 0.3
+    assert set(last.levels) == {"stairs", "rough_slope"}
+    assert "tracking_lin_vel" in last.rewards
+    assert last.steps_per_second > 0
+    assert 0 < last.learning < 1
+
+
+def test_stopping_writes_a_checkpoint(make, tmp_path):
+    calls = iter([False, False, True])
+    runner = make(stop=lambda: next(calls))
+    runner.learn(100)
+    assert runner.current_learning_iteration == 2
+    assert [path.name for path in tmp_path.glob("*.pt")] == ["model_2.pt"]
+
+
+def test_networks_that_diverge_are_told_at_once(make, task, tmp_path):
+    mad = replace(task, algorithm=Algorithm(learning_rate=1e30, schedule="fixed"))
+    with pytest.raises(ConfigError, match=r"iteration 1: the networks have diverged"):
+        make(mad).learn(5)
+    assert list(tmp_path.glob("*.pt")) == []
+
+
+def test_a_checkpoint_of_another_robot_is_told(make, biped, tmp_path):
+    make().save()
+    with pytest.raises(ConfigError, match=r"is of another robot, quadruped, whose joints are: .*_"):
+        make(robot=biped).load(tmp_path / "model_0.pt")
+
+
+def test_a_checkpoint_of_another_task_is_told(make, task, tmp_path, map_ground):
+    make().save()
+    path = tmp_path / "model_0.pt"
+    with pytest.raises(
+        ConfigError, match=r"is of another task: its observations policy are 45 numb"
+    ):
+        make(ground=map_ground).load(path)
+    wide = replace(task, policy=replace(task.policy, actor_hidden_dims=(32,)))
+    with pytest.raises(
+        ConfigError, match=r"does not fit the networks of its task: .*size mismatch"
+    ):
+        make(wide).load(path)
+
+
+def test_a_checkpoint_of_another_map_is_told(make, task, tmp_path, map_ground):
+    blind = replace(task, terrain=replace(task.terrain, measure_heights=False))
+    make(blind).save()
+    with pytest.raises(
+        ConfigError, match=r"^the checkpoint's map has 1 x 1 patches; this one has 3"
+    ):
+        make(blind, map_ground).load(tmp_path / "model_0.pt")
+
+
+def test_a_checkpoint_with_parts_that_are_no_state_is_told(make, tmp_path):
+    runner = make()
+    runner.save()
+    path = tmp_path / "model_0.pt"
+    for change in (
+        {"actor_state_dict": {"weight": 1}},
+        {"optimizer_state_dict": {}},
+        {"processes": []},
+        {"processes": [{"env": 3}]},
+        {"curves": {}},
+    ):
+        save_checkpoint(tmp_path / "changed.pt", read_checkpoint(path) | change)
+        with pytest.raises(ConfigError, match=r"changed\.pt does not fit"):
+            make().load(tmp_path / "changed.pt")
+
+
+def test_a_policy_acts_always_the_same_and_changes_nothing(make, task, tmp_path, quadruped):
+    folder = create_run(tmp_path / "run", task, "quadruped", "plane").folder
+    runner = make(folder=folder)
+    runner.learn(1)
+    env = LeggedEnv(task, quadruped, Plane())
+    before, state = env.get_observations(), torch.get_rng_state()
+    act = policy_of(open_run(folder), env)
+    actions = act(before)
+    torch.testing.assert_close(actions, act(before), rtol=0, atol=0)
+    expected = runner.alg.get_policy()(before)
+    torch.testing.assert_close(actions, expected.detach(), rtol=0, atol=0)
+    assert not actions.requires_grad
+    assert torch.is_grad_enabled()
+    for _ in range(3):
+        env.step(act(env.get_observations()))
+    assert runner.alg.get_policy().training
+    assert state.shape == torch.get_rng_state().shape
+
+
+def test_a_run_without_a_checkpoint_has_no_policy(make, task, tmp_path):
+    run = create_run(tmp_path / "run", task, "quadruped", "plane")
+    with pytest.raises(ConfigError, match="has no checkpoint yet"):
+        policy_of(run, make().env)
+
+
+@pytest.mark.parametrize("symmetry", ["augmentation", "loss"])
+def test_symmetry_is_learned_with(make, task, symmetry):
+    runner = make(replace(task, algorithm=Algorithm(symmetry=symmetry)), folder=None)
+    runner.learn(1)
+    assert runner.alg.symmetry.use_data_augmentation == (symmetry == "augmentation")
+    assert runner.alg.symmetry.use_mirror_loss == (symmetry == "loss")
+
+
+def test_every_value_of_the_task_reaches_rsl_rl():
+    task = Task(
+        policy=Policy(actor_hidden_dims=(7,), critic_hidden_dims=(5, 6), activation="relu"),
+        algorithm=Algorithm(gamma=0.5, entropy_coef=0.125, num_mini_batches=2),
+        rewards=Rewards(),
+    )
+    config = runner_config(task)
+    assert config["actor"]["hidden_dims"] == [7]
+    assert config["critic"]["hidden_dims"] == [5, 6]
+    assert config["critic"]["activation"] == "relu"
+    assert config["algorithm"]["gamma"] == 0.5
+    assert config["algorithm"]["entropy_coef"] == 0.125
+    assert config["algorithm"]["num_mini_batches"] == 2
+
+
+TWO_PROCESSES = """
+import os, sys
+from dataclasses import replace
+from pathlib import Path
+import terrainkit_robots.rl.runner as runner
+from terrainkit_robots.rl.run_folder import open_run
+from terrainkit_robots.rl.task import Env, Runner, Task
+from terrainkit_robots.rl.training import train
+
+kept = {}
+class Kept(runner.LeggedRunner):
+    def learn(self, *words, **options):
+        super().learn(*words, **options)
+        kept["runner"] = self
+runner.LeggedRunner = Kept
+
+out = Path(sys.argv[1])
+task = Task(env=Env(num_envs=5, episode_length_s=0.3), runner=Runner(num_steps_per_env=8))
+task = replace(task, runner=replace(task.runner, max_iterations=2))
+trained = train("quadruped", "plane", task, folder=out / "run")
+import torch
+mine = kept["runner"]
+torch.save(
+    {
+        "actor": mine.alg.get_policy().state_dict(),
+        "envs": mine.env.num_envs,
+        "qpos": torch.tensor(mine.env.physics.qpos[:2].copy()),
+        "folder": str(trained.folder),
+    },
+    out / f"rank{os.environ['RANK']}.pt",
+)
+"""
+
+
+def test_two_processes_learn_the_same_weights_from_robots_of_their_own(tmp_path):
+    (tmp_path / "two.py").write_text(TWO_PROCESSES)
+    launch = ["torch.distributed.run", "--nproc-per-node", "2", "--standalone"]
+    run = subprocess.run(
+        [sys.executable, "-m", *launch, str(tmp_path / "two.py"), str(tmp_path)],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
+    first, second = (torch.load(tmp_path / f"rank{k}.pt", weights_only=True) for k in (0, 1))
+    assert differences(first["actor"], second["actor"]) == []
+    assert (first["envs"], second["envs"]) == (3, 2)
+    assert differences(first["qpos"], second["qpos"])
+    assert (first["folder"], second["folder"]) == (str(tmp_path / "run"), "None")
+    state = read_checkpoint(tmp_path / "run" / "model_2.pt")
+    assert [len(each["observations"]["policy"]) for each in state["processes"]] == [3, 2]
+    assert len(list((tmp_path / "run").glob("events.*"))) == 1
+    assert open_run(tmp_path / "run").task.env.num_envs == 5

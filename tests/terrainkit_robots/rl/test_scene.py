@@ -1,0 +1,251 @@
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+import torch
+
+from terrainkit.errors import ConfigError
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.ground import MapGround, Plane, ScannedGround
+from terrainkit_robots.rl.physics import Physics
+from terrainkit_robots.rl.robot import robot_of
+from terrainkit_robots.rl.scene import build_scene
+from terrainkit_robots.rl.task import Asset, Control, Sim
+
+
+@pytest.fixture(scope="module")
+def scene(cart, calm):
+    return build_scene(cart, Plane(), calm())
+
+
+def weight_of(scene):
+    """Return the weight of the robot; the ground has a mass too, of thousands of tons."""
+    return scene.model.body_subtreemass[scene.base] * 9.81
+
+
+def contacts(model, qpos):
+    """Return the pairs of geoms that touch, by name."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_forward(model, data)
+    return {frozenset(model.geom(g).name for g in contact.geom) for contact in data.contact}
+
+
+class TestMotors:
+    def test_are_in_the_order_of_the_spec(self, scene, cart):
+        model = scene.model
+        assert model.nu == 3
+        driven = [model.joint(model.actuator(k).trnid[0]).name for k in range(3)]
+        assert driven == list(cart.spec.joint_order)
+        # The MJCF has them in another order, or this would prove nothing.
+        assert list(scene.joint_qpos) != sorted(scene.joint_qpos)
+
+    def test_have_the_gains_and_limits_of_the_spec(self, scene):
+        model = scene.model
+        np.testing.assert_allclose(model.actuator_gainprm[:, 0], [0.4, 20, 20])
+        np.testing.assert_allclose(
+            model.actuator_biasprm[:, :3], [[0, 0, -0.4], [0, -20, -1.5], [0, -20, -1.5]]
+        )
+        np.testing.assert_allclose(model.actuator_forcerange, [[-3, 3], [-5, 5], [-6, 6]])
+        assert model.actuator_forcelimited.all()
+
+    def test_take_nothing_over_from_the_file(self, scene):
+        # Its default for motors has a gear of 7 and a narrow range of controls.
+        np.testing.assert_allclose(scene.model.actuator_gear[:, 0], 1)
+        assert not scene.model.actuator_ctrllimited.any()
+
+    def test_nor_from_its_joints(self, scene):
+        # A joint of the file passes on 1 N m: the spec's effort is 6, and torques would say so.
+        assert not scene.model.jnt_actfrclimited.any()
+
+    def test_joints_have_the_armature_of_the_spec_and_no_dry_friction(self, scene):
+        np.testing.assert_allclose(scene.model.dof_armature[scene.joint_qvel], [0.001, 0.01, 0.02])
+        assert (scene.model.dof_frictionloss == 0).all()
+        assert (scene.model.dof_armature[:6] == 0).all()
+
+    def test_dry_friction_may_be_kept(self, cart, calm):
+        scene = build_scene(cart, Plane(), calm(asset=Asset(joint_friction=True)))
+        np.testing.assert_allclose(scene.model.dof_frictionloss[scene.joint_qvel], 0.3)
+
+    def test_torque_control_has_plain_motors(self, cart, calm):
+        model = build_scene(cart, Plane(), calm(control=Control(control_type="T"))).model
+        np.testing.assert_allclose(model.actuator_gainprm[:, 0], 1)
+        assert (model.actuator_biasprm == 0).all()
+
+
+class TestPlaces:
+    def test_home_is_the_default_pose(self, scene, cart):
+        for name, position in zip(cart.spec.joint_order, cart.default_pose, strict=True):
+            address = scene.model.joint(name).qposadr[0]
+            assert scene.home[address] == pytest.approx(position)
+        np.testing.assert_array_equal(scene.home[:7], [0, 0, 0, 1, 0, 0, 0])
+
+    def test_speeds_are_those_of_the_same_joints(self, scene, cart):
+        for k, name in enumerate(cart.spec.joint_order):
+            assert scene.joint_qvel[k] == scene.model.joint(name).dofadr[0]
+
+    def test_base_and_touching_geoms(self, scene):
+        assert scene.model.body(scene.base).name == "trunk"
+        names = {scene.model.geom(g).name for g in scene.geoms}
+        assert names == {"hull", "front_leg", "front_ball", "rear_leg", "tire"}
+
+    def test_nothing_is_left_of_the_files_own_sensors_and_keyframes(self, scene):
+        assert scene.model.nkey == 0
+        assert all(scene.model.sensor(k).name != "old" for k in range(scene.model.nsensor))
+
+    def test_blocks_cover_all_sensors(self, scene):
+        last = 0
+        for block in scene.blocks.values():
+            assert block.start == last
+            last = block.stop
+        assert last == scene.model.nsensordata
+
+    def test_sensors_of_the_ground_do_not_shift_those_of_the_robot(self, cart, calm, tmp_path):
+        path = tmp_path / "ground.xml"
+        path.write_text(
+            '<mujoco><worldbody><geom type="plane" size="5 5 0.1"/></worldbody>'
+            "<sensor><clock/></sensor></mujoco>"
+        )
+        ground = ScannedGround(path, cell=0.1, reach=1.0)
+        scene = build_scene(cart, ground, calm())
+        foot = scene.model.sensor("foot_position_sole of wheel")
+        assert foot.adr[0] == scene.blocks["foot_position"].start
+
+    def test_physics_are_those_of_the_task(self, cart, calm):
+        task = calm(sim=Sim(dt=0.002, iterations=7, ls_iterations=9))
+        option = build_scene(cart, Plane(), task).model.opt
+        assert option.timestep == 0.002
+        assert option.iterations == 7
+        assert option.ls_iterations == 9
+        assert option.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
+
+
+class TestCollisions:
+    def folded(self, scene, height=3.0):
+        qpos = scene.home.copy()
+        qpos[2] = height
+        for name in ("front_hinge", "rear_hinge"):
+            turn = 1.9 if name == "front_hinge" else -1.9
+            qpos[scene.model.joint(name).qposadr[0]] = turn
+        return qpos
+
+    def test_the_robot_does_not_touch_itself(self, scene):
+        assert contacts(scene.model, self.folded(scene)) == set()
+
+    def test_unless_asked_to(self, cart, calm):
+        scene = build_scene(cart, Plane(), calm(asset=Asset(self_collisions=True)))
+        touching = contacts(scene.model, self.folded(scene))
+        assert any("ground" not in "".join(pair) for pair in touching)
+
+    @pytest.mark.parametrize("self_collisions", [False, True])
+    def test_all_that_is_solid_touches_the_ground(self, cart, calm, self_collisions):
+        scene = build_scene(cart, Plane(), calm(asset=Asset(self_collisions=self_collisions)))
+        qpos = scene.home.copy()
+        qpos[2] = -0.5
+        touching = {
+            name
+            for pair in contacts(scene.model, qpos)
+            for name in pair
+            if any("ground" in n for n in pair)
+        }
+        assert {"hull", "front_leg", "front_ball", "rear_leg", "tire"} <= touching
+        assert "paint" not in touching
+
+    @pytest.mark.parametrize("affinity", [(1, 1), (0, 1), (1, 0), (2, 4), (8, 0)])
+    def test_whatever_bits_the_ground_has(self, cart, calm, tmp_path, affinity):
+        path = tmp_path / "ground.xml"
+        path.write_text(
+            '<mujoco><worldbody><geom name="floor" type="plane" size="5 5 0.1" '
+            f'contype="{affinity[0]}" conaffinity="{affinity[1]}"/></worldbody></mujoco>'
+        )
+        scene = build_scene(cart, ScannedGround(path, cell=0.1, reach=1.0), calm())
+        qpos = scene.home.copy()
+        qpos[2] = 0.15
+        assert any("ground/floor" in pair for pair in contacts(scene.model, qpos))
+
+    def test_friction_is_the_robots_own(self, scene):
+        assert (scene.model.geom_priority[scene.geoms] == 1).all()
+        assert (scene.model.geom_condim[scene.geoms] == 3).all()
+
+
+class TestForces:
+    def test_a_standing_robot_is_borne_by_its_feet(self, standing):
+        weight = weight_of(standing.scene)
+        total = standing.state.foot_force.sum(axis=1)
+        np.testing.assert_allclose(total[:, 2], weight, rtol=0.01)
+        np.testing.assert_allclose(total[:, :2], 0, atol=0.02 * weight)
+        assert (standing.state.foot_force[:, :, 2] > 0.1 * weight).all()
+        assert (standing.state.penalized_force == 0).all()
+
+    @pytest.mark.parametrize("collision", ["hfield", "boxes"])
+    def test_and_so_on_a_map(self, quadruped, calm, mixed_map, collision):
+        # Which of two geoms is the first differs with their kind; the force must not.
+        env = LeggedEnv(calm(6), quadruped, MapGround(mixed_map, collision))
+        env.careers.levels[:] = 0
+        env.begin_all()
+        for _ in range(60):
+            env.step(torch.zeros(6, 12))
+        np.testing.assert_allclose(
+            env.state.foot_force.sum(axis=1)[:, 2], weight_of(env.scene), rtol=0.02
+        )
+
+    def test_a_robot_on_its_back_is_borne_by_its_trunk(self, cart, calm):
+        scene = build_scene(cart, Plane(), calm(1))
+        physics = Physics(scene, 1, 1)
+        physics.qpos[0] = scene.home
+        physics.qpos[0, 2:7] = (0.06, 0, 1, 0, 0)
+        for _ in range(100):
+            physics.step(4)
+        up = -physics.block("termination_force")[0, 0]
+        np.testing.assert_allclose(up, [0, 0, weight_of(scene)], atol=0.5)
+        assert (physics.block("foot_force") == 0).all()
+
+
+class TestRefused:
+    @pytest.mark.parametrize(
+        ("changes", "message"),
+        [
+            ({"base": "torso"}, "has no body 'torso', the base of its spec"),
+            ({"base": "front"}, "front is not free to move; wanted a freejoint"),
+            ({"feet": ("hoof",)}, "feet of cart has 'hoof'; the bodies of cart.xml are: "),
+            ({"termination_contacts": ("x",)}, "termination_contacts of cart has 'x'"),
+            ({"penalized_contacts": ("x",)}, "penalized_contacts of cart has 'x'"),
+            ({"mjcf": "gone.xml"}, "MuJoCo does not read .*gone.xml"),
+        ],
+    )
+    def test_a_spec_of_another_robot(self, cart, calm, changes, message):
+        other = robot_of(replace(cart.spec, **changes), cart.mjcf.parent)
+        with pytest.raises(ConfigError, match=message) as caught:
+            build_scene(other, Plane(), calm())
+        assert "\n" not in str(caught.value)
+
+    def test_a_joint_that_is_not_there(self, cart, calm):
+        tables = {
+            name: {".*": 0.5}
+            for name in (
+                "default_pose", "stiffness", "damping", "effort", "velocity", "armature",
+                "action_scale", "soft_limits",
+            )
+        }  # fmt: skip
+        tables["soft_limits"] = {".*": (-1.0, 1.0)}
+        spec = replace(cart.spec, joint_order=("wheel_axle", "fore_hinge"), **tables)
+        with pytest.raises(ConfigError, match=r"joint 'fore_hinge'; cart\.xml has: "):
+            build_scene(robot_of(spec, cart.mjcf.parent), Plane(), calm())
+
+    def test_something_else_that_moves_before_the_robot(self, cart, calm, tmp_path):
+        # Positions begin with those of the base.
+        text = cart.mjcf.read_text().replace(
+            '<body name="trunk"',
+            '<body name="ball" pos="2 0 1"><freejoint/><geom size="0.1"/></body><body name="trunk"',
+        )
+        (tmp_path / "cart.xml").write_text(text.partition("<keyframe>")[0] + "</mujoco>")
+        with pytest.raises(ConfigError, match="trunk") as caught:
+            build_scene(robot_of(cart.spec, tmp_path), Plane(), calm())
+        assert "\n" not in str(caught.value)
+
+    def test_a_file_that_is_no_robot(self, cart, calm, tmp_path):
+        (tmp_path / "cart.xml").write_text("<mujoco><worldbody>")
+        with pytest.raises(ConfigError, match="MuJoCo does not read"):
+            build_scene(robot_of(cart.spec, tmp_path), Plane(), calm())
+        assert not (tmp_path / "MUJOCO_LOG.TXT").exists()

@@ -1,0 +1,227 @@
+from dataclasses import fields
+
+import mujoco
+import numpy as np
+import pytest
+import torch
+
+from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.ground import Plane
+from terrainkit_robots.rl.state import State
+from terrainkit_robots.rl.task import DomainRand, InitState
+
+
+@pytest.fixture
+def moving(cart, calm):
+    """Return carts that tumble through the air."""
+    env = LeggedEnv(calm(5), cart, Plane())
+    rng = np.random.default_rng(2)
+    env.physics.qpos[:, 2] = 2.0
+    env.physics.qvel[:] = rng.normal(size=env.physics.qvel.shape)
+    env.step(torch.from_numpy(rng.normal(size=(5, 3)).astype(np.float32)))
+    return env
+
+
+@pytest.fixture
+def sensed(cart, moving):
+    """Return what MuJoCo's own sensors tell of those carts: one dictionary each."""
+    with quiet_mujoco():
+        spec = mujoco.MjSpec.from_file(str(cart.mjcf))
+        kind, site, body = mujoco.mjtSensor, mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_BODY
+        for name, sensor in (("velocity", kind.mjSENS_VELOCIMETER), ("turn", kind.mjSENS_GYRO)):
+            spec.add_sensor(name=name, type=sensor, objtype=site, objname="imu")
+        spec.add_sensor(
+            name="up", type=kind.mjSENS_FRAMEZAXIS, objtype=body, objname="world",
+            reftype=body, refname="trunk",
+        )  # fmt: skip
+        for joint in ("wheel_axle", "rear_hinge", "front_hinge"):
+            spec.add_sensor(
+                name=joint, type=kind.mjSENS_JOINTVEL, objtype=mujoco.mjtObj.mjOBJ_JOINT,
+                objname=joint,
+            )  # fmt: skip
+        model = spec.compile()
+    found = []
+    for qpos, qvel in zip(moving.physics.qpos, moving.physics.qvel, strict=True):
+        data = mujoco.MjData(model)
+        data.qpos[:], data.qvel[:] = qpos, qvel
+        mujoco.mj_forward(model, data)
+        found.append(
+            {model.sensor(k).name: data.sensor(k).data.copy() for k in range(model.nsensor)}
+            | {"ball": data.geom("front_ball").xpos.copy(), "wheel": data.body("wheel").xpos.copy()}
+        )
+    return found
+
+
+class TestAgainstSensors:
+    def test_velocity_of_the_base_is_that_of_a_velocimeter(self, moving, sensed):
+        expected = [each["velocity"] for each in sensed]
+        np.testing.assert_allclose(moving.state.base_lin_vel, expected, atol=1e-5)
+        assert np.abs(expected).max() > 0.5
+
+    def test_angular_velocity_is_that_of_a_gyro(self, moving, sensed):
+        expected = [each["turn"] for each in sensed]
+        np.testing.assert_allclose(moving.state.base_ang_vel, expected, atol=1e-5)
+
+    def test_gravity_is_against_the_worlds_up(self, moving, sensed):
+        expected = [-each["up"] for each in sensed]
+        np.testing.assert_allclose(moving.state.projected_gravity, expected, atol=1e-5)
+
+    def test_speeds_of_joints_are_in_the_order_of_the_spec(self, moving, sensed):
+        joints = ("wheel_axle", "rear_hinge", "front_hinge")
+        expected = [[each[name][0] for name in joints] for each in sensed]
+        np.testing.assert_allclose(moving.state.dof_vel, expected, atol=1e-5)
+
+    def test_feet_are_where_they_touch(self, moving, sensed):
+        # A foot's own radius is taken off; the sole of the leg is between its two shapes.
+        expected = [each["wheel"][2] - 0.03 for each in sensed]
+        np.testing.assert_allclose(moving.state.foot_height[:, 0], expected, atol=1e-5)
+
+
+class TestByHand:
+    def test_a_cart_that_has_not_moved(self, cart, calm):
+        state = LeggedEnv(calm(2), cart, Plane()).state
+        np.testing.assert_allclose(state.base_pos, [[0, 0, 0.24]] * 2, atol=1e-6)
+        np.testing.assert_allclose(state.base_height, [0.24] * 2, atol=1e-6)
+        np.testing.assert_allclose(state.projected_gravity, [[0, 0, -1]] * 2, atol=1e-7)
+        np.testing.assert_allclose(state.dof_pos, [cart.default_pose] * 2, atol=1e-6)
+        for name in ("base_lin_vel", "dof_vel", "dof_acc", "actions", "foot_force", "push_vel"):
+            assert (getattr(state, name) == 0).all(), name
+        assert not state.fallen.any()
+        # The wheel hangs 0.2 m along a leg that is turned by -0.2 rad, less its radius.
+        wheel = 0.24 - 0.2 * np.cos(0.2) - 0.03
+        np.testing.assert_allclose(state.foot_height[:, 0], wheel, atol=1e-5)
+
+    def test_acceleration_is_the_change_of_speed(self, cart, calm):
+        env = LeggedEnv(calm(2), cart, Plane())
+        before = env.state.dof_vel.copy()
+        for _ in range(3):
+            env.step(torch.full((2, 3), 0.2))
+            expected = (env.state.dof_vel - before) / env.cfg.dt
+            np.testing.assert_allclose(env.state.dof_acc, expected, rtol=1e-4, atol=1e-4)
+            before = env.state.dof_vel.copy()
+
+    def test_actions_are_remembered_for_two_steps(self, cart, calm):
+        env = LeggedEnv(calm(2), cart, Plane())
+        for value in (0.1, 0.2, 0.3):
+            env.step(torch.full((2, 3), value))
+        np.testing.assert_allclose(env.state.actions, 0.3)
+        np.testing.assert_allclose(env.state.last_actions, 0.2)
+        np.testing.assert_allclose(env.state.last_last_actions, 0.1)
+
+    def test_torques_are_in_the_order_of_the_spec(self, cart, calm):
+        env = LeggedEnv(calm(1), cart, Plane())
+        env.physics.qpos[:, 2] = 2.0
+        env.step(torch.tensor([[50.0, 0.0, 0.0]]))  # the wheel only
+        assert env.state.torques[0, 0] == pytest.approx(3.0)
+        assert np.abs(env.state.torques[0, 1:]).max() < 1.0
+
+    def test_air_time_counts_from_the_start_and_from_each_lift(self, quadruped, calm):
+        env = LeggedEnv(calm(1), quadruped, Plane())
+        env.physics.qpos[:, 2] = 0.6
+        flown = 0
+        while not env.state.first_contact.any():
+            env.step(torch.zeros(1, 12))
+            flown += 1
+            assert flown < 50
+        came = env.state.first_contact[0]
+        # The step in which a foot comes down counts: so long had it been up, to within a step.
+        np.testing.assert_allclose(env.state.air_time[0, came], flown * env.cfg.dt, rtol=1e-4)
+        env.step(torch.zeros(1, 12))
+        assert not (env.state.first_contact[0] & came).any()
+        np.testing.assert_allclose(env.air_time[0, came & (env.state.foot_force[0, :, 2] > 1)], 0)
+
+    def test_a_foot_that_has_stood_since_it_came_down_comes_down_no_more(self, standing):
+        for _ in range(5):
+            standing.step(torch.zeros(4, 12))
+            assert not standing.state.first_contact.any()
+
+    def test_a_push_changes_the_velocity_in_the_world(self, cart, calm):
+        task = calm(
+            64,
+            domain_rand=DomainRand(
+                friction=None, added_mass=None, com_shift=0, gains=None, motor_strength=None,
+                joint_offset=0, push_interval_s=0.04, max_push_vel_xy=0.8,
+            ),
+        )  # fmt: skip
+        env = LeggedEnv(task, cart, Plane())
+        env.physics.qpos[:, 2] = 3.0
+        env.step(torch.zeros(64, 3))
+        env.step(torch.zeros(64, 3))
+        assert (env.state.push_vel == 0).all()
+        before = env.physics.qvel[:, :2].copy()
+        env.step(torch.zeros(64, 3))  # 0.04 s have gone by
+        added = env.physics.qvel[:, :2] - before
+        np.testing.assert_allclose(added, env.state.push_vel[:, :2], atol=0.05)
+        assert (env.state.push_vel[:, 2] == 0).all()
+        assert 0.7 < np.abs(env.state.push_vel).max() <= 0.8
+
+    def test_the_error_of_a_joints_zero_is_observed_and_told(self, cart, calm):
+        task = calm(
+            2,
+            domain_rand=DomainRand(
+                friction=None, added_mass=None, com_shift=0, gains=None, motor_strength=None,
+                joint_offset=0.1, push_interval_s=0,
+            ),
+        )  # fmt: skip
+        env = LeggedEnv(task, cart, Plane())
+        offset = env.state.joint_offset
+        assert 0.01 < np.abs(offset).max() <= 0.1
+        observed = env.get_observations()["policy"][:, 9:12]
+        np.testing.assert_allclose(observed, offset, atol=1e-6)
+
+
+class TestCopies:
+    def test_arrays_stay_when_the_physics_goes_on(self, quadruped, lively):
+        env = LeggedEnv(lively(3), quadruped, Plane())
+        env.step(torch.zeros(3, 12))
+        kept = env.state
+        before = {field.name: getattr(kept, field.name).copy() for field in fields(State)}
+        for _ in range(5):
+            env.step(torch.full((3, 12), 0.3))
+        for name, value in before.items():
+            np.testing.assert_array_equal(getattr(kept, name), value, err_msg=name)
+
+    def test_nothing_in_it_is_the_environments_own(self, quadruped, lively):
+        # A reward that writes into the state must not change the robots.
+        env = LeggedEnv(lively(3), quadruped, Plane())
+        env.step(torch.zeros(3, 12))
+        own = [env.physics.batch.state, *vars(env.differences).values(), env.commands]
+        own += [env.joint_offset, env.push_vel, env.air_time, env.actions]
+        for field in fields(State):
+            value = getattr(env.state, field.name)
+            assert not any(np.shares_memory(value, other) for other in own), field.name
+
+    def test_numbers_are_single(self, quadruped, calm, map_ground):
+        env = LeggedEnv(calm(3), quadruped, map_ground)
+        env.step(torch.zeros(3, 12))
+        for field in fields(State):
+            value = getattr(env.state, field.name)
+            assert value.dtype in (np.float32, np.bool_), field.name
+
+    def test_put_takes_over_some_robots(self, quadruped, lively):
+        first = LeggedEnv(lively(4), quadruped, Plane()).state
+        before = first.base_pos.copy()
+        other = LeggedEnv(lively(2, init_state=InitState(position=3.0)), quadruped, Plane()).state
+        first.put(np.array([1, 3]), other)
+        np.testing.assert_array_equal(first.base_pos[[1, 3]], other.base_pos)
+        np.testing.assert_array_equal(first.base_pos[[0, 2]], before[[0, 2]])
+
+    def test_a_robot_that_has_just_begun_shows_nothing_of_the_one_before(self, quadruped, calm):
+        env = LeggedEnv(calm(3), quadruped, Plane())
+        for _ in range(30):
+            env.step(torch.full((3, 12), 0.5))
+        env.physics.qpos[1, 3:7] = (0, 1, 0, 0)  # on its back: a fall
+        _, _, dones, _ = env.step(torch.zeros(3, 12))
+        assert dones.tolist() == [False, True, False]
+        new = LeggedEnv(calm(3), quadruped, Plane()).state
+        for field in fields(State):
+            if field.name in ("commands", "foot_height", "foot_vel"):
+                continue
+            found, fresh = getattr(env.state, field.name)[1], getattr(new, field.name)[1]
+            np.testing.assert_allclose(found, fresh, atol=1e-6, err_msg=field.name)
+        where = np.array([1])
+        env.physics.batch.forward(where, stage=mujoco.mjtStage.mjSTAGE_VEL)
+        feet = env.physics.block("foot_position", where)[0]
+        expected = feet[:, 2] - quadruped.spec.foot_radius
+        np.testing.assert_allclose(env.state.foot_height[1], expected, atol=1e-5)

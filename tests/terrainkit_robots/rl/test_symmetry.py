@@ -1,0 +1,324 @@
+"""The mirror: what is true of a robot is true of its image."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from tensordict import TensorDict
+
+from terrainkit.errors import ConfigError
+from terrainkit_robots import bundled
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.ground import Ground, Plane
+from terrainkit_robots.rl.robot import Robot, read_robot
+from terrainkit_robots.rl.symmetry import Mirror, mirror_of, mirrored
+from terrainkit_robots.rl.task import DomainRand, Env, Noise, Sim, Task, Terrain
+from terrainkit_robots.spec.robot_spec import Twin
+
+torch.set_num_threads(1)
+
+_PAIRS = 4
+"""Robots k and k + 4 of each environment here are images of one another."""
+
+
+class Valley(Plane):
+    """A plane that looks like a valley along x, the same to both sides of y = 0."""
+
+    level = False
+
+    def height(self, x: Any, y: Any) -> Any:
+        return (0.3 * np.abs(y) + 0.1 * np.sin(3 * x)).astype(np.float32)
+
+
+def make_env(name: str, ground: Ground | None = None, robot: Robot | None = None) -> LeggedEnv:
+    task = Task(
+        env=Env(num_envs=2 * _PAIRS, num_threads=1),
+        noise=Noise(noise_level=0.0),
+        domain_rand=DomainRand(push_interval_s=0.0),
+        sim=Sim(iterations=100, ls_iterations=50),  # so that both sides converge to the same
+    )
+    return LeggedEnv(task, robot or robot_named(name), ground or Plane())
+
+
+def robot_named(name: str) -> Robot:
+    return read_robot(Path(str(bundled.find(name))).parent)
+
+
+def mirror_physics(env: LeggedEnv, mirror: Mirror, *, turn: bool = True) -> None:
+    """Put a random state into half of the environments, and its image into the others."""
+    rng, p, scene = np.random.default_rng(3), env.physics, env.scene
+    a, b = slice(0, _PAIRS), slice(_PAIRS, 2 * _PAIRS)
+    height = float(env.robot.spec.spawn_height or 0.0)
+    p.qpos[a, :2] = rng.uniform(-1, 1, (_PAIRS, 2))
+    p.qpos[a, 2] = height + rng.uniform(0, 0.02, _PAIRS)
+    quat = np.array([1.0, 0, 0, 0]) + rng.uniform(-0.1, 0.1, (_PAIRS, 4))
+    quat[:, 3] += rng.uniform(-2, 2, _PAIRS) * turn
+    p.qpos[a, 3:7] = quat / np.linalg.norm(quat, axis=1, keepdims=True)
+    bent = env.robot.default_pose + rng.uniform(-0.1, 0.1, (_PAIRS, env.num_actions))
+    p.qpos[a, scene.joint_qpos] = bent
+    p.qvel[a] = rng.uniform(-0.5, 0.5, (_PAIRS, scene.model.nv))
+    # The image, from physics alone: y is turned around, so are turns about x and z.
+    p.qpos[b] = p.qpos[a]
+    p.qpos[b, 1] *= -1
+    p.qpos[b, 4] *= -1
+    p.qpos[b, 6] *= -1
+    p.qvel[b] = p.qvel[a]
+    p.qvel[b, 1] *= -1
+    p.qvel[b, 3] *= -1
+    p.qvel[b, 5] *= -1
+    p.qpos[b, scene.joint_qpos] = mirror.actions.of(p.qpos[a, scene.joint_qpos])
+    p.qvel[b, scene.joint_qvel] = mirror.actions.of(p.qvel[a, scene.joint_qvel])
+
+
+def mirror_memory(env: LeggedEnv, mirror: Mirror) -> None:
+    """Make commands, actions and differences of one half the images of the other's."""
+    from terrainkit_robots.rl.randomization import apply_differences
+
+    rng = np.random.default_rng(4)
+    a, b = slice(0, _PAIRS), slice(_PAIRS, 2 * _PAIRS)
+    env.hold_commands(rng.uniform(-1, 1, (2 * _PAIRS, 3)).astype(np.float32))
+    assert env.held is not None
+    env.held[b] = env.held[a] * np.array([1, -1, -1])
+    env.actions[:, a] = rng.uniform(-0.2, 0.2, env.actions[:, a].shape)
+    env.actions[:, b] = [mirror.actions.of(each) for each in env.actions[:, a]]
+    env.push_vel[a] = rng.uniform(-1, 1, (_PAIRS, 3)) * [1, 1, 0]
+    env.push_vel[b] = env.push_vel[a] * np.array([1, -1, 1])
+    env.joint_offset[b] = mirror.actions.of(env.joint_offset[a])
+    env.air_time[:] = 0
+    d = env.differences
+    for same in (d.friction, d.geom_friction, d.added_mass, d.strength):
+        same[b] = same[a]
+    d.com_shift[b] = d.com_shift[a] * np.array([1, -1, 1])
+    for each in (d.stiffness, d.damping):
+        each[b] = each[a][:, mirror.actions.index]  # a factor has no direction
+    apply_differences(env.physics, env.differences)
+
+
+def assert_images(env: LeggedEnv, mirror: Mirror, tolerance: float) -> None:
+    for name, image in mirror.groups.items():
+        values = env.get_observations()[name].numpy()
+        one, other = values[:_PAIRS], values[_PAIRS:]
+        width = 0
+        for each in env.groups[name]:
+            here = slice(width, width + each.read(env.state).shape[1])
+            width = here.stop
+            np.testing.assert_allclose(
+                image.of(one)[:, here], other[:, here], atol=tolerance, err_msg=each.name
+            )
+        assert width == values.shape[1]
+
+
+@pytest.mark.parametrize("name", ["quadruped", "biped"])
+class TestRobot:
+    def test_image_of_image(self, name: str) -> None:
+        env = make_env(name, Valley())
+        mirror = mirror_of(env)
+        for image in (*mirror.groups.values(), mirror.actions):
+            values = np.random.default_rng(1).normal(size=(3, len(image.index))).astype(np.float32)
+            np.testing.assert_array_equal(image.of(image.of(values)), values)
+            assert not np.array_equal(image.of(values), values)
+            assert sorted(image.index) == list(range(len(image.index)))
+            assert set(image.sign) == {-1, 1}
+
+    def test_mirrored_states_give_mirrored_observations(self, name: str) -> None:
+        env = make_env(name, Valley())
+        mirror = mirror_of(env)
+        mirror_physics(env, mirror)
+        mirror_memory(env, mirror)
+        _look_again(env)
+        # The feet have no contacts yet; any forces will do, of feet that are images by their place.
+        feet = env.physics.block("foot_position")
+        force = np.random.default_rng(5).uniform(-50, 50, feet.shape).astype(np.float32)
+        twins = _nearest_images(feet)
+        force[_PAIRS:] = force[:_PAIRS, twins] * np.array([1, -1, 1], np.float32)
+        env.state.foot_force[:] = force
+        env._observed = env._observe()
+        assert_images(env, mirror, 3e-5)
+        scan = env.state.height_scan
+        assert np.ptp(scan[0]) > 0.1
+        assert not np.allclose(scan[0], scan[_PAIRS])
+
+    def test_mirrored_actions_lead_to_mirrored_states(self, name: str) -> None:
+        env = make_env(name)
+        mirror = mirror_of(env)
+        mirror_physics(env, mirror)
+        mirror_memory(env, mirror)
+        rng = np.random.default_rng(6)
+        touched = False
+        for _ in range(6):
+            one = rng.uniform(-0.5, 0.5, (_PAIRS, env.num_actions)).astype(np.float32)
+            actions = np.concatenate([one, mirror.actions.of(one)])
+            env.step(torch.from_numpy(actions))
+            touched |= bool((env.state.foot_force[..., 2] > 5).any())
+            assert not env.state.fallen.any()
+        assert touched
+        assert_images(env, mirror, 2e-3)
+        image = env.physics.qpos[:_PAIRS].copy()
+        image[:, [1, 4, 6]] *= -1
+        np.testing.assert_allclose(image[:, :7], env.physics.qpos[_PAIRS:, :7], atol=1e-4)
+        rewards = env._reward(env.state)
+        np.testing.assert_allclose(rewards[:_PAIRS], rewards[_PAIRS:], atol=1e-4)
+
+    def test_wrong_sign_is_seen(self, name: str) -> None:
+        """Proves that the tests above can fail."""
+        env = make_env(name)
+        mirror = mirror_of(env)
+        mirror_physics(env, mirror)
+        mirror_memory(env, mirror)
+        _look_again(env)
+        mirror.groups["policy"].sign[-1] *= -1
+        with pytest.raises(AssertionError, match="actions"):
+            assert_images(env, mirror, 3e-5)
+
+
+class TestMirrored:
+    def test_originals_then_images(self) -> None:
+        env = make_env("quadruped")
+        mirror, obs = mirror_of(env), env.get_observations()
+        actions = torch.randn(8, 12)
+        both, acted = mirrored(env, obs, actions)
+        assert both is not None
+        assert acted is not None
+        assert both.batch_size == torch.Size([16])
+        assert set(both.keys()) == {"policy", "privileged"}
+        for name, image in mirror.groups.items():
+            np.testing.assert_array_equal(both[name][:8], obs[name])
+            np.testing.assert_array_equal(both[name][8:], image.of(obs[name].numpy()))
+        np.testing.assert_array_equal(acted[:8], actions)
+        np.testing.assert_array_equal(acted[8:], mirror.actions.of(actions.numpy()))
+
+    def test_either_may_be_none(self) -> None:
+        env = make_env("quadruped")
+        both, acted = mirrored(env, None, torch.zeros(2, 12))
+        assert both is None
+        assert acted is not None
+        assert acted.shape == (4, 12)
+        both, acted = mirrored(env, env.get_observations()[:3], None)
+        assert acted is None
+        assert both is not None
+        assert both["policy"].shape == (6, 45)
+
+    def test_gradients_pass(self) -> None:
+        env = make_env("quadruped")
+        actions = torch.zeros(1, 12, requires_grad=True)
+        _, acted = mirrored(env, None, actions)
+        assert acted is not None
+        acted.sum().backward()
+        assert actions.grad is not None
+        # Of a quadruped's joints only the hips turn the other way: 1 + 1 or 1 - 1.
+        assert sorted(actions.grad[0].tolist()) == [0] * 4 + [2] * 8
+
+    def test_rsl_rl_takes_it(self) -> None:
+        from rsl_rl.extensions.symmetry import Symmetry
+        from rsl_rl.storage import RolloutStorage
+
+        env = make_env("quadruped")
+        symmetry = Symmetry(env, mirrored, use_data_augmentation=True)
+        batch = RolloutStorage.Batch()
+        batch.observations, batch.actions = env.get_observations(), torch.zeros(8, 12)
+        batch.old_actions_log_prob = batch.values = torch.arange(8.0)[:, None]
+        batch.advantages = batch.returns = torch.zeros(8, 1)
+        symmetry.augment_batch(batch, 8)
+        assert batch.observations.batch_size == torch.Size([16])
+        assert batch.actions.shape == (16, 12)
+        assert batch.values[:, 0].tolist() == 2 * list(range(8))
+
+    def test_group_unknown_here(self) -> None:
+        env = make_env("quadruped")
+        with pytest.raises(ConfigError, match="group 'camera'; there are: policy, privileged"):
+            mirrored(env, TensorDict({"camera": torch.zeros(8, 3)}, batch_size=[8]), None)
+
+
+class TestNames:
+    """The mirror of the quadruped, by the names of its joints and feet."""
+
+    def test_joints(self) -> None:
+        env = make_env("quadruped")
+        names, image = env.robot.spec.joint_order, mirror_of(env).actions
+        for k, (index, sign) in enumerate(zip(image.index, image.sign, strict=True)):
+            swapped = {"L": "R", "R": "L"}[names[k][1]]
+            assert names[index] == names[k][0] + swapped + names[k][2:]
+            assert sign == (-1 if "hip" in names[k] else 1)
+
+    def test_commands_vectors_turns(self) -> None:
+        image = mirror_of(make_env("quadruped")).groups["policy"]
+        np.testing.assert_array_equal(image.index[:9], range(9))
+        np.testing.assert_array_equal(image.sign[:9], [1, -1, -1, 1, -1, 1, -1, 1, -1])
+
+    def test_feet(self) -> None:
+        env = make_env("quadruped")
+        feet = list(env.robot.spec.feet)
+        image = mirror_of(env).groups["privileged"]
+        width = len(image.index)
+        own = image.index[-12:] - (width - 12)
+        for k, foot in enumerate(feet):
+            twin = feet.index(foot[0] + {"L": "R", "R": "L"}[foot[1]] + foot[2:])
+            assert own[3 * k : 3 * k + 3].tolist() == [3 * twin, 3 * twin + 1, 3 * twin + 2]
+        assert image.sign[-12:].tolist() == [1, -1, 1] * 4
+
+    def test_scan(self) -> None:
+        env = make_env("quadruped", Valley())
+        image = mirror_of(env).groups["policy"]
+        rows = (image.index[-187:] - 45).reshape(17, 11)
+        np.testing.assert_array_equal(rows, np.arange(187).reshape(17, 11)[:, ::-1])
+        assert (image.sign[-187:] == 1).all()
+
+
+class TestErrors:
+    def test_joint_without_twin(self) -> None:
+        robot = robot_named("quadruped")
+        mirror = {k: v for k, v in robot.spec.mirror.items() if k != "FL_hip_joint"}
+        env = make_env("", robot=replace(robot, spec=replace(robot.spec, mirror=mirror)))
+        with pytest.raises(ConfigError, match=r"wants a twin for each joint.*FL_hip_joint"):
+            mirror_of(env)
+
+    def test_twin_that_is_not_one(self) -> None:
+        robot = robot_named("quadruped")
+        mirror = dict(robot.spec.mirror) | {"FL_hip_joint": Twin(joint="RR_hip_joint", sign=-1)}
+        env = make_env("", robot=replace(robot, spec=replace(robot.spec, mirror=mirror)))
+        with pytest.raises(ConfigError, match="FL_hip_joint has the twin 'RR_hip_joint'"):
+            mirror_of(env)
+
+    def test_default_pose_differs(self) -> None:
+        robot = robot_named("quadruped")
+        pose = robot.default_pose.copy()
+        pose[1] += 0.1
+        with pytest.raises(ConfigError, match="same default_pose to the left and to the right"):
+            mirror_of(make_env("", robot=replace(robot, default_pose=pose)))
+
+    def test_scan_that_leans(self) -> None:
+        env = make_env("quadruped", Valley())
+        terrain = Terrain(measured_points_y=(-0.5, 0.0, 0.4))
+        leaning = LeggedEnv(replace(env.cfg, terrain=terrain), env.robot, Valley())
+        with pytest.raises(ConfigError, match=r"measured_points_y .* has -0\.5 without 0\.5"):
+            mirror_of(leaning)
+
+    def test_observation_of_another_width(self) -> None:
+        env = make_env("quadruped")
+        first, *others = env.groups["policy"]
+        env.groups["policy"] = (replace(first, image="joints"), *others)
+        with pytest.raises(ConfigError, match="commands has 3 numbers; its image, 'joints'"):
+            mirror_of(env)
+
+
+def _look_again(env: LeggedEnv) -> None:
+    """Observe what was written into the physics."""
+    import mujoco
+
+    everyone = np.arange(env.num_envs)
+    env.physics.batch.forward(everyone, mujoco.mjtStage.mjSTAGE_VEL)
+    assert env.held is not None
+    env.commands[:] = env.held
+    env.state = env._look(everyone, fresh=True)
+    env._observed = env._observe()
+
+
+def _nearest_images(feet: Any) -> list[int]:
+    """Return which foot of one robot stands where the image of each foot of the other does."""
+    image = feet[:_PAIRS] * np.array([1, -1, 1])
+    far = np.linalg.norm(feet[_PAIRS:, :, None] - image[:, None], axis=-1).max(axis=0)
+    assert far.min(axis=1).max() < 1e-4
+    return [int(k) for k in far.argmin(axis=1)]

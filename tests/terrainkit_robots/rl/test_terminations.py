@@ -1,0 +1,135 @@
+"""The terminations: what is a fall and what is not."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from terrainkit_robots import bundled
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.ground import Plane
+from terrainkit_robots.rl.robot import read_robot
+from terrainkit_robots.rl.rotation import gravity_in_body
+from terrainkit_robots.rl.task import DomainRand, Env, InitState, Task, Termination
+from terrainkit_robots.rl.terminations import outside, tilted, touched
+
+torch.set_num_threads(1)
+
+
+class Field(Plane):
+    """A plane of 10 m x 4 m."""
+
+    lower, upper = (-5.0, -1.0), (5.0, 3.0)
+
+
+class TestTouched:
+    def test_by_hand(self) -> None:
+        force = np.zeros((5, 2, 3), np.float32)
+        force[1, 0] = (0.6, 0, 0.79)  # just under 1 N
+        force[2, 1] = (0, -0.7, 0.75)  # just over
+        force[3, 0], force[3, 1] = (0.9, 0, 0), (0, 0.9, 0)  # each for itself
+        force[4, 1] = (0, 0, -300)
+        assert touched(force, Termination()).tolist() == [False, False, True, False, True]
+        harder = touched(force, Termination(contact_force=300.5))
+        assert harder.tolist() == [False] * 5
+
+    def test_without_termination_bodies(self) -> None:
+        assert touched(np.zeros((3, 0, 3), np.float32), Termination()).tolist() == [False] * 3
+
+
+class TestTilted:
+    @pytest.mark.parametrize("around", [1, 2])
+    def test_by_angle(self, around: int) -> None:
+        """Rolled or pitched by an angle, it is that angle that counts."""
+        angles = np.array([0, 0.5, 1.29, 1.31, 2, np.pi, -1.29, -1.31], np.float32)
+        quat = np.zeros((len(angles), 4), np.float32)
+        quat[:, 0], quat[:, around] = np.cos(angles / 2), np.sin(angles / 2)
+        found = tilted(gravity_in_body(quat), Termination())
+        assert found.tolist() == [False, False, False, True, True, True, False, True]
+        less = tilted(gravity_in_body(quat), Termination(tilt=0.4))
+        assert less.tolist() == [False] + [True] * 7
+
+    def test_turning_is_no_tilt(self) -> None:
+        yaw = np.linspace(-3, 3, 9, dtype=np.float32)
+        quat = np.zeros((9, 4), np.float32)
+        quat[:, 0], quat[:, 3] = np.cos(yaw / 2), np.sin(yaw / 2)
+        assert not tilted(gravity_in_body(quat), Termination(tilt=0.01)).any()
+
+
+class TestOutside:
+    def test_by_hand(self) -> None:
+        places = [[0, 0, 9], [4.9, 2.9, 0], [5.1, 0, 0], [-5.1, 0, 0], [0, 3.1, 0], [0, -1.1, 0]]
+        found = outside(np.array(places, np.float32), Field())
+        assert found.tolist() == [False, False, True, True, True, True]
+
+    def test_plane_has_no_end(self) -> None:
+        assert not outside(np.array([[1e6, -1e6, 0]], np.float32), Plane()).any()
+
+
+def make_env(ground: Plane | None = None, **changes: Any) -> LeggedEnv:
+    task = Task(
+        env=Env(num_envs=4, num_threads=1, episode_length_s=0.2),
+        init_state=InitState(lin_vel=0, ang_vel=0, yaw=0, reset_range=(1, 1)),
+        domain_rand=DomainRand(push_interval_s=0),
+        **changes,
+    )
+    robot = read_robot(Path(str(bundled.find("quadruped"))).parent)
+    return LeggedEnv(task, robot, ground or Plane())
+
+
+def step(env: LeggedEnv) -> tuple[list[bool], list[bool]]:
+    """Return who is done, and whose time is out."""
+    _, _, dones, extras = env.step(torch.zeros(4, 12))
+    return dones.tolist(), extras["time_outs"].tolist()
+
+
+class TestEnvironment:
+    def test_upright_robots_live_until_their_time_is_out(self) -> None:
+        env = make_env()
+        for _ in range(9):
+            assert step(env) == ([False] * 4, [False] * 4)
+        assert step(env) == ([True] * 4, [True] * 4)
+
+    def test_on_its_back(self) -> None:
+        env = make_env()
+        env.physics.qpos[2, 3:7] = (0, 1, 0, 0)
+        assert step(env) == ([False, False, True, False], [False] * 4)
+
+    def test_trunk_on_the_ground(self) -> None:
+        env = make_env()
+        env.physics.qpos[1, 2] = 0.05
+        env.physics.qpos[1, env.scene.joint_qpos] = [0, 1.5, -2.5] * 4
+        dones, time_outs = step(env)
+        assert dones == [False, True, False, False]
+        assert time_outs == [False] * 4
+
+    def test_trunk_may_touch_where_nothing_says_it_ends(self) -> None:
+        env = make_env(termination=Termination(contact_force=1e9))
+        env.physics.qpos[1, 2] = 0.05
+        env.physics.qpos[1, env.scene.joint_qpos] = [0, 1.5, -2.5] * 4
+        assert step(env)[0] == [False] * 4
+
+    def test_out_of_the_map(self) -> None:
+        env = make_env(Field())
+        env.physics.qpos[3, 1] = -1.2
+        assert step(env) == ([False, False, False, True], [False] * 4)
+        assert env.state.base_pos[3, 1] > -1  # begun anew
+
+    def test_physics_that_blow_up(self) -> None:
+        env = make_env()
+        env.physics.qvel[0, 6] = 1e12
+        dones, time_outs = step(env)
+        assert dones == [True, False, False, False]
+        assert time_outs == [False] * 4
+        for value in env.get_observations().values():
+            assert torch.isfinite(value).all()
+        assert step(env)[0] == [False] * 4
+
+    def test_fall_at_the_last_moment_is_a_fall(self) -> None:
+        env = make_env()
+        for _ in range(9):
+            step(env)
+        env.physics.qpos[0, 3:7] = (0, 1, 0, 0)
+        assert step(env) == ([True] * 4, [False, True, True, True])

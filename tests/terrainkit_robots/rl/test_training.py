@@ -1,0 +1,291 @@
+import os
+import resource
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from terrainkit.errors import CapacityError, ConfigError, ExportError
+from terrainkit_robots.rl import registry
+from terrainkit_robots.rl.checkpoint import only_policy, read_checkpoint, save_checkpoint
+from terrainkit_robots.rl.progress import Progress
+from terrainkit_robots.rl.run_folder import checkpoints, open_run
+from terrainkit_robots.rl.task import Algorithm, Env, Policy, Runner, Task
+from terrainkit_robots.rl.training import train
+
+
+@pytest.fixture
+def task() -> Task:
+    """Return a task of short episodes, so that many end, and of small networks."""
+    return Task(
+        env=Env(num_envs=4, num_threads=1, episode_length_s=0.3),
+        policy=Policy(actor_hidden_dims=(16,), critic_hidden_dims=(16,)),
+        algorithm=Algorithm(num_learning_epochs=2, num_mini_batches=2),
+        runner=Runner(num_steps_per_env=8, max_iterations=4),
+    )
+
+
+def lasting(task: Task, iterations: int) -> Task:
+    return replace(task, runner=replace(task.runner, max_iterations=iterations))
+
+
+def weights(path: Path) -> list[torch.Tensor]:
+    return list(read_checkpoint(path)["actor_state_dict"].values())
+
+
+def same_weights(a: Path, b: Path) -> bool:
+    return all(torch.equal(x, y) for x, y in zip(weights(a), weights(b), strict=True))
+
+
+@contextmanager
+def full_disk(size: int) -> Iterator[None]:
+    """Let no file grow beyond a size [bytes]."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+def test_training_makes_a_run(task, tmp_path):
+    trained = train("quadruped", "plane", task, folder=tmp_path / "run")
+    assert (trained.folder, trained.iteration, trained.signal) == (tmp_path / "run", 4, 0)
+    run = open_run(tmp_path / "run")
+    assert run.task == task
+    assert run.checkpoint == tmp_path / "run" / "model_4.pt"
+
+
+def test_the_folder_has_the_robot_and_the_time_in_its_name(task, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    folder = train("quadruped", "plane", lasting(task, 1)).folder
+    assert folder.parent == Path("logs/quadruped")
+    assert (folder / "model_1.pt").exists()
+
+
+def test_a_run_goes_on_exactly_in_its_own_folder(task, tmp_path):
+    train("quadruped", "plane", task, folder=tmp_path / "whole")
+    train("quadruped", "plane", lasting(task, 2), folder=tmp_path / "run")
+    done = train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
+    assert done.folder == tmp_path / "run"
+    assert same_weights(tmp_path / "whole" / "model_4.pt", tmp_path / "run" / "model_4.pt")
+    assert list(checkpoints(tmp_path / "run")) == [2, 4]
+    assert open_run(tmp_path / "run").task == task
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_goes_on_as_if_it_had_not_been(task, tmp_path, number):
+    def interrupt(progress: Progress) -> None:
+        if progress.iteration == 2:
+            signal.raise_signal(number)
+
+    before = [signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)]
+    train("quadruped", "plane", task, folder=tmp_path / "whole")
+    stopped = train("quadruped", "plane", task, folder=tmp_path / "run", watch=interrupt)
+    assert (stopped.iteration, stopped.signal) == (2, number)
+    assert [signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)] == before
+    train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
+    assert same_weights(tmp_path / "whole" / "model_4.pt", tmp_path / "run" / "model_4.pt")
+
+
+def test_a_second_interrupt_ends_it_at_once(task, tmp_path):
+    def interrupt(_progress: Progress) -> None:
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        train("quadruped", "plane", task, folder=tmp_path / "run", watch=interrupt)
+    assert checkpoints(tmp_path / "run") == {}
+
+
+def test_a_thread_may_train_too(task, tmp_path):
+    trained: list[Any] = []
+    work = threading.Thread(
+        target=lambda: trained.append(
+            train("quadruped", "plane", lasting(task, 1), folder=tmp_path / "run")
+        )
+    )
+    work.start()
+    work.join()
+    assert trained[0].iteration == 1
+
+
+def test_with_more_environments_a_run_goes_on_in_its_folder(task, tmp_path):
+    train("quadruped", "plane", lasting(task, 1), folder=tmp_path / "run")
+    more = lasting(replace(task, env=replace(task.env, num_envs=6)), 2)
+    done = train("quadruped", "plane", more, resume=open_run(tmp_path / "run"))
+    assert (done.folder, done.iteration) == (tmp_path / "run", 2)
+    assert open_run(tmp_path / "run").task.env.num_envs == 6
+
+
+def test_from_an_earlier_checkpoint_nothing_is_overwritten(task, tmp_path):
+    run, branch = tmp_path / "run", tmp_path / "branch"
+    train(
+        "quadruped",
+        "plane",
+        replace(task, runner=replace(task.runner, save_interval=2)),
+        folder=run,
+    )
+    before = (run / "model_4.pt").read_bytes()
+    done = train("quadruped", "plane", task, resume=open_run(run, 2), folder=branch)
+    assert done.folder == branch
+    assert (run / "model_4.pt").read_bytes() == before
+    assert same_weights(run / "model_4.pt", branch / "model_4.pt")
+
+
+def test_another_task_begins_a_new_run_with_the_networks(task, tmp_path, mixed_map):
+    run = tmp_path / "run"
+    train("quadruped", "plane", task, folder=run)
+    other = lasting(replace(task, rewards=replace(task.rewards, base_height=-1.0)), 1)
+    seen: list[int] = []
+    done = train(
+        "quadruped",
+        "plane",
+        other,
+        resume=open_run(run),
+        folder=tmp_path / "other",
+        watch=lambda progress: seen.append(progress.iteration),
+    )
+    assert (done.folder, seen) == (tmp_path / "other", [1])
+    blind = replace(task.terrain, measure_heights=False)
+    path = mixed_map.save(tmp_path / "map.npz")
+    done = train(
+        "quadruped",
+        path,
+        lasting(replace(task, terrain=blind), 1),
+        resume=open_run(run),
+        folder=tmp_path / "map",
+    )
+    assert open_run(done.folder).terrain == str(path)
+
+
+def test_a_policy_alone_is_gone_on_with_in_a_new_run(task, tmp_path):
+    run = tmp_path / "run"
+    train("quadruped", "plane", lasting(task, 1), folder=run)
+    path = run / "model_1.pt"
+    save_checkpoint(path, only_policy(read_checkpoint(path)))
+    done = train("quadruped", "plane", task, resume=open_run(run), folder=tmp_path / "more")
+    assert (done.folder, done.iteration) == (tmp_path / "more", 4)
+    assert list(checkpoints(run)) == [1]
+
+
+def test_a_run_that_is_done_says_so(task, tmp_path):
+    train("quadruped", "plane", task, folder=tmp_path / "run")
+    with pytest.raises(ConfigError, match=r"4 iterations are done; runner\.max_iterations is 4"):
+        train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
+
+
+def test_a_run_of_another_robot_is_told(task, tmp_path):
+    train("quadruped", "plane", lasting(task, 1), folder=tmp_path / "run")
+    with pytest.raises(ConfigError, match="is of another robot, quadruped"):
+        train("biped", "plane", task, resume=open_run(tmp_path / "run"), folder=tmp_path / "b")
+    assert not (tmp_path / "b").exists()
+
+
+def test_a_run_that_is_there_is_not_overwritten(task, tmp_path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "mine.txt").touch()
+    with pytest.raises(ExportError, match="exists"):
+        train("quadruped", "plane", task, folder=tmp_path / "run")
+    assert [path.name for path in (tmp_path / "run").iterdir()] == ["mine.txt"]
+
+
+def test_a_disk_that_fills_up_leaves_the_checkpoint_before(task, tmp_path, capfd):
+    task = replace(task, runner=replace(task.runner, save_interval=2))
+    disk = full_disk(20_000)
+
+    def fill(progress: Progress) -> None:
+        if progress.iteration == 3:
+            disk.__enter__()
+
+    run = tmp_path / "run"
+    try:
+        with pytest.raises(
+            ExportError, match=r"cannot write .*model_4\.pt: File too large; .* is .*model_2\.pt"
+        ):
+            train("quadruped", "plane", task, folder=run, watch=fill)
+    finally:
+        disk.__exit__(None, None, None)
+    assert open_run(run).checkpoint == run / "model_2.pt"
+    assert read_checkpoint(run / "model_2.pt")["iteration"] == 2
+    assert sorted(path.name for path in run.iterdir() if path.name.startswith(".")) == []
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_disk_that_is_too_full_for_the_curves_is_one_error(task, tmp_path, capfd):
+    disk = full_disk(200)
+
+    def fill(progress: Progress) -> None:
+        if progress.iteration == 1:
+            disk.__enter__()
+
+    try:
+        with pytest.raises(
+            ExportError, match=r"cannot write .*: File too large; there is no check"
+        ):
+            train("quadruped", "plane", task, folder=tmp_path / "run", watch=fill)
+    finally:
+        disk.__exit__(None, None, None)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_training_that_diverges_points_at_the_last_checkpoint(task, tmp_path):
+    algorithm = replace(task.algorithm, learning_rate=1e30, schedule="fixed")
+    mad = replace(task, algorithm=algorithm)
+    with pytest.raises(ConfigError, match=r"networks have diverged.*; there is no checkpoint"):
+        train("quadruped", "plane", mad, folder=tmp_path / "run")
+
+
+def test_too_many_environments_are_refused_before_anything_is_made(task, tmp_path):
+    many = replace(task, env=replace(task.env, num_envs=100_000_000))
+    with pytest.raises(CapacityError, match=r"100000000 environments needs .* GB .* would fit"):
+        train("quadruped", "plane", many, folder=tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_wandb_has_to_be_installed(task, tmp_path, monkeypatch):
+    monkeypatch.setattr("terrainkit_robots.rl.training.find_spec", lambda _: None)
+    task = replace(task, runner=replace(task.runner, logger="wandb"))
+    with pytest.raises(ConfigError, match="wandb, which is not installed: pip install wandb"):
+        train("quadruped", "plane", task, folder=tmp_path / "run")
+
+
+@pytest.mark.parametrize("device", ["gpu", "cuda:99", "meta"])
+def test_a_device_that_is_not_there_is_told(task, tmp_path, device):
+    if torch.cuda.is_available():
+        pytest.skip("there is one")
+    with pytest.raises(ConfigError, match=f"device '{device}'; here there is: cpu"):
+        train("quadruped", "plane", task, folder=tmp_path / "run", device=device)
+
+
+def test_processes_share_the_environments(task, tmp_path, monkeypatch):
+    monkeypatch.setenv("WORLD_SIZE", "9")
+    with pytest.raises(
+        ConfigError, match=r"env\.num_envs is 4; wanted one for each of 9 processes"
+    ):
+        train("quadruped", "plane", task, folder=tmp_path / "run")
+
+
+def test_a_spec_that_does_not_fit_its_robot_is_told(task, tmp_path):
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    for path in registry.find("quadruped").folder.iterdir():
+        if path.is_file():
+            (mine / path.name).write_bytes(path.read_bytes())
+    model = mine / "quadruped.xml"
+    model.write_text(model.read_text().replace("FL_hip_joint", "FL_shoulder_joint"))
+    with pytest.raises(ConfigError, match="has the joint 'FL_hip_joint'"):
+        train(mine, "plane", task, folder=tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_waiting_threads_are_told_to_be_passive(task, tmp_path, monkeypatch):
+    monkeypatch.delenv("OMP_WAIT_POLICY", raising=False)
+    train("quadruped", "plane", lasting(task, 1), folder=tmp_path / "run")
+    assert os.environ["OMP_WAIT_POLICY"] == "PASSIVE"

@@ -1,0 +1,177 @@
+import json
+import subprocess
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from terrainkit.errors import ConfigError, ExportError
+from terrainkit_robots.onboard import pictures
+from terrainkit_robots.onboard.pictures import PicturesError
+from terrainkit_robots.rl import video
+from terrainkit_robots.rl.scene import build_scene
+from terrainkit_robots.rl.video import Film, Shot, check_video, film_frames
+
+SIZE = (160, 96)
+
+
+@pytest.fixture(scope="module")
+def film(quadruped, map_ground, calm):
+    """Return a film of three robots on a map: each walks 6 m in a second, sideways to the other."""
+    model = build_scene(quadruped, map_ground, calm()).model
+    home = np.array(model.qpos0)
+    home[:3] = [*map_ground.env_origins[0, 0, :2], map_ground.env_origins[0, 0, 2] + 0.35]
+    poses = np.tile(home, (8, 3, 1)).astype(np.float32)
+    poses[:, 1, 1] += 1
+    poses[:, 2, 0] += 500  # so far away that it is not drawn
+    poses[:, :, 0] += np.linspace(0, 6 / 25 * 7, 8)[:, None]
+    shots = (
+        Shot(robot=0, start=0, stop=6, captions=("first",) * 6),
+        Shot(robot=1, start=2, stop=4, captions=("second",) * 2),
+    )
+    return Film(model=model, poses=poses, shots=shots, fps=25.0, size=SIZE)
+
+
+@pytest.fixture(scope="module")
+def drawn(film, tmp_path_factory):
+    """Return the frames of its video; skips where MuJoCo cannot draw."""
+    path = tmp_path_factory.mktemp("film") / "film.mp4"
+    try:
+        assert list(film_frames(film, path)) == list(range(8))
+    except PicturesError as error:
+        pytest.skip(str(error))
+    assert [each.name for each in path.parent.iterdir()] == ["film.mp4"]
+    return read(path)
+
+
+def read(path):
+    reader = cv2.VideoCapture(str(path))
+    assert reader.get(cv2.CAP_PROP_FPS) == 25
+    frames = []
+    while True:
+        more, frame = reader.read()
+        if not more:
+            return np.array(frames).astype(int)
+        frames.append(frame)
+
+
+def test_it_can_be_played_and_has_every_frame(drawn):
+    assert drawn.shape == (8, SIZE[1], SIZE[0], 3)
+
+
+def test_something_is_to_be_seen_and_moves(drawn):
+    assert drawn[0].std() > 10
+    assert np.abs(drawn[5] - drawn[0]).mean() > 1
+    assert np.abs(drawn[6] - drawn[2]).mean() > 1  # another robot at the same time
+
+
+def test_far_away_is_bright_and_near_is_ground(drawn):
+    for frame in drawn:
+        top, bottom = frame[: SIZE[1] // 12].mean(), frame[2 * SIZE[1] // 3 :].mean()
+        assert top > 200
+        assert bottom < top - 20
+
+
+def test_captions_are_below_on_the_left(film, drawn, tmp_path):
+    bare = Film(
+        model=film.model,
+        poses=film.poses,
+        shots=(replace(film.shots[0], captions=("",) * 6),),
+        fps=25.0,
+        size=SIZE,
+    )
+    path = tmp_path / "bare.mp4"
+    list(film_frames(bare, path))
+    changed = np.abs(read(path)[0] - drawn[0]).max(axis=2) > 25
+    rows, columns = np.nonzero(changed)
+    assert len(rows) > 5
+    assert rows.min() > 0.8 * SIZE[1]
+    assert columns.max() < 0.5 * SIZE[0]
+
+
+def test_an_existing_video_stays_unless_told(film, tmp_path):
+    path = tmp_path / "film.mp4"
+    path.write_bytes(b"mine")
+    with pytest.raises(ExportError, match="exists"):
+        next(film_frames(film, path))
+    assert path.read_bytes() == b"mine"
+
+
+@pytest.mark.parametrize("name", ["film.avi", "film", "film.mp4.png"])
+def test_other_formats_are_refused(tmp_path, name):
+    with pytest.raises(ConfigError, match=r"wanted a name that ends in \.mp4"):
+        check_video(tmp_path / name)
+
+
+@pytest.mark.parametrize("size", [(0, 96), (161, 96), (160, 5000), (-2, 96)])
+def test_sizes_that_cannot_be_are_refused(film, size):
+    with pytest.raises(ConfigError, match="wanted two even numbers from 64 to 4096"):
+        Film(model=film.model, poses=film.poses, shots=film.shots, fps=25.0, size=size)
+
+
+def test_a_film_without_frames_is_refused(film):
+    with pytest.raises(ConfigError, match="no frames"):
+        Film(model=film.model, poses=film.poses, shots=(), fps=25.0)
+
+
+def test_a_graphics_library_that_is_not_there_is_an_error(film, tmp_path, monkeypatch):
+    monkeypatch.setenv("TERRAINKIT_MUJOCO_GL", "osmesa")
+    monkeypatch.setenv("PYOPENGL_PLATFORM", "osmesa")
+    monkeypatch.setattr(pictures, "_environment", lambda _: {"PATH": "", "MUJOCO_GL": "crayons"})
+    path = tmp_path / "film.mp4"
+    with pytest.raises(PicturesError, match=r"MuJoCo cannot draw here \(osmesa: .*MUJOCO_GL says"):
+        list(film_frames(film, path))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_crash_is_an_error_and_leaves_nothing(film, tmp_path, monkeypatch):
+    monkeypatch.setenv("TERRAINKIT_MUJOCO_GL", "egl")
+    monkeypatch.setattr(video.sys, "executable", "/bin/false")
+    with pytest.raises(PicturesError, match="egl: it crashed"):
+        list(film_frames(film, tmp_path / "film.mp4"))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_never_comes_back_is_ended(film, tmp_path, monkeypatch):
+    sleeper = tmp_path / "sleeper"
+    sleeper.write_text("#!/bin/sh\nexec sleep 60\n")
+    sleeper.chmod(0o755)
+    monkeypatch.setattr(video.sys, "executable", str(sleeper))
+    monkeypatch.setattr(video, "_PATIENCE", 0.2)
+    with pytest.raises(PicturesError, match="did not draw in time"):
+        list(film_frames(film, tmp_path / "film.mp4"))
+    assert [each.name for each in tmp_path.iterdir()] == ["sleeper"]
+
+
+def test_the_other_process_answers_what_is_wrong(tmp_path, monkeypatch):
+    request = {"folder": str(tmp_path), "shots": [], "fps": 25, "size": [64, 64]}
+    monkeypatch.setattr(video.json, "load", lambda _: request)
+    video.main()
+    answer = json.loads((tmp_path / "answer.json").read_text())
+    assert "FileNotFoundError" in answer["failed"]
+
+
+def test_the_camera_keeps_calm():
+    path = np.zeros((100, 3), np.float32)
+    path[:, 0] = np.linspace(0, 6, 100)
+    path[:, 2] = 0.3 + 0.05 * (-1.0) ** np.arange(100)
+    smooth = video._smooth(path, 8.0)
+    assert smooth.shape == path.shape
+    np.testing.assert_allclose(smooth[:, 0], path[:, 0], atol=1e-4)  # a straight way stays
+    assert np.ptp(smooth[25:-25, 2]) < 1e-3
+    assert video._smooth(path[:1], 8.0).shape == (1, 3)
+
+
+def test_the_module_is_a_process_of_its_own(tmp_path):
+    done = subprocess.run(
+        [video.sys.executable, "-P", "-m", video.__name__],
+        input=b"{",
+        capture_output=True,
+        cwd=tmp_path,
+        env=pictures._environment(""),
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode != 0
+    assert list(tmp_path.iterdir()) == []
