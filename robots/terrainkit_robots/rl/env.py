@@ -18,6 +18,7 @@ from terrainkit_robots.rl.careers import Careers
 from terrainkit_robots.rl.commands import draw_commands, turning_to, widened
 from terrainkit_robots.rl.control import control_of
 from terrainkit_robots.rl.ground import Ground
+from terrainkit_robots.rl.memory import require_room
 from terrainkit_robots.rl.observations import observe, policy_group, privileged_group
 from terrainkit_robots.rl.physics import Physics
 from terrainkit_robots.rl.randomization import apply_differences, draw_differences
@@ -52,12 +53,13 @@ class LeggedEnv(VecEnv):
         self.max_episode_length = task.max_episode_length
         self.device = device
         self.scene = build_scene(robot, ground, task)
+        wanted = task.terrain.measure_heights
+        scan = not ground.level if wanted is None else wanted
+        require_room(task, robot, scan=scan, geoms=self.scene.model.ngeom)
         self.physics = Physics(self.scene, self.num_envs, task.env.num_threads)
         self.control = control_of(robot, task)
         self.rng = np.random.default_rng(task.runner.seed)
         self.rewards = chosen(task.rewards)
-        wanted = task.terrain.measure_heights
-        scan = not ground.level if wanted is None else wanted
         weight = float(self.scene.model.body_subtreemass[self.scene.base] * 9.81)
         self.groups = {
             "policy": policy_group(robot, task, scan=scan),

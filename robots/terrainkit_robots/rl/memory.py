@@ -8,9 +8,6 @@ from terrainkit_robots.rl.task import Task
 _DOUBLE, _FLOAT = 8, 4
 """Size of a number in the physics, and of one in observations and networks [bytes]."""
 
-_GEOMS = 100
-"""Shapes in a scene. A ground of boxes has up to some thousands; each takes 24 bytes more."""
-
 _LOOKS = 12
 """Arrays as long as an observation that looking and observing hold at a time."""
 
@@ -19,15 +16,16 @@ _PASSES = 5
 gradients of both, and what is computed of them."""
 
 
-def require_room(task: Task, robot: Robot, *, scan: bool) -> None:
+def require_room(task: Task, robot: Robot, *, scan: bool, geoms: int) -> None:
     """Raise CapacityError if the environments of a task do not fit in memory.
 
     Args:
         task: The task, with as many environments as this process has.
         robot: The robot.
         scan: Whether there is a height scan.
+        geoms: Shapes in the scene; a ground of boxes has up to some thousands.
     """
-    each = bytes_each(task, robot, scan=scan)
+    each = bytes_each(task, robot, scan=scan, geoms=geoms)
     asked = task.env.num_envs
     try:
         require_memory(asked * each, f"training with {asked} environments")
@@ -42,7 +40,7 @@ def require_room(task: Task, robot: Robot, *, scan: bool) -> None:
         raise
 
 
-def bytes_each(task: Task, robot: Robot, *, scan: bool) -> int:
+def bytes_each(task: Task, robot: Robot, *, scan: bool, geoms: int) -> int:
     """Return what training takes for each environment [bytes], within a factor of two."""
     joints, feet = len(robot.default_pose), len(robot.spec.feet)
     points = len(task.terrain.measured_points_x) * len(task.terrain.measured_points_y)
@@ -51,7 +49,7 @@ def bytes_each(task: Task, robot: Robot, *, scan: bool) -> int:
     bodies = joints + feet
     # The state twice, sensors, and what differs from robot to robot: see `apply_differences`.
     physics = 2 * (20 + 6 * bodies + 3 * joints) + 6 * 3 * feet + 7 * bodies
-    physics += 3 * _GEOMS + 20 * joints
+    physics += 3 * geoms + 20 * joints
     steps = task.runner.num_steps_per_env
     stored = steps * (observed + 3 * joints + 7)
     normalized = 3 * steps * observed

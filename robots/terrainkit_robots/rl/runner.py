@@ -1,12 +1,10 @@
 """The runner: rsl-rl's, so that it goes on exactly where a checkpoint ends, and keeps quiet."""
 
-import io
 import os
 import statistics
-import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, redirect_stdout, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +14,11 @@ import numpy as np
 import torch
 from rsl_rl.models import MLPModel
 from rsl_rl.runners import OnPolicyRunner
-from rsl_rl.utils.logger import Logger
 from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.rl.checkpoint import read_checkpoint, save_checkpoint
+from terrainkit_robots.rl.curves import Curves, quiet
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.progress import Progress, Watch, nobody
 from terrainkit_robots.rl.run_folder import Run, checkpoint_name
@@ -176,7 +174,7 @@ class LeggedRunner(OnPolicyRunner):
             stop: Asked before each iteration; training ends, with a checkpoint, once it is true.
         """
         self.folder, self.watch, self.stop = folder, watch, stop
-        with _quiet():
+        with quiet():
             super().__init__(env, runner_config(env.cfg), None, device)
         self.first = self.gpu_global_rank == 0
         self.logger = Curves(
@@ -292,7 +290,6 @@ class LeggedRunner(OnPolicyRunner):
         """Return all that training needs to go on; of every process, if this is the first."""
         mine = {
             "env": self.env.state_dict(),
-            "observations": dict(self._obs.items()),
             "random": _random_state(self.device),
         }
         return {
@@ -309,15 +306,8 @@ class LeggedRunner(OnPolicyRunner):
         processes = state["processes"]
         mine = processes[min(self.gpu_global_rank, len(processes) - 1)]
         self.env.load_state_dict(mine["env"])
-        if len(mine["observations"]["policy"]) == self.env.num_envs:
-            # To look, as the environment has done to load, takes time in the air.
-            self.env.air_time[:] = mine["env"]["arrays"]["air_time"].numpy()
-            observations = {k: v.to(self.device) for k, v in mine["observations"].items()}
-            self._obs = TensorDict(observations, batch_size=[self.env.num_envs])
-        else:
-            self._obs = self.env.get_observations().to(self.device)
+        self._obs = self.env.get_observations().to(self.device)
         if len(processes) == self.gpu_world_size:
-            self.env.rng.bit_generator.state = mine["env"]["rng"]
             _set_random_state(mine["random"], self.device)
         else:  # or several would go on alike
             self.env.rng = np.random.default_rng([self.env.cfg.runner.seed, state["iteration"]])
@@ -355,8 +345,8 @@ class LeggedRunner(OnPolicyRunner):
         weights = [*self.alg.actor.parameters(), *self.alg.critic.parameters()]
         if not all(torch.isfinite(each).all() for each in weights):
             raise ConfigError(
-                f"iteration {self.current_learning_iteration + 1}: the networks have diverged, their "
-                "weights are not numbers any more; smaller rewards or a smaller "
+                f"iteration {self.current_learning_iteration + 1}: the networks have diverged, "
+                "their weights are not numbers any more; smaller rewards or a smaller "
                 "algorithm.learning_rate may help"
             )
 
@@ -404,99 +394,6 @@ class LeggedRunner(OnPolicyRunner):
         }
 
 
-class Curves(Logger):
-    """What rsl-rl writes for TensorBoard or wandb, without what it prints."""
-
-    def __init__(self, **settings: Any) -> None:
-        super().__init__(**settings)
-        self._means: dict[str, float] = {}
-
-    @contextmanager
-    def writing(self, folder: Path | None) -> Iterator[None]:
-        """Open the files in a folder, and close them in the end.
-
-        Raises:
-            ConfigError: if wandb does not start.
-        """
-        self.log_dir = None if folder is None else str(folder)
-        with _quiet():
-            try:
-                self.init_logging_writer()
-            except Exception as error:  # wandb's own: it is asked for only if it is wanted
-                if self.cfg["logger"] == "tensorboard":
-                    raise
-                raise ConfigError(
-                    f"wandb does not start: {' '.join(str(error).split())}"
-                ) from error
-        with _told_once():
-            try:
-                yield
-            except BaseException:
-                with suppress(OSError):  # the disk may be full: what was raised says so
-                    self._close()
-                raise
-            self._close()
-
-    def _close(self) -> None:
-        if self.writer is not None:
-            self.writer.close()
-        self.stop_logging_writer()
-
-    def write(
-        self,
-        iteration: int,
-        collecting: float,
-        learning: float,
-        losses: dict[str, float],
-        learning_rate: float,
-        std: torch.Tensor,
-    ) -> None:
-        """Write the curves of an iteration."""
-        for key in dict.fromkeys(key for log in self.ep_extras for key in log):
-            self._means[key] = statistics.mean(log[key] for log in self.ep_extras if key in log)
-        with _quiet():
-            self.log(
-                it=iteration,
-                start_it=0,
-                total_it=iteration,
-                collect_time=collecting,
-                learn_time=learning,
-                loss_dict=losses,
-                learning_rate=learning_rate,
-                action_std=std,
-                rnd_weight=None,
-            )
-
-    def latest(self, prefix: str) -> dict[str, float]:
-        """Return the last known means of what is called `prefix` and more, by the rest of it."""
-        found = self._means.items()
-        return {key.removeprefix(prefix): mean for key, mean in found if key.startswith(prefix)}
-
-    def state_dict(self) -> dict[str, Any]:
-        """Return what the next values of curves depend on."""
-        return {
-            "rewards": list(self.rewbuffer),
-            "lengths": list(self.lenbuffer),
-            "reward_sums": self.cur_reward_sum,
-            "episode_lengths": self.cur_episode_length,
-            "total_steps": self.tot_timesteps,
-            "total_time": self.tot_time,
-        }
-
-    def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Go on with the curves; those of other robots' episodes are not gone on with."""
-        self.rewbuffer.extend(state["rewards"])
-        self.lenbuffer.extend(state["lengths"])
-        self.tot_timesteps, self.tot_time = state["total_steps"], state["total_time"]
-        if len(state["reward_sums"]) == self.num_envs:
-            self.cur_reward_sum.copy_(state["reward_sums"])
-            self.cur_episode_length.copy_(state["episode_lengths"])
-
-    def _store_code_state(self) -> list[str]:
-        """Leave the user's git alone: `run.toml` says which versions were used."""
-        return []
-
-
 def _mean(values: Any) -> float | None:
     return statistics.mean(values) if values else None
 
@@ -512,21 +409,3 @@ def _set_random_state(state: Mapping[str, torch.Tensor], device: str) -> None:
     torch.set_rng_state(state["cpu"])
     if device != "cpu" and "cuda" in state:
         torch.cuda.set_rng_state(state["cuda"], device)
-
-
-@contextmanager
-def _told_once() -> Iterator[None]:
-    """Keep TensorBoard's thread from printing why it ends: the next curve raises it again."""
-    before = threading.excepthook
-    threading.excepthook = lambda told: None if told.exc_type is OSError else before(told)
-    try:
-        yield
-    finally:
-        threading.excepthook = before
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep rsl-rl from printing."""
-    with redirect_stdout(io.StringIO()):
-        yield

@@ -22,7 +22,6 @@ from typing import TYPE_CHECKING
 from terrainkit.errors import ConfigError, ExportError, TerrainkitError
 from terrainkit_robots.rl import registry
 from terrainkit_robots.rl.ground import read_ground
-from terrainkit_robots.rl.memory import require_room
 from terrainkit_robots.rl.progress import Watch, nobody
 from terrainkit_robots.rl.robot import read_robot
 from terrainkit_robots.rl.run_folder import (
@@ -94,8 +93,6 @@ def train(
     mine = _share(task)
     body = before.robot if before else read_robot(registry.find(robot).folder)
     ground = read_ground(terrain, task.terrain.collision)
-    scan = task.terrain.measure_heights
-    require_room(mine, body, scan=not ground.level if scan is None else scan)
     torch.set_num_threads(mine.env.num_threads)
     torch.manual_seed(mine.runner.seed)
     device = _device(device)

@@ -49,7 +49,7 @@ def test_the_estimate_is_near_what_is_taken(quadruped, scan):
         check=True,
     )
     measured, task = float(run.stdout), Task(runner=Runner(num_steps_per_env=12))
-    assert 0.7 < bytes_each(task, quadruped, scan=scan) / measured < 2.0
+    assert 0.7 < bytes_each(task, quadruped, scan=scan, geoms=50) / measured < 2.0
 
 
 def test_what_would_fit_is_said(quadruped, monkeypatch):
@@ -58,5 +58,5 @@ def test_what_would_fit_is_said(quadruped, monkeypatch):
     with pytest.raises(
         CapacityError, match=r"with 40000 environments needs .*; env\.num_envs 5000 would fit"
     ):
-        require_room(task, quadruped, scan=False)
-    require_room(Task(env=Env(num_envs=5000)), quadruped, scan=False)
+        require_room(task, quadruped, scan=False, geoms=50)
+    require_room(Task(env=Env(num_envs=5000)), quadruped, scan=False, geoms=50)
