@@ -141,9 +141,12 @@ def headline(found: "Evaluation") -> str:
     """Return an evaluation in a line."""
     whole = found.whole
     success = "" if whole.success is None else f", {whole.success:.0%} success"
+    off = f"off by {'; '.join(errors(whole))}"
+    if whole.lin_vel_error is None:
+        off = "errors are measured from 2 s after a command on, and none walked so long"
     return (
         f"{found.robot}, {found.checkpoint}, on {found.terrain}: {whole.robots} robots, "
-        f"{whole.falls} fell{success}; off by {'; '.join(errors(whole))}"
+        f"{whole.falls} fell{success}; {off}"
     )
 
 

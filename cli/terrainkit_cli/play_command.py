@@ -35,8 +35,8 @@ class Play(PolicyCommand):
 
     size: Annotated[
         tuple[int, int],
-        tyro.conf.arg(metavar="WIDTH HEIGHT", help_behavior_hint="(default: 800 450)"),
-    ] = (800, 450)
+        tyro.conf.arg(metavar="WIDTH HEIGHT", help_behavior_hint="(default: 640 360)"),
+    ] = (640, 360)
     """Size of the video [pixels]."""
 
     no_video: bool = False

@@ -4,7 +4,7 @@ import importlib.util
 
 from terrainkit.errors import ConfigError
 
-_PACKAGES = ("torch", "rsl_rl", "tensordict", "tensorboard")
+_PACKAGES = ("torch", "rsl_rl", "tensordict", "tensorboard", "imageio_ffmpeg")
 """Packages of the extra that training imports."""
 
 

@@ -138,7 +138,7 @@ def test_a_terminal_gets_a_headline(here, monkeypatch):
     assert "quadruped, model_7.pt, on plane: 1 robots, 0 fell; off by 0.00" in err
 
 
-def test_what_was_never_measured_is_a_dash():
+def test_what_was_never_measured_is_told_and_is_a_dash():
     from terrainkit_robots.rl.evaluation import Evaluation, Score
 
     score = Score(
@@ -155,7 +155,7 @@ def test_what_was_never_measured_is_a_dash():
     )
     assert evaluate_command.headline(found) == (
         "hare, model_1.pt, on hill.npz: 4 robots, 4 fell, 25% success; "
-        "off by - m/s (- averaged over 1 s); - rad/s (- averaged over 1 s)"
+        "errors are measured from 2 s after a command on, and none walked so long"
     )
     measured = replace(score, lin_vel_error=0.12345)
     assert evaluate_command.errors(measured)[0] == "0.123 m/s (- averaged over 1 s)"

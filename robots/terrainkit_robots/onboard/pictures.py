@@ -1,11 +1,9 @@
 """Pictures: a robot in its pose, from three sides, drawn by MuJoCo without a window.
 
-They are drawn in a process of their own: which graphics library MuJoCo takes is settled when it is
-imported, and a broken one may crash.
+They are drawn in a process of their own: see `graphics_library`.
 """
 
 import json
-import os
 import subprocess
 import sys
 import tempfile
@@ -15,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from terrainkit.errors import TerrainkitError
+from terrainkit_robots import graphics_library
 from terrainkit_robots.onboard.picture_process import ANSWER
 from terrainkit_robots.wording import short
 
@@ -63,33 +62,16 @@ def draw(
             "size": list(size),
         }
         complaints = []
-        for library in _libraries():
+        for library in graphics_library.libraries():
             answer = _ask(request, library, deadline, folder)
             if "pictures" in answer:
                 return {view: (folder / f"{view}.png").read_bytes() for view in answer["pictures"]}
             if "undrawable" in answer:
                 raise PicturesError(f"MuJoCo cannot draw it: {answer['undrawable']}")
             complaints.append(f"{library or 'its default'}: {answer['failed']}")
-    raise PicturesError(f"MuJoCo cannot draw here ({'; '.join(complaints)}); {_advice()}")
-
-
-def _asked() -> str:
-    """Return the library that the environment names; the command line puts that variable aside."""
-    return (os.environ.get("TERRAINKIT_MUJOCO_GL") or os.environ.get("MUJOCO_GL", "")).strip()
-
-
-def _libraries() -> tuple[str, ...]:
-    """Return what to try as MUJOCO_GL, in this order."""
-    asked = _asked()
-    if asked:
-        return (asked,)
-    return ("egl", "osmesa") if sys.platform == "linux" else ("",)
-
-
-def _advice() -> str:
-    if _asked():
-        return "MUJOCO_GL says so; unset it to have EGL and OSMesa tried"
-    return "install EGL or OSMesa (Debian: libegl1 libgl1-mesa-dri, or libosmesa6)"
+    raise PicturesError(
+        f"MuJoCo cannot draw here ({'; '.join(complaints)}); {graphics_library.advice()}"
+    )
 
 
 def _ask(request: Mapping[str, Any], library: str, deadline: float, folder: Path) -> dict[str, Any]:
@@ -101,7 +83,7 @@ def _ask(request: Mapping[str, Any], library: str, deadline: float, folder: Path
             input=json.dumps(request).encode(),
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            env=_environment(library),
+            env=graphics_library.environment(library),
             cwd=folder,
             timeout=max(left, 0.0),
             check=False,
@@ -116,19 +98,3 @@ def _ask(request: Mapping[str, Any], library: str, deadline: float, folder: Path
     for key in answer.keys() & {"failed", "undrawable"}:
         answer[key] = short(" ".join(answer[key].split()), _MOST_WORDS)
     return answer
-
-
-def _environment(library: str) -> dict[str, str]:
-    """Return the environment of the other process, which finds modules where this one does."""
-    environment = dict(os.environ)
-    environment.pop("PYOPENGL_PLATFORM", None)  # which MuJoCo sets, here to another library
-    environment.pop("MUJOCO_GL", None)
-    if library:
-        environment["MUJOCO_GL"] = library
-    # Nothing is to be left on this machine.
-    environment.setdefault("MESA_SHADER_CACHE_DISABLE", "true")
-    environment.setdefault("__GL_SHADER_DISK_CACHE", "0")
-    environment["PYTHONPATH"] = os.pathsep.join(
-        str(Path(entry).absolute()) for entry in sys.path if entry
-    )
-    return environment

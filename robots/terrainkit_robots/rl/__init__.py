@@ -1,6 +1,8 @@
 """The training loop: MuJoCo steps, rsl-rl learns, terrainkit supplies the ground and the task.
 
-Read it in this order: `task` (every number), `scene` (the model), `physics` (what steps it),
-`state` (what is known after a step), `observations`, `rewards`, `commands`, `terminations`,
-`careers` (the terrain curriculum), `env` (all of it as rsl-rl's `VecEnv`), `train`.
+Read it in this order: `env`, which is the loop; then what it calls: `task` (every number), `scene`
+(the model), `physics` (what steps it), `state` (what is known after a step), `observations`,
+`rewards`, `terminations`, `commands`, `control`, `start`, `randomization`, `careers` (the terrain
+curriculum). `training` and `runner` learn with it; `evaluation`, `play`, `policy_export` and `smoke`
+are for what came of it.
 """

@@ -90,11 +90,11 @@ class Careers:
 
     def by_terrain(self) -> dict[str, tuple[float, float]]:
         """Return mean level and mean success rate of each terrain; NaN where nobody is."""
-        names = np.array(self._ground.terrain_names)
-        here = names[self.columns]
+        names = self._ground.terrain_names
+        here = names[self.levels, self.columns]
         found = {}
-        for name in dict.fromkeys(self._ground.terrain_names):
-            rates = self.success[:, names == name]
+        for name in dict.fromkeys(names.ravel().tolist()):
+            rates = self.success[names == name]
             rates = rates[~np.isnan(rates)]
             level = float(self.levels[here == name].mean()) if (here == name).any() else np.nan
             found[name] = level, float(rates.mean()) if rates.size else np.nan
@@ -122,6 +122,11 @@ class Careers:
                 f"{state['success'].shape[1]} patches; this one has "
                 f"{self.success.shape[0]} x {self.success.shape[1]}"
             )
+        rows, cols = self.success.shape
+        levels, columns = np.asarray(state["levels"]), np.asarray(state["columns"])
+        off = (levels < 0) | (levels >= rows) | (columns < 0) | (columns >= cols)
+        if off.any():
+            raise ConfigError(f"the checkpoint's robots are not on {rows} x {cols} patches")
         self.success[:] = state["success"]
         self._updates = int(state["updates"])
         if len(state["levels"]) == len(self.levels):

@@ -7,6 +7,7 @@ from terrainkit_robots.rl.rotation import wrapped
 from terrainkit_robots.rl.task import Commands
 
 FloatArray = NDArray[np.float32]
+Ids = NDArray[np.int64]
 
 _WELL = 0.8
 """Part of the largest tracking reward from which a command is followed well: legged_gym's."""
@@ -60,3 +61,65 @@ def widened(
     low, high = lin_vel_x
     most = settings.max_curriculum
     return max(low - _WIDER, min(low, -most)), min(high + _WIDER, max(high, most))
+
+
+class Orders:
+    """What n robots are asked for now."""
+
+    def __init__(self, settings: Commands, num_envs: int, dt: float) -> None:
+        self.commands = np.zeros((num_envs, 3), np.float32)
+        """Speed forward and to the left [m/s], turning speed to the left [rad/s], shape (n, 3)."""
+
+        self.heading = np.zeros(num_envs, np.float32)
+        """Direction to turn to, NaN for none [rad], shape (n,)."""
+
+        self.held: FloatArray | None = None
+        """What is asked for all the time, shape (n, 3); None for what is drawn."""
+
+        self.lin_vel_x = settings.lin_vel_x
+        """Range of the forward speed at this time [m/s]."""
+
+        self.followed = np.zeros(2)
+        """Earned for `tracking_lin_vel` since the range was judged, and in what time [s]."""
+
+        self._settings = settings
+        self._every = max(1, round(settings.resampling_time / dt))
+
+    def draw(self, rng: np.random.Generator, ids: Ids) -> None:
+        """Ask robots `ids` for something new."""
+        self.commands[ids], self.heading[ids] = draw_commands(
+            rng, len(ids), self._settings, self.lin_vel_x
+        )
+
+    def renew(self, rng: np.random.Generator, steps: Ids) -> None:
+        """Ask those for something new whose time has come.
+
+        Args:
+            rng: Where it is drawn from.
+            steps: Steps of each robot's episode, 0 for one that has just been asked, shape (n,).
+        """
+        ids = np.flatnonzero((steps % self._every == 0) & (steps > 0))
+        if len(ids):
+            self.draw(rng, ids)
+
+    def steer(self, yaw: FloatArray) -> None:
+        """Ask for what is held, or for turning towards the headings; yaw [rad], shape (n,)."""
+        if self.held is not None:
+            self.commands[:] = self.held
+        elif self._settings.heading_command:
+            self.commands[:, 2] = turning_to(self.heading, yaw, self._settings)
+
+    def widen(self, earned: float, lived: float, *, scale: float, enough: float) -> None:
+        """Ask for more, once what is asked was followed well for long enough.
+
+        Args:
+            earned: What robots earned for `tracking_lin_vel` in episodes that ended.
+            lived: How long these were, in all [s].
+            scale: What following to perfection earns in a second.
+            enough: Time over which following is judged [s].
+        """
+        self.followed += earned, lived
+        earned, lived = self.followed
+        if lived >= enough:
+            self.lin_vel_x = widened(self.lin_vel_x, earned / lived / scale, self._settings)
+            self.followed[:] = 0

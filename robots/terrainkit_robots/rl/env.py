@@ -15,27 +15,24 @@ from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.careers import Careers
-from terrainkit_robots.rl.commands import draw_commands, turning_to, widened
+from terrainkit_robots.rl.commands import Orders
 from terrainkit_robots.rl.control import control_of
+from terrainkit_robots.rl.earnings import Earnings
 from terrainkit_robots.rl.ground import Ground
 from terrainkit_robots.rl.memory import require_room
 from terrainkit_robots.rl.observations import observe, policy_group, privileged_group
 from terrainkit_robots.rl.physics import Physics
 from terrainkit_robots.rl.randomization import apply_differences, draw_differences
-from terrainkit_robots.rl.rewards import chosen
 from terrainkit_robots.rl.robot import Robot
-from terrainkit_robots.rl.rotation import gravity_in_body, to_body, yaw_of
+from terrainkit_robots.rl.rotation import yaw_of
 from terrainkit_robots.rl.scene import build_scene
+from terrainkit_robots.rl.sensors import Sensors
 from terrainkit_robots.rl.start import draw_start
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.task import Task
-from terrainkit_robots.rl.terminations import outside, tilted, touched
 
 FloatArray = NDArray[np.float32]
 Ids = NDArray[np.int64]
-
-_CONTACT = 1.0
-"""Force from which a foot is on the ground [N]: legged_gym's."""
 
 
 class LeggedEnv(VecEnv):
@@ -59,40 +56,37 @@ class LeggedEnv(VecEnv):
         self.physics = Physics(self.scene, self.num_envs, task.env.num_threads)
         self.control = control_of(robot, task)
         self.rng = np.random.default_rng(task.runner.seed)
-        self.rewards = chosen(task.rewards)
+        self.sensors = Sensors(self.physics, ground, task, scan=scan)
+        self.orders = Orders(task.commands, self.num_envs, task.dt)
+        self.earnings = Earnings(task.rewards, robot, task.dt, self.num_envs)
         weight = float(self.scene.model.body_subtreemass[self.scene.base] * 9.81)
         self.groups = {
             "policy": policy_group(robot, task, scan=scan),
             "privileged": privileged_group(robot, task, scan=scan, weight=weight),
         }
-        self._scan = _scan_points(task) if scan else np.zeros((2, 0), np.float32)
         self.differences = draw_differences(self.rng, self.num_envs, self.physics, task.domain_rand)
         apply_differences(self.physics, self.differences)
         self.careers = Careers(ground, self.num_envs, task.terrain.max_init_level, task.runner.seed)
-        self.lin_vel_x = task.commands.lin_vel_x
-        self.followed = np.zeros(2)  # reward for tracking, and the time that it was earned in [s]
         self._allocate()
         self.begin_all()
 
     def _allocate(self) -> None:
         """Make what each robot remembers from step to step."""
-        n, joints, feet = self.num_envs, self.num_actions, len(self.robot.spec.feet)
+        n, joints = self.num_envs, self.num_actions
         self.episode_length_buf = torch.zeros(n, dtype=torch.long)
-        self.commands = np.zeros((n, 3), np.float32)
-        self.held: FloatArray | None = None
-        self.heading = np.zeros(n, np.float32)
         self.actions = np.zeros((3, n, joints), np.float32)  # of this step, and of two before
-        self.last_dof_vel = np.zeros((n, joints), np.float32)
         self.joint_offset = np.zeros((n, joints), np.float32)
         self.push_vel = np.zeros((n, 3), np.float32)
-        self.air_time = np.zeros((n, feet), np.float32)
         self.steps = np.zeros(n, np.int64)  # of this episode, whatever the runner says
         self.start = np.zeros((n, 2))
-        self.sums = {name: np.zeros(n, np.float32) for name in self.rewards}
+        # What those who look at an environment ask for most; live.
+        self.commands, self.heading = self.orders.commands, self.orders.heading
+        self.rewards, self.sums = self.earnings.rewards, self.earnings.sums
+        self.air_time = self.sensors.air_time
 
     def hold_commands(self, commands: FloatArray | None) -> None:
         """Ask for the same all the time, shape (n, 3); None to draw commands again."""
-        self.held = commands
+        self.orders.held = commands
         if commands is not None:
             self.commands[:] = commands
             np.copyto(self.state.commands, commands)
@@ -102,7 +96,7 @@ class LeggedEnv(VecEnv):
         """Begin every episode anew."""
         everyone = np.arange(self.num_envs)
         self._begin(everyone)
-        self._steer()
+        self.orders.steer(self._yaw())
         self.state = self._look(everyone, fresh=True)
         self._observed = self._observe()
 
@@ -112,7 +106,7 @@ class LeggedEnv(VecEnv):
         return {
             "arrays": arrays,
             "rng": self.rng.bit_generator.state,
-            "lin_vel_x": self.lin_vel_x,
+            "lin_vel_x": self.orders.lin_vel_x,
             "careers": self.careers.state_dict(),
             "state": {k: torch.from_numpy(v.copy()) for k, v in vars(self.state).items()},
             "observed": dict(self._observed.clone().items()),
@@ -125,7 +119,7 @@ class LeggedEnv(VecEnv):
             ConfigError: if the state is of another robot or map.
         """
         self.careers.load_state_dict(state["careers"])
-        self.lin_vel_x = tuple(state["lin_vel_x"])
+        self.orders.lin_vel_x = tuple(state["lin_vel_x"])
         mine, theirs = self._arrays(), state["arrays"]
         if len(theirs["episode_length"]) != self.num_envs:
             self.begin_all()
@@ -149,13 +143,13 @@ class LeggedEnv(VecEnv):
             "commands": self.commands,
             "heading": self.heading,
             "actions": self.actions,
-            "last_dof_vel": self.last_dof_vel,
+            "last_dof_vel": self.sensors.last_dof_vel,
             "joint_offset": self.joint_offset,
             "push_vel": self.push_vel,
             "air_time": self.air_time,
             "steps": self.steps,
             "start": self.start,
-            "followed": self.followed,
+            "followed": self.orders.followed,
         }
         sums = {f"rew_{name}": value for name, value in self.sums.items()}
         return own | sums | vars(self.differences)
@@ -183,9 +177,9 @@ class LeggedEnv(VecEnv):
         bad = self.physics.step(self.cfg.control.decimation)
         self.episode_length_buf += 1
         self.steps += 1
+        self.sensors.last_dof_vel[bad] = 0  # the jump back to rest is no acceleration
         self.state = state = self._look(np.arange(self.num_envs), bad)
-        self.last_dof_vel[:] = state.dof_vel
-        rewards = self._reward(state)
+        rewards = self.earnings.pay(state)
         lengths = self.episode_length_buf.cpu().numpy()
         time_out = (lengths >= self.max_episode_length) & ~state.fallen
         done = state.fallen | time_out
@@ -195,7 +189,8 @@ class LeggedEnv(VecEnv):
         if len(ended):
             extras["log"] = self._end(ended, state, bad)
             self._begin(ended)
-        self._command(ended)
+        self.orders.renew(self.rng, self.steps)
+        self.orders.steer(self._yaw())
         if len(ended):
             state.put(ended, self._look(ended, fresh=True))
         np.copyto(state.commands, self.commands)
@@ -223,102 +218,37 @@ class LeggedEnv(VecEnv):
         self, ids: Ids, bad: NDArray[np.bool_] | None = None, *, fresh: bool = False
     ) -> State:
         """Return the state of robots `ids`; what has just begun has no contacts yet."""
-        physics, scene, dt = self.physics, self.scene, self.cfg.dt
         rows: Any = slice(None) if len(ids) == self.num_envs else ids
-        qpos, qvel = physics.qpos[rows].astype(np.float32), physics.qvel[rows].astype(np.float32)
-        quat, pos = qpos[:, 3:7], qpos[:, :3]
-        gravity = gravity_in_body(quat)
-        dof_vel = qvel[:, scene.joint_qvel]
-        feet = physics.block("foot_position", rows)
-        under = self.ground.height(feet[..., 0], feet[..., 1])
-        force = -physics.block("foot_force", rows)
-        penalized = physics.block("penalized_force", rows)
-        ending = physics.block("termination_force", rows)
-        if fresh:
-            force[:] = penalized[:] = ending[:] = 0
-        first, air_time = self._steps_taken(rows, force, 0.0 if fresh else dt)
-        fallen = (
-            touched(ending, self.cfg.termination)
-            | tilted(gravity, self.cfg.termination)
-            | outside(pos, self.ground)
-        )
+        seen = vars(self.sensors.measure(rows, fresh=fresh))
+        if bad is not None:
+            seen["fallen"] |= bad
         return State(
-            base_pos=pos,
-            base_quat=quat,
-            base_lin_vel=to_body(quat, qvel[:, :3]),
-            base_ang_vel=qvel[:, 3:6],
-            projected_gravity=gravity,
-            base_height=pos[:, 2] - self.ground.height(pos[:, 0], pos[:, 1]),
-            dof_pos=qpos[:, scene.joint_qpos],
-            dof_vel=dof_vel,
-            dof_acc=(dof_vel - self.last_dof_vel[rows]) / np.float32(dt),
-            torques=physics.torque[rows].astype(np.float32) * np.float32(not fresh),
+            **seen,
             actions=self.actions[0, rows].copy(),
             last_actions=self.actions[1, rows].copy(),
             last_last_actions=self.actions[2, rows].copy(),
             commands=self.commands[rows].copy(),
-            foot_height=feet[..., 2] - under - scene.sole_depth,
-            foot_vel=physics.block("foot_velocity", rows),
-            foot_force=force,
-            first_contact=first,
-            air_time=air_time,
-            penalized_force=np.sqrt(np.einsum("npi,npi->np", penalized, penalized)),
-            height_scan=self._scanned(pos, quat),
             push_vel=self.push_vel[rows].copy(),
             friction=self.differences.friction[rows].copy(),
             added_mass=self.differences.added_mass[rows].copy(),
             com_shift=self.differences.com_shift[rows].copy(),
             joint_offset=self.joint_offset[rows].copy(),
-            fallen=fallen if bad is None else fallen | bad,
         )
 
-    def _steps_taken(
-        self, rows: Any, force: FloatArray, dt: float
-    ) -> tuple[NDArray[np.bool_], FloatArray]:
-        """Return which feet came down, and how long each was in the air; count on by `dt`."""
-        down = force[..., 2] > _CONTACT
-        air_time = self.air_time[rows] + np.float32(dt)
-        first = down & (self.air_time[rows] > 0)
-        self.air_time[rows] = np.where(down, 0, air_time)
-        return first, air_time
-
-    def _scanned(self, pos: FloatArray, quat: FloatArray) -> FloatArray:
-        """Return the height of the base above the points of the scan [m], shape (n, k)."""
-        if not self._scan.size:
-            return np.zeros((len(pos), 0), np.float32)
-        yaw = yaw_of(quat)
-        c, s = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
-        x, y = self._scan
-        height = self.ground.height(pos[:, :1] + c * x - s * y, pos[:, 1:2] + s * x + c * y)
-        return pos[:, 2:3] - height
-
-    def _reward(self, state: State) -> FloatArray:
-        dt, total = np.float32(self.cfg.dt), np.zeros(self.num_envs, np.float32)
-        settings = self.cfg.rewards
-        for name, (function, scale) in self.rewards.items():
-            earned = function(state, self.robot, settings) * np.float32(scale) * dt
-            self.sums[name] += earned
-            if name != "termination":
-                total += earned
-        if settings.only_positive_rewards:
-            np.maximum(total, 0, out=total)
-        if "termination" in self.rewards:
-            function, scale = self.rewards["termination"]
-            total += function(state, self.robot, settings) * np.float32(scale) * dt
-        return total
+    def _yaw(self) -> FloatArray:
+        """Return the heading of each robot now [rad], shape (n,)."""
+        return yaw_of(self.physics.qpos[:, 3:7].astype(np.float32))
 
     def _end(self, ids: Ids, state: State, bad: NDArray[np.bool_]) -> dict[str, float]:
         """Close the episodes of robots `ids`, and return what is to be logged of them."""
         lived = self.steps[ids] * self.cfg.dt
-        log = {
-            f"Episode/rew_{name}": float((total[ids] / lived).mean())
-            for name, total in self.sums.items()
-        }
+        earned = self.earnings.per_second(ids, lived)
+        log = {f"Episode/rew_{name}": mean for name, mean in earned.items()}
         fallen = state.fallen[ids]
         log["Episode/falls"] = float(fallen.mean())
         self._widen(ids, lived)
         if self.cfg.commands.curriculum:
-            log["Curriculum/lin_vel_x"] = self.lin_vel_x[1]
+            log["Curriculum/lin_vel_x"] = self.orders.lin_vel_x[1]
         # The runner may have cut the first episodes to random lengths, which says nothing.
         lengths = self.episode_length_buf.numpy()[ids]
         whole = lengths == self.steps[ids]
@@ -338,14 +268,13 @@ class LeggedEnv(VecEnv):
 
     def _widen(self, ids: Ids, lived: NDArray[np.floating[Any]]) -> None:
         """Ask for more, once what is asked was followed well over as long as an episode of all."""
-        if "tracking_lin_vel" not in self.rewards:
-            return
-        self.followed += float(self.sums["tracking_lin_vel"][ids].sum()), float(lived.sum())
-        earned, time = self.followed
-        if time >= self.num_envs * self.cfg.env.episode_length_s:
-            scale = self.rewards["tracking_lin_vel"][1]
-            self.lin_vel_x = widened(self.lin_vel_x, earned / time / scale, self.cfg.commands)
-            self.followed[:] = 0
+        if "tracking_lin_vel" in self.rewards:
+            self.orders.widen(
+                float(self.sums["tracking_lin_vel"][ids].sum()),
+                float(lived.sum()),
+                scale=self.rewards["tracking_lin_vel"][1],
+                enough=self.num_envs * self.cfg.env.episode_length_s,
+            )
 
     def _begin(self, ids: Ids) -> None:
         """Begin new episodes."""
@@ -360,14 +289,12 @@ class LeggedEnv(VecEnv):
         self.episode_length_buf[torch.from_numpy(ids)] = 0
         self.steps[ids] = 0
         self.actions[:, ids] = 0
-        self.last_dof_vel[ids] = 0
         self.push_vel[ids] = 0
-        self.air_time[ids] = 0
+        self.sensors.forget(ids)
         most = self.cfg.domain_rand.joint_offset
         self.joint_offset[ids] = self.rng.uniform(-most, most, (len(ids), self.num_actions))
-        for total in self.sums.values():
-            total[ids] = 0
-        self._draw_commands(ids)
+        self.earnings.forget(ids)
+        self.orders.draw(self.rng, ids)
 
     def _lift(self, ids: Ids) -> None:
         """Lift those with a foot in the ground: legs that are bent at random may be too long."""
@@ -376,29 +303,6 @@ class LeggedEnv(VecEnv):
         if (deep > 0).any():
             self.physics.qpos[ids, 2] += np.maximum(deep, 0)
             self.physics.refresh(ids)
-
-    def _draw_commands(self, ids: Ids) -> None:
-        self.commands[ids], self.heading[ids] = draw_commands(
-            self.rng, len(ids), self.cfg.commands, self.lin_vel_x
-        )
-
-    def _command(self, ended: Ids) -> None:
-        """Give new commands to those whose time has come, and turn towards headings."""
-        every = max(1, round(self.cfg.commands.resampling_time / self.cfg.dt))
-        due = self.steps % every == 0
-        due[ended] = False
-        ids = np.flatnonzero(due)
-        if len(ids):
-            self._draw_commands(ids)
-        self._steer()
-
-    def _steer(self) -> None:
-        """Ask for what is held, or for turning towards the headings."""
-        if self.held is not None:
-            self.commands[:] = self.held
-        elif self.cfg.commands.heading_command:
-            yaw = yaw_of(self.physics.qpos[:, 3:7].astype(np.float32))
-            self.commands[:, 2] = turning_to(self.heading, yaw, self.cfg.commands)
 
     def _push(self) -> None:
         """Push those whose time has come."""
@@ -422,11 +326,3 @@ class LeggedEnv(VecEnv):
             },
             batch_size=[self.num_envs],
         ).to(self.device)
-
-
-def _scan_points(task: Task) -> FloatArray:
-    """Return where the height scan looks, x and y in the base's frame [m], shape (2, k)."""
-    x, y = np.meshgrid(
-        task.terrain.measured_points_x, task.terrain.measured_points_y, indexing="ij"
-    )
-    return np.stack([x.ravel(), y.ravel()]).astype(np.float32)

@@ -492,8 +492,10 @@ def summed_up(
     """Return an evaluation; commands as they are to be told apart, shape (n, 3)."""
     patches = not env.ground.level
     levels = env.careers.levels.tolist()
-    terrains = [env.ground.terrain_names[k] for k in env.careers.columns]
-    across = np.lexsort((env.careers.levels, env.careers.columns))
+    names = env.ground.terrain_names
+    terrains = names[env.careers.levels, env.careers.columns].tolist()
+    place = {name: k for k, name in enumerate(dict.fromkeys(names.ravel().tolist()))}
+    across = np.lexsort((levels, [place[name] for name in terrains]))
 
     def parts(keys: Sequence[tuple[Any, ...]], kinds: Iterable[Any], *names: str) -> list[Part]:
         found = []

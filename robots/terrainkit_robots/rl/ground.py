@@ -26,8 +26,8 @@ class Ground(ABC):
     env_origins: FloatArray
     """Spawn origins [m], shape (rows, cols, 3): rows are levels of the curriculum."""
 
-    terrain_names: tuple[str, ...]
-    """Terrain of each column, shape (cols,)."""
+    terrain_names: NDArray[np.str_]
+    """Terrain of each patch, shape (rows, cols)."""
 
     patch_length: float
     """Distance that a robot walks on a patch to have crossed it [m]."""
@@ -54,7 +54,7 @@ class Plane(Ground):
     """A level plane without end, at height 0."""
 
     level = True
-    terrain_names = ("plane",)
+    terrain_names = np.array([["plane"]])
     patch_length = 8.0
     lower, upper = (-np.inf, -np.inf), (np.inf, np.inf)
 
@@ -126,8 +126,7 @@ class MapGround(Ground):
         collision: Literal["auto", "hfield", "boxes"] = "auto",
     ) -> None:
         self.env_origins = terrain_map.env_origins
-        types = terrain_map.terrain_types[0]
-        self.terrain_names = tuple(terrain_map.terrain_names[k] for k in types)
+        self.terrain_names = np.array(terrain_map.terrain_names)[terrain_map.terrain_types]
         self.patch_length = terrain_map.config.patch_size[0]
         self.lower, self.upper = terrain_map.grid.lower, terrain_map.grid.upper
         self._map = terrain_map
@@ -145,7 +144,7 @@ class MapGround(Ground):
             spec = mujoco.MjSpec.from_file(str(path))
         _paint(spec)
         for geom in spec.geoms:
-            geom.material = "ground"
+            geom.material, geom.rgba = "ground", [1, 1, 1, 1]  # or its color darkens the material
         return spec
 
     def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
@@ -173,7 +172,7 @@ class ScannedGround(Ground):
     Robots start at the world's origin, or around `origins`.
     """
 
-    terrain_names = ("custom",)
+    terrain_names = np.array([["custom"]])
 
     def __init__(self, path: Path, *, cell: float = 0.05, reach: float = 20.0) -> None:
         """Read it.

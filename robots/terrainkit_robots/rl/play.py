@@ -199,24 +199,25 @@ class Recorder:
         env = self._env
         fell = np.flatnonzero(np.stack([each[robot] for each in self._begun[:frames]]))
         stop = max(1, int(fell[0])) if len(fell) else frames
-        terrain = env.ground.terrain_names[int(env.careers.columns[robot])]
+        level, column = int(env.careers.levels[robot]), int(env.careers.columns[robot])
+        terrain = str(env.ground.terrain_names[level, column])
         rows = len(env.ground.env_origins)
-        where = f"{terrain}, level {int(env.careers.levels[robot])} of {rows - 1}"
+        where = f"{terrain}, level {level} of {rows - 1}"
         caption = where if rows > 1 else terrain
         return Shot(robot=robot, start=0, stop=stop, captions=(caption,) * stop)
 
 
 def visited(env: LeggedEnv, robots: int) -> list[int]:
     """Return whom a video follows: robots on different terrains, at the middle level or near it."""
-    columns, levels = env.careers.columns, env.careers.levels
-    names = np.array(env.ground.terrain_names)[columns]
-    middle = (len(env.ground.env_origins) - 1) / 2
+    levels, every = env.careers.levels, env.ground.terrain_names
+    names = every[levels, env.careers.columns]
+    middle = (len(every) - 1) / 2
     # The nearest to the middle of each terrain; then the second nearest of each, and so on.
-    order = np.lexsort((np.arange(len(columns)), np.abs(levels - middle)))
+    order = np.lexsort((np.arange(len(levels)), np.abs(levels - middle)))
     turn = {
         int(robot): int((names[order[:k]] == names[robot]).sum()) for k, robot in enumerate(order)
     }
-    place = {name: k for k, name in enumerate(dict.fromkeys(env.ground.terrain_names))}
+    place = {name: k for k, name in enumerate(dict.fromkeys(every.ravel().tolist()))}
     # Terrains from end to end of the map, if there are more of them than robots.
     first = sorted(turn, key=lambda robot: (turn[robot], place[str(names[robot])]))
     kinds = len(set(names))
@@ -262,7 +263,8 @@ def view(run: "Run", asked: Asked | None = None) -> None:
     policy = policy_of(run, env)
     held = None if commands is None else commands.reshape(-1, 1, 3)
     each = max(1, round(asked.seconds / env.cfg.dt / (1 if held is None else len(held))))
-    data = mujoco.MjData(env.scene.model)
+    data, lamp = mujoco.MjData(env.scene.model), env.scene.model.vis.headlight
+    lamp.ambient[:], lamp.diffuse[:], lamp.specular[:] = 0.35, 0.65, 0.1  # it is all the light
     try:
         window = mujoco.viewer.launch_passive(env.scene.model, data)
     except RuntimeError as error:  # macOS wants mjpython

@@ -16,7 +16,14 @@ from typing import TYPE_CHECKING
 from terrainkit.errors import ConfigError, listing
 from terrainkit_robots import bundled
 from terrainkit_robots.rl.robot import SPEC_FILE
-from terrainkit_robots.rl.task import Control, Policy, Task
+from terrainkit_robots.rl.task import (
+    Commands,
+    Control,
+    DomainRand,
+    Policy,
+    Rewards,
+    Task,
+)
 from terrainkit_robots.spec.spec_file import read_spec
 from terrainkit_robots.wording import closest, short
 
@@ -140,6 +147,15 @@ _BUNDLED = {
     # Softer than what stands best: an action has to reach as far as a step does.
     "quadruped": Task(
         control=Control(stiffness=40.0, damping=1.0, action_scale=0.25),
+        policy=Policy(init_noise_std=0.7),
+    ),
+    # Slower than four legs, and falling costs: else it learns to fall forward first.
+    "biped": Task(
+        commands=Commands(
+            lin_vel_x=(-0.4, 0.8), lin_vel_y=(-0.2, 0.2), ang_vel_yaw=(-0.5, 0.5), min_norm=0.1
+        ),
+        domain_rand=DomainRand(max_push_vel_xy=0.5),
+        rewards=Rewards(termination=-100.0, air_time_target=0.3),
         policy=Policy(init_noise_std=0.7),
     ),
 }

@@ -172,6 +172,21 @@ def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
     )
 
 
+def same_ground(run: Run) -> bool:
+    """Return whether the run's map is still the one that it was trained on.
+
+    Raises:
+        ConfigError: if a config cannot be read.
+        MapFileError: if the map cannot.
+    """
+    noted = run.folder / MAP_FILE
+    if not noted.is_file():
+        return True
+    from terrainkit.config_text import read_config
+
+    return _map_config(run.terrain) == read_config(noted)
+
+
 def rewrite_task(run: Run, task: Task) -> None:
     """Note in a run's folder that it goes on with another task."""
     from terrainkit.atomic import atomic_write

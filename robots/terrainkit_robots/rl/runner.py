@@ -232,6 +232,7 @@ class LeggedRunner(OnPolicyRunner):
             for _ in range(self.cfg["num_steps_per_env"]):
                 actions = self.alg.act(self._obs)
                 obs, rewards, dones, extras = self.env.step(actions)
+                self._refuse_pay(rewards)
                 self._obs = obs.to(self.device)
                 rewards, dones = rewards.to(self.device), dones.to(self.device)
                 self.alg.process_env_step(self._obs, rewards, dones, extras)
@@ -339,6 +340,15 @@ class LeggedRunner(OnPolicyRunner):
             raise
         self._refuse_nonsense()
         return losses
+
+    def _refuse_pay(self, rewards: torch.Tensor) -> None:
+        """Raise ConfigError if a reward is not a number: a division by zero, as a rule."""
+        if not torch.isfinite(rewards).all():
+            sums = self.env.sums.items()
+            wrong = [name for name, total in sums if not np.isfinite(total).all()]
+            raise ConfigError(
+                f"rewards are not numbers any more: {listing(wrong) or 'of robots that fell'}"
+            )
 
     def _refuse_nonsense(self) -> None:
         """Raise ConfigError if the networks hold what is not a number: it would only spread."""

@@ -107,15 +107,6 @@ def _attached(robot: Robot, ground: Ground, task: Task) -> tuple[Any, Any]:
     base = own.body(robot.spec.base)
     if base is None:
         raise ConfigError(f"{robot.mjcf} has no body {robot.spec.base!r}, the base of its spec")
-    base.add_camera(
-        name="track",
-        mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM,
-        pos=[-1.6, -1.8, 0.9],
-        xyaxes=[0.75, -0.66, 0, 0.24, 0.27, 0.93],
-    )
-    own.worldbody.add_light(
-        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, pos=[0, 0, 10], dir=[0.2, 0.3, -1]
-    )
     return own, base
 
 
@@ -236,6 +227,7 @@ def _options(spec: Any, task: Task) -> None:
     """Set what was measured to pay, together a factor of two."""
     import mujoco
 
+    spec.option = mujoco.MjSpec().option  # gravity, impratio, wind: the same for every robot
     option = spec.option
     option.timestep = task.sim.dt
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST

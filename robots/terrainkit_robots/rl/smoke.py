@@ -26,6 +26,7 @@ from terrainkit_robots.rl.ground import Ground, Plane
 from terrainkit_robots.rl.rewards import Reward
 from terrainkit_robots.rl.robot import Robot, read_robot
 from terrainkit_robots.rl.runner import LeggedRunner
+from terrainkit_robots.rl.start import draw_start
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.task import Rewards, Task
 
@@ -243,7 +244,16 @@ def _gaps(env: LeggedEnv) -> dict[str, float]:
 
     model, data = env.scene.model, mujoco.MjData(env.scene.model)
     gaps: dict[str, float] = {}
-    for qpos in env.physics.qpos:
+    # As it was drawn: an environment lifts robots that begin in the ground.
+    drawn, _ = draw_start(
+        np.random.default_rng(0),
+        env.careers.origins,
+        env.scene,
+        env.robot,
+        env.ground,
+        env.cfg.init_state,
+    )
+    for qpos in drawn:
         data.qpos[:] = qpos
         with quiet_mujoco():
             mujoco.mj_kinematics(model, data)
@@ -444,13 +454,13 @@ def rewards(env: LeggedEnv) -> list[Check]:
     commands = env.commands.copy()
     commands[::4] = 0
     env.hold_commands(commands)
-    before = env.rewards
+    before = dict(env.rewards)
     recorders = {name: _Recorder(name, function) for name, (function, _) in before.items()}
-    env.rewards = {name: (recorders[name], scale) for name, (_, scale) in before.items()}
+    env.rewards.update({name: (recorders[name], scale) for name, (_, scale) in before.items()})
     try:
         _act_at_random(env, _RANDOM_STEPS)
     finally:
-        env.rewards = before
+        env.rewards.update(before)
         env.hold_commands(None)
     return [recorder.check() for recorder in recorders.values()]
 

@@ -9,8 +9,8 @@ FloatArray = NDArray[np.float32]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class State:
-    """n robots with j joints, f feet, p penalized bodies and k points of the height scan.
+class Measured:
+    """What is measured of n robots: j joints, f feet, p penalized bodies, k points of the scan.
 
     The arrays are copies: they stay what they are when the physics goes on.
     """
@@ -45,18 +45,6 @@ class State:
     torques: FloatArray
     """Torque of the motors [N m], shape (n, j)."""
 
-    actions: FloatArray
-    """The actions of this step, shape (n, j)."""
-
-    last_actions: FloatArray
-    """The actions of the step before, shape (n, j)."""
-
-    last_last_actions: FloatArray
-    """The actions of the step before that, shape (n, j)."""
-
-    commands: FloatArray
-    """What is asked for: speed forward, to the left [m/s], turning [rad/s], shape (n, 3)."""
-
     foot_height: FloatArray
     """Height of the feet above the ground under them [m], shape (n, f)."""
 
@@ -78,6 +66,26 @@ class State:
     height_scan: FloatArray
     """Height of the base above each point of the scan [m], shape (n, k); empty without one."""
 
+    fallen: NDArray[np.bool_]
+    """Robots whose episode ends as a fall, shape (n,)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class State(Measured):
+    """What is measured of n robots, and what is known of them otherwise."""
+
+    actions: FloatArray
+    """The actions of this step, shape (n, j)."""
+
+    last_actions: FloatArray
+    """The actions of the step before, shape (n, j)."""
+
+    last_last_actions: FloatArray
+    """The actions of the step before that, shape (n, j)."""
+
+    commands: FloatArray
+    """What is asked for: speed forward, to the left [m/s], turning [rad/s], shape (n, 3)."""
+
     push_vel: FloatArray
     """What the last push added to the base's velocity, in the world's frame [m/s], shape (n, 3)."""
 
@@ -92,9 +100,6 @@ class State:
 
     joint_offset: FloatArray
     """Error of the zero of each joint: what is measured less what is [rad], shape (n, j)."""
-
-    fallen: NDArray[np.bool_]
-    """Robots whose episode ends as a fall, shape (n,)."""
 
     def put(self, ids: NDArray[np.int64], other: "State") -> None:
         """Take over the robots `ids` from a state of those alone."""

@@ -32,6 +32,7 @@ from terrainkit_robots.rl.run_folder import (
     located_robot,
     located_terrain,
     rewrite_task,
+    same_ground,
 )
 from terrainkit_robots.rl.task import Task
 
@@ -109,8 +110,8 @@ def train(
             )
         if runner.first:
             runner.folder = _place(folder, robot, terrain, task, before)
-        same_size = before is not None and before.task.env.num_envs == task.env.num_envs
-        _learn(runner, left, fresh=not same_size)
+        # Where all robots begin at once, they would also run out of time at once.
+        _learn(runner, left, fresh=not env.steps.any())
         return Trained(
             folder=runner.folder, iteration=runner.current_learning_iteration, signal=stop()
         )
@@ -146,6 +147,11 @@ def _goes_on(run: Run, robot: str | Path, terrain: str | Path, task: Task) -> bo
     )
     same = replace(task, env=same_size, runner=run.task.runner) == run.task
     same &= located_terrain(terrain) == run.terrain and located_robot(robot) == run.robot_name
+    if same and not same_ground(run):
+        raise ConfigError(
+            f"{run.terrain} is another map than {run.folder} was trained on, which its map.toml "
+            "describes; another --terrain begins a new run with its networks"
+        )
     return same and "processes" in read_checkpoint(_checkpoint(run))
 
 

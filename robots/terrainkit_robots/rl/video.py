@@ -1,13 +1,14 @@
 """The video: robots on their ground, drawn by MuJoCo without a window, as an mp4.
 
-It is drawn in a process of its own, as the pictures of onboarding are: which graphics library
-MuJoCo takes is settled when it is imported, and a broken one may crash. `python -m` this module is
-that process: a request on stdin, an answer and a video as files.
+It is drawn in a process of its own: see `graphics_library`. `python -m` this module is that
+process: a request on stdin, an answer and a video as files.
 """
 
 import json
 import math
+import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -21,21 +22,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.atomic import atomic_write
-from terrainkit.errors import ConfigError
-from terrainkit_robots.onboard import pictures
+from terrainkit.errors import ConfigError, ExportError
+from terrainkit_robots import graphics_library
 from terrainkit_robots.onboard.pictures import PicturesError
+from terrainkit_robots.rl.hfield_window import HeightfieldWindows
+from terrainkit_robots.rl.mp4 import Mp4Error, Mp4Writer
 from terrainkit_robots.wording import short
 
 FloatArray = NDArray[np.float32]
 
 SUFFIX = ".mp4"
 
-SIZE = (800, 450)
+SIZE = (640, 360)
 """Width and height of a video unless told [pixels]; without a graphics card a frame takes 0.2 s."""
-
-CODEC = "vp09"
-"""VP9, which browsers play in an mp4. OpenCV's wheels cannot write H.264, and no browser plays the
-`mp4v` that most programs write with it."""
 
 _REQUEST, _ANSWER, _DONE, _VIDEO = "request.json", "answer.json", "done", "video.mp4"
 """Files of the other process: what it is asked, its answer, a byte for each frame that is drawn,
@@ -49,15 +48,18 @@ _MOST_WORDS = 160
 _SKY = np.array([0.93, 0.95, 0.97], np.float32)
 """Color of what is far away."""
 
-_HAZE = (3.0, 10.0)
+_HAZE = (2.0, 6.0)
 """From where to where things fade into it, in distances of the camera."""
 
-_FAR = 150.0
+_FAR = 400.0
 """How far the picture reaches, in distances of the camera. The tolerance with which shadows are
 told from light grows with it; with less, slopes are speckled."""
 
 _FIELD_OF_VIEW = 35.0
 """Angle between the lower and the upper edge of a picture [deg]."""
+
+_TOWARD, _SWING = 128.0, 10.0
+"""Direction of the camera on the map, and how far it swings to either side [deg]."""
 
 _AWAY = 7.0
 """Distance of the camera, in sizes of the robot."""
@@ -149,7 +151,7 @@ def film_frames(film: Film, path: Path, *, overwrite: bool = False) -> Iterator[
 
     Raises:
         ConfigError: if it is not an mp4.
-        ExportError: if the file is there and `overwrite` is not set, or cannot be written.
+        ExportError: if the file is there and `overwrite` is not set, or it cannot be written.
         PicturesError: if MuJoCo cannot draw here.
     """
     check_video(path, overwrite=overwrite)
@@ -160,15 +162,17 @@ def film_frames(film: Film, path: Path, *, overwrite: bool = False) -> Iterator[
         folder = Path(name)
         _ask(film, folder)
         complaints = []
-        for library in pictures._libraries():
+        for library in graphics_library.libraries():
             yield from _drawn(library, folder, len(film))
             answer = _answer(folder)
             if "frames" in answer:
                 shutil.copyfile(folder / _VIDEO, target)
                 return
+            if "unwritten" in answer:
+                raise ExportError(f"{path} cannot be written: {answer['unwritten']}")
             complaints.append(f"{library or 'its default'}: {answer['failed']}")
         raise PicturesError(
-            f"MuJoCo cannot draw here ({'; '.join(complaints)}); {pictures._advice()}"
+            f"MuJoCo cannot draw here ({'; '.join(complaints)}); {graphics_library.advice()}"
         )
 
 
@@ -195,8 +199,9 @@ def _drawn(library: str, folder: Path, frames: int) -> Iterator[int]:
             stdin=request,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            env=pictures._environment(library),
+            env=graphics_library.environment(library),
             cwd=folder,
+            start_new_session=True,
         )
     try:
         done, last = 0, time.monotonic()
@@ -210,9 +215,17 @@ def _drawn(library: str, folder: Path, frames: int) -> Iterator[int]:
                 raise PicturesError(f"MuJoCo did not draw in time ({library or 'its default'})")
         yield from range(done, min(_size(folder / _DONE), frames))
     finally:
-        process.kill()
-        process.wait()
+        _end(process)
         (folder / _DONE).unlink(missing_ok=True)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End it if it runs, and ffmpeg with it."""
+    if process.poll() is None:
+        if hasattr(os, "killpg"):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.kill()
+    process.wait()
 
 
 def _size(file: Path) -> int:
@@ -228,8 +241,8 @@ def _answer(folder: Path) -> dict[str, Any]:
     except (OSError, ValueError):
         return {"failed": "it crashed"}
     (folder / _ANSWER).unlink()
-    if "failed" in answer:
-        answer["failed"] = short(" ".join(answer["failed"].split()), _MOST_WORDS)
+    for key in answer.keys() & {"failed", "unwritten"}:
+        answer[key] = short(" ".join(answer[key].split()), _MOST_WORDS)
     return answer
 
 
@@ -239,6 +252,8 @@ def main() -> None:
     folder = Path(request["folder"])
     try:
         answer: dict[str, Any] = {"frames": _draw(request, folder)}
+    except Mp4Error as error:
+        answer = {"unwritten": str(error)}
     except Exception as error:  # graphics libraries raise whatever they like
         answer = {"failed": f"{type(error).__name__}: {error}"}
     (folder / _ANSWER).write_text(json.dumps(answer))
@@ -246,27 +261,22 @@ def main() -> None:
 
 def _draw(request: Mapping[str, Any], folder: Path) -> int:
     """Draw the video, and return how many frames it has."""
-    import cv2
     import mujoco
 
     from terrainkit_robots.quiet_mujoco import quiet_mujoco
 
-    width, height = request["size"]
-    fps, poses = float(request["fps"]), np.load(folder / "poses.npy", mmap_mode="r")
+    size, fps = tuple(request["size"]), float(request["fps"])
+    poses = np.load(folder / "poses.npy", mmap_mode="r")
     shots = [Shot(**shot) for shot in request["shots"]]
     with quiet_mujoco(), (folder / _DONE).open("wb", buffering=0) as done:
-        stage = Stage(mujoco.MjModel.from_binary_path(str(folder / "scene.mjb")), (width, height))
-        file = str(folder / _VIDEO)
-        writer = cv2.VideoWriter(file, cv2.VideoWriter.fourcc(*CODEC), fps, (width, height))
-        if not writer.isOpened():
-            raise RuntimeError(f"OpenCV {cv2.__version__} cannot write {CODEC} video")
-        frames = 0
-        for shot in shots:
-            for picture in stage.frames(poses, shot, fps):
-                writer.write(np.ascontiguousarray(picture[:, :, ::-1]))
-                done.write(b".")
-                frames += 1
-        writer.release()
+        stage = Stage(mujoco.MjModel.from_binary_path(str(folder / "scene.mjb")), size)
+        with Mp4Writer(folder / _VIDEO, size, fps) as video:
+            frames = 0
+            for shot in shots:
+                for picture in stage.frames(poses, shot, fps):
+                    video.write(picture)
+                    done.write(b".")
+                    frames += 1
     return frames
 
 
@@ -290,8 +300,9 @@ class Stage:
         visual = model.vis
         visual.global_.offwidth, visual.global_.offheight = width, height
         visual.global_.fovy = _FIELD_OF_VIEW
-        visual.quality.shadowsize, visual.quality.offsamples = 2048, 4
-        _unpaint(model)
+        # Smoothing edges by several samples for each pixel would take twice the time.
+        visual.quality.shadowsize, visual.quality.offsamples = 2048, 0
+        self._windows = HeightfieldWindows(model)
         # Near, far and the reach of shadows are told in extents.
         model.stat.extent = _AWAY * self._radius
         visual.map.znear, visual.map.zfar = 0.02, _FAR
@@ -318,11 +329,28 @@ class Stage:
             fps: Frames per second.
         """
         targets = _smooth(poses[shot.start : shot.stop, shot.robot, :3], _CALM * fps)
+        self._show_ground(targets)
         for k, target in enumerate(targets):
             now = poses[shot.start + k]
-            azimuth = 128 + 10 * math.sin(0.4 * k / fps)
+            azimuth = _TOWARD + _SWING * math.sin(0.4 * k / fps)
             picture = self._picture(now, shot.robot, target, azimuth)
-            yield self._captioned(picture, shot.captions[k])
+            yield _captioned(picture, shot.captions[k])
+
+    def _show_ground(self, targets: FloatArray) -> None:
+        """Leave of heightfields what the camera will see before haze hides it."""
+        import mujoco
+
+        width, height = self._size
+        distance = _AWAY * self._radius
+        across = math.degrees(
+            math.atan(width / height * math.tan(math.radians(_FIELD_OF_VIEW) / 2))
+        )
+        edges = np.radians(_TOWARD + (across + _SWING) * np.linspace(-1, 1, 5))
+        rays = np.column_stack([np.cos(edges), np.sin(edges)])
+        corners = np.concatenate([-1.2 * distance * rays, _HAZE[1] * distance * rays])
+        seen = (targets[:, None, :2] + corners).reshape(-1, 2)
+        for field in self._windows.show(seen):
+            mujoco.mjr_uploadHField(self._model, self._context, field)
 
     def _picture(
         self, poses: FloatArray, followed: int, target: FloatArray, azimuth: float
@@ -413,25 +441,19 @@ class Stage:
         mixed = pixels * (1 - haze) + (255 * _SKY) * haze
         return np.round(mixed[::-1]).astype(np.uint8)
 
-    def _captioned(self, picture: NDArray[np.uint8], caption: str) -> NDArray[np.uint8]:
-        import cv2
 
-        height = len(picture)
-        x, y, scale = round(0.03 * height), round(0.955 * height), height / 900
-        font, smooth = cv2.FONT_HERSHEY_SIMPLEX, cv2.LINE_AA
-        picture = np.ascontiguousarray(picture)
-        rim = [((x + i, y + j), _PAPER) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
-        for place, color in [*rim, ((x, y), _INK)]:
-            cv2.putText(picture, caption, place, font, scale, color, 1, smooth)
-        return picture
+def _captioned(picture: NDArray[np.uint8], caption: str) -> NDArray[np.uint8]:
+    """Return a picture with words below, on the left."""
+    import cv2
 
-
-def _unpaint(model: Any) -> None:
-    """Let ground of ours have the color of its material, which that of its shape would darken."""
-    import mujoco
-
-    ground = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_MATERIAL, "ground/ground")
-    model.geom_rgba[(model.geom_matid == ground) & (ground >= 0)] = 1
+    height = len(picture)
+    x, y, scale = round(0.03 * height), round(0.955 * height), height / 750
+    font, smooth = cv2.FONT_HERSHEY_SIMPLEX, cv2.LINE_AA
+    picture = np.ascontiguousarray(picture)
+    rim = [((x + i, y + j), _PAPER) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
+    for place, color in [*rim, ((x, y), _INK)]:
+        cv2.putText(picture, caption, place, font, scale, color, 1, smooth)
+    return picture
 
 
 def _radius(model: Any, own: NDArray[np.int64]) -> float:

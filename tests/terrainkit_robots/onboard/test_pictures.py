@@ -5,7 +5,7 @@ import cv2
 import numpy as np
 import pytest
 
-from terrainkit_robots import bundled
+from terrainkit_robots import bundled, graphics_library
 from terrainkit_robots.onboard import pictures
 from terrainkit_robots.onboard.pictures import PicturesError, draw
 
@@ -76,7 +76,7 @@ def test_the_next_library_is_tried_and_then_all_are_told(monkeypatch, tmp_path):
         return {"pictures": ["front"]}
 
     monkeypatch.setattr(pictures, "_ask", ask)
-    monkeypatch.setattr(pictures, "_libraries", lambda: ("egl", "osmesa"))
+    monkeypatch.setattr(graphics_library, "libraries", lambda: ("egl", "osmesa"))
     assert draw(tmp_path) == {"front": b"png"}
     assert asked == ["egl", "osmesa"]
     monkeypatch.setattr(pictures, "_ask", lambda *_: {"failed": "no"})
@@ -86,20 +86,10 @@ def test_the_next_library_is_tried_and_then_all_are_told(monkeypatch, tmp_path):
 
 
 def test_a_robot_that_cannot_be_drawn_is_told_and_nothing_else_is_tried(monkeypatch, tmp_path):
-    monkeypatch.setattr(pictures, "_libraries", lambda: ("egl", "osmesa"))
+    monkeypatch.setattr(graphics_library, "libraries", lambda: ("egl", "osmesa"))
     monkeypatch.setattr(pictures, "_ask", lambda *_: {"undrawable": "no shape"})
     with pytest.raises(PicturesError, match=r"^MuJoCo cannot draw it: no shape$"):
         draw(tmp_path)
-
-
-def test_what_the_user_asks_for_is_all_that_is_tried(monkeypatch):
-    monkeypatch.setenv("MUJOCO_GL", " osmesa")
-    assert pictures._libraries() == ("osmesa",)
-    monkeypatch.delenv("MUJOCO_GL")
-    monkeypatch.setattr("sys.platform", "linux")
-    assert pictures._libraries() == ("egl", "osmesa")
-    monkeypatch.setattr("sys.platform", "darwin")
-    assert pictures._libraries() == ("",)
 
 
 def test_a_crash_costs_only_the_pictures(monkeypatch, tmp_path):
@@ -113,13 +103,3 @@ def test_a_crash_costs_only_the_pictures(monkeypatch, tmp_path):
 def test_no_time_no_pictures():
     with pytest.raises(PicturesError, match="in time"):
         draw(QUADRUPED, seconds=0)
-
-
-def test_the_other_process_finds_modules_here_and_takes_no_library_from_here(monkeypatch):
-    monkeypatch.setenv("PYOPENGL_PLATFORM", "glx")
-    monkeypatch.setenv("MUJOCO_GL", "glfw")
-    environment = pictures._environment("egl")
-    assert "PYOPENGL_PLATFORM" not in environment
-    assert environment["MUJOCO_GL"] == "egl"
-    assert "MUJOCO_GL" not in pictures._environment("")
-    assert environment["PYTHONPATH"]

@@ -32,7 +32,7 @@ class Patches(Plane):
         self.env_origins = np.zeros((rows, len(names), 3), np.float32)
         self.env_origins[..., 0] = 8 * np.arange(rows)[:, None] + 4
         self.env_origins[..., 1] = 8 * np.arange(len(names)) + 4
-        self.terrain_names = names
+        self.terrain_names = np.tile(np.array(names), (rows, 1))
 
 
 def live(
@@ -238,6 +238,17 @@ class TestSuccess:
         careers.levels[:] = [1, 5, 3]
         assert careers.by_terrain()["flat"][0] == 2
         assert list(careers.by_terrain()) == ["flat", "steps"]
+
+    def test_patches_of_the_same_terrain_are_one_wherever_they_are(self) -> None:
+        ground = Patches(rows=2)
+        ground.terrain_names = np.array([["flat", "rough"], ["rough", "flat"]])
+        careers = Careers(ground, 4, 0, 1)
+        careers.levels[:], careers.columns[:] = [0, 1, 1, 1], [0, 0, 1, 1]
+        careers.success[:] = [[0.1, 0.2], [0.4, 0.7]]
+        assert careers.by_terrain() == {
+            "flat": (pytest.approx(2 / 3), pytest.approx(0.4)),
+            "rough": (1, pytest.approx(0.3)),
+        }
 
     def test_terrain_without_robots(self) -> None:
         careers = Careers(Patches(), 1, 0, 1)

@@ -259,11 +259,11 @@ class TestEnvironment:
         )
         env.physics.qpos[0, 3:7] = (0, 1, 0, 0)
         run(env, 1)
-        assert env.lin_vel_x == (-1.0, 1.0)
+        assert env.orders.lin_vel_x == (-1.0, 1.0)
         spans = []
         for _ in range(5):
             run(env, 10)
-            spans.append(env.lin_vel_x[1])
+            spans.append(env.orders.lin_vel_x[1])
         assert max(spans) == 1.15
         assert spans == sorted(spans)
         assert spans[0] <= 1.1 + 1e-6
@@ -275,4 +275,4 @@ class TestEnvironment:
             rewards=Rewards(tracking_sigma=0.01),
         )
         run(env, 30)
-        assert env.lin_vel_x == (-1.0, 1.0)
+        assert env.orders.lin_vel_x == (-1.0, 1.0)

@@ -338,11 +338,11 @@ class TestGoingOn:
     ):
         env = LeggedEnv(lively(4), quadruped, map_ground)
         env.careers.levels[:] = 2
-        env.lin_vel_x = (-1.3, 1.3)
+        env.orders.lin_vel_x = (-1.3, 1.3)
         other = LeggedEnv(lively(7), quadruped, map_ground)
         other.load_state_dict(env.state_dict())
         assert (other.careers.levels == 2).all()
-        assert other.lin_vel_x == (-1.3, 1.3)
+        assert other.orders.lin_vel_x == (-1.3, 1.3)
         assert (other.episode_length_buf == 0).all()
         still(other)
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 import torch
 
+from terrainkit import MapConfig, TerrainChoice, generate
 from terrainkit.errors import ConfigError, ExportError
+from terrainkit_robots.rl import evaluation
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.evaluation import (
     SETTLING,
@@ -281,15 +283,18 @@ def test_the_policy_sees_as_much_as_in_training(run_of, map_file):
 
 
 @pytest.mark.parametrize("terrain", ["plane", "map"])
-def test_the_same_seed_gives_the_same_result(run_of, map_file, terrain):
+def test_the_same_seed_gives_the_same_result(run_of, map_file, terrain, monkeypatch):
+    monkeypatch.setattr(evaluation, "SETTLING", 0.1)
+    monkeypatch.setattr(evaluation, "WINDOW", 0.1)
     run = run_of(map_file if terrain == "map" else "plane")
 
     def result(seed):
-        asked = Asked(num_envs=3, seconds=2.2, seed=seed, random_commands=True)
+        asked = Asked(num_envs=3, seconds=0.4, seed=seed, random_commands=True)
         env, commands = prepared(run, asked)
         torch.manual_seed(7)
         mix = 0.5 * torch.randn(env.get_observations()["policy"].shape[1], env.num_actions)
-        outcome = roll_out(env, lambda seen: torch.tanh(seen["policy"] @ mix), 2.2, commands)
+        outcome = roll_out(env, lambda seen: torch.tanh(seen["policy"] @ mix), 0.4, commands)
+        assert outcome.counts.all()
         return summed_up(run, asked, env, outcome).as_json()
 
     assert result(3) == result(3)
@@ -322,6 +327,27 @@ def test_results_are_told_apart_by_terrain_and_level(run_of, map_file):
     assert [part["robots"] for part in told["by_terrain_and_level"]] == [2] * 6
     assert told["by_terrain_and_level"][1]["level"] == 1
     assert "by_command" not in told
+
+
+def test_on_a_randomized_map_each_robot_counts_for_the_terrain_below_it(run_of, tmp_path):
+    choices = tuple(TerrainChoice(terrain=name) for name in ("flat", "pyramid_slope"))
+    made = MapConfig(
+        mode="randomized", rows=3, cols=3, patch_size=(4, 4), border=0.5, terrains=choices
+    )
+    path = generate(made).save(tmp_path / "map.npz")
+    run, asked = run_of(path), Asked(seconds=0.04)
+    env, commands = prepared(run, replace(asked, num_envs=9))
+    found = summed_up(run, asked, env, roll_out(env, still(env), 0.04, commands))
+    names = env.ground.terrain_names
+    assert len({tuple(row) for row in names}) > 1
+    for part in found.by_terrain:
+        assert part.score.robots == (names == part.terrain).sum()
+    assert sum(part.score.robots for part in found.by_terrain) == 9
+    for part in found.by_terrain_and_level:
+        assert part.score.robots == (names[part.level] == part.terrain).sum()
+    keys = [(part.terrain, part.level) for part in found.by_terrain_and_level]
+    order = [part.terrain for part in found.by_terrain]
+    assert keys == sorted(keys, key=lambda key: (order.index(key[0]), key[1]))
 
 
 @pytest.mark.parametrize(

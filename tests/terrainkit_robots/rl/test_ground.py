@@ -2,6 +2,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from terrainkit import MapConfig, TerrainChoice, generate
 from terrainkit.errors import ConfigError, TerrainkitError
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.env import LeggedEnv
@@ -124,11 +125,32 @@ class TestMapGround:
     def test_tells_its_rows_columns_and_size(self, mixed_map):
         ground = MapGround(mixed_map)
         assert ground.env_origins.shape == (3, 2, 3)
-        assert ground.terrain_names == ("stairs", "rough_slope")
+        assert ground.terrain_names.tolist() == [["stairs", "rough_slope"]] * 3
         assert ground.patch_length == 6.0
         np.testing.assert_allclose(ground.lower, (-1.2, -1.2))
         np.testing.assert_allclose(ground.upper, (3 * 6 + 1.2, 2 * 4 + 1.2))
         assert not ground.level
+
+    def test_knows_the_terrain_of_each_patch_of_a_randomized_map(self):
+        choices = tuple(TerrainChoice(terrain=name) for name in ("flat", "stairs"))
+        config = MapConfig(
+            mode="randomized", rows=4, cols=3, patch_size=(4, 4), border=0.5, terrains=choices
+        )
+        terrain_map = generate(config)
+        ground = MapGround(terrain_map)
+        assert ground.terrain_names.shape == (4, 3)
+        assert len({tuple(row) for row in ground.terrain_names}) > 1  # or nothing is told apart
+        for row in range(4):
+            for col in range(3):
+                x, y, _ = ground.env_origins[row, col]
+                near = np.linspace(-1.5, 1.5, 31, dtype=np.float32)
+                level = np.ptp(ground.height(x + near, np.full(31, y))) == 0
+                assert ground.terrain_names[row, col] == ("flat" if level else "stairs")
+
+    def test_has_the_color_of_its_material(self, map_ground):
+        model = compiled(map_ground)
+        assert (model.geom_rgba == 1).all()
+        assert (model.geom_matid == model.material("ground").id).all()
 
     def test_origins_stand_on_it(self, map_ground):
         origins = map_ground.env_origins.reshape(-1, 3)
@@ -150,6 +172,10 @@ class TestScannedGround:
         off = np.abs(found - rays(compiled(scanned), xy))
         assert smooth.mean() > 0.8
         assert off[smooth].max() < EXACT
+
+    def test_is_one_patch_of_its_own_kind(self, scanned):
+        assert scanned.terrain_names.tolist() == [["custom"]]
+        assert Plane().terrain_names.tolist() == [["plane"]]
 
     def test_is_as_wide_as_its_reach(self, scanned):
         assert scanned.lower == (-1.5, -1.5)

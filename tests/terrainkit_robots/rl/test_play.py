@@ -1,3 +1,4 @@
+import copy
 from contextlib import nullcontext
 from types import SimpleNamespace
 
@@ -144,6 +145,18 @@ def test_visits_are_of_all_terrains_before_a_second_of_any(quadruped, calm, map_
     assert env.careers.levels[chosen].tolist() == [1, 1, 1]
     assert visited(env, 1) == chosen[:1]
     assert len(set(visited(env, 100))) == 12
+
+
+def test_on_a_map_of_mixed_columns_the_terrain_below_is_told(quadruped, calm, map_ground):
+    ground = copy.copy(map_ground)
+    ground.terrain_names = np.array([["a", "b"], ["b", "c"], ["c", "a"]])
+    env = LeggedEnv(calm(6), quadruped, ground)
+    env.careers.levels[:], env.careers.columns[:] = np.divmod(np.arange(6), 2)
+    recorder = Recorder(env)
+    recorder.record()
+    film = recorder.film(3, (128, 72))
+    told = [shot.captions[0] for shot in film.shots]
+    assert told == ["a, level 0 of 2", "b, level 1 of 2", "c, level 1 of 2"]
 
 
 def test_without_a_film_nothing_is_recorded(run_of):

@@ -101,13 +101,13 @@ def test_another_number_of_environments_keeps_weights_and_curriculum(
     before = make(task, map_ground)
     before.env.careers.levels[:] = 2
     before.env.careers.success[1, 0] = 0.75
-    before.env.lin_vel_x = (-2.0, 2.0)
+    before.env.orders.lin_vel_x = (-2.0, 2.0)
     before.save()
     more = make(replace(task, env=replace(task.env, num_envs=9)), map_ground)
     more.load(tmp_path / "model_0.pt")
     assert (more.env.careers.levels == 2).all()
     assert more.env.careers.success[1, 0] == 0.75
-    assert more.env.lin_vel_x == (-2.0, 2.0)
+    assert more.env.orders.lin_vel_x == (-2.0, 2.0)
     assert differences(before.alg.save(), more.alg.save()) == []
     more.learn(1)
 

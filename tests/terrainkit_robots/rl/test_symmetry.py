@@ -80,8 +80,8 @@ def mirror_memory(env: LeggedEnv, mirror: Mirror) -> None:
     rng = np.random.default_rng(4)
     a, b = slice(0, _PAIRS), slice(_PAIRS, 2 * _PAIRS)
     env.hold_commands(rng.uniform(-1, 1, (2 * _PAIRS, 3)).astype(np.float32))
-    assert env.held is not None
-    env.held[b] = env.held[a] * np.array([1, -1, -1])
+    assert env.orders.held is not None
+    env.orders.held[b] = env.orders.held[a] * np.array([1, -1, -1])
     env.actions[:, a] = rng.uniform(-0.2, 0.2, env.actions[:, a].shape)
     env.actions[:, b] = [mirror.actions.of(each) for each in env.actions[:, a]]
     env.push_vel[a] = rng.uniform(-1, 1, (_PAIRS, 3)) * [1, 1, 0]
@@ -159,7 +159,7 @@ class TestRobot:
         image = env.physics.qpos[:_PAIRS].copy()
         image[:, [1, 4, 6]] *= -1
         np.testing.assert_allclose(image[:, :7], env.physics.qpos[_PAIRS:, :7], atol=1e-4)
-        rewards = env._reward(env.state)
+        rewards = env.earnings.pay(env.state)
         np.testing.assert_allclose(rewards[:_PAIRS], rewards[_PAIRS:], atol=1e-4)
 
     def test_wrong_sign_is_seen(self, name: str) -> None:
@@ -310,8 +310,8 @@ def _look_again(env: LeggedEnv) -> None:
 
     everyone = np.arange(env.num_envs)
     env.physics.batch.forward(everyone, mujoco.mjtStage.mjSTAGE_VEL)
-    assert env.held is not None
-    env.commands[:] = env.held
+    assert env.orders.held is not None
+    env.commands[:] = env.orders.held
     env.state = env._look(everyone, fresh=True)
     env._observed = env._observe()
 

@@ -1,15 +1,17 @@
 import json
 import subprocess
-from dataclasses import replace
+import time
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
 from terrainkit.errors import ConfigError, ExportError
-from terrainkit_robots.onboard import pictures
+from terrainkit_robots import graphics_library
 from terrainkit_robots.onboard.pictures import PicturesError
 from terrainkit_robots.rl import video
+from terrainkit_robots.rl.mp4 import Mp4Error
 from terrainkit_robots.rl.scene import build_scene
 from terrainkit_robots.rl.video import Film, Shot, check_video, film_frames
 
@@ -28,7 +30,8 @@ def film(quadruped, map_ground, calm):
     poses[:, :, 0] += np.linspace(0, 6 / 25 * 7, 8)[:, None]
     shots = (
         Shot(robot=0, start=0, stop=6, captions=("first",) * 6),
-        Shot(robot=1, start=2, stop=4, captions=("second",) * 2),
+        Shot(robot=1, start=2, stop=3, captions=("",)),
+        Shot(robot=1, start=2, stop=3, captions=("second",)),
     )
     return Film(model=model, poses=poses, shots=shots, fps=25.0, size=SIZE)
 
@@ -73,17 +76,9 @@ def test_far_away_is_bright_and_near_is_ground(drawn):
         assert bottom < top - 20
 
 
-def test_captions_are_below_on_the_left(film, drawn, tmp_path):
-    bare = Film(
-        model=film.model,
-        poses=film.poses,
-        shots=(replace(film.shots[0], captions=("",) * 6),),
-        fps=25.0,
-        size=SIZE,
-    )
-    path = tmp_path / "bare.mp4"
-    list(film_frames(bare, path))
-    changed = np.abs(read(path)[0] - drawn[0]).max(axis=2) > 25
+def test_captions_are_below_on_the_left(drawn):
+    bare, captioned = drawn[6:]  # twice the same
+    changed = np.abs(captioned - bare).max(axis=2) > 25
     rows, columns = np.nonzero(changed)
     assert len(rows) > 5
     assert rows.min() > 0.8 * SIZE[1]
@@ -118,7 +113,8 @@ def test_a_film_without_frames_is_refused(film):
 def test_a_graphics_library_that_is_not_there_is_an_error(film, tmp_path, monkeypatch):
     monkeypatch.setenv("TERRAINKIT_MUJOCO_GL", "osmesa")
     monkeypatch.setenv("PYOPENGL_PLATFORM", "osmesa")
-    monkeypatch.setattr(pictures, "_environment", lambda _: {"PATH": "", "MUJOCO_GL": "crayons"})
+    broken = {"PATH": "", "MUJOCO_GL": "crayons"}
+    monkeypatch.setattr(graphics_library, "environment", lambda _: broken)
     path = tmp_path / "film.mp4"
     with pytest.raises(PicturesError, match=r"MuJoCo cannot draw here \(osmesa: .*MUJOCO_GL says"):
         list(film_frames(film, path))
@@ -133,15 +129,31 @@ def test_a_crash_is_an_error_and_leaves_nothing(film, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_never_comes_back_is_ended(film, tmp_path, monkeypatch):
-    sleeper = tmp_path / "sleeper"
-    sleeper.write_text("#!/bin/sh\nexec sleep 60\n")
+def test_what_never_comes_back_is_ended_with_what_it_started(film, tmp_path, monkeypatch):
+    sleeper, told = tmp_path / "sleeper", tmp_path / "told"
+    sleeper.write_text(f"#!/bin/sh\nsleep 60 &\necho $! > {told}\nwait\n")
     sleeper.chmod(0o755)
     monkeypatch.setattr(video.sys, "executable", str(sleeper))
-    monkeypatch.setattr(video, "_PATIENCE", 0.2)
+    monkeypatch.setattr(video, "_PATIENCE", 0.5)
     with pytest.raises(PicturesError, match="did not draw in time"):
         list(film_frames(film, tmp_path / "film.mp4"))
-    assert [each.name for each in tmp_path.iterdir()] == ["sleeper"]
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["sleeper", "told"]
+    stat = Path(f"/proc/{int(told.read_text())}/stat")
+    deadline = time.monotonic() + 5
+    while stat.exists() and stat.read_text().split()[2] != "Z" and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert not stat.exists() or stat.read_text().split()[2] == "Z"
+
+
+def test_a_video_that_cannot_be_written_is_an_error_and_tried_once(film, tmp_path, monkeypatch):
+    program = tmp_path / "python"
+    program.write_text('#!/bin/sh\necho \'{"unwritten": "ffmpeg: no  space"}\' > answer.json\n')
+    program.chmod(0o755)
+    monkeypatch.setattr(video.sys, "executable", str(program))
+    path = tmp_path / "film.mp4"
+    with pytest.raises(ExportError, match=r"film\.mp4 cannot be written: ffmpeg: no space$"):
+        list(film_frames(film, path))
+    assert [each.name for each in tmp_path.iterdir()] == ["python"]
 
 
 def test_the_other_process_answers_what_is_wrong(tmp_path, monkeypatch):
@@ -150,6 +162,16 @@ def test_the_other_process_answers_what_is_wrong(tmp_path, monkeypatch):
     video.main()
     answer = json.loads((tmp_path / "answer.json").read_text())
     assert "FileNotFoundError" in answer["failed"]
+
+
+def test_the_other_process_tells_a_failing_ffmpeg_apart(tmp_path, monkeypatch):
+    def draw(*_):
+        raise Mp4Error("ffmpeg: no")
+
+    monkeypatch.setattr(video, "_draw", draw)
+    monkeypatch.setattr(video.json, "load", lambda _: {"folder": str(tmp_path)})
+    video.main()
+    assert json.loads((tmp_path / "answer.json").read_text()) == {"unwritten": "ffmpeg: no"}
 
 
 def test_the_camera_keeps_calm():
@@ -169,7 +191,7 @@ def test_the_module_is_a_process_of_its_own(tmp_path):
         input=b"{",
         capture_output=True,
         cwd=tmp_path,
-        env=pictures._environment(""),
+        env=graphics_library.environment(""),
         timeout=60,
         check=False,
     )
