@@ -10,9 +10,10 @@ from terrainkit.errors import ConfigError
 from terrainkit_cli import render
 from terrainkit_cli.evaluate_command import PolicyCommand, headline, number
 from terrainkit_cli.robot_options import Output
+from terrainkit_cli.training_extra import require_training
 
 if TYPE_CHECKING:
-    from terrainkit_robots.rl.evaluation import Evaluation
+    from terrainkit_robots.rl.score import Evaluation
     from terrainkit_robots.rl.video import Film
 
 
@@ -52,6 +53,8 @@ class Play(PolicyCommand):
         """Roll the policy, print the table, and write the video."""
         if self.viewer and (self.no_video or self.output):
             raise ConfigError("--viewer writes no video; --output and --no-video are of no use")
+        if not (self.viewer or self.no_video):
+            require_training("imageio_ffmpeg")  # before the wait
         run = self.open()
         name = run.folder.resolve().name if Path(self.policy).exists() else self.policy
         target = Path(self.output or f"{name}.mp4")

@@ -168,8 +168,9 @@ def drop_stdout() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-_LINE_EVERY = 10
-"""Iterations of training between lines, where there is no terminal to show each on."""
+_LINE_EVERY, _TERMS_EVERY = 10, 50
+"""Iterations of training between lines, where there is no terminal to show each on: of how it goes,
+and of what robots succeed in and are rewarded for."""
 
 
 @contextmanager
@@ -191,6 +192,13 @@ def _training_line(progress: "Progress") -> None:
         return
     facts = ", ".join(f"{name} {value}" for name, value in _training_facts(progress))
     print(f"iteration {done}/{progress.last}: {facts}", file=sys.stderr, flush=True)
+    if done % _TERMS_EVERY and done != progress.last:
+        return
+    terms = [f"success {name} {rate:.0%}" for name, rate in progress.success.items()]
+    terms += [f"{name} {reward:+.3f} /s" for name, reward in progress.rewards.items()]
+    if terms:
+        told = ", ".join(terms)
+        print(f"iteration {done}/{progress.last}: {told}", file=sys.stderr, flush=True)
 
 
 def _training_facts(progress: "Progress") -> list[tuple[str, str]]:

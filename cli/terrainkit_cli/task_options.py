@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from typing import Self
 
     from terrainkit_robots.rl.section import Section
-from terrainkit_robots.rl.task import Task
+    from terrainkit_robots.rl.task import Task
 
 _CLOSE = 0.7
 """Share of common letters from which an option is what another was meant for."""
@@ -100,6 +100,11 @@ class TaskCommand(Command):
         task = self.start_task()
         changes = getattr(self, "changes", None)
         return task if changes is None else _changed("", task, changes)
+
+    def has_given(self, section: str, name: str) -> bool:
+        """Return whether the command line has the option of a value."""
+        options = getattr(getattr(self, "changes", None), section, None)
+        return getattr(options, name, _LEFT_OUT) is not _LEFT_OUT
 
 
 _HELP = ("-h", "--help")

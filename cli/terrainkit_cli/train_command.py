@@ -1,6 +1,7 @@
 """The command that trains a policy."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated
@@ -66,7 +67,7 @@ class Train(TaskCommand):
         from terrainkit_robots.rl.registry import find
         from terrainkit_robots.rl.task_file import read_task
 
-        run = self._resumed()
+        run = self._resumed
         task = find(self._robot(None)).task if run is None else run.task
         return read_task(self.config, task) if self.config else task
 
@@ -75,8 +76,8 @@ class Train(TaskCommand):
         from terrainkit_robots.rl.task_file import changed
 
         task = super().task()
-        env = _given(num_envs=self.num_envs)
-        runner = _given(max_iterations=self.max_iterations, seed=self.seed)
+        env = self._given("env", num_envs=self.num_envs)
+        runner = self._given("runner", max_iterations=self.max_iterations, seed=self.seed)
         return replace(
             task, env=changed("env.", task.env, env), runner=changed("runner.", task.runner, runner)
         )
@@ -86,7 +87,7 @@ class Train(TaskCommand):
         require_training()
         from terrainkit_robots.rl.training import train
 
-        run = self._resumed()
+        run = self._resumed
         robot, terrain, task = self._robot(run), self._terrain(run), self.task()
         with render.training() as watch:
             trained = train(
@@ -101,6 +102,7 @@ class Train(TaskCommand):
         _tell(trained, task)
         return 128 + trained.signal if trained.signal else 0
 
+    @cached_property  # read once, or a checkpoint that is written meanwhile would count for a part
     def _resumed(self) -> "Run | None":
         from terrainkit_robots.rl.run_folder import open_run
 
@@ -122,17 +124,20 @@ class Train(TaskCommand):
             )
         return run.robot_name
 
+    def _given(self, section: str, **words: str) -> dict[str, int]:
+        """Return the whole numbers that were given, by the name of their value in a section."""
+        given = {name: word for name, word in words.items() if word}
+        for name in given:
+            if self.has_given(section, name):
+                option = name.replace("_", "-")
+                raise ConfigError(f"--{option} and --{section}.{option} are one; wanted it once")
+        return {
+            name: coerce(f"--{name.replace('_', '-')}", value_of(word), int)
+            for name, word in given.items()
+        }
+
     def _terrain(self, run: "Run | None") -> str:
         return self.terrain or ("plane" if run is None else run.terrain)
-
-
-def _given(**words: str) -> dict[str, int]:
-    """Return the whole numbers that were given, by the name of their option."""
-    return {
-        name: coerce(f"--{name.replace('_', '-')}", value_of(word), int)
-        for name, word in words.items()
-        if word
-    }
 
 
 def _tell(trained: "Trained", task: "Task") -> None:

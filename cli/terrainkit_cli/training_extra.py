@@ -4,19 +4,25 @@ import importlib.util
 
 from terrainkit.errors import ConfigError
 
-_PACKAGES = ("torch", "rsl_rl", "tensordict", "tensorboard", "imageio_ffmpeg")
+_PACKAGES = ("torch", "rsl_rl", "tensordict", "tensorboard")
 """Packages of the extra that training imports."""
 
 
-def require_training() -> None:
-    """Raise an error that says what to install, if the extra is not; imports nothing.
+def require_training(*more: str) -> None:
+    """Make ready for training, or raise an error that says what to install; imports no torch.
+
+    Args:
+        *more: Packages of the extra that this command needs besides.
 
     Raises:
         ConfigError: if a package is missing.
     """
-    missing = [name for name in _PACKAGES if importlib.util.find_spec(name) is None]
+    missing = [name for name in (*_PACKAGES, *more) if importlib.util.find_spec(name) is None]
     if missing:
         raise ConfigError(
             f"this needs {', '.join(missing)}, which is not installed: "
             "pip install 'terrainkit[train]'"
         )
+    from terrainkit_robots.rl.threads import wait_asleep
+
+    wait_asleep()

@@ -1,8 +1,12 @@
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
+
+from terrainkit_robots import bundled
 
 Run = subprocess.CompletedProcess[str]
 
@@ -30,6 +34,18 @@ def small(terrainkit) -> str:
     run = terrainkit("generate", "-o", "small.npz", *SMALL)
     assert run.returncode == 0, run.stderr
     return "small.npz"
+
+
+@pytest.fixture
+def walking(tmp_path) -> Path:
+    """Return the folder of a run `walk` of a quadruped that walks, with two checkpoints."""
+    shipped = bundled.find("quadruped").parent / "trained"
+    (policy,) = shipped.glob("model_*.pt")
+    folder = tmp_path / "walk"
+    shutil.copytree(shipped, folder, ignore=shutil.ignore_patterns(policy.name))
+    for iteration in (3, 7):
+        shutil.copy(policy, folder / f"model_{iteration}.pt")
+    return folder
 
 
 SMALL = ("--rows", 2, "--cols", 5, "--preset", "rough", "--border", 1, "--patch-size", 8, 6)

@@ -1,39 +1,22 @@
-from types import SimpleNamespace
+import importlib.util
 
 import pytest
 
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
-import torch
-
 from terrainkit import MapConfig, TerrainChoice, generate
 from terrainkit_cli.main import main
 from terrainkit_robots.onboard.pictures import PicturesError
-from terrainkit_robots.rl import play, run_folder, runner, video
-from terrainkit_robots.rl.registry import find
-from terrainkit_robots.rl.robot import read_robot
-from terrainkit_robots.rl.task import Env, Task
+from terrainkit_robots.rl import play, video
 
 QUICK = ("--seconds", "0.04", "--num-envs", "1")
 SMALL = ("--size", "96", "64")
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch, capsys):
-    """Run `terrainkit play` in this process, in an empty folder with a run `walk`."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "walk").mkdir()
-    made = SimpleNamespace(
-        folder=tmp_path / "walk",
-        task=Task(env=Env(num_threads=1)),
-        robot=read_robot(find("quadruped").folder),
-        terrain="plane",
-        checkpoint=tmp_path / "walk/model_7.pt",
-    )
-    monkeypatch.setattr(run_folder, "open_run", lambda *_: made)
-    monkeypatch.setattr(
-        runner, "policy_of", lambda _, env: lambda _: torch.zeros(env.num_envs, env.num_actions)
-    )
+def here(walking, monkeypatch, capsys):
+    """Run `terrainkit play` in this process, in a folder with a run `walk`."""
+    monkeypatch.chdir(walking.parent)
 
     def run(*words):
         capsys.readouterr()
@@ -63,6 +46,27 @@ def test_it_writes_a_video_called_as_the_run(here, tmp_path):
     more, frame = reader.read()
     assert more
     assert frame.shape == (64, 96, 3)
+
+
+def test_a_robot_whose_policy_is_shipped_is_played_by_its_name(here, tmp_path):
+    words = ("--seconds", "0.2", "--num-envs", "2", *SMALL)
+    code, out, err = here("quadruped", *words)
+    if "MuJoCo cannot draw here" in err:
+        pytest.skip(err)
+    assert (code, err) == (0, "")
+    assert "on plane: 2 robots, 0 fell" in out
+    assert (tmp_path / "quadruped.mp4").stat().st_size > 1000
+
+
+def test_without_what_writes_videos_it_says_what_to_install(here, monkeypatch):
+    find_spec = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name: None if "ffmpeg" in name else find_spec(name)
+    )
+    code, out, err = here("walk", *QUICK)
+    assert (code, out) == (2, "")
+    assert "imageio_ffmpeg, which is not installed: pip install 'terrainkit[train]'" in err
+    assert here("walk", *QUICK, "--no-video")[0] == 0
 
 
 def test_a_table_for_a_map(here, tmp_path):

@@ -1,6 +1,8 @@
 """The command runs in this process: importing torch anew for each test takes seconds."""
 
+import importlib.util
 import io
+import os
 import resource
 import signal
 import sys
@@ -14,8 +16,10 @@ import pytest
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit import MapConfig, TerrainChoice, generate
+from terrainkit.errors import ConfigError
 from terrainkit_cli import render
 from terrainkit_cli.main import main
+from terrainkit_cli.training_extra import require_training
 from terrainkit_robots.rl.progress import Progress
 from terrainkit_robots.rl.run_folder import checkpoints, open_run
 
@@ -135,6 +139,10 @@ def without_origins(folder: Path) -> None:
         (("quadruped", "--num-envs", "many"), "--num-envs is 'many'; wanted a whole number"),
         (("quadruped", "--num-envs", "0"), "env.num_envs is 0; wanted 1 or more"),
         (("quadruped", "--num-envs", "100000000"), "would fit"),
+        (
+            ("quadruped", "--seed", "1", "--runner.seed", "2"),
+            "--seed and --runner.seed are one; wanted it once",
+        ),
         (("quadruped", "--device", "tpu"), "device 'tpu'; here there is: cpu"),
         (("quadruped", "--resume", "nowhere"), "no run nowhere"),
         (("quadruped", "--rewards.torque", "1"), "did you mean --rewards.torques?"),
@@ -167,6 +175,18 @@ def test_a_missing_extra_says_what_to_install(train, capsys, monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
     assert train("quadruped") == 2
     assert "pip install 'terrainkit[train]'" in capsys.readouterr().err
+
+
+def test_what_only_videos_need_is_wanted_only_for_them(monkeypatch):
+    monkeypatch.delenv("OMP_WAIT_POLICY", raising=False)
+    found = importlib.util.find_spec
+    monkeypatch.setattr(
+        "importlib.util.find_spec", lambda name: None if name == "imageio_ffmpeg" else found(name)
+    )
+    require_training()
+    assert os.environ["OMP_WAIT_POLICY"] == "PASSIVE"
+    with pytest.raises(ConfigError, match="this needs imageio_ffmpeg, which is not installed"):
+        require_training("imageio_ffmpeg")
 
 
 def test_a_task_file_comes_before_options(train, tmp_path):
@@ -203,11 +223,21 @@ def test_without_a_terminal_progress_is_a_line_now_and_then(capsys):
         "iteration 10/23",
         "iteration 20/23",
         "iteration 23/23",
+        "iteration 23/23",
     ]
     assert err.splitlines()[0].endswith(
         "env steps/s 1234, to go 1:02:03, reward -1.50, episode 4.2 s, noise std 0.88, "
         "level stairs 3.5"
     )
+
+
+def test_what_robots_are_rewarded_for_is_a_line_less_often(capsys):
+    with render.training() as watch:
+        for iteration in range(1, 101):
+            watch(Progress(**{**vars(PROGRESS), "iteration": iteration}))
+    terms = [line for line in capsys.readouterr().err.splitlines() if "env steps/s" not in line]
+    told = "success stairs 75%, tracking_lin_vel +0.500 /s, torques -0.062 /s"
+    assert terms == [f"iteration 50/400: {told}", f"iteration 100/400: {told}"]
 
 
 def test_on_a_terminal_progress_is_a_table(monkeypatch):

@@ -23,6 +23,11 @@ class Careers:
     than half as far as its commands would have taken it: those that it really got, over the time
     that it really lived. legged_gym compares with its first command over a whole episode, so that
     a robot that is told to stop is moved down.
+
+    That a fall before crossing moves down whatever was asked is what holds robots where they can
+    learn. In simulated careers with headings, with a chance to fall of 1/2 per 4 m at level 5 and e
+    times that rate on each level above, the mean level comes to 4.2. If distances of the fallen
+    were compared with what was asked of them, hardly any would move down: it comes to 7.1.
     """
 
     def __init__(self, ground: Ground, num_envs: int, max_init_level: int, seed: int) -> None:

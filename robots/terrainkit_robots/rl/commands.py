@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit_robots.rl.ground import Ground
 from terrainkit_robots.rl.rotation import wrapped
 from terrainkit_robots.rl.task import Commands
 
@@ -14,6 +15,12 @@ _WELL = 0.8
 
 _WIDER = 0.1
 """How much the range of commands widens at a time [m/s]; legged_gym's 0.5 is most of it."""
+
+
+def asks_headings(settings: Commands, ground: Ground) -> bool:
+    """Return whether headings are asked for: unless given, on any ground but a plane."""
+    given = settings.heading_command
+    return not ground.level if given is None else given
 
 
 def draw_commands(
@@ -66,12 +73,15 @@ def widened(
 class Orders:
     """What n robots are asked for now."""
 
-    def __init__(self, settings: Commands, num_envs: int, dt: float) -> None:
+    def __init__(self, settings: Commands, num_envs: int, dt: float, *, headings: bool) -> None:
         self.commands = np.zeros((num_envs, 3), np.float32)
         """Speed forward and to the left [m/s], turning speed to the left [rad/s], shape (n, 3)."""
 
         self.heading = np.zeros(num_envs, np.float32)
         """Direction to turn to, NaN for none [rad], shape (n,)."""
+
+        self.headings = headings
+        """Whether headings are asked for, in place of turning speeds."""
 
         self.held: FloatArray | None = None
         """What is asked for all the time, shape (n, 3); None for what is drawn."""
@@ -106,7 +116,7 @@ class Orders:
         """Ask for what is held, or for turning towards the headings; yaw [rad], shape (n,)."""
         if self.held is not None:
             self.commands[:] = self.held
-        elif self._settings.heading_command:
+        elif self.headings:
             self.commands[:, 2] = turning_to(self.heading, yaw, self._settings)
 
     def widen(self, earned: float, lived: float, *, scale: float, enough: float) -> None:

@@ -27,6 +27,7 @@ class Curves(Logger):
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
         self._means: dict[str, float] = {}
+        self._fresh = False
 
     @contextmanager
     def writing(self, folder: Path | None) -> Iterator[None]:
@@ -45,6 +46,7 @@ class Curves(Logger):
                 raise ConfigError(
                     f"wandb does not start: {' '.join(str(error).split())}"
                 ) from error
+        self._fresh = True
         with _told_once():
             try:
                 yield
@@ -69,6 +71,9 @@ class Curves(Logger):
         std: torch.Tensor,
     ) -> None:
         """Write the curves of an iteration."""
+        if self._fresh and self.writer is not None and self.cfg["logger"] == "tensorboard":
+            self._begin_at(iteration)
+        self._fresh = False
         for key in dict.fromkeys(key for log in self.ep_extras for key in log):
             self._means[key] = statistics.mean(log[key] for log in self.ep_extras if key in log)
         with quiet():
@@ -83,6 +88,13 @@ class Curves(Logger):
                 action_std=std,
                 rnd_weight=None,
             )
+
+    def _begin_at(self, iteration: int) -> None:
+        """Let TensorBoard forget what a run that broke off wrote after its last checkpoint."""
+        from tensorboard.compat.proto.event_pb2 import Event, SessionLog
+
+        start = Event(session_log=SessionLog(status=SessionLog.START))
+        self.writer.file_writer.add_event(start, iteration)
 
     def latest(self, prefix: str) -> dict[str, float]:
         """Return the last known means of what is called `prefix` and more, by the rest of it."""

@@ -26,17 +26,24 @@ class Earnings:
 
         self._settings, self._robot, self._dt = settings, robot, np.float32(dt)
 
-    def pay(self, state: State) -> FloatArray:
-        """Return what a step pays, shape (n,), and add it to the sums."""
+    def pay(self, state: State, bad: NDArray[np.bool_]) -> FloatArray:
+        """Return what a step pays, shape (n,), and add it to the sums.
+
+        Args:
+            state: The state after the step.
+            bad: Robots whose physics went bad: the state is not theirs but that of a reset, so
+                they get no more than what a fall costs. Shape (n,).
+        """
         total = np.zeros(len(state.base_pos), np.float32)
         falls = np.zeros_like(total)
         for name, (function, scale) in self.rewards.items():
             earned = function(state, self._robot, self._settings) * np.float32(scale) * self._dt
-            self.sums[name] += earned
             if name == "termination":
                 falls += earned
             else:
+                earned[bad] = 0
                 total += earned
+            self.sums[name] += earned
         if self._settings.only_positive_rewards:
             np.maximum(total, 0, out=total)
         return total + falls

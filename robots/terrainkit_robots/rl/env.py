@@ -15,21 +15,22 @@ from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.careers import Careers
-from terrainkit_robots.rl.commands import Orders
+from terrainkit_robots.rl.commands import Orders, asks_headings
 from terrainkit_robots.rl.control import control_of
 from terrainkit_robots.rl.earnings import Earnings
 from terrainkit_robots.rl.ground import Ground
-from terrainkit_robots.rl.memory import require_room
 from terrainkit_robots.rl.observations import observe, policy_group, privileged_group
 from terrainkit_robots.rl.physics import Physics
-from terrainkit_robots.rl.randomization import apply_differences, draw_differences
+from terrainkit_robots.rl.randomization import Pushes, apply_differences, draw_differences
 from terrainkit_robots.rl.robot import Robot
+from terrainkit_robots.rl.room import require_room
 from terrainkit_robots.rl.rotation import yaw_of
 from terrainkit_robots.rl.scene import build_scene
 from terrainkit_robots.rl.sensors import Sensors
 from terrainkit_robots.rl.start import draw_start
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.task import Task
+from terrainkit_robots.rl.terminations import outside
 
 FloatArray = NDArray[np.float32]
 Ids = NDArray[np.int64]
@@ -57,7 +58,9 @@ class LeggedEnv(VecEnv):
         self.control = control_of(robot, task)
         self.rng = np.random.default_rng(task.runner.seed)
         self.sensors = Sensors(self.physics, ground, task, scan=scan)
-        self.orders = Orders(task.commands, self.num_envs, task.dt)
+        headings = asks_headings(task.commands, ground)
+        self.orders = Orders(task.commands, self.num_envs, task.dt, headings=headings)
+        self.pushes = Pushes(task.domain_rand, self.num_envs, task.dt)
         self.earnings = Earnings(task.rewards, robot, task.dt, self.num_envs)
         weight = float(self.scene.model.body_subtreemass[self.scene.base] * 9.81)
         self.groups = {
@@ -73,23 +76,34 @@ class LeggedEnv(VecEnv):
     def _allocate(self) -> None:
         """Make what each robot remembers from step to step."""
         n, joints = self.num_envs, self.num_actions
-        self.episode_length_buf = torch.zeros(n, dtype=torch.long)
+        self.lengths = np.zeros(n, np.int64)  # of episodes, as the runner knows them
         self.actions = np.zeros((3, n, joints), np.float32)  # of this step, and of two before
         self.joint_offset = np.zeros((n, joints), np.float32)
-        self.push_vel = np.zeros((n, 3), np.float32)
         self.steps = np.zeros(n, np.int64)  # of this episode, whatever the runner says
         self.start = np.zeros((n, 2))
         # What those who look at an environment ask for most; live.
         self.commands, self.heading = self.orders.commands, self.orders.heading
         self.rewards, self.sums = self.earnings.rewards, self.earnings.sums
-        self.air_time = self.sensors.air_time
+        self.air_time, self.push_vel = self.sensors.air_time, self.pushes.velocity
+
+    @property
+    def episode_length_buf(self) -> torch.Tensor:
+        """Length of each episode so far, in steps; live, and the runner may replace it."""
+        return torch.from_numpy(self.lengths)
+
+    @episode_length_buf.setter
+    def episode_length_buf(self, lengths: torch.Tensor) -> None:
+        self.lengths[:] = lengths.cpu().numpy()
 
     def hold_commands(self, commands: FloatArray | None) -> None:
-        """Ask for the same all the time, shape (n, 3); None to draw commands again."""
+        """Ask for the same all the time, shape (n, 3); None to draw new commands at once."""
+        let_go = commands is None and self.orders.held is not None
         self.orders.held = commands
-        if commands is not None:
-            self.commands[:] = commands
-            np.copyto(self.state.commands, commands)
+        if let_go:
+            self.orders.draw(self.rng, np.arange(self.num_envs))
+        if let_go or commands is not None:
+            self.orders.steer(self._yaw())
+            np.copyto(self.state.commands, self.commands)
             self._observed = self._observe()
 
     def begin_all(self) -> None:
@@ -124,6 +138,12 @@ class LeggedEnv(VecEnv):
         if len(theirs["episode_length"]) != self.num_envs:
             self.begin_all()
             return
+        kept = {name for name in mine if not name.startswith("rew_")}  # those are the task's
+        if kept - theirs.keys() or vars(self.state).keys() != state["state"].keys():
+            raise ConfigError(
+                "the checkpoint was written by another version of terrainkit; with another "
+                "env.num_envs its networks and its curriculum go on"
+            )
         for name, value in mine.items():
             if name not in theirs or tuple(theirs[name].shape) != value.shape:
                 raise ConfigError(f"the checkpoint's {name} is of another robot or task")
@@ -139,13 +159,14 @@ class LeggedEnv(VecEnv):
         """Return what each robot remembers, by name; live."""
         own = {
             "physics": self.physics.batch.state,
-            "episode_length": self.episode_length_buf.numpy(),
+            "episode_length": self.lengths,
             "commands": self.commands,
             "heading": self.heading,
             "actions": self.actions,
             "last_dof_vel": self.sensors.last_dof_vel,
             "joint_offset": self.joint_offset,
             "push_vel": self.push_vel,
+            "push_in": self.pushes.wait,
             "air_time": self.air_time,
             "steps": self.steps,
             "start": self.start,
@@ -173,15 +194,14 @@ class LeggedEnv(VecEnv):
             ConfigError: if an action is not a number.
         """
         self._act(actions)
-        self._push()
+        self.pushes.push(self.rng, self.physics.qvel)
         bad = self.physics.step(self.cfg.control.decimation)
-        self.episode_length_buf += 1
+        self.lengths += 1
         self.steps += 1
         self.sensors.last_dof_vel[bad] = 0  # the jump back to rest is no acceleration
         self.state = state = self._look(np.arange(self.num_envs), bad)
-        rewards = self.earnings.pay(state)
-        lengths = self.episode_length_buf.cpu().numpy()
-        time_out = (lengths >= self.max_episode_length) & ~state.fallen
+        rewards = self.earnings.pay(state, bad)
+        time_out = (self.lengths >= self.max_episode_length) & ~state.fallen
         done = state.fallen | time_out
         self.careers.ask(self.commands, yaw_of(state.base_quat), self.cfg.dt)
         extras: dict[str, Any] = {"time_outs": torch.from_numpy(time_out).to(self.device)}
@@ -250,9 +270,10 @@ class LeggedEnv(VecEnv):
         if self.cfg.commands.curriculum:
             log["Curriculum/lin_vel_x"] = self.orders.lin_vel_x[1]
         # The runner may have cut the first episodes to random lengths, which says nothing.
-        lengths = self.episode_length_buf.numpy()[ids]
-        whole = lengths == self.steps[ids]
+        whole = self.lengths[ids] == self.steps[ids]
         distance = np.linalg.norm(state.base_pos[ids, :2] - self.start[ids], axis=1)
+        # Who left the map has crossed its patch, which may be narrower than it is long.
+        distance[outside(state.base_pos[ids], self.ground)] = self.ground.patch_length
         distance[bad[ids]] = 0  # MuJoCo has put these at the world's origin
         self.careers.end(
             ids[whole], distance[whole], fallen[whole], move=self.cfg.terrain.curriculum
@@ -286,10 +307,9 @@ class LeggedEnv(VecEnv):
         self._lift(ids)
         self.start[ids] = qpos[:, :2]
         self.careers.begin(ids)
-        self.episode_length_buf[torch.from_numpy(ids)] = 0
-        self.steps[ids] = 0
+        self.lengths[ids] = self.steps[ids] = 0
         self.actions[:, ids] = 0
-        self.push_vel[ids] = 0
+        self.pushes.begin(self.rng, ids)
         self.sensors.forget(ids)
         most = self.cfg.domain_rand.joint_offset
         self.joint_offset[ids] = self.rng.uniform(-most, most, (len(ids), self.num_actions))
@@ -303,18 +323,6 @@ class LeggedEnv(VecEnv):
         if (deep > 0).any():
             self.physics.qpos[ids, 2] += np.maximum(deep, 0)
             self.physics.refresh(ids)
-
-    def _push(self) -> None:
-        """Push those whose time has come."""
-        settings = self.cfg.domain_rand
-        if settings.push_interval_s <= 0:
-            return
-        every = max(1, round(settings.push_interval_s / self.cfg.dt))
-        ids = np.flatnonzero((self.steps % every == 0) & (self.steps > 0))
-        if len(ids):
-            most = settings.max_push_vel_xy
-            self.push_vel[ids, :2] = self.rng.uniform(-most, most, (len(ids), 2))
-            self.physics.qvel[ids, :2] += self.push_vel[ids, :2]
 
     def _observe(self) -> TensorDict:
         clip = self.cfg.normalization.clip_observations

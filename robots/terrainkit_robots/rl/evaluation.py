@@ -6,36 +6,27 @@ once it has crossed half a patch, since the ground beyond is another's. What a r
 first fall does not count any more.
 """
 
-import json
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from itertools import product
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Ground, read_ground
-from terrainkit_robots.rl.state import State
+from terrainkit_robots.rl.policy import policy_of
+from terrainkit_robots.rl.score import Evaluation, summed_up
 from terrainkit_robots.rl.task import Commands, Task
+from terrainkit_robots.rl.threads import one_thread
+from terrainkit_robots.rl.trials import Watch, roll_out
 
 if TYPE_CHECKING:
     from terrainkit_robots.rl.run_folder import Run
 
 FloatArray = NDArray[np.float32]
-Actor = Callable[[TensorDict], torch.Tensor]
-Watch = Callable[[float], object]
-
-SETTLING = 2.0
-"""Time after the start, and after each new command, that is not measured: robots speed up [s]."""
-
-WINDOW = 1.0
-"""Time over which velocities are averaged in the errors called `_1s` [s]."""
 
 LONGEST = 3600.0
 """Longest evaluation [s]."""
@@ -87,109 +78,6 @@ class Asked:
             raise ConfigError("a command and random commands are both asked for; wanted one")
         if self.seed < 0:
             raise ConfigError(f"seed is {self.seed}; wanted 0 or more")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Score:
-    """How some robots did.
-
-    Errors are means over their steps before they fell, and None where they never walked long enough
-    to be measured.
-    """
-
-    robots: int
-    """How many they are."""
-
-    falls: int
-    """How many of them fell."""
-
-    success: float | None
-    """Part of them that crossed half a patch, or came half as far as they were asked to without a
-    fall; None on a plane, which has no patches."""
-
-    lin_vel_error: float | None
-    """Distance between the horizontal velocity asked for and that of each instant [m/s]."""
-
-    lin_vel_error_1s: float | None
-    """The same for velocities averaged over a second, in which swaying cancels out [m/s]."""
-
-    ang_vel_error: float | None
-    """Difference between the turning speed asked for and that of each instant [rad/s]."""
-
-    ang_vel_error_1s: float | None
-    """The same for turning speeds averaged over a second [rad/s]."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Part:
-    """Some of the robots, by what they have in common, and how they did."""
-
-    command: tuple[float, float, float] | None = None
-    """The command that they had."""
-
-    terrain: str | None = None
-    """The terrain that they started on."""
-
-    level: int | None = None
-    """The level that they started on."""
-
-    score: Score
-    """How they did."""
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return what they have in common and their score, in one."""
-        shared = {"command": self.command, "terrain": self.terrain, "level": self.level}
-        return {k: v for k, v in shared.items() if v is not None} | asdict(self.score)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Evaluation:
-    """How a policy did."""
-
-    robot: str
-    """Name of the robot."""
-
-    checkpoint: str
-    """Name of the file with the policy."""
-
-    terrain: str
-    """Ground, as it was given."""
-
-    seconds: float
-    """How long robots walked [s]."""
-
-    seed: int
-    """Start of all random numbers."""
-
-    whole: Score
-    """All robots."""
-
-    by_command: tuple[Part, ...] = ()
-    """On a plane, robots by command."""
-
-    by_terrain: tuple[Part, ...] = ()
-    """On a map, robots by terrain."""
-
-    by_level: tuple[Part, ...] = ()
-    """On a map, robots by level."""
-
-    by_terrain_and_level: tuple[Part, ...] = ()
-    """On a map, robots by both."""
-
-    def as_json(self) -> str:
-        """Return it as JSON, which is the same for the same evaluation."""
-        tables = ("by_command", "by_terrain", "by_level", "by_terrain_and_level")
-        about = {
-            "robot": self.robot,
-            "checkpoint": self.checkpoint,
-            "terrain": self.terrain,
-            "seconds": self.seconds,
-            "settling_seconds": SETTLING,
-            "seed": self.seed,
-            "all": asdict(self.whole),
-        }
-        parts = {table: [part.as_dict() for part in getattr(self, table)] for table in tables}
-        return json.dumps(about | {k: v for k, v in parts.items() if v}, indent=2) + "\n"
 
 
 def evaluation_task(task: Task, num_envs: int, *, seconds: float = 20.0, seed: int = 1) -> Task:
@@ -247,6 +135,7 @@ def forward_command(settings: Commands) -> FloatArray:
     return np.array([_FORWARD * settings.lin_vel_x[1], 0, 0], np.float32)
 
 
+@one_thread()
 def evaluate(run: "Run", asked: Asked | None = None, watch: Watch = lambda _: None) -> Evaluation:
     """Evaluate the policy of a run; the same seed gives the same result, bit for bit.
 
@@ -259,8 +148,6 @@ def evaluate(run: "Run", asked: Asked | None = None, watch: Watch = lambda _: No
         ConfigError: if the run has no policy, or one of another robot; if the ground cannot be
             read; if there is no such device.
     """
-    from terrainkit_robots.rl.runner import policy_of
-
     asked = asked or Asked()
     env, commands = prepared(run, asked)
     outcome = roll_out(env, policy_of(run, env), asked.seconds, commands, watch)
@@ -338,206 +225,3 @@ def _require_device(device: str) -> None:
     except (RuntimeError, AssertionError) as error:
         reason = str(error).splitlines()[0]
         raise ConfigError(f"torch has no device {device!r} here: {reason}") from None
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Outcome:
-    """How n robots did in their trials."""
-
-    fell: NDArray[np.bool_]
-    """Who fell, shape (n,)."""
-
-    success: NDArray[np.bool_]
-    """Who crossed half a patch, or came half as far as asked without a fall, shape (n,)."""
-
-    sums: NDArray[np.float64]
-    """Sums over steps of four errors, in the order of `Score`, shape (4, n)."""
-
-    counts: NDArray[np.int64]
-    """Steps that were summed, shape (4, n)."""
-
-    def score(self, who: NDArray[np.bool_], *, patches: bool) -> Score:
-        """Return how some of them did; each counts alike, however long it was measured."""
-        errors: list[float | None] = []
-        for total, count in zip(self.sums[:, who], self.counts[:, who], strict=True):
-            known = count > 0
-            errors.append(float((total[known] / count[known]).mean()) if known.any() else None)
-        return Score(
-            robots=int(who.sum()),
-            falls=int(self.fell[who].sum()),
-            success=float(self.success[who].mean()) if patches else None,
-            lin_vel_error=errors[0],
-            lin_vel_error_1s=errors[1],
-            ang_vel_error=errors[2],
-            ang_vel_error_1s=errors[3],
-        )
-
-
-def roll_out(
-    env: LeggedEnv,
-    policy: Actor,
-    seconds: float,
-    commands: FloatArray | None = None,
-    watch: Watch = lambda _: None,
-    *,
-    to_the_end: bool = False,
-) -> Outcome:
-    """Let robots walk that have just begun, and return how they did.
-
-    Args:
-        env: The environment.
-        policy: What acts.
-        seconds: How long they walk [s].
-        commands: What they are asked for one after the other, each for the same part of the time,
-            shape (n, 3) or (k, n, 3); None for the task's random commands.
-        watch: Is told after each step which part of the time is over, 0 to 1.
-        to_the_end: Go on when every trial has ended before its time.
-    """
-    steps = max(1, round(seconds / env.cfg.dt))
-    held = None if commands is None else commands.reshape(-1, env.num_envs, 3)
-    trials = _Trials(env)
-    if held is None:
-        env.hold_commands(None)
-    shown = -1
-    for k in range(steps):
-        if held is not None and (now := k * len(held) // steps) != shown:
-            env.hold_commands(held[now])
-            shown = now
-        before = env.state
-        with torch.inference_mode():
-            actions = policy(env.get_observations())
-        _, _, dones, extras = env.step(actions)
-        trials.add(before, (dones & ~extras["time_outs"]).cpu().numpy())
-        watch((k + 1) / steps)
-        if trials.ended.all() and not to_the_end:
-            break
-    return trials.outcome()
-
-
-class _Trials:
-    """The first walk of each robot, as it is measured."""
-
-    def __init__(self, env: LeggedEnv) -> None:
-        n, dt = env.num_envs, env.cfg.dt
-        self._env, self._start = env, env.start.copy()
-        # A heading makes a new turning speed of every step; only new directions count then.
-        self._axes = slice(0, 2 if env.cfg.commands.heading_command else 3)
-        self._settling, self._window = round(SETTLING / dt), max(1, round(WINDOW / dt))
-        self._half = np.inf if env.ground.level else env.ground.patch_length / 2
-        self.fell, self.crossed = np.zeros(n, bool), np.zeros(n, bool)
-        self._distance, self._asked = np.zeros(n), np.zeros(n)
-        self._sums, self._counts = np.zeros((4, n)), np.zeros((4, n), np.int64)
-        self._recent = np.zeros((self._window, n, 3), np.float32)
-        self._command = np.full((n, 3), np.nan, np.float32)
-        self._same = np.zeros(n, np.int64)  # steps since the command changed
-        self._streak = np.zeros(n, np.int64)  # steps measured since then
-        self._steps = 0
-
-    @property
-    def ended(self) -> NDArray[np.bool_]:
-        """Whose trial has ended before its time, shape (n,)."""
-        return self.fell | self.crossed
-
-    def add(self, before: State, fallen: NDArray[np.bool_]) -> None:
-        """Measure a step.
-
-        Args:
-            before: The state that it began with, whose commands it had to follow.
-            fallen: Who fell in it, and has begun anew.
-        """
-        active = ~self.ended
-        self.fell |= active & fallen
-        active &= ~fallen
-        state = self._env.state
-        error = np.column_stack([state.base_lin_vel[:, :2], state.base_ang_vel[:, 2]])
-        self._measure(before.commands, error - before.commands, active)
-        way = np.linalg.norm(state.base_pos[:, :2] - self._start, axis=1)
-        self._distance[active] = way[active]
-        self._asked[active] = np.linalg.norm(self._env.careers.asked[active], axis=1)
-        self.crossed |= active & (way > self._half)
-
-    def _measure(self, commands: FloatArray, error: FloatArray, active: NDArray[np.bool_]) -> None:
-        same = (commands[:, self._axes] == self._command[:, self._axes]).all(axis=1)
-        self._same = np.where(same, self._same + 1, 1)
-        self._command[:] = commands
-        measured = active & (self._same > self._settling)
-        self._streak = np.where(measured, self._streak + 1, 0)
-        self._recent[self._steps % self._window] = error
-        self._steps += 1
-        full = self._streak >= self._window
-        mean = self._recent.mean(axis=0)
-        kinds = (error, mean)
-        for k, (kind, counted) in enumerate(zip(kinds, (measured, full), strict=True)):
-            for at, size in ((k, np.hypot(kind[:, 0], kind[:, 1])), (k + 2, np.abs(kind[:, 2]))):
-                self._sums[at, counted] += size[counted]
-                self._counts[at, counted] += 1
-
-    def outcome(self) -> Outcome:
-        """Return how the trials went."""
-        return Outcome(
-            fell=self.fell,
-            success=self.crossed | (~self.fell & (self._distance >= self._asked / 2)),
-            sums=self._sums,
-            counts=self._counts,
-        )
-
-
-def summed_up(
-    run: "Run",
-    asked: Asked,
-    env: LeggedEnv,
-    outcome: Outcome,
-    commands: FloatArray | None = None,
-) -> Evaluation:
-    """Return an evaluation; commands as they are to be told apart, shape (n, 3)."""
-    patches = not env.ground.level
-    levels = env.careers.levels.tolist()
-    names = env.ground.terrain_names
-    terrains = names[env.careers.levels, env.careers.columns].tolist()
-    place = {name: k for k, name in enumerate(dict.fromkeys(names.ravel().tolist()))}
-    across = np.lexsort((levels, [place[name] for name in terrains]))
-
-    def parts(keys: Sequence[tuple[Any, ...]], kinds: Iterable[Any], *names: str) -> list[Part]:
-        found = []
-        for kind in dict.fromkeys(kinds):
-            who = np.array([key == kind for key in keys])
-            shared: dict[str, Any] = dict(zip(names, kind, strict=True))
-            found.append(Part(**shared, score=outcome.score(who, patches=patches)))
-        return found
-
-    def by(*names: str) -> tuple[Part, ...]:
-        columns = {"terrain": terrains, "level": levels}
-        keys = list(zip(*(columns[name] for name in names), strict=True))
-        ordered = sorted(keys) if names == ("level",) else [keys[k] for k in across]
-        return tuple(parts(keys, ordered, *names)) if patches else ()
-
-    given = [] if commands is None else [(each,) for each in _rounded(commands)]
-    return Evaluation(
-        robot=run.robot.spec.name,
-        checkpoint=run.checkpoint.name if run.checkpoint is not None else "",
-        terrain=str(asked.terrain or run.terrain),
-        seconds=float(asked.seconds),
-        seed=asked.seed,
-        whole=outcome.score(np.ones(env.num_envs, bool), patches=patches),
-        by_command=tuple(parts(given, given, "command")),
-        by_terrain=by("terrain"),
-        by_level=by("level"),
-        by_terrain_and_level=by("terrain", "level"),
-    )
-
-
-def _rounded(commands: FloatArray) -> list[tuple[float, ...]]:
-    """Return commands as they are written down: single precision has its tails cut."""
-    return [tuple(round(float(each), 4) for each in command) for command in commands]
-
-
-def write_evaluation(evaluation: Evaluation, path: Path, *, overwrite: bool = False) -> None:
-    """Write it as JSON, whole or not at all.
-
-    Raises:
-        ExportError: if the file is there and `overwrite` is not set, or cannot be written.
-    """
-    from terrainkit.atomic import atomic_write
-
-    with atomic_write(path, overwrite=overwrite) as target:
-        target.write_text(evaluation.as_json())

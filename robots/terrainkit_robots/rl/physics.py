@@ -42,6 +42,7 @@ class Physics:
         self.ctrl: NDArray[np.float64] = self.batch.bind("ctrl")
         self.torque: NDArray[np.float64] = self.batch.bind("actuator_force")
         self.sensors: NDArray[np.float64] = self.batch.bind("sensordata")
+        self._unstable = _unstable()
 
     def step(self, count: int) -> NDArray[np.bool_]:
         """Step every simulation `count` times.
@@ -52,11 +53,10 @@ class Physics:
         import mujoco
 
         # MuJoCo sets the counts back with the state, so only those from 0 can be relied on.
-        counts = self.batch.warning[:, _UNSTABLE, 1]
-        counts[:] = 0
+        self.batch.warning[:, self._unstable, 1] = 0
         with quiet_mujoco():
             self.batch.step(nstep=count, stage=mujoco.mjtStage.mjSTAGE_VEL)
-        bad: NDArray[np.bool_] = (counts > 0).any(axis=1)
+        bad: NDArray[np.bool_] = (self.batch.warning[:, self._unstable, 1] > 0).any(axis=1)
         return bad
 
     def reset(self, ids: Ids, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> None:
@@ -87,6 +87,10 @@ class Physics:
         return values.reshape(len(values), -1, 3)
 
 
-_UNSTABLE = slice(3, 7)
-"""Of MuJoCo's warnings, those of positions, velocities, accelerations and controls that are not
-numbers any more: `mjWARN_BADQPOS` to `mjWARN_BADCTRL`."""
+def _unstable() -> list[int]:
+    """Return which of MuJoCo's warnings are of a state that is not numbers any more."""
+    import mujoco
+
+    kind = mujoco.mjtWarning
+    bad = (kind.mjWARN_BADQPOS, kind.mjWARN_BADQVEL, kind.mjWARN_BADQACC, kind.mjWARN_BADCTRL)
+    return [int(each) for each in bad]

@@ -54,6 +54,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from itertools import repeat
 from pathlib import Path
 from typing import Any
 
@@ -68,18 +69,17 @@ from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots.rl.checkpoint import read_checkpoint
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import read_ground
-from terrainkit_robots.rl.observations import Observation
+from terrainkit_robots.rl.policy import actor_of
+from terrainkit_robots.rl.policy_description import ONNX, TORCHSCRIPT, description, width_of
 from terrainkit_robots.rl.run_folder import Run
-from terrainkit_robots.rl.runner import actor_of
+from terrainkit_robots.rl.threads import one_thread
+from terrainkit_robots.rl.walk import walk
 
 FloatArray = NDArray[np.float32]
 Answer = Callable[[FloatArray], FloatArray]
 
-ONNX, TORCHSCRIPT, TEXT = "policy.onnx", "policy.pt", "policy.json"
-"""What the files are called."""
-
-FORMAT_VERSION = 1
-"""Raised when a key of the JSON changes its meaning or goes; new keys may come without."""
+TEXT = "policy.json"
+"""What the file with the description is called."""
 
 METADATA = "terrainkit"
 """Key of the ONNX file's metadata that holds the JSON."""
@@ -89,24 +89,6 @@ TOLERANCE = 1e-5
 
 _OPSET = 17
 """Version of ONNX's operators: old enough for the runtimes on robots."""
-
-_UNITS = {
-    "commands": ("m/s", "m/s", "rad/s"),
-    "projected_gravity": "1",
-    "base_ang_vel": "rad/s",
-    "actions": "1",
-    "height_scan": "m",
-}
-"""Unit of each part of an observation before its scale, but for those by joint."""
-
-_TOLD = {
-    "observation": "obs = clip((raw - offset) * scale, -clip, clip), part by part; a part with a "
-    "clip of its own is (clip(raw - offset, *clip)) * scale",
-    "action": "target = action_offset + action_scale * action",
-    "torque": "clip(gain * target - stiffness * position - damping * velocity, -effort, effort), "
-    "every physics_dt; a new action every policy_dt",
-}
-"""How the numbers are used, as formulas."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,133 +135,7 @@ class DeployedPolicy(torch.nn.Module):
         return torch.clamp(actions, -self.clip_actions, self.clip_actions)
 
 
-def description(env: LeggedEnv) -> dict[str, Any]:
-    """Return all that it takes to run a policy of an environment, as plain data.
-
-    Everything is in SI units and radians. Arrays by joint are in the order of the actions. The
-    gains are those of the scene that it was trained in, without their randomization.
-    """
-    from terrainkit import __version__
-
-    task, spec = env.cfg, env.robot.spec
-    return {
-        "format_version": FORMAT_VERSION,
-        "terrainkit": __version__,
-        "robot": {
-            "name": spec.name,
-            "base": spec.base,
-            "spawn_height": spec.spawn_height,
-            "base_height_target": spec.base_height_target,
-        },
-        "files": {"onnx": ONNX, "torchscript": TORCHSCRIPT},
-        "formulas": _TOLD,
-        "timing": {
-            "physics_dt": task.sim.dt,
-            "decimation": task.control.decimation,
-            "policy_dt": task.dt,
-        },
-        "observation": {
-            "size": _width(env),
-            "clip": task.normalization.clip_observations,
-            "parts": _parts(env),
-        },
-        "action": {"size": env.num_actions, "clip": task.normalization.clip_actions},
-        "control_type": task.control.control_type,
-        "joints": _joints(env),
-        "height_scan": _scan(env),
-    }
-
-
-def _width(env: LeggedEnv) -> int:
-    return int(env.get_observations()["policy"].shape[1])
-
-
-def _parts(env: LeggedEnv) -> list[dict[str, Any]]:
-    """Return each part of an observation: its place, and how it is made of what is measured."""
-    parts: list[dict[str, Any]] = []
-    start = 0
-    for each in env.groups["policy"]:
-        width = each.read(env.state).shape[1]
-        offset = np.zeros(width)
-        if each.name == "dof_pos":
-            offset[:] = env.robot.default_pose
-        part = {
-            "name": each.name,
-            "start": start,
-            "stop": start + width,
-            "unit": _units(each.name, env),
-            "offset": _numbers(offset),
-            "scale": _numbers(np.broadcast_to(each.scale, width)),
-        }
-        if each.name == "height_scan":
-            # Asked of the table itself, whose constants these are.
-            below, level, above = (_scanned(each, env, z) for z in (-1e3, 0.0, 1e3))
-            part |= {"offset": _numbers(np.full(width, -level)), "clip": [below, above]}
-        parts.append(part)
-        start += width
-    return parts
-
-
-def _scanned(each: Observation, env: LeggedEnv, height: float) -> float:
-    """Return what is observed, before the scale, where the base is so high above the ground [m]."""
-    scan = np.full_like(env.state.height_scan, height)
-    return float(each.read(replace(env.state, height_scan=scan))[0, 0])
-
-
-def _units(name: str, env: LeggedEnv) -> list[str] | str:
-    if name in ("dof_pos", "dof_vel"):
-        return [unit + "/s" * (name == "dof_vel") for unit in _position_units(env)]
-    unit = _UNITS.get(name, "")
-    return unit if isinstance(unit, str) else list(unit)
-
-
-def _position_units(env: LeggedEnv) -> list[str]:
-    import mujoco
-
-    kinds = (env.scene.model.joint(name).type[0] for name in env.robot.spec.joint_order)
-    return ["m" if kind == mujoco.mjtJoint.mjJNT_SLIDE else "rad" for kind in kinds]
-
-
-def _joints(env: LeggedEnv) -> dict[str, Any]:
-    """Return names, poses and gains by joint; the gains are those of the scene's own motors."""
-    model, control = env.scene.model, env.control
-    gain = model.actuator_gainprm[:, 0]
-    stiffness, damping = -model.actuator_biasprm[:, 1], -model.actuator_biasprm[:, 2]
-    held = np.where(stiffness > 0, "position", "velocity")
-    drives = held if env.cfg.control.control_type != "T" else np.full(len(held), "torque")
-    return {
-        "name": list(env.robot.spec.joint_order),
-        "position_unit": _position_units(env),
-        "drive": drives.tolist(),
-        "default_position": _numbers(env.robot.default_pose),
-        "action_offset": _numbers(control.middle),
-        "action_scale": _numbers(control.scale),
-        "gain": _numbers(gain),
-        "stiffness": _numbers(stiffness),
-        "damping": _numbers(damping),
-        "effort": _numbers(model.actuator_forcerange[:, 1]),
-        "velocity": _numbers(env.robot.velocity),
-    }
-
-
-def _scan(env: LeggedEnv) -> dict[str, Any] | None:
-    """Return where the height scan looks; None without one."""
-    if not env.state.height_scan.shape[1]:
-        return None
-    terrain = env.cfg.terrain
-    return {
-        "frame": "at the base's position, turned by its yaw alone; x forward, y left",
-        "value": "height of the base above the ground at the point",
-        "unit": "m",
-        "points": [[x, y] for x in terrain.measured_points_x for y in terrain.measured_points_y],
-    }
-
-
-def _numbers(values: Any) -> list[float]:
-    """Return numbers as they were written: a float32 of 0.1 is 0.1."""
-    return [float(f"{value + 0.0:.7g}") for value in np.asarray(values, float)]
-
-
+@one_thread()
 def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> Exported:
     """Write the policy of a run's checkpoint to `folder`, which is made if it is not there.
 
@@ -350,7 +206,7 @@ def write_policy(
     with _folder(folder), atomic_write(folder / TEXT, overwrite=overwrite) as path:
         path.write_text(text, encoding="utf-8")
         onnx_file, script_file = path.with_name(ONNX), path.with_name(TORCHSCRIPT)
-        _write_onnx(live, _width(env), text, onnx_file)
+        _write_onnx(live, width_of(env), text, onnx_file)
         _write_script(live, script_file)
         batches = _batches(env, actor)
         wanted = [_clipped(env, _asked_live(actor, batch)) for batch in batches]
@@ -361,7 +217,7 @@ def write_policy(
         files=tuple(folder / name for name in (ONNX, TORCHSCRIPT, TEXT)),
         error=error,
         onnx_error=onnx_error,
-        observations=_width(env),
+        observations=width_of(env),
         actions=env.num_actions,
     )
 
@@ -428,13 +284,8 @@ _ROBOTS, _STEPS = 8, 25
 
 def _batches(env: LeggedEnv, actor: MLPModel) -> list[FloatArray]:
     """Return observations to ask: of a rollout, and random ones; one at a time, and many."""
-    seen = []
-    for _ in range(_STEPS):
-        obs = env.get_observations()
-        seen.append(obs["policy"].numpy())
-        with torch.no_grad():
-            env.step(actor(obs))
-    rolled = np.concatenate(seen)
+    steps = walk(env, actor, repeat(None, _STEPS))
+    rolled = np.concatenate([step.observed["policy"].numpy() for step in steps])
     clip = env.cfg.normalization.clip_observations
     drawn = np.random.default_rng(0).normal(size=rolled.shape).astype(np.float32)
     random = np.clip(drawn, -clip, clip)

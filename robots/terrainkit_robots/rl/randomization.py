@@ -1,4 +1,7 @@
-"""The randomization: what differs from robot to robot, so that a policy bears the real one."""
+"""The randomization: what differs from robot to robot and from time to time.
+
+So that a policy bears the real one.
+"""
 
 from dataclasses import dataclass
 
@@ -11,6 +14,7 @@ from terrainkit_robots.rl.physics import Physics
 from terrainkit_robots.rl.task import DomainRand
 
 FloatArray = NDArray[np.float32]
+Ids = NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,6 +41,38 @@ class Differences:
 
     strength: FloatArray
     """Factor on all torques, shape (n, 1)."""
+
+
+class Pushes:
+    """Push n robots now and then, each at times of its own."""
+
+    def __init__(self, settings: DomainRand, num_envs: int, dt: float) -> None:
+        self.velocity = np.zeros((num_envs, 3), np.float32)
+        """What was added to each base's velocity in this step, in the world's frame [m/s], (n, 3).
+        """
+
+        self.wait = np.zeros(num_envs, np.int64)
+        """Steps until each is pushed, shape (n,)."""
+
+        self._every = max(1, round(settings.push_interval_s / dt))
+        self._most = settings.max_push_vel_xy if settings.push_interval_s else 0.0
+
+    def begin(self, rng: np.random.Generator, ids: Ids) -> None:
+        """Begin episodes: the first push may come at any time, so also soon after a command."""
+        self.velocity[ids] = 0
+        if self._most:
+            self.wait[ids] = rng.integers(1, self._every + 1, len(ids))
+
+    def push(self, rng: np.random.Generator, qvel: NDArray[np.float64]) -> None:
+        """Push those whose time has come; qvel is that of the physics, shape (n, nv)."""
+        self.velocity[:] = 0
+        if not self._most:
+            return
+        self.wait -= 1
+        ids = np.flatnonzero(self.wait <= 0)
+        self.wait[ids] = self._every
+        self.velocity[ids, :2] = rng.uniform(-self._most, self._most, (len(ids), 2))
+        qvel[:, :2] += self.velocity[:, :2]
 
 
 def draw_differences(

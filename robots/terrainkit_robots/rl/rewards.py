@@ -17,6 +17,10 @@ from terrainkit_robots.rl.task import Rewards
 FloatArray = NDArray[np.float32]
 
 
+_TURNING = 0.1
+"""Turning speed from which robots are asked to move [rad/s]: a heading is never reached to the last
+digit, and asks for less and less."""
+
 Reward = Callable[[State, Robot, Rewards], FloatArray]
 
 REWARDS: dict[str, Reward] = {}
@@ -42,7 +46,8 @@ def _squared(values: FloatArray) -> FloatArray:
 
 def _asked(state: State) -> NDArray[np.bool_]:
     """Return who is asked to move, shape (n,)."""
-    return np.abs(state.commands).max(axis=1) > 0
+    moves = (state.commands[:, :2] != 0).any(axis=1)
+    return moves | (np.abs(state.commands[:, 2]) >= _TURNING)
 
 
 @reward

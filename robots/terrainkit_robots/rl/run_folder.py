@@ -25,6 +25,9 @@ from terrainkit_robots.wording import free_name
 if TYPE_CHECKING:
     from terrainkit.config import MapConfig
 
+_ROBOT = "robot_sha256"
+"""Table in `run.toml` that tells the files of the robot from other ones."""
+
 RUN_FILE, TASK_FILE, MAP_FILE = "run.toml", "task.toml", "map.toml"
 
 SHIPPED = "trained"
@@ -114,7 +117,7 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
     """
     name, ground = located_robot(robot_name), located_terrain(terrain)
     files = {
-        RUN_FILE: _about(name, ground, task),
+        RUN_FILE: _about(name, ground, task, _digests(registry.find(robot_name).folder)),
         TASK_FILE: to_toml(task),
         SPEC_FILE: _text(registry.find(robot_name).folder / SPEC_FILE),
     }
@@ -170,6 +173,21 @@ def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
         terrain=terrain,
         checkpoint=_chosen(folder, checkpoint, named),
     )
+
+
+def changed_robot(run: Run) -> tuple[str, ...]:
+    """Return which files of the run's robot are others than those it was trained with.
+
+    A run that does not tell, of an earlier version, is not asked.
+
+    Raises:
+        ConfigError: if a file cannot be read.
+    """
+    noted = parsed(_text(run.folder / RUN_FILE)).get(_ROBOT)
+    if not isinstance(noted, dict):
+        return ()
+    now = _digests(registry.find(run.robot_name).folder)
+    return tuple(name for name in sorted({*noted, *now}) if noted.get(name) != now.get(name))
 
 
 def same_ground(run: Run) -> bool:
@@ -232,7 +250,21 @@ def _chosen(folder: Path, iteration: int | None, named: Path | None) -> Path | N
     return there[iteration]
 
 
-def _about(robot: str, terrain: str, task: Task) -> str:
+def _digests(folder: Path) -> dict[str, str]:
+    """Return the SHA-256 of the files that make up a robot, but for its meshes, by name."""
+    import hashlib
+
+    spec, found = read_spec(folder / SPEC_FILE), {}
+    for name in (SPEC_FILE, spec.mjcf):
+        try:
+            with open_regular(folder / name) as file:
+                found[name] = hashlib.sha256(file.read()).hexdigest()
+        except OSError as error:
+            raise ConfigError(f"cannot read {folder / name}: {error.strerror or error}") from error
+    return found
+
+
+def _about(robot: str, terrain: str, task: Task, robot_files: dict[str, str]) -> str:
     """Return `run.toml`."""
     from importlib.metadata import version
 
@@ -247,6 +279,7 @@ def _about(robot: str, terrain: str, task: Task) -> str:
             "seed": task.runner.seed,
             "begun": datetime.now().astimezone().isoformat(timespec="seconds"),
             "versions": {name: version(name) for name in packages},
+            _ROBOT: robot_files,
         }
     )
 

@@ -3,8 +3,7 @@
 import os
 import statistics
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,22 +11,16 @@ os.environ.setdefault("GIT_PYTHON_REFRESH", "quiet")  # rsl-rl asks for git, whi
 
 import numpy as np
 import torch
-from rsl_rl.models import MLPModel
 from rsl_rl.runners import OnPolicyRunner
-from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.rl.checkpoint import read_checkpoint, save_checkpoint
 from terrainkit_robots.rl.curves import Curves, quiet
 from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.policy import GROUPS, actor_config, fitting, refuse_other, widths
 from terrainkit_robots.rl.progress import Progress, Watch, nobody
-from terrainkit_robots.rl.run_folder import Run, checkpoint_name
+from terrainkit_robots.rl.run_folder import checkpoint_name
 from terrainkit_robots.rl.task import Task
-
-Act = Callable[[TensorDict], torch.Tensor]
-
-_GROUPS = {"actor": ["policy"], "critic": ["privileged"]}
-"""Which observations each network sees."""
 
 
 def runner_config(task: Task) -> dict[str, Any]:
@@ -37,8 +30,8 @@ def runner_config(task: Task) -> dict[str, Any]:
         "save_interval": task.runner.save_interval,
         "seed": task.runner.seed,
         "logger": _logger_config(task),
-        "obs_groups": {name: list(groups) for name, groups in _GROUPS.items()},
-        "actor": {"class_name": "MLPModel", **_actor_config(task)},
+        "obs_groups": {name: list(groups) for name, groups in GROUPS.items()},
+        "actor": {"class_name": "MLPModel", **actor_config(task)},
         "critic": {
             "class_name": "MLPModel",
             "hidden_dims": list(task.policy.critic_hidden_dims),
@@ -46,20 +39,6 @@ def runner_config(task: Task) -> dict[str, Any]:
             "obs_normalization": task.policy.obs_normalization,
         },
         "algorithm": _algorithm_config(task),
-    }
-
-
-def _actor_config(task: Task) -> dict[str, Any]:
-    policy = task.policy
-    return {
-        "hidden_dims": list(policy.actor_hidden_dims),
-        "activation": policy.activation,
-        "obs_normalization": policy.obs_normalization,
-        "distribution_cfg": {
-            "class_name": "GaussianDistribution",
-            "init_std": policy.init_noise_std,
-            "std_type": "scalar",
-        },
     }
 
 
@@ -83,71 +62,6 @@ def _logger_config(task: Task) -> str | dict[str, str]:
     if task.runner.logger == "wandb":
         return {"class_name": "WandbLogWriter", "project_name": "terrainkit"}
     return "tensorboard"
-
-
-def policy_of(run: Run, env: LeggedEnv) -> Act:
-    """Return the policy of a run: from observations of `env` to actions, always the same.
-
-    Raises:
-        ConfigError: if the run has no checkpoint, or one of another robot or task.
-    """
-    actor = actor_of(run, env)
-
-    def act(observations: TensorDict) -> torch.Tensor:
-        with torch.inference_mode():
-            return actor(observations.to(env.device)).clone()
-
-    return act
-
-
-def actor_of(run: Run, env: LeggedEnv) -> MLPModel:
-    """Return the network of a run's policy, ready to be used; errors as `policy_of`."""
-    if run.checkpoint is None:
-        raise ConfigError(f"{run.folder} has no checkpoint yet; wanted a run that has been trained")
-    state = read_checkpoint(run.checkpoint)
-    _refuse_other(run.checkpoint, state, env, _GROUPS["actor"])
-    with _fitting(run.checkpoint):
-        actor = MLPModel(
-            env.get_observations(), _GROUPS, "actor", env.num_actions, **_actor_config(run.task)
-        )
-        actor.load_state_dict(state["actor_state_dict"])
-    return actor.to(env.device).eval()
-
-
-def _refuse_other(
-    path: Path, state: Mapping[str, Any], env: LeggedEnv, groups: Sequence[str]
-) -> None:
-    """Refuse a checkpoint of another robot, or of a task whose groups are of another size."""
-    joints = list(env.robot.spec.joint_order)
-    if state["joints"] != joints:
-        raise ConfigError(
-            f"{path} is of another robot, {state['robot']}, whose joints are: "
-            f"{listing(map(str, state['joints']))}; wanted: {listing(joints)}"
-        )
-    observed = _observed(env)
-    for name in groups:
-        if state["observed"].get(name) != observed[name]:
-            raise ConfigError(
-                f"{path} is of another task: its observations {name} are "
-                f"{state['observed'].get(name)} numbers; here they are {observed[name]}"
-            )
-
-
-def _observed(env: LeggedEnv) -> dict[str, int]:
-    """Return how many numbers each group of observations has."""
-    return {name: values.shape[1] for name, values in env.get_observations().items()}
-
-
-@contextmanager
-def _fitting(path: Path) -> Iterator[None]:
-    """Turn torch's reasons why weights do not fit into one line."""
-    try:
-        yield
-    except ConfigError:
-        raise
-    except (RuntimeError, ValueError, LookupError, TypeError, AttributeError) as error:
-        reason = " ".join(str(error).split())[:200]
-        raise ConfigError(f"{path} does not fit the networks of its task: {reason}") from error
 
 
 class LeggedRunner(OnPolicyRunner):
@@ -276,8 +190,8 @@ class LeggedRunner(OnPolicyRunner):
         """
         path = Path(path)
         state = read_checkpoint(path)
-        _refuse_other(path, state, self.env, list(self.env.groups))
-        with _fitting(path):
+        refuse_other(path, state, self.env, list(self.env.groups))
+        with fitting(path):
             whole = load_cfg is None and "processes" in state
             self.alg.load(
                 state, load_cfg or {"actor": True, "critic": True, "optimizer": whole}, strict
@@ -297,7 +211,7 @@ class LeggedRunner(OnPolicyRunner):
             "iteration": self.current_learning_iteration,
             "robot": self.env.robot.spec.name,
             "joints": list(self.env.robot.spec.joint_order),
-            "observed": _observed(self.env),
+            "observed": widths(self.env),
             **self.alg.save(),
             "processes": self._gathered(mine),
             "curves": self.logger.state_dict(),

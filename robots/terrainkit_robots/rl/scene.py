@@ -71,7 +71,7 @@ def build_scene(robot: Robot, ground: Ground, task: Task) -> Scene:
     with quiet_mujoco():
         whole, body = _attached(robot, ground, task)
         _fits(robot, whole, body)
-        _collisions(body, task)
+        _collisions(robot, body, task)
         _joints(robot, body, task)
         _actuators(robot, whole, task)
         blocks = _sensors(robot, whole)
@@ -137,10 +137,14 @@ def _fits(robot: Robot, whole: Any, base: Any) -> None:
                 )
 
 
-def _collisions(base: Any, task: Task) -> None:
+def _collisions(robot: Robot, base: Any, task: Task) -> None:
     """Let the robot touch the ground, with what touches anything, and itself if wanted."""
+    wanted = {*robot.spec.feet, *robot.spec.termination_contacts}
     for geom in base.find_all("geom"):
         if not geom.contype and not geom.conaffinity:
+            continue
+        if task.asset.collisions != "all" and geom.parent.name not in wanted:
+            geom.contype = geom.conaffinity = 0
             continue
         geom.contype = int(task.asset.self_collisions)
         geom.conaffinity = _ANY
@@ -272,20 +276,30 @@ def _sole_depth(robot: Robot, model: Any, home: Any) -> Any:
             & ((model.geom_contype != 0) | (model.geom_conaffinity != 0))
         )
         at = data.site(_sole_name(foot)).xpos[2]
-        depths.append(max((at - _lowest(model, data, int(geom)) for geom in geoms), default=0.0))
+        depths.append(max((at - lowest_point(model, data, int(g)) for g in geoms), default=0.0))
     return np.array(depths, np.float32)
 
 
-def _lowest(model: Any, data: Any, geom: int) -> float:
-    """Return the height of the lowest point of a geom [m]; of a mesh that of its box."""
+def lowest_point(model: Any, data: Any, geom: int) -> float:
+    """Return the height of the lowest point of a geom in the world [m]."""
     import mujoco
 
-    z, axes = data.geom_xpos[geom][2], data.geom_xmat[geom].reshape(3, 3)[2]
-    radius, half = model.geom_size[geom, :2]
-    kind = model.geom_type[geom]
-    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-        return float(z - radius)
-    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-        return float(z - radius - abs(axes[2]) * half)
-    middle, size = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
-    return float(z + axes @ middle - np.abs(axes) @ size)
+    kind = mujoco.mjtGeom
+    axes = data.geom_xmat[geom].reshape(3, 3)[2]  # how far up each axis of the geom points
+    size, up = model.geom_size[geom], np.abs(axes)
+    match model.geom_type[geom]:
+        case kind.mjGEOM_SPHERE:
+            reach = size[0]
+        case kind.mjGEOM_CAPSULE:
+            reach = size[0] + size[1] * up[2]
+        case kind.mjGEOM_CYLINDER:
+            reach = size[0] * np.hypot(up[0], up[1]) + size[1] * up[2]
+        case kind.mjGEOM_ELLIPSOID:
+            reach = np.linalg.norm(size * up)
+        case kind.mjGEOM_MESH:
+            mesh = model.mesh(int(model.geom_dataid[geom]))
+            start, count = int(mesh.vertadr[0]), int(mesh.vertnum[0])
+            reach = -(model.mesh_vert[start : start + count] @ axes).min()
+        case _:
+            reach = size @ up
+    return float(data.geom_xpos[geom][2] - reach)

@@ -87,7 +87,8 @@ class State(Measured):
     """What is asked for: speed forward, to the left [m/s], turning [rad/s], shape (n, 3)."""
 
     push_vel: FloatArray
-    """What the last push added to the base's velocity, in the world's frame [m/s], shape (n, 3)."""
+    """What a push in this step added to the base's velocity, in the world's frame [m/s], shape
+    (n, 3); of one before there is nothing left but that velocity, so it is 0 again."""
 
     friction: FloatArray
     """Friction of the robot's contacts, shape (n, 1)."""

@@ -28,7 +28,7 @@ FloatArray = NDArray[np.float32]
 
 _SAME = 1e-3
 """Twins may differ so much: in default pose [rad], in points of the scan [m], and in action scale,
-as a part of it."""
+gains and effort, as a part of them."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -180,11 +180,16 @@ def _joints(robot: Robot) -> Image:
 
 def _same_control(env: "LeggedEnv", joints: Image) -> None:
     """Refuse a robot whose actions mean something else to the left than to the right."""
-    names, pose, scale = env.robot.spec.joint_order, env.robot.default_pose, env.control.scale
-    for table, own, of_twin, most in (
-        ("default_pose", pose, pose[joints.index] * joints.sign, np.full(len(pose), _SAME)),
-        ("action_scale", scale, scale[joints.index], _SAME * np.abs(scale)),
+    names, pose, model = env.robot.spec.joint_order, env.robot.default_pose, env.scene.model
+    tables = [("default_pose", pose, pose[joints.index] * joints.sign, np.full(len(pose), _SAME))]
+    for table, values in (
+        ("action_scale", env.control.scale),
+        ("stiffness", -model.actuator_biasprm[:, 1]),
+        ("damping", -model.actuator_biasprm[:, 2]),
+        ("effort", model.actuator_forcerange[:, 1]),
     ):
+        tables.append((table, values, values[joints.index], _SAME * np.abs(values)))
+    for table, own, of_twin, most in tables:
         off = np.flatnonzero(np.abs(own - of_twin) > most)
         if len(off):
             k = int(off[0])

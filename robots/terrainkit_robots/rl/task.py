@@ -127,6 +127,10 @@ class Control(Section):
 class Asset(Section):
     """What of the robot takes part."""
 
+    collisions: Literal["all", "feet_and_termination"] = "all"
+    """What of the robot touches the ground: all that has a shape for it, or only feet and bodies
+    that end an episode, which is up to a quarter faster, and leaves `rewards.collision` nothing."""
+
     self_collisions: bool = False
     """Whether the robot touches itself."""
 
@@ -150,8 +154,9 @@ class Commands(Section):
     heading: Span = (-3.14159, 3.14159)
     """Direction to turn to, in the world [rad]."""
 
-    heading_command: bool = False
-    """Whether a heading is asked for, in place of a turning speed."""
+    heading_command: bool | None = None
+    """Whether a heading is asked for, in place of a turning speed; unless given, on any ground but
+    a plane: who turns all the time comes nowhere."""
 
     heading_stiffness: NotNegative = 0.5
     """Turning speed for an error of heading [1/s]."""
@@ -170,6 +175,20 @@ class Commands(Section):
 
     max_curriculum: NotNegative = 1.0
     """Widest range of `lin_vel_x`, to either side [m/s]."""
+
+    def __post_init__(self) -> None:
+        """Check the values, and that the curriculum has somewhere to go.
+
+        Raises:
+            ConfigError: if there is something wrong.
+        """
+        super().__post_init__()
+        low, high = self.lin_vel_x
+        if self.curriculum and self.max_curriculum <= min(-low, high):
+            raise ConfigError(
+                f"max_curriculum is {self.max_curriculum:g}, and lin_vel_x from {low:g} to "
+                f"{high:g} already; wanted more, or no curriculum"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -525,6 +544,11 @@ class Task(Section):
             raise ConfigError(
                 f"env.episode_length_s is {self.env.episode_length_s:g}; wanted one step of the "
                 f"policy or more, {self.dt:g} s"
+            )
+        if self.asset.collisions != "all" and self.rewards.collision:
+            raise ConfigError(
+                f"rewards.collision is {self.rewards.collision:g}; wanted 0 with "
+                f"asset.collisions {self.asset.collisions}, as penalized bodies touch nothing"
             )
         samples = self.env.num_envs * self.runner.num_steps_per_env
         if samples < self.algorithm.num_mini_batches:

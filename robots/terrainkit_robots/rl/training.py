@@ -26,6 +26,7 @@ from terrainkit_robots.rl.progress import Watch, nobody
 from terrainkit_robots.rl.robot import read_robot
 from terrainkit_robots.rl.run_folder import (
     Run,
+    changed_robot,
     checkpoints,
     create_run,
     default_folder,
@@ -35,6 +36,7 @@ from terrainkit_robots.rl.run_folder import (
     same_ground,
 )
 from terrainkit_robots.rl.task import Task
+from terrainkit_robots.rl.threads import wait_asleep
 
 if TYPE_CHECKING:
     from terrainkit_robots.rl.runner import LeggedRunner
@@ -82,7 +84,7 @@ def train(
         CapacityError: if so many environments do not fit in memory.
         ExportError: if the folder exists, or the disk is full.
     """
-    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # waiting, torch would hold up the physics
+    wait_asleep()
     import torch
 
     from terrainkit_robots.rl.env import LeggedEnv
@@ -151,6 +153,11 @@ def _goes_on(run: Run, robot: str | Path, terrain: str | Path, task: Task) -> bo
         raise ConfigError(
             f"{run.terrain} is another map than {run.folder} was trained on, which its map.toml "
             "describes; another --terrain begins a new run with its networks"
+        )
+    if same and (files := changed_robot(run)):
+        raise ConfigError(
+            f"{run.robot_name} has another {' and '.join(files)} than {run.folder} was trained "
+            "with; a copy of the robot in another folder begins a new run with its networks"
         )
     return same and "processes" in read_checkpoint(_checkpoint(run))
 

@@ -7,6 +7,7 @@ that are changed by a test are made anew; what is only read lives as long as the
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -20,7 +21,18 @@ from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Ground, MapGround, Plane
 from terrainkit_robots.rl.registry import find
 from terrainkit_robots.rl.robot import Robot, read_robot, robot_of
-from terrainkit_robots.rl.task import DomainRand, Env, InitState, Noise, Task
+from terrainkit_robots.rl.run_folder import create_run
+from terrainkit_robots.rl.runner import LeggedRunner
+from terrainkit_robots.rl.task import (
+    DomainRand,
+    Env,
+    InitState,
+    Noise,
+    Normalization,
+    Policy,
+    Runner,
+    Task,
+)
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
 # The contract is a class that several test files share; there are no packages here to find it in.
@@ -177,6 +189,38 @@ def lively() -> Callable[..., Task]:
         return Task(**({"env": Env(num_envs=num_envs, num_threads=num_threads)} | sections))
 
     return make
+
+
+@pytest.fixture
+def run_of(quadruped: Robot, lively: Callable[..., Task]) -> Callable[..., Any]:
+    """Return runs without a checkpoint: what an evaluation needs to know of one."""
+
+    def make(ground: str | Path = "plane", **sections: Any) -> Any:
+        return SimpleNamespace(
+            task=lively(**sections), robot=quadruped, terrain=str(ground), checkpoint=None
+        )
+
+    return make
+
+
+@pytest.fixture
+def map_file(mixed_map: TerrainMap, tmp_path: Path) -> Path:
+    return mixed_map.save(tmp_path / "map.npz")
+
+
+@pytest.fixture(scope="session")
+def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a run with two checkpoints, which is only to be read."""
+    task = Task(
+        env=Env(num_envs=4, num_threads=1),
+        policy=Policy(actor_hidden_dims=(16, 16), critic_hidden_dims=(16, 16)),
+        normalization=Normalization(clip_actions=0.3),  # so that the clip is at work
+        runner=Runner(num_steps_per_env=4, save_interval=1),
+    )
+    run = create_run(tmp_path_factory.mktemp("runs") / "run", task, "quadruped", "plane")
+    torch.manual_seed(1)
+    LeggedRunner(LeggedEnv(run.task, run.robot, Plane()), run.folder).learn(2)
+    return run.folder
 
 
 @pytest.fixture

@@ -372,6 +372,16 @@ class TestEnvironment:
         self.walk(env, 10)
         assert env.careers.levels.tolist() == [3, 3, 5, 3, 3, 3]
 
+    def test_leaving_the_map_is_crossing(self) -> None:
+        """A patch may be narrower than it is long: its side is nearer than half its length."""
+        env = self.make()
+        env.ground.lower = (-np.inf, 2.0)
+        env.physics.qpos[1, 1] -= 2.9
+        *_, extras = env.step(torch.zeros(6, 12))
+        assert extras["log"]["Episode/falls"] == 1
+        assert env.careers.levels.tolist() == [4, 5, 4, 4, 4, 4]
+        assert env.careers.success[4, 0] == 1
+
     def test_falls_move_down(self) -> None:
         env = self.make()
         self.walk(env, 2)

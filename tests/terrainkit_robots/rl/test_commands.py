@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 import torch
 
+from terrainkit.errors import ConfigError
 from terrainkit_robots import bundled
-from terrainkit_robots.rl.commands import draw_commands, turning_to, widened
+from terrainkit_robots.rl.commands import asks_headings, draw_commands, turning_to, widened
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane
 from terrainkit_robots.rl.rewards import REWARDS
 from terrainkit_robots.rl.robot import read_robot
+from terrainkit_robots.rl.rotation import yaw_of
 from terrainkit_robots.rl.task import Commands, Control, DomainRand, Env, InitState, Rewards, Task
 
 torch.set_num_threads(1)
@@ -121,6 +123,23 @@ class TestHeading:
         np.testing.assert_allclose(off, 0, atol=1e-3)
 
 
+class TestHeadingUnlessGiven:
+    @pytest.mark.parametrize(
+        ("given", "level", "asked"),
+        [(None, True, False), (None, False, True), (True, True, True), (False, False, False)],
+    )
+    def test_is_asked_on_any_ground_but_a_plane(
+        self, given: bool | None, *, level: bool, asked: bool
+    ) -> None:
+        ground = Plane()
+        ground.level = level
+        settings = Commands(heading_command=given, standing=0.0)
+        assert asks_headings(settings, ground) == asked
+        env = make_env(ground=ground, commands=settings)
+        turning = turning_to(env.heading, yaw_of(env.state.base_quat), settings)
+        assert np.allclose(env.commands[:, 2], turning, atol=1e-5) == asked
+
+
 class TestWidening:
     def test_by_hand(self) -> None:
         settings = Commands(curriculum=True, max_curriculum=2.0)
@@ -136,8 +155,16 @@ class TestWidening:
         assert span == (-1.25, 1.25)
 
     def test_never_narrows(self) -> None:
-        settings = Commands(curriculum=True, max_curriculum=0.5)
-        assert widened((-1.0, 3.0), 0.9, settings) == (-1.0, 3.0)
+        settings = Commands(curriculum=True, max_curriculum=1.5)
+        assert widened((-2.0, 3.0), 0.9, settings) == (-2.0, 3.0)
+
+    def test_needs_room(self) -> None:
+        with pytest.raises(ConfigError, match="max_curriculum is 1, and lin_vel_x from -1 to 1"):
+            Commands(curriculum=True)
+        with pytest.raises(ConfigError, match=r"max_curriculum is 0\.3, "):
+            Commands(curriculum=True, lin_vel_x=(-0.4, 0.8), max_curriculum=0.3)
+        Commands(curriculum=True, lin_vel_x=(-1.0, 0.5))
+        Commands(curriculum=True, lin_vel_x=(0.0, 1.5))
 
     def test_only_where_asked_for(self) -> None:
         assert widened((-1.0, 1.0), 1.0, Commands(max_curriculum=5.0)) == (-1.0, 1.0)
@@ -152,7 +179,8 @@ def make_env(num_envs: int = 4, **changes: Any) -> LeggedEnv:
         control=Control(decimation=changes.pop("decimation", 4)),
     )
     robot = read_robot(Path(str(bundled.find("quadruped"))).parent)
-    return LeggedEnv(replace(task, **changes), robot, Plane())
+    ground = changes.pop("ground", Plane())
+    return LeggedEnv(replace(task, **changes), robot, ground)
 
 
 def run(env: LeggedEnv, steps: int) -> list[Any]:
@@ -247,6 +275,7 @@ class TestEnvironment:
         env.hold_commands(held)
         run(env, 1)
         env.hold_commands(None)
+        assert np.abs(env.state.commands).max() <= 1
         assert np.abs(run(env, 3)[-1]).max() <= 1
 
     def test_range_widens_only_after_as_long_as_an_episode_of_all(self) -> None:

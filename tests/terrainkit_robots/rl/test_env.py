@@ -195,6 +195,18 @@ class TestEndings:
             assert dones.tolist() == [False, True, False], value
             assert torch.isfinite(rewards).all()
 
+    def test_a_bad_state_is_paid_for_the_fall_alone(self, quadruped, calm):
+        # What is seen of it is the pose of MuJoCo's reset, in which nothing is asked too much.
+        env = LeggedEnv(calm(3, rewards=Rewards(termination=-3.0)), quadruped, Plane())
+        env.physics.qvel[1, 7] = np.nan
+        _, rewards, dones, extras = still(env)
+        assert dones.tolist() == [False, True, False]
+        assert rewards[1] == pytest.approx(-3 * 0.02)
+        paid = {k: v for k, v in extras["log"].items() if k.startswith("Episode/rew_")}
+        assert paid.pop("Episode/rew_termination") == pytest.approx(-3)
+        assert set(paid.values()) == {0}
+        assert (rewards[[0, 2]] > 0).all()
+
     def test_a_bad_state_is_no_progress_in_the_curriculum(self, quadruped, calm, map_ground):
         # MuJoCo puts it at the world's origin, far from where the robot was.
         env = LeggedEnv(calm(4), quadruped, map_ground)
@@ -291,7 +303,9 @@ class TestGoingOn:
         # Short commands and episodes, so that all that is drawn is drawn again.
         task = lively(
             env=Env(num_envs=6, num_threads=1, episode_length_s=0.7),
-            commands=Commands(resampling_time=0.2, heading_command=True, curriculum=True),
+            commands=Commands(
+                resampling_time=0.2, heading_command=True, curriculum=True, max_curriculum=2.0
+            ),
             domain_rand=domain_rand,
         )
         env = LeggedEnv(task, quadruped, ground)
@@ -346,6 +360,20 @@ class TestGoingOn:
         assert (other.episode_length_buf == 0).all()
         still(other)
 
+    @pytest.mark.parametrize(("part", "name"), [("arrays", "push_in"), ("state", "push_vel")])
+    def test_a_state_of_another_version_is_refused(self, quadruped, lively, part, name):
+        saved = LeggedEnv(lively(3), quadruped, Plane()).state_dict()
+        del saved[part][name]
+        with pytest.raises(ConfigError, match="written by another version of terrainkit"):
+            LeggedEnv(lively(3), quadruped, Plane()).load_state_dict(saved)
+        LeggedEnv(lively(4), quadruped, Plane()).load_state_dict(saved)
+
+    def test_a_state_of_other_rewards_is_refused(self, quadruped, lively):
+        saved = LeggedEnv(lively(3), quadruped, Plane()).state_dict()
+        task = lively(3, rewards=Rewards(termination=-1.0))
+        with pytest.raises(ConfigError, match="rew_termination is of another robot or task"):
+            LeggedEnv(task, quadruped, Plane()).load_state_dict(saved)
+
     def test_a_state_of_another_robot_or_map_is_refused(self, quadruped, biped, lively, map_ground):
         saved = LeggedEnv(lively(3), quadruped, Plane()).state_dict()
         with pytest.raises(ConfigError, match="another robot"):
@@ -375,12 +403,17 @@ class TestHeldCommands:
         np.testing.assert_allclose(env.state.commands, self.HELD)
 
     def test_until_they_are_let_go(self, quadruped, lively):
-        env = LeggedEnv(lively(commands=Commands(resampling_time=0.04)), quadruped, Plane())
+        env = LeggedEnv(lively(commands=Commands(standing=0.0)), quadruped, Plane())
         env.hold_commands(self.HELD)
         env.hold_commands(None)
-        for _ in range(3):
-            still(env)
-        assert not np.allclose(env.commands, self.HELD)
+        assert (env.commands[:, :2] != self.HELD[:, :2]).any(axis=1).all()
+        np.testing.assert_array_equal(env.state.commands, env.commands)
+        observed = env.get_observations()["policy"][:, :3] / torch.tensor([2, 2, 0.25])
+        np.testing.assert_allclose(observed, env.commands, atol=1e-6)
+        drawn = env.commands.copy()
+        env.hold_commands(None)  # there is nothing to let go
+        still(env)
+        np.testing.assert_array_equal(env.commands, drawn)
 
 
 class TestBeginning:

@@ -1,102 +1,20 @@
-import json
-from dataclasses import dataclass, replace
-from types import SimpleNamespace
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 import torch
 
-from terrainkit import MapConfig, TerrainChoice, generate
-from terrainkit.errors import ConfigError, ExportError
-from terrainkit_robots.rl import evaluation
-from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.evaluation import (
-    SETTLING,
     Asked,
     command_grid,
     evaluate,
     evaluation_task,
     forward_command,
     prepared,
-    roll_out,
-    summed_up,
-    write_evaluation,
 )
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.task import (
-    Algorithm,
-    Commands,
-    Control,
-    DomainRand,
-    Runner,
-    Sim,
-    Task,
-    Terrain,
-)
-
-
-@pytest.fixture
-def run_of(quadruped, lively):
-    """Return a run without a checkpoint: what an evaluation needs to know of one."""
-
-    def make(ground="plane", **sections):
-        return SimpleNamespace(
-            task=lively(**sections), robot=quadruped, terrain=str(ground), checkpoint=None
-        )
-
-    return make
-
-
-@pytest.fixture
-def map_file(mixed_map, tmp_path):
-    return mixed_map.save(tmp_path / "map.npz")
-
-
-def still(env):
-    return lambda _: torch.zeros(env.num_envs, env.num_actions)
-
-
-def limp(env):
-    """Return a policy that lets the legs of the first robot collapse, and no others."""
-    actions = torch.zeros(env.num_envs, env.num_actions)
-    actions[0] = 100.0
-    return lambda _: actions
-
-
-class Sliding(LeggedEnv):
-    """Robots whose bases move as they are told, whatever they do."""
-
-    moves = np.zeros((1, 3), np.float32)
-    """Speed forward and to the left [m/s], turning speed [rad/s], of each robot, shape (n, 3)."""
-
-    falls = np.zeros(1)
-    """When each robot falls [s]; 0: never. Shape (n,)."""
-
-    def step(self, actions):
-        observed, rewards, _, _ = super().step(actions)
-        dt, n = self.cfg.dt, self.num_envs
-        self.now = getattr(self, "now", 0) + 1
-        state = self.state
-        state.base_lin_vel[:, :2], state.base_ang_vel[:, 2] = self.moves[:, :2], self.moves[:, 2]
-        way = self.moves[:, 0] * np.float32(self.now * dt)
-        state.base_pos[:, :2] = self.start + np.column_stack([way, np.zeros(n)])
-        dones = torch.from_numpy(np.isclose(self.falls, self.now * dt))
-        return observed, rewards, dones, {"time_outs": torch.zeros(n, dtype=torch.bool)}
-
-
-@pytest.fixture
-def sliding(quadruped, calm):
-    def make(moves, falls=None, ground=None, **sections):
-        moves = np.array(moves, np.float32)
-        # What the physics does is of no account, so it is done in one step.
-        coarse = calm(len(moves), sim=Sim(dt=0.02), control=Control(decimation=1), **sections)
-        task = evaluation_task(coarse, len(moves))
-        env = Sliding(task, quadruped, ground or Plane())
-        env.moves = moves
-        env.falls = np.zeros(len(moves)) if falls is None else np.array(falls)
-        return env
-
-    return make
+from terrainkit_robots.rl.run_folder import open_run
+from terrainkit_robots.rl.task import Algorithm, Commands, DomainRand, Runner, Task, Terrain
 
 
 def test_nothing_of_a_robot_is_random_in_an_evaluation():
@@ -161,93 +79,6 @@ def test_forward_is_three_quarters_of_the_largest_speed():
     np.testing.assert_allclose(forward_command(Commands(lin_vel_x=(-1, 2))), [1.5, 0, 0])
 
 
-def test_errors_are_those_of_the_time_after_settling(sliding):
-    env = sliding([[0.6, 0.3, 0.5], [1, 0, 0]])
-    commands = np.array([[1, 0, 0.3], [1, 0, 0]], np.float32)
-    outcome = roll_out(env, still(env), 4.0, commands)
-    first = outcome.score(np.array([True, False]), patches=False)
-    assert first.lin_vel_error == pytest.approx(0.5)
-    assert first.lin_vel_error_1s == pytest.approx(0.5)
-    assert first.ang_vel_error == pytest.approx(0.2)
-    assert first.success is None
-    both = outcome.score(np.ones(2, bool), patches=False)
-    assert both.lin_vel_error == pytest.approx(0.25)
-    steps = round((4.0 - SETTLING) / env.cfg.dt)
-    assert outcome.counts.tolist() == [[steps] * 2, [steps - 49] * 2] * 2
-
-
-def test_swaying_cancels_out_over_a_second(sliding):
-    env = sliding([[1, 0, 0]])
-    before = env.step
-
-    def swaying(actions):
-        env.moves = np.array([[1, 0.4 * (-1) ** env.steps[0], 0]], np.float32)
-        return before(actions)
-
-    env.step = swaying
-    score = roll_out(env, still(env), 4.0, np.array([[1, 0, 0]], np.float32)).score(
-        np.ones(1, bool), patches=False
-    )
-    assert score.lin_vel_error == pytest.approx(0.4)
-    assert score.lin_vel_error_1s == pytest.approx(0, abs=1e-6)
-
-
-def test_each_new_command_has_its_time_to_settle(sliding):
-    env = sliding([[1, 0, 0]])
-    commands = np.array([[[1, 0, 0]], [[0, 0, 0]]], np.float32)
-    outcome = roll_out(env, still(env), 6.0, commands)
-    assert outcome.counts[0].item() == 2 * round((3 - SETTLING) / env.cfg.dt)
-    assert outcome.sums[0].item() / outcome.counts[0].item() == pytest.approx(0.5)
-
-
-def test_a_fall_counts_once_and_ends_the_measuring(sliding):
-    env = sliding([[0, 0, 0], [0, 0, 0], [0, 0, 0]], falls=[0, 3.0, 1.0])
-    before = env.step
-
-    def again(actions):
-        if env.now == 160:
-            env.falls = np.array([0, 3.2, 3.2])  # and once more, after a new start
-        return before(actions)
-
-    env.now, env.step = 0, again
-    outcome = roll_out(env, still(env), 4.0, np.tile(np.float32([1, 0, 0]), (3, 1)))
-    assert outcome.fell.tolist() == [False, True, True]
-    assert outcome.counts[0].tolist() == [100, 49, 0]
-    lost = outcome.score(np.array([False, False, True]), patches=False)
-    assert (lost.falls, lost.robots, lost.lin_vel_error) == (1, 1, None)
-
-
-def test_falls_of_the_physics_are_seen(run_of):
-    run = run_of()
-    env, commands = prepared(run, Asked(num_envs=2, command=(0, 0, 0), seconds=1))
-    outcome = roll_out(env, limp(env), 1.0, commands)
-    assert outcome.fell.tolist() == [True, False]
-
-
-def test_who_crosses_half_a_patch_succeeds_and_is_judged_no_longer(sliding, map_ground):
-    # Patches are 6 m long: half is crossed after 3 s at 1 m/s, before the falls after that.
-    moves = [[1, 0, 0], [1, 0, 0], [0.3, 0, 0], [0.7, 0, 0], [1, 0, 0]]
-    env = sliding(moves, falls=[0, 3.5, 0, 0, 2.0], ground=map_ground)
-    outcome = roll_out(env, still(env), 4.0, np.tile(np.float32([1, 0, 0]), (5, 1)))
-    assert outcome.fell.tolist() == [False, False, False, False, True]
-    # The third came not half as far as it was asked to, the fourth did.
-    assert outcome.success.tolist() == [True, True, False, True, False]
-    assert outcome.counts[0, 1] == outcome.counts[0, 0] < 100
-    score = outcome.score(np.ones(5, bool), patches=True)
-    assert (score.success, score.falls) == (0.6, 1)
-
-
-def test_it_ends_when_every_trial_has(sliding, map_ground):
-    done = []
-    env = sliding([[0, 0, 0]], falls=[0.1], ground=map_ground)
-    roll_out(env, still(env), 4.0, np.zeros((1, 3), np.float32), done.append)
-    assert len(done) == 5
-    env = sliding([[0, 0, 0]], falls=[0.1], ground=map_ground)
-    roll_out(env, still(env), 0.4, np.zeros((1, 3), np.float32), done.append, to_the_end=True)
-    assert len(done) == 25
-    assert done[-1] == 1
-
-
 def test_on_a_plane_each_command_has_a_robot(run_of):
     env, commands = prepared(run_of(), Asked())
     assert env.num_envs == len(commands) == len(np.unique(commands, axis=0)) == 75
@@ -282,74 +113,6 @@ def test_the_policy_sees_as_much_as_in_training(run_of, map_file):
         assert env.ground.level == (terrain in ("plane", None))
 
 
-@pytest.mark.parametrize("terrain", ["plane", "map"])
-def test_the_same_seed_gives_the_same_result(run_of, map_file, terrain, monkeypatch):
-    monkeypatch.setattr(evaluation, "SETTLING", 0.1)
-    monkeypatch.setattr(evaluation, "WINDOW", 0.1)
-    run = run_of(map_file if terrain == "map" else "plane")
-
-    def result(seed):
-        asked = Asked(num_envs=3, seconds=0.4, seed=seed, random_commands=True)
-        env, commands = prepared(run, asked)
-        torch.manual_seed(7)
-        mix = 0.5 * torch.randn(env.get_observations()["policy"].shape[1], env.num_actions)
-        outcome = roll_out(env, lambda seen: torch.tanh(seen["policy"] @ mix), 0.4, commands)
-        assert outcome.counts.all()
-        return summed_up(run, asked, env, outcome).as_json()
-
-    assert result(3) == result(3)
-    assert result(3) != result(4)
-
-
-def test_results_are_told_apart_by_command(run_of):
-    run = run_of(commands=Commands(lin_vel_x=(-1, 1), lin_vel_y=(-0.5, 0.5), ang_vel_yaw=(-1, 1)))
-    asked = Asked(seconds=0.1)
-    env, commands = prepared(run, asked)
-    outcome = roll_out(env, still(env), 0.1, commands)
-    told = json.loads(summed_up(run, asked, env, outcome, commands).as_json())
-    assert told["all"]["robots"] == 75
-    assert told["all"]["success"] is None
-    assert told["all"]["lin_vel_error"] is None  # nobody had settled yet
-    assert len(told["by_command"]) == 75
-    assert told["by_command"][0]["command"] == [-1.0, -0.5, -1.0]
-    assert "by_terrain" not in told
-
-
-def test_results_are_told_apart_by_terrain_and_level(run_of, map_file):
-    run = run_of(map_file)
-    asked = Asked(seconds=0.1, num_envs=12)
-    env, commands = prepared(run, asked)
-    told = json.loads(
-        summed_up(run, asked, env, roll_out(env, still(env), 0.1, commands)).as_json()
-    )
-    assert [part["terrain"] for part in told["by_terrain"]] == ["stairs", "rough_slope"]
-    assert [part["level"] for part in told["by_level"]] == [0, 1, 2]
-    assert [part["robots"] for part in told["by_terrain_and_level"]] == [2] * 6
-    assert told["by_terrain_and_level"][1]["level"] == 1
-    assert "by_command" not in told
-
-
-def test_on_a_randomized_map_each_robot_counts_for_the_terrain_below_it(run_of, tmp_path):
-    choices = tuple(TerrainChoice(terrain=name) for name in ("flat", "pyramid_slope"))
-    made = MapConfig(
-        mode="randomized", rows=3, cols=3, patch_size=(4, 4), border=0.5, terrains=choices
-    )
-    path = generate(made).save(tmp_path / "map.npz")
-    run, asked = run_of(path), Asked(seconds=0.04)
-    env, commands = prepared(run, replace(asked, num_envs=9))
-    found = summed_up(run, asked, env, roll_out(env, still(env), 0.04, commands))
-    names = env.ground.terrain_names
-    assert len({tuple(row) for row in names}) > 1
-    for part in found.by_terrain:
-        assert part.score.robots == (names == part.terrain).sum()
-    assert sum(part.score.robots for part in found.by_terrain) == 9
-    for part in found.by_terrain_and_level:
-        assert part.score.robots == (names[part.level] == part.terrain).sum()
-    keys = [(part.terrain, part.level) for part in found.by_terrain_and_level]
-    order = [part.terrain for part in found.by_terrain]
-    assert keys == sorted(keys, key=lambda key: (order.index(key[0]), key[1]))
-
-
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -379,14 +142,27 @@ def test_a_run_without_a_checkpoint_is_an_error(run_of, tmp_path):
         evaluate(run, Asked(num_envs=1, seconds=0.1))
 
 
-def test_it_is_written_whole_and_replaces_nothing_unasked(run_of, tmp_path):
-    run = run_of()
-    asked = Asked(seconds=0.04, num_envs=1)
-    env, commands = prepared(run, asked)
-    found = summed_up(run, asked, env, roll_out(env, still(env), 0.04, commands))
-    path = tmp_path / "result.json"
-    write_evaluation(found, path)
-    assert path.read_text() == found.as_json()
-    with pytest.raises(ExportError, match="exists"):
-        write_evaluation(replace(found, seed=9), path)
-    assert path.read_text() == found.as_json()
+# The policy that is shipped walks.
+
+
+def test_the_quadruped_that_is_shipped_follows_commands_and_does_not_fall():
+    found = evaluate(open_run("quadruped"), Asked(seconds=8.0, num_envs=8))
+    assert found.whole.robots == len(found.by_command) == 8
+    assert found.whole.falls == 0
+    assert found.whole.lin_vel_error < 0.25
+    assert found.whole.ang_vel_error < 0.25
+
+
+def test_torch_works_on_one_thread_and_on_as_many_as_before_afterwards():
+    before, during = torch.get_num_threads(), []
+    torch.set_num_threads(2)
+    try:
+        evaluate(
+            open_run("quadruped"),
+            Asked(seconds=0.04, num_envs=1),
+            lambda _: during.append(torch.get_num_threads()),
+        )
+        assert torch.get_num_threads() == 2
+    finally:
+        torch.set_num_threads(before)
+    assert during == [1, 1]

@@ -12,7 +12,12 @@ from terrainkit_robots import bundled
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane
 from terrainkit_robots.rl.physics import Physics
-from terrainkit_robots.rl.randomization import Differences, apply_differences, draw_differences
+from terrainkit_robots.rl.randomization import (
+    Differences,
+    Pushes,
+    apply_differences,
+    draw_differences,
+)
 from terrainkit_robots.rl.robot import Robot, read_robot
 from terrainkit_robots.rl.scene import build_scene
 from terrainkit_robots.rl.task import Control, DomainRand, Env, InitState, Task
@@ -283,18 +288,36 @@ class TestEnvironment:
 
     def test_pushes(self) -> None:
         env = make_env(replace(_NONE, push_interval_s=0.06, max_push_vel_xy=0.5))
-        before = env.state.base_lin_vel.copy()
-        pushed = []
-        for _ in range(8):
+        pushes = []
+        for _ in range(9):
             env.step(torch.zeros(6, 12))
-            changed = np.abs(env.state.base_lin_vel[:, :2] - before[:, :2]).max() > 0.1
-            pushed.append(bool(changed))
-            before = env.state.base_lin_vel.copy()
-        # Every third step; the fourth and the seventh begin with one.
-        assert pushed == [False, False, False, True, False, False, True, False]
-        assert np.abs(env.push_vel).max() <= 0.5
-        assert (env.push_vel[:, 2] == 0).all()
-        np.testing.assert_array_equal(env.state.push_vel, env.push_vel)
+            np.testing.assert_array_equal(env.state.push_vel, env.push_vel)
+            pushes.append(env.state.push_vel)
+        velocity = np.array(pushes)
+        pushed = (velocity != 0).any(axis=2)
+        # Every third step, and not at the same time.
+        assert (pushed[:3].sum(axis=0) == 1).all()
+        np.testing.assert_array_equal(pushed[3:], pushed[:-3])
+        assert len(set(pushed.argmax(axis=0))) > 1
+        assert 0.3 < np.abs(velocity).max() <= 0.5
+        assert (velocity[..., 2] == 0).all()
+
+    def test_pushes_may_come_at_any_time_of_an_episode(self) -> None:
+        pushes = Pushes(DomainRand(push_interval_s=0.1), 2000, 0.02)
+        pushes.begin(np.random.default_rng(0), np.arange(2000))
+        times, counts = np.unique(pushes.wait, return_counts=True)
+        assert times.tolist() == [1, 2, 3, 4, 5]
+        np.testing.assert_allclose(counts, 400, rtol=0.15)
+
+    def test_a_new_episode_has_a_time_of_its_own(self) -> None:
+        pushes = Pushes(DomainRand(push_interval_s=15), 6, 0.02)
+        rng = np.random.default_rng(0)
+        pushes.begin(rng, np.arange(6))
+        before = pushes.wait.copy()
+        pushes.velocity[:] = 1
+        pushes.begin(rng, np.array([1, 4]))
+        assert np.flatnonzero(pushes.wait != before).tolist() == [1, 4]
+        assert pushes.velocity[:, 0].tolist() == [1, 0, 1, 1, 0, 1]
 
     def test_no_pushes(self) -> None:
         env = make_env(replace(_NONE, push_interval_s=0.0))

@@ -202,6 +202,17 @@ class TestByHand:
         longer = paid("feet_air_time", robot, given, air_time_target=0.5)
         assert longer == pytest.approx([0.25, -0.375, 0, 0])
 
+    def test_who_has_almost_reached_a_heading_is_asked_to_stand(self, robot: Robot) -> None:
+        given = state(
+            4,
+            commands=[[0, 0, 0.09], [0, 0, -0.11], [0.05, 0, 0], [0, -0.05, 0.01]],
+            first_contact=[[True, True]] * 4,
+            air_time=[[1.0, 1.0]] * 4,
+            dof_pos=[[0.75, -1.0]] * 4,
+        )
+        assert (np.array(paid("feet_air_time", robot, given)) > 0).tolist() == [False] + 3 * [True]
+        assert (np.array(paid("stand_still", robot, given)) > 0).tolist() == [True] + 3 * [False]
+
     def test_foot_clearance(self, robot: Robot) -> None:
         # (0.18 - 0.08)^2 * |(3, 4)| and 0.08^2 * 0.5; a foot that stands is free, and so is up.
         given = state(
@@ -242,7 +253,8 @@ class TestByHand:
 
     def test_every_reward_is_here(self) -> None:
         here = {name.removeprefix("test_") for name in vars(TestByHand) if name.startswith("test_")}
-        assert {*REWARDS} == here - {"every_reward_is_here"}
+        others = {"every_reward_is_here", "who_has_almost_reached_a_heading_is_asked_to_stand"}
+        assert {*REWARDS} == here - others
 
 
 _PENALTIES = sorted({*REWARDS} - {"tracking_lin_vel", "tracking_ang_vel", "feet_air_time"})

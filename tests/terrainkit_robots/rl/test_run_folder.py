@@ -17,6 +17,7 @@ from terrainkit_robots.rl.run_folder import (
     RUN_FILE,
     SHIPPED,
     TASK_FILE,
+    changed_robot,
     checkpoint_name,
     checkpoints,
     create_run,
@@ -72,6 +73,22 @@ def test_a_robot_that_is_gone_is_told(tmp_path, task):
     (mine / "quadruped.xml").unlink()
     with pytest.raises(ConfigError, match=r"is gone: there is no file .*quadruped\.xml"):
         open_run(folder)
+
+
+def test_what_changed_of_a_robot_is_told(tmp_path, task):
+    mine = tmp_path / "mine"
+    shutil.copytree(registry.find("quadruped").folder, mine)
+    run = open_run(create_run(tmp_path / "run", task, mine, "plane").folder)
+    assert changed_robot(run) == ()
+    for name in ("quadruped.xml", "robot.toml"):
+        before = (mine / name).read_bytes()
+        (mine / name).write_bytes(before + b"\n")
+        assert changed_robot(run) == (name,)
+        (mine / name).write_bytes(before)
+    about = (run.folder / RUN_FILE).read_text().partition("[robot_sha256]")[0]
+    (run.folder / RUN_FILE).write_text(about)
+    (mine / "robot.toml").write_bytes(before + b"\n")
+    assert changed_robot(run) == ()  # an earlier version did not note it
 
 
 def test_a_map_that_is_gone_is_made_again(tmp_path, task, mixed_map):

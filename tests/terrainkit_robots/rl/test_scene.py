@@ -11,7 +11,7 @@ from terrainkit_robots.rl.ground import MapGround, Plane, ScannedGround
 from terrainkit_robots.rl.physics import Physics
 from terrainkit_robots.rl.robot import robot_of
 from terrainkit_robots.rl.scene import build_scene
-from terrainkit_robots.rl.task import Asset, Control, Sim
+from terrainkit_robots.rl.task import Asset, Control, Rewards, Sim
 
 
 @pytest.fixture(scope="module")
@@ -151,6 +151,15 @@ class TestCollisions:
         }
         assert {"hull", "front_leg", "front_ball", "rear_leg", "tire"} <= touching
         assert "paint" not in touching
+
+    def test_only_feet_and_what_ends_an_episode_may(self, cart, calm):
+        touching = []
+        for collisions in ("all", "feet_and_termination"):
+            task = calm(asset=Asset(collisions=collisions), rewards=Rewards(collision=0.0))
+            scene = build_scene(cart, Plane(), task)
+            bodies = scene.model.geom_bodyid[scene.geoms]
+            touching.append({scene.model.body(k).name for k in bodies})
+        assert touching == [{"trunk", "front", "rear", "wheel"}, {"trunk", "front", "wheel"}]
 
     @pytest.mark.parametrize("affinity", [(1, 1), (0, 1), (1, 0), (2, 4), (8, 0)])
     def test_whatever_bits_the_ground_has(self, cart, calm, tmp_path, affinity):

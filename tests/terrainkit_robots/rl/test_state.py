@@ -146,15 +146,18 @@ class TestByHand:
         )  # fmt: skip
         env = LeggedEnv(task, cart, Plane())
         env.physics.qpos[:, 2] = 3.0
-        env.step(torch.zeros(64, 3))
-        env.step(torch.zeros(64, 3))
-        assert (env.state.push_vel == 0).all()
-        before = env.physics.qvel[:, :2].copy()
-        env.step(torch.zeros(64, 3))  # 0.04 s have gone by
-        added = env.physics.qvel[:, :2] - before
-        np.testing.assert_allclose(added, env.state.push_vel[:, :2], atol=0.05)
-        assert (env.state.push_vel[:, 2] == 0).all()
-        assert 0.7 < np.abs(env.state.push_vel).max() <= 0.8
+        seen = []
+        for _ in range(4):
+            before = env.physics.qvel[:, :2].copy()
+            env.step(torch.zeros(64, 3))
+            added = env.physics.qvel[:, :2] - before
+            np.testing.assert_allclose(added, env.state.push_vel[:, :2], atol=0.05)
+            assert (env.state.push_vel[:, 2] == 0).all()
+            assert 0.7 < np.abs(env.state.push_vel).max() <= 0.8
+            seen.append((env.state.push_vel != 0).any(axis=1))
+        # Every 0.04 s each, and told only of the step that it was in.
+        np.testing.assert_array_equal(seen[0], ~seen[1])
+        np.testing.assert_array_equal(seen[2:], seen[:2])
 
     def test_the_error_of_a_joints_zero_is_observed_and_told(self, cart, calm):
         task = calm(

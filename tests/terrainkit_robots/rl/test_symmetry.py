@@ -159,7 +159,7 @@ class TestRobot:
         image = env.physics.qpos[:_PAIRS].copy()
         image[:, [1, 4, 6]] *= -1
         np.testing.assert_allclose(image[:, :7], env.physics.qpos[_PAIRS:, :7], atol=1e-4)
-        rewards = env.earnings.pay(env.state)
+        rewards = env.earnings.pay(env.state, np.zeros(env.num_envs, bool))
         np.testing.assert_allclose(rewards[:_PAIRS], rewards[_PAIRS:], atol=1e-4)
 
     def test_wrong_sign_is_seen(self, name: str) -> None:
@@ -288,6 +288,15 @@ class TestErrors:
         pose[1] += 0.1
         with pytest.raises(ConfigError, match="same default_pose to the left and to the right"):
             mirror_of(make_env("", robot=replace(robot, default_pose=pose)))
+
+    @pytest.mark.parametrize("table", ["stiffness", "damping", "effort"])
+    def test_control_differs(self, table: str) -> None:
+        robot = robot_named("quadruped")
+        values = robot.spec.per_joint(table)
+        other = {**values, "RR_hip_joint": 1.1 * values["RR_hip_joint"]}
+        robot = replace(robot, spec=replace(robot.spec, **{table: other}))
+        with pytest.raises(ConfigError, match=f"same {table} to the left and to the right; RL_hip"):
+            mirror_of(make_env("", robot=robot))
 
     def test_scan_that_leans(self) -> None:
         env = make_env("quadruped", Valley())

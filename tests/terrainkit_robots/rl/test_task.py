@@ -9,6 +9,7 @@ from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.rewards import REWARDS
 from terrainkit_robots.rl.task import (
     Algorithm,
+    Asset,
     Commands,
     Control,
     DomainRand,
@@ -148,6 +149,14 @@ def test_an_episode_has_a_step():
 def test_there_is_a_sample_for_each_mini_batch():
     with pytest.raises(ConfigError, match=r"num_mini_batches is 4; .* = 3"):
         Task(env=Env(num_envs=1), runner=Runner(num_steps_per_env=3))
+
+
+def test_who_touches_nothing_pays_for_no_collisions():
+    few = Asset(collisions="feet_and_termination")
+    told = r"rewards.collision is -1; wanted 0 with asset.collisions feet_and_termination"
+    with pytest.raises(ConfigError, match=told):
+        Task(asset=few)
+    assert Task(asset=few, rewards=Rewards(collision=0.0)).asset == few
 
 
 def test_a_section_is_of_its_class():

@@ -8,7 +8,7 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.section import Section
-from terrainkit_robots.rl.task import Rewards, Task
+from terrainkit_robots.rl.task import Commands, Rewards, Task
 from terrainkit_robots.rl.task_file import (
     from_toml,
     may_be_none,
@@ -24,6 +24,9 @@ class RoverRewards(Rewards):
 
     wheel_slip: float = -0.5
     """Wheels that slide."""
+
+    collision: float = 0.0
+    """Nothing, so that little of it may touch the ground."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +49,9 @@ class RoverTask(Task):
 
     wheels: Wheels = field(default_factory=Wheels)
     """The wheels."""
+
+    commands: Commands = field(default_factory=lambda: Commands(max_curriculum=2.0))
+    """Commands that may grow."""
 
     laps: int = 3
     """A value that is in no section."""

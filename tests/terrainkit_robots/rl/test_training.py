@@ -1,5 +1,6 @@
 import os
 import resource
+import shutil
 import signal
 import threading
 from collections.abc import Iterator
@@ -124,6 +125,17 @@ def test_with_more_environments_a_run_goes_on_in_its_folder(task, tmp_path):
     assert open_run(tmp_path / "run").task.env.num_envs == 6
 
 
+def test_curves_of_a_run_that_broke_off_have_each_iteration_once(task, tmp_path):
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    task = replace(task, runner=replace(task.runner, save_interval=2))
+    train("quadruped", "plane", task, folder=tmp_path / "run")
+    (tmp_path / "run" / "model_4.pt").unlink()  # as if it had been killed before
+    train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
+    curves = EventAccumulator(str(tmp_path / "run")).Reload()
+    assert [event.step for event in curves.Scalars("Loss/value")] == [1, 2, 3, 4]
+
+
 def test_from_an_earlier_checkpoint_nothing_is_overwritten(task, tmp_path):
     run, branch = tmp_path / "run", tmp_path / "branch"
     train(
@@ -137,6 +149,21 @@ def test_from_an_earlier_checkpoint_nothing_is_overwritten(task, tmp_path):
     assert done.folder == branch
     assert (run / "model_4.pt").read_bytes() == before
     assert same_weights(run / "model_4.pt", branch / "model_4.pt")
+
+
+@pytest.mark.parametrize("name", ["quadruped.xml", "robot.toml"])
+def test_a_robot_that_has_changed_begins_a_new_run_elsewhere(task, tmp_path, name):
+    mine, run = tmp_path / "mine", tmp_path / "run"
+    shutil.copytree(registry.find("quadruped").folder, mine)
+    train(mine, "plane", lasting(task, 1), folder=run)
+    (mine / name).write_text((mine / name).read_text() + "\n")
+    with pytest.raises(ConfigError, match=rf"mine has another {name} than .*run was trained with"):
+        train(mine, "plane", task, resume=open_run(run))
+    assert list(checkpoints(run)) == [1]
+    other = tmp_path / "other"
+    shutil.copytree(mine, other)
+    done = train(other, "plane", lasting(task, 1), resume=open_run(run), folder=tmp_path / "new")
+    assert list(checkpoints(done.folder)) == [1]
 
 
 def test_another_task_begins_a_new_run_with_the_networks(task, tmp_path, mixed_map):

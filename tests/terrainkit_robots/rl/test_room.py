@@ -4,7 +4,7 @@ import sys
 import pytest
 
 from terrainkit.errors import CapacityError
-from terrainkit_robots.rl.memory import bytes_each, require_room
+from terrainkit_robots.rl.room import bytes_each, require_room
 from terrainkit_robots.rl.task import Env, Runner, Task
 
 MEASURED = """
