@@ -8,13 +8,16 @@ from terrainkit_robots.model import Matrix
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
+_SPACES = re.compile(r"[ \t\r\n]+")
+"""What XML counts as white space; Python's `split` takes more."""
+
 _LARGEST = 1e30
 """A larger number is told as one that cannot be meant, and would overflow in the first square."""
 
 
 def parse_numbers(text: str, count: int) -> Matrix | None:
     """Return the numbers in `text`, shape (count,); None if there are others, or not that many."""
-    words = text.split()
+    words = [word for word in re.split(_SPACES, text) if word]
     if len(words) != count or not all(_NUMBER.fullmatch(word) for word in words):
         return None
     values = [float(word) for word in words]
