@@ -183,6 +183,7 @@ import os, signal, sys
 from terrainkit_cli.main import main
 from terrainkit_robots.onboard import bringing_in, folder
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
 whole = folder.write_files
 
 def written_then_interrupted(*arguments):
