@@ -6,6 +6,7 @@ drawn in processes of their own, one for each library that is tried; a broken on
 
 import os
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 
@@ -38,6 +39,16 @@ def environment(library: str) -> dict[str, str]:
         str(Path(entry).absolute()) for entry in sys.path if entry
     )
     return variables
+
+
+def cannot_draw(complaints: Mapping[str, str]) -> str:
+    """Return that none of the libraries draws, and what a user can do.
+
+    Args:
+        complaints: How each library that was tried failed.
+    """
+    told = "; ".join(f"{name or 'its default'}: {how}" for name, how in complaints.items())
+    return f"MuJoCo cannot draw here ({told}); {advice()}"
 
 
 def advice() -> str:

@@ -61,17 +61,15 @@ def draw(
             "qpos": None if qpos is None else [float(each) for each in qpos],
             "size": list(size),
         }
-        complaints = []
+        complaints = {}
         for library in graphics_library.libraries():
             answer = _ask(request, library, deadline, folder)
             if "pictures" in answer:
                 return {view: (folder / f"{view}.png").read_bytes() for view in answer["pictures"]}
             if "undrawable" in answer:
                 raise PicturesError(f"MuJoCo cannot draw it: {answer['undrawable']}")
-            complaints.append(f"{library or 'its default'}: {answer['failed']}")
-    raise PicturesError(
-        f"MuJoCo cannot draw here ({'; '.join(complaints)}); {graphics_library.advice()}"
-    )
+            complaints[library] = answer["failed"]
+    raise PicturesError(graphics_library.cannot_draw(complaints))
 
 
 def _ask(request: Mapping[str, Any], library: str, deadline: float, folder: Path) -> dict[str, Any]:

@@ -19,7 +19,12 @@ from terrainkit_robots.rl.commands import Orders, asks_headings
 from terrainkit_robots.rl.control import control_of
 from terrainkit_robots.rl.earnings import Earnings
 from terrainkit_robots.rl.ground import Ground
-from terrainkit_robots.rl.observations import observe, policy_group, privileged_group
+from terrainkit_robots.rl.observations import (
+    observe,
+    policy_group,
+    privileged_group,
+    sees_heights,
+)
 from terrainkit_robots.rl.physics import Physics
 from terrainkit_robots.rl.randomization import Pushes, apply_differences, draw_differences
 from terrainkit_robots.rl.robot import Robot
@@ -51,8 +56,7 @@ class LeggedEnv(VecEnv):
         self.max_episode_length = task.max_episode_length
         self.device = device
         self.scene = build_scene(robot, ground, task)
-        wanted = task.terrain.measure_heights
-        scan = not ground.level if wanted is None else wanted
+        scan = sees_heights(task.terrain, ground)
         require_room(task, robot, scan=scan, geoms=self.scene.model.ngeom)
         self.physics = Physics(self.scene, self.num_envs, task.env.num_threads)
         self.control = control_of(robot, task)

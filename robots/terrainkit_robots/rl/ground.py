@@ -226,12 +226,17 @@ class ScannedGround(Ground):
         return self._grid.at(x, y)
 
 
+def touching(model: Any) -> NDArray[np.bool_]:
+    """Return which geoms of a MuJoCo model touch anything, shape (ngeom,)."""
+    return np.asarray((model.geom_contype != 0) | (model.geom_conaffinity != 0))
+
+
 def _rays_down(model: Any, along: FloatArray) -> NDArray[np.float64]:
     """Return the height under each point of a grid, NaN for nothing, shape (n, n)."""
     import mujoco
 
     # Rays meet what is seen, robots what is solid. The extent in a file is for its cameras.
-    solid = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    solid = touching(model)
     model.geom_group[:] = np.where(solid, 0, 1)
     model.geom_matid[:], model.geom_rgba[:, 3] = -1, 1
     only_solid = np.array([1, 0, 0, 0, 0, 0], np.uint8)

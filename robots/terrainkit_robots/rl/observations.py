@@ -6,15 +6,17 @@ without noise, and what only a simulation knows. The order is that of the export
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit_robots.rl.ground import Ground
 from terrainkit_robots.rl.robot import Robot
 from terrainkit_robots.rl.rotation import to_body
 from terrainkit_robots.rl.state import State
-from terrainkit_robots.rl.task import Task
+from terrainkit_robots.rl.task import Task, Terrain
 
 FloatArray = NDArray[np.float32]
 
@@ -43,6 +45,12 @@ class Observation:
 
     image: Image = "number"
     """What a mirror makes of it."""
+
+
+def sees_heights(settings: Terrain, ground: Ground) -> bool:
+    """Return whether the policy has a height scan: unless given, on any ground but a plane."""
+    given = settings.measure_heights
+    return not ground.level if given is None else given
 
 
 def policy_group(robot: Robot, task: Task, *, scan: bool) -> tuple[Observation, ...]:
@@ -154,19 +162,24 @@ def observe(
         rng: Where noise is drawn from; None for none.
     """
     values = [each.read(state) for each in group]
-    widths = [value.shape[1] for value in values]
+    widths = tuple(value.shape[1] for value in values)
     observed = np.concatenate(values, axis=1, dtype=np.float32)
-    noise = _by_number([each.noise for each in group], widths)
+    noise = _by_number(tuple(each.noise for each in group), widths)
     if rng is not None and noise.any():
         noisy = np.flatnonzero(noise)
         start, stop = noisy[0], noisy[-1] + 1  # one block, for speed
         drawn = rng.random((len(observed), stop - start), dtype=np.float32)
         observed[:, start:stop] += (2 * drawn - 1) * noise[start:stop]
-    observed *= _by_number([each.scale for each in group], widths)
+    observed *= _by_number(tuple(each.scale for each in group), widths)
     return np.clip(observed, -clip, clip, out=observed)
 
 
-def _by_number(values: Sequence[tuple[float, ...] | float], widths: Sequence[int]) -> FloatArray:
-    """Return the value for each number of a group."""
+@lru_cache(maxsize=64)  # the same in every step
+def _by_number(
+    values: tuple[tuple[float, ...] | float, ...], widths: tuple[int, ...]
+) -> FloatArray:
+    """Return the value for each number of a group; not to be written to."""
     parts = [np.broadcast_to(value, width) for value, width in zip(values, widths, strict=True)]
-    return np.concatenate(parts).astype(np.float32)
+    found = np.concatenate(parts).astype(np.float32)
+    found.flags.writeable = False
+    return found

@@ -11,7 +11,7 @@ import numpy as np
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.rl.ground import Ground
+from terrainkit_robots.rl.ground import Ground, touching
 from terrainkit_robots.rl.robot import Robot
 from terrainkit_robots.rl.task import Task
 
@@ -217,8 +217,8 @@ def _sensors(robot: Robot, whole: Any) -> dict[str, slice]:
 
 def _sole(whole: Any, foot: str) -> str:
     """Add a site at the middle of what a foot touches the ground with, and return its name."""
-    touching = [g for g in whole.body(foot).geoms if g.contype or g.conaffinity]
-    where = np.mean([g.pos for g in touching], axis=0) if touching else np.zeros(3)
+    shapes = [g for g in whole.body(foot).geoms if g.contype or g.conaffinity]
+    where = np.mean([g.pos for g in shapes], axis=0) if shapes else np.zeros(3)
     whole.body(foot).add_site(name=_sole_name(foot), pos=where, group=4)
     return _sole_name(foot)
 
@@ -238,8 +238,6 @@ def _options(spec: Any, task: Task) -> None:
     option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
     option.iterations = task.sim.iterations
     option.ls_iterations = task.sim.ls_iterations
-    spec.visual.global_.offwidth = 1280
-    spec.visual.global_.offheight = 720
 
 
 def _scene(robot: Robot, model: Any, blocks: dict[str, slice]) -> Scene:
@@ -249,14 +247,13 @@ def _scene(robot: Robot, model: Any, blocks: dict[str, slice]) -> Scene:
     home[:7] = (0, 0, 0, 1, 0, 0, 0)
     home[joint_qpos] = robot.default_pose
     base = model.body(robot.spec.base).id
-    touching = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
     own = model.body_rootid[model.geom_bodyid] == model.body_rootid[base]
     return Scene(
         model=model,
         joint_qpos=joint_qpos,
         joint_qvel=np.array([model.joint(name).dofadr[0] for name in names]),
         base=base,
-        geoms=np.flatnonzero(touching & own),
+        geoms=np.flatnonzero(touching(model) & own),
         home=home,
         sole_depth=_sole_depth(robot, model, home),
         blocks=blocks,
@@ -271,10 +268,7 @@ def _sole_depth(robot: Robot, model: Any, home: Any) -> Any:
     mujoco.mj_kinematics(model, data)
     depths = []
     for foot in robot.spec.feet:
-        geoms = np.flatnonzero(
-            (model.geom_bodyid == model.body(foot).id)
-            & ((model.geom_contype != 0) | (model.geom_conaffinity != 0))
-        )
+        geoms = np.flatnonzero(touching(model) & (model.geom_bodyid == model.body(foot).id))
         at = data.site(_sole_name(foot)).xpos[2]
         depths.append(max((at - lowest_point(model, data, int(g)) for g in geoms), default=0.0))
     return np.array(depths, np.float32)

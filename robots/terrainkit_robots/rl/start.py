@@ -56,15 +56,15 @@ def _places(
     They start beside the origin where that is as good as level, else half as far, else on it.
     """
     offset = rng.uniform(-reach, reach, (len(origins), 2)).astype(np.float32)
-    highest = np.empty(len(origins), np.float32)
-    for share in (1.0, 0.5, 0.0):
+    ring_x, ring_y = _ring(robot)
+    for nearer in (0.5, 0.0, 1.0):  # on the origin itself it is as it is
         x, y = (origins[:, :2] + offset).T
-        under = ground.height(x[:, None] + _ring(robot)[0], y[:, None] + _ring(robot)[1])
-        highest[:] = under.max(axis=1)
+        under = ground.height(x[:, None] + ring_x, y[:, None] + ring_y)
+        highest = under.max(axis=1)
         uneven = highest - under.min(axis=1) > _RELIEF
         if not uneven.any():
             break
-        offset[uneven] *= 0.5 if share == 1.0 else 0.0
+        offset[uneven] *= nearer
     return origins[:, :2] + offset, highest
 
 

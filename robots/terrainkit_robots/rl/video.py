@@ -123,7 +123,7 @@ def film_frames(film: Film, path: Path, *, overwrite: bool = False) -> Iterator[
     ):
         folder = Path(name)
         _ask(film, folder)
-        complaints = []
+        complaints = {}
         for library in graphics_library.libraries():
             yield from _drawn(library, folder, len(film))
             answer = _answer(folder)
@@ -132,10 +132,8 @@ def film_frames(film: Film, path: Path, *, overwrite: bool = False) -> Iterator[
                 return
             if "unwritten" in answer:
                 raise ExportError(f"{path} cannot be written: {answer['unwritten']}")
-            complaints.append(f"{library or 'its default'}: {answer['failed']}")
-        raise PicturesError(
-            f"MuJoCo cannot draw here ({'; '.join(complaints)}); {graphics_library.advice()}"
-        )
+            complaints[library] = answer["failed"]
+        raise PicturesError(graphics_library.cannot_draw(complaints))
 
 
 def _ask(film: Film, folder: Path) -> None:
