@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from terrainkit_cli.main import main
 from terrainkit_robots import bundled
 
 Run = subprocess.CompletedProcess[str]
@@ -24,6 +25,19 @@ def terrainkit(tmp_path) -> Callable[..., Run]:
             timeout=120,
             check=False,
         )
+
+    return run
+
+
+@pytest.fixture
+def called(capsys) -> Callable[..., Run]:
+    """Run `terrainkit` in this process: torch takes seconds to import."""
+
+    def run(*words: object) -> Run:
+        capsys.readouterr()
+        code = main([str(word) for word in words])
+        said = capsys.readouterr()
+        return Run(words, code, said.out, said.err)
 
     return run
 

@@ -7,20 +7,17 @@ import pytest
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit_cli import evaluate_command, training_extra
-from terrainkit_cli.main import main
 from terrainkit_robots.rl import run_folder
 
 
 @pytest.fixture
-def here(walking, monkeypatch, capsys):
-    """Run `terrainkit evaluate` in this process, in a folder with a run `walk`."""
+def here(walking, monkeypatch, called):
+    """Run `terrainkit evaluate` in a folder with a run `walk`."""
     monkeypatch.chdir(walking.parent)
 
     def run(*words):
-        capsys.readouterr()
-        code = main(["evaluate", *words])
-        said = capsys.readouterr()
-        return code, said.out, said.err
+        done = called("evaluate", *words)
+        return done.returncode, done.stdout, done.stderr
 
     return run
 

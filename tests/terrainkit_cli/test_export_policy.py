@@ -11,7 +11,6 @@ pytest.importorskip("torch", reason="the extra `train` is not installed")
 import torch
 
 from terrainkit_cli import training_extra
-from terrainkit_cli.main import main
 from terrainkit_robots.rl import registry
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane
@@ -40,17 +39,10 @@ def trained(tmp_path_factory):
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch, capsys):
-    """Run `terrainkit` in this process, in an empty folder; torch takes seconds to import."""
-
-    def run(*words):
-        capsys.readouterr()
-        code = main([str(word) for word in words])
-        said = capsys.readouterr()
-        return subprocess.CompletedProcess(words, code, said.out, said.err)
-
+def here(tmp_path, monkeypatch, called):
+    """Run `terrainkit` in an empty folder."""
     monkeypatch.chdir(tmp_path)
-    return run
+    return called
 
 
 @pytest.fixture

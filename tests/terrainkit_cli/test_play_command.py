@@ -5,7 +5,6 @@ import pytest
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit import MapConfig, TerrainChoice, generate
-from terrainkit_cli.main import main
 from terrainkit_robots.onboard.pictures import PicturesError
 from terrainkit_robots.rl import play, video
 
@@ -14,15 +13,13 @@ SMALL = ("--size", "96", "64")
 
 
 @pytest.fixture
-def here(walking, monkeypatch, capsys):
-    """Run `terrainkit play` in this process, in a folder with a run `walk`."""
+def here(walking, monkeypatch, called):
+    """Run `terrainkit play` in a folder with a run `walk`."""
     monkeypatch.chdir(walking.parent)
 
     def run(*words):
-        capsys.readouterr()
-        code = main(["play", *words])
-        said = capsys.readouterr()
-        return code, said.out, said.err
+        done = called("play", *words)
+        return done.returncode, done.stdout, done.stderr
 
     return run
 

@@ -1,6 +1,5 @@
 import json
 import shutil
-import subprocess
 
 import pytest
 
@@ -8,7 +7,6 @@ pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit.errors import ConfigError
 from terrainkit_cli import training_extra
-from terrainkit_cli.main import main
 from terrainkit_robots.rl import smoke as smoke_test
 from terrainkit_robots.rl.registry import find
 from terrainkit_robots.rl.smoke import Check, Smoke
@@ -18,17 +16,10 @@ BAD = Check(name="observation policy", passed=False, measured="44 numbers", want
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch, capsys):
-    """Run `terrainkit` in this process, in an empty folder; torch takes seconds to import."""
-
-    def run(*words):
-        capsys.readouterr()
-        code = main([str(word) for word in words])
-        said = capsys.readouterr()
-        return subprocess.CompletedProcess(words, code, said.out, said.err)
-
+def here(tmp_path, monkeypatch, called):
+    """Run `terrainkit` in an empty folder."""
     monkeypatch.chdir(tmp_path)
-    return run
+    return called
 
 
 @pytest.fixture

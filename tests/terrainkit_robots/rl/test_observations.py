@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from made_states import made_state, shapes
 
 from terrainkit_robots import bundled
 from terrainkit_robots.rl.env import LeggedEnv
@@ -18,27 +19,7 @@ from terrainkit_robots.rl.task import Env, Noise, Normalization, ObsScales, Task
 
 torch.set_num_threads(1)
 
-_WIDTHS = {
-    "base_pos": (3,),
-    "base_quat": (4,),
-    "base_lin_vel": (3,),
-    "base_ang_vel": (3,),
-    "projected_gravity": (3,),
-    "base_height": (),
-    "commands": (3,),
-    "foot_height": (4,),
-    "foot_vel": (4, 3),
-    "foot_force": (4, 3),
-    "first_contact": (4,),
-    "air_time": (4,),
-    "penalized_force": (8,),
-    "height_scan": (187,),
-    "push_vel": (3,),
-    "friction": (1,),
-    "added_mass": (1,),
-    "com_shift": (3,),
-    "fallen": (),
-}
+_SHAPES = shapes(joints=12, feet=4, penalized=8, points=187)
 
 _TASK_TABLE = [
     ("commands", 3),
@@ -64,15 +45,7 @@ _SECRETS = [
 
 def state(n: int = 1, **arrays: Any) -> State:
     """Return a state of n quadrupeds that is 0 everywhere but in what is given."""
-    made = {}
-    for each in fields(State):
-        shape = (n, *_WIDTHS.get(each.name, (12,)))
-        kind = bool if each.name in ("first_contact", "fallen") else np.float32
-        made[each.name] = np.zeros(shape, kind)
-        if each.name in arrays:
-            made[each.name][...] = arrays.pop(each.name)
-    assert not arrays, f"a state has no {list(arrays)}"
-    return State(**made)
+    return made_state(_SHAPES, n, **arrays)
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from made_states import FLAGS, made_state, shapes
 
 from terrainkit_robots import bundled
 from terrainkit_robots.rl import rewards as module
@@ -21,52 +22,21 @@ from terrainkit_robots.rl.task import Env, Rewards, Task
 
 torch.set_num_threads(1)
 
-_WIDTHS = {
-    "base_pos": (3,),
-    "base_quat": (4,),
-    "base_lin_vel": (3,),
-    "base_ang_vel": (3,),
-    "projected_gravity": (3,),
-    "base_height": (),
-    "commands": (3,),
-    "foot_height": (2,),
-    "foot_vel": (2, 3),
-    "foot_force": (2, 3),
-    "first_contact": (2,),
-    "air_time": (2,),
-    "penalized_force": (3,),
-    "height_scan": (0,),
-    "push_vel": (3,),
-    "friction": (1,),
-    "added_mass": (1,),
-    "com_shift": (3,),
-    "fallen": (),
-}
+_SHAPES = shapes(joints=2, feet=2, penalized=3, points=0)
 """Shapes by robot: two joints, where nothing else is said, and two feet."""
 
 
 def state(n: int = 1, **arrays: Any) -> State:
     """Return a state of n robots that is 0 everywhere but in what is given."""
-    made = {}
-    for each in fields(State):
-        shape = (n, *_WIDTHS.get(each.name, (2,)))
-        kind = bool if each.name in ("first_contact", "fallen") else np.float32
-        made[each.name] = np.zeros(shape, kind)
-        if each.name in arrays:
-            made[each.name][...] = arrays.pop(each.name)
-    assert not arrays, f"a state has no {list(arrays)}"
-    return State(**made)
+    return made_state(_SHAPES, n, **arrays)
 
 
 def random_state(n: int, seed: int) -> State:
     rng = np.random.default_rng(seed)
     arrays = {}
-    for each in fields(State):
-        shape = (n, *_WIDTHS.get(each.name, (2,)))
-        arrays[each.name] = (
-            rng.random(shape) < 0.5
-            if each.name in ("first_contact", "fallen")
-            else rng.normal(0, 3, shape)
+    for name, shape in _SHAPES.items():
+        arrays[name] = (
+            rng.random((n, *shape)) < 0.5 if name in FLAGS else rng.normal(0, 3, (n, *shape))
         )
     for positive in ("air_time", "penalized_force"):
         arrays[positive] = np.abs(arrays[positive])
