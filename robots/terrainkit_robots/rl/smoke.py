@@ -9,7 +9,7 @@ import gc
 import tempfile
 import tracemalloc
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -333,26 +333,28 @@ class _Recorder:
         self.low, self.high = min(self.low, values.min()), max(self.high, values.max())
         return values
 
-    def check(self) -> Check:
-        """Return whether it is a number; one that is always 0 is said to be, and no fault.
+    def check(self, possible: State, robot: Robot, settings: Rewards) -> Check:
+        """Return whether it is a number, and can be another one than 0.
 
-        Some are for what a robot may well not do in two seconds.
+        Some are for what a robot may well not do in two seconds: so those that were always 0 are
+        asked about states that it might come to.
         """
-        measured = f"{self.low:.3g} to {self.high:.3g}"
+        measured, passed = f"{self.low:.3g} to {self.high:.3g}", self.finite
         if not self.finite:
             measured = "not finite"
         elif self.low == 0 == self.high:
-            measured = "always 0: nothing happened that it is for"
+            passed = bool(self.function(possible, robot, settings).any())
+            measured = "0: nothing happened that it is for" if passed else "0, whatever may happen"
         return Check(
             name=f"reward {self.name}",
-            passed=self.finite,
+            passed=passed,
             measured=measured,
-            wanted="finite",
+            wanted=f"finite, and not 0 in every state; rewards.{self.name} 0 leaves it out",
         )
 
 
 def rewards(env: LeggedEnv) -> list[Check]:
-    """Return whether each reward is a number, and which, while robots act at random.
+    """Return whether each reward is a number, and not always 0, while robots act at random.
 
     One in four is asked to stand, so that what pays only there can show.
     """
@@ -367,7 +369,25 @@ def rewards(env: LeggedEnv) -> list[Check]:
     finally:
         env.rewards.update(before)
         env.hold_commands(None)
-    return [recorder.check() for recorder in recorders.values()]
+    possible = possible_states(env.state, env.cfg.runner.seed)
+    return [recorder.check(possible, env.robot, env.cfg.rewards) for recorder in recorders.values()]
+
+
+def possible_states(state: State, seed: int) -> State:
+    """Return states of as many robots in which anything may be the case.
+
+    All numbers of the first robot are about 0.1, those of the last about 1000, so no robot is in
+    such a state; but what is 0 in all of them is 0 in any. One in four is asked to stand.
+    """
+    rng = np.random.default_rng(seed)
+    made: dict[str, NDArray[Any]] = {}
+    for name in (field.name for field in fields(state)):
+        shape, dtype = getattr(state, name).shape, getattr(state, name).dtype
+        sizes = np.logspace(-1, 3, shape[0]).reshape(-1, *(1 for _ in shape[1:]))
+        values = sizes * rng.normal(size=shape)
+        made[name] = values > 0 if np.issubdtype(dtype, np.bool_) else values.astype(dtype)
+    made["commands"][::4] = 0
+    return State(**made)
 
 
 def _act_at_random(env: LeggedEnv, steps: int) -> None:

@@ -12,12 +12,14 @@ from terrainkit_robots.rl import smoke as smoke_test
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane
 from terrainkit_robots.rl.registry import find
+from terrainkit_robots.rl.rewards import REWARDS
 from terrainkit_robots.rl.robot import robot_of
 from terrainkit_robots.rl.scene import lowest_point
 from terrainkit_robots.rl.smoke import (
     Smoke,
     memory,
     observation_shapes,
+    possible_states,
     record,
     rewards,
     smoke,
@@ -26,7 +28,7 @@ from terrainkit_robots.rl.smoke import (
     stands,
     training,
 )
-from terrainkit_robots.rl.task import Control, Env, Task
+from terrainkit_robots.rl.task import Control, Env, Rewards, Task
 
 
 def failed(found):
@@ -216,7 +218,7 @@ def constant(value):
 @pytest.mark.parametrize(
     ("value", "said", "passed"),
     [
-        (0.0, "always 0: nothing happened that it is for", True),
+        (0.0, "0, whatever may happen", False),
         (np.nan, "not finite", False),
         (np.inf, "not finite", False),
     ],
@@ -226,6 +228,29 @@ def test_a_reward_that_tells_nothing_is_told(env, value, said, passed):
     check = found_of(env, "torques")
     assert check.passed == passed
     assert check.measured == said
+
+
+def test_a_reward_for_what_did_not_happen_is_no_fault(env):
+    env.rewards["torques"] = (lambda state, *_: state.base_pos[:, 0] > 10, -0.1)
+    check = found_of(env, "torques")
+    assert check.passed
+    assert check.measured == "0: nothing happened that it is for"
+
+
+def test_every_reward_can_be_something_for_a_robot_with_all_that_it_needs(quadruped, calm):
+    scales = dict.fromkeys(REWARDS, 1.0)
+    env = LeggedEnv(calm(rewards=Rewards(**scales)), quadruped, Plane())
+    possible = possible_states(env.state, 1)
+    for name, function in REWARDS.items():
+        assert function(possible, quadruped, env.cfg.rewards).any(), name
+
+
+def test_a_reward_that_nothing_of_the_robot_can_earn_is_told(quadruped, calm):
+    env = LeggedEnv(calm(), changed(quadruped, penalized_contacts=()), Plane())
+    check = found_of(env, "collision")
+    assert not check.passed
+    assert check.measured == "0, whatever may happen"
+    assert "rewards.collision 0" in check.wanted
 
 
 def test_states_that_are_kept_are_told(env):
