@@ -14,7 +14,8 @@ from terrainkit_cli import training_extra
 from terrainkit_robots.rl import registry
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.run_folder import SHIPPED, create_run
+from terrainkit_robots.rl.registry import SHIPPED
+from terrainkit_robots.rl.run_folder import create_run
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.task import Env, Policy, Runner, Task
 
@@ -107,11 +108,12 @@ def test_a_robot_whose_policy_is_shipped_is_exported_by_its_name(
     run = here("export", "quadruped")
     assert run.returncode == 2
     assert "no policy is shipped with quadruped" in run.stderr
-    shutil.copytree(trained, folder / SHIPPED)
+    shipped = registry.find("quadruped").shipped
+    shutil.copytree(trained, shipped)
     run = here("export", "quadruped")
     assert run.returncode == 0, run.stderr
     assert names(tmp_path / "quadruped_policy") == FILES
-    assert names(folder / SHIPPED) == names(trained)
+    assert names(shipped) == names(trained)
 
 
 def test_a_map_is_exported_as_before(here, tmp_path):

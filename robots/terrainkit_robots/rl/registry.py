@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 ENTRY_POINTS = "terrainkit.tasks"
 """Group of the entry points of other packages."""
 
+SHIPPED = "trained"
+"""Folder of a robot that holds policies that come along, each in a folder named as its task."""
+
 _CLOSE = 0.7
 """Share of common letters from which a name is what another was meant for."""
 
@@ -52,6 +55,11 @@ class Registered:
 
     task: Task
     """What it is trained for."""
+
+    @property
+    def shipped(self) -> Path:
+        """Where the run is whose policy comes along, if there is one."""
+        return self.folder / SHIPPED / self.name
 
 
 def register(name: str, folder: str | Path, task: Task | None = None) -> Registered:

@@ -30,9 +30,6 @@ _ROBOT = "robot_sha256"
 
 RUN_FILE, TASK_FILE, MAP_FILE = "run.toml", "task.toml", "map.toml"
 
-SHIPPED = "trained"
-"""Folder of a robot that holds the run of its shipped policy."""
-
 FORMAT_VERSION = 1
 """Version of a run's files; it changes when an old one would be read wrongly."""
 
@@ -228,7 +225,7 @@ def _located(name: str | Path) -> tuple[Path, Path | None]:
             f"no run {name}: neither a folder that terrainkit train wrote, nor a checkpoint in "
             f"one, nor a robot; the robots are: {listing(registry.names())}"
         )
-    shipped = registry.find(str(name)).folder / SHIPPED
+    shipped = registry.find(str(name)).shipped
     if not shipped.is_dir():
         raise ConfigError(
             f"no policy is shipped with {name}; wanted the folder of a run: "

@@ -1,7 +1,7 @@
 """The shipping: of a run, what a robot needs that comes with a policy.
 
 What is left is small, names no folder of the machine that it was trained on, and is opened like any
-run: by the robot's name, once it is in the robot's folder, called `trained`.
+run: by the name of its task, once it is where :attr:`~.registry.Registered.shipped` says.
 """
 
 from pathlib import Path
@@ -29,7 +29,7 @@ def ship(run: Run, folder: Path | str) -> Run:
 
     Args:
         run: A run on a plane or on a map, of a robot that is registered.
-        folder: Where; `trained` in the robot's folder, for a policy that is found by its name.
+        folder: Where; the task's `shipped`, for a policy that is found by its name.
 
     Returns:
         The run that was written.

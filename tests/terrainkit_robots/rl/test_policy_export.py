@@ -19,7 +19,7 @@ from terrainkit_robots.rl.ground import Plane
 from terrainkit_robots.rl.policy import policy_of
 from terrainkit_robots.rl.policy_export import METADATA, export_policy
 from terrainkit_robots.rl.registry import find
-from terrainkit_robots.rl.run_folder import SHIPPED, create_run, open_run
+from terrainkit_robots.rl.run_folder import create_run, open_run
 from terrainkit_robots.rl.task import Env, Task
 
 
@@ -127,7 +127,7 @@ def test_the_example_runs_a_policy_in_plain_mujoco(exported, quadruped, tmp_path
 
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
 def test_the_example_walks_with_the_policy_that_is_shipped(name, tmp_path, monkeypatch):
-    if not (find(name).folder / SHIPPED).is_dir():
+    if not find(name).shipped.is_dir():
         pytest.skip(f"no policy of {name} is shipped")
     run = open_run(name)
     export_policy(run, tmp_path / "exported")

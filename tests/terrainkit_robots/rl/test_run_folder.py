@@ -15,7 +15,6 @@ from terrainkit_robots.rl.robot import read_robot
 from terrainkit_robots.rl.run_folder import (
     MAP_FILE,
     RUN_FILE,
-    SHIPPED,
     TASK_FILE,
     changed_robot,
     checkpoint_name,
@@ -161,16 +160,16 @@ def test_a_task_is_rewritten_whole(run, task):
     assert open_run(run).task == other
 
 
-def test_a_shipped_policy_is_found_by_the_name_of_its_robot(tmp_path, task):
+def test_a_shipped_policy_is_found_by_the_name_of_its_robot(tmp_path, task, monkeypatch):
+    monkeypatch.setattr(registry, "_registered", dict(registry._registered))
     mine = tmp_path / "mine"
     shutil.copytree(registry.find("quadruped").folder, mine)
-    shutil.rmtree(mine / SHIPPED, ignore_errors=True)
-    registry.register("rover_of_this_test", mine)
+    shipped = registry.register("rover_of_this_test", mine).shipped
     with pytest.raises(ConfigError, match="no policy is shipped with rover_of_this_test"):
         open_run("rover_of_this_test")
-    create_run(mine / SHIPPED, task, "rover_of_this_test", "plane")
+    create_run(shipped, task, "rover_of_this_test", "plane")
     opened = open_run("rover_of_this_test")
-    assert opened.folder == mine / SHIPPED
+    assert opened.folder == shipped == mine / "trained" / "rover_of_this_test"
     assert opened.robot_name == "rover_of_this_test"
 
 

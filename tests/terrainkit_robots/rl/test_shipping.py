@@ -4,18 +4,17 @@ import pytest
 import torch
 
 from terrainkit.errors import ConfigError, ExportError
-from terrainkit_robots import bundled
 from terrainkit_robots.rl.checkpoint import read_checkpoint
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane, read_ground
 from terrainkit_robots.rl.policy import policy_of
-from terrainkit_robots.rl.registry import find
-from terrainkit_robots.rl.run_folder import SHIPPED, create_run, open_run
+from terrainkit_robots.rl.registry import find, names
+from terrainkit_robots.rl.run_folder import create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.shipping import ship
 from terrainkit_robots.rl.task import Env, Policy, Runner, Task
 
-SHIPPING = [name for name in bundled.names() if (find(name).folder / SHIPPED).is_dir()]
+SHIPPING = [name for name in names() if find(name).shipped.is_dir()]
 TASK = Task(
     env=Env(num_envs=2, num_threads=1),
     policy=Policy(actor_hidden_dims=(8,), critic_hidden_dims=(8,)),
@@ -108,7 +107,7 @@ def test_a_quadruped_that_walks_comes_with_the_package():
 
 @pytest.mark.parametrize("name", SHIPPING)
 def test_a_policy_of_the_package_is_small_and_holds_nothing_that_could_run(name):
-    folder = find(name).folder / SHIPPED
+    folder = find(name).shipped
     assert sum(path.stat().st_size for path in folder.iterdir()) < 2e6
     assert len(list(folder.glob("*.pt"))) == 1
     torch.load(open_run(name).checkpoint, weights_only=True)
@@ -119,5 +118,5 @@ def test_a_policy_of_the_package_is_small_and_holds_nothing_that_could_run(name)
 
 @pytest.mark.parametrize("name", SHIPPING)
 def test_a_policy_of_the_package_was_trained_with_the_robot_of_the_package(name):
-    folder = find(name).folder
-    assert (folder / SHIPPED / "robot.toml").read_bytes() == (folder / "robot.toml").read_bytes()
+    found = find(name)
+    assert (found.shipped / "robot.toml").read_bytes() == (found.folder / "robot.toml").read_bytes()
