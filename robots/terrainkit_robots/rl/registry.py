@@ -1,4 +1,6 @@
-"""The registry: what can be trained, by name: a robot's folder and its task, named as the robot.
+"""The registry: what can be trained, by name: a robot's folder and its task.
+
+A task is named as the robot; a second one of the same robot says what it is for, too.
 
 One line adds yours::
 
@@ -9,7 +11,7 @@ says which module has that line; it is imported when the task is asked for, not 
 that `terrainkit onboard` wrote needs none of this: its path is enough.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,12 +19,15 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit_robots import bundled
 from terrainkit_robots.rl.robot import SPEC_FILE
 from terrainkit_robots.rl.task import (
+    Asset,
     Commands,
     Control,
     DomainRand,
+    Noise,
     Policy,
     Rewards,
     Task,
+    Terrain,
 )
 from terrainkit_robots.spec.spec_file import read_spec
 from terrainkit_robots.wording import closest, short
@@ -151,23 +156,46 @@ def _load(point: "EntryPoint") -> None:
         raise ConfigError(f"{what} registers no task of that name; it has to call register()")
 
 
-_BUNDLED = {
+_QUADRUPED = Task(
     # Softer than what stands best: an action has to reach as far as a step does.
-    "quadruped": Task(
-        control=Control(stiffness=40.0, damping=1.0, action_scale=0.25),
-        policy=Policy(init_noise_std=0.7),
+    control=Control(stiffness=40.0, damping=1.0, action_scale=0.25),
+    policy=Policy(init_noise_std=0.7),
+)
+
+_BUNDLED = {
+    "quadruped": ("quadruped", _QUADRUPED),
+    # For a plane first and a map then, so on both it sees the ground and is given headings. Few and
+    # clear heights: each number that tells nothing yet takes its part of what an update may change.
+    "quadruped_map": (
+        "quadruped",
+        replace(
+            _QUADRUPED,
+            terrain=Terrain(
+                max_init_level=1,
+                measure_heights=True,
+                measured_points_x=(-0.8, -0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8),
+                measured_points_y=(-0.4, -0.2, 0.0, 0.2, 0.4),
+            ),
+            asset=Asset(collisions="feet_and_termination"),
+            commands=Commands(heading_command=True),
+            rewards=Rewards(collision=0.0),
+            noise=Noise(height_measurements=0.02),
+        ),
     ),
     # Slower than four legs, and falling costs: else it learns to fall forward first.
-    "biped": Task(
-        commands=Commands(
-            lin_vel_x=(-0.4, 0.8), lin_vel_y=(-0.2, 0.2), ang_vel_yaw=(-0.5, 0.5), min_norm=0.1
+    "biped": (
+        "biped",
+        Task(
+            commands=Commands(
+                lin_vel_x=(-0.4, 0.8), lin_vel_y=(-0.2, 0.2), ang_vel_yaw=(-0.5, 0.5), min_norm=0.1
+            ),
+            domain_rand=DomainRand(max_push_vel_xy=0.5),
+            rewards=Rewards(termination=-100.0, air_time_target=0.3),
+            policy=Policy(init_noise_std=0.7),
         ),
-        domain_rand=DomainRand(max_push_vel_xy=0.5),
-        rewards=Rewards(termination=-100.0, air_time_target=0.3),
-        policy=Policy(init_noise_std=0.7),
     ),
 }
-"""Tasks of bundled robots that differ from the standard one."""
+"""Tasks of the bundled robots: the robot, and what it is trained for."""
 
-for _name in bundled.names():
-    register(_name, Path(bundled.__file__).parent / _name, _BUNDLED.get(_name))
+for _name, (_robot, _task) in _BUNDLED.items():
+    register(_name, Path(bundled.__file__).parent / _robot, _task)

@@ -52,7 +52,7 @@ def test_one_line_registers_a_robot_and_its_task(tmp_path):
     made = registry.register("rover", tmp_path, MINE)
     assert registry.find("rover") is made
     assert (made.name, made.folder, made.task) == ("rover", tmp_path, MINE)
-    assert registry.names() == ("biped", "quadruped", "rover")
+    assert registry.names() == ("biped", "quadruped", "quadruped_map", "rover")
     assert registry.register("standard", tmp_path).task == Task()
 
 
@@ -88,7 +88,7 @@ def test_a_folder_is_a_task_of_its_own(tmp_path, monkeypatch, kind):
 
 
 def test_what_is_unknown_is_told_with_what_exists(tmp_path):
-    told = r"no robot 'quadrupde', .*; did you mean quadruped\?; there are: biped, quadruped$"
+    told = r"no robot 'quadrupde', .*; did you mean quadruped\?; there are: biped, quadruped, quadruped_map$"
     with pytest.raises(ConfigError, match=told):
         registry.find("quadrupde")
     with pytest.raises(ConfigError, match=r"has no robot\.toml; wanted a folder that terrainkit"):
@@ -114,7 +114,7 @@ def test_an_entry_point_is_imported_when_it_is_asked_for(tmp_path, monkeypatch, 
     )
     monkeypatch.syspath_prepend(tmp_path)
     plugin("rover_tasks")
-    assert registry.names() == ("biped", "quadruped", "rover")
+    assert registry.names() == ("biped", "quadruped", "quadruped_map", "rover")
     registry.find("quadruped")
     assert "rover_tasks" not in sys.modules
     try:
