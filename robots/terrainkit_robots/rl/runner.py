@@ -180,8 +180,9 @@ class LeggedRunner(OnPolicyRunner):
 
         Args:
             path: The checkpoint.
-            load_cfg: Which networks to take over, `{"actor": True}`, and nothing else; unless
-                given, all that is in the checkpoint.
+            load_cfg: What to take over, and nothing else: the networks `actor` and `critic`, and
+                `careers`, where robots are in the curriculum; unless given, all that is in the
+                checkpoint.
             strict: Whether every weight has to be there.
             map_location: Of no use: where the networks are, weights go.
 
@@ -199,6 +200,10 @@ class LeggedRunner(OnPolicyRunner):
             if whole:
                 self.current_learning_iteration = state["iteration"]
                 self._load_state(state)
+            elif load_cfg and load_cfg.get("careers") and "processes" in state:
+                self.env.careers.load_state_dict(self._own(state)["env"]["careers"])
+                self.env.begin_all()
+                self._obs = self.env.get_observations().to(self.device)
         return {}
 
     def state_dict(self) -> dict[str, Any]:
@@ -218,15 +223,19 @@ class LeggedRunner(OnPolicyRunner):
         }
 
     def _load_state(self, state: Mapping[str, Any]) -> None:
-        processes = state["processes"]
-        mine = processes[min(self.gpu_global_rank, len(processes) - 1)]
+        mine = self._own(state)
         self.env.load_state_dict(mine["env"])
         self._obs = self.env.get_observations().to(self.device)
-        if len(processes) == self.gpu_world_size:
+        if len(state["processes"]) == self.gpu_world_size:
             _set_random_state(mine["random"], self.device)
         else:  # or several would go on alike
             self.env.rng = np.random.default_rng([self.env.cfg.runner.seed, state["iteration"]])
         self.logger.load_state_dict(state["curves"])
+
+    def _own(self, state: Mapping[str, Any]) -> Any:
+        """Return what this process has in a checkpoint, or that of another for one too many."""
+        processes = state["processes"]
+        return processes[min(self.gpu_global_rank, len(processes) - 1)]
 
     def _gathered(self, mine: dict[str, Any]) -> list[Any]:
         """Return what each process has; only in the first one it is more than its own."""

@@ -75,7 +75,8 @@ def train(
         folder: Where the run goes; unless given, `logs/<robot>/<date-time>`.
         resume: A run to go on with. With the same ground and task, but for the number of
             environments and what is in `runner`, it goes on as if it had not ended, in its own
-            folder unless another is given. Else a new run begins, with its networks.
+            folder unless another is given. Else a new run begins, with its networks; on the same
+            map robots stay on their levels.
         device: Where the networks are: `cpu`, `cuda`, `cuda:1`. The physics is on the CPU.
         watch: Told of the progress after each iteration.
 
@@ -103,7 +104,8 @@ def train(
     with _asked_to_stop() as stop, _processes_left():
         runner = LeggedRunner(env, device=device, watch=watch, stop=stop)
         if resume is not None:
-            runner.load(_checkpoint(resume), None if before else {"actor": True, "critic": True})
+            networks = {"actor": True, "critic": True, "careers": _same_map(resume, terrain)}
+            runner.load(_checkpoint(resume), None if before else networks)
         left = task.runner.max_iterations - runner.current_learning_iteration
         if left <= 0:
             raise ConfigError(
@@ -149,7 +151,7 @@ def _goes_on(run: Run, robot: str | Path, terrain: str | Path, task: Task) -> bo
     )
     same = replace(task, env=same_size, runner=run.task.runner) == run.task
     same &= located_terrain(terrain) == run.terrain and located_robot(robot) == run.robot_name
-    if same and not same_ground(run):
+    if same and not _same_map(run, terrain):
         raise ConfigError(
             f"{run.terrain} is another map than {run.folder} was trained on, which its map.toml "
             "describes; another --terrain begins a new run with its networks"
@@ -160,6 +162,10 @@ def _goes_on(run: Run, robot: str | Path, terrain: str | Path, task: Task) -> bo
             "with; a copy of the robot in another folder begins a new run with its networks"
         )
     return same and "processes" in read_checkpoint(_checkpoint(run))
+
+
+def _same_map(run: Run, terrain: str | Path) -> bool:
+    return located_terrain(terrain) == run.terrain and same_ground(run)
 
 
 def _checkpoint(run: Run) -> Path:

