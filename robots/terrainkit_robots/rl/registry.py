@@ -19,6 +19,7 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit_robots import bundled
 from terrainkit_robots.rl.robot import SPEC_FILE
 from terrainkit_robots.rl.task import (
+    Algorithm,
     Asset,
     Commands,
     Control,
@@ -166,6 +167,7 @@ _BUNDLED = {
     "quadruped": ("quadruped", _QUADRUPED),
     # For a plane first and a map then, so on both it sees the ground and is given headings. Few and
     # clear heights: each number that tells nothing yet takes its part of what an update may change.
+    # Feet that shuffle climb no step, and a policy that acts at random falls from it.
     "quadruped_map": (
         "quadruped",
         replace(
@@ -178,8 +180,15 @@ _BUNDLED = {
             ),
             asset=Asset(collisions="feet_and_termination"),
             commands=Commands(heading_command=True),
-            rewards=Rewards(collision=0.0),
+            rewards=Rewards(
+                collision=0.0,
+                feet_air_time=3.0,
+                air_time_target=0.25,
+                foot_clearance=-8.0,
+                foot_clearance_target=0.1,
+            ),
             noise=Noise(height_measurements=0.02),
+            algorithm=Algorithm(entropy_coef=0.001),
         ),
     ),
     # Slower than four legs, and falling costs: else it learns to fall forward first.

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import tomli_w
 
-from terrainkit.errors import ConfigError, listing
+from terrainkit.errors import ConfigError, ExportError, listing
 from terrainkit.toml_text import parsed
 from terrainkit_robots.onboard.folder import new_folder
 from terrainkit_robots.rl import registry
@@ -30,6 +30,7 @@ def ship(run: Run, folder: Path | str) -> Run:
     Args:
         run: A run on a plane or on a map, of a robot that is registered.
         folder: Where; the task's `shipped`, for a policy that is found by its name.
+            Folders above it are made.
 
     Returns:
         The run that was written.
@@ -55,6 +56,10 @@ def ship(run: Run, folder: Path | str) -> Run:
     about = parsed((run.folder / RUN_FILE).read_text(encoding="utf-8"))
     about["terrain"] = "plane" if run.terrain == "plane" else MAP_FILE
     state = only_policy(read_checkpoint(run.checkpoint))
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ExportError(f"cannot write {folder}: {error.strerror or error}") from error
     with new_folder(folder) as made:
         for name in noted:
             (made / name).write_bytes((run.folder / name).read_bytes())

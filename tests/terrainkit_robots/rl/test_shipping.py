@@ -50,6 +50,10 @@ def test_what_only_training_needs_stays_behind(trained, tmp_path):
     assert shipped.checkpoint.stat().st_size < run.checkpoint.stat().st_size / 2
 
 
+def test_the_first_policy_of_a_robot_makes_the_folder_of_its_policies(trained, tmp_path):
+    assert ship(open_run(trained), tmp_path / "trained" / "walk").checkpoint is not None
+
+
 def test_a_checkpoint_may_be_asked_for(trained, tmp_path):
     assert ship(open_run(trained, 1), tmp_path / "trained").checkpoint.name == "model_1.pt"
 
