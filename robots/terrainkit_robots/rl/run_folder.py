@@ -123,18 +123,30 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
 
         files[MAP_FILE] = config_text.to_toml(config)
     _refuse_existing(folder)
+    make_parents(folder)
     with new_folder(folder) as made:
         write_files(made, {file: text.encode() for file, text in files.items()})
     return open_run(folder)
 
 
 def _refuse_existing(folder: Path) -> None:
-    """Refuse to write where something is; make the folders above."""
+    """Refuse to write where something is."""
     try:
         if folder.is_dir() and any(folder.iterdir()):
             raise ExportError(
                 f"{folder} exists; another folder would do, or --resume {folder} to go on with it"
             )
+    except OSError as error:
+        raise ExportError(f"cannot write {folder}: {error.strerror or error}") from error
+
+
+def make_parents(folder: Path) -> None:
+    """Make the folders above a run's.
+
+    Raises:
+        ExportError: if one cannot be made.
+    """
+    try:
         folder.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ExportError(f"cannot write {folder}: {error.strerror or error}") from error

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import tomli_w
 
-from terrainkit.errors import ConfigError, ExportError, listing
+from terrainkit.errors import ConfigError, listing
 from terrainkit.toml_text import parsed
 from terrainkit_robots.onboard.folder import new_folder
 from terrainkit_robots.rl import registry
@@ -20,6 +20,7 @@ from terrainkit_robots.rl.run_folder import (
     TASK_FILE,
     Run,
     checkpoint_name,
+    make_parents,
     open_run,
 )
 
@@ -56,10 +57,7 @@ def ship(run: Run, folder: Path | str) -> Run:
     about = parsed((run.folder / RUN_FILE).read_text(encoding="utf-8"))
     about["terrain"] = "plane" if run.terrain == "plane" else MAP_FILE
     state = only_policy(read_checkpoint(run.checkpoint))
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ExportError(f"cannot write {folder}: {error.strerror or error}") from error
+    make_parents(folder)
     with new_folder(folder) as made:
         for name in noted:
             (made / name).write_bytes((run.folder / name).read_bytes())

@@ -104,8 +104,7 @@ def train(
     with _asked_to_stop() as stop, _processes_left():
         runner = LeggedRunner(env, device=device, watch=watch, stop=stop)
         if resume is not None:
-            networks = {"actor": True, "critic": True, "careers": _same_map(resume, terrain)}
-            runner.load(_checkpoint(resume), None if before else networks)
+            runner.load(_checkpoint(resume), None if before else _taken_over(resume, terrain))
         left = task.runner.max_iterations - runner.current_learning_iteration
         if left <= 0:
             raise ConfigError(
@@ -151,7 +150,7 @@ def _goes_on(run: Run, robot: str | Path, terrain: str | Path, task: Task) -> bo
     )
     same = replace(task, env=same_size, runner=run.task.runner) == run.task
     same &= located_terrain(terrain) == run.terrain and located_robot(robot) == run.robot_name
-    if same and not _same_map(run, terrain):
+    if same and not same_ground(run):
         raise ConfigError(
             f"{run.terrain} is another map than {run.folder} was trained on, which its map.toml "
             "describes; another --terrain begins a new run with its networks"
@@ -164,8 +163,10 @@ def _goes_on(run: Run, robot: str | Path, terrain: str | Path, task: Task) -> bo
     return same and "processes" in read_checkpoint(_checkpoint(run))
 
 
-def _same_map(run: Run, terrain: str | Path) -> bool:
-    return located_terrain(terrain) == run.terrain and same_ground(run)
+def _taken_over(run: Run, terrain: str | Path) -> dict[str, bool]:
+    """Return what a new run takes over of another: its networks, and the levels on its map."""
+    same_map = located_terrain(terrain) == run.terrain and same_ground(run)
+    return {"actor": True, "critic": True, "careers": same_map}
 
 
 def _checkpoint(run: Run) -> Path:
