@@ -4,10 +4,17 @@ Which one it takes is settled when MuJoCo is imported, by the variable MUJOCO_GL
 drawn in processes of their own, one for each library that is tried; a broken one may crash.
 """
 
+import json
 import os
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
+
+from terrainkit_robots.wording import short
+
+_MOST_WORDS = 160
+"""So many characters of a complaint are passed on."""
 
 
 def libraries() -> tuple[str, ...]:
@@ -39,6 +46,24 @@ def environment(library: str) -> dict[str, str]:
         str(Path(entry).absolute()) for entry in sys.path if entry
     )
     return variables
+
+
+def take_answer(file: Path, crash: str) -> dict[str, Any]:
+    """Return what a process that draws has answered, complaints in one line, and take it away.
+
+    Args:
+        file: The JSON that it was to write.
+        crash: What has `failed` if it wrote none.
+    """
+    try:
+        answer: dict[str, Any] = json.loads(file.read_bytes())
+    except (OSError, ValueError):
+        return {"failed": crash}
+    file.unlink()
+    for key, told in answer.items():
+        if isinstance(told, str):
+            answer[key] = short(" ".join(told.split()), _MOST_WORDS)
+    return answer
 
 
 def cannot_draw(complaints: Mapping[str, str]) -> str:

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from terrainkit_robots.graphics_library import advice, environment, libraries
+from terrainkit_robots.graphics_library import advice, environment, libraries, take_answer
 
 
 @pytest.fixture(autouse=True)
@@ -53,3 +53,14 @@ def test_it_leaves_nothing_on_the_disk_unless_told(monkeypatch):
     variables = environment("egl")
     assert variables["MESA_SHADER_CACHE_DISABLE"] == "true"
     assert variables["__GL_SHADER_DISK_CACHE"] == "1"
+
+
+def test_an_answer_is_taken_away_and_its_complaints_are_one_short_line(tmp_path):
+    file = tmp_path / "answer.json"
+    assert take_answer(file, "it crashed") == {"failed": "it crashed"}
+    file.write_text('{"frames": 3, "failed": "no\\n display ' + 300 * "x" + '"}')
+    answer = take_answer(file, "it crashed")
+    assert answer["frames"] == 3
+    assert answer["failed"].startswith("no display xxx")
+    assert len(answer["failed"]) <= 160
+    assert not file.exists()

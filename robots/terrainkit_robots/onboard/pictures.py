@@ -15,16 +15,12 @@ from typing import Any
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots import graphics_library
 from terrainkit_robots.onboard.picture_process import ANSWER
-from terrainkit_robots.wording import short
 
 SIZE = (480, 420)
 """Width and height of a picture [pixels]."""
 
 SECONDS = 60.0
 """How long all pictures may take [s]; large robots take 3 s without a graphics card."""
-
-_MOST_WORDS = 160
-"""So many characters of a graphics library's complaint are passed on."""
 
 
 class PicturesError(TerrainkitError):
@@ -88,11 +84,5 @@ def _ask(request: Mapping[str, Any], library: str, deadline: float, folder: Path
         )
     except subprocess.TimeoutExpired:
         raise PicturesError(f"MuJoCo did not draw it in time ({library or 'default'})") from None
-    try:
-        answer: dict[str, Any] = json.loads((folder / ANSWER).read_bytes())
-    except (OSError, ValueError):
-        return {"failed": f"it crashed (exit code {process.returncode})"}
-    (folder / ANSWER).unlink()
-    for key in answer.keys() & {"failed", "undrawable"}:
-        answer[key] = short(" ".join(answer[key].split()), _MOST_WORDS)
-    return answer
+    crash = f"it crashed (exit code {process.returncode})"
+    return graphics_library.take_answer(folder / ANSWER, crash)

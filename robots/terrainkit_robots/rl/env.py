@@ -56,7 +56,7 @@ class LeggedEnv(VecEnv):
         self.max_episode_length = task.max_episode_length
         self.device = device
         self.scene = build_scene(robot, ground, task)
-        scan = sees_heights(task.terrain, ground)
+        scan = sees_heights(task.terrain, level=ground.level)
         require_room(task, robot, scan=scan, geoms=self.scene.model.ngeom)
         self.physics = Physics(self.scene, self.num_envs, task.env.num_threads)
         self.control = control_of(robot, task)

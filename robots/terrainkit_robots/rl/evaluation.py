@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Ground, read_ground
+from terrainkit_robots.rl.observations import sees_heights
 from terrainkit_robots.rl.policy import policy_of
 from terrainkit_robots.rl.score import Evaluation, summed_up
 from terrainkit_robots.rl.task import Commands, Task
@@ -170,9 +171,7 @@ def prepared(run: "Run", asked: Asked, *, each: int = MOST) -> tuple[LeggedEnv, 
     source, task = asked.terrain or run.terrain, run.task
     touch = task.terrain.collision
     # The policy sees as much as in training, whatever it walks on now.
-    scan = task.terrain.measure_heights
-    if scan is None:
-        scan = not (run.terrain == "plane" or touch == "plane")
+    scan = sees_heights(task.terrain, level=run.terrain == "plane" or touch == "plane")
     if asked.terrain is not None and touch == "plane":
         touch = "auto"
     ground = read_ground(source, touch)

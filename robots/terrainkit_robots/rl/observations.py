@@ -12,7 +12,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit_robots.rl.ground import Ground
 from terrainkit_robots.rl.robot import Robot
 from terrainkit_robots.rl.rotation import to_body
 from terrainkit_robots.rl.state import State
@@ -47,10 +46,10 @@ class Observation:
     """What a mirror makes of it."""
 
 
-def sees_heights(settings: Terrain, ground: Ground) -> bool:
-    """Return whether the policy has a height scan: unless given, on any ground but a plane."""
+def sees_heights(settings: Terrain, *, level: bool) -> bool:
+    """Return whether the policy has a height scan: unless given, on any ground but a level one."""
     given = settings.measure_heights
-    return not ground.level if given is None else given
+    return not level if given is None else given
 
 
 def policy_group(robot: Robot, task: Task, *, scan: bool) -> tuple[Observation, ...]:

@@ -23,7 +23,6 @@ from terrainkit.atomic import atomic_write
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots import graphics_library
 from terrainkit_robots.onboard.pictures import PicturesError
-from terrainkit_robots.wording import short
 
 FloatArray = NDArray[np.float32]
 
@@ -38,8 +37,6 @@ and the video."""
 
 _PATIENCE = 120.0
 """A frame that takes longer will never come [s]."""
-
-_MOST_WORDS = 160
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,7 +123,7 @@ def film_frames(film: Film, path: Path, *, overwrite: bool = False) -> Iterator[
         complaints = {}
         for library in graphics_library.libraries():
             yield from _drawn(library, folder, len(film))
-            answer = _answer(folder)
+            answer = graphics_library.take_answer(folder / ANSWER, "it crashed")
             if "frames" in answer:
                 shutil.copyfile(folder / VIDEO, target)
                 return
@@ -193,14 +190,3 @@ def _size(file: Path) -> int:
         return file.stat().st_size
     except OSError:
         return 0
-
-
-def _answer(folder: Path) -> dict[str, Any]:
-    try:
-        answer: dict[str, Any] = json.loads((folder / ANSWER).read_bytes())
-    except (OSError, ValueError):
-        return {"failed": "it crashed"}
-    (folder / ANSWER).unlink()
-    for key in answer.keys() & {"failed", "unwritten"}:
-        answer[key] = short(" ".join(answer[key].split()), _MOST_WORDS)
-    return answer
