@@ -199,19 +199,19 @@ def changed_robot(run: Run) -> tuple[str, ...]:
     return tuple(name for name in sorted({*noted, *now}) if noted.get(name) != now.get(name))
 
 
-def same_ground(run: Run) -> bool:
-    """Return whether the run's map is still the one that it was trained on.
+def same_ground(run: Run, terrain: str | Path) -> bool:
+    """Return whether a ground is the one that the run was trained on: a map is, wherever it lies.
 
     Raises:
         ConfigError: if a config cannot be read.
         MapFileError: if the map cannot.
     """
-    noted = run.folder / MAP_FILE
+    here, noted = located_terrain(terrain), run.folder / MAP_FILE
     if not noted.is_file():
-        return True
+        return here == run.terrain
     from terrainkit.config_text import read_config
 
-    return _map_config(run.terrain) == read_config(noted)
+    return _map_config(here) == read_config(noted)
 
 
 def rewrite_task(run: Run, task: Task) -> None:

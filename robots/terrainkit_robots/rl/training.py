@@ -150,7 +150,7 @@ def _goes_on(run: Run, robot: str | Path, terrain: str | Path, task: Task) -> bo
     )
     same = replace(task, env=same_size, runner=run.task.runner) == run.task
     same &= located_terrain(terrain) == run.terrain and located_robot(robot) == run.robot_name
-    if same and not same_ground(run):
+    if same and not same_ground(run, terrain):
         raise ConfigError(
             f"{run.terrain} is another map than {run.folder} was trained on, which its map.toml "
             "describes; another --terrain begins a new run with its networks"
@@ -165,8 +165,7 @@ def _goes_on(run: Run, robot: str | Path, terrain: str | Path, task: Task) -> bo
 
 def _taken_over(run: Run, terrain: str | Path) -> dict[str, bool]:
     """Return what a new run takes over of another: its networks, and the levels on its map."""
-    same_map = located_terrain(terrain) == run.terrain and same_ground(run)
-    return {"actor": True, "critic": True, "careers": same_map}
+    return {"actor": True, "critic": True, "careers": same_ground(run, terrain)}
 
 
 def _checkpoint(run: Run) -> Path:

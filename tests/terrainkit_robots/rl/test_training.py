@@ -194,8 +194,9 @@ def test_another_task_begins_a_new_run_with_the_networks(task, tmp_path, mixed_m
 
 
 def test_robots_stay_on_their_levels_of_a_map_whatever_the_task(task, tmp_path, mixed_map):
-    path, other = tmp_path / "map.npz", tmp_path / "other.npz"
+    path, copied, other = (tmp_path / f"{name}.npz" for name in ("map", "copied", "other"))
     mixed_map.save(path)
+    mixed_map.save(copied)
     terrainkit.generate(replace(mixed_map.config, seed=mixed_map.config.seed + 1)).save(other)
     task = lasting(replace(task, terrain=Terrain(curriculum=False, max_init_level=0)), 1)
     train("quadruped", path, task, folder=tmp_path / "run")
@@ -206,7 +207,7 @@ def test_robots_stay_on_their_levels_of_a_map_whatever_the_task(task, tmp_path, 
     careers["levels"][:] = top
     save_checkpoint(run.checkpoint, before)
     rewarded = replace(task, rewards=replace(task.rewards, base_height=-1.0))
-    for ground, levels in ((path, {top}), (other, {0})):
+    for ground, levels in ((path, {top}), (copied, {top}), (other, {0})):
         folder = tmp_path / f"from_{ground.stem}"
         train("quadruped", ground, rewarded, resume=run, folder=folder)
         after = read_checkpoint(open_run(folder).checkpoint)["processes"][0]["env"]["careers"]
