@@ -95,7 +95,7 @@ def test_a_robot_whose_policy_is_shipped_walks(here):
         (("walk", "--num-envs", "-3"), "num_envs is -3"),
         (("walk", "--terrain", "moon"), "terrain 'moon'; wanted plane"),
         (("walk", "--terrain", "gone.npz"), "gone.npz"),
-        (("walk", "--device", "abacus"), "torch has no device 'abacus'"),
+        (("walk", "--device", "abacus"), "device 'abacus'; here there is: cpu"),
         (("walk", "--command", "1", "0"), "--command"),
         (("walk", "--command", "nan", "0", "0"), "wanted three numbers"),
         (("walk", "--command", "1", "0", "0", "--random-commands"), "wanted one"),

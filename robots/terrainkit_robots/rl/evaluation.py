@@ -11,10 +11,10 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
+from terrainkit_robots.rl.device import require_device
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Ground, read_ground
 from terrainkit_robots.rl.observations import sees_heights
@@ -167,7 +167,7 @@ def prepared(run: "Run", asked: Asked, *, each: int = MOST) -> tuple[LeggedEnv, 
     Returns:
         The environment, and commands of shape (n, 3); None: the task's random ones.
     """
-    _require_device(asked.device)
+    device = require_device(asked.device)
     source, task = asked.terrain or run.terrain, run.task
     touch = task.terrain.collision
     # The policy sees as much as in training, whatever it walks on now.
@@ -180,7 +180,7 @@ def prepared(run: "Run", asked: Asked, *, each: int = MOST) -> tuple[LeggedEnv, 
     count = asked.num_envs or _count(choice, rows * cols, each)
     task = evaluation_task(task, count, seconds=asked.seconds, seed=asked.seed)
     task = replace(task, terrain=replace(task.terrain, collision=touch, measure_heights=scan))
-    env = LeggedEnv(task, run.robot, ground, asked.device)
+    env = LeggedEnv(task, run.robot, ground, device)
     env.careers.levels[:], env.careers.columns[:] = np.divmod(
         _spread(rows * cols, count, asked.seed), cols
     )
@@ -216,11 +216,3 @@ def _spread(things: int, count: int, seed: int) -> NDArray[np.int64]:
     if count < things:
         return np.sort(np.random.default_rng(seed).permutation(things)[:count])
     return np.arange(count) % things
-
-
-def _require_device(device: str) -> None:
-    try:
-        torch.zeros(1, device=device)
-    except (RuntimeError, AssertionError) as error:
-        reason = str(error).splitlines()[0]
-        raise ConfigError(f"torch has no device {device!r} here: {reason}") from None

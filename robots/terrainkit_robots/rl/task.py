@@ -129,7 +129,8 @@ class Asset(Section):
 
     collisions: Literal["all", "feet_and_termination"] = "all"
     """What of the robot touches the ground: all that has a shape for it, or only feet and bodies
-    that end an episode, which is up to a quarter faster, and leaves `rewards.collision` nothing."""
+    that end an episode. The latter steps half as fast again, but legs pass through the edges of
+    stairs, so that the trunk hits them, and `rewards.collision` has nothing to count."""
 
     self_collisions: bool = False
     """Whether the robot touches itself."""

@@ -215,19 +215,12 @@ def _processors() -> int:
 
 
 def _device(name: str) -> str:
-    import torch
+    """Return the device of this process: under torchrun each has its own GPU."""
+    from terrainkit_robots.rl.device import require_device
 
-    try:
-        kind = torch.device(name).type
-    except RuntimeError:
-        kind = ""
-    if kind == "cuda" and torch.cuda.is_available():
-        several = int(os.environ.get("WORLD_SIZE", "1")) > 1
-        return f"cuda:{os.environ.get('LOCAL_RANK', '0')}" if several else name
-    if kind != "cpu":
-        there = "cpu, cuda" if torch.cuda.is_available() else "cpu"
-        raise ConfigError(f"device {name!r}; here there is: {there}")
-    return "cpu"
+    if name.startswith("cuda") and int(os.environ.get("WORLD_SIZE", "1")) > 1:
+        name = f"cuda:{os.environ.get('LOCAL_RANK', '0')}"
+    return require_device(name)
 
 
 @contextmanager

@@ -131,7 +131,7 @@ def test_what_cannot_be_is_refused(options, words):
 
 
 def test_a_device_that_is_not_there_is_an_error(run_of):
-    with pytest.raises(ConfigError, match="torch has no device 'abacus' here"):
+    with pytest.raises(ConfigError, match="device 'abacus'; here there is: cpu"):
         prepared(run_of(), Asked(device="abacus"))
 
 
