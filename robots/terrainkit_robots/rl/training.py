@@ -11,6 +11,7 @@ otherwise.
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -40,6 +41,11 @@ from terrainkit_robots.rl.threads import wait_asleep
 
 if TYPE_CHECKING:
     from terrainkit_robots.rl.runner import LeggedRunner
+
+
+_TOGETHER = 1.0
+"""Signals are one asking that come so soon after the first [s]: torchrun passes on what the
+terminal, or a scheduler, has told its processes already."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -228,14 +234,18 @@ def _asked_to_stop() -> Iterator[Callable[[], int]]:
     """Yield what tells which signal has asked to stop: ctrl-C, or a scheduler's; 0 for none.
 
     The first lets the iteration come to its end, so that a checkpoint can be written; the second
-    ends it at once.
+    ends it at once, unless both came together.
     """
     asked: list[int] = []
+    since = 0.0
 
     def note(number: int, _frame: FrameType | None) -> None:
-        if asked:
+        nonlocal since
+        if not asked:
+            since = time.monotonic()
+            asked.append(number)
+        elif time.monotonic() - since >= _TOGETHER:
             raise KeyboardInterrupt
-        asked.append(number)
 
     if threading.current_thread() is not threading.main_thread():
         yield lambda: 0  # only the main thread is told

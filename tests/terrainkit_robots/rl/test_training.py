@@ -14,7 +14,7 @@ import torch
 
 import terrainkit
 from terrainkit.errors import CapacityError, ConfigError, ExportError
-from terrainkit_robots.rl import registry
+from terrainkit_robots.rl import registry, training
 from terrainkit_robots.rl.checkpoint import only_policy, read_checkpoint, save_checkpoint
 from terrainkit_robots.rl.progress import Progress
 from terrainkit_robots.rl.run_folder import checkpoints, open_run
@@ -96,7 +96,9 @@ def test_an_interrupted_run_goes_on_as_if_it_had_not_been(task, tmp_path, number
     assert same_weights(tmp_path / "whole" / "model_4.pt", tmp_path / "run" / "model_4.pt")
 
 
-def test_a_second_interrupt_ends_it_at_once(task, tmp_path):
+def test_a_second_interrupt_ends_it_at_once(task, tmp_path, monkeypatch):
+    monkeypatch.setattr(training, "_TOGETHER", 0.0)
+
     def interrupt(_progress: Progress) -> None:
         signal.raise_signal(signal.SIGINT)
         signal.raise_signal(signal.SIGINT)
@@ -104,6 +106,17 @@ def test_a_second_interrupt_ends_it_at_once(task, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         train("quadruped", "plane", task, folder=tmp_path / "run", watch=interrupt)
     assert checkpoints(tmp_path / "run") == {}
+
+
+def test_torchrun_tells_its_processes_again_what_the_terminal_told_them(task, tmp_path):
+    def interrupt(progress: Progress) -> None:
+        if progress.iteration == 2:
+            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(signal.SIGTERM)
+
+    stopped = train("quadruped", "plane", task, folder=tmp_path / "run", watch=interrupt)
+    assert (stopped.iteration, stopped.signal) == (2, signal.SIGINT)
+    assert list(checkpoints(tmp_path / "run")) == [2]
 
 
 def test_a_thread_may_train_too(task, tmp_path):
