@@ -44,6 +44,14 @@ def _squared(values: FloatArray) -> FloatArray:
     return np.einsum("ij,ij->i", values, values)
 
 
+def _off(height: FloatArray, target: float) -> FloatArray:
+    """Return how far heights are from their target [m]; above a hole, no farther than the ground.
+
+    Without that bound a foot that swings over a pit of 10 m costs more than all else is worth.
+    """
+    return np.minimum(height, np.float32(2 * target)) - np.float32(target)
+
+
 def _asked(state: State) -> NDArray[np.bool_]:
     """Return who is asked to move, shape (n,)."""
     moves = (state.commands[:, :2] != 0).any(axis=1)
@@ -88,8 +96,7 @@ def base_height(state: State, robot: Robot, settings: Rewards) -> FloatArray:
     target = settings.base_height_target
     if target is None:
         target = robot.spec.base_height_target
-    off: FloatArray = state.base_height - np.float32(target or 0.0)
-    return off * off
+    return np.square(_off(state.base_height, target or 0.0))
 
 
 @reward
@@ -172,7 +179,7 @@ def feet_air_time(state: State, robot: Robot, settings: Rewards) -> FloatArray:
 @reward
 def foot_clearance(state: State, robot: Robot, settings: Rewards) -> FloatArray:
     """Return how far feet are from their target height, squared, by their speed [m3/s]."""
-    off = np.square(state.foot_height - np.float32(settings.foot_clearance_target))
+    off = np.square(_off(state.foot_height, settings.foot_clearance_target))
     speed = np.hypot(state.foot_vel[..., 0], state.foot_vel[..., 1])
     return (off * speed).sum(axis=1)
 

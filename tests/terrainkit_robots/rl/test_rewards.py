@@ -104,6 +104,8 @@ class TestByHand:
         assert paid("base_height", robot, given) == pytest.approx([0, 0.04])
         own = paid("base_height", robot, given, base_height_target=0.4)
         assert own == pytest.approx([0.01, 0.01])
+        # Over a hole of 10 m it is as bad as on the ground, no worse: 0.3^2.
+        assert paid("base_height", robot, state(1, base_height=[10.0])) == pytest.approx([0.09])
 
     def test_torques(self, robot: Robot) -> None:
         assert paid("torques", robot, state(torques=[[3, -4]])) == [25]
@@ -184,15 +186,18 @@ class TestByHand:
         assert (np.array(paid("stand_still", robot, given)) > 0).tolist() == [True] + 3 * [False]
 
     def test_foot_clearance(self, robot: Robot) -> None:
-        # (0.18 - 0.08)^2 * |(3, 4)| and 0.08^2 * 0.5; a foot that stands is free, and so is up.
+        # (0.13 - 0.08)^2 * |(3, 4)| and 0.08^2 * 0.5; a foot that stands is free, and so is up.
         given = state(
             2,
-            foot_height=[[0.18, 0.0], [0.0, 0.08]],
+            foot_height=[[0.13, 0.0], [0.0, 0.08]],
             foot_vel=[[[3, 4, 9], [0.5, 0, 0]], [[0, 0, 5], [2, 0, 0]]],
         )
-        assert paid("foot_clearance", robot, given) == pytest.approx([0.05 + 0.0032, 0], abs=1e-6)
+        assert paid("foot_clearance", robot, given) == pytest.approx([0.0125 + 0.0032, 0], abs=1e-6)
         higher = paid("foot_clearance", robot, given, foot_clearance_target=0.18)
-        assert higher == pytest.approx([0.0162, 0.02], abs=1e-6)
+        assert higher == pytest.approx([0.0125 + 0.0162, 0.02], abs=1e-6)
+        # Over a stone's hole of 10 m a step is as bad as one that drags, no worse: 0.08^2 * 1.
+        hole = state(1, foot_height=[[10.0, 0.08]], foot_vel=[[[1, 0, 0], [0, 0, 0]]])
+        assert paid("foot_clearance", robot, hole) == pytest.approx([0.0064])
 
     def test_stumble(self, robot: Robot) -> None:
         given = state(
