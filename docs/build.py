@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import cv2
 import numpy as np
@@ -146,6 +147,7 @@ def draw_pictures() -> None:
     terrain_map = terrainkit.generate(terrainkit.MapConfig())
     write_preview(terrain_map, PICTURES / "map.png", width=820, overwrite=True)
     draw_robot("quadruped")
+    draw_walk("quadruped_map")
 
 
 def draw_robot(name: str) -> None:
@@ -154,6 +156,24 @@ def draw_robot(name: str) -> None:
     views = draw(found.with_suffix(".xml"), size=(400, 340)).values()
     pictures = [cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR) for png in views]
     cv2.imwrite(str(PICTURES / f"{name}.png"), np.hstack(pictures))
+
+
+def draw_walk(policy: str) -> None:
+    """Film a policy on stairs, and put moments of it side by side."""
+    up = terrainkit.TerrainChoice(terrain="pyramid_stairs", parameters={"inverted": True})
+    stairs = terrainkit.MapConfig(
+        rows=1, cols=1, border=4, mode="selected", selected_difficulty=0.33, terrains=(up,)
+    )
+    with TemporaryDirectory() as folder:
+        ground, video = Path(folder) / "stairs.npz", Path(folder) / "walk.mp4"
+        terrainkit.generate(stairs).save(ground)
+        command = [sys.executable, "-m", "terrainkit_cli.main", "play", policy, "--seconds", "8"]
+        command += ["--terrain", ground, "--num-envs", "1", "--command", "0.75", "0", "0"]
+        subprocess.run([*command, "-o", video, "--size", "400", "340"], check=True)
+        film = cv2.VideoCapture(str(video))
+        moments = [film.read()[1] for _ in range(int(film.get(cv2.CAP_PROP_FRAME_COUNT)))]
+    shown = [moments[int(part * len(moments))] for part in (0.3, 0.5, 0.7)]
+    cv2.imwrite(str(PICTURES / f"{policy}.png"), np.hstack(shown))
 
 
 def written(name: str) -> str:
@@ -170,7 +190,9 @@ def main() -> int:
     pages = {"terrains.md": terrains_page(), "rules.md": rules_page(), "cli.md": cli_page()}
     if sys.argv[1:] == ["--check"]:
         stale = [n for n, text in pages.items() if words(written(n)) != words(text)]
-        wanted = [f"{name}.png" for name in (*registry.names(), "map", "quadruped")]
+        wanted = [
+            f"{name}.png" for name in (*registry.names(), "map", "quadruped", "quadruped_map")
+        ]
         stale += [name for name in wanted if not (PICTURES / name).exists()]
         if stale:
             print(f"out of date: {', '.join(stale)}; run python docs/build.py")
