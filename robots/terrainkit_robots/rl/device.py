@@ -15,8 +15,10 @@ def require_device(name: str) -> str:
     try:
         device = torch.device(name)
     except RuntimeError:
-        device = torch.device("meta")
-    if device.type == "cpu" or (device.type == "cuda" and (device.index or 0) < count):
-        return str(device)
+        device = None
+    if device is not None and device.type == "cpu":
+        return "cpu"
+    if device is not None and device.type == "cuda" and (device.index or 0) < count:
+        return name
     there = ["cpu", *(f"cuda:{k}" for k in range(count))]
     raise ConfigError(f"device {name!r}; here there is: {listing(there)}")

@@ -224,9 +224,10 @@ def _device(name: str) -> str:
     """Return the device of this process: under torchrun each has its own GPU."""
     from terrainkit_robots.rl.device import require_device
 
-    if name.startswith("cuda") and int(os.environ.get("WORLD_SIZE", "1")) > 1:
-        name = f"cuda:{os.environ.get('LOCAL_RANK', '0')}"
-    return require_device(name)
+    device = require_device(name)
+    if device == "cpu" or int(os.environ.get("WORLD_SIZE", "1")) == 1:
+        return device
+    return require_device(f"cuda:{os.environ.get('LOCAL_RANK', '0')}")
 
 
 @contextmanager

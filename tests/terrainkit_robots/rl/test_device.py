@@ -8,8 +8,9 @@ from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.device import require_device
 
 
-def test_the_cpu_is_always_there():
-    assert require_device("cpu") == "cpu"
+@pytest.mark.parametrize("name", ["cpu", "cpu:0"])
+def test_the_cpu_is_always_there(name):
+    assert require_device(name) == "cpu"
 
 
 @pytest.mark.parametrize("name", ["gpu", "abacus", "", "meta", "cuda:99", "cuda:-1"])
