@@ -47,9 +47,11 @@ def _squared(values: FloatArray) -> FloatArray:
 def _off(height: FloatArray, target: float) -> FloatArray:
     """Return how far heights are from their target [m]; above a hole, no farther than the ground.
 
-    Without that bound a foot that swings over a pit of 10 m costs more than all else is worth.
+    Without that bound a foot that swings over a pit of 10 m costs more than all else is worth. A
+    target of 0 has none: nothing costs less than the ground there.
     """
-    return np.minimum(height, np.float32(2 * target)) - np.float32(target)
+    most = 2 * target if target > 0 else np.inf
+    return np.minimum(height, np.float32(most)) - np.float32(target)
 
 
 def _asked(state: State) -> NDArray[np.bool_]:

@@ -198,6 +198,9 @@ class TestByHand:
         # Over a stone's hole of 10 m a step is as bad as one that drags, no worse: 0.08^2 * 1.
         hole = state(1, foot_height=[[10.0, 0.08]], foot_vel=[[[1, 0, 0], [0, 0, 0]]])
         assert paid("foot_clearance", robot, hole) == pytest.approx([0.0064])
+        # Feet that are to stay down cost for every height.
+        low = state(1, foot_height=[[0.1, 0.0]], foot_vel=[[[1, 0, 0], [1, 0, 0]]])
+        assert paid("foot_clearance", robot, low, foot_clearance_target=0) == pytest.approx([0.01])
 
     def test_stumble(self, robot: Robot) -> None:
         given = state(
