@@ -5,9 +5,6 @@ from terrainkit.choice import TerrainChoice
 from terrainkit.errors import ConfigError, listing
 from terrainkit.parameter import parameters_of
 
-_INVERTED = "_inverted"
-"""Ends the name of a terrain that stands upside down."""
-
 _MIXES = {
     # legged_gym's columns in its order. What it calls "stairs up" is climbed from the platform
     # outwards, so it is the inverted pyramid here, and "stairs down" the upright one.
@@ -50,14 +47,14 @@ def _all() -> list[str]:
     for terrain in registry.names():
         mix.append(terrain)
         if "inverted" in parameters_of(registry.find(terrain)):
-            mix.append(terrain + _INVERTED)
+            mix.append(terrain + registry.INVERTED)
     return mix
 
 
 def _choice(name: str, proportion: float) -> TerrainChoice:
     return TerrainChoice(
-        terrain=name.removesuffix(_INVERTED),
+        terrain=name.removesuffix(registry.INVERTED),
         name=name,
         proportion=proportion,
-        parameters={"inverted": True} if name.endswith(_INVERTED) else {},
+        parameters={"inverted": True} if name.endswith(registry.INVERTED) else {},
     )

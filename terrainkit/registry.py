@@ -10,12 +10,16 @@ from typing import TYPE_CHECKING
 
 from terrainkit import terrains
 from terrainkit.errors import ConfigError, listing
+from terrainkit.parameter import parameters_of
 from terrainkit.terrain import Terrain
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 ENTRY_POINTS = "terrainkit.terrains"
+
+INVERTED = "_inverted"
+"""Ends the name that a terrain which stands upside down has in a preset, and so in a map."""
 
 
 @cache
@@ -42,6 +46,9 @@ def find(name: str) -> type[Terrain]:
         return _ours(name)
     others = plugins()
     if name not in others:
+        upright = name.removesuffix(INVERTED)
+        if upright != name and upright in names() and "inverted" in parameters_of(find(upright)):
+            raise ConfigError(f"no terrain {name!r}; it is {upright} with inverted = true")
         raise ConfigError(f"no terrain {name!r}; there are: {listing([*names(), *others])}")
     try:
         found = others[name].load()

@@ -57,6 +57,17 @@ def test_an_unknown_name_lists_those_that_exist():
         registry.find("stair")
 
 
+def test_the_name_of_an_inverted_terrain_says_what_to_ask_for():
+    with pytest.raises(ConfigError, match=r"it is pyramid_stairs with inverted = true$"):
+        registry.find("pyramid_stairs_inverted")
+
+
+@pytest.mark.parametrize("name", ["flat_inverted", "stair_inverted", "_inverted"])
+def test_what_cannot_be_inverted_is_unknown_as_any_other(name):
+    with pytest.raises(ConfigError, match=rf"no terrain '{name}'; there are: flat, gap, .*, wave$"):
+        registry.find(name)
+
+
 @pytest.mark.usefixtures("moon")
 def test_a_new_file_is_a_new_terrain():
     assert "moon" in registry.names()
