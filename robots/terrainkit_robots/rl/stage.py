@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit_robots.rl.box_tops import set_box_tops_apart
 from terrainkit_robots.rl.hfield_window import HeightfieldWindows
 from terrainkit_robots.rl.mp4 import Mp4Error, Mp4Writer
 from terrainkit_robots.rl.video import ANSWER, DONE, VIDEO, Shot
@@ -112,6 +113,7 @@ class Stage:
         # Smoothing edges by several samples for each pixel would take twice the time.
         visual.quality.shadowsize, visual.quality.offsamples = 2048, 0
         self._windows = HeightfieldWindows(model)
+        set_box_tops_apart(model)
         # Near, far and the reach of shadows are told in extents.
         model.stat.extent = _AWAY * self._radius
         visual.map.znear, visual.map.zfar = 0.02, _FAR

@@ -2,6 +2,7 @@ import time
 from pathlib import Path
 
 import cv2
+import mujoco
 import numpy as np
 import pytest
 
@@ -80,6 +81,28 @@ def test_captions_are_below_on_the_left(drawn):
     assert len(rows) > 5
     assert rows.min() > 0.8 * SIZE[1]
     assert columns.max() < 0.5 * SIZE[0]
+
+
+def test_tops_that_overlap_in_one_plane_are_no_brighter(tmp_path):
+    robot = '<body pos="0 0 0.6"><freejoint/><geom size="0.1"/></body>'
+    slab = '<geom type="box" size="9 9 0.5" pos="{} 0 -0.5"/>'
+    frames = []
+    for number, places in enumerate([[0], [0, 1, -1]]):
+        ground = "".join(slab.format(x) for x in places)
+        text = f"<mujoco><worldbody>{ground}{robot}</worldbody></mujoco>"
+        model = mujoco.MjModel.from_xml_string(text)
+        poses = np.tile(model.qpos0, (1, 1, 1)).astype(np.float32)
+        shots = (Shot(robot=0, start=0, stop=1, captions=("",)),)
+        film = Film(model=model, poses=poses, shots=shots, fps=25.0, size=SIZE)
+        path = tmp_path / f"{number}.mp4"
+        try:
+            list(film_frames(film, path))
+        except PicturesError as error:
+            pytest.skip(str(error))
+        frames.append(read(path)[0])
+    one, several = frames
+    brighter = (several - one)[SIZE[1] // 2 :]
+    assert brighter.max() < 25
 
 
 def test_an_existing_video_stays_unless_told(film, tmp_path):
