@@ -110,7 +110,8 @@ def train(
     with _asked_to_stop() as stop, _processes_left():
         runner = LeggedRunner(env, device=device, watch=watch, stop=stop)
         if resume is not None:
-            runner.load(_checkpoint(resume), None if before else _taken_over(resume, terrain))
+            parts = None if before else _taken_over(resume, terrain, task)
+            runner.load(_checkpoint(resume), parts)
         left = task.runner.max_iterations - runner.current_learning_iteration
         if left <= 0:
             raise ConfigError(
@@ -121,9 +122,9 @@ def train(
             runner.folder = _place(folder, robot, terrain, task, before)
         # Where all robots begin at once, they would also run out of time at once.
         _learn(runner, left, fresh=not env.steps.any())
-        return Trained(
-            folder=runner.folder, iteration=runner.current_learning_iteration, signal=stop()
-        )
+        done = runner.current_learning_iteration
+        early = done < task.runner.max_iterations
+        return Trained(folder=runner.folder, iteration=done, signal=stop() if early else 0)
 
 
 def _require_logger(task: Task) -> None:
@@ -169,9 +170,12 @@ def _goes_on(run: Run, robot: str | Path, terrain: str | Path, task: Task) -> bo
     return same and "processes" in read_checkpoint(_checkpoint(run))
 
 
-def _taken_over(run: Run, terrain: str | Path) -> dict[str, bool]:
+def _taken_over(run: Run, terrain: str | Path, task: Task) -> dict[str, bool]:
     """Return what a new run takes over of another: its networks, and the levels on its map."""
-    return {"actor": True, "critic": True, "careers": same_ground(run, terrain)}
+    # A map that is left flat is one patch.
+    flat, was_flat = (each.terrain.collision == "plane" for each in (task, run.task))
+    same = flat == was_flat and same_ground(run, terrain)
+    return {"actor": True, "critic": True, "careers": same}
 
 
 def _checkpoint(run: Run) -> Path:
@@ -185,8 +189,8 @@ def _place(
 ) -> Path:
     """Return the folder to write to: that of the run before, if nothing is overwritten there."""
     if folder is None and before is not None:
-        last = max(checkpoints(before.folder).items())[1]
-        if last == before.checkpoint:
+        there = checkpoints(before.folder)
+        if there and there[max(there)] == before.checkpoint:
             if task != before.task:
                 rewrite_task(before, task)
             return before.folder

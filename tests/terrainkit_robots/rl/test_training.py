@@ -96,6 +96,15 @@ def test_an_interrupted_run_goes_on_as_if_it_had_not_been(task, tmp_path, number
     assert same_weights(tmp_path / "whole" / "model_4.pt", tmp_path / "run" / "model_4.pt")
 
 
+def test_a_signal_in_the_last_iteration_ends_nothing_early(task, tmp_path):
+    def interrupt(progress: Progress) -> None:
+        if progress.iteration == 4:
+            signal.raise_signal(signal.SIGTERM)
+
+    done = train("quadruped", "plane", task, folder=tmp_path / "run", watch=interrupt)
+    assert (done.iteration, done.signal) == (4, 0)
+
+
 def test_a_second_interrupt_ends_it_at_once(task, tmp_path, monkeypatch):
     monkeypatch.setattr(training, "_TOGETHER", 0.0)
 
@@ -225,6 +234,30 @@ def test_robots_stay_on_their_levels_of_a_map_whatever_the_task(task, tmp_path, 
         train("quadruped", ground, rewarded, resume=run, folder=folder)
         after = read_checkpoint(open_run(folder).checkpoint)["processes"][0]["env"]["careers"]
         assert set(after["levels"].tolist()) == levels
+
+
+@pytest.mark.parametrize("before", ["plane", "auto"])
+def test_a_map_can_be_left_flat_at_first_or_later(task, tmp_path, mixed_map, before):
+    path = mixed_map.save(tmp_path / "map.npz")
+    after = {"plane": "auto", "auto": "plane"}[before]
+    first, second = (
+        lasting(replace(task, terrain=Terrain(collision=touched, measure_heights=True)), 1)
+        for touched in (before, after)
+    )
+    train("quadruped", path, first, folder=tmp_path / "run")
+    run = open_run(tmp_path / "run")
+    done = train("quadruped", path, second, resume=run, folder=tmp_path / "more")
+    assert done.iteration == 1
+
+
+def test_a_checkpoint_of_another_name_is_gone_on_with_in_a_new_run(task, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    run = tmp_path / "run"
+    train("quadruped", "plane", lasting(task, 1), folder=run)
+    (run / "model_1.pt").rename(run / "best.pt")
+    done = train("quadruped", "plane", task, resume=open_run(run / "best.pt"))
+    assert done.folder.parent == Path("logs/quadruped")
+    assert [path.name for path in run.glob("*.pt")] == ["best.pt"]
 
 
 def test_a_policy_alone_is_gone_on_with_in_a_new_run(task, tmp_path):
