@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 _NOT_ASKED = (-math.inf, -math.inf, -math.inf)
 """No command; not None, since tyro's errors about a union name its members."""
 
+_OPEN = -1
+"""No number, for the same reason."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class PolicyCommand(Command):
@@ -46,12 +49,12 @@ class PolicyCommand(Command):
 
     num_envs: Annotated[
         int, tyro.conf.arg(metavar="INT", help_behavior_hint="(default: as many as are of use)")
-    ] = 0
+    ] = _OPEN
     """Robots."""
 
     checkpoint: Annotated[
         int, tyro.conf.arg(metavar="ITERATION", help_behavior_hint="(default: the last)")
-    ] = -1
+    ] = _OPEN
     """The checkpoint to take."""
 
     seed: int = 1
@@ -73,7 +76,7 @@ class PolicyCommand(Command):
         require_training()
         from terrainkit_robots.rl.run_folder import open_run
 
-        return open_run(self.policy, self.checkpoint if self.checkpoint >= 0 else None)
+        return open_run(self.policy, None if self.checkpoint == _OPEN else self.checkpoint)
 
     def asked(self, seconds: float) -> "Asked":
         """Return what is to be rolled.
@@ -86,7 +89,7 @@ class PolicyCommand(Command):
         return Asked(
             seconds=seconds,
             terrain=self.terrain or None,
-            num_envs=self.num_envs or None,
+            num_envs=None if self.num_envs == _OPEN else self.num_envs,
             command=None if self.command == _NOT_ASKED else self.command,
             random_commands=self.random_commands,
             seed=self.seed,

@@ -113,11 +113,10 @@ class Export(Command):
 
         require_training()
         from terrainkit_robots.rl.policy_export import export_policy
-        from terrainkit_robots.rl.run_folder import open_run
+        from terrainkit_robots.rl.run_folder import is_shipped, open_run
 
         run = open_run(self.subject, None if self.checkpoint == _LAST else self.checkpoint)
-        shipped = not Path(self.subject).exists()
-        own = Path(f"{self.subject}_policy") if shipped else run.folder / "exported"
+        own = Path(f"{run.folder.name}_policy") if is_shipped(run) else run.folder / "exported"
         folder = Path(self.output) if self.output else own
         done = export_policy(run, folder, overwrite=self.overwrite)
         _tell(done, run.checkpoint)

@@ -56,8 +56,7 @@ class Play(PolicyCommand):
         if not (self.viewer or self.no_video):
             require_training("imageio_ffmpeg")  # before the wait
         run = self.open()
-        name = run.folder.resolve().name if Path(self.policy).exists() else self.policy
-        target = Path(self.output or f"{name}.mp4")
+        target = Path(self.output or f"{run.folder.resolve().name}.mp4")
         asked = self.asked(self.seconds)
         from terrainkit_robots.rl.play import play, view
         from terrainkit_robots.rl.video import check_size, check_video

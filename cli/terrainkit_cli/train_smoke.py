@@ -31,25 +31,25 @@ def check_training(command: "CheckRobot") -> int:
         from terrainkit.atomic import check_target
 
         check_target(Path(command.output), overwrite=True)  # before the wait
-    found: dict[str, Smoke] = {}
+    found: list[tuple[str, Smoke]] = []
     with render.steps() as steps:
         for name in command.files:
             steps.say(f"training {name} for a moment")
             smoke = _tried(name, command, settings)
             if smoke is not None:
-                found[name] = smoke
+                found.append((name, smoke))
     text = _as_json(found) if command.format == "json" else _as_text(found)
     if command.output:
         from terrainkit.atomic import atomic_write
 
         with atomic_write(Path(command.output), overwrite=True) as path:
             path.write_text(text, encoding="utf-8")
-        render.result(f"wrote {command.output}: {', '.join(map(_verdict, found.values()))}")
+        render.result(f"wrote {command.output}: {', '.join(_verdict(smoke) for _, smoke in found)}")
     else:
         render.report(text)
     if len(found) < len(command.files):
         return 2
-    return int(not all(smoke.passed for smoke in found.values()))
+    return int(not all(smoke.passed for _, smoke in found))
 
 
 def _refuse_others(command: "CheckRobot") -> None:
@@ -103,10 +103,10 @@ def _verdict(smoke: "Smoke") -> str:
     return f"{smoke.robot}: {failed} of {len(smoke.checks)} checks failed"
 
 
-def _as_text(found: "dict[str, Smoke]") -> str:
+def _as_text(found: "list[tuple[str, Smoke]]") -> str:
     """Return a table for each robot, with what was wanted where it is not so."""
     blocks = []
-    for name, smoke in found.items():
+    for name, smoke in found:
         width = max(len(check.name) for check in smoke.checks)
         lines = [f"robot     {smoke.robot} ({name})", ""]
         for check in smoke.checks:
@@ -121,7 +121,7 @@ def _word(passed: bool) -> str:
     return "ok  " if passed else "FAIL"
 
 
-def _as_json(found: "dict[str, Smoke]") -> str:
+def _as_json(found: "list[tuple[str, Smoke]]") -> str:
     """Return one document, indented; several are JSON lines."""
     from terrainkit import __version__
     from terrainkit_robots.rl.smoke import record
@@ -130,6 +130,6 @@ def _as_json(found: "dict[str, Smoke]") -> str:
         "schema_version": SCHEMA_VERSION,
         "tool": {"name": "terrainkit", "version": __version__},
     }
-    documents = [{**head, "file": name, **record(smoke)} for name, smoke in found.items()]
+    documents = [{**head, "file": name, **record(smoke)} for name, smoke in found]
     indent = 2 if len(documents) == 1 else None
     return "".join(f"{json.dumps(document, indent=indent)}\n" for document in documents)

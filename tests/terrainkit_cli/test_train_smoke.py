@@ -64,6 +64,7 @@ def test_a_robot_that_fails_is_exit_1_and_one_that_cannot_be_read_is_2(here, tol
         (("good", "bad"), 1),
         (("none", "good"), 2),
         (("bad", "none"), 2),
+        (("good", "good"), 0),
     ):
         run = here("check-robot", *words, "--train-smoke")
         assert run.returncode == code, words

@@ -37,10 +37,9 @@ class Control:
 def control_of(robot: Robot, task: Task) -> Control:
     """Return the control of a robot in a task."""
     kind, scale = task.control.control_type, task.control.action_scale
-    stiff = np.array(list(robot.spec.per_joint("stiffness").values())) > 0
+    positional = robot.held & (kind == "P")
     if task.control.stiffness is not None:
-        stiff &= task.control.stiffness > 0
-    positional = stiff & (kind == "P")
+        positional &= task.control.stiffness > 0
     own = {
         "P": np.array(list(robot.spec.per_joint("action_scale").values())),
         "V": robot.velocity,

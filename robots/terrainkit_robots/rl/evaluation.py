@@ -8,7 +8,6 @@ first fall does not count any more.
 
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +18,11 @@ from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Ground, read_ground
 from terrainkit_robots.rl.observations import sees_heights
 from terrainkit_robots.rl.policy import policy_of
+from terrainkit_robots.rl.run_folder import Run, same_ground
 from terrainkit_robots.rl.score import Evaluation, summed_up
 from terrainkit_robots.rl.task import Commands, Task
 from terrainkit_robots.rl.threads import one_thread
 from terrainkit_robots.rl.trials import Watch, roll_out
-
-if TYPE_CHECKING:
-    from terrainkit_robots.rl.run_folder import Run
 
 FloatArray = NDArray[np.float32]
 
@@ -137,7 +134,7 @@ def forward_command(settings: Commands) -> FloatArray:
 
 
 @one_thread()
-def evaluate(run: "Run", asked: Asked | None = None, watch: Watch = lambda _: None) -> Evaluation:
+def evaluate(run: Run, asked: Asked | None = None, watch: Watch = lambda _: None) -> Evaluation:
     """Evaluate the policy of a run; the same seed gives the same result, bit for bit.
 
     Args:
@@ -147,7 +144,7 @@ def evaluate(run: "Run", asked: Asked | None = None, watch: Watch = lambda _: No
 
     Raises:
         ConfigError: if the run has no policy, or one of another robot; if the ground cannot be
-            read; if there is no such device.
+            read, or that of the training is another by now; if there is no such device.
     """
     asked = asked or Asked()
     env, commands = prepared(run, asked)
@@ -156,7 +153,7 @@ def evaluate(run: "Run", asked: Asked | None = None, watch: Watch = lambda _: No
     return summed_up(run, asked, env, outcome, commands if grid else None)
 
 
-def prepared(run: "Run", asked: Asked, *, each: int = MOST) -> tuple[LeggedEnv, FloatArray | None]:
+def prepared(run: Run, asked: Asked, *, each: int = MOST) -> tuple[LeggedEnv, FloatArray | None]:
     """Return an environment to evaluate a policy in, and the command of each robot.
 
     Args:
@@ -168,10 +165,15 @@ def prepared(run: "Run", asked: Asked, *, each: int = MOST) -> tuple[LeggedEnv, 
         The environment, and commands of shape (n, 3); None: the task's random ones.
     """
     device = require_device(asked.device)
+    if asked.terrain is None and not same_ground(run, run.terrain):
+        raise ConfigError(
+            f"{run.terrain} is not what {run.folder} was trained on any more; "
+            "--terrain says what to take"
+        )
     source, task = asked.terrain or run.terrain, run.task
-    touch = task.terrain.collision
     # The policy sees as much as in training, whatever it walks on now.
-    scan = sees_heights(task.terrain, level=run.terrain == "plane" or touch == "plane")
+    scan = sees_heights(task.terrain, level=is_flat(run, Asked()))
+    touch = task.terrain.collision
     if asked.terrain is not None and touch == "plane":
         touch = "auto"
     ground = read_ground(source, touch)
@@ -186,6 +188,13 @@ def prepared(run: "Run", asked: Asked, *, each: int = MOST) -> tuple[LeggedEnv, 
     )
     env.begin_all()
     return env, None if choice is None else choice[_spread(len(choice), count, asked.seed)]
+
+
+def is_flat(run: Run, asked: Asked) -> bool:
+    """Return whether robots walk on a plane, or on what a map has in its place."""
+    if asked.terrain is not None:
+        return asked.terrain == "plane"
+    return run.terrain == "plane" or run.task.terrain.collision == "plane"
 
 
 def _choice(task: Task, ground: Ground, asked: Asked) -> FloatArray | None:

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float32]
 
+_UPWARD = 0.1
+"""Least cosine between up and the normal of a plane that is ground, and no wall."""
+
 
 class Ground(ABC):
     """Something to stand on."""
@@ -169,7 +172,7 @@ class MapGround(Ground):
 class ScannedGround(Ground):
     """Any MuJoCo model without a robot, measured by rays from above on a grid.
 
-    Robots start at the world's origin, or around `origins`.
+    Robots start at the world's origin.
     """
 
     terrain_names = np.array([["custom"]])
@@ -243,6 +246,7 @@ def _rays_down(model: Any, along: FloatArray) -> NDArray[np.float64]:
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     top = float((data.geom_xpos[:, 2] + model.geom_rbound).max(initial=0.0)) + 1
+    top += _rise_of_planes(model, data, float(along[-1]))
     down, geom = np.array([0.0, 0.0, -1.0]), np.zeros(1, np.int32)
     heights = np.full((len(along), len(along)), np.nan)
     for i, x in enumerate(along):
@@ -252,6 +256,20 @@ def _rays_down(model: Any, along: FloatArray) -> NDArray[np.float64]:
             if far >= 0:
                 heights[i, j] = top - far
     return heights
+
+
+def _rise_of_planes(model: Any, data: Any, reach: float) -> float:
+    """Return how far a plane rises above its middle within a square around the origin [m].
+
+    From below, no ray meets it, and its size tells nothing of its height.
+    """
+    import mujoco
+
+    normal = data.geom_xmat.reshape(-1, 3, 3)[:, :, 2]
+    planes = (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE) & (normal[:, 2] > _UPWARD)
+    grade = -normal[planes, :2] / normal[planes, 2:]
+    rise = np.abs(grade).sum(axis=1) * reach - (grade * data.geom_xpos[planes, :2]).sum(axis=1)
+    return float(rise.max(initial=0.0))
 
 
 def _paint(spec: Any) -> None:

@@ -79,7 +79,8 @@ def policy_group(robot: Robot, task: Task, *, scan: bool) -> tuple[Observation, 
         Observation(
             name="dof_pos",
             read=lambda state: state.dof_pos + state.joint_offset - robot.default_pose,
-            scale=scales.dof_pos,
+            # How far a wheel has turned since it was built says nothing, and grows without end.
+            scale=tuple(np.where(robot.held, scales.dof_pos, 0.0).tolist()),
             noise=level * noise.dof_pos,
             image="joints",
         ),

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.evaluation import Asked, prepared
+from terrainkit_robots.rl.evaluation import Asked, is_flat, prepared
 from terrainkit_robots.rl.policy import policy_of
 from terrainkit_robots.rl.recorder import Recorder
 from terrainkit_robots.rl.score import Evaluation, summed_up
@@ -96,8 +96,7 @@ def play(
 
 def _prepared(run: "Run", asked: Asked) -> tuple[LeggedEnv, FloatArray | None]:
     """Return the environment, and the commands of each robot, one after the other."""
-    plane = (asked.terrain or run.terrain) == "plane"
-    if plane:
+    if is_flat(run, asked):
         asked = replace(asked, num_envs=asked.num_envs or _MARCHING)
         if asked.command is None and not asked.random_commands:
             tour = tour_of(run.task.commands)

@@ -149,7 +149,11 @@ def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> Exporte
     """
     require_onnx()
     _check_targets(folder, overwrite=overwrite)
-    task = replace(run.task, env=replace(run.task.env, num_envs=_ROBOTS, num_threads=1))
+    task = replace(
+        run.task,
+        env=replace(run.task.env, num_envs=_ROBOTS, num_threads=1),
+        algorithm=replace(run.task.algorithm, num_mini_batches=1),  # so few may have no more
+    )
     env = LeggedEnv(task, run.robot, read_ground(run.terrain, task.terrain.collision))
     actor = actor_of(run, env)
     document = description(env) | {"iteration": _iteration(run)}

@@ -196,9 +196,9 @@ def stumble(state: State, robot: Robot, settings: Rewards) -> FloatArray:
 
 @reward
 def stand_still(state: State, robot: Robot, settings: Rewards) -> FloatArray:
-    """Return how far the joints are from the default pose, in all, where asked to stand [rad]."""
-    off = np.abs(state.dof_pos - robot.default_pose).sum(axis=1)
-    return off * ~_asked(state)
+    """Return how far joints, but wheels, are from the default pose where asked to stand [rad]."""
+    off = np.abs(state.dof_pos - robot.default_pose) * robot.held
+    return off.sum(axis=1) * ~_asked(state)
 
 
 @reward

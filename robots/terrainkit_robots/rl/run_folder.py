@@ -25,8 +25,9 @@ from terrainkit_robots.wording import free_name
 if TYPE_CHECKING:
     from terrainkit.config import MapConfig
 
-_ROBOT = "robot_sha256"
-"""Table in `run.toml` that tells the files of the robot from other ones."""
+_ROBOT, _GROUND = "robot_sha256", "terrain_sha256"
+"""Keys in `run.toml` that tell the files of the robot, and a ground that is no map, from other
+ones."""
 
 RUN_FILE, TASK_FILE, MAP_FILE = "run.toml", "task.toml", "map.toml"
 
@@ -114,7 +115,7 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
     """
     name, ground = located_robot(robot_name), located_terrain(terrain)
     files = {
-        RUN_FILE: _about(name, ground, task, _digests(registry.find(robot_name).folder)),
+        RUN_FILE: _about(name, ground, task, registry.find(robot_name).folder),
         TASK_FILE: to_toml(task),
         SPEC_FILE: _text(registry.find(robot_name).folder / SPEC_FILE),
     }
@@ -184,6 +185,11 @@ def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
     )
 
 
+def is_shipped(run: Run) -> bool:
+    """Return whether a run comes with a package, so that nothing is to be written to its folder."""
+    return run.folder.resolve() == registry.find(run.robot_name).shipped.resolve()
+
+
 def changed_robot(run: Run) -> tuple[str, ...]:
     """Return which files of the run's robot are others than those it was trained with.
 
@@ -202,13 +208,18 @@ def changed_robot(run: Run) -> tuple[str, ...]:
 def same_ground(run: Run, terrain: str | Path) -> bool:
     """Return whether a ground is the one that the run was trained on: a map is, wherever it lies.
 
+    Of a MuJoCo model the file itself is looked at, not those that it names.
+
     Raises:
         ConfigError: if a config cannot be read.
         MapFileError: if the map cannot.
     """
     here, noted = located_terrain(terrain), run.folder / MAP_FILE
     if not noted.is_file():
-        return here == run.terrain
+        if here != run.terrain:
+            return False
+        digest = parsed(_text(run.folder / RUN_FILE)).get(_GROUND)
+        return digest is None or digest == _digest(Path(here))
     from terrainkit.config_text import read_config
 
     return _map_config(here) == read_config(noted)
@@ -223,16 +234,19 @@ def rewrite_task(run: Run, task: Task) -> None:
 
 
 def _located(name: str | Path) -> tuple[Path, Path | None]:
-    """Return the folder of a run, and the checkpoint in it that `name` is, if it is one."""
-    path = Path(name)
+    """Return the folder of a run, and the checkpoint in it that `name` is, if it is one.
+
+    A run here goes before a policy that is shipped; another folder that is called so does not.
+    """
+    path, known = Path(name), str(name) in registry.names()
     try:
-        if path.is_dir():
+        if (path / RUN_FILE).is_file() or (path.is_dir() and not known):
             return path, None
         if path.is_file():
             return path.parent, path
     except (OSError, ValueError) as error:
         raise ConfigError(f"cannot read {name}: {error}") from error
-    if str(name) not in registry.names():
+    if not known:
         raise ConfigError(
             f"no run {name}: neither a folder that terrainkit train wrote, nor a checkpoint in "
             f"one, nor a robot; the robots are: {listing(registry.names())}"
@@ -261,20 +275,23 @@ def _chosen(folder: Path, iteration: int | None, named: Path | None) -> Path | N
 
 def _digests(folder: Path) -> dict[str, str]:
     """Return the SHA-256 of the files that make up a robot, but for its meshes, by name."""
+    spec = read_spec(folder / SPEC_FILE)
+    return {name: _digest(folder / name) for name in (SPEC_FILE, spec.mjcf)}
+
+
+def _digest(path: Path) -> str:
+    """Return the SHA-256 of a file."""
     import hashlib
 
-    spec, found = read_spec(folder / SPEC_FILE), {}
-    for name in (SPEC_FILE, spec.mjcf):
-        try:
-            with open_regular(folder / name) as file:
-                found[name] = hashlib.sha256(file.read()).hexdigest()
-        except OSError as error:
-            raise ConfigError(f"cannot read {folder / name}: {error.strerror or error}") from error
-    return found
+    try:
+        with open_regular(path) as file:
+            return hashlib.sha256(file.read()).hexdigest()
+    except OSError as error:
+        raise ConfigError(f"cannot read {path}: {error.strerror or error}") from error
 
 
-def _about(robot: str, terrain: str, task: Task, robot_files: dict[str, str]) -> str:
-    """Return `run.toml`."""
+def _about(robot: str, terrain: str, task: Task, folder: Path) -> str:
+    """Return `run.toml` of a robot in a folder."""
     from importlib.metadata import version
 
     import tomli_w
@@ -285,10 +302,11 @@ def _about(robot: str, terrain: str, task: Task, robot_files: dict[str, str]) ->
             "format_version": FORMAT_VERSION,
             "robot": robot,
             "terrain": terrain,
+            **({_GROUND: _digest(Path(terrain))} if terrain.endswith(".xml") else {}),
             "seed": task.runner.seed,
             "begun": datetime.now().astimezone().isoformat(timespec="seconds"),
             "versions": {name: version(name) for name in packages},
-            _ROBOT: robot_files,
+            _ROBOT: _digests(folder),
         }
     )
 

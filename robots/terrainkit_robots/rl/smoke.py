@@ -100,7 +100,12 @@ def smoke(robot: Robot, task: Task, ground: Ground) -> Smoke:
         task: Its task; of its numbers of environments and updates a few are enough.
         ground: What it stands on.
     """
-    small = replace(task, env=replace(task.env, num_envs=ROBOTS, num_threads=1))
+    parts = min(task.algorithm.num_mini_batches, ROBOTS)
+    small = replace(
+        task,
+        env=replace(task.env, num_envs=ROBOTS, num_threads=1),
+        algorithm=replace(task.algorithm, num_mini_batches=parts),
+    )
     with one_thread():
         try:
             env, still = LeggedEnv(small, robot, ground), LeggedEnv(_still(small), robot, ground)

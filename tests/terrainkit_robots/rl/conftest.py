@@ -6,8 +6,8 @@ that are changed by a test are made anew; what is only read lives as long as the
 
 import sys
 from collections.abc import Callable
+from itertools import count
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -21,7 +21,7 @@ from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Ground, MapGround, Plane
 from terrainkit_robots.rl.registry import find
 from terrainkit_robots.rl.robot import Robot, read_robot, robot_of
-from terrainkit_robots.rl.run_folder import create_run
+from terrainkit_robots.rl.run_folder import Run, create_run
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.task import (
     DomainRand,
@@ -192,13 +192,13 @@ def lively() -> Callable[..., Task]:
 
 
 @pytest.fixture
-def run_of(quadruped: Robot, lively: Callable[..., Task]) -> Callable[..., Any]:
-    """Return runs without a checkpoint: what an evaluation needs to know of one."""
+def run_of(lively: Callable[..., Task], tmp_path: Path) -> Callable[..., Run]:
+    """Return runs without a checkpoint."""
+    numbers = count()
 
-    def make(ground: str | Path = "plane", **sections: Any) -> Any:
-        return SimpleNamespace(
-            task=lively(**sections), robot=quadruped, terrain=str(ground), checkpoint=None
-        )
+    def make(ground: str | Path = "plane", **sections: Any) -> Run:
+        folder = tmp_path / "runs" / str(next(numbers))
+        return create_run(folder, lively(**sections), "quadruped", ground)
 
     return make
 

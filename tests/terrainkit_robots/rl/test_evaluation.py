@@ -1,9 +1,10 @@
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 import torch
 
+from terrainkit import generate
 from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.evaluation import (
     Asked,
@@ -135,9 +136,18 @@ def test_a_device_that_is_not_there_is_an_error(run_of):
         prepared(run_of(), Asked(device="abacus"))
 
 
-def test_a_run_without_a_checkpoint_is_an_error(run_of, tmp_path):
+def test_another_ground_under_the_same_name_is_told(run_of, mixed_map, map_file):
+    run, other = run_of(map_file), replace(mixed_map.config, seed=mixed_map.config.seed + 1)
+    generate(other).save(map_file, overwrite=True)
+    said = r"map\.npz is not what .* was trained on any more; --terrain says what to take"
+    with pytest.raises(ConfigError, match=said):
+        prepared(run, Asked(num_envs=1))
+    for terrain in (map_file, run.folder / "map.toml"):
+        prepared(run, Asked(num_envs=1, terrain=str(terrain)))
+
+
+def test_a_run_without_a_checkpoint_is_an_error(run_of):
     run = run_of(runner=Runner(seed=2))
-    run.folder = tmp_path
     with pytest.raises(ConfigError, match="no checkpoint"):
         evaluate(run, Asked(num_envs=1, seconds=0.1))
 

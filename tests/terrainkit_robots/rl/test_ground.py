@@ -193,6 +193,20 @@ class TestScannedGround:
         found = ground.height(np.float32([0, 0.9]), np.float32([0, 0]))
         np.testing.assert_allclose(found, [0.1, 0.1 - 10], atol=1e-6)
 
+    @pytest.mark.parametrize("turn", ["0 10 0", "0 -10 0", "10 0 0"])
+    @pytest.mark.parametrize("x", [0, 3])
+    def test_a_tilted_plane_is_seen_uphill_too(self, tmp_path, turn, x):
+        path = tmp_path / "tilted.xml"
+        path.write_text(
+            "<mujoco><worldbody>"
+            f'<geom type="plane" size="0 0 1" euler="{turn}" pos="{x} 0 0"/>'
+            "</worldbody></mujoco>"
+        )
+        ground = ScannedGround(path, cell=1.0, reach=12.0)
+        corners = np.float32([[-12, -12], [-12, 12], [12, -12], [12, 12]])
+        found = ground.height(corners[:, 0], corners[:, 1])
+        np.testing.assert_allclose(found, rays(compiled(ground), corners), atol=1e-4)
+
     @pytest.mark.parametrize(
         ("text", "message"),
         [

@@ -9,7 +9,7 @@ from terrainkit.errors import ConfigError
 from terrainkit_robots.rl import play as playing
 from terrainkit_robots.rl.evaluation import Asked
 from terrainkit_robots.rl.play import play, tour_of, view
-from terrainkit_robots.rl.task import Commands, Env
+from terrainkit_robots.rl.task import Commands, Env, Terrain
 
 
 @pytest.fixture(autouse=True)
@@ -27,9 +27,11 @@ def test_the_tour_keeps_to_the_task():
     np.testing.assert_allclose(tour, [[1.5, 0, 0], [1.5, 0, 0.75], [0, 0, 0], [0, 0, -0.75]])
 
 
-def test_on_a_plane_robots_go_through_a_tour_together(run_of):
+@pytest.mark.parametrize("flat", [False, True])
+def test_on_a_plane_robots_go_through_a_tour_together(run_of, map_file, flat):
     parts = []
-    done = play(run_of(), Asked(seconds=0.8), progress=parts.append)
+    run = run_of(map_file, terrain=Terrain(collision="plane")) if flat else run_of()
+    done = play(run, Asked(seconds=0.8), progress=parts.append)
     assert len(parts) == 40
     assert parts[-1] == 1
     assert done.evaluation.whole.robots == 9

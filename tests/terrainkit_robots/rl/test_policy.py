@@ -1,10 +1,14 @@
+import shutil
+import warnings
+
 import pytest
 import torch
 
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, TerrainkitWarning
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane
 from terrainkit_robots.rl.policy import actor_of, policy_of
+from terrainkit_robots.rl.registry import find
 from terrainkit_robots.rl.run_folder import create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.task import Env, Task
@@ -48,6 +52,20 @@ def test_a_run_without_a_checkpoint_has_no_policy(env, tmp_path):
     run = create_run(tmp_path / "run", Task(), "quadruped", "plane")
     with pytest.raises(ConfigError, match="has no checkpoint yet"):
         policy_of(run, env)
+
+
+@pytest.mark.parametrize(("name", "told"), [("quadruped.xml", True), ("robot.toml", False)])
+def test_a_robot_that_moves_otherwise_than_in_training_is_told(trained, env, tmp_path, name, told):
+    mine = tmp_path / "mine"
+    shutil.copytree(find("quadruped").folder, mine)
+    folder = create_run(tmp_path / "run", Task(policy=env.cfg.policy), mine, "plane").folder
+    shutil.copy(trained / "model_2.pt", folder)
+    (mine / name).write_text((mine / name).read_text() + "\n")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        policy_of(open_run(folder), env)
+    said = [str(each.message) for each in caught if each.category is TerrainkitWarning]
+    assert said == [f"{mine} has another {name} than {folder} was trained with"] * told
 
 
 def test_a_policy_of_another_robot_is_told(trained, biped):

@@ -52,6 +52,16 @@ def session(folder):
     return onnxruntime.InferenceSession(folder / "policy.onnx", providers=["CPUExecutionProvider"])
 
 
+def test_a_task_of_many_robots_and_mini_batches_is_exported(trained, tmp_path):
+    run = open_run(trained)
+    many = replace(
+        run.task,
+        env=replace(run.task.env, num_envs=4096),
+        algorithm=replace(run.task.algorithm, num_mini_batches=256),
+    )
+    assert export_policy(replace(run, task=many), tmp_path / "policy").error < 1e-5
+
+
 @pytest.mark.parametrize("batch", [1, 7, 800])
 def test_the_onnx_file_acts_as_the_checkpoint_whatever_the_batch(exported, asked, batch):
     obs, wanted = asked

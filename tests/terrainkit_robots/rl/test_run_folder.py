@@ -23,6 +23,7 @@ from terrainkit_robots.rl.run_folder import (
     default_folder,
     open_run,
     rewrite_task,
+    same_ground,
 )
 from terrainkit_robots.rl.task import Rewards, Task
 
@@ -101,6 +102,16 @@ def test_a_map_that_is_gone_is_made_again(tmp_path, task, mixed_map):
     np.testing.assert_array_equal(again.env_origins, mixed_map.env_origins)
 
 
+def test_a_mujoco_model_that_has_changed_is_another_ground(tmp_path, task):
+    path = tmp_path / "ground.xml"
+    path.write_text("<mujoco><worldbody><geom type='plane' size='9 9 1'/></worldbody></mujoco>")
+    run = create_run(tmp_path / "run", task, "quadruped", path)
+    assert same_ground(run, path)
+    assert not same_ground(run, "plane")
+    path.write_text(path.read_text().replace("9 9 1", "8 8 1"))
+    assert not same_ground(run, path)
+
+
 def test_a_map_of_another_version_is_told_before_anything_is_written(tmp_path, task, mixed_map):
     path = mixed_map.save(tmp_path / "map.npz")
     arrays = dict(np.load(path))
@@ -171,6 +182,16 @@ def test_a_shipped_policy_is_found_by_the_name_of_its_robot(tmp_path, task, monk
     opened = open_run("rover_of_this_test")
     assert opened.folder == shipped == mine / "trained" / "rover_of_this_test"
     assert opened.robot_name == "rover_of_this_test"
+
+
+def test_a_run_goes_before_a_robot_of_its_name_and_any_other_folder_does_not(
+    tmp_path, task, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    Path("quadruped").mkdir()
+    assert open_run("quadruped").folder == registry.find("quadruped").shipped
+    create_run(Path("quadruped"), task, "biped", "plane")
+    assert open_run("quadruped").robot_name == "biped"
 
 
 def test_what_is_no_run_is_told(tmp_path):

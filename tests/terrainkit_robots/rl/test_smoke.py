@@ -66,6 +66,15 @@ def test_a_bundled_robot_can_be_trained(biped):
     assert len(set(names)) == len(names)
 
 
+def test_a_task_of_many_robots_and_mini_batches_is_tried(quadruped, small):
+    many = replace(
+        small,
+        env=replace(small.env, num_envs=4096),
+        algorithm=replace(small.algorithm, num_mini_batches=512),
+    )
+    assert "environment initialises" not in failed(smoke(quadruped, many, Plane()))
+
+
 def test_on_a_map_feet_start_on_the_ground_and_heights_are_observed(
     quadruped, map_ground, lively, calm
 ):
