@@ -32,7 +32,7 @@ Activation = Literal[
 class Env(Section):
     """How many environments there are, and how long an episode lasts."""
 
-    num_envs: Count = 1024
+    num_envs: Count = 512
     """Environments that are stepped together; on a CPU 512 to 1024 pay best."""
 
     episode_length_s: Annotated[float, Limits(least=0.0, most=1e6, zero=False)] = 20.0
