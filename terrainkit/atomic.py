@@ -20,15 +20,21 @@ def atomic_write(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
         ExportError: if a target exists and `overwrite` is not set, or cannot be written.
     """
     check_target(path, overwrite=overwrite)
-    if path.is_symlink():
-        path = path.resolve()  # through the link, which stays one
+    name = path.name
+    try:
+        if path.is_symlink():
+            path = path.resolve()  # through the link, which stays one
+    except (OSError, RuntimeError) as error:  # before Python 3.13 a loop is a RuntimeError
+        raise ExportError(f"cannot write {path}: {error}") from error
     try:
         # Beside the target, so that moving there is a rename on the same disk.
         folder = Path(tempfile.mkdtemp(prefix=".terrainkit-", dir=path.parent))
     except OSError as error:
         raise ExportError(f"cannot write {path}: {error.strerror or error}") from error
     try:
-        yield folder / path.name
+        yield folder / name  # whose suffix may name the format
+        if name != path.name:
+            (folder / name).rename(folder / path.name)
         written = sorted(folder.iterdir())
         for file in written:
             check_target(path.with_name(file.name), overwrite=overwrite)

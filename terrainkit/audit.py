@@ -94,6 +94,8 @@ def _patches(terrain_map: TerrainMap) -> Iterator[str]:
         warnings.simplefilter("ignore", TerrainkitWarning)
         columns = terrain_columns(config)
     for row, col in _patch_indices(terrain_map):
+        (i, j), (nx, ny) = config.patch_start(row, col), config.patch_shape
+        border[i : i + nx, j : j + ny] = False
         kind, difficulty = assign_patch(config, columns, row, col)
         try:
             made = build_patch(config, config.mix[kind], difficulty, row, col)
@@ -101,8 +103,6 @@ def _patches(terrain_map: TerrainMap) -> Iterator[str]:
             yield f"patch ({row}, {col}) cannot be made from its config: {error}"
             continue
         yield from _differences(terrain_map.tile(row, col), made, f"patch ({row}, {col})")
-        (i, j), (nx, ny) = config.patch_start(row, col), made.grid.shape
-        border[i : i + nx, j : j + ny] = False
     if (np.abs(terrain_map.heights[border]) > _MILLIMETRE).any():
         yield "the border is not level at height 0"
 
@@ -140,6 +140,10 @@ def _realized(terrain_map: TerrainMap) -> Iterator[str]:
 
 def _spawn(terrain_map: TerrainMap) -> Iterator[str]:
     config = terrain_map.config
+    if 2 * config.spawn_radius > min(config.patch_size):
+        x, y = config.patch_size
+        yield f"no disc of radius {config.spawn_radius:g} m lies in a patch of {x:g} m x {y:g} m"
+        return
     radius = config.spawn_radius * np.linspace(0, 1, max(3, round(config.spawn_radius / 0.05)))
     angle = np.linspace(0, 2 * np.pi, 48, endpoint=False)
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)

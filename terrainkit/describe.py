@@ -58,7 +58,8 @@ def describe(name: str) -> TerrainText:
     terrain = registry.find(name)
     texts = {
         field.arg_name: " ".join((field.description or "").split())
-        for field in docstring_parser.parse_from_object(terrain).params
+        for owner in reversed(terrain.__mro__[:-1])  # a subclass has the words of its parents
+        for field in docstring_parser.parse_from_object(owner).params
     }
     return TerrainText(
         name=name,
@@ -68,7 +69,7 @@ def describe(name: str) -> TerrainText:
                 name=name,
                 easy=_text(parameter.easy),
                 hard=_text(parameter.hard) if parameter.hard != parameter.easy else "",
-                text=texts[name],
+                text=texts.get(name, ""),
             )
             for name, parameter in parameters_of(terrain).items()
         ),

@@ -28,8 +28,9 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
         progress: Wraps the walk over the patches, for a progress bar.
 
     Warns:
-        TerrainkitWarning: if a terrain of a preset gets no column, or the cells are too coarse (or
-            the patches too small) for what was asked.
+        TerrainkitWarning: if a terrain of a preset gets no column, if the cells are too coarse (or
+            the patches too small) for what was asked, or if a robot cannot start where the terrain
+            would have it.
 
     Raises:
         ConfigError: if a terrain does not fit in a patch, or leaves no room to spawn.
@@ -55,6 +56,7 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
         difficulty[row, col] = level
         parameters[row, col] = patch.parameters
     _warn_of_deviations(config, kinds, parameters)
+    _warn_of_moved_spawns(config, kinds, parameters, origins)
     return TerrainMap(
         config=config,
         grid=grid,
@@ -80,8 +82,33 @@ def _warn_of_deviations(
     if counts:
         said = listing(f"{name} on {count} patches" for name, count in counts.items())
         warnings.warn(
-            f"cells of {config.cell:g} m, or the patches, are too coarse or small for what was "
-            f"asked: {said}; the map records what was built",
+            f"cells of {config.cell:g} m, steps of height, or patches are too coarse or small for "
+            f"what was asked: {said}; the map records what was built",
+            TerrainkitWarning,
+            stacklevel=3,
+        )
+
+
+def _warn_of_moved_spawns(
+    config: MapConfig,
+    kinds: NDArray[np.int32],
+    parameters: NDArray[np.object_],
+    origins: NDArray[np.float32],
+) -> None:
+    """Warn of robots that start elsewhere, which may be beyond what they are to learn."""
+    counts: Counter[str] = Counter()
+    records: list[Parameters] = parameters.ravel().tolist()
+    for (row, col), record in zip(np.ndindex(*kinds.shape), records, strict=True):
+        choice = config.mix[kinds[row, col]]
+        terrain = registry.find(choice.terrain)(**record.requested)
+        wanted = terrain.spawn(config.patch_grid(row, col))
+        if np.abs(origins[row, col, :2] - wanted).max() > config.cell:
+            counts[choice.name] += 1
+    if counts:
+        said = listing(f"{name} on {count} patches" for name, count in counts.items())
+        warnings.warn(
+            f"no level disc of radius {config.spawn_radius:g} m where robots should start: {said}; "
+            "they start at the nearest one; wanted a larger platform or a smaller spawn_radius",
             TerrainkitWarning,
             stacklevel=3,
         )

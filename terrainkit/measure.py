@@ -25,15 +25,13 @@ def hardness(heights: NDArray[np.float32], cell: float, start: float) -> float:
         cell: Distance between two samples [m].
         start: Height that the robot starts from [m].
     """
-    longest = max(1, round(STRIDE / cell))
-    steps = [
-        np.abs(step).ravel()
-        for n in range(1, longest + 1)
-        for step in (heights[n:] - heights[:-n], heights[:, n:] - heights[:, :-n])
-    ]
-    per_step = _clipped_mean(np.concatenate(steps))
-    return per_step + _clipped_mean(np.abs(heights - np.float32(start)))
+    total, count = 0.0, 0
+    for n in range(1, max(1, round(STRIDE / cell)) + 1):
+        for step in (heights[n:] - heights[:-n], heights[:, n:] - heights[:, :-n]):
+            total, count = total + _clipped_sum(step), count + step.size
+    away = _clipped_sum(heights - np.float32(start)) / heights.size
+    return (total / count if count else 0.0) + away
 
 
-def _clipped_mean(change: NDArray[np.float32]) -> float:
-    return float(np.minimum(change, LEG).mean(dtype=np.float64)) if change.size else 0.0
+def _clipped_sum(change: NDArray[np.float32]) -> float:
+    return float(np.minimum(np.abs(change), LEG).sum(dtype=np.float64))

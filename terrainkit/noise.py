@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 from terrainkit.grid import Grid
 from terrainkit.parameter import Realized
 
+STEP = 0.005
+"""Heights are multiples of it unless told: Isaac Gym's own vertical scale [m]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class LatticeNoise:

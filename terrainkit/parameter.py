@@ -49,6 +49,9 @@ class Parameter:
     ramps: bool = True
     """Whether it may be given as a range (easy, hard)."""
 
+    slack: float = 0.0
+    """How much it may be off, in its own unit: what is made of steps may miss one."""
+
     def at(self, difficulty: float) -> Value:
         """Return the default at `difficulty`, 0 to 1."""
         return at_difficulty((self.easy, self.hard), difficulty)
@@ -65,9 +68,11 @@ class Parameter:
     def deviates(self, asked: Value, built: Realized, cell: float) -> bool:
         """Return whether `built` differs from `asked` by more than it has to.
 
-        A length on the cells may be half a cell off, or one to stay centered; any other number 5 %.
+        A length on the cells may be half a cell off, or one to stay centered; any other number 5 %,
+        or its slack.
         """
-        allowed = {"cells": cell / 2, "centered": cell, "none": 0.05 * asked}[self.snap]
+        least = {"cells": cell / 2, "centered": cell, "none": 0.05 * asked}[self.snap]
+        allowed = max(least, self.slack)
         ends = built if isinstance(built, tuple) else (built,)
         return any(abs(end - asked) > allowed + 1e-6 for end in ends)
 
@@ -84,9 +89,9 @@ def at_difficulty(value: Value | Range, difficulty: float) -> Value:
     return easy if easy == hard else easy * (1.0 - difficulty) + hard * difficulty
 
 
-def height(easy: float, hard: float | None = None) -> Any:
-    """Declare a vertical length [m]; heights are floats, so it is met as it is."""
-    return _field(easy, hard)
+def height(easy: float, hard: float | None = None, *, slack: float = 0.0) -> Any:
+    """Declare a vertical length [m]; heights are floats, so it is met as it is, or to `slack`."""
+    return _field(easy, hard, slack=slack)
 
 
 def length(easy: float, hard: float | None = None, *, zero: bool = False) -> Any:

@@ -121,6 +121,11 @@ class Terrain(ABC):
             raise ConfigError(
                 f"{self.kind()}: {name} {value:g} m does not fit in a patch of {x:g} m x {y:g} m"
             )
+        if all(count >= n for count, n in zip(counts, plot.shape, strict=True)):
+            x, y = plot.size
+            raise ConfigError(
+                f"{self.kind()}: {name} {value:g} m leaves nothing of a patch of {x:g} m x {y:g} m"
+            )
         if min(counts) == 0:
             raise ConfigError(
                 f"{self.kind()}: {name} {value:g} m cannot be held by cells of {plot.cell:g} m; "

@@ -1,6 +1,7 @@
 """The commands that make, look at and check maps."""
 
 import dataclasses
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -131,8 +132,9 @@ class List(Command):
         return 0
 
 
-_WHOLE_MAP = (-1, -1)
-"""No patch in particular; not None, since tyro's errors about a union name its members."""
+_WHOLE_MAP = (-sys.maxsize, -sys.maxsize)
+"""No patch in particular, and none that one would ask for; not None, since tyro's errors about a
+union name its members."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
-from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.terrain import Terrain
 
@@ -30,10 +29,5 @@ class PyramidSlope(Terrain):
     def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the sides, falling by `grade` times a cell from ring to ring."""
         rings = plot.rings(plot.centered(self.platform))
-        if rings.max() == 0:
-            raise ConfigError(
-                f"{self.kind()}: the platform of {self.platform:g} m leaves no slope in a patch of "
-                f"{plot.size[0]:g} m x {plot.size[1]:g} m"
-            )
         rise: NDArray[np.floating] = self.grade * plot.cell * (rings.max() - rings)
         return -rise if self.inverted else rise

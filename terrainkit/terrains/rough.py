@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.grid import Grid
-from terrainkit.noise import LatticeNoise
+from terrainkit.noise import STEP, LatticeNoise
 from terrainkit.parameter import Realized
 from terrainkit.terrain import Terrain
 
@@ -16,10 +16,10 @@ from terrainkit.terrain import Terrain
 class Rough(Terrain):
     """Uniform noise around height 0, with a level platform to start from."""
 
-    amplitude: float = parameter.height(0.02, 0.1)
-    """Largest height above or below 0 [m]."""
+    amplitude: float = parameter.height(0.02, 0.1, slack=STEP)
+    """Largest height above or below 0 [m]; of it there are whole steps."""
 
-    step: float = parameter.height(0.005)
+    step: float = parameter.height(STEP)
     """Heights are drawn as multiples of this [m]."""
 
     spacing: float = parameter.scalar(0.2, zero=False)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.grid import Grid
-from terrainkit.noise import LatticeNoise
+from terrainkit.noise import STEP, LatticeNoise
 from terrainkit.parameter import Realized
 from terrainkit.terrain import Terrain
 from terrainkit.terrains.pyramid_slope import PyramidSlope
@@ -20,10 +20,10 @@ class RoughSlope(Terrain):
     grade: float = parameter.grade(0.0, 0.4)
     """Rise over run of the sides, before the noise."""
 
-    amplitude: float = parameter.height(0.05)
-    """Largest height of the noise above or below the slope [m]."""
+    amplitude: float = parameter.height(0.05, slack=STEP)
+    """Largest height of the noise above or below the slope [m]; of it there are whole steps."""
 
-    step: float = parameter.height(0.005)
+    step: float = parameter.height(STEP)
     """Noise is drawn as multiples of this [m]."""
 
     spacing: float = parameter.scalar(0.2, zero=False)

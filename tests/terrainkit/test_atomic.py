@@ -161,6 +161,22 @@ def test_a_link_stays_one_and_what_it_leads_to_is_written(target):
         write(target)
 
 
+def test_what_is_written_through_a_link_has_the_name_of_the_link_until_it_is_there(target):
+    target.symlink_to("blob")
+    with atomic_write(target) as path:
+        assert path.name == target.name
+        path.write_text("new")
+    assert target.with_name("blob").read_text() == "new"
+    assert target.is_symlink()
+
+
+def test_a_link_to_itself_is_an_export_error(target):
+    target.symlink_to(target.name)
+    with pytest.raises(ExportError, match="cannot write"):
+        write(target)
+    assert target.is_symlink()
+
+
 def test_a_name_too_long_for_the_disk_is_an_export_error(tmp_path):
     with pytest.raises(ExportError, match=r"cannot write .*: File name too long"):
         write(tmp_path / ("m" * 300))

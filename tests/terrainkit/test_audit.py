@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import terrainkit as tk
+from terrainkit import presets
 from terrainkit.audit import audit
 from terrainkit.mesh import TriMesh
 
@@ -39,6 +40,19 @@ def test_a_map_of_ours_has_nothing_wrong(config):
     terrain_map = tk.generate(config)
     assert found(terrain_map) == []
     assert found(terrain_map, terrain_map.mesh(merged=False)) == []
+
+
+@pytest.mark.parametrize("preset", presets.names())
+def test_no_preset_builds_something_else_than_it_asks_for(preset):
+    terrain_map = tk.generate(tk.MapConfig(rows=10, cols=17, border=0.0, preset=preset))
+    assert found(terrain_map) == []
+
+
+def test_a_disc_wider_than_a_patch_is_one_line_in_bounded_time(sound):
+    config = dataclasses.replace(sound.config, spawn_radius=1e6)
+    messages = found(dataclasses.replace(sound, config=config))
+    assert ("spawn", "no disc of radius 1e+06 m lies in a patch of 8 m x 8 m") in messages
+    assert not any("border" in message for _, message in messages)
 
 
 def test_a_height_that_is_no_number(sound):

@@ -28,18 +28,54 @@ def test_a_map_beyond_the_memory_is_refused_before_it_is_begun():
         generate(MapConfig(rows=10_000, cols=10_000))
 
 
-def test_the_limit_of_a_control_group_counts(tmp_path, monkeypatch):
-    (tmp_path / "memory.max").write_text(f"{3 * 10**9}\n")
-    (tmp_path / "memory.current").write_text(f"{2 * 10**9}\n")
-    monkeypatch.setattr("terrainkit.capacity._CONTROL_GROUP", str(tmp_path))
+@pytest.fixture
+def group(tmp_path, monkeypatch):
+    """Return a function that makes a control group which this process is in, or is below."""
+    own = tmp_path / "cgroup"
+    own.write_text("1:net:/x\n0::/job/step\n")
+    monkeypatch.setattr("terrainkit.capacity._OWN_GROUP", own)
+    monkeypatch.setattr("terrainkit.capacity._CONTROL_GROUPS", tmp_path / "groups")
+
+    def make(name, limit, used=2 * 10**9, cached=0):
+        folder = tmp_path / "groups" / name
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "memory.max").write_text(f"{limit}\n")
+        (folder / "memory.current").write_text(f"{used}\n")
+        (folder / "memory.stat").write_text(f"anon 5\ninactive_file {cached}\n")
+
+    return make
+
+
+@pytest.mark.parametrize("name", [".", "job", "job/step"])
+def test_the_limit_of_a_control_group_counts(group, name):
+    group("job/step", "max")
+    group(name, 3 * 10**9)
     require_memory(9 * 10**8, "a map")
     with pytest.raises(CapacityError, match=r"a map needs 1\.1 GB of memory; 1\.0 GB free"):
         require_memory(11 * 10**8, "a map")
 
 
-@pytest.mark.parametrize("limit", ["max\n", ""])
-def test_a_control_group_without_a_limit_does_not(tmp_path, monkeypatch, limit):
-    (tmp_path / "memory.max").write_text(limit)
-    (tmp_path / "memory.current").write_text("1\n")
-    monkeypatch.setattr("terrainkit.capacity._CONTROL_GROUP", str(tmp_path))
+def test_the_smallest_of_several_counts(group):
+    group(".", 9 * 10**9)
+    group("job", 3 * 10**9)
+    group("job/step", 8 * 10**9)
+    with pytest.raises(CapacityError, match=r"1\.0 GB free"):
+        require_memory(11 * 10**8, "a map")
+
+
+def test_copies_of_files_are_no_use_of_memory(group):
+    group("job", 3 * 10**9, used=28 * 10**8, cached=2 * 10**9)
+    require_memory(21 * 10**8, "a map")
+    with pytest.raises(CapacityError, match=r"2\.2 GB free"):
+        require_memory(23 * 10**8, "a map")
+
+
+@pytest.mark.parametrize("limit", ["max", ""])
+def test_a_control_group_without_a_limit_does_not(group, limit):
+    group("job", limit, used=1)
+    require_memory(3 * 10**8, "a map")
+
+
+def test_a_limit_of_another_group_does_not(group):
+    group("other", 1)
     require_memory(3 * 10**8, "a map")

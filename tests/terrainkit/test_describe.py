@@ -1,6 +1,8 @@
+from dataclasses import dataclass
+
 import pytest
 
-from terrainkit import registry
+from terrainkit import parameter, registry
 from terrainkit.describe import describe, summaries
 from terrainkit.errors import ConfigError
 
@@ -11,15 +13,28 @@ def test_every_terrain_and_parameter_has_words_and_a_unit(name):
     assert about.text.partition("\n")[0].endswith(".")
     assert [p.name for p in about.parameters] == list(registry.find(name).at(0).requested())
     unitless = {"grade", "number", "inverted"}
-    for parameter in about.parameters:
-        assert parameter.text.endswith(".")
-        assert ("[m]" in parameter.text) != (parameter.name in unitless)
+    for each in about.parameters:
+        assert each.text.endswith(".")
+        assert ("[m]" in each.text) != (each.name in unitless)
 
 
 def test_a_range_has_two_ends_and_a_value_one():
     step_height, step_width, *_ = describe("pyramid_stairs").parameters
     assert (step_height.easy, step_height.hard) == ("0.05", "0.23")
     assert (step_width.easy, step_width.hard) == ("0.31", "")
+
+
+def test_a_terrain_of_others_has_the_words_of_its_parent_and_none_are_needed(monkeypatch):
+    @dataclass(frozen=True, kw_only=True)
+    class Hurdles(registry.find("stairs")):
+        """Hurdles."""
+
+        number: int = parameter.count(3)
+
+    monkeypatch.setattr(registry, "find", lambda _: Hurdles)
+    words = {each.name: each.text for each in describe("hurdles").parameters}
+    assert words["step_height"] == "Rise of a step [m]."
+    assert words["number"] == ""
 
 
 def test_summaries_are_one_sentence_each():

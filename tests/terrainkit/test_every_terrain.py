@@ -77,6 +77,23 @@ def test_heights_are_finite_float32_of_the_shape_of_the_patch(terrain, given_par
         assert np.isfinite(heights).all()
 
 
+@pytest.mark.parametrize(
+    ("terrain", "block"),
+    [
+        (name, field)
+        for name in registry.names()
+        for field, known in parameters_of(registry.find(name)).items()
+        if known.snap == "centered"
+    ],
+)
+@pytest.mark.parametrize("size", [4.0, 7.9])
+def test_a_block_as_wide_as_the_patch_is_refused(terrain, block, size):
+    plot = Grid(shape=(round(size / 0.1),) * 2, cell=0.1)
+    choice = TerrainChoice(terrain=terrain, parameters={block: size})
+    with pytest.raises(ConfigError, match=f"{block} {size:g} m leaves nothing of a patch of"):
+        choice.at(0.5).build(plot, np.random.default_rng(0))
+
+
 @coarse
 @every_plot
 @every_terrain

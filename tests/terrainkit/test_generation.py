@@ -169,6 +169,21 @@ def test_progress_sees_every_patch():
     assert seen == [4, (0, 0), (0, 1), (1, 0), (1, 1)]
 
 
+@pytest.mark.parametrize(
+    ("terrain", "given"),
+    [
+        ("gap", {"platform": 1.0}),
+        ("pit", {"side": 1.0}),
+        ("stairs", {"landing": 1.0, "step_width": 0.7}),
+    ],
+)
+def test_a_robot_that_cannot_start_where_it_should_is_told(terrain, given):
+    choice = TerrainChoice(terrain=terrain, parameters=given)
+    config = MapConfig(rows=3, cols=1, border=0.0, difficulty_range=(0.5, 1.0), terrains=(choice,))
+    with pytest.warns(TerrainkitWarning, match=f"where robots should start: {terrain} on 3 patch"):
+        generate(config)
+
+
 def test_a_preset_with_too_few_columns_warns_once():
     with pytest.warns(TerrainkitWarning, match="2 columns .*no column for rough_slope, ") as caught:
         generate(MapConfig(rows=2, cols=2, preset="rough", border=0.0))

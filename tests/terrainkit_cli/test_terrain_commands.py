@@ -213,9 +213,10 @@ def test_info_of_a_patch_shows_asked_and_built(terrainkit):
 
 
 def test_info_of_a_patch_that_is_not_there(terrainkit, small):
-    run = terrainkit("info", small, "--patch", 2, 0)
-    assert run.returncode == 2
-    assert "no patch (2, 0) in a map of 2 rows and 5 columns" in run.stderr
+    for patch in ((2, 0), (-1, -1)):
+        run = terrainkit("info", small, "--patch", *patch)
+        assert run.returncode == 2
+        assert f"no patch {patch} in a map of 2 rows and 5 columns" in run.stderr
 
 
 def test_preview_is_a_picture_of_the_width_asked(terrainkit, tmp_path, small):

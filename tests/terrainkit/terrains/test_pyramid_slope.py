@@ -73,7 +73,7 @@ def test_the_grade_grows_with_the_difficulty(difficulty, peak, plot, rng):
 
 
 def test_a_platform_of_the_whole_patch_is_an_error(plot, rng):
-    with pytest.raises(ConfigError, match="platform of 8 m leaves no slope in a patch of 8 m x 8"):
+    with pytest.raises(ConfigError, match="platform 8 m leaves nothing of a patch of 8 m x 8"):
         PyramidSlope(grade=0.4, platform=8.0).build(plot, rng)
 
 
