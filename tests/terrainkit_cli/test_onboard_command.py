@@ -154,9 +154,34 @@ def test_an_edited_spec_is_kept_when_its_folder_is_replaced(here, tmp_path):
     assert code == 0
     assert "robot.toml.before" in out
     assert "# Mine." in (tmp_path / "arm/robot.toml.before").read_text()
-    # Once more, and there is nothing new to be kept.
+    # Once more, and there is nothing new to be kept: what was kept stays.
     code, out, _ = here("arm.urdf", NO_PICTURES, "--overwrite")
     assert code == 0
+    assert "# Mine." in (tmp_path / "arm/robot.toml.before").read_text()
+
+
+def test_an_edited_configuration_is_kept_and_a_file_of_ones_own_is_not_touched(here, tmp_path):
+    words = ("quadruped", "-o", "robot", NO_PICTURES, "--overwrite", "--config", "mjlab")
+    assert here(*words)[0] == 0
+    config = tmp_path / "robot/mjlab_config.py"
+    config.write_text(config.read_text() + "# Mine.\n")
+    code, out, _ = here(*words)
+    assert code == 0
+    assert "mjlab_config.py.before" in out
+    assert "# Mine." in (tmp_path / "robot/mjlab_config.py.before").read_text()
+    (tmp_path / "robot/train_config.py").write_text("mine")
+    code, _, err = here(*words)
+    assert code == 2
+    assert "also holds train_config.py, which onboarding did not write" in one_line(err)
+    assert (tmp_path / "robot/train_config.py").read_text() == "mine"
+
+
+def test_settings_that_select_rules_let_no_broken_robot_in(here, tmp_path):
+    text = (tmp_path / "arm.urdf").read_text()
+    (tmp_path / "arm.urdf").write_text(text.replace('<mass value="1"', '<mass value="-1"', 1))
+    (tmp_path / "pyproject.toml").write_text('[tool.terrainkit.check-robot]\nselect = ["NAM"]\n')
+    assert here("arm.urdf", NO_PICTURES)[0] == 1
+    assert not (tmp_path / "arm").exists()
 
 
 def test_the_help_names_every_framework(capsys):

@@ -38,7 +38,7 @@ class Body:
     """Index of the parent; None for the trunk."""
 
     joint: Joint | None
-    """The joint that moves it; None for the trunk, and for a body that floats."""
+    """The joint that moves it, of whatever kind; None for the trunk."""
 
     mount: Matrix
     """Frame of the joint's child at its reference in the parent body's, shape (4, 4) [m]."""

@@ -1,4 +1,4 @@
-"""Rigid motions: undone, and how far apart two of them are."""
+"""Rigid motions: made of quaternions, undone, and how far apart two of them are."""
 
 import math
 
@@ -26,3 +26,19 @@ def apart(a: Matrix, b: Matrix) -> tuple[Matrix, Matrix]:
     distance = np.linalg.norm(a[..., :3, 3] - b[..., :3, 3], axis=-1)
     between = np.linalg.norm(a[..., :3, :3] - b[..., :3, :3], axis=(-2, -1))
     return distance, 2 * np.arcsin(np.clip(between / math.sqrt(8), 0.0, 1.0))
+
+
+def turned_by(quat: Matrix) -> Matrix:
+    """Return the rotation of a quaternion w, x, y, z, of any length above zero, shape (3, 3)."""
+    w, x, y, z = map(float, quat)
+    if x == y == z == 0:
+        return np.eye(3)
+    length = math.sqrt(w * w + x * x + y * y + z * z)
+    w, x, y, z = w / length, x / length, y / length, z / length
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )

@@ -4,6 +4,7 @@ import io
 import os
 import sys
 import zipfile
+import zlib
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -16,6 +17,17 @@ from terrainkit_robots.mesh.surface import Surface
 
 _MOST_BYTES = 64 * 2**20
 """No parts take more; of a longer file nothing is read."""
+
+_DAMAGED = (
+    OSError,
+    ValueError,
+    KeyError,
+    EOFError,
+    NotImplementedError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What numpy raises of a file that is no archive of arrays any more."""
 
 
 def cache_folder() -> Path:
@@ -81,7 +93,7 @@ def unpacked(data: bytes) -> tuple[Surface, ...] | None:
                 Surface(points=arrays[f"points_{k}"], faces=arrays[f"faces_{k}"])
                 for k in range(count)
             )
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, NotImplementedError):
+    except _DAMAGED:
         return None
     return parts if parts and all(map(_is_sound, parts)) else None
 

@@ -15,7 +15,7 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit_robots import config
 from terrainkit_robots.config.legged_robot import check_legs
 from terrainkit_robots.config.robot import ConfiguredRobot
-from terrainkit_robots.spec.named_bodies import body_name, feet
+from terrainkit_robots.spec.named_bodies import body_name
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def config_of(framework: str, facts: "Facts", spec: RobotSpec) -> str:
     Raises:
         ConfigError: if there is no such framework, or it cannot have such a robot.
     """
-    bodies = (*(body_name(body) for body in facts.bodies), *feet(facts))
+    bodies = (*(body_name(body) for body in facts.bodies), *spec.feet)
     ranges = {joint.name: joint.range for joint in facts.model.joints if joint.range is not None}
     return config_text(framework, spec, bodies=bodies, ranges=ranges)
 

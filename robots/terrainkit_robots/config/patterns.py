@@ -5,6 +5,10 @@ from collections.abc import Mapping, Sequence
 
 from terrainkit.errors import ConfigError
 
+_RUN = "|_+)"
+"""Ends the part of a pattern that stands for letters beyond ASCII: how many underscores come in
+their place depends on the importer."""
+
 
 def usd_patterns(names: Sequence[str]) -> dict[str, str]:
     """Return a pattern for each name that also matches what USD makes of it.
@@ -38,7 +42,7 @@ def mjlab_patterns(names: Sequence[str]) -> dict[str, str]:
 def _usd_pattern(name: str) -> str:
     if not name:
         raise ConfigError("a joint or body without a name cannot be configured")
-    pattern = re.sub(r"[^\x00-\x7f]+", r"(?:\g<0>|_+)", re.sub(r"[\x00-\x7f]", _letter, name))
+    pattern = re.sub(r"[^\x00-\x7f]+", rf"(?:\g<0>{_RUN}", re.sub(r"[\x00-\x7f]", _letter, name))
     if re.match(r"[A-Za-z]", pattern):
         return pattern
     first = "[" + pattern[0] + "_]" if pattern[0].isdigit() else pattern[0]
@@ -56,6 +60,21 @@ def _only_own(
     """Return the patterns, if each of them matches its own name only."""
     for name, pattern in patterns.items():
         for other in patterns:
-            if other != name and re.fullmatch(pattern, (seen or {}).get(other, other)):
+            if other != name and _matches(name, pattern, (seen or {}).get(other, other)):
                 raise ConfigError(f"{name!r} and {other!r} are one name in {where}; rename one")
     return dict(patterns)
+
+
+def _matches(name: str, pattern: str, other: str) -> bool:
+    """Return whether the pattern of a name matches another."""
+    if _RUN not in pattern:
+        return re.fullmatch(pattern, other) is not None
+    # Trying how many underscores are whose may take for ever; so their number does not count.
+    return _flat(name) == _flat(other)
+
+
+def _flat(name: str) -> str:
+    """Return what USD makes of a name, with one underscore for several."""
+    flat = re.sub(r"[^A-Za-z0-9]+", "_", name)
+    flat = "_" + flat[1:] if flat[0].isdigit() else flat
+    return "a" * flat.startswith("_") + flat

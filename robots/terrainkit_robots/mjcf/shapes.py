@@ -1,6 +1,5 @@
 """Shapes and poses of MJCF: what MuJoCo's parser has read, in the frame of the body."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -8,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from terrainkit_robots.body.rigid import turned_by
 from terrainkit_robots.mjcf.document import Node
 from terrainkit_robots.mjcf.inertia import Solid
 from terrainkit_robots.model import Geometry, Matrix, MeshFile, ShapeKind
@@ -83,23 +83,7 @@ def turn_of(quat: Matrix, alternative: Any, compiler: Any, spec: "mujoco.MjSpec"
                 degree=bool(compiler.degree), sequence=compiler.eulerseq, orientation=alternative
             )
         )
-    return rotation_of(quat)
-
-
-def rotation_of(quat: Matrix) -> Matrix:
-    """Return the rotation of a quaternion w, x, y, z, of any length above zero, shape (3, 3)."""
-    w, x, y, z = map(float, quat)
-    if x == y == z == 0:
-        return np.eye(3)
-    length = math.sqrt(w * w + x * x + y * y + z * z)
-    w, x, y, z = w / length, x / length, y / length, z / length
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return turned_by(quat)
 
 
 def frame_scale(frame: Any) -> Scale:
@@ -182,7 +166,7 @@ def between(ends: Matrix) -> tuple[Matrix, float]:
         norm = np.hypot(x, y)
         axis = axis / norm if norm > 1e-14 else np.array([1.0, 0, 0])
         half = np.arctan2(norm, z) / 2
-        pose[:3, :3] = rotation_of(np.array([np.cos(half), *(np.sin(half) * axis)]))
+        pose[:3, :3] = turned_by(np.array([np.cos(half), *(np.sin(half) * axis)]))
     pose[:3, 3] = (ends[:3] + ends[3:]) / 2
     return pose, length / 2
 
@@ -257,7 +241,7 @@ def mesh_geometry(geometry: Geometry, mesh: Any, file: MeshFile, scale: Scale) -
     MuJoCo takes `refpos` from each vertex, turns by `refquat` back, and then scales.
     """
     factors = np.array(file.scale)
-    turn = rotation_of(np.asarray(mesh.refquat)).T
+    turn = turned_by(np.asarray(mesh.refquat)).T
     if np.any(factors != factors[0]) and np.abs(turn - np.eye(3)).max() > 1e-9:
         return replace(geometry, shape="unknown", mesh=file)  # no scaled mesh in any pose
     moved = np.eye(4)

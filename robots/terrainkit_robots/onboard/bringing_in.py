@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.lint import Report
-from terrainkit_robots.onboard.folder import KEPT, check_folder, new_folder, write_files
-from terrainkit_robots.onboard.onboarding import MJCF, SPEC, Given, Onboarded, onboard
+from terrainkit_robots.onboard.folder import check_folder, new_folder, of_before, write_files
+from terrainkit_robots.onboard.onboarding import MJCF, Given, Onboarded, onboard
 from terrainkit_robots.settings import Settings, read_settings
 from terrainkit_robots.writing.normal_form import plain_name
 
@@ -101,8 +101,8 @@ class BroughtIn:
     no_pictures: str = ""
     """Why there are no pictures."""
 
-    kept: bool = False
-    """Whether the robot.toml of the folder before is in this one, under another name."""
+    kept: tuple[str, ...] = ()
+    """Files with what was edited in the folder before."""
 
 
 def bring_in(file: Path, wishes: Wishes) -> BroughtIn:
@@ -137,11 +137,11 @@ def bring_in(file: Path, wishes: Wishes) -> BroughtIn:
         progress=wishes.progress,
     )
     configs = _configs(made, wishes.configs)
-    kept = _edited(target, made.files[SPEC])
+    kept = of_before(target, {**made.files, **configs})
     with new_folder(target, overwrite=wishes.overwrite) as folder:
         wishes.say("proving that it stands")
         write_files(folder, made.files)
-        write_files(folder, {name: text.encode() for name, text in configs.items()})
+        write_files(folder, configs)
         # The pictures are drawn by another process, which there is no need to wait for.
         with ThreadPoolExecutor(1) as beside:
             drawing = beside.submit(_pictures, folder) if wishes.pictures else None
@@ -158,7 +158,7 @@ def bring_in(file: Path, wishes: Wishes) -> BroughtIn:
             configs=tuple(configs),
             pictures=tuple(pictures),
             no_pictures=no_pictures,
-            kept=bool(kept),
+            kept=tuple(kept),
         )
         write_files(folder, {"report.md": report_page(done).encode()})
     return done
@@ -194,13 +194,14 @@ def _check_frameworks(frameworks: Sequence[str]) -> None:
             file_name(name)
 
 
-def _configs(made: Onboarded, frameworks: Sequence[str]) -> dict[str, str]:
+def _configs(made: Onboarded, frameworks: Sequence[str]) -> dict[str, bytes]:
     """Return configurations by the names of their files."""
     if not frameworks:
         return {}
     from terrainkit_robots.config.frameworks import config_of, file_name
 
-    return {file_name(name): config_of(name, made.facts, made.spec) for name in frameworks}
+    texts = {file_name(name): config_of(name, made.facts, made.spec) for name in frameworks}
+    return {name: text.encode() for name, text in texts.items()}
 
 
 def keeps_out(finding: "Finding") -> bool:
@@ -215,8 +216,10 @@ def _repaired(file: Path, wishes: Wishes) -> tuple[Report, tuple["Finding", ...]
     from terrainkit_robots.robot_file import read_robot
     from terrainkit_robots.selection import lint_selected
 
-    # What is simulated is what will be written, not what was read.
-    settings = replace(wishes.settings.over(read_settings(file.parent)), simulate=False)
+    # What is simulated is what will be written, not what was read; and what may keep a robot out
+    # is always asked.
+    found_settings = wishes.settings.over(read_settings(file.parent))
+    settings = replace(found_settings, select=(), simulate=False)
 
     def look(contents: Mapping[Path, bytes]) -> Report:
         model = read_robot(
@@ -233,15 +236,6 @@ def _repaired(file: Path, wishes: Wishes) -> tuple[Report, tuple["Finding", ...]
         return found, ()
     result = fix_robot(file, lambda c: look(c) if c else found, unsafe=wishes.unsafe)
     return result.report, result.fixed
-
-
-def _edited(target: Path, spec: bytes) -> dict[str, bytes]:
-    """Return the spec of a folder that is replaced, under another name, if it says other things."""
-    try:
-        before = (target / SPEC).read_bytes()
-    except OSError:
-        return {}
-    return {} if before == spec else {KEPT: before}
 
 
 def _pictures(folder: Path) -> tuple[dict[str, bytes], str]:

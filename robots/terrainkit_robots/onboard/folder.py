@@ -12,15 +12,11 @@ from terrainkit_robots.wording import names
 SPEC = "robot.toml"
 """A folder that holds this file is an onboarded robot."""
 
-KEPT = "robot.toml.before"
-"""What the spec of a folder that is replaced is called in the new one."""
+_BEFORE = ".before"
+"""Ends the names of files with what was edited in a folder that is replaced."""
 
-_OURS = frozenset(
-    {SPEC, KEPT, "robot.urdf", "robot.xml", "scene.xml", "report.md", "report", "meshes"}
-)
-"""What onboarding writes, beside configurations."""
-
-_CONFIG_ENDING = "_config.py"
+_OURS = frozenset({"robot.urdf", "robot.xml", "scene.xml", "report.md", "report", "meshes"})
+"""What onboarding writes, beside the files that are there to be edited."""
 
 
 def check_folder(target: Path, *, overwrite: bool) -> None:
@@ -45,12 +41,41 @@ def check_folder(target: Path, *, overwrite: bool) -> None:
         raise ExportError(f"{target} exists; another name would do, or --overwrite")
     if SPEC not in held:
         raise ExportError(f"{target} holds no {SPEC}: it is not an onboarded robot to overwrite")
-    foreign = [name for name in held if name not in _OURS and not name.endswith(_CONFIG_ENDING)]
+    ours = _OURS | _to_be_edited()
+    foreign = [name for name in held if name.removesuffix(_BEFORE) not in ours]
     if foreign:
         raise ExportError(
             f"{target} also holds {names(foreign)}, which onboarding did not write; "
             "move it away to overwrite the rest"
         )
+
+
+def _to_be_edited() -> frozenset[str]:
+    """Return the names of the files that users edit: the spec, and configurations."""
+    from terrainkit_robots.config import frameworks
+
+    return frozenset({SPEC, *map(frameworks.file_name, frameworks.names())})
+
+
+def of_before(target: Path, files: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Return what was edited in a folder that is replaced, under names that tell.
+
+    That is what differs from the files that come in its place, and else what was kept before.
+
+    Raises:
+        ExportError: if a file cannot be read.
+    """
+    kept = {}
+    try:
+        for name in sorted(_to_be_edited()):
+            path, before = target / name, target / f"{name}{_BEFORE}"
+            if path.is_file() and path.read_bytes() != files.get(name):
+                kept[before.name] = path.read_bytes()
+            elif before.is_file():
+                kept[before.name] = before.read_bytes()
+    except OSError as error:
+        raise ExportError(f"cannot read {target}: {error.strerror or error}") from error
+    return kept
 
 
 @contextmanager
@@ -73,13 +98,23 @@ def new_folder(target: Path, *, overwrite: bool = False) -> Iterator[Path]:
         made.mkdir()
         yield made
         check_folder(target, overwrite=overwrite)
-        if target.is_dir():
-            target.replace(work / "before")
-        made.replace(target)
+        _swap(target, made, work / "before")
     except OSError as error:
         raise ExportError(f"cannot write {target}: {error.strerror or error}") from error
     finally:
         shutil.rmtree(work, ignore_errors=True)
+
+
+def _swap(target: Path, made: Path, before: Path) -> None:
+    """Move a folder to its place, and what is there out of the way; both or neither."""
+    if target.is_dir():
+        target.replace(before)
+    try:
+        made.replace(target)
+    except OSError:
+        if before.is_dir():
+            before.replace(target)
+        raise
 
 
 def write_files(folder: Path, files: Mapping[str, bytes]) -> None:

@@ -205,7 +205,7 @@ def _mjcf(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[str]]) 
         imu = replace(imu, name=f"{imu.name}_site")
     extras = Extras(
         drives=drives,
-        feet=foot_sites(facts),
+        feet=foot_sites(facts, spec.feet),
         imu=imu,
         frames=tuple(frames),
         excluded=single.model.excluded,

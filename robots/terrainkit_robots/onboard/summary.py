@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.onboard.agreement import POSES
-from terrainkit_robots.onboard.folder import KEPT
 from terrainkit_robots.report.tally import count, tally
 from terrainkit_robots.wording import names
 
@@ -31,7 +30,7 @@ def summary(done: "BroughtIn") -> Iterator[tuple[str, str]]:
     drawn = f"{count(len(done.pictures), 'picture')} in report.md"
     yield "pictures", drawn if done.pictures else f"none: {done.no_pictures}"
     if done.kept:
-        yield "kept", f"the robot.toml of before as {KEPT}; --spec takes its values"
+        yield "kept", f"what was edited before, as {names(done.kept)}; --spec takes values"
     missing = sum(finding.code == "MSH001" for finding in done.report.findings)
     if missing:
         yield "missing", f"{count(missing, 'mesh')}; --package NAME=DIR tells where a package is"

@@ -52,9 +52,10 @@ def _one(field: "Field[Any]", name: str, value: object, kind: Any) -> Any:
 
 
 def _check_numbers(field: "Field[Any]", name: str, numbers: Sequence[float]) -> None:
-    least = field.metadata.get("least")
+    least, above = field.metadata.get("least"), field.metadata.get("above", False)
     for number in numbers:
-        if not math.isfinite(number) or (least is not None and number < least):
+        low = least is not None and (number < least or (above and number == least))
+        if low or not math.isfinite(number):
             raise ConfigError(f"{name} is {number:g}; wanted {_wanted(field, float)}")
     if list(numbers) != sorted(numbers):
         raise ConfigError(f"{name} is {list(numbers)}; wanted the lower number first")
@@ -65,6 +66,8 @@ def _wanted(field: "Field[Any]", kind: Any) -> str:
     if not unit:
         return "a text" if kind is str else "a list of texts"
     what = "a finite number" if least is None else f"{least:g} or more"
+    if field.metadata.get("above"):
+        what = f"more than {least:g}"
     pair = get_origin(kind) is tuple
     return ("two numbers, each " if pair else "") + what + ("" if unit == "1" else f" {unit}")
 

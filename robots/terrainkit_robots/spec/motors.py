@@ -121,8 +121,8 @@ def _scale(joint: Joint, saturated: float) -> tuple[float, str]:
 
 
 def _sound(value: float | None) -> float | None:
-    """Return what is declared, if it is a limit."""
-    return rounded(value) if value is not None and 0 < value < math.inf else None
+    """Return what is declared, if it is a limit; what is rounded to nothing is none."""
+    return (rounded(value) or None) if value is not None and 0 < value < math.inf else None
 
 
 def _in_file(robot: Facts) -> Provenance:

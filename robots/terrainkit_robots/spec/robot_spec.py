@@ -63,9 +63,9 @@ class Twin:
 PerJoint = Mapping[str, float]
 
 
-def _in(unit: str, least: float | None = None) -> Mapping[str, Any]:
-    """Return what is known of numbers that are measured in `unit` and nowhere below `least`."""
-    return {"unit": unit, "least": least}
+def _in(unit: str, least: float | None = None, *, above: bool = False) -> Mapping[str, Any]:
+    """Return what is known of numbers in `unit`, nowhere below `least`, or all `above` it."""
+    return {"unit": unit, "least": least, "above": above}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,7 +114,7 @@ class RobotSpec:
     damping: PerJoint = field(metadata=_in("N m s/rad or N s/m", 0.0))
     """Derivative gain of each joint."""
 
-    effort: PerJoint = field(metadata=_in("N m or N", 0.0))
+    effort: PerJoint = field(metadata=_in("N m or N", 0.0, above=True))
     """Largest torque or force of each joint."""
 
     velocity: PerJoint = field(metadata=_in("rad/s or m/s", 0.0))

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 
+from terrainkit_robots.body.rigid import turned_by
 from terrainkit_robots.markup.document import XmlDocument
 from terrainkit_robots.markup.numbers import parse_numbers, without_commas
 from terrainkit_robots.model import (
@@ -138,11 +139,30 @@ class _Reader:
         if written is None:
             return origin
         xyz, rpy = self._numbers(written, "xyz", 3), self._numbers(written, "rpy", 3)
+        quat = self._quaternion(written)
         if xyz is not None:
             origin[:3, 3] = xyz
         if rpy is not None:
             origin[:3, :3] = rotation_of(rpy)
+        elif quat is not None:
+            origin[:3, :3] = turned_by(np.roll(quat, 1))
         return origin
+
+    def _quaternion(self, origin: "etree._Element") -> Matrix | None:
+        """Return the x, y, z and w of URDF 1.1, shape (4,); None if there is no rotation in it."""
+        quat = self._numbers(origin, "quat_xyzw", 4)
+        if quat is None:
+            return None
+        if origin.get("rpy") is not None:
+            told = "quat_xyzw of <origin> stands beside its rpy; wanted one of them"
+        elif not 0 < np.linalg.norm(quat) < np.inf:
+            told = (
+                f"quat_xyzw of <origin> is {short(origin.get('quat_xyzw', ''), 40)!r}, no rotation"
+            )
+        else:
+            return quat
+        self._tell("XML006", origin, told, attribute="quat_xyzw")
+        return None
 
     # Links
 

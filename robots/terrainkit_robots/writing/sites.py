@@ -21,23 +21,32 @@ _AROUND = 0.002
 """A foot's site is larger than its shapes by this on each side, so that contacts lie within [m]."""
 
 
-def foot_sites(facts: "Facts") -> tuple[Site, ...]:
-    """Return a site for each leg, around the shapes that touch the ground at the standing pose."""
+def foot_sites(facts: "Facts", feet: Sequence[str] = ()) -> tuple[Site, ...]:
+    """Return a site for each leg, around the shapes that touch the ground at the standing pose.
+
+    Args:
+        facts: The robot.
+        feet: What its feet are to be called, links that move with them; else as they were found.
+    """
     poses = body_poses(facts.bodies, facts.positions)
-    return tuple(_foot_site(leg, facts, poses) for leg in facts.legs)
+    called = {facts.body_of[name].index: name for name in feet}
+    return tuple(
+        _foot_site(leg, called.get(leg.limb.chain[-1], leg.foot), facts, poses)
+        for leg in facts.legs
+    )
 
 
-def _foot_site(leg: "Leg", facts: "Facts", poses: Sequence[Matrix]) -> Site:
+def _foot_site(leg: "Leg", foot: str, facts: "Facts", poses: Sequence[Matrix]) -> Site:
     body = facts.bodies[leg.limb.chain[-1]]
-    local = _pose_in_body(body, leg.foot)
+    local = _pose_in_body(body, foot)
     box = bounds(_touching(body, poses[body.index], facts), facts.meshes)
     if box is None:
-        return Site(name=leg.foot, body=leg.foot, pose=np.eye(4))
+        return Site(name=foot, body=foot, pose=np.eye(4))
     place = np.eye(4)
     place[:3, 3] = box.mean(axis=0)
     half = np.ptp(box, axis=0) / 2 + _AROUND
     pose = inverse(local) @ place
-    return Site(name=leg.foot, body=leg.foot, pose=pose, half_size=tuple(half.tolist()))
+    return Site(name=foot, body=foot, pose=pose, half_size=tuple(half.tolist()))
 
 
 def _touching(body: Body, pose: Matrix, facts: "Facts") -> list[Placed]:

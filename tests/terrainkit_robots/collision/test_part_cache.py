@@ -34,6 +34,7 @@ DAMAGES = {
     "empty": lambda data: data[:0],
     "of something else": lambda data: data[::-1],
     "with zeros in it": lambda data: data[:100] + bytes(50) + data[150:],
+    "with ones in it": lambda data: data[:100] + b"\xff" * 50 + data[150:],
 }
 
 

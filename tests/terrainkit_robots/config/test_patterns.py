@@ -20,8 +20,15 @@ def test_patterns_match_the_name_and_what_usd_makes_of_it(robots):
 def test_names_that_usd_makes_one_are_an_error():
     with pytest.raises(ConfigError, match=r"'a\.b' and 'a_b' are one name in USD"):
         usd_patterns(("a.b", "a_b"))
+    with pytest.raises(ConfigError, match="are one name in USD"):
+        usd_patterns(("\u00e9_x", "___x"))
     with pytest.raises(ConfigError, match="without a name"):
         usd_patterns(("",))
+
+
+def test_no_names_take_for_ever_to_be_told_apart():
+    names = ("\u00e9_" * 12 + "\u00e9", "_" * 40 + "x")
+    assert set(usd_patterns(names)) == set(names)
 
 
 def test_patterns_of_mjlab_match_one_name_even_by_its_beginning():

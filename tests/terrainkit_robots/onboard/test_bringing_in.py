@@ -10,6 +10,7 @@ import pytest
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots import bundled
 from terrainkit_robots.comparison.kinematics import largest_difference
+from terrainkit_robots.config import frameworks
 from terrainkit_robots.facts import Facts
 from terrainkit_robots.lint import lint
 from terrainkit_robots.onboard.bringing_in import Wishes, bring_in
@@ -170,6 +171,31 @@ ARM = """<robot name="arm">
     <origin xyz="0 0 0.11"/><axis xyz="0 1 0"/>
     <limit lower="-1.5" upper="1.5" effort="30" velocity="3"/></joint>
 </robot>"""
+
+
+def test_feet_may_be_called_by_any_link_that_moves_with_them(tmp_path):
+    first = bring_in(bundled.find("quadruped"), wishes(tmp_path))
+    text = (first.folder / "robot.toml").read_text()
+    wanted = tuple(foot.replace("foot", "calf") for foot in first.made.spec.feet)
+    before, after = (
+        f"feet = {list(feet)}".replace("'", '"') for feet in (first.made.spec.feet, wanted)
+    )
+    assert before in text
+    edited = tmp_path / "mine.toml"
+    edited.write_text(text.replace(before, after))
+    done = bring_in(
+        bundled.find("quadruped"),
+        Wishes(
+            target=tmp_path / "again",
+            pictures=False,
+            spec=edited,
+            configs=tuple(frameworks.names()),
+        ),
+    )
+    assert done.made.spec.feet == wanted
+    model = mujoco.MjModel.from_xml_path(str(done.folder / "robot.xml"))
+    for foot in wanted:
+        assert model.site(foot).bodyid[0] == model.body(foot).id
 
 
 def test_an_arm_is_brought_in_without_legs(tmp_path):

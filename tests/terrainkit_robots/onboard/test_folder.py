@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import pytest
 
 from terrainkit.errors import ExportError
@@ -64,6 +66,21 @@ def test_a_replaced_folder_keeps_the_old_one_if_the_new_one_fails(tmp_path):
     make(tmp_path / "robot")
     with pytest.raises(RuntimeError), new_folder(tmp_path / "robot", overwrite=True):
         raise RuntimeError
+    assert (tmp_path / "robot/robot.toml").read_bytes() == b"new"
+
+
+def test_a_disk_that_does_not_take_the_new_folder_keeps_the_old_one(tmp_path, monkeypatch):
+    make(tmp_path / "robot")
+    move = Path.replace
+
+    def refuse(path, target):
+        if path.name == "robot" and path.parent != tmp_path:
+            raise OSError("no")
+        return move(path, target)
+
+    monkeypatch.setattr(Path, "replace", refuse)
+    with pytest.raises(ExportError, match="cannot write"):
+        make(tmp_path / "robot", overwrite=True)
     assert (tmp_path / "robot/robot.toml").read_bytes() == b"new"
 
 

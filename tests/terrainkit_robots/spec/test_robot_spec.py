@@ -53,10 +53,11 @@ def test_per_joint_is_in_the_order_of_the_joints(spec):
         ({"stiffness": {"a.b": float("nan")}}, 'stiffness."a.b" is nan; wanted 0 or more N m/rad'),
         ({"damping": {"a": float("inf")}}, "damping.a is inf; wanted 0 or more N m s/rad or N s/m"),
         ({"effort": {"a": "1"}}, "effort.a is '1'; wanted a number"),
+        ({"effort": {"a": 0}}, "effort.a is 0; wanted more than 0 N m or N"),
         ({"effort": {"a": True}}, "effort.a is True; wanted a number"),
         (
             {"effort": {"a": {"b": 1}}},
-            "effort.a is a table; wanted 0 or more N m or N, a name with",
+            "effort.a is a table; wanted more than 0 N m or N, a name with",
         ),
         ({"effort": 3}, "effort is 3; wanted a table"),
         ({"effort": {"": 3}}, "a key of effort is ''; wanted a name"),

@@ -80,6 +80,27 @@ def test_a_joint_without_anything_that_may_be_left_out():
     assert not read_joint.dont_collapse
 
 
+def test_an_origin_may_be_told_by_a_quaternion_of_any_length():
+    read_joint, problems = joint('<origin xyz="1 2 3" quat_xyzw="0 0 2 2"/>' + PARENTS)
+    assert problems == ()
+    turned = [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]
+    np.testing.assert_allclose(read_joint.origin, turned, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("written", "said"),
+    [
+        ('quat_xyzw="0 0 0 0"', "quat_xyzw of <origin> is '0 0 0 0', no rotation"),
+        ('quat_xyzw="0 0 1"', "quat_xyzw of <origin> is '0 0 1'; wanted 4 numbers"),
+        ('quat_xyzw="0 0 1 0" rpy="1 0 0"', "quat_xyzw of <origin> stands beside its rpy"),
+    ],
+)
+def test_a_quaternion_that_says_nothing_is_told(written, said):
+    _, problems = joint(f"<origin {written}/>{PARENTS}")
+    assert [problem.code for problem in problems] == ["XML006"]
+    assert said in problems[0].message
+
+
 def test_a_joint_with_everything():
     read_joint, problems = joint(
         '<origin xyz="1 2 3" rpy="0 0 1.5707963267948966"/>'
