@@ -41,6 +41,7 @@ def config_text(
     *,
     bodies: Sequence[str] = (),
     ranges: Mapping[str, tuple[float, float]] | None = None,
+    undriven: Sequence[str] = (),
 ) -> str:
     """Return the configuration of a robot, a Python file that lies beside its `robot.toml`.
 
@@ -51,12 +52,13 @@ def config_text(
             substrings, which must not hit others. If empty, those that the spec names.
         ranges: Lower and upper limit of each joint, as the URDF has them; without them the
             share that soft limits leave is the usual one.
+        undriven: Joints of the URDF that move and have no motor.
 
     Raises:
         ConfigError: if there is no such framework, or it cannot have such a robot.
     """
     _check(framework)
-    robot = ConfiguredRobot(spec=spec, bodies=bodies, ranges=ranges)
+    robot = ConfiguredRobot(spec=spec, bodies=bodies, ranges=ranges, undriven=undriven)
     module = _module(framework)
     if module.LEGGED_ONLY:
         others = [name for name in names() if not _module(name).LEGGED_ONLY]
@@ -78,7 +80,9 @@ def config_of(framework: str, facts: "Facts", spec: RobotSpec) -> str:
     """
     bodies = (*(body_name(body) for body in facts.bodies), *spec.feet)
     ranges = {joint.name: joint.range for joint in facts.model.joints if joint.range is not None}
-    return config_text(framework, spec, bodies=bodies, ranges=ranges)
+    moving = [joint.name for joint in facts.model.joints if joint.moves]
+    undriven = [name for name in moving if name not in spec.joint_order]
+    return config_text(framework, spec, bodies=bodies, ranges=ranges, undriven=undriven)
 
 
 def _check(framework: str) -> None:

@@ -173,8 +173,9 @@ def _scales(robot: ConfiguredRobot) -> list[str]:
     if robot.wheels:
         lines += ["", *robot.speed_origin()]
         lines += _value("SPEED_SCALE = ", robot.scales(robot.wheels), patterns)
-        for name, joints in (("JOINTS", robot.placed), ("WHEELS", robot.wheels)):
-            lines += spread(f"{name} = ", strings(patterns[joint] for joint in joints))
+        lines += spread("WHEELS = ", strings(patterns[joint] for joint in robot.wheels))
+    if robot.placed and (robot.wheels or robot.undriven):
+        lines += spread("JOINTS = ", strings(patterns[joint] for joint in robot.placed))
     return lines
 
 
@@ -235,11 +236,14 @@ def _task(robot: ConfiguredRobot, name: str) -> list[str]:
 def _actions(robot: ConfiguredRobot) -> list[str]:
     """Return what tells each joint a position, or a speed."""
     lines = ["cfg.actions.joint_pos.scale = ACTION_SCALE"] if robot.placed else []
-    if robot.wheels:
+    if robot.wheels or robot.undriven:
         lines += [
             "cfg.actions.joint_pos.joint_names = JOINTS"
             if robot.placed
-            else "cfg.actions.joint_pos = None",
+            else "cfg.actions.joint_pos = None"
+        ]
+    if robot.wheels:
+        lines += [
             "cfg.actions.joint_vel = JointVelocityActionCfg(",
             '    asset_name="robot",',
             "    joint_names=WHEELS,",

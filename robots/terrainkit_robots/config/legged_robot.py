@@ -17,6 +17,7 @@ from terrainkit_robots.config.source import (
     table,
 )
 from terrainkit_robots.config.substrings import common_key, gain_keys, keys_for
+from terrainkit_robots.wording import names
 
 BEFORE_IMPORTS = ["# ruff: noqa: RUF012", "", "from pathlib import Path", ""]
 """The first lines. Lists that belong to a class are how these frameworks are configured."""
@@ -32,13 +33,19 @@ def check_legs(robot: ConfiguredRobot, framework: str, others: Sequence[str]) ->
     """Refuse a robot that cannot walk.
 
     Raises:
-        ConfigError: if it has no legs or no joints, is bolted down, or nobody knows how high it is.
+        ConfigError: if it has no legs or no joints, or some without a motor, is bolted down, or
+            nobody knows how high it is.
     """
     spec = robot.spec
     if not spec.feet or not spec.joint_order:
         raise ConfigError(
             f"{robot.title} has no legs; {framework} trains legged robots; "
             f"for others there are: {listing(others)}"
+        )
+    if robot.undriven:
+        raise ConfigError(
+            f"no motor drives {names(robot.undriven)} of {robot.title}; {framework} drives "
+            f"every joint; for others there are: {listing(others)}"
         )
     if not spec.floating:
         raise ConfigError(

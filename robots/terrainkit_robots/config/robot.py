@@ -32,6 +32,9 @@ class ConfiguredRobot:
     ranges: Mapping[str, tuple[float, float]] | None = None
     """Lower and upper limit of joints, as the URDF has them; None if they are not known."""
 
+    undriven: Sequence[str] = ()
+    """Joints of the URDF that move and have no motor: they follow another, or swing."""
+
     @property
     def title(self) -> str:
         """Return what to call the robot in a message or a sentence."""

@@ -1,6 +1,7 @@
 import ast
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
@@ -144,6 +145,20 @@ def test_soft_limits_are_a_share_of_the_range(robots):
     text = config_text("mjlab", robots.quadruped(), ranges=ranges)
     assert "soft_joint_pos_limit_factor=0.75," in text
     assert "soft_joint_pos_limit_factor=0.9," in config_text("mjlab", robots.quadruped())
+
+
+@pytest.mark.parametrize("framework", LEGGED)
+def test_joints_without_a_motor_keep_a_robot_from_frameworks_that_drive_all(robots, framework):
+    with pytest.raises(ConfigError, match=f"no motor drives tail_joint of .*; {framework} drives"):
+        config_text(framework, robots.quadruped(), undriven=["tail_joint"])
+
+
+def test_joints_without_a_motor_are_found(robots, bundled_xml):
+    facts = Facts(read_robot(bundled_xml.with_suffix(".urdf")), Meshes())
+    spec = robots.quadruped()
+    fewer = replace(spec, joint_order=spec.joint_order[:-1])
+    with pytest.raises(ConfigError, match=f"no motor drives {spec.joint_order[-1]} of"):
+        config_of("legged_gym", facts, fewer)
 
 
 def test_bodies_and_ranges_come_from_the_facts(robots, bundled_xml):

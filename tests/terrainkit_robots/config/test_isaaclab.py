@@ -201,6 +201,12 @@ def test_wheels_are_told_a_speed(load, modules, robots):
     assert not hasattr(task.actions, "joint_vel")
 
 
+def test_joints_without_a_motor_get_no_action(load, modules, robots):
+    spec = robots.quadruped()
+    task = load("isaaclab", spec, modules, undriven=["tail_joint"]).rough_env_cfg()
+    assert tuple(task.actions.joint_pos.joint_names) == spec.joint_order
+
+
 def test_a_robot_of_wheels_alone(load, modules, robots):
     spec = robots.plain(("left", "right"), stiffness={".*": 0.0})
     loaded = load("isaaclab", spec, modules)
