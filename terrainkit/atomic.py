@@ -26,6 +26,8 @@ def atomic_write(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
             path = path.resolve()  # through the link, which stays one
     except (OSError, RuntimeError) as error:  # before Python 3.13 a loop is a RuntimeError
         raise ExportError(f"cannot write {path}: {error}") from error
+    if path.is_symlink():
+        raise ExportError(f"cannot write {path}: it leads to itself")
     try:
         # Beside the target, so that moving there is a rename on the same disk.
         folder = Path(tempfile.mkdtemp(prefix=".terrainkit-", dir=path.parent))

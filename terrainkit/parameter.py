@@ -50,7 +50,8 @@ class Parameter:
     """Whether it may be given as a range (easy, hard)."""
 
     slack: float = 0.0
-    """How much it may be off, in its own unit: what is made of steps may miss one."""
+    """How much it may be off, in its own unit: what is made of steps may miss one of their
+    default."""
 
     def at(self, difficulty: float) -> Value:
         """Return the default at `difficulty`, 0 to 1."""
@@ -69,11 +70,11 @@ class Parameter:
         """Return whether `built` differs from `asked` by more than it has to.
 
         A length on the cells may be half a cell off, or one to stay centered; any other number 5 %,
-        or its slack.
+        or its slack if anything was built at all.
         """
-        least = {"cells": cell / 2, "centered": cell, "none": 0.05 * asked}[self.snap]
-        allowed = max(least, self.slack)
         ends = built if isinstance(built, tuple) else (built,)
+        least = {"cells": cell / 2, "centered": cell, "none": 0.05 * asked}[self.snap]
+        allowed = max(least, self.slack if all(ends) else 0.0)
         return any(abs(end - asked) > allowed + 1e-6 for end in ends)
 
 

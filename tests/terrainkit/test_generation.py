@@ -169,6 +169,13 @@ def test_progress_sees_every_patch():
     assert seen == [4, (0, 0), (0, 1), (1, 0), (1, 1)]
 
 
+def test_a_step_above_the_amplitude_makes_level_ground_which_is_told():
+    choice = TerrainChoice(terrain="rough", parameters={"amplitude": 0.004})
+    with pytest.warns(TerrainkitWarning, match=r"steps of height, .* rough\.amplitude on 1 patch"):
+        made = generate(MapConfig(rows=1, cols=1, border=0.0, terrains=(choice,)))
+    assert not made.heights.any()
+
+
 @pytest.mark.parametrize(
     ("terrain", "given"),
     [

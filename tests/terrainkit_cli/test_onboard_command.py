@@ -158,6 +158,13 @@ def test_an_edited_spec_is_kept_when_its_folder_is_replaced(here, tmp_path):
     code, out, _ = here("arm.urdf", NO_PICTURES, "--overwrite")
     assert code == 0
     assert "# Mine." in (tmp_path / "arm/robot.toml.before").read_text()
+    # And it stays beside what is kept of another time.
+    spec.write_text(spec.read_text().replace("# Name of the robot.", "# Yours."))
+    code, out, _ = here("arm.urdf", NO_PICTURES, "--overwrite")
+    assert "robot.toml.before_2" in out
+    assert "# Mine." in (tmp_path / "arm/robot.toml.before").read_text()
+    assert "# Yours." in (tmp_path / "arm/robot.toml.before_2").read_text()
+    assert here("arm.urdf", NO_PICTURES, "--overwrite")[0] == 0
 
 
 def test_an_edited_configuration_is_kept_and_a_file_of_ones_own_is_not_touched(here, tmp_path):

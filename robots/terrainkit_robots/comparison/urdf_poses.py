@@ -127,7 +127,7 @@ def _written(robot: Facts) -> dict[Joint, "etree._Element"]:
 
 
 def _origin(joint: Joint, written: "etree._Element | None") -> Iterator[tuple[str, str]]:
-    """Yield xyz and rpy, as far as they are numbers."""
+    """Yield xyz and rpy, as far as they are numbers; yourdfpy knows no quaternions."""
     if written is None:
         yield "xyz", _text(joint.origin[:3, 3])
         yield "rpy", _text(roll_pitch_yaw(joint.origin[:3, :3]))
@@ -139,6 +139,8 @@ def _origin(joint: Joint, written: "etree._Element | None") -> Iterator[tuple[st
             text = without_commas(text, 3)
         if text:
             yield name, text
+        elif name == "rpy" and origin is not None and origin.get("quat_xyzw") is not None:
+            yield name, _text(roll_pitch_yaw(joint.origin[:3, :3]))
 
 
 def _axis(joint: Joint, written: "etree._Element | None") -> str:

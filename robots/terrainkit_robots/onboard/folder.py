@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from terrainkit.errors import ExportError
-from terrainkit_robots.wording import names
+from terrainkit_robots.wording import free_name, names
 
 SPEC = "robot.toml"
 """A folder that holds this file is an onboarded robot."""
@@ -41,8 +41,8 @@ def check_folder(target: Path, *, overwrite: bool) -> None:
         raise ExportError(f"{target} exists; another name would do, or --overwrite")
     if SPEC not in held:
         raise ExportError(f"{target} holds no {SPEC}: it is not an onboarded robot to overwrite")
-    ours = _OURS | _to_be_edited()
-    foreign = [name for name in held if name.removesuffix(_BEFORE) not in ours]
+    edited = _to_be_edited()
+    foreign = [name for name in held if name not in _OURS and _edited_as(name) not in edited]
     if foreign:
         raise ExportError(
             f"{target} also holds {names(foreign)}, which onboarding did not write; "
@@ -57,24 +57,32 @@ def _to_be_edited() -> frozenset[str]:
     return frozenset({SPEC, *map(frameworks.file_name, frameworks.names())})
 
 
-def of_before(target: Path, files: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Return what was edited in a folder that is replaced, under names that tell.
+def _edited_as(name: str) -> str:
+    """Return the name that a file had when it was edited."""
+    return name.partition(_BEFORE)[0]
 
-    That is what differs from the files that come in its place, and else what was kept before.
+
+def of_before(target: Path, files: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Return what may have been edited in a folder that is replaced, under names that tell.
+
+    That is what differs from the files that come in its place, and all that was kept before.
 
     Raises:
         ExportError: if a file cannot be read.
     """
-    kept = {}
+    edited = _to_be_edited()
     try:
-        for name in sorted(_to_be_edited()):
-            path, before = target / name, target / f"{name}{_BEFORE}"
-            if path.is_file() and path.read_bytes() != files.get(name):
-                kept[before.name] = path.read_bytes()
-            elif before.is_file():
-                kept[before.name] = before.read_bytes()
+        held = {
+            path.name: path.read_bytes()
+            for path in (sorted(target.iterdir()) if target.is_dir() else ())
+            if _edited_as(path.name) in edited
+        }
     except OSError as error:
         raise ExportError(f"cannot read {target}: {error.strerror or error}") from error
+    kept = {name: data for name, data in held.items() if name not in edited}
+    for name in held.keys() & edited:
+        if held[name] not in (files.get(name), *kept.values()):
+            kept[free_name(f"{name}{_BEFORE}", kept)] = held[name]
     return kept
 
 

@@ -37,9 +37,10 @@ class Control:
 def control_of(robot: Robot, task: Task) -> Control:
     """Return the control of a robot in a task."""
     kind, scale = task.control.control_type, task.control.action_scale
-    positional = robot.held & (kind == "P")
+    stiff = np.array(list(robot.spec.per_joint("stiffness").values())) > 0
     if task.control.stiffness is not None:
-        positional &= task.control.stiffness > 0
+        stiff &= task.control.stiffness > 0
+    positional = stiff & (kind == "P")
     own = {
         "P": np.array(list(robot.spec.per_joint("action_scale").values())),
         "V": robot.velocity,

@@ -165,7 +165,8 @@ def prepared(run: Run, asked: Asked, *, each: int = MOST) -> tuple[LeggedEnv, Fl
         The environment, and commands of shape (n, 3); None: the task's random ones.
     """
     device = require_device(asked.device)
-    if asked.terrain is None and not same_ground(run, run.terrain):
+    own = asked.terrain is None and not is_flat(run, asked)
+    if own and not same_ground(run, run.terrain):
         raise ConfigError(
             f"{run.terrain} is not what {run.folder} was trained on any more; "
             "--terrain says what to take"

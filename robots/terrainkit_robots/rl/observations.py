@@ -80,7 +80,7 @@ def policy_group(robot: Robot, task: Task, *, scan: bool) -> tuple[Observation, 
             name="dof_pos",
             read=lambda state: state.dof_pos + state.joint_offset - robot.default_pose,
             # How far a wheel has turned since it was built says nothing, and grows without end.
-            scale=tuple(np.where(robot.held, scales.dof_pos, 0.0).tolist()),
+            scale=tuple(np.where(robot.wheels, 0.0, scales.dof_pos).tolist()),
             noise=level * noise.dof_pos,
             image="joints",
         ),

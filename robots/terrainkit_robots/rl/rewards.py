@@ -197,7 +197,7 @@ def stumble(state: State, robot: Robot, settings: Rewards) -> FloatArray:
 @reward
 def stand_still(state: State, robot: Robot, settings: Rewards) -> FloatArray:
     """Return how far joints, but wheels, are from the default pose where asked to stand [rad]."""
-    off = np.abs(state.dof_pos - robot.default_pose) * robot.held
+    off = np.abs(state.dof_pos - robot.default_pose) * ~robot.wheels
     return off.sum(axis=1) * ~_asked(state)
 
 

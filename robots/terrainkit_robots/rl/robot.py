@@ -30,8 +30,8 @@ class Robot:
     default_pose: FloatArray
     """Position of each joint that actions are added to [rad], shape (j,)."""
 
-    held: NDArray[np.bool_]
-    """Joints with a stiffness, which are held at a position; a wheel is not. Shape (j,)."""
+    wheels: NDArray[np.bool_]
+    """Joints with damping and no stiffness, which stay nowhere, shape (j,)."""
 
     effort: FloatArray
     """Largest torque of each joint [N m], shape (j,)."""
@@ -67,7 +67,7 @@ def robot_of(spec: RobotSpec, folder: Path) -> Robot:
         spec=spec,
         mjcf=folder / spec.mjcf,
         default_pose=_array(spec, "default_pose"),
-        held=_array(spec, "stiffness") > 0,
+        wheels=(_array(spec, "stiffness") == 0) & (_array(spec, "damping") > 0),
         effort=_array(spec, "effort"),
         velocity=_array(spec, "velocity"),
         lower=np.array([low for low, _ in limits], np.float32),

@@ -159,8 +159,8 @@ def _goes_on(run: Run, robot: str | Path, terrain: str | Path, task: Task) -> bo
     same &= located_terrain(terrain) == run.terrain and located_robot(robot) == run.robot_name
     if same and not same_ground(run, terrain):
         raise ConfigError(
-            f"{run.terrain} is another map than {run.folder} was trained on, which its map.toml "
-            "describes; another --terrain begins a new run with its networks"
+            f"{run.terrain} is not what {run.folder} was trained on any more; another --terrain "
+            "begins a new run with its networks"
         )
     if same and (files := changed_robot(run)):
         raise ConfigError(

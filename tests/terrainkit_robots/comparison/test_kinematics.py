@@ -61,6 +61,14 @@ def worst(robot, count=5):
     return max(gaps)
 
 
+def test_it_agrees_on_turns_that_are_told_by_quaternions(tmp_path):
+    path = tmp_path / "robot.urdf"
+    text = ARM.replace('rpy="0.2 -0.3 0.4"', 'quat_xyzw="0.1 0.2 0.3 0.9"')
+    assert text != ARM
+    path.write_text(text)
+    assert worst(Facts(read_robot(path))) < 1e-9
+
+
 @pytest.mark.parametrize("name", REAL)
 def test_our_own_kinematics_agrees_on_real_robots(robot_file, name):
     assert worst(Facts(read_robot(robot_file(name)))) < 1e-9

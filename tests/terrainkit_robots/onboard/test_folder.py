@@ -49,6 +49,7 @@ def test_an_empty_folder_is_filled(tmp_path):
     [
         ({"thesis.tex": "mine"}, "holds no robot.toml"),
         ({"robot.toml": "", "notes.txt": "mine"}, "also holds notes.txt"),
+        ({"robot.toml": "", "robot.xml.before": "mine"}, r"also holds robot\.xml\.before"),
     ],
 )
 def test_what_onboarding_did_not_write_is_never_replaced(tmp_path, files, message):

@@ -146,6 +146,14 @@ def test_another_ground_under_the_same_name_is_told(run_of, mixed_map, map_file)
         prepared(run, Asked(num_envs=1, terrain=str(terrain)))
 
 
+def test_a_map_that_is_left_flat_may_be_another_or_gone(run_of, map_file):
+    run = run_of(map_file, terrain=Terrain(collision="plane"))
+    (run.folder / "map.toml").unlink()
+    map_file.write_text("gone")
+    env, _ = prepared(run, Asked(num_envs=1))
+    assert env.ground.level
+
+
 def test_a_run_without_a_checkpoint_is_an_error(run_of):
     run = run_of(runner=Runner(seed=2))
     with pytest.raises(ConfigError, match="no checkpoint"):

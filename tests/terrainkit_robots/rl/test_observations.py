@@ -98,7 +98,7 @@ class TestByHand:
         given = state(dof_pos=robot.default_pose + np.float32(0.5), joint_offset=0.125)
         assert observed(group_of(robot), "dof_pos", given) == pytest.approx([0.625] * 12)
         # Wheels turn on and on; 100 is the largest observation.
-        wheeled = replace(robot, held=np.arange(12) % 3 < 2)
+        wheeled = replace(robot, wheels=np.arange(12) % 3 == 2)
         given = state(dof_pos=robot.default_pose + np.float32(400))
         seen = observed(group_of(wheeled), "dof_pos", given)
         assert seen == pytest.approx([100, 100, 0] * 4)

@@ -53,7 +53,7 @@ def robot() -> Robot:
     return replace(
         real,
         spec=replace(real.spec, base_height_target=0.3),
-        held=np.ones(2, bool),
+        wheels=np.zeros(2, bool),
         default_pose=np.array([0.5, -0.5], np.float32),
         effort=np.array([10, 20], np.float32),
         velocity=np.array([5, 10], np.float32),
@@ -222,7 +222,7 @@ class TestByHand:
             dof_pos=[[0.75, -1.0], [0.75, -1.0], [0.5, -0.5]],
         )
         assert paid("stand_still", robot, given) == [0.75, 0, 0]
-        wheeled = replace(robot, held=np.array([True, False]))
+        wheeled = replace(robot, wheels=np.array([False, True]))
         assert paid("stand_still", wheeled, given) == [0.25, 0, 0]
 
     def test_feet_contact_forces(self, robot: Robot) -> None:

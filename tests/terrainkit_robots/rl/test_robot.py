@@ -18,6 +18,15 @@ class TestArrays:
         np.testing.assert_allclose(cart.lower, [-np.inf, -0.9, -0.9], rtol=1e-6)
         np.testing.assert_allclose(cart.upper, [np.inf, 0.9, 0.9], rtol=1e-6)
 
+    @pytest.mark.parametrize(
+        ("stiffness", "damping", "wheel"), [(0.0, 1.0, True), (0.0, 0.0, False), (5.0, 1.0, False)]
+    )
+    def test_wheels_have_damping_and_no_stiffness(
+        self, cart_spec, tmp_path, stiffness, damping, wheel
+    ):
+        spec = replace(cart_spec, stiffness={".*": stiffness}, damping={".*": damping})
+        assert robot_of(spec, tmp_path).wheels.tolist() == [wheel] * len(spec.joint_order)
+
     def test_the_mjcf_lies_beside_the_spec(self, cart):
         assert cart.mjcf.name == "cart.xml"
         assert cart.mjcf.is_file()
