@@ -171,7 +171,8 @@ class TestByHand:
         offset = env.state.joint_offset
         assert 0.01 < np.abs(offset).max() <= 0.1
         observed = env.get_observations()["policy"][:, 9:12]
-        np.testing.assert_allclose(observed, offset, atol=1e-6)
+        np.testing.assert_allclose(observed, np.where(cart.wheels, 0, offset), atol=1e-6)
+        assert cart.wheels.tolist() == [True, False, False]
 
 
 class TestCopies:

@@ -33,6 +33,8 @@ def strategy(field):
     """Return what a field of a spec may hold."""
     if field.name in ("default_pose",):
         return table(NUMBERS)
+    if field.name == "effort":
+        return table(POSITIVE.filter(bool))
     if field.name in JOINT_TABLES:
         return table(POSITIVE)
     by_name = {
