@@ -27,9 +27,11 @@ GROUPS = {"actor": ["policy"], "critic": ["privileged"]}
 def policy_of(run: Run, env: LeggedEnv) -> Act:
     """Return the policy of a run: from observations of `env` to actions, always the same.
 
+    Warns:
+        TerrainkitWarning: if the robot's model is another by now.
+
     Raises:
         ConfigError: if the run has no checkpoint, or one of another robot or task.
-        TerrainkitWarning: if the robot's model is another by now.
     """
     actor = actor_of(run, env)
 
