@@ -193,7 +193,7 @@ _BUNDLED = {
                 foot_clearance_target=0.12,
             ),
             noise=Noise(height_measurements=0.02),
-            algorithm=Algorithm(entropy_coef=0.002, desired_kl=0.01, symmetry="loss"),
+            algorithm=Algorithm(entropy_coef=0.001, desired_kl=0.008, symmetry="loss"),
             runner=Runner(num_steps_per_env=48),
         ),
     ),
