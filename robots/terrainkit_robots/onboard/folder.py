@@ -80,7 +80,7 @@ def of_before(target: Path, files: Mapping[str, bytes]) -> dict[str, bytes]:
     except OSError as error:
         raise ExportError(f"cannot read {target}: {error.strerror or error}") from error
     kept = {name: data for name, data in held.items() if name not in edited}
-    for name in held.keys() & edited:
+    for name in sorted(held.keys() & edited):
         if held[name] not in (files.get(name), *kept.values()):
             kept[free_name(f"{name}{_BEFORE}", kept)] = held[name]
     return kept
