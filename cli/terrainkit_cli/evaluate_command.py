@@ -10,7 +10,7 @@ import tyro
 from terrainkit.errors import ConfigError
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
-from terrainkit_cli.robot_options import Output, plain
+from terrainkit_cli.robot_options import Checkpoint, Output, Whole, plain, whole_number
 
 if TYPE_CHECKING:
     from terrainkit_robots.rl.evaluation import Asked
@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 
 _NOT_ASKED = (-math.inf, -math.inf, -math.inf)
 """No command; not None, since tyro's errors about a union name its members."""
-
-_OPEN = -1
-"""No number, for the same reason."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,15 +44,11 @@ class PolicyCommand(Command):
     random_commands: bool = False
     """Ask for what the task draws at random."""
 
-    num_envs: Annotated[
-        int, tyro.conf.arg(metavar="INT", help_behavior_hint="(default: as many as are of use)")
-    ] = _OPEN
-    """Robots."""
+    num_envs: Whole = ""
+    """Robots; unless given, as many as are of use."""
 
-    checkpoint: Annotated[
-        int, tyro.conf.arg(metavar="ITERATION", help_behavior_hint="(default: the last)")
-    ] = _OPEN
-    """The checkpoint to take."""
+    checkpoint: Checkpoint = ""
+    """The checkpoint to take; unless given, the last."""
 
     seed: int = 1
     """Start of all random numbers: those of where robots start."""
@@ -76,7 +69,7 @@ class PolicyCommand(Command):
         require_training()
         from terrainkit_robots.rl.run_folder import open_run
 
-        return open_run(self.policy, None if self.checkpoint == _OPEN else self.checkpoint)
+        return open_run(self.policy, whole_number("--checkpoint", self.checkpoint))
 
     def asked(self, seconds: float) -> "Asked":
         """Return what is to be rolled.
@@ -89,7 +82,7 @@ class PolicyCommand(Command):
         return Asked(
             seconds=seconds,
             terrain=self.terrain or None,
-            num_envs=None if self.num_envs == _OPEN else self.num_envs,
+            num_envs=whole_number("--num-envs", self.num_envs),
             command=None if self.command == _NOT_ASKED else self.command,
             random_commands=self.random_commands,
             seed=self.seed,

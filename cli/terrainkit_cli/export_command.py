@@ -10,15 +10,11 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit.terrain_map import TerrainMap
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
-from terrainkit_cli.robot_options import plain
+from terrainkit_cli.robot_options import Checkpoint, plain, whole_number
 from terrainkit_cli.terrain_commands import written
 
 if TYPE_CHECKING:
     from terrainkit_robots.rl.policy_export import Exported
-
-
-_LAST = -1
-"""No iteration in particular; not None, since tyro's errors about a union name its members."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,10 +57,8 @@ class Export(Command):
     y_up: bool = False
     """For meshes: turn the map so that y is up, as glTF viewers and game engines expect."""
 
-    checkpoint: Annotated[
-        int, tyro.conf.arg(metavar="ITERATION", help_behavior_hint="(default: the last)")
-    ] = _LAST
-    """Of a run: the checkpoint to take."""
+    checkpoint: Checkpoint = ""
+    """Of a run: the checkpoint to take; unless given, the last."""
 
     overwrite: bool = False
     """Replace existing files."""
@@ -89,7 +83,7 @@ class Export(Command):
         return {name: value for name, value in given.items() if value is not None}
 
     def _export_map(self) -> None:
-        if self.checkpoint != _LAST:
+        if self.checkpoint:
             raise ConfigError(f"{self.subject} is a map; --checkpoint is for runs")
         terrain_map = TerrainMap.load(self.subject)
         if not self.output:
@@ -115,7 +109,7 @@ class Export(Command):
         from terrainkit_robots.rl.policy_export import export_policy
         from terrainkit_robots.rl.run_folder import is_shipped, open_run
 
-        run = open_run(self.subject, None if self.checkpoint == _LAST else self.checkpoint)
+        run = open_run(self.subject, whole_number("--checkpoint", self.checkpoint))
         own = Path(f"{run.folder.name}_policy") if is_shipped(run) else run.folder / "exported"
         folder = Path(self.output) if self.output else own
         done = export_policy(run, folder, overwrite=self.overwrite)

@@ -31,6 +31,23 @@ Packages = Annotated[Words, *repeated("NAME=DIR")]
 XacroArguments = Annotated[Words, *repeated("NAME:=VALUE")]
 Text = Annotated[str, plain("PATH")]
 Output = Annotated[str, plain("PATH", "-o")]
+Whole = Annotated[str, plain("INT")]
+Checkpoint = Annotated[str, plain("ITERATION")]
+
+
+def whole_number(option: str, word: str) -> int | None:
+    """Return the number that an option holds, None if it was not given.
+
+    Such options are texts, and not `int | None`: tyro's errors about a union name its members.
+
+    Raises:
+        ConfigError: if it holds something else.
+    """
+    from terrainkit.coerce import coerce
+    from terrainkit_cli.parse import value_of
+
+    number: int | None = coerce(option, value_of(word), int) if word else None
+    return number
 
 
 def find_robot(name: str) -> Path:

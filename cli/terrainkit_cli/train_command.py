@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from terrainkit.coerce import coerce
 from terrainkit.errors import ConfigError
 from terrainkit_cli import render
-from terrainkit_cli.parse import value_of
-from terrainkit_cli.robot_options import plain
+from terrainkit_cli.robot_options import Whole, plain, whole_number
 from terrainkit_cli.task_options import TaskCommand
 from terrainkit_cli.training_extra import require_training
 
@@ -20,8 +18,6 @@ if TYPE_CHECKING:
     from terrainkit_robots.rl.run_folder import Run
     from terrainkit_robots.rl.task import Task
     from terrainkit_robots.rl.training import Trained
-
-Whole = Annotated[str, plain("INT")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,7 +120,7 @@ class Train(TaskCommand):
             )
         return run.robot_name
 
-    def _given(self, section: str, **words: str) -> dict[str, int]:
+    def _given(self, section: str, **words: str) -> dict[str, int | None]:
         """Return the whole numbers that were given, by the name of their value in a section."""
         given = {name: word for name, word in words.items() if word}
         for name in given:
@@ -132,8 +128,7 @@ class Train(TaskCommand):
                 option = name.replace("_", "-")
                 raise ConfigError(f"--{option} and --{section}.{option} are one; wanted it once")
         return {
-            name: coerce(f"--{name.replace('_', '-')}", value_of(word), int)
-            for name, word in given.items()
+            name: whole_number(f"--{name.replace('_', '-')}", word) for name, word in given.items()
         }
 
     def _terrain(self, run: "Run | None") -> str:
