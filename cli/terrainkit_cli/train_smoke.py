@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from terrainkit.errors import ConfigError, TerrainkitError
+from terrainkit.errors import ConfigError, TerrainkitError, listing
 from terrainkit_cli import render
 from terrainkit_cli.robot_options import packages, reasons, xacro_arguments
 from terrainkit_cli.training_extra import require_training
@@ -26,6 +26,7 @@ def check_training(command: "CheckRobot") -> int:
     """
     _refuse_others(command)
     require_training()
+    _refuse_unused(command)
     settings = _settings(command)
     if command.output:
         from terrainkit.atomic import check_target
@@ -70,6 +71,23 @@ def _refuse_others(command: "CheckRobot") -> None:
         raise ConfigError(f"--train-smoke asks no rules, so --{given[0]} makes no sense with it")
     if command.spec and len(command.files) > 1:
         raise ConfigError(f"--spec is of one robot, and there are {len(command.files)}")
+
+
+def _refuse_unused(command: "CheckRobot") -> None:
+    """Refuse options of use for a robot's file alone where there is none."""
+    from terrainkit_robots.rl.smoke import is_file
+
+    options = {
+        "package": command.package,
+        "xacro-arg": command.xacro_arg,
+        "ignore": command.ignore,
+    }
+    given = [name for name, value in options.items() if value]
+    if given and not any(map(is_file, command.files)):
+        raise ConfigError(
+            f"--{given[0]} is for a robot's file, which --train-smoke onboards first; "
+            f"no file is called: {listing(command.files)}"
+        )
 
 
 def _settings(command: "CheckRobot") -> "Settings":

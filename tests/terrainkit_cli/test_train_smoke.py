@@ -121,6 +121,7 @@ def test_the_report_goes_to_a_file(here, tmp_path):
 
 def test_packages_arguments_and_a_spec_are_handed_on(here, told, tmp_path):
     (tmp_path / "meshes").mkdir()
+    (tmp_path / "a").touch()
     words = ("--package", "my=meshes", "--xacro-arg", "arm:=false", "--ignore", "MSH=no meshes")
     assert here("check-robot", "a", "--train-smoke", *words, "--spec", "a.toml").returncode == 0
     (_, options) = told[0]
@@ -141,6 +142,8 @@ def test_packages_arguments_and_a_spec_are_handed_on(here, told, tmp_path):
         (("a", "--no-simulation"), "--no-simulation makes no sense"),
         (("a", "b", "--spec", "c.toml"), "--spec is of one robot, and there are 2"),
         ((), "no FILE to check"),
+        (("a", "--package", "my=."), "--package is for a robot's file"),
+        (("a", "b", "--xacro-arg", "arm:=false"), "no file is called: a, b"),
         (("a", "-o", "nowhere/a.txt"), "there is no folder nowhere"),
         (("a", "-o", "."), "it is a folder"),
     ],
