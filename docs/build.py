@@ -187,6 +187,9 @@ def words(text: str) -> list[str]:
 
 
 def main() -> int:
+    if sys.argv[1:] not in ([], ["--check"]):
+        print(f"{' '.join(sys.argv[1:])} is not known; wanted --check or nothing", file=sys.stderr)
+        return 2
     pages = {"terrains.md": terrains_page(), "rules.md": rules_page(), "cli.md": cli_page()}
     if sys.argv[1:] == ["--check"]:
         stale = [n for n, text in pages.items() if words(written(n)) != words(text)]
