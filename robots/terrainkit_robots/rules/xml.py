@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from terrainkit_robots.facts import Facts
-from terrainkit_robots.fix import Fix, RemoveElement, SetAttribute
+from terrainkit_robots.fix import Fix, RemoveAttribute, RemoveElement, SetAttribute
 from terrainkit_robots.markup.document import without_mark
 from terrainkit_robots.model import Problem
 from terrainkit_robots.rule import Defect, Severity, rule
@@ -261,3 +261,29 @@ def missing_attribute(robot: Facts) -> Iterator[Defect]:
     """
     for problem in _problems(robot, "XML013"):
         yield _defect(robot, problem)
+
+
+@rule("XML014", "quaternion", "error", fixes="safe")
+def quaternion(robot: Facts) -> Iterator[Defect]:
+    """A rotation is written as a quaternion, which most readers skip.
+
+    `quat_xyzw` came with URDF 1.1. MuJoCo, yourdfpy and every older reader take such an origin for
+    one that is not turned, without a word: links and joints point another way than in the tool that
+    wrote the file.
+
+    Fix:
+        Write the same rotation as roll, pitch and yaw, which everyone reads.
+
+    Source:
+        urdfdom reads it in files that say version="1.1"; seen skipped by MuJoCo 4.0 and yourdfpy.
+    """
+    for problem in _problems(robot, "XML014"):
+        fix = None
+        if problem.source.element is not None:
+            rpy = problem.details["rpy"]
+            edits = (
+                SetAttribute(source=problem.source, name="rpy", value=rpy),
+                RemoveAttribute(source=problem.source, name="quat_xyzw"),
+            )
+            fix = Fix(safety="safe", description=f'Write rpy="{rpy}".', edits=edits)
+        yield _defect(robot, problem, fix)

@@ -13,6 +13,7 @@ import numpy as np
 from lxml import etree
 
 from terrainkit_robots.body.rigid import turned_by
+from terrainkit_robots.body.roll_pitch_yaw import roll_pitch_yaw
 from terrainkit_robots.markup.document import XmlDocument
 from terrainkit_robots.markup.numbers import parse_numbers, without_commas
 from terrainkit_robots.model import (
@@ -31,6 +32,7 @@ from terrainkit_robots.packages import Packages
 from terrainkit_robots.urdf.colors import Color, color_of, named_colors
 from terrainkit_robots.urdf.words import has_variable, misspelt, unexpanded
 from terrainkit_robots.wording import short
+from terrainkit_robots.writing.number_text import place_text
 
 
 def read_urdf(document: XmlDocument, *, packages: Mapping[str, Path]) -> RobotModel:
@@ -160,9 +162,16 @@ class _Reader:
                 f"quat_xyzw of <origin> is {short(origin.get('quat_xyzw', ''), 40)!r}, no rotation"
             )
         else:
+            self._tell_of_quaternion(origin, turned_by(np.roll(quat, 1)))
             return quat
         self._tell("XML006", origin, told, attribute="quat_xyzw")
         return None
+
+    def _tell_of_quaternion(self, origin: "etree._Element", turn: Matrix) -> None:
+        rpy = place_text(roll_pitch_yaw(turn))
+        if rpy != place_text(np.zeros(3)):
+            told = "quat_xyzw of <origin> is skipped by most readers, so that nothing is turned"
+            self._tell("XML014", origin, f'{told}; wanted rpy="{rpy}"', rpy=rpy)
 
     # Links
 

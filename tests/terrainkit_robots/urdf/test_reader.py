@@ -82,9 +82,15 @@ def test_a_joint_without_anything_that_may_be_left_out():
 
 def test_an_origin_may_be_told_by_a_quaternion_of_any_length():
     read_joint, problems = joint('<origin xyz="1 2 3" quat_xyzw="0 0 2 2"/>' + PARENTS)
-    assert problems == ()
+    assert [(problem.code, problem.details["rpy"]) for problem in problems] == [
+        ("XML014", "0 0 1.570796327")
+    ]
     turned = [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]
     np.testing.assert_allclose(read_joint.origin, turned, atol=1e-15)
+
+
+def test_a_quaternion_that_turns_nothing_is_no_matter():
+    assert joint(f'<origin quat_xyzw="0 0 0 -2"/>{PARENTS}')[1] == ()
 
 
 @pytest.mark.parametrize(
