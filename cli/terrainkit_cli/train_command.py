@@ -53,7 +53,8 @@ class Train(TaskCommand):
     resume: Annotated[str, plain("RUN")] = ""
     """Go on with a run: its folder, or one of its checkpoints. Robot, ground and task are those of
     the run, unless given. It goes on in its own folder, exactly as if it had not ended; with
-    another ground or task, a new run begins with its networks."""
+    another ground or task, a new run begins with its networks and, unless given, its learning
+    rate."""
 
     device: Annotated[str, plain("DEVICE")] = "cpu"
     """Where the networks are: cpu, cuda, cuda:1. The physics is on the CPU."""

@@ -180,9 +180,9 @@ class LeggedRunner(OnPolicyRunner):
 
         Args:
             path: The checkpoint.
-            load_cfg: What to take over, and nothing else: the networks `actor` and `critic`, and
-                `careers`, where robots are in the curriculum; unless given, all that is in the
-                checkpoint.
+            load_cfg: What to take over, and nothing else: the networks `actor` and `critic`; as far
+                as it is in the checkpoint, `optimizer`, and `careers`, where robots are in the
+                curriculum. Unless given, all that there is.
             strict: Whether every weight has to be there.
             map_location: Of no use: where the networks are, weights go.
 
@@ -193,14 +193,13 @@ class LeggedRunner(OnPolicyRunner):
         state = read_checkpoint(path)
         refuse_other(path, state, self.env, list(self.env.groups))
         with fitting(path):
-            whole = load_cfg is None and "processes" in state
-            self.alg.load(
-                state, load_cfg or {"actor": True, "critic": True, "optimizer": whole}, strict
-            )
-            if whole:
+            trained = "processes" in state  # and no policy alone
+            parts = load_cfg or {"actor": True, "critic": True, "optimizer": True}
+            self.alg.load(state, {**parts, "optimizer": trained and parts.get("optimizer")}, strict)
+            if trained and load_cfg is None:
                 self.current_learning_iteration = state["iteration"]
                 self._load_state(state)
-            elif load_cfg and load_cfg.get("careers") and "processes" in state:
+            elif trained and parts.get("careers"):
                 self.env.careers.load_state_dict(self._own(state)["env"]["careers"])
                 self.env.begin_all()
                 self._obs = self.env.get_observations().to(self.device)
