@@ -157,12 +157,10 @@ class _Writer:
             return
         moved = np.eye(4)
         moved[:3, 3] = anchor
-        # not called as the child, or legged_gym would take both for what it looks for
-        axis = self._free("axis")
+        axis = self._free(f"{joint.child}_axis")
         self._hang(root, joint, axis, joint.origin @ moved)
         self._tiny_inertial(etree.SubElement(root, "link", name=axis))
         fixed = self._element(root, self._free(f"{axis}_fixed"), "fixed", joint.child)
-        fixed.set("dont_collapse", "true")  # merged, the child would lose its name
         moved[:3, 3] = -anchor
         _origin(fixed, moved)
         _ends(fixed, axis, joint.child)
