@@ -10,7 +10,7 @@ import tyro
 from terrainkit.errors import ConfigError
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
-from terrainkit_cli.robot_options import Checkpoint, Output, Whole, plain, whole_number
+from terrainkit_cli.robot_options import NO_NUMBER, Checkpoint, Output, number_given, plain
 
 if TYPE_CHECKING:
     from terrainkit_robots.rl.evaluation import Asked
@@ -44,11 +44,13 @@ class PolicyCommand(Command):
     random_commands: bool = False
     """Ask for what the task draws at random."""
 
-    num_envs: Whole = ""
-    """Robots; unless given, as many as are of use."""
+    num_envs: Annotated[
+        int, tyro.conf.arg(metavar="INT", help_behavior_hint="(default: as many as are of use)")
+    ] = NO_NUMBER
+    """Robots."""
 
-    checkpoint: Checkpoint = ""
-    """The checkpoint to take; unless given, the last."""
+    checkpoint: Checkpoint = NO_NUMBER
+    """The checkpoint to take."""
 
     seed: int = 1
     """Start of all random numbers: those of where robots start."""
@@ -69,7 +71,7 @@ class PolicyCommand(Command):
         require_training()
         from terrainkit_robots.rl.run_folder import open_run
 
-        return open_run(self.policy, whole_number("--checkpoint", self.checkpoint))
+        return open_run(self.policy, number_given(self.checkpoint))
 
     def asked(self, seconds: float) -> "Asked":
         """Return what is to be rolled.
@@ -82,7 +84,7 @@ class PolicyCommand(Command):
         return Asked(
             seconds=seconds,
             terrain=self.terrain or None,
-            num_envs=whole_number("--num-envs", self.num_envs),
+            num_envs=number_given(self.num_envs),
             command=None if self.command == _NOT_ASKED else self.command,
             random_commands=self.random_commands,
             seed=self.seed,

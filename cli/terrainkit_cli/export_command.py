@@ -10,7 +10,7 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit.terrain_map import TerrainMap
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
-from terrainkit_cli.robot_options import Checkpoint, plain, whole_number
+from terrainkit_cli.robot_options import NO_NUMBER, Checkpoint, number_given, plain
 from terrainkit_cli.terrain_commands import written
 
 if TYPE_CHECKING:
@@ -57,8 +57,8 @@ class Export(Command):
     y_up: bool = False
     """For meshes: turn the map so that y is up, as glTF viewers and game engines expect."""
 
-    checkpoint: Checkpoint = ""
-    """Of a run: the checkpoint to take; unless given, the last."""
+    checkpoint: Checkpoint = NO_NUMBER
+    """Of a run: the checkpoint to take."""
 
     overwrite: bool = False
     """Replace existing files."""
@@ -83,7 +83,7 @@ class Export(Command):
         return {name: value for name, value in given.items() if value is not None}
 
     def _export_map(self) -> None:
-        if self.checkpoint:
+        if number_given(self.checkpoint) is not None:
             raise ConfigError(f"{self.subject} is a map; --checkpoint is for runs")
         terrain_map = TerrainMap.load(self.subject)
         if not self.output:
@@ -109,7 +109,7 @@ class Export(Command):
         from terrainkit_robots.rl.policy_export import export_policy
         from terrainkit_robots.rl.run_folder import is_shipped, open_run
 
-        run = open_run(self.subject, whole_number("--checkpoint", self.checkpoint))
+        run = open_run(self.subject, number_given(self.checkpoint))
         own = Path(f"{run.folder.name}_policy") if is_shipped(run) else run.folder / "exported"
         folder = Path(self.output) if self.output else own
         done = export_policy(run, folder, overwrite=self.overwrite)

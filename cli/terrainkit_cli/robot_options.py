@@ -31,23 +31,19 @@ Packages = Annotated[Words, *repeated("NAME=DIR")]
 XacroArguments = Annotated[Words, *repeated("NAME:=VALUE")]
 Text = Annotated[str, plain("PATH")]
 Output = Annotated[str, plain("PATH", "-o")]
-Whole = Annotated[str, plain("INT")]
-Checkpoint = Annotated[str, plain("ITERATION")]
+
+NO_NUMBER = -1
+"""No number was given; not None, since tyro's errors about a union name its members."""
+
+Checkpoint = Annotated[
+    int, tyro.conf.arg(metavar="ITERATION", help_behavior_hint="(default: the last)")
+]
+"""A checkpoint of a run, `NO_NUMBER` unless given."""
 
 
-def whole_number(option: str, word: str) -> int | None:
-    """Return the number that an option holds, None if it was not given.
-
-    Such options are texts, and not `int | None`: tyro's errors about a union name its members.
-
-    Raises:
-        ConfigError: if it holds something else.
-    """
-    from terrainkit.coerce import coerce
-    from terrainkit_cli.parse import value_of
-
-    number: int | None = coerce(option, value_of(word), int) if word else None
-    return number
+def number_given(number: int) -> int | None:
+    """Return what an option was given; None for nothing."""
+    return None if number == NO_NUMBER else number
 
 
 def find_robot(name: str) -> Path:

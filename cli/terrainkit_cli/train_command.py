@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from terrainkit.coerce import coerce
 from terrainkit.errors import ConfigError
 from terrainkit_cli import render
-from terrainkit_cli.robot_options import Whole, plain, whole_number
+from terrainkit_cli.parse import value_of
+from terrainkit_cli.robot_options import plain
 from terrainkit_cli.task_options import TaskCommand
 from terrainkit_cli.training_extra import require_training
 
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
     from terrainkit_robots.rl.run_folder import Run
     from terrainkit_robots.rl.task import Task
     from terrainkit_robots.rl.training import Trained
+
+Whole = Annotated[str, plain("INT")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,8 +57,8 @@ class Train(TaskCommand):
     resume: Annotated[str, plain("RUN")] = ""
     """Go on with a run: its folder, or one of its checkpoints. Robot, ground and task are those of
     the run, unless given. It goes on in its own folder, exactly as if it had not ended; with
-    another ground or task, a new run begins with its networks and, unless given, its learning
-    rate."""
+    another ground or task, a new run begins with its networks and, unless
+    --algorithm.learning-rate or .schedule differ, with the learning rate that it came to."""
 
     device: Annotated[str, plain("DEVICE")] = "cpu"
     """Where the networks are: cpu, cuda, cuda:1. The physics is on the CPU."""
@@ -121,7 +125,7 @@ class Train(TaskCommand):
             )
         return run.robot_name
 
-    def _given(self, section: str, **words: str) -> dict[str, int | None]:
+    def _given(self, section: str, **words: str) -> dict[str, int]:
         """Return the whole numbers that were given, by the name of their value in a section."""
         given = {name: word for name, word in words.items() if word}
         for name in given:
@@ -129,7 +133,8 @@ class Train(TaskCommand):
                 option = name.replace("_", "-")
                 raise ConfigError(f"--{option} and --{section}.{option} are one; wanted it once")
         return {
-            name: whole_number(f"--{name.replace('_', '-')}", word) for name, word in given.items()
+            name: coerce(f"--{name.replace('_', '-')}", value_of(word), int)
+            for name, word in given.items()
         }
 
     def _terrain(self, run: "Run | None") -> str:

@@ -1,6 +1,7 @@
 """What `check-robot --train-smoke` does: see whether robots can be trained."""
 
 import json
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,8 +26,8 @@ def check_training(command: "CheckRobot") -> int:
         ConfigError: if an option makes no sense here, or a package is missing.
     """
     _refuse_others(command)
-    require_training()
     _refuse_unused(command)
+    require_training()
     settings = _settings(command)
     if command.output:
         from terrainkit.atomic import check_target
@@ -75,15 +76,15 @@ def _refuse_others(command: "CheckRobot") -> None:
 
 def _refuse_unused(command: "CheckRobot") -> None:
     """Refuse options of use for a robot's file alone where there is none."""
-    from terrainkit_robots.rl.smoke import is_file
-
     options = {
         "package": command.package,
         "xacro-arg": command.xacro_arg,
         "ignore": command.ignore,
+        "spec": command.spec,
     }
     given = [name for name, value in options.items() if value]
-    if given and not any(map(is_file, command.files)):
+    # not Path.is_file, which raises where a name is too long
+    if given and not any(map(os.path.isfile, command.files)):
         raise ConfigError(
             f"--{given[0]} is for a robot's file, which --train-smoke onboards first; "
             f"no file is called: {listing(command.files)}"

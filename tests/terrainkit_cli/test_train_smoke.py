@@ -144,6 +144,8 @@ def test_packages_arguments_and_a_spec_are_handed_on(here, told, tmp_path):
         ((), "no FILE to check"),
         (("a", "--package", "my=."), "--package is for a robot's file"),
         (("a", "b", "--xacro-arg", "arm:=false"), "no file is called: a, b"),
+        (("a" * 300, "--ignore", "MSH=no meshes"), "--ignore is for a robot's file"),
+        (("a", "--spec", "a.toml"), "--spec is for a robot's file"),
         (("a", "-o", "nowhere/a.txt"), "there is no folder nowhere"),
         (("a", "-o", "."), "it is a folder"),
     ],

@@ -120,7 +120,7 @@ def bring_in(file: Path, wishes: Wishes) -> BroughtIn:
         check_folder(wishes.target, overwrite=wishes.overwrite)
     given = Given(spec=read_spec(wishes.spec), file=str(wishes.spec)) if wishes.spec else None
     wishes.say(f"checking {file.name}")
-    report, repaired = _packed(*_repaired(file, wishes))
+    report, repaired = _mended(*_repaired(file, wishes))
     for crash in report.crashed:
         raise TerrainkitError(f"{file}: {crash.code}: {crash.reason}")
     if not wishes.force and any(map(keeps_out, report.findings)):
@@ -170,16 +170,17 @@ was meant: a joint of an unknown type would be fixed, one with inverted limits h
 errors, such as limits that are missing, it is that robot, and not yet one to train."""
 
 
-_PACKED = frozenset({"MSH002", "MSH004", "MSH005", "MSH007", "MSH008"})
-"""Errors of mesh files that their copies do not have, whatever they were called and in whatever
-format: a copy that cannot be made of a collision mesh keeps the robot out."""
+_MENDED = frozenset({"MSH002", "MSH004", "MSH005", "MSH007", "MSH008", "XML014"})
+"""Errors that are not in what is written. Mesh files are copied, whatever they were called and in
+whatever format; a copy that cannot be made of a collision mesh keeps the robot out. Rotations are
+written as roll, pitch and yaw."""
 
 
-def _packed(
+def _mended(
     report: Report, repaired: tuple["Finding", ...]
 ) -> tuple[Report, tuple["Finding", ...]]:
-    """Return what is found and what is repaired, when mesh files are copied."""
-    gone = [f for f in report.findings if f.severity == "error" and f.code in _PACKED]
+    """Return what is found and what is repaired, when the robot is written anew."""
+    gone = [f for f in report.findings if f.severity == "error" and f.code in _MENDED]
     left = tuple(f for f in report.findings if f not in gone)
     # What the fix would have done to the files is not what is done.
     return replace(report, findings=left), (*repaired, *(replace(f, fix=None) for f in gone))

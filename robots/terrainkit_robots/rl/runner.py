@@ -194,7 +194,8 @@ class LeggedRunner(OnPolicyRunner):
         refuse_other(path, state, self.env, list(self.env.groups))
         with fitting(path):
             trained = "processes" in state  # and no policy alone
-            parts = load_cfg or {"actor": True, "critic": True, "optimizer": True}
+            everything = {"actor": True, "critic": True, "optimizer": True}
+            parts = everything if load_cfg is None else load_cfg
             self.alg.load(state, {**parts, "optimizer": trained and parts.get("optimizer")}, strict)
             if trained and load_cfg is None:
                 self.current_learning_iteration = state["iteration"]

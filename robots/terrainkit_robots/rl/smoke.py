@@ -129,7 +129,7 @@ def smoke_of(name: str, *, settings: "Settings | None" = None, spec: Path | None
     Raises:
         TerrainkitError: if there is no such robot, or its files cannot be read or trained.
     """
-    if not is_file(name):
+    if not _is_file(name):
         if spec is not None:
             raise ConfigError(f"a spec for {name}, which has one; wanted it for a robot's file")
         found = registry.find(name)
@@ -151,12 +151,7 @@ def smoke_of(name: str, *, settings: "Settings | None" = None, spec: Path | None
     return replace(tried, checks=(_onboarded(""), *tried.checks))
 
 
-def is_file(name: str) -> bool:
-    """Return whether a robot is a file, which is onboarded before it is tried.
-
-    Raises:
-        ConfigError: if that cannot be told.
-    """
+def _is_file(name: str) -> bool:
     try:
         return Path(name).is_file()
     except (OSError, ValueError) as error:

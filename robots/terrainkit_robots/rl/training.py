@@ -81,8 +81,10 @@ def train(
         folder: Where the run goes; unless given, `logs/<robot>/<date-time>`.
         resume: A run to go on with. With the same ground and task, but for the number of
             environments and what is in `runner`, it goes on as if it had not ended, in its own
-            folder unless another is given. Else a new run begins, with its networks and, unless
-            another is asked for, its learning rate; on the same map robots stay on their levels.
+            folder unless another is given. Else a new run begins, with its networks; with its
+            optimizer too, and so the learning rate that it came to, where the learning rate to
+            start with and its schedule are the same; and on the same map robots stay on their
+            levels. A policy that is shipped has no optimizer.
         device: Where the networks are: `cpu`, `cuda`, `cuda:1`. The physics is on the CPU.
         watch: Told of the progress after each iteration.
 
@@ -173,14 +175,14 @@ def _goes_on(run: Run, robot: str | Path, terrain: str | Path, task: Task) -> bo
 def _taken_over(run: Run, terrain: str | Path, task: Task) -> dict[str, bool]:
     """Return what a new run takes over of another.
 
-    That is its networks; how large its steps are and which way they went, unless a learning rate is
-    asked for; and levels on its map.
+    That is its networks; its optimizer, where the task has the same learning rate to start with, by
+    the same schedule; and the levels of robots on its map.
     """
     # A map that is left flat is one patch.
     flat, was_flat = (each.terrain.collision == "plane" for each in (task, run.task))
     same = flat == was_flat and same_ground(run, terrain)
-    as_before = task.algorithm.learning_rate == run.task.algorithm.learning_rate
-    return {"actor": True, "critic": True, "optimizer": as_before, "careers": same}
+    rates = [(each.learning_rate, each.schedule) for each in (task.algorithm, run.task.algorithm)]
+    return {"actor": True, "critic": True, "optimizer": rates[0] == rates[1], "careers": same}
 
 
 def _checkpoint(run: Run) -> Path:

@@ -263,19 +263,20 @@ def missing_attribute(robot: Facts) -> Iterator[Defect]:
         yield _defect(robot, problem)
 
 
-@rule("XML014", "quaternion", "error", fixes="safe")
+@rule("XML014", "quaternion", "error", fixes="unsafe")
 def quaternion(robot: Facts) -> Iterator[Defect]:
-    """A rotation is written as a quaternion, which most readers skip.
+    """A rotation is written as a quaternion, which simulators skip.
 
-    `quat_xyzw` came with URDF 1.1. MuJoCo, yourdfpy and every older reader take such an origin for
-    one that is not turned, without a word: links and joints point another way than in the tool that
-    wrote the file.
+    `quat_xyzw` came with URDF 1.1. MuJoCo and yourdfpy take such an origin for one that is not
+    turned, without a word: links and joints point another way than in the tool that wrote the file.
+    Readers of URDF 1.0 skip it too, or refuse the file for its version.
 
     Fix:
-        Write the same rotation as roll, pitch and yaw, which everyone reads.
+        Write the same rotation as roll, pitch and yaw, with which the file may be of version 1.0.
+        `terrainkit onboard` does so, too.
 
     Source:
-        urdfdom reads it in files that say version="1.1"; seen skipped by MuJoCo 4.0 and yourdfpy.
+        The changelog of urdfdom 5; seen skipped by MuJoCo 4.0 and yourdfpy 0.0.60.
     """
     for problem in _problems(robot, "XML014"):
         fix = None
@@ -285,5 +286,5 @@ def quaternion(robot: Facts) -> Iterator[Defect]:
                 SetAttribute(source=problem.source, name="rpy", value=rpy),
                 RemoveAttribute(source=problem.source, name="quat_xyzw"),
             )
-            fix = Fix(safety="safe", description=f'Write rpy="{rpy}".', edits=edits)
+            fix = Fix(safety="unsafe", description=f'Write rpy="{rpy}".', edits=edits)
         yield _defect(robot, problem, fix)

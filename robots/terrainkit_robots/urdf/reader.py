@@ -170,7 +170,7 @@ class _Reader:
     def _tell_of_quaternion(self, origin: "etree._Element", turn: Matrix) -> None:
         rpy = place_text(roll_pitch_yaw(turn))
         if rpy != place_text(np.zeros(3)):
-            told = "quat_xyzw of <origin> is skipped by most readers, so that nothing is turned"
+            told = "quat_xyzw of <origin> is skipped by simulators, for which nothing is turned"
             self._tell("XML014", origin, f'{told}; wanted rpy="{rpy}"', rpy=rpy)
 
     # Links

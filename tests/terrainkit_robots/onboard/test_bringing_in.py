@@ -290,6 +290,18 @@ def test_repairs_are_made_in_what_is_written_only(tmp_path):
     assert 'axis xyz="0 1 0"' in (done.folder / "robot.urdf").read_text()
 
 
+@pytest.mark.parametrize("suffix", ["urdf", "xacro"])
+def test_a_quaternion_is_written_as_everyone_reads_it(tmp_path, suffix):
+    file = tmp_path / f"arm.{suffix}"
+    file.write_text(ARM.replace('xyz="0 0 0.11"', 'xyz="0 0 0.11" quat_xyzw="0 0 1 1"'))
+    done = bring_in(file, wishes(tmp_path))
+    assert [f.code for f in done.repaired] == ["XML014"]
+    assert done.proof is not None
+    assert 'rpy="0 0 1.570796327"' in (done.folder / "robot.urdf").read_text()
+    turned = mujoco.MjModel.from_xml_path(str(done.folder / "robot.urdf")).body_quat
+    np.testing.assert_allclose(turned[-1], [0.5**0.5, 0, 0, 0.5**0.5], atol=1e-9)
+
+
 def test_a_folder_that_is_there_is_left_alone(tmp_path):
     bring_in(bundled.find("quadruped"), wishes(tmp_path))
     spec = tmp_path / "robot/robot.toml"
