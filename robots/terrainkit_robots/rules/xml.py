@@ -276,7 +276,7 @@ def quaternion(robot: Facts) -> Iterator[Defect]:
         `terrainkit onboard` does so, too.
 
     Source:
-        The changelog of urdfdom 5; seen skipped by MuJoCo 4.0 and yourdfpy 0.0.60.
+        Pull requests 194 and 235 of urdfdom; seen skipped by MuJoCo 4.0 and yourdfpy 0.0.60.
     """
     for problem in _problems(robot, "XML014"):
         fix = None
