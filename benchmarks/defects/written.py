@@ -222,15 +222,6 @@ def entity_bomb(robot: Patient) -> Subjects:
     return ()
 
 
-@kind("XML014", "error", "a rotation as a quaternion")
-def quaternion(robot: Patient) -> Subjects:
-    joint = robot.choose(j for j in robot.moving() if j.find("origin") is not None)
-    origin = joint.find("origin")
-    origin.attrib.pop("rpy", None)
-    origin.set("quat_xyzw", "0 0 0.6 0.8")
-    return [joint.get("name")]
-
-
 @kind("XML013", "error", "a mesh or a shape without its size or file")
 def no_size(robot: Patient) -> Subjects:
     link = robot.choose(robot.links("collision/geometry"))
@@ -243,6 +234,15 @@ def no_size(robot: Patient) -> Subjects:
 def no_child(robot: Patient) -> Subjects:
     joint = robot.choose(robot.moving())
     joint.remove(joint.find("child"))
+    return [joint.get("name")]
+
+
+@kind("XML014", "error", "a rotation as a quaternion")
+def quaternion(robot: Patient) -> Subjects:
+    joint = robot.choose(j for j in robot.moving() if j.find("origin") is not None)
+    origin = joint.find("origin")
+    origin.attrib.pop("rpy", None)
+    origin.set("quat_xyzw", "0 0 0.6 0.8")
     return [joint.get("name")]
 
 

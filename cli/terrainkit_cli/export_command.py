@@ -83,7 +83,7 @@ class Export(Command):
         return {name: value for name, value in given.items() if value is not None}
 
     def _export_map(self) -> None:
-        if number_given(self.checkpoint) is not None:
+        if self.checkpoint != NO_NUMBER:
             raise ConfigError(f"{self.subject} is a map; --checkpoint is for runs")
         terrain_map = TerrainMap.load(self.subject)
         if not self.output:

@@ -58,16 +58,8 @@ def _refuse_others(command: "CheckRobot") -> None:
     """Refuse options that ask for something else."""
     if command.format not in ("text", "json"):
         raise ConfigError(f"--train-smoke reports as text or json; not as {command.format}")
-    others = {
-        "select": command.select,
-        "against": command.against,
-        "no-simulation": command.no_simulation,
-        "strict": command.strict,
-        "fix": command.fix,
-        "unsafe-fixes": command.unsafe_fixes,
-        "diff": command.diff,
-    }
-    given = [name for name, value in others.items() if value]
+    others = "select", "against", "no-simulation", "strict", "fix", "unsafe-fixes", "diff"
+    given = _given(command, *others)
     if given:
         raise ConfigError(f"--train-smoke asks no rules, so --{given[0]} makes no sense with it")
     if command.spec and len(command.files) > 1:
@@ -76,19 +68,18 @@ def _refuse_others(command: "CheckRobot") -> None:
 
 def _refuse_unused(command: "CheckRobot") -> None:
     """Refuse options of use for a robot's file alone where there is none."""
-    options = {
-        "package": command.package,
-        "xacro-arg": command.xacro_arg,
-        "ignore": command.ignore,
-        "spec": command.spec,
-    }
-    given = [name for name, value in options.items() if value]
+    given = _given(command, "package", "xacro-arg", "ignore", "spec")
     # not Path.is_file, which raises where a name is too long
     if given and not any(map(os.path.isfile, command.files)):
         raise ConfigError(
             f"--{given[0]} is for a robot's file, which --train-smoke onboards first; "
             f"no file is called: {listing(command.files)}"
         )
+
+
+def _given(command: "CheckRobot", *options: str) -> list[str]:
+    """Return those of the options that are given."""
+    return [option for option in options if getattr(command, option.replace("-", "_"))]
 
 
 def _settings(command: "CheckRobot") -> "Settings":

@@ -141,17 +141,17 @@ class _Reader:
         if written is None:
             return origin
         xyz, rpy = self._numbers(written, "xyz", 3), self._numbers(written, "rpy", 3)
-        quat = self._quaternion(written)
+        turn = self._quaternion(written)
         if xyz is not None:
             origin[:3, 3] = xyz
         if rpy is not None:
             origin[:3, :3] = rotation_of(rpy)
-        elif quat is not None:
-            origin[:3, :3] = turned_by(np.roll(quat, 1))
+        elif turn is not None:
+            origin[:3, :3] = turn
         return origin
 
     def _quaternion(self, origin: "etree._Element") -> Matrix | None:
-        """Return the x, y, z and w of URDF 1.1, shape (4,); None if there is no rotation in it."""
+        """Return the rotation of URDF 1.1's x, y, z and w, shape (3, 3); None if there is none."""
         quat = self._numbers(origin, "quat_xyzw", 4)
         if quat is None:
             return None
@@ -162,8 +162,9 @@ class _Reader:
                 f"quat_xyzw of <origin> is {short(origin.get('quat_xyzw', ''), 40)!r}, no rotation"
             )
         else:
-            self._tell_of_quaternion(origin, turned_by(np.roll(quat, 1)))
-            return quat
+            turn = turned_by(np.roll(quat, 1))
+            self._tell_of_quaternion(origin, turn)
+            return turn
         self._tell("XML006", origin, told, attribute="quat_xyzw")
         return None
 
