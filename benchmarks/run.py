@@ -12,13 +12,17 @@ import sys
 from pathlib import Path
 
 
-def main() -> None:
+def main() -> int:
     own = {"run", "clock"}
-    found = sorted(path.stem for path in Path(__file__).parent.glob("*.py"))
-    for subject in sys.argv[1:] or [name for name in found if name not in own]:
+    found = sorted({path.stem for path in Path(__file__).parent.glob("*.py")} - own)
+    if unknown := [word for word in sys.argv[1:] if word not in found]:
+        print(f"no subject {unknown[0]}; there are: {', '.join(found)}", file=sys.stderr)
+        return 2
+    for subject in sys.argv[1:] or found:
         for name, value in importlib.import_module(subject).run():
             print(f"{subject}.{name} {value:.3g}", flush=True)
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
