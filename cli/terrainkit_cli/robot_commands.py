@@ -91,19 +91,10 @@ class CheckRobot(Command):
     diff: bool = False
     """Show what --fix (or --unsafe-fixes) would change, and write nothing."""
 
-    train_smoke: bool = False
-    """In place of all that, see in seconds whether the robot can be trained: it starts on its feet,
-    stands, is rewarded, and learns a few times. FILE may also be a folder that terrainkit onboard
-    wrote, or any robot with a task. Exit code 1 if a check fails. As text or json."""
-
     def run(self) -> int:
         """Check each file, and report."""
         if not self.files:
             raise ConfigError("no FILE to check; wanted one or more, or quadruped, or biped")
-        if self.train_smoke:
-            from terrainkit_cli.train_smoke import check_training
-
-            return check_training(self)
         if self.diff and self.format != "text":
             raise ConfigError(f"--diff shows a diff, not a report as {self.format}; wanted one")
         if len(self.files) > 1 and (self.against or self.spec):

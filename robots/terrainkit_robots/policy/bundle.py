@@ -1,8 +1,4 @@
-"""The shipping: of a run, what a robot needs that comes with a policy.
-
-What is left is small, names no folder of the machine that it was trained on, and is opened like any
-run: by the name of its task, once it is where :attr:`~.registry.Registered.shipped` says.
-"""
+"""Bundle a policy: copy the part of a run that is shipped with the package."""
 
 from pathlib import Path
 
@@ -11,56 +7,33 @@ import tomli_w
 from terrainkit.errors import ConfigError, listing
 from terrainkit.toml_text import parsed
 from terrainkit_robots.onboard.folder import new_folder
-from terrainkit_robots.rl import registry
-from terrainkit_robots.rl.checkpoint import only_policy, read_checkpoint, save_checkpoint
-from terrainkit_robots.rl.robot import SPEC_FILE
-from terrainkit_robots.rl.run_folder import (
-    MAP_FILE,
-    RUN_FILE,
-    TASK_FILE,
-    Run,
-    checkpoint_name,
-    make_parents,
-    open_run,
-)
+from terrainkit_robots.rl import checkpoint, registry, run_folder
+from terrainkit_robots.rl.run_folder import MAP_FILE, RUN_FILE, SPEC_FILE, TASK_FILE, Run
 
 
-def ship(run: Run, folder: Path | str) -> Run:
-    """Write what is shipped of a run: its files, and one checkpoint with the networks alone.
-
-    Args:
-        run: A run on a plane or on a map, of a robot that is registered.
-        folder: Where; the task's `shipped`, for a policy that is found by its name.
-            Folders above it are made.
-
-    Returns:
-        The run that was written.
+def bundle_policy(run: Run, folder: Path) -> Run:
+    """Write a run without its training state and without paths of this machine.
 
     Raises:
-        ConfigError: if the run has no checkpoint, or its robot or ground is found on this machine
-            alone.
-        ExportError: if the folder holds something, or cannot be written.
+        ConfigError: if the run has no checkpoint, or its robot or terrain cannot be shipped.
+        ExportError: if the folder is not empty, or cannot be written.
     """
-    folder = Path(folder)
     if run.checkpoint is None:
-        raise ConfigError(f"{run.folder} has no checkpoint yet; wanted a run that has been trained")
+        raise ConfigError(f"run {run.folder}: got no checkpoint; expected a trained run")
     if run.robot_name not in registry.names():
-        raise ConfigError(
-            f"{run.folder} is of the robot in {run.robot_name}; wanted one that is registered: "
-            f"{listing(registry.names())}"
-        )
-    noted = [TASK_FILE, SPEC_FILE] + [MAP_FILE] * (run.terrain != "plane")
-    if not (run.folder / noted[-1]).is_file():
-        raise ConfigError(
-            f"{run.folder} is on {run.terrain}, which is no map that can be made again"
-        )
-    about = parsed((run.folder / RUN_FILE).read_text(encoding="utf-8"))
-    about["terrain"] = "plane" if run.terrain == "plane" else MAP_FILE
-    state = only_policy(read_checkpoint(run.checkpoint))
-    make_parents(folder)
-    with new_folder(folder) as made:
-        for name in noted:
-            (made / name).write_bytes((run.folder / name).read_bytes())
-        (made / RUN_FILE).write_text(tomli_w.dumps(about), encoding="utf-8")
-        save_checkpoint(made / checkpoint_name(state["iteration"]), state)
-    return open_run(folder)
+        known = listing(registry.names())
+        raise ConfigError(f"robot: got {run.robot_name}; expected a registered robot: {known}")
+    files = [TASK_FILE, SPEC_FILE] + [MAP_FILE] * (run.terrain != "plane")
+    if not (run.folder / files[-1]).is_file():
+        raise ConfigError(f"terrain: got {run.terrain}; expected plane or a map with a config")
+    info = parsed((run.folder / RUN_FILE).read_text(encoding="utf-8"))
+    info["terrain"] = "plane" if run.terrain == "plane" else MAP_FILE
+    state = checkpoint.only_policy(checkpoint.read_checkpoint(run.checkpoint))
+    run_folder.make_parents(folder)
+    with new_folder(folder) as path:
+        for name in files:
+            (path / name).write_bytes((run.folder / name).read_bytes())
+        (path / RUN_FILE).write_text(tomli_w.dumps(info), encoding="utf-8")
+        name = run_folder.checkpoint_name(state["iteration"])
+        checkpoint.save_checkpoint(path / name, state)
+    return run_folder.open_run(folder)
