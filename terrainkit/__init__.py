@@ -9,9 +9,8 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from terrainkit.choice import TerrainChoice
+    from terrainkit.sub_terrain import SubTerrain
     from terrainkit.config import MapConfig
-    from terrainkit.config_text import read_config
     from terrainkit.curriculum import update_levels
     from terrainkit.errors import TerrainkitError, TerrainkitWarning
     from terrainkit.generation import generate
@@ -21,12 +20,11 @@ if TYPE_CHECKING:
 __all__ = [
     "MapConfig",
     "Patch",
-    "TerrainChoice",
+    "SubTerrain",
     "TerrainMap",
     "TerrainkitError",
     "TerrainkitWarning",
     "generate",
-    "read_config",
     "tile",
     "update_levels",
 ]
@@ -35,12 +33,11 @@ __version__ = "0.1.0"
 _MODULES = {
     "MapConfig": "config",
     "Patch": "patch",
-    "TerrainChoice": "choice",
+    "SubTerrain": "choice",
     "TerrainMap": "terrain_map",
     "TerrainkitError": "errors",
     "TerrainkitWarning": "errors",
     "generate": "generation",
-    "read_config": "config_text",
     "tile": "patch",
     "update_levels": "curriculum",
 }

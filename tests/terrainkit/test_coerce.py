@@ -4,11 +4,11 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from terrainkit.choice import TerrainChoice
+from terrainkit.sub_terrain import SubTerrain
 from terrainkit.coerce import coerce
 from terrainkit.errors import ConfigError
 
-PIT = TerrainChoice(terrain="pit")
+PIT = SubTerrain(terrain="pit")
 Mode = Literal["a", "b"]
 
 
@@ -27,7 +27,7 @@ Mode = Literal["a", "b"]
         ((8, 4.5), tuple[float, float], (8.0, 4.5)),
         ([1, 2, 3], tuple[float, ...], (1.0, 2.0, 3.0)),
         ([], tuple[float, ...], ()),
-        ([PIT], tuple[TerrainChoice, ...], (PIT,)),
+        ([PIT], tuple[SubTerrain, ...], (PIT,)),
         (2**63 - 1, int, 2**63 - 1),
         (np.int64(3), int, 3),
         (np.int8(8), float, 8.0),
@@ -74,7 +74,7 @@ def test_whole_numbers_within_a_list_become_floats():
         ([8.0], tuple[float, float], "key has 1 values; wanted 2"),
         ([8.0, "4"], tuple[float, float], "key is '4'; wanted a number"),
         ([1.0, None], tuple[float, ...], "key is None; wanted a number"),
-        (["pit"], tuple[TerrainChoice, ...], "key is 'pit'; wanted TerrainChoice"),
+        (["pit"], tuple[SubTerrain, ...], "key is 'pit'; wanted SubTerrain"),
     ],
 )
 def test_nothing_is_guessed(value, annotation, message):

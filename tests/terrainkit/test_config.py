@@ -4,10 +4,10 @@ import math
 import numpy as np
 import pytest
 
-from terrainkit import MapConfig, TerrainChoice, presets
+from terrainkit import MapConfig, SubTerrain, presets
 from terrainkit.errors import ConfigError
 
-FLAT, GAP = TerrainChoice(terrain="flat"), TerrainChoice(terrain="gap")
+FLAT, GAP = SubTerrain(terrain="flat"), SubTerrain(terrain="gap")
 
 
 def test_the_default_is_legged_gyms_map():
@@ -116,12 +116,12 @@ def test_a_config_does_not_change():
         ({"restitution": 1.2}, r"restitution is 1\.2; wanted 0 to 1"),
         ({"mode": "random"}, "mode is 'random'; wanted one of: curriculum, selected, randomized"),
         ({"preset": "moon"}, "no preset 'moon'; there are: legged_gym, rough, stairs, all"),
-        ({"terrains": (FLAT, "gap")}, "terrains is 'gap'; wanted TerrainChoice"),
+        ({"terrains": (FLAT, "gap")}, "terrains is 'gap'; wanted SubTerrain"),
         ({"terrains": (GAP, GAP)}, "2 terrains of the mix are called 'gap'"),
         ({"mode": "selected", "terrains": (GAP, FLAT)}, "mix of one terrain.* has 2: gap, flat"),
         ({"mode": "selected"}, "mode selected wants a mix of one terrain.* this one has 9: "),
         (
-            {"terrains": (TerrainChoice(terrain="gap", proportion=0.0),)},
+            {"terrains": (SubTerrain(terrain="gap", proportion=0.0),)},
             "the proportions of gap sum to 0; wanted more",
         ),
     ],
@@ -132,5 +132,5 @@ def test_what_no_map_can_be_made_from_is_refused(given, message):
 
 
 def test_the_same_terrain_may_stand_twice_under_two_names():
-    wide = TerrainChoice(terrain="gap", name="wide_gap", parameters={"width": 1.0})
+    wide = SubTerrain(terrain="gap", name="wide_gap", parameters={"width": 1.0})
     assert MapConfig(terrains=(GAP, wide)).mix == (GAP, wide)

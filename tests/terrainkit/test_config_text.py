@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from terrainkit import MapConfig, TerrainChoice, read_config
+from terrainkit import MapConfig, SubTerrain, read_config
 from terrainkit.config_text import from_toml, to_toml
 from terrainkit.errors import ConfigError
 
-FLAT = TerrainChoice(terrain="flat")
+FLAT = SubTerrain(terrain="flat")
 NOT_THE_DEFAULT = {
     "rows": 3,
     "cols": 4,
@@ -19,12 +19,10 @@ NOT_THE_DEFAULT = {
     "border": 2.5,
     "preset": "stairs",
     "terrains": (
-        TerrainChoice(terrain="gap", proportion=0.25, parameters={"width": (0.2, 0.7)}),
-        TerrainChoice(
-            terrain="gap", name='a "wide" gap, ü\n', parameters={"width": 1, "depth": 2.5}
-        ),
-        TerrainChoice(terrain="slope", parameters={"inverted": True}),
-        TerrainChoice(terrain="wave", parameters={"number": 3}),
+        SubTerrain(terrain="gap", proportion=0.25, parameters={"width": (0.2, 0.7)}),
+        SubTerrain(terrain="gap", name='a "wide" gap, ü\n', parameters={"width": 1, "depth": 2.5}),
+        SubTerrain(terrain="slope", parameters={"inverted": True}),
+        SubTerrain(terrain="wave", parameters={"number": 3}),
     ),
     "mode": "randomized",
     "difficulty_range": (0.25, 0.75),
@@ -71,7 +69,7 @@ def test_a_mix_of_ones_own_is_written_without_a_preset():
     ids=["number", "range", "count", "switch"],
 )
 def test_numpys_numbers_survive_toml(terrain, parameters):
-    config = MapConfig(terrains=(TerrainChoice(terrain=terrain, parameters=parameters),))
+    config = MapConfig(terrains=(SubTerrain(terrain=terrain, parameters=parameters),))
     assert from_toml(to_toml(config)) == config
 
 
@@ -92,7 +90,7 @@ def test_any_config_survives_toml(rows, seed, threshold, friction, difficulties,
         slope_threshold=threshold,
         static_friction=friction,
         random_difficulties=tuple(difficulties),
-        terrains=(TerrainChoice(terrain="gap", name=name, parameters={"width": width}),),
+        terrains=(SubTerrain(terrain="gap", name=name, parameters={"width": width}),),
     )
     assert from_toml(to_toml(config)) == config
 
@@ -126,8 +124,8 @@ def test_a_file_written_by_hand():
         patch_size=(8.0, 4.0),
         slope_threshold=None,
         terrains=(
-            TerrainChoice(terrain="stairs", proportion=2, parameters={"step_height": (0.05, 0.2)}),
-            TerrainChoice(terrain="stairs", name="down", parameters={"inverted": True}),
+            SubTerrain(terrain="stairs", proportion=2, parameters={"step_height": (0.05, 0.2)}),
+            SubTerrain(terrain="stairs", name="down", parameters={"inverted": True}),
         ),
     )
 

@@ -120,9 +120,8 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
         SPEC_FILE: _text(registry.find(robot_name).folder / SPEC_FILE),
     }
     if (config := _map_config(ground)) is not None:
-        from terrainkit import config_text
 
-        files[MAP_FILE] = config_text.to_toml(config)
+        files[MAP_FILE] = config.to_toml()
     _refuse_existing(folder)
     make_parents(folder)
     with new_folder(folder) as made:
@@ -220,9 +219,9 @@ def same_ground(run: Run, terrain: str | Path) -> bool:
             return False
         digest = parsed(_text(run.folder / RUN_FILE)).get(_GROUND)
         return digest is None or digest == _digest(Path(here))
-    from terrainkit.config_text import read_config
+    from terrainkit.config import MapConfig
 
-    return _map_config(here) == read_config(noted)
+    return _map_config(here) == MapConfig.load(noted)
 
 
 def rewrite_task(run: Run, task: Task) -> None:
@@ -341,9 +340,9 @@ def _text(path: Path) -> str:
 def _map_config(terrain: str) -> "MapConfig | None":
     """Return the config of the map, if the ground is one."""
     if terrain.endswith(".toml"):
-        from terrainkit.config_text import read_config
+        from terrainkit.config import MapConfig
 
-        return read_config(terrain)
+        return MapConfig.load(terrain)
     if terrain.endswith(".npz"):
         from terrainkit.terrain_map import TerrainMap
 
