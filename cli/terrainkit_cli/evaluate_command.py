@@ -13,9 +13,9 @@ from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import NO_NUMBER, Checkpoint, Output, number_given, plain
 
 if TYPE_CHECKING:
-    from terrainkit_robots.rl.evaluation import Asked
+    from terrainkit_robots.policy.evaluate import Asked
+    from terrainkit_robots.policy.score import Evaluation, Score
     from terrainkit_robots.rl.run_folder import Run
-    from terrainkit_robots.rl.score import Evaluation, Score
 
 _NOT_ASKED = (-math.inf, -math.inf, -math.inf)
 """No command; not None, since tyro's errors about a union name its members."""
@@ -79,7 +79,7 @@ class PolicyCommand(Command):
         Raises:
             ConfigError: if an option is outside its limits.
         """
-        from terrainkit_robots.rl.evaluation import Asked
+        from terrainkit_robots.policy.evaluate import Asked
 
         return Asked(
             seconds=seconds,
@@ -119,8 +119,8 @@ class Evaluate(PolicyCommand):
         if output is not None:
             check_target(output, overwrite=self.overwrite)  # before the wait
         run = self.open()
-        from terrainkit_robots.rl.evaluation import evaluate
-        from terrainkit_robots.rl.score import write_evaluation
+        from terrainkit_robots.policy.evaluate import evaluate
+        from terrainkit_robots.policy.score import write_evaluation
 
         with render.steps() as steps:
             found = evaluate(

@@ -14,7 +14,7 @@ from terrainkit_cli.robot_options import NO_NUMBER, Checkpoint, number_given, pl
 from terrainkit_cli.terrain_commands import written
 
 if TYPE_CHECKING:
-    from terrainkit_robots.rl.policy_export import Exported
+    from terrainkit_robots.policy.export import Exported
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +106,7 @@ class Export(Command):
         from terrainkit_cli.training_extra import require_training
 
         require_training()
-        from terrainkit_robots.rl.policy_export import export_policy
+        from terrainkit_robots.policy.export import export_policy
         from terrainkit_robots.rl.run_folder import is_shipped, open_run
 
         run = open_run(self.subject, number_given(self.checkpoint))

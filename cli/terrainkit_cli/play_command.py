@@ -13,7 +13,7 @@ from terrainkit_cli.robot_options import Output
 from terrainkit_cli.training_extra import require_training
 
 if TYPE_CHECKING:
-    from terrainkit_robots.rl.score import Evaluation
+    from terrainkit_robots.policy.score import Evaluation
     from terrainkit_robots.rl.video import Film
 
 
@@ -58,7 +58,7 @@ class Play(PolicyCommand):
         run = self.open()
         target = Path(self.output or f"{run.folder.resolve().name}.mp4")
         asked = self.asked(self.seconds)
-        from terrainkit_robots.rl.play import play, view
+        from terrainkit_robots.policy.play import play, view
         from terrainkit_robots.rl.video import check_size, check_video
 
         if self.viewer:

@@ -12,7 +12,7 @@ from terrainkit_cli.training_extra import require_training
 
 if TYPE_CHECKING:
     from terrainkit_cli.robot_commands import CheckRobot
-    from terrainkit_robots.rl.smoke import Smoke
+    from terrainkit_robots.policy.smoke_test import Smoke
     from terrainkit_robots.settings import Settings
 
 SCHEMA_VERSION = 1
@@ -94,7 +94,7 @@ def _settings(command: "CheckRobot") -> "Settings":
 
 def _tried(name: str, command: "CheckRobot", settings: "Settings") -> "Smoke | None":
     """Return what is found of a robot; None, and one line of error, if that failed."""
-    from terrainkit_robots.rl.smoke import smoke_of
+    from terrainkit_robots.policy.smoke_test import smoke_of
 
     spec = Path(command.spec) if command.spec else None
     try:
@@ -134,7 +134,7 @@ def _word(passed: bool) -> str:
 def _as_json(found: "list[tuple[str, Smoke]]") -> str:
     """Return one document, indented; several are JSON lines."""
     from terrainkit import __version__
-    from terrainkit_robots.rl.smoke import record
+    from terrainkit_robots.policy.smoke_test import record
 
     head = {
         "schema_version": SCHEMA_VERSION,

@@ -125,7 +125,7 @@ def test_a_terminal_gets_a_headline(here, monkeypatch):
 
 
 def test_what_was_never_measured_is_told_and_is_a_dash():
-    from terrainkit_robots.rl.score import Evaluation, Score
+    from terrainkit_robots.policy.score import Evaluation, Score
 
     score = Score(
         robots=4,

@@ -6,7 +6,8 @@ pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit_robots.onboard.pictures import PicturesError
-from terrainkit_robots.rl import play, video
+from terrainkit_robots.policy import play
+from terrainkit_robots.rl import video
 
 QUICK = ("--seconds", "0.04", "--num-envs", "1")
 SMALL = ("--size", "96", "64")

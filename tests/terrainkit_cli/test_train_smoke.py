@@ -7,9 +7,9 @@ pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit.errors import ConfigError
 from terrainkit_cli import training_extra
-from terrainkit_robots.rl import smoke as smoke_test
+from terrainkit_robots.policy import smoke_test as smoke_test
+from terrainkit_robots.policy.smoke_test import Check, Smoke
 from terrainkit_robots.rl.registry import find
-from terrainkit_robots.rl.smoke import Check, Smoke
 
 GOOD = Check(name="spawn height", passed=True, measured="1.0 cm", wanted="within 2.0 cm")
 BAD = Check(name="observation policy", passed=False, measured="44 numbers", wanted="45 numbers")

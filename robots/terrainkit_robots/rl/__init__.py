@@ -4,8 +4,4 @@ Read it in this order: `env`, which is the loop; then what it calls: `task` (eve
 (the model), `physics` (what steps it), `sensors` and `state` (what is known after a step),
 `observations`, `rewards` and `earnings`, `terminations`, `commands`, `control`, `start`,
 `randomization`, `careers` (the terrain curriculum). `training` and `runner` learn with it.
-
-`policy` is what came of it: `walk` lets it act, `trials`, `score` and `evaluation` measure it,
-`recorder`, `play`, `stage` and `video` show it, `policy_description` and `policy_export` take it
-elsewhere, `shipping` puts it into a package.
 """

@@ -6,7 +6,7 @@ import torch
 
 from terrainkit import generate
 from terrainkit.errors import ConfigError
-from terrainkit_robots.rl.evaluation import (
+from terrainkit_robots.policy.evaluate import (
     Asked,
     command_grid,
     evaluate,

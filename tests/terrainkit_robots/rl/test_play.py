@@ -6,9 +6,9 @@ import pytest
 import torch
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots.rl import play as playing
-from terrainkit_robots.rl.evaluation import Asked
-from terrainkit_robots.rl.play import play, tour_of, view
+from terrainkit_robots.policy import play as playing
+from terrainkit_robots.policy.evaluate import Asked
+from terrainkit_robots.policy.play import play, tour_of, view
 from terrainkit_robots.rl.task import Commands, Env, Terrain
 
 

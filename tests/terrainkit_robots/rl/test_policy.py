@@ -5,9 +5,9 @@ import pytest
 import torch
 
 from terrainkit.errors import ConfigError, TerrainkitWarning
+from terrainkit_robots.policy.actor import actor_of, policy_of
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.policy import actor_of, policy_of
 from terrainkit_robots.rl.registry import find
 from terrainkit_robots.rl.run_folder import create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner

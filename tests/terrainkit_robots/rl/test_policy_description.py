@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import torch
 
+from terrainkit_robots.policy.description import description
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.policy_description import description
 from terrainkit_robots.rl.task import Control, Env, Noise, Task
 
 SMALL = Task(env=Env(num_envs=4, num_threads=1))

@@ -12,12 +12,12 @@ import torch
 from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError, ExportError
+from terrainkit_robots.policy import export as policy_export
+from terrainkit_robots.policy.actor import policy_of
+from terrainkit_robots.policy.export import METADATA, export_policy
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.rl import policy_export
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.policy import policy_of
-from terrainkit_robots.rl.policy_export import METADATA, export_policy
 from terrainkit_robots.rl.registry import find
 from terrainkit_robots.rl.run_folder import create_run, open_run
 from terrainkit_robots.rl.task import Env, Task

@@ -3,9 +3,9 @@ import pytest
 import torch
 
 from terrainkit_robots.onboard.bringing_in import Wishes, bring_in
+from terrainkit_robots.policy.export import export_policy
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.policy_export import export_policy
 from terrainkit_robots.rl.robot import read_robot
 from terrainkit_robots.rl.run_folder import create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner

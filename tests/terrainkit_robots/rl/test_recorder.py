@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import torch
 
+from terrainkit_robots.policy.recorder import Recorder, visited
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.recorder import Recorder, visited
 from terrainkit_robots.rl.rotation import yaw_of
 from terrainkit_robots.rl.task import InitState
 

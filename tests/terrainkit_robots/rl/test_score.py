@@ -7,11 +7,11 @@ import torch
 
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ExportError
-from terrainkit_robots.rl import trials
-from terrainkit_robots.rl.evaluation import Asked, prepared
-from terrainkit_robots.rl.score import score_of, summed_up, write_evaluation
+from terrainkit_robots.policy import trials
+from terrainkit_robots.policy.evaluate import Asked, prepared
+from terrainkit_robots.policy.score import score_of, summed_up, write_evaluation
+from terrainkit_robots.policy.trials import Outcome, roll_out
 from terrainkit_robots.rl.task import Commands
-from terrainkit_robots.rl.trials import Outcome, roll_out
 
 
 def still(env):

@@ -4,14 +4,14 @@ import pytest
 import torch
 
 from terrainkit.errors import ConfigError, ExportError
+from terrainkit_robots.policy.actor import policy_of
+from terrainkit_robots.policy.bundle import ship
 from terrainkit_robots.rl.checkpoint import read_checkpoint
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane, read_ground
-from terrainkit_robots.rl.policy import policy_of
 from terrainkit_robots.rl.registry import find, names
 from terrainkit_robots.rl.run_folder import create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.shipping import ship
 from terrainkit_robots.rl.task import Env, Policy, Runner, Task
 
 SHIPPING = [name for name in names() if find(name).shipped.is_dir()]

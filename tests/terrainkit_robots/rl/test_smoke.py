@@ -8,14 +8,8 @@ import torch
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots import bundled
-from terrainkit_robots.rl import smoke as smoke_test
-from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.registry import find
-from terrainkit_robots.rl.rewards import REWARDS
-from terrainkit_robots.rl.robot import robot_of
-from terrainkit_robots.rl.scene import lowest_point
-from terrainkit_robots.rl.smoke import (
+from terrainkit_robots.policy import smoke_test as smoke_test
+from terrainkit_robots.policy.smoke_test import (
     Smoke,
     memory,
     observation_shapes,
@@ -28,6 +22,12 @@ from terrainkit_robots.rl.smoke import (
     stands,
     training,
 )
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.ground import Plane
+from terrainkit_robots.rl.registry import find
+from terrainkit_robots.rl.rewards import REWARDS
+from terrainkit_robots.rl.robot import robot_of
+from terrainkit_robots.rl.scene import lowest_point
 from terrainkit_robots.rl.task import Control, Env, Rewards, Task
 
 

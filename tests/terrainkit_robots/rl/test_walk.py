@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import torch
 
+from terrainkit_robots.policy.rollout import timetable, walk
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.walk import timetable, walk
 
 
 @pytest.fixture

@@ -66,14 +66,14 @@ from tensordict import TensorDict
 
 from terrainkit.atomic import atomic_write, check_target
 from terrainkit.errors import ConfigError, ExportError
+from terrainkit_robots.policy.actor import actor_of
+from terrainkit_robots.policy.description import ONNX, TORCHSCRIPT, description, width_of
+from terrainkit_robots.policy.rollout import walk
 from terrainkit_robots.rl.checkpoint import read_checkpoint
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import read_ground
-from terrainkit_robots.rl.policy import actor_of
-from terrainkit_robots.rl.policy_description import ONNX, TORCHSCRIPT, description, width_of
 from terrainkit_robots.rl.run_folder import Run
 from terrainkit_robots.rl.threads import one_thread
-from terrainkit_robots.rl.walk import walk
 
 FloatArray = NDArray[np.float32]
 Answer = Callable[[FloatArray], FloatArray]

@@ -13,16 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
+from terrainkit_robots.policy.actor import policy_of
+from terrainkit_robots.policy.score import Evaluation, summed_up
+from terrainkit_robots.policy.trials import Watch, roll_out
 from terrainkit_robots.rl.device import require_device
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Ground, read_ground
 from terrainkit_robots.rl.observations import sees_heights
-from terrainkit_robots.rl.policy import policy_of
 from terrainkit_robots.rl.run_folder import Run, same_ground
-from terrainkit_robots.rl.score import Evaluation, summed_up
 from terrainkit_robots.rl.task import Commands, Task
 from terrainkit_robots.rl.threads import one_thread
-from terrainkit_robots.rl.trials import Watch, roll_out
 
 FloatArray = NDArray[np.float32]
 

@@ -8,8 +8,8 @@ import torch
 from numpy.typing import NDArray
 from tensordict import TensorDict
 
+from terrainkit_robots.policy.actor import Act
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.policy import Act
 
 FloatArray = NDArray[np.float32]
 

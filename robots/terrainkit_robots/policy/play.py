@@ -16,16 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
+from terrainkit_robots.policy.actor import policy_of
+from terrainkit_robots.policy.evaluate import Asked, is_flat, prepared
+from terrainkit_robots.policy.recorder import Recorder
+from terrainkit_robots.policy.rollout import timetable, walk
+from terrainkit_robots.policy.score import Evaluation, summed_up
+from terrainkit_robots.policy.trials import roll_out
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.evaluation import Asked, is_flat, prepared
-from terrainkit_robots.rl.policy import policy_of
-from terrainkit_robots.rl.recorder import Recorder
-from terrainkit_robots.rl.score import Evaluation, summed_up
 from terrainkit_robots.rl.task import Commands
 from terrainkit_robots.rl.threads import one_thread
-from terrainkit_robots.rl.trials import roll_out
 from terrainkit_robots.rl.video import SIZE, Film
-from terrainkit_robots.rl.walk import timetable, walk
 
 if TYPE_CHECKING:
     from terrainkit_robots.rl.run_folder import Run

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit_robots.policy.trials import SETTLING, Outcome
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.trials import SETTLING, Outcome
 
 if TYPE_CHECKING:
-    from terrainkit_robots.rl.evaluation import Asked
+    from terrainkit_robots.policy.evaluate import Asked
     from terrainkit_robots.rl.run_folder import Run
 
 FloatArray = NDArray[np.float32]

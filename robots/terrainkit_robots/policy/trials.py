@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit_robots.policy.actor import Act
+from terrainkit_robots.policy.rollout import Step, timetable, walk
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.policy import Act
-from terrainkit_robots.rl.walk import Step, timetable, walk
 
 FloatArray = NDArray[np.float32]
 Watch = Callable[[float], object]

@@ -1,0 +1,1 @@
+"""Evaluate, play, export and bundle trained policies, and smoke-test robots before training."""
