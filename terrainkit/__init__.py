@@ -9,12 +9,12 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from terrainkit.sub_terrain import SubTerrain
     from terrainkit.config import MapConfig
     from terrainkit.curriculum import update_levels
     from terrainkit.errors import TerrainkitError, TerrainkitWarning
     from terrainkit.generation import generate
     from terrainkit.patch import Patch, tile
+    from terrainkit.sub_terrain import SubTerrain
     from terrainkit.terrain_map import TerrainMap
 
 __all__ = [
@@ -33,7 +33,7 @@ __version__ = "0.1.0"
 _MODULES = {
     "MapConfig": "config",
     "Patch": "patch",
-    "SubTerrain": "choice",
+    "SubTerrain": "sub_terrain",
     "TerrainMap": "terrain_map",
     "TerrainkitError": "errors",
     "TerrainkitWarning": "errors",

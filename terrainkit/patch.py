@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.sub_terrain import SubTerrain
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.layout import assign_patch, terrain_columns
 from terrainkit.parameter import Realized, Value, parameters_of
+from terrainkit.sub_terrain import SubTerrain
 from terrainkit.terrain import Terrain
 
 

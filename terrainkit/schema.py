@@ -269,8 +269,10 @@ def _describe(annotation: Any) -> str:
         text = f"one of: {', '.join(map(str, args))}"
     elif origin is tuple:
         non_empty = "non-empty " if any(meta.min_length for meta in metas) else ""
-        length = f"a {non_empty}list, each" if Ellipsis in args else f"a list of {len(args)}, each"
-        text = f"{length} {_describe(args[0])}"
+        count = (
+            f"a {non_empty}list, each value" if Ellipsis in args else f"{len(args)} values, each"
+        )
+        text = f"{count} {_describe(args[0])}"
         text += ", the lower one first" if "sorted" in extra else ""
         text += ", each one once" if "unique" in extra else ""
     elif origin is Mapping:
@@ -280,7 +282,8 @@ def _describe(annotation: Any) -> str:
     if {"ge", "le"} <= set(limits):
         text += f" from {_number(limits['ge'])} to {_number(limits['le'])}"
     else:
-        text += "".join(f" {_LIMITS[key]} {_number(limit)}" for key, limit in limits.items())
+        limit_texts = (f" {_LIMITS[key]} {_number(limit)}" for key, limit in limits.items())
+        text += " and".join(limit_texts)
     return f"{text} [{extra['unit']}]" if extra.get("unit", "1") != "1" else text
 
 

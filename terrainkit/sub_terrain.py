@@ -52,7 +52,10 @@ class SubTerrain(Config):
         """Return the sub-terrain of a `[[terrains]]` table; its other keys are parameters."""
         own = {key: table[key] for key in ("terrain", "proportion", "name") if key in table}
         parameters = {key: value for key, value in table.items() if key not in own}
-        return super().from_table({**own, "parameters": parameters}, default, path)
+        try:
+            return super().from_table({**own, "parameters": parameters}, default)
+        except ConfigError as error:
+            raise ConfigError(f"{path.removesuffix('.')}: {error}") from error
 
     def to_table(self) -> dict[str, Any]:
         """Return the keys of a `[[terrains]]` table."""

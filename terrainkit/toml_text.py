@@ -17,7 +17,7 @@ LINE_LENGTH = 100
 """Longest line that is written; a longer list gets one line per item."""
 
 _MAX_SQUARED_DOTS = 10_000_000
-"""Limit on the sum of (dots in a line)^2, to which the time that `tomllib` takes is proportional."""
+"""Limit on the sum of (dots in a line)^2: `tomllib` takes quadratic time for dotted keys."""
 
 
 def parse_toml(text: str) -> dict[str, Any]:

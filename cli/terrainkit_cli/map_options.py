@@ -55,10 +55,13 @@ def _metavar(kind: Any) -> str:
 if TYPE_CHECKING:
     MapOptions = Any
 else:
+    _TYPES = field_types(MapConfig)
     MapOptions = dataclasses.make_dataclass(
         "MapOptions",
         [
-            _option(f.name, field_types(MapConfig)[f.name], f.default, field_docs(MapConfig)[f.name])
+            _option(
+                f.name, field_types(MapConfig)[f.name], f.default, field_docs(MapConfig)[f.name]
+            )
             for f in dataclasses.fields(MapConfig)
             if f.name != "terrains"
         ],

@@ -9,10 +9,10 @@ from typing import Annotated, Any
 import tyro
 
 from terrainkit import presets, registry
-from terrainkit.sub_terrain import SubTerrain
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
 from terrainkit.parameter import Range, Value
+from terrainkit.sub_terrain import SubTerrain
 from terrainkit.terrain_map import TerrainMap
 from terrainkit_cli import render
 from terrainkit_cli.map_options import MapOptions, given

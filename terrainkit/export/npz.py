@@ -16,7 +16,7 @@ from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError, MapFileError, listing
 from terrainkit.mesh.lattice import BYTES_PER_NODE
 from terrainkit.mesh.tri_mesh import TriMesh
-from terrainkit.parameter import LARGEST, Realized, Value, parameters_of
+from terrainkit.parameter import MAX_VALUE, Realized, Value, parameters_of
 from terrainkit.patch import Parameters
 
 if TYPE_CHECKING:
@@ -169,6 +169,6 @@ def _realized(value: Any) -> Realized:
 
 
 def _number(value: Any) -> Value:
-    if not isinstance(value, int | float) or not abs(value) <= LARGEST:
+    if not isinstance(value, int | float) or not abs(value) <= MAX_VALUE:
         raise ValueError("a value is not a number within bounds")
     return value
