@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from terrainkit.boxes import BoxCover, around, level_cells
 from terrainkit.capacity import require_memory
-from terrainkit.schema import convert
 from terrainkit.mesh.closed import THICKNESS
+from terrainkit.schema import convert
 
 if TYPE_CHECKING:
     from terrainkit.terrain_map import TerrainMap

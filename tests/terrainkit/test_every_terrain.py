@@ -7,7 +7,7 @@ from terrainkit import MapConfig, SubTerrain, TerrainkitError, generate, registr
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.measure import hardness
-from terrainkit.parameter import LARGEST, parameters_of
+from terrainkit.parameter import MAX_VALUE, parameters_of
 
 VARIANTS = [(name, {}) for name in registry.names()] + [
     (name, {"inverted": True})
@@ -192,7 +192,7 @@ def test_what_is_built_is_within_a_cell_of_what_is_asked(terrain, given_paramete
                 assert off.max() <= cell + 1e-9
 
 
-@pytest.mark.parametrize("value", [5e-324, LARGEST, 1e308])
+@pytest.mark.parametrize("value", [5e-324, MAX_VALUE, 1e308])
 @pytest.mark.parametrize(
     ("terrain", "parameter"),
     [(name, key) for name in registry.names() for key in parameters_of(registry.find(name))],

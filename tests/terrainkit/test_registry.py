@@ -53,7 +53,7 @@ def test_a_terrain_that_uses_another_is_still_found_by_its_own_name():
 
 
 def test_an_unknown_name_lists_those_that_exist():
-    with pytest.raises(ConfigError, match=r"no terrain 'stair'; there are: flat, gap, .*, wave$"):
+    with pytest.raises(ConfigError, match=r"did you mean 'stairs'\? There are: flat, .*, wave$"):
         registry.find("stair")
 
 
