@@ -31,11 +31,11 @@ import defects
 from defects.patient import KINDS, Healthy, Kind, NotHereError, Patient
 from lxml import etree
 
-from terrainkit_robots import bundled
-from terrainkit_robots.facts import Facts
-from terrainkit_robots.lint import Finding, lint
-from terrainkit_robots.mesh.meshes import Meshes
-from terrainkit_robots.robot_file import read_robot
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description import bundled
+from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.lint.runner import Finding, lint
+from terrainkit_robots.mesh.mesh_cache import Meshes
 
 ROBOTS = Path(
     os.environ.get("TERRAINKIT_ROBOTS", Path(__file__).resolve().parents[2] / "shared" / "robots")

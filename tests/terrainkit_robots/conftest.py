@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from terrainkit_robots import bundled
+from terrainkit_robots.description import bundled
 from terrainkit_robots.simulation.standing import Standing
 
 _PROJECT = Path(__file__).resolve().parents[2]

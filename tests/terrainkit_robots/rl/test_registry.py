@@ -11,7 +11,7 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit_cli.main import COMMANDS
-from terrainkit_robots import bundled
+from terrainkit_robots.description import bundled
 from terrainkit_robots.rl import registry, rewards, robot
 from terrainkit_robots.rl.task import Env, Task
 from terrainkit_robots.rl.task_file import from_toml, to_toml, values_of

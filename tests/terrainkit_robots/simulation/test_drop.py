@@ -3,11 +3,11 @@ import math
 import numpy as np
 import pytest
 
-from terrainkit_robots import bundled
-from terrainkit_robots.facts import Facts
-from terrainkit_robots.robot_file import read_robot
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description import bundled
+from terrainkit_robots.description.load import read_robot
 from terrainkit_robots.simulation.drop import let_fall
-from terrainkit_robots.simulation.plant import plant
+from terrainkit_robots.simulation.sim_model import plant
 
 PENDULUM = """
 <robot name="pendulum">

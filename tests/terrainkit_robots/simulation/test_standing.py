@@ -4,15 +4,15 @@ from pathlib import Path
 
 import pytest
 
-from terrainkit_robots import bundled
-from terrainkit_robots.edit.apply import fix_robot
-from terrainkit_robots.facts import Facts
-from terrainkit_robots.lint import lint
-from terrainkit_robots.mesh.meshes import Meshes
-from terrainkit_robots.robot_file import read_robot
-from terrainkit_robots.rule import CannotCheckError
-from terrainkit_robots.simulation.gains import suggest_gains
-from terrainkit_robots.simulation.plant import plant
+from terrainkit_robots.analysis.cannot_check import CannotCheckError
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description import bundled
+from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.lint.fixes.apply import fix_robot
+from terrainkit_robots.lint.runner import lint
+from terrainkit_robots.mesh.mesh_cache import Meshes
+from terrainkit_robots.simulation.pd_gains import suggest_gains
+from terrainkit_robots.simulation.sim_model import plant
 from terrainkit_robots.simulation.standing import footholds, stand_still
 
 BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]

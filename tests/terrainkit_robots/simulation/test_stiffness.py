@@ -2,9 +2,9 @@ import re
 
 import pytest
 
-from terrainkit_robots.facts import Facts
-from terrainkit_robots.robot_file import read_robot
-from terrainkit_robots.simulation.gains import suggest_gains
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.simulation.pd_gains import suggest_gains
 
 LEGS = ("FL", "FR", "RL", "RR")
 

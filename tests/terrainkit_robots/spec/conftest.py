@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 import terrainkit_robots
-from terrainkit_robots.facts import Facts
-from terrainkit_robots.robot_file import read_robot
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.load import read_robot
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
-BUNDLED = Path(terrainkit_robots.__file__).parent / "bundled"
+BUNDLED = Path(terrainkit_robots.__file__).parent / "description/bundled"
 
 
 @dataclass(frozen=True)
