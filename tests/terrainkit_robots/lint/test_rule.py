@@ -4,7 +4,7 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.lint.rule import FAMILIES, Defect, find, rule, rules
-from terrainkit_robots.lint.runner import rule as module
+from terrainkit_robots.lint import rule as module
 
 PAGE = """A mass is negative.
 
