@@ -3,8 +3,8 @@ import re
 import pytest
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots.lint.rule import FAMILIES, Defect, find, rule, rules
 from terrainkit_robots.lint import rule as module
+from terrainkit_robots.lint.rule import FAMILIES, Defect, find, rule, rules
 
 PAGE = """A mass is negative.
 
