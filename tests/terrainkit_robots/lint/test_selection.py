@@ -4,7 +4,12 @@ from terrainkit.errors import ConfigError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import read_robot
 from terrainkit_robots.lint.rule import rules
-from terrainkit_robots.lint.selection import IdleComment, Ignored, choose, lint_selected
+from terrainkit_robots.lint.selection import (
+    Suppressed,
+    UnusedSuppression,
+    lint_selected,
+    select_rules,
+)
 from terrainkit_robots.lint.settings import Settings, matching
 
 LINK = '<link name="{name}"><inertial><mass value="-1"/></inertial></link>'
@@ -27,21 +32,21 @@ def file(tmp_path):
 
 
 def test_without_a_word_every_rule_is_asked():
-    chosen, left_out = choose(Settings())
+    chosen, left_out = select_rules(Settings())
     assert chosen == rules()
     assert left_out == ()
 
 
 def test_what_is_ignored_is_left_out_of_what_is_selected_with_its_reason():
     settings = Settings(select=("INR",), ignore={"INR002": "a balloon", "JNT": "no joints"})
-    chosen, left_out = choose(settings)
+    chosen, left_out = select_rules(settings)
     assert codes(chosen) == codes(matching("INR")) - {"INR002"}
     assert [(s.code, s.reason) for s in left_out] == [("INR002", "ignored: a balloon")]
 
 
 def test_an_ignored_word_that_is_no_rule_is_an_error():
     with pytest.raises(ConfigError, match="no rule 'NOPE1'"):
-        choose(Settings(ignore={"NOPE1": "why"}))
+        select_rules(Settings(ignore={"NOPE1": "why"}))
 
 
 def test_only_the_selected_rules_are_asked(file):
@@ -95,7 +100,7 @@ A, B = LINK.format(name="a"), LINK.format(name="b")
 def test_a_comment_quiets_a_rule_for_what_it_is_on_in_or_above(file, text, left):
     report = check(file, f'<robot name="r">\n{text}\n</robot>\n')
     assert [finding.subject for finding in report.findings] == left
-    ignored = [skipped for skipped in report.skipped if isinstance(skipped, Ignored)]
+    ignored = [skipped for skipped in report.skipped if isinstance(skipped, Suppressed)]
     assert len(ignored) + len(left) == text.count("-1")
     assert {each.comment.reason for each in ignored} <= {"a balloon"}
 
@@ -121,7 +126,7 @@ def test_above_the_root_it_speaks_of_the_robot_and_not_of_all_that_is_in_it(file
     ):
         report = check(file, f"{text}\n</robot>", select=("INR002", "XML003"))
         assert codes(report.findings) == {"INR002"}
-        assert codes(s for s in report.skipped if isinstance(s, Ignored)) == {"XML003"}
+        assert codes(s for s in report.skipped if isinstance(s, Suppressed)) == {"XML003"}
 
 
 def test_in_mjcf_a_body_in_a_body_is_another_part(tmp_path):
@@ -176,7 +181,7 @@ def test_a_comment_that_can_quiet_nothing_is_told(file, comment, said):
     report = check(file, f'<robot name="r">\n<!-- terrainkit: {comment} -->\n{A}\n</robot>')
     assert codes(report.findings) == {"INR002"}
     (idle,) = report.skipped
-    assert isinstance(idle, IdleComment)
+    assert isinstance(idle, UnusedSuppression)
     assert idle.reason.startswith(f"comment at {file}:2: ")
     assert said in idle.reason
 
@@ -226,4 +231,4 @@ def test_in_xacro_a_comment_stands_where_the_finding_is(tmp_path):
     </robot>"""
     report = check(tmp_path / "robot.xacro", text)
     assert [finding.subject for finding in report.findings] == ["c"]
-    assert [s.finding.subject for s in report.skipped if isinstance(s, Ignored)] == ["a", "b"]
+    assert [s.finding.subject for s in report.skipped if isinstance(s, Suppressed)] == ["a", "b"]

@@ -3,7 +3,7 @@ import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import read_robot
-from terrainkit_robots.lint.rule import find, rules
+from terrainkit_robots.lint.rule import get_rule, rules
 
 HEALTHY = [
     "a1/urdf/a1.urdf",
@@ -84,7 +84,7 @@ def told(tmp_path, code, text):
     """Return the messages of one rule."""
     path = tmp_path / "r.urdf"
     path.write_text(text)
-    return [defect.message for defect in find(code).check(Facts(read_robot(path)))]
+    return [defect.message for defect in get_rule(code).check(Facts(read_robot(path)))]
 
 
 @pytest.mark.parametrize(("count", "words"), [(1, "a has a"), (2, "a, b have a")])
