@@ -197,7 +197,7 @@ def _tried(name: str, command: CheckRobot, options: "Settings") -> _Checked | No
 def _check(name: str, command: CheckRobot, options: "Settings") -> _Checked:
     from terrainkit_robots.analysis.facts import Facts
     from terrainkit_robots.description import bundled
-    from terrainkit_robots.description.load import read_robot
+    from terrainkit_robots.description.load import load_robot
     from terrainkit_robots.lint.selection import lint_selected
     from terrainkit_robots.lint.settings import read_settings
     from terrainkit_robots.mesh.mesh_cache import Meshes
@@ -210,7 +210,7 @@ def _check(name: str, command: CheckRobot, options: "Settings") -> _Checked:
     spec = read_spec(Path(command.spec)) if command.spec else None
 
     def look(contents: Mapping[Path, bytes]) -> "Report":
-        model = read_robot(
+        model = load_robot(
             path,
             packages=settings.packages,
             xacro_arguments=settings.xacro_arguments,
@@ -233,11 +233,11 @@ def _check(name: str, command: CheckRobot, options: "Settings") -> _Checked:
 def _other(name: str, settings: "Settings") -> "Facts | None":
     """Return the robot to compare with; None without one."""
     from terrainkit_robots.analysis.facts import Facts
-    from terrainkit_robots.description.load import read_robot
+    from terrainkit_robots.description.load import load_robot
 
     if not name:
         return None
-    model = read_robot(
+    model = load_robot(
         find_robot(name),
         packages=settings.packages,
         xacro_arguments=settings.xacro_arguments,

@@ -12,7 +12,7 @@ import pytest
 
 import terrainkit_robots
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.fixes.apply import fix_robot, write_fixes
 from terrainkit_robots.lint.rule import FAMILIES, get_rule, rules
 from terrainkit_robots.lint.runner import lint
@@ -93,12 +93,12 @@ class Case:
         if self.other_text is not None:
             file = path.parent / f"other{suffix_of(self.other_text)}"
             file.write_bytes(self.other_text.encode())
-            other = Facts(read_robot(file))
+            other = Facts(load_robot(file))
         if self.spec is not None:
             from terrainkit_robots.spec.spec_file import from_toml
 
             spec = from_toml(self.spec)
-        model = read_robot(path, contents=contents)
+        model = load_robot(path, contents=contents)
         return Facts(model, Meshes(contents), against=other, spec=spec)
 
 

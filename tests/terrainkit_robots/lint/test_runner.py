@@ -6,7 +6,7 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.fix import Fix
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import Source
 from terrainkit_robots.lint.rule import Rule, Violation, rules
 from terrainkit_robots.lint.runner import INTERNAL, MOST_FINDINGS, lint
@@ -15,7 +15,7 @@ FILE = Path("/robots/robot.urdf")
 
 
 def facts(text='<robot name="r"><link name="a"/></robot>'):
-    return Facts(read_robot(FILE, contents={FILE: text.encode()}))
+    return Facts(load_robot(FILE, contents={FILE: text.encode()}))
 
 
 def violation(subject="a", line=1, **more):
@@ -114,7 +114,7 @@ def test_a_rule_for_legs_is_not_asked_of_a_robot_without():
     made = report(rule([violation()], needs=("legs",)))
     assert made.findings == ()
     assert made.skipped[0].reason == "no legs were found"
-    robot = Facts(read_robot(bundled.find("biped")))
+    robot = Facts(load_robot(bundled.find("biped")))
     assert len(report(rule([violation()], needs=("legs",)), robot=robot).findings) == 1
 
 
@@ -174,7 +174,7 @@ def test_all_rules_are_asked_unless_told():
 
 def test_the_same_robot_has_the_same_findings():
     robot = bundled.find("quadruped")
-    first, second = (lint(Facts(read_robot(robot))) for _ in range(2))
+    first, second = (lint(Facts(load_robot(robot))) for _ in range(2))
     assert first.findings == second.findings
     assert first.skipped == second.skipped
 
@@ -182,6 +182,6 @@ def test_the_same_robot_has_the_same_findings():
 @pytest.mark.parametrize("name", bundled.names())
 @pytest.mark.parametrize("suffix", [".urdf", ".xml"])
 def test_no_rule_fails_on_a_bundled_robot(name, suffix):
-    made = lint(Facts(read_robot(bundled.find(name).with_suffix(suffix))))
+    made = lint(Facts(load_robot(bundled.find(name).with_suffix(suffix))))
     assert made.crashed == ()
     assert made.verdict == "pass"

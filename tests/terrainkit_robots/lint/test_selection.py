@@ -2,7 +2,7 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.rule import rules
 from terrainkit_robots.lint.selection import (
     Suppressed,
@@ -23,7 +23,7 @@ def check(path, text, **settings):
     """Return the report of what INR002, negative-mass, finds in `text`."""
     path.write_text(text)
     wanted = Settings(**{"select": ("INR002",)} | settings)
-    return lint_selected(Facts(read_robot(path)), wanted)
+    return lint_selected(Facts(load_robot(path)), wanted)
 
 
 @pytest.fixture
@@ -154,7 +154,7 @@ def test_a_file_with_syntax_errors_has_comments_too(file):
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-8-sig"])
 def test_a_file_in_another_encoding_has_comments_too(file, encoding):
     file.write_bytes(f'<robot name="r">\n{NOTE}\n{A}\n{B}\n</robot>'.encode(encoding))
-    report = lint_selected(Facts(read_robot(file)), Settings(select=("INR002",)))
+    report = lint_selected(Facts(load_robot(file)), Settings(select=("INR002",)))
     assert [finding.subject for finding in report.findings] == ["b"]
 
 
@@ -162,7 +162,7 @@ def test_what_is_read_instead_of_a_file_has_its_own_comments(file):
     text = f'<robot name="r">\n{A}\n</robot>'
     file.write_text(text)
     contents = {file: text.replace("\n<link", f"\n{NOTE} <link").encode()}
-    facts = Facts(read_robot(file, contents=contents))
+    facts = Facts(load_robot(file, contents=contents))
     assert lint_selected(facts, Settings(select=("INR002",)), contents).findings == ()
     assert len(lint_selected(facts, Settings(select=("INR002",))).findings) == 1
 
@@ -203,7 +203,7 @@ def test_a_file_without_comments_is_not_parsed_again(file, monkeypatch):
     import terrainkit_robots.description.xml.document as xml_document
 
     file.write_text(f'<robot name="r">{A}</robot>')
-    facts = Facts(read_robot(file))
+    facts = Facts(load_robot(file))
     monkeypatch.setattr(xml_document, "parse_xml", lambda *_: pytest.fail("parsed"))
     assert codes(lint_selected(facts, Settings(select=("INR002",))).findings) == {"INR002"}
 
