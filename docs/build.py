@@ -21,9 +21,9 @@ from terrainkit.describe import TerrainText, describe
 from terrainkit.grid import Grid
 from terrainkit.preview import write_preview
 from terrainkit_cli.main import COMMANDS
-from terrainkit_robots import bundled
-from terrainkit_robots.onboard.pictures import draw
-from terrainkit_robots.rule import FAMILIES, Rule, rules
+from terrainkit_robots.description import bundled
+from terrainkit_robots.lint.rule import FAMILIES, Rule, rules
+from terrainkit_robots.onboarding.pictures import draw
 
 DOCS = Path(__file__).parent
 PICTURES = DOCS / "pictures"

@@ -5,7 +5,7 @@ import pytest
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit import MapConfig, SubTerrain, generate
-from terrainkit_robots.onboard.pictures import PicturesError
+from terrainkit_robots.onboarding.pictures import PicturesError
 from terrainkit_robots.policy import play
 from terrainkit_robots.rl import video
 

@@ -10,7 +10,7 @@ import tomli_w
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit.toml_text import parse_toml
-from terrainkit_robots.onboard.folder import new_folder
+from terrainkit_robots.onboarding.folder import new_folder
 from terrainkit_robots.rl import registry
 from terrainkit_robots.rl.checkpoint import only_policy, read_checkpoint, save_checkpoint
 from terrainkit_robots.rl.robot import SPEC_FILE

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING
 
 from terrainkit.errors import ConfigError, ExportError, listing
 from terrainkit.toml_text import parse_toml
-from terrainkit_robots.mesh.header import open_regular
-from terrainkit_robots.onboard.folder import new_folder, write_files
+from terrainkit_robots.mesh.sniff import open_regular
+from terrainkit_robots.onboarding.folder import new_folder, write_files
 from terrainkit_robots.rl import registry
 from terrainkit_robots.rl.robot import SPEC_FILE, Robot, robot_of
 from terrainkit_robots.rl.task import Task
 from terrainkit_robots.rl.task_file import read_task, to_toml
 from terrainkit_robots.spec.spec_file import read_spec
-from terrainkit_robots.wording import free_name
+from terrainkit_robots.text import free_name
 
 if TYPE_CHECKING:
     from terrainkit.config import MapConfig
