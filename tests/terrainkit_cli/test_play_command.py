@@ -112,7 +112,7 @@ def test_an_existing_video_is_told_before_the_wait(here, tmp_path, monkeypatch):
     [
         ((), "no RUN; wanted"),
         (("walk", "-o", "film.avi"), "ends in .mp4"),
-        (("walk", "--size", "99", "64"), "wanted two even numbers"),
+        (("walk", "--size", "99", "64"), "expected two even numbers"),
         (("walk", "--robots", "0"), "robots is 0"),
         (("walk", "--seconds", "0"), "seconds is 0"),
         (("walk", "--viewer", "--no-video"), "--viewer writes no video"),

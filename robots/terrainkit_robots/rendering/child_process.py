@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots import gl_backend
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.wording import one_line, short
+from terrainkit_robots.text import one_line, short
 
 Frame = NDArray[np.uint8]
 """An RGB image, shape (height, width, 3)."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, ExportError
-from terrainkit_robots.wording import one_line
+from terrainkit_robots.text import one_line
 
 DEFAULT_SIZE = (640, 360)
 """Width and height of a video [pixels]; without a GPU a frame takes 0.2 s."""

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from terrainkit_robots import bundled
+from terrainkit_robots.description import bundled
 from terrainkit_robots.rendering import robot_pictures
 from terrainkit_robots.rendering.child_process import RenderError
 from terrainkit_robots.rendering.robot_pictures import (
