@@ -107,8 +107,8 @@ class SmokeTest(Command):
             check_target(Path(self.output), overwrite=True)  # before the tests
 
     def _smoke_test(self, name: str) -> "SmokeTestResult":
+        from terrainkit_robots.lint.settings import Settings
         from terrainkit_robots.policy.smoke_test import smoke_test
-        from terrainkit_robots.settings import Settings
 
         settings = Settings(
             ignore=reasons(self.ignore),

@@ -5,8 +5,8 @@ from pathlib import Path
 import tomli_w
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit.toml_text import parsed
-from terrainkit_robots.onboard.folder import new_folder
+from terrainkit.toml_text import parse_toml
+from terrainkit_robots.onboarding.folder import new_folder
 from terrainkit_robots.rl import checkpoint, registry, run_folder
 from terrainkit_robots.rl.run_folder import MAP_FILE, RUN_FILE, SPEC_FILE, TASK_FILE, Run
 
@@ -26,7 +26,7 @@ def bundle_policy(run: Run, folder: Path) -> Run:
     files = [TASK_FILE, SPEC_FILE] + [MAP_FILE] * (run.terrain != "plane")
     if not (run.folder / files[-1]).is_file():
         raise ConfigError(f"terrain: got {run.terrain}; expected plane or a map with a config")
-    info = parsed((run.folder / RUN_FILE).read_text(encoding="utf-8"))
+    info = parse_toml((run.folder / RUN_FILE).read_text(encoding="utf-8"))
     info["terrain"] = "plane" if run.terrain == "plane" else MAP_FILE
     state = checkpoint.only_policy(checkpoint.read_checkpoint(run.checkpoint))
     run_folder.make_parents(folder)

@@ -28,11 +28,11 @@ from terrainkit_robots.policy.rollout import (
     command_schedule,
     rollout,
 )
+from terrainkit_robots.rendering.video import DEFAULT_SIZE, Shot, VideoSpec
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run_folder import Run
 from terrainkit_robots.rl.task import Commands
 from terrainkit_robots.rl.threads import one_thread
-from terrainkit_robots.rl.video import SIZE, Film, Shot
 
 DEFAULT_SECONDS, DEFAULT_ROBOTS = 12.0, 4
 """Default duration [s], and default number of robots that a video of a map follows."""
@@ -46,7 +46,7 @@ class PlayResult:
     """Metrics of a played policy, and the video to render; None without a video."""
 
     evaluation: EvaluationResult
-    video: Film | None
+    video: VideoSpec | None
 
 
 @one_thread()
@@ -56,7 +56,7 @@ def play(
     *,
     video: bool = True,
     robots: int = DEFAULT_ROBOTS,
-    size: tuple[int, int] = SIZE,
+    size: tuple[int, int] = DEFAULT_SIZE,
     progress: Progress = lambda _: None,
 ) -> PlayResult:
     """Roll out the policy of a run, and record a video.
@@ -173,7 +173,7 @@ class PoseRecorder:
             self.commands.append(self.env.commands.copy())
         self.num_steps += 1
 
-    def make_video(self, robots: int, size: tuple[int, int]) -> Film:
+    def make_video(self, robots: int, size: tuple[int, int]) -> VideoSpec:
         """Return a video of the formation on a plane, or of some robots in turn on a map."""
         env, poses = self.env, np.stack(self.poses)
         frames, n = poses.shape[:2]
@@ -188,7 +188,7 @@ class PoseRecorder:
             tracked = select_tracked_robots(env, robots)
             shots = [self._make_shot(robot, max(1, frames // len(tracked))) for robot in tracked]
         fps = 1 / (env.cfg.dt * self.stride)
-        return Film(model=env.scene.model, poses=poses, shots=tuple(shots), fps=fps, size=size)
+        return VideoSpec(model=env.scene.model, poses=poses, shots=tuple(shots), fps=fps, size=size)
 
     def _make_shot(self, robot: int, length: int) -> Shot:
         """Return the first frames of a robot, up to its first fall."""

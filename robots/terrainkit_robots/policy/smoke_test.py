@@ -26,7 +26,7 @@ from terrainkit_robots.rl.task import Task
 from terrainkit_robots.rl.threads import one_thread
 
 if TYPE_CHECKING:
-    from terrainkit_robots.settings import Settings
+    from terrainkit_robots.lint.settings import Settings
 
 NUM_ENVS = 16
 """Environments of a smoke test."""
@@ -90,7 +90,7 @@ def smoke_test(
             raise ConfigError(f"spec: {name} has its own robot.toml; expected a robot file")
         task_spec = registry.find(name)
         return check_robot(read_robot(task_spec.folder), task_spec.task)
-    from terrainkit_robots.onboard.bringing_in import Wishes, bring_in, keeps_out
+    from terrainkit_robots.onboarding.pipeline import Wishes, bring_in, keeps_out
 
     with tempfile.TemporaryDirectory() as folder:
         options = Wishes(target=Path(folder) / "robot", spec=spec, pictures=False)

@@ -3,9 +3,9 @@ import warnings
 
 import pytest
 import torch
+from terrainkit_robots.policy.actor import actor_of, policy_of
 
 from terrainkit.errors import ConfigError, TerrainkitWarning
-from terrainkit_robots.policy.actor import actor_of, policy_of
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane
 from terrainkit_robots.rl.registry import find

@@ -5,8 +5,8 @@ import mujoco
 import numpy as np
 import pytest
 import torch
-
 from terrainkit_robots.policy.description import description
+
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane

@@ -10,10 +10,10 @@ import onnxruntime
 import pytest
 import torch
 from tensordict import TensorDict
+from terrainkit_robots.policy.actor import policy_of
 
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots.policy import export as policy_export
-from terrainkit_robots.policy.actor import policy_of
 from terrainkit_robots.policy.export import METADATA, export_policy
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.env import LeggedEnv

@@ -3,8 +3,8 @@ import copy
 import numpy as np
 import pytest
 import torch
-
 from terrainkit_robots.policy.recorder import Recorder, visited
+
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane
 from terrainkit_robots.rl.rotation import yaw_of

@@ -2,9 +2,9 @@ import tomllib
 
 import pytest
 import torch
+from terrainkit_robots.policy.actor import policy_of
 
 from terrainkit.errors import ConfigError, ExportError
-from terrainkit_robots.policy.actor import policy_of
 from terrainkit_robots.policy.bundle import ship
 from terrainkit_robots.rl.checkpoint import read_checkpoint
 from terrainkit_robots.rl.env import LeggedEnv

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 import torch
-
-from terrainkit_robots.policy.evaluate import Asked, evaluation_task, prepared
 from terrainkit_robots.policy.score import score_of
 from terrainkit_robots.policy.trials import SETTLING, roll_out
+
+from terrainkit_robots.policy.evaluate import Asked, evaluation_task, prepared
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane
 from terrainkit_robots.rl.task import Commands, Control, Sim

@@ -1,0 +1,112 @@
+"""Convex parts that were found before, kept on disk by what they were made from."""
+
+import io
+import os
+import sys
+import zipfile
+import zlib
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+
+from terrainkit.atomic import atomic_write
+from terrainkit.errors import ExportError
+from terrainkit_robots.mesh.surface import Surface
+
+_MOST_BYTES = 64 * 2**20
+"""No parts take more; of a longer file nothing is read."""
+
+_DAMAGED = (
+    OSError,
+    ValueError,
+    KeyError,
+    EOFError,
+    NotImplementedError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What numpy raises of a file that is no archive of arrays any more."""
+
+
+def cache_folder() -> Path:
+    """Return the folder in which this system keeps what can be made again."""
+    home = Path.home()
+    if sys.platform == "win32":
+        kept = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        kept = home / "Library" / "Caches"
+    else:
+        named = os.environ.get("XDG_CACHE_HOME", "")
+        # one that is not absolute is to be ignored: XDG Base Directory Specification
+        kept = Path(named) if named.startswith("/") else home / ".cache"
+    return kept / "terrainkit" / "coacd"
+
+
+class DecompositionCache:
+    """Parts by key; a file that is damaged counts as none."""
+
+    def __init__(self, folder: Path | None) -> None:
+        """Keep parts in `folder`, which is made when it is needed; nowhere without one."""
+        self._folder = folder
+
+    def get(self, key: str) -> tuple[Surface, ...] | None:
+        """Return the parts of a key; None if there are none."""
+        if self._folder is None:
+            return None
+        file = self._folder / f"{key}.npz"
+        try:
+            if not file.is_file() or file.stat().st_size > _MOST_BYTES:
+                return None
+            return unpacked(file.read_bytes())
+        except OSError:
+            return None
+
+    def put(self, key: str, parts: Sequence[Surface]) -> None:
+        """Keep parts; where that cannot be done they are made again the next time."""
+        if self._folder is None:
+            return
+        with suppress(OSError, ExportError):
+            self._folder.mkdir(parents=True, exist_ok=True)
+            with atomic_write(self._folder / f"{key}.npz", overwrite=True) as file:
+                file.write_bytes(packed(parts))
+
+
+def packed(parts: Sequence[Surface]) -> bytes:
+    """Return surfaces as the content of a file."""
+    arrays = {}
+    for k, part in enumerate(parts):
+        arrays[f"points_{k}"] = np.asarray(part.points, dtype=np.float64)
+        arrays[f"faces_{k}"] = np.asarray(part.faces, dtype=np.int64)
+    stream = io.BytesIO()
+    np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
+    return stream.getvalue()
+
+
+def unpacked(data: bytes) -> tuple[Surface, ...] | None:
+    """Return the surfaces in the content of a file; None if it is damaged."""
+    try:
+        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+            count = len(arrays.files) // 2
+            parts = tuple(
+                Surface(points=arrays[f"points_{k}"], faces=arrays[f"faces_{k}"])
+                for k in range(count)
+            )
+    except _DAMAGED:
+        return None
+    return parts if parts and all(map(_is_sound, parts)) else None
+
+
+def _is_sound(part: Surface) -> bool:
+    points, faces = part.points, part.faces
+    shaped = points.ndim == faces.ndim == 2 and points.shape[1] == faces.shape[1] == 3
+    return (
+        shaped
+        and points.dtype == np.float64
+        and faces.dtype == np.int64
+        and len(points) > 3
+        and len(faces) > 3
+        and bool(np.isfinite(points).all())
+        and 0 <= int(faces.min()) <= int(faces.max()) < len(points)
+    )
