@@ -95,12 +95,11 @@ class SmokeTest(Command):
             raise ConfigError("ROBOT is missing; expected a name, a folder, or a robot file")
         if self.spec and len(self.robots) > 1:
             raise ConfigError(f"--spec: got {len(self.robots)} robots; expected one")
-        options = {"package": self.package, "xacro-arg": self.xacro_arg}
-        options |= {"ignore": self.ignore, "spec": self.spec}
-        given = [name for name, value in options.items() if value]
+        names = "package", "xacro-arg", "ignore", "spec"
+        given = [name for name in names if getattr(self, name.replace("-", "_"))]
         if given and not any(Path(name).is_file() for name in self.robots):
-            names = listing(self.robots)
-            raise ConfigError(f"--{given[0]}: got no robot file among {names}; expected one")
+            robots = listing(self.robots)
+            raise ConfigError(f"--{given[0]}: got no robot file among {robots}; expected one")
         if self.output:
             from terrainkit.atomic import check_target
 

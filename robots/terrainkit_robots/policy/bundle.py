@@ -8,7 +8,8 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit.toml_text import parse_toml
 from terrainkit_robots.onboarding.folder import new_folder
 from terrainkit_robots.rl import checkpoint, registry, run_folder
-from terrainkit_robots.rl.run_folder import MAP_FILE, RUN_FILE, SPEC_FILE, TASK_FILE, Run
+from terrainkit_robots.rl.robot import SPEC_FILE
+from terrainkit_robots.rl.run_folder import MAP_FILE, RUN_FILE, TASK_FILE, Run
 
 
 def bundle_policy(run: Run, folder: Path) -> Run:

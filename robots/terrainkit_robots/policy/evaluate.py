@@ -134,7 +134,7 @@ class EvaluationResult:
 
     def as_json(self) -> str:
         """Return the result as JSON; equal evaluations give equal bytes."""
-        document = {
+        document: dict[str, Any] = {
             "robot": self.robot,
             "checkpoint": self.checkpoint,
             "terrain": self.config.terrain,
@@ -230,9 +230,9 @@ def _assign(count: int, num_envs: int, seed: int) -> Any:
 
 def evaluation_task(task: Task, num_envs: int, *, seconds: float = 20.0, seed: int = 1) -> Task:
     """Return a task without noise, randomization, pushes, curricula and timeouts in `seconds`."""
-    no_randomization = dict.fromkeys(["friction", "added_mass", "gains", "motor_strength"]) | (
-        dict.fromkeys(["com_shift", "joint_offset", "push_interval_s", "max_push_vel_xy"], 0.0)
-    )
+    no_randomization: dict[str, Any] = dict.fromkeys(
+        ["friction", "added_mass", "gains", "motor_strength"]
+    ) | (dict.fromkeys(["com_shift", "joint_offset", "push_interval_s", "max_push_vel_xy"], 0.0))
     return replace(
         task,
         env=replace(task.env, num_envs=num_envs, episode_length_s=2 * seconds + 1),
@@ -274,7 +274,8 @@ def summarize(
 
     With commands of shape (n, 3), the metrics on a plane are grouped by command.
     """
-    env, groups = rollout.env, {}
+    env = rollout.env
+    groups: dict[str, list[RolloutMetrics]] = {}
     levels, names = env.careers.levels, env.ground.terrain_names
     terrains = names[levels, env.careers.columns]
 

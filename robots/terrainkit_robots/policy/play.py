@@ -215,11 +215,14 @@ def select_tracked_robots(env: LeggedEnv, count: int) -> list[int]:
 
 
 def _caption(command: FloatArray) -> str:
-    words = ("forward", "backward", "m/s"), ("left", "right", "m/s")
-    words += (("turning left", "turning right", "rad/s"),)
+    axes = (
+        ("forward", "backward", "m/s"),
+        ("left", "right", "m/s"),
+        ("turning left", "turning right", "rad/s"),
+    )
     parts = [
         f"{negative if value < 0 else positive} {abs(value):g} {unit}"
-        for value, (positive, negative, unit) in zip(np.round(command, 2), words, strict=True)
+        for value, (positive, negative, unit) in zip(np.round(command, 2), axes, strict=True)
         if value
     ]
     return ", ".join(parts) or "standing"
