@@ -1,3 +1,43 @@
 """Former path of rl/config.py."""
 
-from terrainkit_robots.rl.config import *  # noqa: F403
+from terrainkit_robots.rl.config import (
+    Activation,
+    Algorithm,
+    Asset,
+    Commands,
+    Control,
+    DomainRand,
+    Env,
+    InitState,
+    Noise,
+    Normalization,
+    ObsScales,
+    Policy,
+    Rewards,
+    Runner,
+    Sim,
+    Task,
+    Termination,
+    Terrain,
+)
+
+__all__ = [
+    "Activation",
+    "Algorithm",
+    "Asset",
+    "Commands",
+    "Control",
+    "DomainRand",
+    "Env",
+    "InitState",
+    "Noise",
+    "Normalization",
+    "ObsScales",
+    "Policy",
+    "Rewards",
+    "Runner",
+    "Sim",
+    "Task",
+    "Termination",
+    "Terrain",
+]
