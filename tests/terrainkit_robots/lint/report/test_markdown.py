@@ -18,7 +18,7 @@ def test_each_finding_is_a_row(report):
         "error",
         "INR002 negative-mass",
         "robot.urdf:12",
-        "the mass is -1 kg; expected > 0",
+        "the mass is -1 kg; expected &gt; 0",
         "Weigh it.",
     ]
     assert len(rows(text)) == 4
@@ -37,7 +37,7 @@ def test_names_are_escaped(nasty):
 
 def test_fixed_and_unfixed_findings_are_listed(fixed_report):
     text = format_reports([fixed_report])
-    assert "Fixed:\n\n- XML003: unnamed-robot: the mass is -1 kg; expected > 0\n" in text
+    assert "Fixed:\n\n- XML003: unnamed-robot: the mass is -1 kg; expected &gt; 0\n" in text
     assert "Not fixed:\n\n- JNT009: calf: no space\n" in text
 
 
