@@ -45,9 +45,7 @@ class Case:
 
     def __post_init__(self):
         assert (self.robot is None) != (self.of is None), f"{self}: expected either robot or of"
-        assert None in (self.against, self.against_of), (
-            f"{self}: two robots to compare with"
-        )
+        assert None in (self.against, self.against_of), f"{self}: two robots to compare with"
         assert not self.replace or self.of, f"{self}: replace is for of"
         assert not self.against_replace or self.against_of, f"{self}: against_of is missing"
 

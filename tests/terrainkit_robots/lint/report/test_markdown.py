@@ -42,6 +42,4 @@ def test_fixed_and_unfixed_findings_are_listed(fixed_report):
 
 
 def test_each_robot_is_a_section(report):
-    assert (
-        format_reports([report, report]).count("\n## robot.urdf\n") == 1
-    )
+    assert format_reports([report, report]).count("\n## robot.urdf\n") == 1
