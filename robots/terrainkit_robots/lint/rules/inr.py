@@ -28,7 +28,7 @@ from terrainkit_robots.analysis.inertia.physical import (
 from terrainkit_robots.analysis.inertia.placeholder import is_identity, placeholders
 from terrainkit_robots.analysis.inertia.repair import repair
 from terrainkit_robots.description.model import Link
-from terrainkit_robots.description.xml.unparsed import Unread
+from terrainkit_robots.description.xml.unparsed import UnparsedNumbers
 from terrainkit_robots.lint.rule import Severity, Violation, rule
 from terrainkit_robots.text import names
 from terrainkit_robots.transforms import Matrix
@@ -95,7 +95,7 @@ def massless_body(robot: Facts) -> Iterator[Violation]:
         MuJoCo 4.0: "mass and inertia of moving bodies must be larger than mjMINVAL", and
         "missing element: 'mass'".
     """
-    unparsed = Unread(robot.model)
+    unparsed = UnparsedNumbers(robot.model)
     for link in robot.model.links:
         inertial = link.inertial
         if inertial and inertial.mass is None and not unparsed.has(link.name, "value", "mass"):
@@ -211,7 +211,7 @@ def not_positive_definite(robot: Facts) -> Iterator[Violation]:
     Source:
         MuJoCo 4.0: "inertia must have positive eigenvalues", "missing element: 'inertia'".
     """
-    unparsed = Unread(robot.model)
+    unparsed = UnparsedNumbers(robot.model)
     main = {id(main_link(body)) for body in robot.bodies}
     for link in robot.model.links:
         if not _has_finite_mass(link) or unparsed.has(link.name, *_INERTIA_ATTRIBUTES):

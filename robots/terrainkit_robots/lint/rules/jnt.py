@@ -18,7 +18,7 @@ from terrainkit_robots.analysis.legs.joint_roles import (
 from terrainkit_robots.analysis.legs.stance import GRAVITY
 from terrainkit_robots.description.fix import Fix, SetAttribute
 from terrainkit_robots.description.model import JOINT_TYPES, Joint, Limit
-from terrainkit_robots.description.xml.unparsed import Unread
+from terrainkit_robots.description.xml.unparsed import UnparsedNumbers
 from terrainkit_robots.lint.rule import Violation, rule
 from terrainkit_robots.lint.rules.inr import (
     com_outside_body,
@@ -167,7 +167,7 @@ def zero_axis(robot: Facts) -> Iterator[Violation]:
     Source:
         MuJoCo 4.0: "axis too small"; http://wiki.ros.org/urdf/XML/joint for the default.
     """
-    unparsed = Unread(robot.model)
+    unparsed = UnparsedNumbers(robot.model)
     for joint in robot.model.joints:
         short_axis = joint.moves and _axis_length(joint) < _MIN_AXIS_LENGTH
         if short_axis and not unparsed.at(joint.axis_source):
@@ -246,7 +246,7 @@ def missing_limit(robot: Facts) -> Iterator[Violation]:
         http://wiki.ros.org/urdf/XML/joint: limit is required. Tested with MuJoCo 4.0: a URDF joint
         with equal limits or with one limit is unlimited; MJCF rejects such a range.
     """
-    unparsed = Unread(robot.model)
+    unparsed = UnparsedNumbers(robot.model)
     for joint in robot.model.joints:
         problem = _limit_problem(joint, robot.model.kind == "mjcf")
         if problem and not unparsed.has(joint.name, "lower", "upper", "range"):
@@ -296,7 +296,7 @@ def inverted_limits(robot: Facts) -> Iterator[Violation]:
     Source:
         Tested with MuJoCo 4.0: jnt_limited is false.
     """
-    unparsed = Unread(robot.model)
+    unparsed = UnparsedNumbers(robot.model)
     for joint in robot.model.joints:
         if joint.kind not in ("revolute", "prismatic") or joint.limit is None:
             continue
@@ -353,7 +353,7 @@ def missing_effort(robot: Facts) -> Iterator[Violation]:
     Source:
         http://wiki.ros.org/urdf/XML/joint: effort is required.
     """
-    unparsed = Unread(robot.model)
+    unparsed = UnparsedNumbers(robot.model)
     for joint in _joints_with_limit(robot):
         assert joint.limit is not None
         effort = joint.limit.effort
@@ -399,7 +399,7 @@ def missing_velocity(robot: Facts) -> Iterator[Violation]:
     Source:
         http://wiki.ros.org/urdf/XML/joint: velocity is required.
     """
-    unparsed = Unread(robot.model)
+    unparsed = UnparsedNumbers(robot.model)
     for joint in _joints_with_limit(robot):
         assert joint.limit is not None
         velocity, unit = joint.limit.velocity, joint.speed_unit
