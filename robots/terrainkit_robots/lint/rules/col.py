@@ -14,6 +14,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.analysis.legs.standing_pose import range_of
 from terrainkit_robots.lint.rule import Severity, Violation, rule
+from terrainkit_robots.text import count
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.bodies.overlap import Overlap
@@ -144,7 +145,8 @@ def no_collision(robot: Facts) -> Iterator[Violation]:
         yield Violation(
             subject=robot.model.title,
             source=robot.model.source,
-            message=f"collision shapes of {len(robot.links)} links: got 0; expected 1 or more",
+            message=f"collision shapes of {count(len(robot.links), 'link')}: got 0; expected 1 or "
+            "more",
         )
 
 
@@ -249,8 +251,8 @@ def overlap_in_range(robot: Facts) -> Iterator[Violation]:
     for overlaps in robot.overlaps.sweep(positions, _NUM_SAMPLES):
         deepest = _deepest(robot, overlaps)
         counts.update(pair for pair, each in deepest.items() if each.depth > _MAX_OVERLAP)
-    for pair, count in counts.items():
-        share = count / _NUM_SAMPLES
+    for pair, number in counts.items():
+        share = number / _NUM_SAMPLES
         if share > _MAX_OVERLAP_SHARE:
             yield Violation(
                 subject=" and ".join(pair),

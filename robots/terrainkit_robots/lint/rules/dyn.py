@@ -91,7 +91,7 @@ def unstable_drop(robot: Facts) -> Iterator[Violation]:
         source=robot.model.source,
         severity=_SEVERITIES[level - with_hulls],
         certainty="likely" if with_hulls else "proven",
-        message=f"joint velocity when {start} without torques: got {got}; expected at most "
+        message=f"largest velocity when {start} without torques: got {got}; expected at most "
         f"{_MAX_SPEED:.0f} {unit}{calm}",
         hint=_OVERLAP_HINT if stable else "",
         measured=measured,

@@ -25,7 +25,7 @@ from terrainkit_robots.lint.rules.inr import (
     implausible_density,
     negative_mass,
 )
-from terrainkit_robots.text import closest, names, short
+from terrainkit_robots.text import closest, count, names, short
 from terrainkit_robots.transforms import Matrix
 
 _MIN_AXIS_LENGTH = 1e-6
@@ -651,8 +651,8 @@ def missing_actuator(robot: Facts) -> Iterator[Violation]:
                 subject=robot.model.title,
                 source=robot.model.source,
                 severity="info",
-                message=f"actuators of the file: got 0 for {len(robot.joints)} joints; expected "
-                "one for each joint, unless the framework adds them",
+                message=f"actuators of the file: got 0 for {count(len(robot.joints), 'joint')}; "
+                "expected one for each joint, unless the framework adds them",
                 measured={"joints": len(robot.joints)},
             )
         return
@@ -665,8 +665,7 @@ def missing_actuator(robot: Facts) -> Iterator[Violation]:
                 subject=joint.name,
                 source=joint.source,
                 severity="warning" if robot.legs else "info",
-                message=f"actuators of joint {joint.name}: got 0; expected 1, as on "
-                f"{len(actuated)} other joints",
+                message=f"actuators of joint {joint.name}: got 0; expected 1",
             )
 
 
