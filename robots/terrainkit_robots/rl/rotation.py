@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float32]
 
 
-def to_body(quat: FloatArray, vector: FloatArray) -> FloatArray:
+def quat_rotate_inverse(quat: FloatArray, vector: FloatArray) -> FloatArray:
     """Return vectors of the world in the frames of bodies, shape (n, 3).
 
     With q = (w, u): v' = v - 2 w (u x v) + 2 u x (u x v), the rotation by the conjugate of q.
@@ -20,7 +20,7 @@ def to_body(quat: FloatArray, vector: FloatArray) -> FloatArray:
     return vector - w * twice + _cross(u, twice)
 
 
-def gravity_in_body(quat: FloatArray) -> FloatArray:
+def projected_gravity(quat: FloatArray) -> FloatArray:
     """Return the unit vector of gravity in the frames of bodies, shape (n, 3).
 
     It is minus the third row of their rotation matrices.
@@ -29,14 +29,14 @@ def gravity_in_body(quat: FloatArray) -> FloatArray:
     return np.stack([2 * (w * y - x * z), -2 * (w * x + y * z), 2 * (x * x + y * y) - 1], axis=1)
 
 
-def yaw_of(quat: FloatArray) -> FloatArray:
+def quat_to_yaw(quat: FloatArray) -> FloatArray:
     """Return the heading of bodies [rad], shape (n,)."""
     w, x, y, z = quat.T
     yaw: FloatArray = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
     return yaw
 
 
-def wrapped(angle: FloatArray) -> FloatArray:
+def wrap_to_pi(angle: FloatArray) -> FloatArray:
     """Return angles as those between -pi and pi [rad]."""
     return (angle + np.float32(np.pi)) % np.float32(2 * np.pi) - np.float32(np.pi)
 
