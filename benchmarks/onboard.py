@@ -11,7 +11,7 @@ from pathlib import Path
 
 from clock import process, ratio
 
-from terrainkit_robots import bundled
+from terrainkit_robots.description import bundled
 
 _SHARED = Path(__file__).resolve().parents[2] / "shared" / "robots"
 

@@ -21,9 +21,9 @@ from terrainkit.describe import TerrainText, describe
 from terrainkit.grid import Grid
 from terrainkit.preview import write_preview
 from terrainkit_cli.main import COMMANDS
-from terrainkit_robots import bundled
-from terrainkit_robots.onboard.pictures import draw
-from terrainkit_robots.rule import FAMILIES, Rule, rules
+from terrainkit_robots.description import bundled
+from terrainkit_robots.lint.rule import FAMILIES, Rule, rules
+from terrainkit_robots.onboarding.pictures import draw
 
 DOCS = Path(__file__).parent
 PICTURES = DOCS / "pictures"
@@ -160,7 +160,7 @@ def draw_robot(name: str) -> None:
 
 def draw_walk(policy: str) -> None:
     """Film a policy on stairs, and put moments of it side by side."""
-    up = terrainkit.TerrainChoice(terrain="pyramid_stairs", parameters={"inverted": True})
+    up = terrainkit.SubTerrain(terrain="pyramid_stairs", parameters={"inverted": True})
     stairs = terrainkit.MapConfig(
         rows=1, cols=1, border=4, mode="selected", selected_difficulty=0.33, terrains=(up,)
     )

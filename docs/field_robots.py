@@ -21,10 +21,10 @@ from functools import partial
 from pathlib import Path
 
 from terrainkit.errors import TerrainkitError
-from terrainkit_robots.onboard.bringing_in import Wishes
-from terrainkit_robots.onboard.bringing_in import bring_in as onboarding
-from terrainkit_robots.onboard.proof import Proof
-from terrainkit_robots.wording import names
+from terrainkit_robots.onboarding.pipeline import Wishes
+from terrainkit_robots.onboarding.pipeline import bring_in as onboarding
+from terrainkit_robots.onboarding.verify import Proof
+from terrainkit_robots.text import names
 
 DOCS = Path(__file__).parent
 SECONDS = 120

@@ -127,8 +127,8 @@ def _realized(terrain_map: TerrainMap) -> Iterator[str]:
     cell, mix = terrain_map.config.cell, terrain_map.config.mix
     for row, col in _patch_indices(terrain_map):
         patch = terrain_map.tile(row, col)
-        choice = mix[terrain_map.terrain_types[row, col]]
-        kinds = parameters_of(registry.find(choice.terrain))
+        sub_terrain = mix[terrain_map.terrain_types[row, col]]
+        kinds = parameters_of(registry.find(sub_terrain.terrain))
         for name, asked in patch.parameters.requested.items():
             built = patch.parameters.realized[name]
             if kinds[name].deviates(asked, built, cell):

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from terrainkit import registry
 from terrainkit.parameter import Value, parameters_of
+from terrainkit.schema import field_docs
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,14 +54,8 @@ def describe(name: str) -> TerrainText:
     Raises:
         ConfigError: if there is no such terrain, listing those that exist.
     """
-    import docstring_parser
-
     terrain = registry.find(name)
-    texts = {
-        field.arg_name: " ".join((field.description or "").split())
-        for owner in reversed(terrain.__mro__[:-1])  # a subclass has the words of its parents
-        for field in docstring_parser.parse_from_object(owner).params
-    }
+    texts = field_docs(terrain)
     return TerrainText(
         name=name,
         text=inspect.getdoc(terrain) or "",

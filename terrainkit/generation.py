@@ -63,7 +63,7 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
         heights=heights,
         env_origins=origins,
         terrain_types=kinds,
-        terrain_names=tuple(choice.name for choice in mix),
+        terrain_names=tuple(sub_terrain.name for sub_terrain in mix),
         difficulty=difficulty,
         parameters=parameters,
     )
@@ -72,7 +72,7 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
 def _warn_of_deviations(
     config: MapConfig, kinds: NDArray[np.int32], parameters: NDArray[np.object_]
 ) -> None:
-    known = [parameters_of(registry.find(choice.terrain)) for choice in config.mix]
+    known = [parameters_of(registry.find(sub_terrain.terrain)) for sub_terrain in config.mix]
     counts: Counter[str] = Counter()
     records: list[Parameters] = parameters.ravel().tolist()
     for kind, record in zip(kinds.flat, records, strict=True):
@@ -99,11 +99,11 @@ def _warn_of_moved_spawns(
     counts: Counter[str] = Counter()
     records: list[Parameters] = parameters.ravel().tolist()
     for (row, col), record in zip(np.ndindex(*kinds.shape), records, strict=True):
-        choice = config.mix[kinds[row, col]]
-        terrain = registry.find(choice.terrain)(**record.requested)
+        sub_terrain = config.mix[kinds[row, col]]
+        terrain = registry.find(sub_terrain.terrain)(**record.requested)
         wanted = terrain.spawn(config.patch_grid(row, col))
         if np.abs(origins[row, col, :2] - wanted).max() > config.cell:
-            counts[choice.name] += 1
+            counts[sub_terrain.name] += 1
     if counts:
         said = listing(f"{name} on {count} patches" for name, count in counts.items())
         warnings.warn(

@@ -35,7 +35,7 @@ def terrain_columns(config: MapConfig) -> list[int]:
         ConfigError: if a terrain of a mix of one's own gets no column.
     """
     mix = config.mix
-    counts = apportion([choice.proportion for choice in mix], config.cols)
+    counts = apportion([sub_terrain.proportion for sub_terrain in mix], config.cols)
     starved = [c.name for c, n in zip(mix, counts, strict=True) if n == 0 and c.proportion > 0]
     if starved and config.mode != "randomized":
         message = (
@@ -62,7 +62,7 @@ def assign_patch(config: MapConfig, columns: list[int], row: int, col: int) -> t
     if config.mode == "curriculum":
         return columns[col], _row_difficulty(config, row, col)
     rng = _layout_rng(config, row, col)
-    weights = np.array([choice.proportion for choice in config.mix])
+    weights = np.array([sub_terrain.proportion for sub_terrain in config.mix])
     kind = rng.choice(len(weights), p=weights / weights.sum())
     return int(kind), float(rng.choice(config.random_difficulties))
 

@@ -8,11 +8,13 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from terrainkit.coerce import coerce
+from msgspec import Meta
+
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
+from terrainkit.schema import convert
 
 Snap = Literal["none", "cells", "centered"]
 Value = float | int | bool
@@ -20,11 +22,11 @@ Range = tuple[float, float]
 Realized = float | int | bool | tuple[float, float]
 
 
-LARGEST = 1e6
-"""Largest number that a parameter takes: far beyond any ground, and far from overflow."""
+MAX_VALUE = 1_000_000
+"""Largest number that a parameter accepts: far beyond any terrain, and far from overflow."""
 
-_MOST = 10_000
-"""Largest count that a parameter takes, so that building a patch takes bounded time."""
+MAX_COUNT = 10_000
+"""Largest integer that a parameter accepts, so that building a patch takes bounded time."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,18 +145,22 @@ def parameters_of(terrain: type) -> Mapping[str, Parameter]:
     return {f.name: f.metadata["parameter"] for f in dataclasses.fields(terrain)}
 
 
-def checked(owner: str, name: str, value: object, parameter: Parameter) -> Value:
-    """Return `value` as a plain number, or raise the ConfigError that says why it cannot be.
+def convert_parameter(terrain: str, name: str, value: object, parameter: Parameter) -> Value:
+    """Return `value` as a plain number.
 
     Args:
-        owner: The terrain, for the error.
-        name: The parameter, for the error.
-        value: What was given for it.
-        parameter: What is known of it.
+        terrain: Name of the terrain, for the error message.
+        name: Name of the parameter, for the error message.
+        value: The value to convert.
+        parameter: The declaration of the parameter.
+
+    Raises:
+        ConfigError: if the value has another type or is out of range.
     """
-    number: Value = coerce(f"{owner}: {name}", value, type(parameter.easy))
-    most = LARGEST if isinstance(number, float) else _MOST
-    if not 0 <= number <= most or (number == 0 and not parameter.zero):
-        least = "0" if parameter.zero else "above 0"
-        raise ConfigError(f"{owner}: {name} is {number:g}; wanted {least} to {most:g}")
+    kind = type(parameter.easy)
+    if kind is bool:
+        return bool(convert(f"{terrain}.{name}", value, bool))
+    limit = MAX_VALUE if kind is float else MAX_COUNT
+    least = Meta(ge=0, le=limit) if parameter.zero else Meta(gt=0, le=limit)
+    number: Value = convert(f"{terrain}.{name}", value, Annotated[kind, least])
     return number

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.choice import TerrainChoice
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.layout import assign_patch, terrain_columns
 from terrainkit.parameter import Realized, Value, parameters_of
+from terrainkit.sub_terrain import SubTerrain
 from terrainkit.terrain import Terrain
 
 
@@ -62,16 +62,16 @@ def tile(config: MapConfig, row: int, col: int) -> Patch:
 
 
 def build_patch(
-    config: MapConfig, choice: TerrainChoice, difficulty: float, row: int, col: int
+    config: MapConfig, sub_terrain: SubTerrain, difficulty: float, row: int, col: int
 ) -> Patch:
-    """Return `choice` at `difficulty`, built at (row, col).
+    """Return `sub_terrain` at `difficulty`, built at (row, col).
 
     The draws come from the seed, the row and the column alone, so the patch has the same bytes in
     whatever order, process or company it is built.
     """
     from terrainkit.spawn import find_spawn, room_error
 
-    terrain = choice.at(difficulty)
+    terrain = sub_terrain.at(difficulty)
     _refuse_walls(terrain, config)
     grid = config.patch_grid(row, col)
     rng = np.random.default_rng(np.random.SeedSequence([config.seed, row, col]))
@@ -85,9 +85,9 @@ def build_patch(
         threshold=config.wall_threshold,
     )
     if origin is None:
-        raise room_error(choice.name, grid, config.spawn_radius, config.spawn_tolerance)
+        raise room_error(sub_terrain.name, grid, config.spawn_radius, config.spawn_tolerance)
     return Patch(
-        terrain=choice.name,
+        terrain=sub_terrain.name,
         difficulty=difficulty,
         parameters=Parameters(requested=terrain.requested(), realized=terrain.realized(grid)),
         grid=grid,

@@ -1,9 +1,9 @@
 """Presets: ready mixes of terrains, by name."""
 
 from terrainkit import registry
-from terrainkit.choice import TerrainChoice
-from terrainkit.errors import ConfigError, listing
+from terrainkit.errors import ConfigError, known_names
 from terrainkit.parameter import parameters_of
+from terrainkit.sub_terrain import SubTerrain
 
 _MIXES = {
     # legged_gym's columns in its order. What it calls "stairs up" is climbed from the platform
@@ -30,16 +30,16 @@ def names() -> tuple[str, ...]:
     return (*_MIXES, "all")
 
 
-def find(name: str) -> tuple[TerrainChoice, ...]:
+def find(name: str) -> tuple[SubTerrain, ...]:
     """Return the mix called `name`; "all" holds each terrain, upright and inverted, once.
 
     Raises:
         ConfigError: if there is none, listing those that exist.
     """
     if name not in names():
-        raise ConfigError(f"no preset {name!r}; there are: {listing(names())}")
+        raise ConfigError(f"no preset {name!r}; {known_names(name, names())}")
     mix = dict.fromkeys(_all(), 1.0) if name == "all" else _MIXES[name]
-    return tuple(_choice(terrain, proportion) for terrain, proportion in mix.items())
+    return tuple(_sub_terrain(terrain, proportion) for terrain, proportion in mix.items())
 
 
 def _all() -> list[str]:
@@ -51,8 +51,8 @@ def _all() -> list[str]:
     return mix
 
 
-def _choice(name: str, proportion: float) -> TerrainChoice:
-    return TerrainChoice(
+def _sub_terrain(name: str, proportion: float) -> SubTerrain:
+    return SubTerrain(
         terrain=name.removesuffix(registry.INVERTED),
         name=name,
         proportion=proportion,

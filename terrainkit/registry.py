@@ -9,7 +9,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from terrainkit import terrains
-from terrainkit.errors import ConfigError, listing
+from terrainkit.errors import ConfigError, known_names
 from terrainkit.parameter import parameters_of
 from terrainkit.terrain import Terrain
 
@@ -49,7 +49,7 @@ def find(name: str) -> type[Terrain]:
         upright = name.removesuffix(INVERTED)
         if upright != name and upright in names() and "inverted" in parameters_of(find(upright)):
             raise ConfigError(f"no terrain {name!r}; it is {upright} with inverted = true")
-        raise ConfigError(f"no terrain {name!r}; there are: {listing([*names(), *others])}")
+        raise ConfigError(f"no terrain {name!r}; {known_names(name, [*names(), *others])}")
     try:
         found = others[name].load()
     except (ImportError, AttributeError) as error:

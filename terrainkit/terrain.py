@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.errors import ConfigError, listing
+from terrainkit.errors import ConfigError, known_names
 from terrainkit.grid import Grid
 from terrainkit.parameter import (
     Parameter,
@@ -16,7 +16,7 @@ from terrainkit.parameter import (
     Realized,
     Value,
     at_difficulty,
-    checked,
+    convert_parameter,
     parameters_of,
 )
 
@@ -36,7 +36,7 @@ class Terrain(ABC):
 
     def __post_init__(self) -> None:
         for name, parameter in parameters_of(type(self)).items():
-            value = checked(self.kind(), name, getattr(self, name), parameter)
+            value = convert_parameter(self.kind(), name, getattr(self, name), parameter)
             object.__setattr__(self, name, value)
 
     @classmethod
@@ -56,13 +56,15 @@ class Terrain(ABC):
             ConfigError: if `given` names an unknown parameter or holds a value that it cannot take.
         """
         if not 0 <= difficulty <= 1:
-            raise ConfigError(f"{cls.kind()}: difficulty is {difficulty:g}; wanted 0 to 1")
+            raise ConfigError(
+                f"{cls.kind()}.difficulty: got {difficulty:g}; expected a number from 0 to 1"
+            )
         given = given or {}
         known = parameters_of(cls)
         for name in given:
             if name not in known:
                 raise ConfigError(
-                    f"{cls.kind()} has no parameter {name!r}; it has: {listing(known)}"
+                    f"{cls.kind()} has no parameter {name!r}; {known_names(name, known, 'it has')}"
                 )
         return cls(**{name: cls._value(name, p, given, difficulty) for name, p in known.items()})
 
@@ -75,9 +77,9 @@ class Terrain(ABC):
         value = given[name]
         if isinstance(value, tuple):
             if not parameter.ramps or len(value) != 2:
-                wanted = "one value or a pair (easy, hard)" if parameter.ramps else "one value"
-                raise ConfigError(f"{cls.kind()}: {name} is {value}; wanted {wanted}")
-            easy, hard = (checked(cls.kind(), name, end, parameter) for end in value)
+                expected = "one value or a pair (easy, hard)" if parameter.ramps else "one value"
+                raise ConfigError(f"{cls.kind()}.{name}: got {value}; expected {expected}")
+            easy, hard = (convert_parameter(cls.kind(), name, end, parameter) for end in value)
             return at_difficulty((easy, hard), difficulty)
         return value
 

@@ -11,7 +11,7 @@ from terrainkit.config import MapConfig
 from terrainkit.curriculum import Assignment, assign_levels, update_levels
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit.grid import Grid
-from terrainkit.parameter import LARGEST
+from terrainkit.parameter import MAX_VALUE
 from terrainkit.patch import Patch
 
 if TYPE_CHECKING:
@@ -142,9 +142,9 @@ class TerrainMap:
         for name in ("heights", "env_origins"):
             values = getattr(self, name)
             # One pass each: NaN makes both comparisons false.
-            if not (values.min() >= -LARGEST and values.max() <= LARGEST):
+            if not (values.min() >= -MAX_VALUE and values.max() <= MAX_VALUE):
                 raise ExportError(
-                    f"{name} holds numbers that are not finite, or beyond {LARGEST:g} m; "
+                    f"{name} holds numbers that are not finite, or beyond {MAX_VALUE:g} m; "
                     "terrainkit check says where"
                 )
 

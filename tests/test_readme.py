@@ -168,7 +168,7 @@ def check_robot_lines():
 @pytest.fixture
 def my_robot():
     """Write the robot of the example: two numbers exchanged, and a 2 instead of a 1."""
-    from terrainkit_robots import bundled
+    from terrainkit_robots.description import bundled
 
     path = bundled.find("quadruped")
     assert path is not None
@@ -226,7 +226,7 @@ def onboard_part():
 @pytest.fixture
 def healthy_robots():
     """Write the robots of the lines that bring one in: each is the quadruped that comes along."""
-    from terrainkit_robots import bundled
+    from terrainkit_robots.description import bundled
 
     path = bundled.find("quadruped")
     assert path is not None

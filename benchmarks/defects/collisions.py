@@ -4,7 +4,7 @@ import numpy as np
 from lxml import etree
 
 from defects.patient import NotHereError, Patient, Subjects, child, kind, put
-from terrainkit_robots.body.bodies import Body
+from terrainkit_robots.analysis.bodies.bodies import Body
 
 
 def _bare(link: etree._Element) -> None:

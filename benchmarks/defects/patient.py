@@ -11,7 +11,7 @@ from typing import Literal, TypeVar
 import numpy as np
 from lxml import etree
 
-from terrainkit_robots.facts import Facts
+from terrainkit_robots.analysis.facts import Facts
 
 Severity = Literal["error", "warning", "info"]
 T = TypeVar("T")

@@ -24,7 +24,7 @@ from terrainkit_cli.robot_options import (
 )
 
 if TYPE_CHECKING:
-    from terrainkit_robots.onboard.bringing_in import BroughtIn, Wishes
+    from terrainkit_robots.onboarding.pipeline import BroughtIn, Wishes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,8 +85,8 @@ class Onboard(Command):
 
     def run(self) -> int:
         """Bring the robot in, and tell what was done."""
-        from terrainkit_robots.onboard.bringing_in import bring_in
-        from terrainkit_robots.onboard.summary import summary
+        from terrainkit_robots.onboarding.pipeline import bring_in
+        from terrainkit_robots.onboarding.summary import summary
 
         if not self.file:
             raise ConfigError("no FILE to onboard; wanted one, or quadruped, or biped")
@@ -107,9 +107,11 @@ class Onboard(Command):
     def _wishes(self, steps: render.Steps) -> "Wishes":
         from functools import partial
 
-        from terrainkit_robots.collision.part_cache import cache_folder
-        from terrainkit_robots.onboard.bringing_in import Wishes
-        from terrainkit_robots.settings import Settings
+        from terrainkit_robots.export.collision_simplification.decomposition_cache import (
+            cache_folder,
+        )
+        from terrainkit_robots.lint.settings import Settings
+        from terrainkit_robots.onboarding.pipeline import Wishes
 
         return Wishes(
             target=Path(self.output) if self.output else None,
@@ -136,8 +138,8 @@ def _refusal(done: "BroughtIn") -> str:
     """Return the errors of a robot that was not brought in."""
     from dataclasses import replace
 
-    from terrainkit_robots.onboard.bringing_in import keeps_out
-    from terrainkit_robots.report import as_text
+    from terrainkit_robots.lint.report import as_text
+    from terrainkit_robots.onboarding.pipeline import keeps_out
 
     errors = tuple(filter(keeps_out, done.report.findings))
     return as_text([replace(done.report, findings=errors)], "text")
@@ -161,7 +163,7 @@ def _viewer(folder: Path) -> str:
 
 def _faults(done: "BroughtIn") -> list[str]:
     """Return why a robot that was written is not yet one to train."""
-    from terrainkit_robots.report.tally import count
+    from terrainkit_robots.lint.report.tally import count
 
     left = [finding for finding in done.report.findings if finding.severity == "error"]
     codes = ", ".join(dict.fromkeys(finding.code for finding in left))

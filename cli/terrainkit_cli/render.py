@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.status import Status
     from rich.table import Table
 
-    from terrainkit_robots.report.text import Span
+    from terrainkit_robots.lint.report.text import Span
     from terrainkit_robots.rl.progress import Progress, Watch
 
 _T = TypeVar("_T")

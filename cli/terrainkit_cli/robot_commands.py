@@ -25,10 +25,10 @@ from terrainkit_cli.robot_options import (
 )
 
 if TYPE_CHECKING:
-    from terrainkit_robots.facts import Facts
-    from terrainkit_robots.lint import Report
-    from terrainkit_robots.rule import Rule as RobotRule
-    from terrainkit_robots.settings import Settings
+    from terrainkit_robots.analysis.facts import Facts
+    from terrainkit_robots.lint.rule import Rule as RobotRule
+    from terrainkit_robots.lint.runner import Report
+    from terrainkit_robots.lint.settings import Settings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,8 +124,8 @@ class CheckRobot(Command):
         return int(any(check.bad for check in checks))
 
     def _settings(self) -> "Settings":
-        from terrainkit_robots.selection import choose
-        from terrainkit_robots.settings import Settings
+        from terrainkit_robots.lint.selection import select_rules
+        from terrainkit_robots.lint.settings import Settings
 
         settings = Settings(
             select=tuple(word for words in self.select for word in listed(words)),
@@ -135,12 +135,12 @@ class CheckRobot(Command):
             strict=self.strict,
             simulate=not self.no_simulation,
         )
-        choose(settings)
+        select_rules(settings)
         return settings
 
     def _say(self, checks: "Sequence[_Checked]", output: Path | None) -> None:
-        from terrainkit_robots.report import as_text
-        from terrainkit_robots.report.tally import tally
+        from terrainkit_robots.lint.report import as_text
+        from terrainkit_robots.lint.report.tally import tally
 
         reports = [check.report for check in checks]
         if self.diff:
@@ -148,7 +148,7 @@ class CheckRobot(Command):
             if checks and not text:
                 render.note("there is nothing to fix")
         elif output is None and self.format == "text" and render.has_colors():
-            from terrainkit_robots.report.text import lines
+            from terrainkit_robots.lint.report.text import lines
 
             render.styled(lines(reports, width=render.width()))
             return
@@ -175,13 +175,13 @@ class _Checked:
 
 def _tried(name: str, command: CheckRobot, options: "Settings") -> _Checked | None:
     """Return what there is to say of a file; None, and one line of error, if that failed."""
-    from terrainkit_robots.facts_record import facts_record
-    from terrainkit_robots.lint import INTERNAL
+    from terrainkit_robots.lint.report.facts_json import facts_json
+    from terrainkit_robots.lint.runner import INTERNAL
 
     try:
         check = _check(name, command, options)
         # So that what fails in it fails here.
-        facts_record(check.report.facts, simulated=check.report.simulated)
+        facts_json(check.report.facts, simulated=check.report.simulated)
         return check
     except TerrainkitError as error:
         render.error(str(error))
@@ -195,12 +195,12 @@ def _tried(name: str, command: CheckRobot, options: "Settings") -> _Checked | No
 
 
 def _check(name: str, command: CheckRobot, options: "Settings") -> _Checked:
-    from terrainkit_robots import bundled
-    from terrainkit_robots.facts import Facts
-    from terrainkit_robots.mesh.meshes import Meshes
-    from terrainkit_robots.robot_file import read_robot
-    from terrainkit_robots.selection import lint_selected
-    from terrainkit_robots.settings import read_settings
+    from terrainkit_robots.analysis.facts import Facts
+    from terrainkit_robots.description import bundled
+    from terrainkit_robots.description.load import load_robot
+    from terrainkit_robots.lint.selection import lint_selected
+    from terrainkit_robots.lint.settings import read_settings
+    from terrainkit_robots.mesh.mesh_cache import Meshes
     from terrainkit_robots.spec.spec_file import read_spec
 
     path = find_robot(name)
@@ -210,7 +210,7 @@ def _check(name: str, command: CheckRobot, options: "Settings") -> _Checked:
     spec = read_spec(Path(command.spec)) if command.spec else None
 
     def look(contents: Mapping[Path, bytes]) -> "Report":
-        model = read_robot(
+        model = load_robot(
             path,
             packages=settings.packages,
             xacro_arguments=settings.xacro_arguments,
@@ -232,12 +232,12 @@ def _check(name: str, command: CheckRobot, options: "Settings") -> _Checked:
 
 def _other(name: str, settings: "Settings") -> "Facts | None":
     """Return the robot to compare with; None without one."""
-    from terrainkit_robots.facts import Facts
-    from terrainkit_robots.robot_file import read_robot
+    from terrainkit_robots.analysis.facts import Facts
+    from terrainkit_robots.description.load import load_robot
 
     if not name:
         return None
-    model = read_robot(
+    model = load_robot(
         find_robot(name),
         packages=settings.packages,
         xacro_arguments=settings.xacro_arguments,
@@ -255,8 +255,8 @@ def _repaired(
     command: CheckRobot,
 ) -> "tuple[Report, str]":
     """Return the report once the fixes are written; what was found and a diff, if none is to be."""
-    from terrainkit_robots.edit.apply import fix_robot, unified_diff, write_fixes
-    from terrainkit_robots.report.repaired import Repaired
+    from terrainkit_robots.lint.fixes.apply import fix_robot, unified_diff, write_fixes
+    from terrainkit_robots.lint.report.repaired import Repaired
 
     result = fix_robot(
         path, lambda contents: look(contents) if contents else found, unsafe=command.unsafe_fixes
@@ -312,12 +312,12 @@ class Rule(Command):
 
     def run(self) -> int:
         """Print the page of a rule, or a line for each."""
-        from terrainkit_robots.rule import FAMILIES, find, rules
+        from terrainkit_robots.lint.rule import FAMILIES, get_rule, rules
 
         if self.code and self.all:
             raise ConfigError("wanted the code or the name of a rule, or --all")
         if self.code:
-            render.result(_page(find(self.code)))
+            render.result(_page(get_rule(self.code)))
             return 0
         for family, about in FAMILIES.items():
             render.result(f"{family}: {about}")
@@ -337,7 +337,7 @@ _FIXES = {"safe": "--fix", "unsafe": "--unsafe-fixes", "no": ""}
 def _page(rule: "RobotRule") -> str:
     import textwrap
 
-    from terrainkit_robots.rule import FAMILIES
+    from terrainkit_robots.lint.rule import FAMILIES
 
     fixes = f"; repaired by {_FIXES[rule.fixes]}" if rule.fixes != "no" else ""
     paragraphs = [

@@ -48,7 +48,7 @@ def number_given(number: int) -> int | None:
 
 def find_robot(name: str) -> Path:
     """Return the file of that name, or else the bundled robot."""
-    from terrainkit_robots import bundled
+    from terrainkit_robots.description import bundled
 
     path = Path(name)
     try:
@@ -95,7 +95,7 @@ def pairs(option: str, words: Sequence[str], sign: str, wanted: str) -> dict[str
 
 def packages(words: Sequence[str]) -> dict[str, Path]:
     """Return the folder of each package, as NAME=DIR writes them."""
-    from terrainkit_robots.settings import package_folder
+    from terrainkit_robots.lint.settings import package_folder
 
     found = pairs("--package", words, "=", "NAME=DIR")
     return {name: package_folder(name, Path(folder)) for name, folder in found.items()}

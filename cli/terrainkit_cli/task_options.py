@@ -254,7 +254,7 @@ def _apart(arguments: Sequence[str], options: Sequence[str]) -> tuple[list[str],
 def _refuse_unknown(named: Sequence[str], options: Sequence[str], task: "Task") -> None:
     """Refuse options that neither the command nor the task has, on one line; tyro fills a page."""
     from terrainkit_robots.rl.task_file import values_of
-    from terrainkit_robots.wording import closest, short
+    from terrainkit_robots.text import closest, short
 
     known = [*options, *(_dashed(name) for name, _ in values_of(task))]
     for name in named:

@@ -12,8 +12,8 @@ from terrainkit_cli.training_extra import require_training
 
 if TYPE_CHECKING:
     from terrainkit_cli.robot_commands import CheckRobot
+    from terrainkit_robots.lint.settings import Settings
     from terrainkit_robots.policy.smoke_test import Smoke
-    from terrainkit_robots.settings import Settings
 
 SCHEMA_VERSION = 1
 """Raised when a key changes its meaning or goes; new keys may come without."""
@@ -83,7 +83,7 @@ def _given(command: "CheckRobot", *options: str) -> list[str]:
 
 
 def _settings(command: "CheckRobot") -> "Settings":
-    from terrainkit_robots.settings import Settings
+    from terrainkit_robots.lint.settings import Settings
 
     return Settings(
         ignore=reasons(command.ignore),

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from terrainkit.boxes import BoxCover, around, level_cells
 from terrainkit.capacity import require_memory
-from terrainkit.coerce import coerce
 from terrainkit.mesh.closed import THICKNESS
+from terrainkit.schema import convert
 
 if TYPE_CHECKING:
     from terrainkit.terrain_map import TerrainMap
@@ -55,7 +55,7 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
         ConfigError: if there is no such way of collision.
         CapacityError: if the map would not fit in memory.
     """
-    collision = coerce("collision", collision, Collision)
+    collision = convert("collision", collision, Collision)
     samples = terrain_map.heights.size
     require_memory(samples * BYTES_PER_SAMPLE, f"a MuJoCo model of {samples} samples")
     cover = box_cover_of(terrain_map, collision)

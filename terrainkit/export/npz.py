@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from terrainkit import registry
 from terrainkit.archive import LONGEST_TEXT, Archive, opened, write_arrays
 from terrainkit.config import MapConfig
-from terrainkit.config_text import from_toml, to_toml
 from terrainkit.errors import ConfigError, MapFileError, listing
 from terrainkit.mesh.lattice import BYTES_PER_NODE
 from terrainkit.mesh.tri_mesh import TriMesh
-from terrainkit.parameter import LARGEST, Realized, Value, parameters_of
+from terrainkit.parameter import MAX_VALUE, Realized, Value, parameters_of
 from terrainkit.patch import Parameters
 
 if TYPE_CHECKING:
@@ -58,7 +57,7 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
         "vertices": mesh.vertices,
         "triangles": mesh.triangles,
         "boxes": np.empty((0, 10), dtype=np.float32),
-        "config": np.array(to_toml(config)),
+        "config": np.array(config.to_toml()),
         "parameters": np.array(_parameters_text(terrain_map)),
         "friction": np.array([config.static_friction, config.dynamic_friction]),
         "restitution": np.float64(config.restitution),
@@ -130,7 +129,7 @@ def _config(archive: Archive) -> MapConfig:
             f"{archive.path} has format version {version}; this terrainkit reads {FORMAT_VERSION}"
         )
     try:
-        return from_toml(archive.text("config"))
+        return MapConfig.from_toml(archive.text("config"))
     except ConfigError as error:
         raise MapFileError(f"{archive.path}: config: {error}") from error
 
@@ -144,7 +143,7 @@ def _all_parameters(
     archive: Archive, config: MapConfig, kinds: NDArray[np.int32]
 ) -> NDArray[np.object_]:
     table = np.empty(kinds.shape, dtype=object)
-    wanted = [set(parameters_of(registry.find(choice.terrain))) for choice in config.mix]
+    wanted = [set(parameters_of(registry.find(sub_terrain.terrain))) for sub_terrain in config.mix]
     try:
         rows = json.loads(archive.text("parameters", limit=(table.size + 16) * _TEXT_OF_A_PATCH))
         for row, col in np.ndindex(table.shape):
@@ -170,6 +169,6 @@ def _realized(value: Any) -> Realized:
 
 
 def _number(value: Any) -> Value:
-    if not isinstance(value, int | float) or not abs(value) <= LARGEST:
+    if not isinstance(value, int | float) or not abs(value) <= MAX_VALUE:
         raise ValueError("a value is not a number within bounds")
     return value

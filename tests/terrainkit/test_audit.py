@@ -31,7 +31,7 @@ def changed(terrain_map, name, index, value):
         tk.MapConfig(rows=2, cols=16, border=0.0, preset="all", seed=4, centered=True),
         tk.MapConfig(rows=2, cols=5, border=1.0, mode="randomized", preset="rough"),
         tk.MapConfig(rows=4, cols=1, border=1.0, difficulty_jitter=1.0, slope_threshold=None),
-        tk.MapConfig(rows=1, cols=1, border=0.0, terrains=(tk.TerrainChoice(terrain="wave"),)),
+        tk.MapConfig(rows=1, cols=1, border=0.0, terrains=(tk.SubTerrain(terrain="wave"),)),
     ],
     ids=["legged_gym", "all", "randomized", "jitter", "one patch"],
 )
@@ -114,7 +114,7 @@ def test_a_difficulty_that_falls(sound):
 def test_a_width_that_the_patch_cannot_hold_is_named():
     # A moat of 1 m around a platform of 3 m: a patch of 8 m x 4 m has 0.5 m for it along y.
     config = tk.MapConfig(
-        rows=2, cols=1, patch_size=(8.0, 4.0), terrains=(tk.TerrainChoice(terrain="gap"),)
+        rows=2, cols=1, patch_size=(8.0, 4.0), terrains=(tk.SubTerrain(terrain="gap"),)
     )
     with pytest.warns(tk.TerrainkitWarning, match="gap.width on 1 patches; the map records"):
         terrain_map = tk.generate(config)

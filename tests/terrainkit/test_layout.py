@@ -6,15 +6,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from terrainkit import MapConfig, TerrainChoice, generate
+from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError, TerrainkitWarning
 from terrainkit.layout import apportion, assign_patch, terrain_columns
 
-FLAT, GAP, PIT = (TerrainChoice(terrain=name) for name in ("flat", "gap", "pit"))
+FLAT, GAP, PIT = (SubTerrain(terrain=name) for name in ("flat", "gap", "pit"))
 
 
 def mix(**proportions):
-    return tuple(TerrainChoice(terrain=name, proportion=p) for name, p in proportions.items())
+    return tuple(SubTerrain(terrain=name, proportion=p) for name, p in proportions.items())
 
 
 def difficulties(config, col=0):

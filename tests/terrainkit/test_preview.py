@@ -12,7 +12,7 @@ PAPER = (250, 249, 246)
 @pytest.fixture(scope="module")
 def pits():
     """Make three rows along x and one column along y; only the last row has a deep pit."""
-    pit = tk.TerrainChoice(terrain="pit", parameters={"side": 6.0})
+    pit = tk.SubTerrain(terrain="pit", parameters={"side": 6.0})
     return tk.generate(tk.MapConfig(rows=3, cols=1, border=1.0, terrains=(pit,)))
 
 
@@ -24,13 +24,13 @@ def test_x_is_to_the_right(pits):
 
 
 def test_y_is_up():
-    bowl = tk.TerrainChoice(terrain="pyramid_slope", name="bowl", parameters={"inverted": True})
+    bowl = tk.SubTerrain(terrain="pyramid_slope", name="bowl", parameters={"inverted": True})
     config = tk.MapConfig(
         rows=1,
         cols=2,
         border=0.0,
         difficulty_range=(1.0, 1.0),
-        terrains=(tk.TerrainChoice(terrain="flat"), bowl),
+        terrains=(tk.SubTerrain(terrain="flat"), bowl),
     )
     picture = preview(tk.generate(config), 160)
     top, bottom = (picture[70 + i, 250 + 30].astype(int) for i in (80 + 30, 240 + 30))
@@ -92,7 +92,7 @@ def test_an_existing_picture_stays_unless_told(pits, tmp_path):
 
 
 def test_a_long_map_stays_within_bounds():
-    flat = tk.TerrainChoice(terrain="flat")
+    flat = tk.SubTerrain(terrain="flat")
     config = tk.MapConfig(
         rows=1, cols=300, patch_size=(2.0, 2.0), cell=0.2, border=0.0, terrains=(flat,)
     )

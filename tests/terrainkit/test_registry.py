@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from terrainkit import MapConfig, TerrainChoice, generate, registry, terrains
+from terrainkit import MapConfig, SubTerrain, generate, registry, terrains
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.terrain import Terrain
@@ -53,7 +53,7 @@ def test_a_terrain_that_uses_another_is_still_found_by_its_own_name():
 
 
 def test_an_unknown_name_lists_those_that_exist():
-    with pytest.raises(ConfigError, match=r"no terrain 'stair'; there are: flat, gap, .*, wave$"):
+    with pytest.raises(ConfigError, match=r"did you mean 'stairs'\? There are: flat, .*, wave$"):
         registry.find("stair")
 
 
@@ -119,7 +119,7 @@ def plugin(monkeypatch):
 def test_a_terrain_of_another_package_is_found_by_its_entry_point(plugin):
     plugin("terrainkit.terrains.wave:Wave")
     assert registry.find("dunes") is registry.find("wave")
-    dunes = TerrainChoice(terrain="dunes", parameters={"amplitude": 0.1})
+    dunes = SubTerrain(terrain="dunes", parameters={"amplitude": 0.1})
     assert generate(MapConfig(rows=1, cols=1, border=0.0, terrains=(dunes,))).heights.max() > 0.09
 
 

@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 
 import terrainkit
-from terrainkit import MapConfig, TerrainChoice, generate
+from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError, ExportError
 
 
 @pytest.fixture(scope="module")
 def slope_map():
     # Level to x = 1, up at grade 0.5, and level again from x = 5 on.
-    slope = TerrainChoice(terrain="slope", parameters={"grade": 0.5, "landing": 1.0})
+    slope = SubTerrain(terrain="slope", parameters={"grade": 0.5, "landing": 1.0})
     return generate(
         MapConfig(
             rows=1,

@@ -5,7 +5,7 @@ import sys
 import pytest
 
 from terrainkit_cli.main import main
-from terrainkit_robots.config import frameworks
+from terrainkit_robots.onboarding.frameworks import frameworks
 
 ARM = """<robot name="arm">
   <link name="stand"><inertial><mass value="5"/>
@@ -213,7 +213,7 @@ def test_a_graphics_library_that_is_not_there_only_costs_the_pictures(tmp_path):
 INTERRUPTED = """
 import os, signal, sys
 from terrainkit_cli.main import main
-from terrainkit_robots.onboard import bringing_in, folder
+from terrainkit_robots.onboarding import folder, pipeline
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
 whole = folder.write_files
@@ -222,7 +222,7 @@ def written_then_interrupted(*arguments):
     whole(*arguments)
     os.kill(os.getpid(), signal.SIGINT)
 
-bringing_in.write_files = written_then_interrupted
+pipeline.write_files = written_then_interrupted
 sys.exit(main(["onboard", "quadruped", "-o", "robot"]))
 """
 

@@ -7,8 +7,8 @@ import sys
 import pytest
 
 from terrainkit_cli.main import main
-from terrainkit_robots import bundled
-from terrainkit_robots.rule import rules
+from terrainkit_robots.description import bundled
+from terrainkit_robots.lint.rule import rules
 
 GOOD = """<?xml version="1.0"?>
 <robot name="box">
@@ -356,6 +356,6 @@ def test_the_command_line_offers_every_format():
     import typing
 
     from terrainkit_cli.robot_commands import CheckRobot
-    from terrainkit_robots.report import FORMATS
+    from terrainkit_robots.lint.report import FORMATS
 
     assert typing.get_args(typing.get_type_hints(CheckRobot)["format"]) == FORMATS

@@ -53,7 +53,7 @@ def test_every_option_reaches_the_map(terrainkit, tmp_path):
         patch_size=(8.0, 4.0),
         cell=0.2,
         border=2.0,
-        terrains=(tk.TerrainChoice(terrain="pit", parameters={"depth": (0.1, 0.6), "side": 2}),),
+        terrains=(tk.SubTerrain(terrain="pit", parameters={"depth": (0.1, 0.6), "side": 2}),),
         seed=9,
         centered=True,
         slope_threshold=None,

@@ -1,14 +1,19 @@
-"""Robots of other people, which the tests read where they lie."""
+"""Fixtures shared by the tests of terrainkit_robots."""
 
 import os
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from terrainkit_robots import bundled
+import terrainkit_robots
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description import bundled as bundled_robots
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.simulation.standing import Standing
+from terrainkit_robots.spec.robot_spec import RobotSpec
 
 _PROJECT = Path(__file__).resolve().parents[2]
 ROBOTS = Path(os.environ.get("TERRAINKIT_ROBOTS", _PROJECT.parent / "shared" / "robots"))
@@ -34,7 +39,7 @@ def sliding_shanks(tmp_path_factory: pytest.TempPathFactory) -> Path:
         r'<axis xyz="0 1 0"/>(\s*)<limit [^>]*/>',
         r'\1"prismatic"\2<axis xyz="0 0 1"/>\3'
         '<limit lower="-0.05" upper="0.1" effort="500" velocity="2"/>',
-        bundled.find("quadruped").read_text(),
+        bundled_robots.find("quadruped").read_text(),
         flags=re.DOTALL,
     )
     assert count == 4
@@ -61,3 +66,79 @@ def stood() -> Standing:
         blew_up=False,
         seconds=5.0,
     )
+
+
+BUNDLED = Path(terrainkit_robots.__file__).parent / "description/bundled"
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What derive_spec needs of a gain."""
+
+    stiffness: float = 40.0
+    damping: float = 1.0
+    armature: float = 0.0
+    reason: str = "for a test"
+
+
+@pytest.fixture
+def bundled():
+    """Return a bundled robot, such as `quadruped.urdf`, with texts replaced."""
+
+    def read(name, *replace, tmp_path=None, spec=None):
+        path = BUNDLED / Path(name).stem / name
+        if replace:
+            text = path.read_text(encoding="utf-8")
+            for old, new in replace:
+                assert old in text
+                text = text.replace(old, new)
+            path = tmp_path / name
+            path.write_text(text, encoding="utf-8")
+        return Facts(load_robot(path), spec=spec)
+
+    return read
+
+
+@pytest.fixture
+def robot(tmp_path):
+    """Return the robot of a text."""
+
+    def read(text, spec=None):
+        path = tmp_path / ("robot.xml" if "<mujoco" in text else "robot.urdf")
+        path.write_text(text, encoding="utf-8")
+        return Facts(load_robot(path), spec=spec)
+
+    return read
+
+
+@pytest.fixture
+def gains():
+    """Return gains for each actuated joint of a robot."""
+
+    def make(facts, **changed):
+        return {joint.name: Gain(**changed) for joint in facts.actuated}
+
+    return make
+
+
+def values(**changed):
+    """Return what a small spec is made from."""
+    table = {"a": 1.0, "b": 2.0}
+    names = ("default_pose", "stiffness", "damping", "effort", "velocity", "armature")
+    return {
+        "name": "robot",
+        "urdf": "robot.urdf",
+        "mjcf": "robot.xml",
+        "floating": True,
+        "joint_order": ("a", "b"),
+        "base": "trunk",
+        **dict.fromkeys((*names, "action_scale"), table),
+        "soft_limits": {"a": (-1.0, 1.0)},
+        **changed,
+    }
+
+
+@pytest.fixture
+def spec():
+    """Return a small spec, with values changed."""
+    return lambda **changed: RobotSpec(**values(**changed))

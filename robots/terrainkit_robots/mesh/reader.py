@@ -6,8 +6,8 @@ from io import BytesIO
 
 import numpy as np
 
-from terrainkit_robots.mesh.dae import read_dae
-from terrainkit_robots.mesh.header import STL_FACE, STL_HEADER, Format
+from terrainkit_robots.mesh.collada import read_dae
+from terrainkit_robots.mesh.sniff import STL_FACE, STL_HEADER, Format
 from terrainkit_robots.mesh.surface import (
     STL_RECORD,
     MeshError,

@@ -32,7 +32,7 @@ from terrainkit_robots.rl.task import Rewards, Task
 from terrainkit_robots.rl.threads import one_thread
 
 if TYPE_CHECKING:
-    from terrainkit_robots.settings import Settings
+    from terrainkit_robots.lint.settings import Settings
 
 FloatArray = NDArray[np.float32]
 
@@ -134,7 +134,7 @@ def smoke_of(name: str, *, settings: "Settings | None" = None, spec: Path | None
             raise ConfigError(f"a spec for {name}, which has one; wanted it for a robot's file")
         found = registry.find(name)
         return smoke(read_robot(found.folder), found.task, Plane())
-    from terrainkit_robots.onboard.bringing_in import Wishes, bring_in, keeps_out
+    from terrainkit_robots.onboarding.pipeline import Wishes, bring_in, keeps_out
 
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "robot"

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import TerrainkitError
-from terrainkit_robots.wording import short
+from terrainkit_robots.text import short
 
 QUALITY = 23
 """The rate factor of x264: 18 cannot be told from the original, 28 is blurred."""

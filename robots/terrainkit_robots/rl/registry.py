@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit_robots import bundled
-from terrainkit_robots.rl.robot import SPEC_FILE
+from terrainkit_robots.description import bundled
+from terrainkit_robots.rl.scene import SPEC_FILE
 from terrainkit_robots.rl.task import (
     Algorithm,
     Commands,
@@ -31,7 +31,7 @@ from terrainkit_robots.rl.task import (
     Terrain,
 )
 from terrainkit_robots.spec.spec_file import read_spec
-from terrainkit_robots.wording import closest, short
+from terrainkit_robots.text import closest, short
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint

@@ -20,14 +20,14 @@ import numpy as np
 
 from terrainkit.atomic import atomic_write
 from terrainkit.errors import ConfigError, ExportError, listing
-from terrainkit.toml_text import parsed
-from terrainkit_robots.mesh.header import open_regular
+from terrainkit.toml_text import parse_toml
+from terrainkit_robots.mesh.sniff import open_regular
 from terrainkit_robots.rl import registry
 from terrainkit_robots.rl.scene import SPEC_FILE, Robot, robot_from_spec
 from terrainkit_robots.rl.task import Task
 from terrainkit_robots.rl.task_file import read_task, to_toml
 from terrainkit_robots.spec.spec_file import read_spec
-from terrainkit_robots.wording import free_name
+from terrainkit_robots.text import free_name
 
 if TYPE_CHECKING:
     from terrainkit.config import MapConfig
@@ -141,9 +141,7 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
         SPEC_FILE: _read_text(robot_folder / SPEC_FILE),
     }
     if (config := _map_config(source)) is not None:
-        from terrainkit import config_text
-
-        files[MAP_FILE] = config_text.to_toml(config)
+        files[MAP_FILE] = config.to_toml()
     write_run_folder(folder, {name: text.encode() for name, text in files.items()})
     return open_run(folder)
 
@@ -278,9 +276,9 @@ def is_same_terrain(run: Run, terrain: str | Path) -> bool:
     """
     source, config_file = resolve_terrain(terrain), run.folder / MAP_FILE
     if config_file.is_file():
-        from terrainkit.config_text import read_config
+        from terrainkit.config import MapConfig
 
-        return _map_config(source) == read_config(config_file)
+        return _map_config(source) == MapConfig.load(config_file)
     recorded = _read_about(run.folder).get("terrain_sha256")
     return source == run.terrain and recorded in (None, recorded and _sha256(Path(source)))
 
@@ -425,7 +423,7 @@ def _read_about(folder: Path) -> dict[str, Any]:
     path = folder / RUN_FILE
     if not path.is_file():
         raise ConfigError(f"{folder} has no {RUN_FILE}; terrainkit train writes such a folder")
-    about = parsed(_read_text(path))
+    about = parse_toml(_read_text(path))
     if about.get("format_version") != FORMAT_VERSION:
         got = about.get("format_version", "nothing")
         raise ConfigError(f"{path}: format_version: got {got!r}; expected {FORMAT_VERSION}")
@@ -447,9 +445,9 @@ def _read_text(path: Path) -> str:
 def _map_config(terrain: str) -> "MapConfig | None":
     """Return the config of a map; None for another terrain."""
     if terrain.endswith(".toml"):
-        from terrainkit.config_text import read_config
+        from terrainkit.config import MapConfig
 
-        return read_config(terrain)
+        return MapConfig.load(terrain)
     if terrain.endswith(".npz"):
         from terrainkit.terrain_map import TerrainMap
 

@@ -279,10 +279,10 @@ def load_terrain(source: str | Path, collision: Collision = "auto") -> Terrain:
 
         return MapTerrain(TerrainMap.load(path), collision)
     if path.suffix == ".toml":
-        from terrainkit.config_text import read_config
+        from terrainkit.config import MapConfig
         from terrainkit.generation import generate
 
-        return MapTerrain(generate(read_config(path)), collision)
+        return MapTerrain(generate(MapConfig.load(path)), collision)
     if path.suffix == ".xml":
         if not path.is_file():
             raise ConfigError(f"there is no file {path}")

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from terrainkit.atomic import atomic_write
 from terrainkit.errors import ConfigError, ExportError
-from terrainkit_robots import graphics_library
-from terrainkit_robots.onboard.pictures import PicturesError
+from terrainkit_robots import gl_backend
+from terrainkit_robots.onboarding.pictures import PicturesError
 
 FloatArray = NDArray[np.float32]
 
@@ -121,16 +121,16 @@ def film_frames(film: Film, path: Path, *, overwrite: bool = False) -> Iterator[
         folder = Path(name)
         _ask(film, folder)
         complaints = {}
-        for library in graphics_library.libraries():
+        for library in gl_backend.libraries():
             yield from _drawn(library, folder, len(film))
-            answer = graphics_library.take_answer(folder / ANSWER, "it crashed")
+            answer = gl_backend.take_answer(folder / ANSWER, "it crashed")
             if "frames" in answer:
                 shutil.copyfile(folder / VIDEO, target)
                 return
             if "unwritten" in answer:
                 raise ExportError(f"{path} cannot be written: {answer['unwritten']}")
             complaints[library] = answer["failed"]
-        raise PicturesError(graphics_library.cannot_draw(complaints))
+        raise PicturesError(gl_backend.cannot_draw(complaints))
 
 
 def _ask(film: Film, folder: Path) -> None:
@@ -156,7 +156,7 @@ def _drawn(library: str, folder: Path, frames: int) -> Iterator[int]:
             stdin=request,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            env=graphics_library.environment(library),
+            env=gl_backend.environment(library),
             cwd=folder,
             start_new_session=True,
         )

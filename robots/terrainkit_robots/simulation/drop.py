@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.simulation.plant import Plant
-from terrainkit_robots.simulation.step_size import free_dofs
-from terrainkit_robots.simulation.trial import Trial
+from terrainkit_robots.simulation.rollout import Trial
+from terrainkit_robots.simulation.sim_model import Plant
+from terrainkit_robots.simulation.time_step import free_dofs
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from terrainkit_robots.body.kinematics import body_poses
-from terrainkit_robots.body.rigid import inverse
+from terrainkit_robots.analysis.bodies.kinematics import body_poses
+from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.rule import CannotCheckError
-from terrainkit_robots.simulation.gains import Gain
-from terrainkit_robots.simulation.plant import Plant, positions_in
-from terrainkit_robots.simulation.trial import Trial
+from terrainkit_robots.simulation.pd_gains import Gain
+from terrainkit_robots.simulation.rollout import Trial
+from terrainkit_robots.simulation.sim_model import Plant, positions_in
+from terrainkit_robots.transforms import invert_poses
 
 if TYPE_CHECKING:
-    from terrainkit_robots.facts import Facts
+    from terrainkit_robots.analysis.facts import Facts
 
 _LOOKS = 4
 """The robot is looked at every so many steps: 20 ms."""
@@ -106,10 +106,10 @@ def footholds(facts: "Facts") -> tuple[Foothold, ...]:
     for leg, contact in zip(facts.legs, facts.stance.contacts, strict=True):
         body = facts.bodies[leg.limb.chain[-1]]
         whole = "knee" in leg.roles[:-1]  # past an ankle there is nothing but foot
-        place = inverse(poses[body.index]) @ [*contact, 1.0]
+        place = invert_poses(poses[body.index]) @ [*contact, 1.0]
         for link, local in zip(body.links, body.poses, strict=True):
             only = whole or (link.name == leg.foot and link is not body.top)
-            x, y, z = (inverse(local) @ place)[:3].tolist()
+            x, y, z = (invert_poses(local) @ place)[:3].tolist()
             reach = math.inf if only else _FOOT_SHARE * leg.length
             found.append(
                 Foothold(

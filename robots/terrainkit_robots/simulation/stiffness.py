@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from terrainkit_robots.facts import Facts
-from terrainkit_robots.leg.stance import GRAVITY, stands_alone
-from terrainkit_robots.rule import CannotCheckError
-from terrainkit_robots.simulation.plant import TIME_STEP, Plant
-from terrainkit_robots.simulation.step_size import (
+from terrainkit_robots.analysis.cannot_check import CannotCheckError
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.legs.stance import GRAVITY, stands_alone
+from terrainkit_robots.simulation.sim_model import TIME_STEP, Plant
+from terrainkit_robots.simulation.time_step import (
     JointInertia,
     needed_inertia,
     stable_stiffness,

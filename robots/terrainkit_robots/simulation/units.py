@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from terrainkit_robots.simulation.plant import Plant
+    from terrainkit_robots.simulation.sim_model import Plant
 
 
 @dataclass(frozen=True, kw_only=True)

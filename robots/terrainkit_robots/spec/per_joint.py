@@ -12,7 +12,7 @@ from typing import Generic, TypeVar
 from terrainkit.errors import ConfigError
 from terrainkit_robots.spec.pattern import compiled, longest_of, ways
 from terrainkit_robots.spec.toml_text import key_text
-from terrainkit_robots.wording import closest, names, short
+from terrainkit_robots.text import closest, names, short
 
 T = TypeVar("T")
 

@@ -4,7 +4,7 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 
-from terrainkit_robots.wording import one_line
+from terrainkit_robots.text import one_line
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 

@@ -11,8 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from terrainkit import MapConfig, TerrainChoice, TerrainMap, generate
-from terrainkit.config_text import from_toml
+from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
 from terrainkit.errors import CapacityError, MapFileError
 from terrainkit.export.npz import read_mesh
 
@@ -112,7 +111,7 @@ def test_numpy_alone_reads_it_without_unpickling(path):
 
 
 def test_the_config_in_it_gives_the_same_bytes(arrays, path, tmp_path):
-    again = generate(from_toml(str(arrays["config"])))
+    again = generate(MapConfig.from_toml(str(arrays["config"])))
     assert again.save(tmp_path / "again.npz").read_bytes() == path.read_bytes()
 
 
@@ -143,7 +142,7 @@ def test_the_mesh_is_read_as_it_was_written(path, terrain_map):
 
 @pytest.fixture(scope="module")
 def small_map():
-    pit = TerrainChoice(terrain="pit", parameters={"side": 0.6})
+    pit = SubTerrain(terrain="pit", parameters={"side": 0.6})
     return generate(
         MapConfig(
             rows=2, cols=1, patch_size=(2.0, 1.0), border=0.1, spawn_radius=0.1, terrains=(pit,)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit import MapConfig, TerrainChoice, generate
+from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.terrains.gap import Gap
@@ -24,8 +24,8 @@ def test_a_gap_of_three_tenths_is_three_cells_wide(plot, rng):
 
 
 def test_the_ground_falls_exactly_where_the_gap_is():
-    choice = TerrainChoice(terrain="gap", parameters={"width": 0.3})
-    terrain_map = generate(MapConfig(rows=1, cols=1, border=0.0, terrains=(choice,)))
+    sub_terrain = SubTerrain(terrain="gap", parameters={"width": 0.3})
+    terrain_map = generate(MapConfig(rows=1, cols=1, border=0.0, terrains=(sub_terrain,)))
     x = np.array([2.199, 2.201, 2.35, 2.499, 2.501, 5.499, 5.501, 5.799, 5.801])
     assert terrain_map.height(np.column_stack([x, np.full(9, 4.0)])).tolist() == [
         0, -5, -5, -5, 0, 0, -5, -5, 0,

@@ -7,8 +7,8 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from terrainkit_robots.mesh.header import header_of
 from terrainkit_robots.mesh.reader import read_mesh
+from terrainkit_robots.mesh.sniff import header_of
 from terrainkit_robots.mesh.surface import MeshError, binary_stl
 
 BOX = trimesh.creation.box(

@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots import bundled
+from terrainkit_robots.description import bundled
 from terrainkit_robots.rl.careers import Careers
 from terrainkit_robots.rl.commands import draw_commands, turning_to
 from terrainkit_robots.rl.env import LeggedEnv

@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots import bundled
+from terrainkit_robots.description import bundled
 from terrainkit_robots.rl.commands import asks_headings, draw_commands, turning_to, widened
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane

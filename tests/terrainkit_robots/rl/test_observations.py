@@ -9,7 +9,7 @@ import pytest
 import torch
 from made_states import made_state, shapes
 
-from terrainkit_robots import bundled
+from terrainkit_robots.description import bundled
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane
 from terrainkit_robots.rl.observations import Observation, observe, policy_group, privileged_group

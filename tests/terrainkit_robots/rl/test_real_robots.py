@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from terrainkit_robots.onboard.bringing_in import Wishes, bring_in
+from terrainkit_robots.onboarding.pipeline import Wishes, bring_in
 from terrainkit_robots.policy.export import export_policy
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane

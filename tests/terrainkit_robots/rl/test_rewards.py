@@ -11,7 +11,7 @@ import pytest
 import torch
 from made_states import FLAGS, made_state, shapes
 
-from terrainkit_robots import bundled
+from terrainkit_robots.description import bundled
 from terrainkit_robots.rl import rewards as module
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane

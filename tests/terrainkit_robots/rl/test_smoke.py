@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots import bundled
+from terrainkit_robots.description import bundled
 from terrainkit_robots.policy import smoke_test as smoke_test
 from terrainkit_robots.policy.smoke_test import (
     Smoke,

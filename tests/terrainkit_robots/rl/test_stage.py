@@ -4,7 +4,7 @@ import sys
 
 import numpy as np
 
-from terrainkit_robots import graphics_library
+from terrainkit_robots import gl_backend
 from terrainkit_robots.rl import stage
 from terrainkit_robots.rl.mp4 import Mp4Error
 
@@ -44,7 +44,7 @@ def test_the_module_is_a_process_of_its_own(tmp_path):
         input=b"{",
         capture_output=True,
         cwd=tmp_path,
-        env=graphics_library.environment(""),
+        env=gl_backend.environment(""),
         timeout=60,
         check=False,
     )

@@ -10,7 +10,7 @@ import torch
 from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots import bundled
+from terrainkit_robots.description import bundled
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Ground, Plane
 from terrainkit_robots.rl.robot import Robot, read_robot

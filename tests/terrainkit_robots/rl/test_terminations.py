@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from terrainkit_robots import bundled
+from terrainkit_robots.description import bundled
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Plane
 from terrainkit_robots.rl.robot import read_robot

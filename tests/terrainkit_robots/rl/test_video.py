@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from terrainkit.errors import ConfigError, ExportError
-from terrainkit_robots import graphics_library
-from terrainkit_robots.onboard.pictures import PicturesError
+from terrainkit_robots import gl_backend
+from terrainkit_robots.onboarding.pictures import PicturesError
 from terrainkit_robots.rl import video
 from terrainkit_robots.rl.scene import build_scene
 from terrainkit_robots.rl.video import Film, Shot, check_video, film_frames
@@ -134,7 +134,7 @@ def test_a_graphics_library_that_is_not_there_is_an_error(film, tmp_path, monkey
     monkeypatch.setenv("TERRAINKIT_MUJOCO_GL", "osmesa")
     monkeypatch.setenv("PYOPENGL_PLATFORM", "osmesa")
     broken = {"PATH": "", "MUJOCO_GL": "crayons"}
-    monkeypatch.setattr(graphics_library, "environment", lambda _: broken)
+    monkeypatch.setattr(gl_backend, "environment", lambda _: broken)
     path = tmp_path / "film.mp4"
     with pytest.raises(PicturesError, match=r"MuJoCo cannot draw here \(osmesa: .*MUJOCO_GL says"):
         list(film_frames(film, path))

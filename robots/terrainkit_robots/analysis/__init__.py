@@ -1,0 +1,1 @@
+"""Compute facts about a robot from its description."""

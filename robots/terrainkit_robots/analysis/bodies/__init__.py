@@ -1,0 +1,1 @@
+"""Rigid bodies: kinematics, contact points, overlaps."""

@@ -1,0 +1,1 @@
+"""Validate, combine and repair inertias."""

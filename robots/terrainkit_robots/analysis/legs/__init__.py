@@ -1,0 +1,1 @@
+"""Detect legs and solve the standing pose."""

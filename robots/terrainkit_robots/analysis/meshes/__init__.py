@@ -1,0 +1,1 @@
+"""Where a robot uses its mesh files, and whether their scale fits."""

@@ -1,0 +1,1 @@
+"""How each simulator orders joints and merges links."""

@@ -1,0 +1,1 @@
+"""Left-right symmetry of a robot."""

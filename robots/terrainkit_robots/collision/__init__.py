@@ -1,1 +1,0 @@
-"""Collision: simpler shapes in the place of collision meshes."""

@@ -1,1 +1,0 @@
-"""Comparison: two descriptions of one robot, side by side."""

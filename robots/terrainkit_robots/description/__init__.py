@@ -1,0 +1,1 @@
+"""Read URDF, xacro and MJCF files into a RobotModel."""

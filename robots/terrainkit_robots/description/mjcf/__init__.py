@@ -1,0 +1,1 @@
+"""Read MJCF files with MuJoCo's parser."""

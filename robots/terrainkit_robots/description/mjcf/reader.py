@@ -1,0 +1,525 @@
+"""MJCF: from XML to a robot.
+
+MuJoCo's own parser says what the XML means (defaults, frames, degrees, replicas), this reader what
+of that a robot is. Nothing is compiled: that would open the meshes, and stop at the first defect.
+
+MuJoCo makes a body's mass from its shapes where there is no <inertial>. So does this reader; a mass
+that hangs on a mesh file is NaN here, since reading opens none.
+"""
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from terrainkit_robots.description.mjcf.actuators import Drive, actuators, force_limit, mimics
+from terrainkit_robots.description.mjcf.document import MjcfDocument, Node, read_document
+from terrainkit_robots.description.mjcf.imu import PlacedSite, find_imu
+from terrainkit_robots.description.mjcf.inertia import Solid, solid, sum_of_solids
+from terrainkit_robots.description.mjcf.parser import parse_mjcf, tell
+from terrainkit_robots.description.mjcf.references import dangling_references
+from terrainkit_robots.description.mjcf.shapes import (
+    SIZES,
+    Scale,
+    between,
+    color_of,
+    in_frames,
+    mesh_file,
+    mesh_geometry,
+    mesh_name,
+    placed,
+    scaled,
+    shape_of,
+    turn_of,
+)
+from terrainkit_robots.description.model import (
+    Actuator,
+    Geometry,
+    Inertial,
+    Joint,
+    Limit,
+    Link,
+    RobotModel,
+    Source,
+)
+from terrainkit_robots.description.xml.document import XmlDocument
+from terrainkit_robots.transforms import Matrix
+
+if TYPE_CHECKING:
+    import mujoco
+
+WORLD = "world"
+
+_PAIRED = 1 << 30
+"""Contype of a shape that only a <pair> lets collide: a bit that others have no use for."""
+
+
+def read_mjcf(document: XmlDocument, *, contents: Mapping[Path, bytes] | None = None) -> RobotModel:
+    """Return the robot of a document whose root is <mujoco>.
+
+    Args:
+        document: The document.
+        contents: What to read instead of the included files of these paths.
+    """
+    file = document.file
+    if document.root is None:
+        return RobotModel(
+            name="",
+            kind="mjcf",
+            file=file,
+            source=Source(file=file, line=0),
+            problems=document.problems,
+            sources=(file,),
+        )
+    tree = read_document(document, contents or {})
+    spec, lines = parse_mjcf(tree)
+    robot = RobotModel(
+        name=tree.root.written.get("model", "").strip(),
+        kind="mjcf",
+        file=file,
+        source=tree.root.source,
+        sources=tree.sources,
+    )
+    if spec is not None:
+        robot = _Reader(tree, spec, lines).filled(robot)
+    return replace(robot, problems=tuple(tree.problems))
+
+
+class _Reader:
+    """One walk through what MuJoCo has parsed; problems are added to those of the document."""
+
+    def __init__(
+        self, document: MjcfDocument, spec: "mujoco.MjSpec", lines: Sequence[Node]
+    ) -> None:
+        self._document = document
+        self._spec = spec
+        self._lines = lines
+        self._meshes = {mesh_name(mesh): mesh for mesh in spec.meshes}
+        self._materials = {material.name: material for material in spec.materials}
+        self._paired = {name for p in spec.pairs for name in (p.geomname1, p.geomname2)} - {""}
+        self._bodies = _Names(body.name for body in spec.bodies)
+        self._joints = _Names(joint.name for joint in spec.joints)
+        self._actuators = tuple(actuators(spec, self._node))
+        self._drives: dict[str, list[Drive]] = {}
+        for drive in self._actuators:
+            self._drives.setdefault(drive.joint, []).append(drive)
+        self._mimics = mimics(spec, self._node)
+        self._factors: dict[str, float] = {}
+        self._sites: list[PlacedSite] = []
+        self._told: set[str] = set()
+
+    def filled(self, robot: RobotModel) -> RobotModel:
+        """Return a robot with all that is in the model."""
+        links, joints = self._tree()
+        compiler = self._spec.compiler
+        bounds = float(compiler.boundmass), float(compiler.boundinertia)
+        links = [replace(each, inertial=_bounded(each, *bounds)) for each in links]
+        dangling_references(self._document, self._spec)
+        return replace(
+            robot,
+            links=_weighed(links, float(compiler.settotalmass)),
+            joints=joints,
+            actuators=self._driving(joints),
+            home=self._home(joints),
+            imu=self._imu(),
+            excluded=frozenset(
+                frozenset((each.bodyname1, each.bodyname2))
+                for each in self._spec.excludes
+                if each.bodyname1 != each.bodyname2
+            ),
+        )
+
+    def _node(self, element: Any, otherwise: Node | None = None) -> Node:
+        """Return the node that MuJoCo made an element of; it tells the line."""
+        match = re.fullmatch(r"line (\d+)", element.info)
+        line = int(match[1]) if match else 0
+        if 1 <= line <= len(self._lines):
+            return self._lines[line - 1]
+        return otherwise or self._document.root
+
+    def _tell(self, node: Node, message: str) -> None:
+        """Add what MuJoCo's compiler would refuse, each thing once."""
+        if message not in self._told:
+            self._told.add(message)
+            tell(self._document, node, "XML011", message)
+
+    def _driving(self, joints: Sequence[Joint]) -> tuple[Actuator, ...]:
+        most = {joint.name: joint.limit.effort for joint in joints if joint.limit is not None}
+        return tuple(
+            drive.actuator(self._factors.get(drive.joint, 1.0), most.get(drive.joint))
+            for drive in self._actuators
+        )
+
+    # Bodies
+
+    def _tree(self) -> tuple[list[Link], tuple[Joint, ...]]:
+        links: list[Link] = []
+        joints: list[Joint] = []
+        stack = [(body, WORLD, Scale(), 0) for body in reversed(self._spec.worldbody.bodies)]
+        while stack:
+            body, parent, outer, depth = stack.pop()
+            node = self._node(body)
+            name = body.name or self._bodies.unused(node.invented or "unnamed_body")
+            pose, scale = self._placed(body, node, outer)
+            between, moving = self._moved(body, node, name, parent, pose, scale)
+            links += [*between, self._link(body, node, name, scale)]
+            joints += moving
+            self._sites += [
+                PlacedSite(site=site, link=name, depth=depth, node=node, scale=scale)
+                for site in body.sites
+            ]
+            stack += [(child, name, scale, depth + 1) for child in reversed(body.bodies)]
+        return links, tuple(joints)
+
+    def _placed(self, element: Any, node: Node, outer: Scale) -> tuple[Matrix, Scale]:
+        try:
+            pose, scale = placed(element, outer, self._spec)
+        except ValueError as error:
+            self._tell(node, f"<{node.tag}> has no orientation: {error}; MuJoCo refuses the file")
+            pose, scale = np.eye(4), outer
+            pose[:3, 3] = np.asarray(element.pos) * outer.length
+        if not scale.even:
+            self._tell(node, "a <frame> scales its axes differently; here, all by their mean")
+        return pose, scale
+
+    def _link(self, body: Any, node: Node, name: str, scale: Scale) -> Link:
+        collisions: list[Geometry] = []
+        visuals: list[Geometry] = []
+        solids: list[Solid] = []
+        low, high = self._spec.compiler.inertiagrouprange
+        for geom in body.geoms:
+            geometry, weight = self._geometry(geom, self._node(geom, node), scale)
+            drawn = not (geom.contype or geom.conaffinity or geom.name in self._paired)
+            (visuals if drawn else collisions).append(geometry)
+            if weight is not None and low <= geom.group <= high:
+                solids.append(weight)
+        return Link(
+            name=name,
+            source=node.source,
+            inertial=self._inertial(body, node, solids, scale),
+            collisions=tuple(collisions),
+            visuals=tuple(visuals),
+        )
+
+    def _inertial(
+        self, body: Any, node: Node, solids: Sequence[Solid], scale: Scale
+    ) -> Inertial | None:
+        import mujoco
+
+        how = body.compiler.inertiafromgeom
+        derived = mujoco.mjtInertiaFromGeom
+        if how == derived.mjINERTIAFROMGEOM_TRUE:
+            return sum_of_solids(solids, node.source)
+        if not body.explicitinertial:
+            return (
+                None
+                if how == derived.mjINERTIAFROMGEOM_FALSE
+                else sum_of_solids(solids, node.source)
+            )
+        written = next((n for n in _inside(node) if n.tag == "inertial"), node)
+        origin = np.eye(4)
+        origin[:3, 3] = np.asarray(body.ipos) * scale.length
+        full = np.asarray(body.fullinertia)
+        inertia = None
+        if not math.isnan(full[0]):
+            xx, yy, zz, xy, xz, yz = full
+            inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        elif "diaginertia" in written.attributes:
+            inertia = np.diag(body.inertia)
+        if math.isnan(full[0]):  # else its axes are those of the body
+            origin[:3, :3] = self._turn(body, written)
+        known = "mass" in written.attributes and "mass" not in written.placeholders
+        return Inertial(
+            source=written.source,
+            mass=float(body.mass) * scale.mass if known else None,
+            origin=origin,
+            inertia=None if inertia is None else inertia * (scale.mass * scale.length**2),
+            attribute=_first(written, ("fullinertia", "diaginertia")),
+            axes_attribute=_first(written, ("quat", "axisangle", "xyaxes", "zaxis", "euler")),
+        )
+
+    def _turn(self, body: Any, node: Node) -> Matrix:
+        try:
+            return turn_of(body.iquat, body.ialt, body.compiler, self._spec)
+        except ValueError as error:
+            self._tell(node, f"<inertial> has no orientation: {error}; MuJoCo refuses the file")
+            return np.eye(3)
+
+    def _imu(self) -> tuple[str, Matrix] | None:
+        """Return the link of the IMU and its pose in the link's frame."""
+        found = find_imu(self._spec, self._sites)
+        if found is None:
+            return None
+        node = self._node(found.site, found.node)
+        ends = np.asarray(found.site.fromto)
+        if math.isnan(ends[0]):
+            return found.link, self._placed(found.site, node, found.scale)[0]
+        try:
+            pose, _ = between(ends)
+            return found.link, in_frames(pose, found.site.frame, found.scale, self._spec)[0]
+        except ValueError as error:
+            self._tell(node, f"<{node.tag}>: {error}; MuJoCo refuses the file")
+            return None
+
+    # Shapes
+
+    def _geometry(self, geom: Any, node: Node, outer: Scale) -> tuple[Geometry, Solid | None]:
+        """Return a geom, and the mass that it gives to its body."""
+        import mujoco
+
+        shape, size = shape_of(geom), np.asarray(geom.size, dtype=np.float64)
+        pose, scale = self._placed(geom, node, outer)
+        if not math.isnan(geom.fromto[0]) and shape in ("capsule", "cylinder", "ellipsoid", "box"):
+            try:
+                pose, half = between(np.asarray(geom.fromto))
+                pose, scale = in_frames(pose, geom.frame, outer, self._spec)
+                flat = shape in ("ellipsoid", "box")
+                size = np.array([size[0], size[0] if flat else half, half])
+            except ValueError as error:
+                self._tell(node, f"<{node.tag}>: {error}; MuJoCo refuses the file")
+        size = size[: SIZES.get(shape, 0)]
+        fitted = bool(geom.meshname) and shape in SIZES
+        shell = geom.typeinertia == mujoco.mjtGeomInertia.mjINERTIA_SHELL
+        massive = "plane" if geom.type == mujoco.mjtGeom.mjGEOM_HFIELD else shape
+        weight = solid(
+            "unknown" if fitted or shell else massive,
+            size.tolist(),
+            pose,
+            mass=float(geom.mass),
+            density=float(geom.density),
+        )
+        contype, conaffinity = self._bits(geom)
+        geometry = Geometry(
+            source=node.source,
+            shape="unknown" if shape == "mesh" or fitted else shape,
+            name=geom.name,
+            size=() if fitted else tuple(float(each) for each in size * scale.length),
+            origin=pose,
+            contype=contype,
+            conaffinity=conaffinity,
+            color=color_of(geom, self._materials),
+        )
+        if shape == "mesh" or fitted:
+            geometry = replace(self._meshed(geometry, geom, scale), fitted=fitted)
+        return geometry, None if weight is None else scaled(weight, scale)
+
+    def _bits(self, geom: Any) -> tuple[int, int]:
+        """Return contype and conaffinity."""
+        import mujoco
+
+        if self._spec.option.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT:
+            return 0, 0
+        if geom.name in self._paired and not (geom.contype or geom.conaffinity):
+            return _PAIRED, 0
+        return int(geom.contype), int(geom.conaffinity)
+
+    def _meshed(self, geometry: Geometry, geom: Any, scale: Scale) -> Geometry:
+        mesh = self._meshes.get(geom.meshname)
+        if mesh is None:
+            return geometry
+        file = mesh_file(mesh, self._node(mesh), bool(self._spec.strippath))
+        return geometry if file is None else mesh_geometry(geometry, mesh, file, scale)
+
+    # Joints
+
+    def _moved(
+        self, body: Any, node: Node, name: str, parent: str, pose: Matrix, scale: Scale
+    ) -> tuple[list[Link], list[Joint]]:
+        """Return the joints above a body, and the links between them if there are several."""
+        moving = list(body.joints)
+        if not moving:
+            fixed = Joint(
+                name=self._joints.unused(f"{name}_fixed"),
+                source=node.source,
+                kind="fixed",
+                parent=parent,
+                child=name,
+                origin=pose,
+            )
+            return [], [fixed]
+        links: list[Link] = []
+        joints: list[Joint] = []
+        for k, joint in enumerate(moving, 1):
+            written = self._node(joint, node)
+            own = joint.name or self._joints.unused(f"{name}_joint")
+            child = name if k == len(moving) else self._bodies.unused(f"{name}:{own}")
+            if child != name:
+                links.append(Link(name=child, source=written.source, virtual=True))
+            joints.append(
+                replace(
+                    self._joint(joint, written, own, scale),
+                    parent=parent,
+                    child=child,
+                    origin=pose if k == 1 else np.eye(4),
+                )
+            )
+            parent = child
+        return links, joints
+
+    def _joint(self, joint: Any, node: Node, name: str, outer: Scale) -> Joint:
+        """Return a joint, which is not hung up yet."""
+        import mujoco
+
+        kinds = mujoco.mjtJoint
+        at = np.eye(4)
+        at[:3, 3] = joint.pos
+        try:
+            at, scale = in_frames(at, joint.frame, outer, self._spec)
+        except ValueError as error:
+            self._tell(node, f"a <frame> has no orientation: {error}; MuJoCo refuses the file")
+            scale = outer
+        bare = Joint(name=name, source=node.source, kind="ball", parent="", child="")
+        if joint.type == kinds.mjJNT_FREE:
+            return replace(bare, kind="floating")
+        if joint.type == kinds.mjJNT_BALL:
+            return replace(bare, anchor=at[:3, 3])
+        slides = joint.type == kinds.mjJNT_SLIDE
+        unit = scale.length if slides else math.pi / 180 if joint.compiler.degree else 1.0
+        force, rotor = (scale.force, scale.rotor) if slides else (scale.torque, scale.torque)
+        self._factors[joint.name] = force
+        drives = self._drives.get(joint.name, []) if joint.name else []
+        limits = self._range(joint, node)
+        return replace(
+            bare,
+            kind="prismatic" if slides else "continuous" if limits is None else "revolute",
+            axis=at[:3, :3] @ np.asarray(joint.axis),
+            anchor=at[:3, 3],
+            reference=float(joint.ref) * unit,
+            limit=_limit(node.source, limits, unit, force_limit(joint, drives, force)),
+            mimic=self._mimics.get(joint.name),
+            damping=float(np.ravel(joint.damping)[0]) * rotor,
+            friction=float(joint.frictionloss) * force,
+            armature=(float(joint.armature) + sum(drive.armature for drive in drives)) * rotor,
+        )
+
+    def _range(self, joint: Any, node: Node) -> tuple[float, float] | None:
+        """Return the limits as written; MuJoCo has none where the lower is not below the upper."""
+        import mujoco
+
+        low, high = map(float, joint.range)
+        limited = mujoco.mjtLimited
+        if joint.limited == limited.mjLIMITED_FALSE:
+            return None
+        written = low != 0 or high != 0 or "range" in node.attributes
+        if joint.limited == limited.mjLIMITED_AUTO and written and not joint.compiler.autolimits:
+            self._tell(
+                node,
+                f"joint {node.owner} has a range but not limited, and autolimits is off; "
+                "MuJoCo refuses the file",
+            )
+        return (low, high) if written or joint.limited == limited.mjLIMITED_TRUE else None
+
+    def _home(self, joints: Sequence[Joint]) -> dict[str, float]:
+        """Return the positions of the first keyframe that has some."""
+        sizes = {"floating": 7, "ball": 4, "fixed": 0}
+        wanted = sum(sizes.get(joint.kind, 1) for joint in joints)
+        for key in self._spec.keys:
+            positions = [float(each) for each in key.qpos]
+            if not positions:
+                continue
+            if len(positions) != wanted:
+                if self._document.whole:
+                    self._tell(
+                        self._node(key),
+                        f"qpos of <key> has {len(positions)} numbers, the joints have {wanted}; "
+                        "MuJoCo refuses the file",
+                    )
+                return {}
+            return dict(_dealt(joints, sizes, positions))
+        return {}
+
+
+def _dealt(
+    joints: Sequence[Joint], sizes: Mapping[str, int], positions: Sequence[float]
+) -> Iterator[tuple[str, float]]:
+    """Yield the position of each joint that has one."""
+    at = 0
+    for joint in joints:
+        if joint.moves and math.isfinite(positions[at]):
+            yield joint.name, positions[at]
+        at += sizes.get(joint.kind, 1)
+
+
+def _inside(node: Node) -> Iterator[Node]:
+    """Yield the elements of a body, those in frames included."""
+    for child in node.children:
+        yield child
+        if child.tag in ("frame", "replicate"):
+            yield from _inside(child)
+
+
+def _limit(
+    source: Source, limits: tuple[float, float] | None, unit: float, effort: float | None
+) -> Limit | None:
+    if limits is None:
+        return None if effort is None else Limit(source=source, effort=effort)
+    lower, upper = limits
+    return Limit(source=source, lower=lower * unit, upper=upper * unit, effort=effort)
+
+
+def _first(node: Node, attributes: Sequence[str]) -> str:
+    """Return the first of some attributes that an element has; nothing if it has none of them."""
+    return next((name for name in attributes if name in node.attributes), "")
+
+
+class _Names:
+    """Names that are taken."""
+
+    def __init__(self, taken: Iterable[str]) -> None:
+        self._taken = set(taken)
+        self._counts: dict[str, int] = {}
+
+    def unused(self, name: str) -> str:
+        """Return a name that is not taken, and take it."""
+        free = name
+        while free in self._taken:
+            self._counts[name] = self._counts.get(name, 1) + 1
+            free = f"{name}_{self._counts[name]}"
+        self._taken.add(free)
+        return free
+
+
+def _bounded(link: Link, least: float, least_moment: float) -> Inertial | None:
+    """Return the inertial of a link with the least mass [kg] and moments [kg m2] of the file.
+
+    What is negative stays so.
+    """
+    inertial = link.inertial
+    if link.virtual or max(least, least_moment) <= 0:
+        return inertial
+    if inertial is None:
+        return Inertial(source=link.source, mass=least, inertia=np.eye(3) * least_moment)
+    mass, inertia = inertial.mass, inertial.inertia
+    if mass is not None and 0 <= mass < least:
+        mass = least
+    if inertia is not None and np.isfinite(inertia).all():
+        moments, axes = np.linalg.eigh(inertia)
+        small = (moments >= 0) & (moments < least_moment)
+        inertia = axes @ np.diag(np.where(small, least_moment, moments)) @ axes.T
+    return replace(inertial, mass=mass, inertia=inertia)
+
+
+def _weighed(links: Sequence[Link], total: float) -> tuple[Link, ...]:
+    """Return links whose masses are scaled to a sum of `total` [kg], if the file asks for that."""
+    masses = [link.inertial.mass for link in links if link.inertial is not None]
+    known = sum(mass for mass in masses if mass is not None)
+    if not (total > 0 and known > 0 and math.isfinite(known)) or None in masses:
+        return tuple(links)
+    factor = total / known
+    return tuple(
+        link
+        if link.inertial is None or link.inertial.mass is None
+        else replace(
+            link,
+            inertial=replace(
+                link.inertial,
+                mass=link.inertial.mass * factor,
+                inertia=None if link.inertial.inertia is None else link.inertial.inertia * factor,
+            ),
+        )
+        for link in links
+    )

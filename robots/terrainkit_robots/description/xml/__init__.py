@@ -1,0 +1,1 @@
+"""Read XML documents with line numbers."""

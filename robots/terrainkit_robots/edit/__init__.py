@@ -1,1 +1,0 @@
-"""Edits: fixes, made in the text without touching the rest of it."""

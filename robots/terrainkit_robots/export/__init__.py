@@ -1,0 +1,1 @@
+"""Write robots as URDF, MJCF and mesh files."""

@@ -1,0 +1,1 @@
+"""Replace collision meshes by convex or primitive shapes."""

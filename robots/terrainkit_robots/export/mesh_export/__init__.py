@@ -1,0 +1,1 @@
+"""Copy and convert the mesh files of a robot."""

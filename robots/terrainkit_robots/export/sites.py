@@ -1,0 +1,94 @@
+"""Sites: where a robot's feet touch the ground, and where its IMU is."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from terrainkit_robots.analysis.bodies.bodies import Body, Placed
+from terrainkit_robots.analysis.bodies.contact import SOLE
+from terrainkit_robots.analysis.bodies.kinematics import body_poses
+from terrainkit_robots.analysis.bodies.shapes import bounds, has_extent, lowest
+from terrainkit_robots.export.mjcf import Site
+from terrainkit_robots.transforms import Matrix, invert_poses
+
+if TYPE_CHECKING:
+    from terrainkit_robots.analysis.facts import Facts
+    from terrainkit_robots.analysis.legs.legs import Leg
+
+_AROUND = 0.002
+"""A foot's site is larger than its shapes by this on each side, so that contacts lie within [m]."""
+
+
+def foot_sites(facts: "Facts", feet: Sequence[str] = ()) -> tuple[Site, ...]:
+    """Return a site for each leg, around the shapes that touch the ground at the standing pose.
+
+    Args:
+        facts: The robot.
+        feet: What its feet are to be called, links that move with them; else as they were found.
+    """
+    poses = body_poses(facts.bodies, facts.positions)
+    called = {facts.body_of[name].index: name for name in feet}
+    return tuple(
+        _foot_site(leg, called.get(leg.limb.chain[-1], leg.foot), facts, poses)
+        for leg in facts.legs
+    )
+
+
+def _foot_site(leg: "Leg", foot: str, facts: "Facts", poses: Sequence[Matrix]) -> Site:
+    body = facts.bodies[leg.limb.chain[-1]]
+    local = _pose_in_body(body, foot)
+    box = bounds(_touching(body, poses[body.index], facts), facts.meshes)
+    if box is None:
+        return Site(name=foot, body=foot, pose=np.eye(4))
+    place = np.eye(4)
+    place[:3, 3] = box.mean(axis=0)
+    half = np.ptp(box, axis=0) / 2 + _AROUND
+    pose = invert_poses(local) @ place
+    return Site(name=foot, body=foot, pose=pose, half_size=tuple(half.tolist()))
+
+
+def _touching(body: Body, pose: Matrix, facts: "Facts") -> list[Placed]:
+    """Return the shapes of a body that reach as far down as any of them."""
+    shapes = [s for s in body.collisions if has_extent(s.geometry, facts.meshes)]
+    depths = [lowest(shape, pose, facts.meshes) for shape in shapes]
+    return [s for s, depth in zip(shapes, depths, strict=True) if depth <= min(depths) + SOLE]
+
+
+def imu_site(facts: "Facts") -> Site:
+    """Return the site of the IMU: where the file has it, else at the base's link of that name.
+
+    Where nothing tells, it is at the base's origin, and `imu_notes` says so.
+    """
+    body, pose = _imu(facts) or (_base(facts), np.eye(4))
+    return Site(name="imu", body=body.top.name, pose=pose)
+
+
+def imu_notes(facts: "Facts") -> tuple[str, ...]:
+    """Return what to say of an IMU that nobody placed, on a robot that needs one."""
+    if _imu(facts) is not None or facts.model.floating is False:
+        return ()
+    base = _base(facts).top.name
+    return (f"the IMU is at the origin of {base}: no sensor, site or link says where it is",)
+
+
+def _imu(facts: "Facts") -> tuple[Body, Matrix] | None:
+    """Return the body of the IMU and the pose in its frame; None if nothing tells."""
+    told = facts.model.imu
+    if told is not None and told[0] in facts.body_of:
+        body = facts.body_of[told[0]]
+        return body, _pose_in_body(body, told[0]) @ told[1]
+    base = _base(facts)
+    for link, pose in zip(base.links, base.poses, strict=True):
+        if "imu" in link.name.lower():
+            return base, pose
+    return None
+
+
+def _base(facts: "Facts") -> Body:
+    return next((body for body in facts.bodies if not body.virtual), facts.bodies[0])
+
+
+def _pose_in_body(body: Body, link: str) -> Matrix:
+    names = [each.name for each in body.links]
+    return body.poses[names.index(link)]

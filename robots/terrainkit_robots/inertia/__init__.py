@@ -1,1 +1,0 @@
-"""Inertias: which ones a body can have, and what to write instead of the others."""

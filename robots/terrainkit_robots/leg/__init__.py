@@ -1,1 +1,0 @@
-"""Legs: which limbs they are, how the robot stands on them, and what that takes."""

@@ -1,0 +1,1 @@
+"""Check robots against rules."""

@@ -1,0 +1,1 @@
+"""Compare two descriptions of one robot."""

@@ -1,0 +1,121 @@
+"""SARIF 2.1.0: one document for all robots, which code hosts and editors read."""
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote_from_bytes
+
+from terrainkit_robots.lint.report.facts_json import facts_json
+from terrainkit_robots.lint.report.json_report import sound
+from terrainkit_robots.lint.rule import FAMILIES, Rule, Severity, rules
+from terrainkit_robots.lint.runner import Finding, Report, Skipped
+from terrainkit_robots.lint.selection import Suppressed, UnusedSuppression
+
+SCHEMA = (
+    "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+)
+
+_LEVELS: dict[Severity, str] = {"error": "error", "warning": "warning", "info": "note"}
+
+
+def write(reports: Sequence[Report]) -> str:
+    """Return one document with the findings of all robots, those that comments quiet included."""
+    document = {"$schema": SCHEMA, "version": "2.1.0", "runs": [_run(reports)]}
+    return json.dumps(sound(document), indent=2, allow_nan=False) + "\n"
+
+
+def _run(reports: Sequence[Report]) -> dict[str, Any]:
+    from terrainkit import __version__
+
+    index = {rule.code: place for place, rule in enumerate(rules())}
+    results: list[dict[str, Any]] = []
+    notifications: list[dict[str, Any]] = []
+    for report in reports:
+        results += [_result(finding, index) for finding in report.findings]
+        for skipped in report.skipped:
+            if isinstance(skipped, Suppressed):
+                results.append(_suppressed(skipped, index))
+            else:
+                notifications.append(_notification(skipped, report.facts.model.file))
+    driver = {"name": "terrainkit", "version": __version__, "rules": [_rule(r) for r in rules()]}
+    invocation = {"executionSuccessful": True, "toolExecutionNotifications": notifications}
+    return {
+        "tool": {"driver": driver},
+        "invocations": [invocation],
+        "results": results,
+        "properties": {
+            "facts": {
+                str(r.facts.model.file): facts_json(r.facts, simulated=r.simulated) for r in reports
+            }
+        },
+    }
+
+
+def _rule(rule: Rule) -> dict[str, Any]:
+    paragraphs = (rule.why, f"To fix it: {rule.how_to_fix}", f"Source: {rule.reference}")
+    return {
+        "id": rule.code,
+        "name": rule.name,
+        "shortDescription": {"text": rule.title},
+        "fullDescription": {"text": rule.why},
+        "help": {"text": "\n\n".join(paragraphs)},
+        "defaultConfiguration": {"level": _LEVELS[rule.severity]},
+        "properties": {"tags": ["robot", FAMILIES[rule.family]], "fixes": rule.fixes},
+    }
+
+
+def _result(finding: Finding, index: dict[str, int]) -> dict[str, Any]:
+    return {
+        "ruleId": finding.code,
+        "ruleIndex": index[finding.code],
+        "level": _LEVELS[finding.severity],
+        "message": _message(f"{finding.message}\n{finding.hint}".strip()),
+        "locations": [_location(finding.file, finding.line, finding.subject)],
+        "properties": dict(_properties(finding)),
+    }
+
+
+def _properties(finding: Finding) -> Iterator[tuple[str, Any]]:
+    yield "certainty", finding.certainty
+    yield "measured", dict(finding.measured)
+    if finding.fix is not None:
+        # Not as SARIF's own `fix`: that is bytes of a file, which a report does not read.
+        yield "fix", {"safety": finding.fix.safety, "description": finding.fix.description}
+
+
+def _suppressed(ignored: Suppressed, index: dict[str, int]) -> dict[str, Any]:
+    suppression = {"kind": "inSource", "justification": ignored.comment.reason}
+    return {**_result(ignored.finding, index), "suppressions": [suppression]}
+
+
+def _notification(skipped: Skipped, file: Path) -> dict[str, Any]:
+    idle = isinstance(skipped, UnusedSuppression)
+    notification: dict[str, Any] = {
+        "level": "warning" if idle else "note",
+        "message": _message(f"{skipped.code}: {skipped.reason}"),
+        "locations": [_location(file)],
+    }
+    if not idle:  # a comment may name a rule that there is not
+        notification["associatedRule"] = {"id": skipped.code}
+    return notification
+
+
+def _location(file: Path, line: int = 0, subject: str = "") -> dict[str, Any]:
+    physical: dict[str, Any] = {"artifactLocation": {"uri": uri(file)}}
+    if line:
+        physical["region"] = {"startLine": line}
+    location: dict[str, Any] = {"physicalLocation": physical}
+    if subject:
+        location["logicalLocations"] = [{"name": subject, "kind": "element"}]
+    return location
+
+
+def uri(file: Path) -> str:
+    """Return a file as a URI: relative to where the reader is, unless it is absolute."""
+    return file.as_uri() if file.is_absolute() else quote_from_bytes(bytes(file), safe="/")
+
+
+def _message(text: str) -> dict[str, str]:
+    # Single braces would be places for arguments.
+    return {"text": text.replace("{", "{{").replace("}", "}}")}

@@ -1,1 +1,0 @@
-"""MJCF: read by MuJoCo's own parser, with files and lines from ours."""

@@ -1,0 +1,1 @@
+"""Turn a robot file into a folder that is ready for training."""

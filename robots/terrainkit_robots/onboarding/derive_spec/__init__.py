@@ -1,0 +1,1 @@
+"""Derive a RobotSpec from the facts of a robot."""

@@ -1,1 +1,0 @@
-"""Simulators: what each makes of a robot's joints and links."""

@@ -1,1 +1,0 @@
-"""Left and right: the mirror, and what differs between its two sides."""

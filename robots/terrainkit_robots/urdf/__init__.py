@@ -1,1 +1,0 @@
-"""URDF: its words, and its reader."""

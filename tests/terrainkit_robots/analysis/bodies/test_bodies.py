@@ -1,0 +1,290 @@
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lxml import etree
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description import bundled
+from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.description.urdf.reader import rotation_of
+
+FILE = Path("/robots/robot.urdf")
+
+
+def bodies(inner):
+    text = f'<robot name="r">{inner}</robot>'
+    return Facts(load_robot(FILE, contents={FILE: text.encode()})).bodies
+
+
+def link(name, mass=None, xyz="0 0 0", inertia="1 1 1 0 0 0", rpy="0 0 0", shape=""):
+    if mass is None:
+        return f'<link name="{name}">{shape}</link>'
+    names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    six = " ".join(f'{n}="{v}"' for n, v in zip(names, inertia.split(), strict=True))
+    return (
+        f'<link name="{name}"><inertial><origin xyz="{xyz}" rpy="{rpy}"/>'
+        f'<mass value="{mass}"/><inertia {six}/></inertial>{shape}</link>'
+    )
+
+
+def joint(parent, child, kind="fixed", xyz="0 0 0", rpy="0 0 0"):
+    return (
+        f'<joint name="{parent}_{child}" type="{kind}"><origin xyz="{xyz}" rpy="{rpy}"/>'
+        f'<parent link="{parent}"/><child link="{child}"/></joint>'
+    )
+
+
+def names(merged):
+    return [[each.name for each in body.links] for body in merged]
+
+
+# Which links move as one
+
+
+def test_a_robot_without_links_has_no_bodies():
+    assert bodies("") == ()
+
+
+def test_fixed_joints_hold_links_together():
+    merged = bodies(
+        "".join(map(link, "abcde"))
+        + joint("a", "b")
+        + joint("b", "c", "revolute", xyz="0 0 1")
+        + joint("c", "d")
+        + joint("a", "e")
+    )
+    assert names(merged) == [["a", "b", "e"], ["c", "d"]]
+    trunk, arm = merged
+    assert (trunk.index, trunk.parent, trunk.joint) == (0, None, None)
+    assert (arm.index, arm.parent, arm.joint.name) == (1, 0, "b_c")
+    assert trunk.top.name == "a"
+
+
+def test_frames_of_links_and_of_the_joint_add_up_along_fixed_joints():
+    # b is 1 m ahead of a and turned to the left, so that c's 2 m ahead of b are to the left of a.
+    quarter = f"0 0 {np.pi / 2}"
+    merged = bodies(
+        "".join(map(link, "abcd"))
+        + joint("a", "b", xyz="1 0 0", rpy=quarter)
+        + joint("b", "c", "continuous", xyz="2 0 0")
+        + joint("c", "d", xyz="0 0 3", rpy=quarter)
+    )
+    np.testing.assert_allclose(merged[0].poses[0], np.eye(4))
+    np.testing.assert_allclose(merged[0].poses[1][:3, 3], [1, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(merged[1].mount[:3, 3], [1, 2, 0], atol=1e-15)
+    np.testing.assert_allclose(merged[1].mount[:3, :3], rotation_of(np.array([0, 0, np.pi / 2])))
+    np.testing.assert_allclose(merged[1].poses[1][:3, 3], [0, 0, 3])
+
+
+@pytest.mark.parametrize("kind", ["revolute", "continuous", "prismatic"])
+def test_joints_of_one_degree_of_freedom_part_bodies(kind):
+    merged = bodies(link("a") + link("b") + joint("a", "b", kind))
+    assert names(merged) == [["a"], ["b"]]
+    assert merged[1].joint.moves
+
+
+@pytest.mark.parametrize("kind", ["floating", "planar"])
+def test_what_nothing_drives_parts_bodies_too(kind):
+    merged = bodies(link("a", 1) + link("b", 1) + joint("a", "b", kind))
+    assert names(merged) == [["a"], ["b"]]
+    assert not merged[1].joint.moves
+
+
+def test_a_joint_of_a_kind_that_is_not_known_holds():
+    assert names(bodies(link("a") + link("b") + joint("a", "b", "hinge"))) == [["a", "b"]]
+
+
+def test_a_world_above_a_floating_joint_is_not_the_trunk():
+    merged = bodies(
+        link("world")
+        + link("a", 1)
+        + link("b", 1)
+        + joint("world", "a", "floating")
+        + joint("a", "b", "revolute")
+    )
+    assert names(merged) == [["a"], ["b"]]
+    assert merged[0].joint is None
+
+
+def test_what_stands_beside_the_trunk_in_a_world_is_not_of_the_robot():
+    merged = bodies(
+        link("world")
+        + link("a", 1)
+        + link("b", 1)
+        + joint("world", "a", "fixed")
+        + joint("world", "b", "floating")
+    )
+    assert names(merged)[0] == ["world", "a"]
+
+
+def test_the_heaviest_link_gives_the_name():
+    merged = bodies(link("a") + link("b", 0.1) + link("c", 2) + joint("a", "b") + joint("b", "c"))
+    assert (merged[0].name, merged[0].top.name) == ("c", "a")
+    assert bodies(link("a") + link("b") + joint("a", "b"))[0].name == "a"
+
+
+def test_shapes_are_in_the_frame_of_the_body():
+    shape = (
+        '<collision><origin xyz="0 0 1"/><geometry><sphere radius="1"/></geometry></collision>'
+        '<visual><geometry><sphere radius="2"/></geometry></visual>'
+    )
+    merged = bodies(
+        link("a") + link("b", shape=shape) + joint("a", "b", xyz="1 0 0", rpy=f"{np.pi} 0 0")
+    )
+    (collision,), (visual,) = merged[0].collisions, merged[0].visuals
+    assert (collision.link, collision.geometry.size) == ("b", (1,))
+    np.testing.assert_allclose(collision.pose[:3, 3], [1, 0, -1], atol=1e-12)
+    np.testing.assert_allclose(visual.pose[:3, 3], [1, 0, 0], atol=1e-12)
+
+
+# Mass, by hand
+
+
+def test_two_points_on_a_rod_by_hand():
+    # 1 kg at x = 0 and 3 kg at x = 2: the centre is at 1.5, and 1 * 1.5^2 + 3 * 0.5^2 = 3.
+    none = "0 0 0 0 0 0"
+    (body,) = bodies(
+        link("a", 1, inertia=none) + link("b", 3, inertia=none) + joint("a", "b", xyz="2 0 0")
+    )
+    assert body.mass == 4
+    assert body.center.tolist() == [1.5, 0, 0]
+    np.testing.assert_allclose(body.inertia, np.diag([0, 3, 3]))
+    np.testing.assert_allclose(body.principal, [0, 3, 3])
+
+
+def test_an_inertia_turns_with_its_frame():
+    (body,) = bodies(link("a", 1, inertia="1 2 3 0 0 0", rpy=f"0 0 {np.pi / 2}"))
+    np.testing.assert_allclose(body.inertia, np.diag([2, 1, 3]), atol=1e-12)
+
+
+def test_an_inertia_turns_with_its_link():
+    (body,) = bodies(
+        link("a") + link("b", 1, inertia="1 2 3 0 0 0") + joint("a", "b", rpy=f"{np.pi / 2} 0 0")
+    )
+    np.testing.assert_allclose(body.inertia, np.diag([1, 3, 2]), atol=1e-12)
+
+
+def test_a_placeholder_changes_nothing():
+    (alone,) = bodies(link("a", 2, xyz="1 2 3", inertia="1 2 3 .1 .2 .3"))
+    (held, moved) = bodies(
+        link("a", 2, xyz="1 2 3", inertia="1 2 3 .1 .2 .3")
+        + link("b")
+        + link("c")
+        + joint("a", "b", xyz="5 5 5")
+        + joint("a", "c", "revolute")
+    )
+    assert held.mass == alone.mass
+    np.testing.assert_array_equal(held.center, alone.center)
+    np.testing.assert_array_equal(held.inertia, alone.inertia)
+    assert moved.mass == 0
+    assert moved.center.tolist() == [0, 0, 0]
+    assert moved.inertia.tolist() == np.zeros((3, 3)).tolist()
+
+
+@pytest.mark.parametrize("mass", ["-1", "0", "1e20", "1e29", "nan", "inf", "x"])
+def test_masses_that_make_no_sense_raise_nothing(mass):
+    (body,) = bodies(link("a", mass, inertia="1e29 0 -1 1e29 0 0") + link("b", 1) + joint("a", "b"))
+    assert np.isfinite([body.mass, *body.center, *body.inertia.ravel(), *body.principal]).all()
+
+
+def test_a_mass_of_minus_one_weighs_minus_one():
+    (body,) = bodies(link("a", -1) + link("b", 3) + joint("a", "b"))
+    assert body.mass == 2
+
+
+# Mass, against six by six spatial inertias
+
+NUMBERS = st.floats(-2, 2)
+PLACES = st.tuples(*[NUMBERS] * 3)
+PARTS = st.tuples(st.floats(0.1, 10), PLACES, PLACES, PLACES, PLACES, PLACES)
+
+
+def words(values):
+    return " ".join(repr(float(value)) for value in values)
+
+
+def cross(v):
+    return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(PARTS, min_size=2, max_size=4))
+def test_merged_bodies_are_sums_of_spatial_inertias(parts):
+    inner, total = link("root"), np.zeros((6, 6))
+    for k, (mass, xyz, rpy, moments, place, turn) in enumerate(parts):
+        principal = 0.1 + np.abs(moments)
+        inner += link(k, mass, words(xyz), words([*principal, 0, 0, 0]), words(rpy))
+        inner += joint("root", k, xyz=words(place), rpy=words(turn))
+        spin = rotation_of(np.array(turn)) @ rotation_of(np.array(rpy))
+        c = cross(rotation_of(np.array(turn)) @ xyz + np.array(place))
+        about = spin @ np.diag(principal) @ spin.T - mass * c @ c
+        total += np.block([[about, mass * c], [-mass * c, mass * np.eye(3)]])
+    (body,) = bodies(inner)
+    assert body.mass == pytest.approx(total[3, 3], rel=1e-12)
+    c = cross(body.center)
+    np.testing.assert_allclose(body.mass * c, total[:3, 3:], atol=1e-10)
+    np.testing.assert_allclose(body.inertia - body.mass * c @ c, total[:3, :3], atol=1e-9)
+
+
+# Mass, against MuJoCo
+
+
+def compiled(path):
+    """Return a URDF as MuJoCo compiles it: afloat, without shapes, and with fixed links merged."""
+    root = etree.parse(str(path)).getroot()
+    for shape in list(root.iter("visual", "collision")):
+        shape.getparent().remove(shape)
+    children = {child.get("link") for child in root.iter("child")}
+    trunk = next(e.get("name") for e in root.findall("link") if e.get("name") not in children)
+    for old in root.findall("mujoco"):
+        root.remove(old)
+    root.append(
+        etree.fromstring(
+            '<mujoco><compiler fusestatic="true" balanceinertia="false" inertiafromgeom="false"/>'
+            "</mujoco>"
+        )
+    )
+    if trunk != "world":
+        root.append(etree.fromstring('<link name="world"/>'))
+        root.append(
+            etree.fromstring(
+                '<joint name="floating_by_test" type="floating"><parent link="world"/>'
+                f'<child link="{trunk}"/></joint>'
+            )
+        )
+    return mujoco.MjModel.from_xml_string(etree.tostring(root).decode())
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "a1/urdf/a1.urdf",
+        "go2/urdf/go2.urdf",
+        "h1/urdf/h1.urdf",
+        "g1/g1_29dof.urdf",
+        *bundled.names(),
+    ],
+)
+def test_merged_bodies_are_as_mujoco_merges_them(name, robot_file):
+    path = bundled.find(name) if name in bundled.names() else robot_file(name)
+    model = compiled(path)
+    merged = Facts(load_robot(path)).bodies
+    assert len(merged) == model.nbody - 1
+    for body in merged:
+        theirs = model.body(body.top.name)
+        turn = np.zeros(9)
+        mujoco.mju_quat2Mat(turn, theirs.iquat)
+        turn = turn.reshape(3, 3)
+        inertia = turn @ np.diag(theirs.inertia) @ turn.T
+        assert body.mass == pytest.approx(float(theirs.mass[0]), rel=1e-9)
+        np.testing.assert_allclose(body.center, theirs.ipos, rtol=1e-9, atol=1e-12)
+        # MuJoCo 3 stops turning to the principal axes a little early.
+        near = 1e-9 if int(mujoco.__version__.split(".")[0]) >= 4 else 1e-5
+        np.testing.assert_allclose(
+            body.inertia, inertia, rtol=near, atol=near * theirs.inertia.max()
+        )
+        np.testing.assert_allclose(body.principal, np.sort(theirs.inertia), rtol=near)

@@ -1,0 +1,251 @@
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.bodies.contact import SOLE, convex_hull, level_turn, margin, sole
+from terrainkit_robots.description.model import Geometry, Link, Source
+from terrainkit_robots.description.urdf.reader import rotation_of
+from terrainkit_robots.mesh.mesh_cache import Meshes
+
+SOURCE = Source(file=Path("robot.urdf"), line=1)
+SIDEWAYS = np.array([0.0, 1.0, 0.0])
+
+
+def pose(xyz=(0, 0, 0), rpy=(0, 0, 0)):
+    made = np.eye(4)
+    made[:3, :3], made[:3, 3] = rotation_of(np.array(rpy)), xyz
+    return made
+
+
+def foot(*shapes, frames=()):
+    """Return a body of one link with shapes (kind, size, pose), and empty links at `frames`."""
+    geometries = tuple(
+        Geometry(source=SOURCE, shape=kind, size=size, origin=origin)
+        for kind, size, origin in shapes
+    )
+    links = [Link(name="foot", source=SOURCE, collisions=geometries)]
+    links += [Link(name=f"frame{k}", source=SOURCE) for k in range(len(frames))]
+    return Body(
+        index=0,
+        parent=None,
+        joint=None,
+        mount=np.eye(4),
+        links=tuple(links),
+        poses=(np.eye(4), *frames),
+    )
+
+
+def contact(body, at=None):
+    return sole(body, pose() if at is None else at, Meshes())
+
+
+# The sole
+
+
+def test_of_a_ball_one_point_touches():
+    found = contact(foot(("sphere", (0.02,), pose((0, 0, -0.1)))), pose((1, 2, 3)))
+    np.testing.assert_allclose(found, [[1, 2, 2.88]])
+
+
+def test_of_a_box_four_corners_touch():
+    found = contact(foot(("box", (0.1, 0.05, 0.02), pose((0.03, 0, -0.1)))))
+    wanted = [[x, y, -0.12] for x in (-0.07, 0.13) for y in (-0.05, 0.05)]
+    np.testing.assert_allclose(sorted(found.tolist()), wanted)
+
+
+def test_of_a_tilted_box_one_edge_touches():
+    found = contact(foot(("box", (0.1, 0.05, 0.02), pose())), pose(rpy=(0, 0.3, 0)))
+    # Toes down: the lower front edge, at x = 0.1 and z = -0.02 before the turn.
+    x = 0.1 * math.cos(0.3) - 0.02 * math.sin(0.3)
+    z = -0.1 * math.sin(0.3) - 0.02 * math.cos(0.3)
+    np.testing.assert_allclose(sorted(found.tolist()), [[x, -0.05, z], [x, 0.05, z]], atol=1e-12)
+
+
+def test_of_a_box_that_is_hardly_tilted_all_four_touch():
+    tilt = 0.9 * SOLE / 0.2
+    assert len(contact(foot(("box", (0.1, 0.05, 0.02), pose())), pose(rpy=(0, tilt, 0)))) == 4
+
+
+def test_of_a_standing_cylinder_the_rim_touches():
+    found = contact(foot(("cylinder", (0.05, 0.1), pose())))
+    np.testing.assert_allclose(found[:, 2], -0.1)
+    np.testing.assert_allclose(np.linalg.norm(found[:, :2], axis=1), 0.05)
+    np.testing.assert_allclose(found.mean(axis=0), [0, 0, -0.1], atol=1e-12)
+
+
+def test_of_a_lying_capsule_both_ends_touch():
+    found = contact(foot(("capsule", (0.02, 0.1), pose(rpy=(0, np.pi / 2, 0)))))
+    np.testing.assert_allclose(
+        sorted(found.tolist()), [[-0.1, 0, -0.02], [0.1, 0, -0.02]], atol=1e-12
+    )
+
+
+def test_of_a_standing_capsule_one_end_touches():
+    np.testing.assert_allclose(contact(foot(("capsule", (0.02, 0.1), pose()))), [[0, 0, -0.12]])
+
+
+def test_where_an_ellipsoid_touches():
+    # Of (x / 0.3)^2 + (z / 0.1)^2 = 1, turned by a quarter about y: the tip along x.
+    body = foot(("ellipsoid", (0.3, 0.2, 0.1), pose()))
+    np.testing.assert_allclose(contact(body), [[0, 0, -0.1]], atol=1e-12)
+    np.testing.assert_allclose(
+        contact(body, pose(rpy=(0, np.pi / 2, 0))), [[0, 0, -0.3]], atol=1e-12
+    )
+
+
+@given(turn=st.tuples(*[st.floats(-4, 4)] * 3))
+def test_an_ellipsoid_touches_on_its_surface(turn):
+    point = contact(foot(("ellipsoid", (0.3, 0.2, 0.1), pose())), pose(rpy=turn))[0]
+    local = rotation_of(np.array(turn)).T @ point
+    assert ((local / [0.3, 0.2, 0.1]) ** 2).sum() == pytest.approx(1)
+
+
+def test_the_lowest_of_several_shapes_touches():
+    body = foot(("sphere", (0.02,), pose((0.1, 0, 0))), ("sphere", (0.02,), pose((-0.1, 0, -0.05))))
+    np.testing.assert_allclose(contact(body), [[-0.1, 0, -0.07]])
+
+
+def test_shapes_that_are_about_as_low_touch_together():
+    body = foot(
+        ("sphere", (0.02,), pose((0.1, 0, 0))), ("sphere", (0.02,), pose((-0.1, 0, -0.005)))
+    )
+    assert len(contact(body)) == 2
+
+
+def test_without_shapes_the_lowest_frame_touches():
+    body = foot(frames=(pose((0.1, 0, -0.3)), pose((0, 0, -0.2))))
+    np.testing.assert_allclose(contact(body, pose((0, 0, 1))), [[0.1, 0, 0.7]])
+
+
+def test_a_shape_without_extent_does_not_count():
+    body = foot(("unknown", (), pose()), frames=(pose((0, 0, -0.3)),))
+    np.testing.assert_allclose(contact(body), [[0, 0, -0.3]])
+
+
+# How a foot is set down
+
+
+@pytest.mark.parametrize("tilt", [-1.2, -0.5, -0.1, 0.0, 0.2, 0.7, 1.0])
+def test_a_flat_foot_is_turned_flat(tilt):
+    body = foot(("box", (0.12, 0.04, 0.015), pose()))
+    turn = level_turn(body, pose(rpy=(0, tilt, 0)), SIDEWAYS, Meshes())
+    assert turn == pytest.approx(-tilt, abs=0.05)
+
+
+def test_a_foot_is_turned_about_the_axis_of_its_leg():
+    body = foot(("box", (0.04, 0.12, 0.015), pose()))
+    turn = level_turn(body, pose(rpy=(0.4, 0, 0)), np.array([1.0, 0, 0]), Meshes())
+    assert turn == pytest.approx(-0.4, abs=0.05)
+
+
+@pytest.mark.parametrize("shape", [("sphere", (0.02,)), ("cylinder", (0.02, 0.05))])
+def test_a_round_foot_is_as_flat_as_it_can_be(shape):
+    body = foot((*shape, pose(rpy=(np.pi / 2, 0, 0))))
+    assert level_turn(body, pose(), SIDEWAYS, Meshes()) == 0
+
+
+def test_a_foot_without_shapes_is_left_as_it_is():
+    assert level_turn(foot(frames=(pose((0.1, 0, -0.1)),)), pose(), SIDEWAYS, Meshes()) == 0
+
+
+def test_points_under_heel_and_toes_make_a_sole():
+    balls = [("sphere", (0.005,), pose((x, 0, -0.03))) for x in (-0.05, 0.12)]
+    turn = level_turn(foot(*balls), pose(rpy=(0, 0.5, 0)), SIDEWAYS, Meshes())
+    assert turn == pytest.approx(-0.5, abs=0.05)
+
+
+# Support polygons
+
+
+def test_the_hull_of_a_square_leaves_out_what_is_inside():
+    points = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5], [0.5, 0], [0, 0]])
+    assert convex_hull(points).tolist() == [[0, 0], [1, 0], [1, 1], [0, 1]]
+
+
+@pytest.mark.parametrize(
+    ("points", "wanted"),
+    [
+        ([[1, 2]], [[1, 2]]),
+        ([[1, 2], [1, 2], [1, 2]], [[1, 2]]),
+        ([[1, 2], [0, 0]], [[0, 0], [1, 2]]),
+        ([[0, 0], [2, 2], [1, 1], [0.5, 0.5]], [[0, 0], [2, 2]]),
+    ],
+)
+def test_hulls_without_area(points, wanted):
+    assert convex_hull(np.array(points, dtype=float)).tolist() == wanted
+
+
+def area(polygon):
+    x, y = polygon.T
+    return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
+
+
+POINTS = st.lists(st.tuples(st.integers(-9, 9), st.integers(-9, 9)), min_size=1, max_size=20)
+
+
+@given(POINTS)
+def test_a_hull_is_convex_and_holds_every_point(points):
+    points = np.array(points, dtype=float)
+    hull = convex_hull(points)
+    assert {tuple(p) for p in hull} <= {tuple(p) for p in points}
+    if len(hull) < 3:
+        return
+    assert area(hull) > 0  # counter-clockwise
+    edge = np.roll(hull, -1, axis=0) - hull
+    away = points[:, None] - hull
+    assert (edge[:, 0] * away[..., 1] - edge[:, 1] * away[..., 0] >= -1e-9).all()
+    corner = (
+        edge[:, 0] * np.roll(edge, -1, axis=0)[:, 1] - edge[:, 1] * np.roll(edge, -1, axis=0)[:, 0]
+    )
+    assert (corner > 0).all()
+
+
+SQUARE = np.array([[0, 0], [2, 0], [2, 2], [0, 2]], dtype=float)
+
+
+@pytest.mark.parametrize(
+    ("point", "wanted"),
+    [
+        ((1, 1), 1.0),
+        ((0.25, 1), 0.25),
+        ((1, 2), 0.0),
+        ((1, 2.5), -0.5),
+        ((-3, -4), -5.0),
+        ((2.3, 1.9), -0.3),
+    ],
+)
+def test_the_margin_by_hand(point, wanted):
+    assert margin(np.array(point, dtype=float), SQUARE) == pytest.approx(wanted)
+
+
+def test_a_triangle_by_hand():
+    # 3, 4, 5: the inscribed circle has a radius of 1 and its middle at (1, 1).
+    triangle = np.array([[0, 0], [4, 0], [0, 3]], dtype=float)
+    assert margin(np.array([1.0, 1.0]), triangle) == pytest.approx(1)
+    assert margin(np.array([4.0, 3.0]), triangle) == pytest.approx(-12 / 5)
+
+
+def test_on_two_points_nothing_is_inside_but_close_to_the_line_between():
+    # Two feet that are balls: the mass is 0.1 m beside the line on which it would balance.
+    line = np.array([[0, -1], [0, 1]], dtype=float)
+    assert margin(np.array([0.1, 0.3]), line) == pytest.approx(-0.1)
+    assert margin(np.array([0.0, 0.0]), line) == pytest.approx(0.0)
+    assert margin(np.array([0.0, 3.0]), line) == pytest.approx(-2.0)
+
+
+def test_on_one_point_and_on_none():
+    assert margin(np.array([3.0, 4.0]), np.zeros((1, 2))) == -5
+    assert margin(np.array([3.0, 4.0]), np.zeros((0, 2))) == -math.inf
+
+
+@given(st.tuples(st.floats(-5, 5), st.floats(-5, 5)), st.floats(-7, 7))
+def test_margins_turn_and_move_with_the_robot(point, angle):
+    turn = rotation_of(np.array([0, 0, angle]))[:2, :2]
+    point = np.array(point)
+    moved = margin(turn @ point + 3, SQUARE @ turn.T + 3)
+    assert moved == pytest.approx(margin(point, SQUARE), abs=1e-6)

@@ -1,0 +1,55 @@
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from terrainkit_robots.analysis.bodies.joint_order import (
+    actuator_order,
+    is_moved,
+    permutation,
+    tree_order,
+)
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description import bundled
+from terrainkit_robots.description.load import load_robot
+
+NAMES = st.permutations([f"j{k}" for k in range(12)])
+
+
+@given(NAMES, NAMES)
+def test_theirs_is_ours_indexed_with_the_permutation(ours, theirs):
+    places = permutation(ours, theirs)
+    assert list(np.array(ours)[places]) == list(theirs)
+    assert list(np.array(theirs)[np.argsort(places)]) == list(ours)
+    assert permutation(theirs, ours) == list(np.argsort(places))
+    assert is_moved(places) == (ours != theirs)
+
+
+def test_other_names_have_no_permutation():
+    assert permutation(["a", "b"], ["a", "c"]) is None
+    assert permutation(["a"], ["a", "b"]) is None
+    assert permutation(["a", "a"], ["a", "b"]) is None
+    assert permutation(["a", "b"], ["a", "a"]) is None
+    assert permutation(["a", "a", "b"], ["a", "b"]) is None
+    assert permutation([], []) == []
+
+
+def test_the_order_of_the_tree_is_depth_first():
+    path = bundled.find("quadruped")
+    robot = Facts(load_robot(path))
+    legs = ("FL", "FR", "RL", "RR")
+    wanted = tuple(f"{leg}_{part}_joint" for leg in legs for part in ("hip", "thigh", "calf"))
+    assert tree_order(robot) == wanted
+    assert actuator_order(robot) == ()
+    assert actuator_order(Facts(load_robot(path.with_suffix(".xml")))) == wanted
+
+
+def test_only_the_first_motor_of_a_joint_counts_and_only_those_of_joints(tmp_path):
+    path = tmp_path / "robot.xml"
+    path.write_text(
+        '<mujoco><worldbody><body name="a"><geom size="0.1"/><site name="s"/>'
+        '<body name="b"><joint name="one" axis="1 0 0"/><geom size="0.1"/></body>'
+        '<body name="c"><joint name="two" axis="1 0 0"/><geom size="0.1"/></body>'
+        '</body></worldbody><actuator><motor joint="two"/><motor site="s"/><motor joint="one"/>'
+        '<motor joint="two"/></actuator></mujoco>'
+    )
+    assert actuator_order(Facts(load_robot(path))) == ("two", "one")

@@ -1,0 +1,222 @@
+import itertools
+from pathlib import Path
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from terrainkit_robots.analysis.bodies.tree import build_tree
+from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.description.model import Joint, Link, RobotModel, Source
+
+SOURCE = Source(file=Path("robot.urdf"), line=1)
+
+
+def joint(parent, child, name=None):
+    name = f"{parent}-{child}" if name is None else name
+    return Joint(name=name, source=SOURCE, kind="fixed", parent=parent, child=child)
+
+
+def robot(links, joints, kind="urdf"):
+    """Return a robot of links `a b c` and of joints that are pairs or joints."""
+    return RobotModel(
+        name="r",
+        kind=kind,
+        file=SOURCE.file,
+        source=SOURCE,
+        links=tuple(Link(name=name, source=SOURCE) for name in links),
+        joints=tuple(j if isinstance(j, Joint) else joint(*j) for j in joints),
+    )
+
+
+def tree(links, joints, kind="urdf"):
+    return build_tree(robot(links.split(), joints, kind))
+
+
+def left_out(tree):
+    return [(joint.name, reason) for joint, reason in tree.left_out]
+
+
+def test_no_links():
+    empty = tree("", [])
+    assert empty.roots == empty.order == empty.left_out == empty.cycles == ()
+
+
+def test_links_come_after_their_parents_depth_first():
+    sound = tree("e d c b a", [("a", "b"), ("b", "c"), ("a", "d"), ("d", "e")])
+    assert sound.order == ("a", "b", "c", "d", "e")
+    assert sound.roots == ("a",)
+    assert sound.left_out == ()
+
+
+def test_children_are_in_the_order_of_the_joints():
+    assert tree("a b c d", [("a", "d"), ("a", "b"), ("a", "c")]).order == ("a", "d", "b", "c")
+
+
+def test_joints_above_and_below():
+    sound = tree("a b c", [("a", "b"), ("a", "c")])
+    assert sound.above["b"].name == "a-b"
+    assert "a" not in sound.above
+    assert [j.child for j in sound.below["a"]] == ["b", "c"]
+    assert sound.below["c"] == ()
+
+
+def test_the_largest_of_several_trees_is_the_robot():
+    several = tree("x a b p q r", [("a", "b"), ("p", "q"), ("q", "r")])
+    assert several.roots == ("p", "a", "x")
+    assert several.order == ("p", "q", "r")
+
+
+def test_of_trees_of_one_size_the_first_in_the_file_is_the_robot():
+    assert tree("b a", []).roots == ("b", "a")
+
+
+def test_the_first_link_of_a_name_counts():
+    model = robot(["a", "b", "b"], [("a", "b")])
+    double = build_tree(model)
+    assert double.order == ("a", "b")
+    assert double.links["b"] is model.links[1]
+
+
+def test_a_joint_that_is_written_twice_is_left_out_once():
+    double = tree("a b", [joint("a", "b", "j"), joint("a", "b", "j")])
+    assert left_out(double) == [("j", "duplicate")]
+    assert double.order == ("a", "b")
+
+
+def test_two_joints_of_a_name_both_hold_their_links():
+    double = tree("a b c", [joint("a", "b", "j"), joint("a", "c", "j")])
+    assert left_out(double) == []
+    assert double.order == ("a", "b", "c")
+
+
+def test_a_joint_to_a_link_that_is_not_there_is_left_out():
+    lost = tree("a b", [("a", "x"), ("y", "b"), ("a", "")])
+    assert left_out(lost) == [(name, "unknown-link") for name in ("a-x", "y-b", "a-")]
+    assert lost.order == ("a",)
+
+
+def test_a_second_parent_is_left_out():
+    two = tree("a b c", [("a", "b"), ("a", "c"), ("b", "c")])
+    assert left_out(two) == [("b-c", "second-parent")]
+    assert two.order == ("a", "b", "c")
+    assert two.cycles == ()
+
+
+def test_a_link_below_itself():
+    own = tree("a b", [("a", "b"), ("a", "a")])
+    assert own.cycles == (("a",),)
+    assert left_out(own) == [("a-a", "cycle")]
+    assert own.order == ("a", "b")
+
+
+def test_a_circle_with_a_tail_is_opened():
+    # No link is without a parent, but the robot is still read: the circle is cut above a.
+    circle = tree("a b c d", [("a", "b"), ("b", "c"), ("c", "a"), ("c", "d")])
+    assert len(circle.cycles) == 1
+    assert set(circle.cycles[0]) == {"a", "b", "c"}
+    assert [reason for _, reason in circle.left_out] == ["cycle"]
+    assert set(circle.order) == {"a", "b", "c", "d"}
+
+
+def test_a_circle_beside_the_robot():
+    beside = tree("a b p q", [("a", "b"), ("p", "q"), ("q", "p")])
+    assert set(beside.cycles[0]) == {"p", "q"}
+    assert beside.order == ("a", "b")
+    assert len(beside.roots) == 2
+
+
+def test_the_robot_begins_where_there_never_was_a_parent():
+    # The circle has more links, and so has what hangs on a link that is not there.
+    beside = tree("a b p q r", [("a", "b"), ("p", "q"), ("q", "r"), ("r", "p")])
+    assert beside.roots[0] == "a"
+    lost = tree("p q r a b", [("x", "p"), ("p", "q"), ("q", "r"), ("a", "b")])
+    assert lost.roots == ("a", "p")
+    assert lost.order == ("a", "b")
+
+
+def test_two_circles():
+    two = tree("a b c d", [("a", "b"), ("b", "a"), ("c", "d"), ("d", "c")])
+    assert [set(cycle) for cycle in two.cycles] == [{"a", "b"}, {"c", "d"}]
+    assert len(two.left_out) == 2
+    assert len(two.roots) == 2
+
+
+def test_what_holds_a_body_of_mjcf_in_the_world_is_not_between_links():
+    held = tree("a b", [("world", "a"), ("a", "b")], kind="mjcf")
+    assert held.order == ("a", "b")
+    assert held.left_out == ()
+    assert "a" not in held.above
+
+
+def test_in_urdf_the_world_is_a_link_like_others():
+    assert left_out(tree("a", [("world", "a")])) == [("world-a", "unknown-link")]
+    assert tree("world a", [("world", "a")]).order == ("world", "a")
+
+
+def test_ten_thousand_links_in_a_chain_are_no_trouble():
+    count = 10_000
+    names = [f"l{i}" for i in range(count)]
+    model = robot(names, list(itertools.pairwise(names)))
+    assert build_tree(model).order == tuple(names)
+
+
+def test_a_circle_of_ten_thousand_links_is_no_trouble():
+    count = 10_000
+    names = [f"l{i}" for i in range(count)]
+    model = robot(names, list(zip(names, [*names[1:], names[0]], strict=True)))
+    circle = build_tree(model)
+    assert len(circle.cycles[0]) == count
+    assert len(circle.order) == count
+
+
+def test_a_star_of_ten_thousand_links_is_no_trouble():
+    names = [f"l{i}" for i in range(10_000)]
+    star = build_tree(robot(names, [(names[0], name) for name in names[1:]]))
+    assert star.order == tuple(names)
+
+
+def test_ten_thousand_links_without_joints_are_no_trouble():
+    names = [f"l{i}" for i in range(10_000)]
+    assert build_tree(robot(names, [])).roots == tuple(names)
+
+
+NAMES = st.sampled_from("abcdefgh")
+
+
+@given(
+    st.lists(NAMES, max_size=10),
+    st.lists(st.tuples(NAMES, NAMES, st.sampled_from(["", "j", "k"])), max_size=12),
+)
+def test_any_joints_make_a_forest(links, joints):
+    model = robot(links, [joint(p, c, n or f"{p}-{c}") for p, c, n in joints])
+    forest = build_tree(model)
+    # Every joint is in the tree or left out, and every link is below exactly one root.
+    assert len(forest.above) + len(forest.left_out) == len(joints)
+    seen, stack = [], list(forest.roots)
+    while stack:
+        at = stack.pop()
+        seen.append(at)
+        stack += [j.child for j in forest.below[at]]
+    assert sorted(seen) == sorted(set(links))
+    for name, above in forest.above.items():
+        assert above.child == name
+        assert above in forest.below[above.parent]
+    place = {name: k for k, name in enumerate(forest.order)}
+    assert all(place[forest.above[n].parent] < k for n, k in place.items() if n in forest.above)
+    assert sum(reason == "cycle" for _, reason in forest.left_out) == len(forest.cycles)
+
+
+@given(st.permutations(range(7)))
+def test_the_order_of_joints_does_not_change_the_tree(order):
+    pairs = [("a", "b"), ("b", "c"), ("b", "d"), ("a", "e"), ("e", "f"), ("e", "g"), ("g", "h")]
+    shuffled = tree("a b c d e f g h", [pairs[k] for k in order])
+    assert set(shuffled.order) == set("abcdefgh")
+    assert {(j.parent, j.child) for j in shuffled.above.values()} == set(pairs)
+
+
+def test_a_real_robot_in_full(robot_file):
+    model = load_robot(robot_file("g1/g1_29dof.urdf"))
+    sound = build_tree(model)
+    assert sound.roots == ("pelvis",)
+    assert set(sound.order) == {link.name for link in model.links}
+    assert sound.left_out == sound.cycles == ()

@@ -1,0 +1,108 @@
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import terrainkit_robots
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.inertia.repair import repair
+from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.fixes.edits import edit_bytes
+from terrainkit_robots.mesh.mesh_cache import Meshes
+
+QUADRUPED = Path(terrainkit_robots.__file__).parent / "description/bundled/quadruped/quadruped.xml"
+THIGH = 'fullinertia="0.00584 0.0058 0.00103 8.72e-05 -0.000289 0.000808"'
+
+ARM = """<mujoco model="arm">
+  <worldbody>
+    <body name="base">
+      <geom type="box" size="0.1 0.1 0.05" mass="3"/>
+      <body name="tip" pos="0 0 0.1">
+        <joint name="turn" axis="0 1 0" range="-60 60"/>
+        <inertial pos="0 0 0.2" mass="1" {inertia}/>
+        <geom type="box" size="0.035 0.035 0.2" pos="0 0 0.2"/>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>"""
+
+
+@pytest.fixture
+def repaired(tmp_path):
+    """Return what becomes of a link, and the attributes that its fix writes or removes."""
+
+    def make(text, link):
+        path = tmp_path / "robot.xml"
+        path.write_text(text)
+        facts = Facts(load_robot(path), Meshes())
+        fix = repair(facts, facts.tree.links[link])
+        assert fix is not None
+        data = edit_bytes(path.read_bytes(), fix.edits)
+        model = mujoco.MjModel.from_xml_string(data.decode())
+        body = model.body(link)
+        turn = np.zeros(9)
+        mujoco.mju_quat2Mat(turn, body.iquat)
+        turn = turn.reshape(3, 3)
+        return turn @ np.diag(body.inertia) @ turn.T, [edit.name for edit in fix.edits]
+
+    return make
+
+
+@pytest.mark.parametrize(
+    ("axes", "removed"),
+    [
+        ("", []),
+        ('quat="1 0 0 0"', ["quat"]),
+        ('quat="0.5 0.5 0.5 0.5"', ["quat"]),
+        ('euler="0 0.3 0"', ["euler"]),
+        ('zaxis="1 0 1"', ["zaxis"]),
+    ],
+)
+def test_the_inertia_of_the_mirror_image_is_written_in_full(repaired, axes, removed):
+    text = QUADRUPED.read_text()
+    sound = mujoco.MjModel.from_xml_string(text).body("FL_thigh")
+    assert THIGH in text
+    broken = text.replace(THIGH, f'{axes} diaginertia="0.00584 -0.0058 0.00103"', 1)
+    inertia, names = repaired(broken, "FL_thigh")
+    assert names == ["fullinertia", "diaginertia", *removed]
+    np.testing.assert_allclose(np.linalg.eigvalsh(inertia), np.sort(sound.inertia), rtol=1e-4)
+    assert inertia[0, 1] == pytest.approx(8.72e-05)
+    assert inertia[0, 2] == pytest.approx(-0.000289)
+    assert inertia[1, 2] == pytest.approx(0.000808)
+
+
+@pytest.mark.parametrize("axes", ["", 'quat="0.5 0.5 0.5 0.5"'])
+def test_a_diagonal_one_stays_in_its_axes(repaired, axes):
+    text = ARM.format(inertia=f'{axes} diaginertia="0.014 0.003 0.004"')
+    inertia, names = repaired(text, "tip")
+    assert names == ["diaginertia"]
+    moments = np.linalg.eigvalsh(inertia)
+    assert moments[0] + moments[1] >= moments[2] * (1 - 1e-9)
+
+
+def test_a_box_in_other_axes_is_written_in_full(repaired):
+    text = ARM.format(inertia='quat="1 0 0 1" diaginertia="0 0 0"')
+    inertia, names = repaired(text, "tip")
+    assert names == ["diaginertia"]
+    assert inertia[2, 2] < inertia[0, 0]
+    aslant = ARM.format(inertia='quat="0.9 0 0.3 0.1" diaginertia="0 0 0"')
+    again, names = repaired(aslant, "tip")
+    assert names == ["fullinertia", "diaginertia", "quat"]
+    np.testing.assert_allclose(again, inertia, rtol=1e-4, atol=1e-9)
+
+
+def test_a_full_one_stays_full(repaired):
+    text = ARM.format(inertia='fullinertia="0.009 0.009 0.002 0.01 0 0"')
+    _, names = repaired(text, "tip")
+    assert names == ["fullinertia"]
+    diagonal = ARM.format(inertia='fullinertia="0.014 0.003 0.004 0 0 0"')
+    _, names = repaired(diagonal, "tip")
+    assert names == ["fullinertia"]
+
+
+def test_what_mujoco_makes_of_shapes_has_no_repair(tmp_path):
+    path = tmp_path / "robot.xml"
+    path.write_text(ARM.format(inertia='diaginertia="1 1 1"'))
+    facts = Facts(load_robot(path), Meshes())
+    assert repair(facts, facts.tree.links["base"]) is None

@@ -1,0 +1,78 @@
+import numpy as np
+import pytest
+
+from terrainkit_robots.analysis.legs.default_pose import starting_positions
+from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
+from terrainkit_robots.spec.robot_spec import RobotSpec
+
+SLIDE = """
+<robot name="r">
+  <link name="base"/><link name="one"/><link name="two"/>
+  <joint name="a" type="revolute"><parent link="base"/><child link="one"/><axis xyz="0 0 1"/>
+    <limit lower="0.5" upper="2.5" effort="1" velocity="1"/></joint>
+  <joint name="b" type="revolute"><parent link="one"/><child link="two"/><axis xyz="0 0 1"/>
+    <limit lower="-9" upper="9" effort="1" velocity="1"/><mimic joint="a" multiplier="-2"/></joint>
+</robot>"""
+
+
+def changed(spec, **values):
+    fields = {name: getattr(spec, name) for name in RobotSpec.__dataclass_fields__}
+    return RobotSpec(**(fields | values))
+
+
+def test_the_pose_of_the_spec_is_the_stance(bundled, gains):
+    plain = bundled("quadruped.urdf")
+    spec = derive_spec(plain, gains=gains(plain), floating=True)
+    low = {".*_hip_joint": 0.1, ".*_thigh_joint": 1.2, ".*_calf_joint": -2.4}
+    facts = bundled("quadruped.urdf", spec=changed(spec, default_pose=low))
+    assert facts.positions["FL_thigh_joint"] == facts.stance.positions["FL_thigh_joint"] == 1.2
+    assert facts.stance.height < plain.stance.height - 0.1
+
+
+def test_what_the_spec_leaves_open_is_searched_for(bundled, gains):
+    plain = bundled("quadruped.urdf")
+    spec = derive_spec(plain, gains=gains(plain), floating=True)
+    facts = bundled("quadruped.urdf", spec=changed(spec, default_pose={"FL_hip_joint": 0.2}))
+    wanted = dict(plain.positions) | {"FL_hip_joint": 0.2}
+    assert starting_positions(facts) == wanted
+    nothing = bundled("quadruped.urdf", spec=changed(spec, default_pose={"(": 1.0, "x": 2.0}))
+    assert starting_positions(nothing) == plain.positions
+
+
+def test_a_joint_that_mimics_another_follows_the_spec(robot, spec):
+    facts = robot(SLIDE, spec=spec(joint_order=("a",), default_pose={"a": 1.0}))
+    assert facts.positions == {"a": 1.0, "b": -2.0}
+
+
+def test_the_pose_of_the_spec_may_be_outside_the_limits(robot, spec):
+    facts = robot(SLIDE, spec=spec(joint_order=("a",), default_pose={"a": 3.0}))
+    assert facts.positions["a"] == 3.0
+
+
+@pytest.mark.parametrize("name", ["quadruped.urdf", "biped.xml"])
+def test_the_pose_that_was_derived_is_the_one_that_was_solved(bundled, gains, name):
+    plain = bundled(name)
+    facts = bundled(name, spec=derive_spec(plain, gains=gains(plain), floating=True))
+    np.testing.assert_allclose(
+        [facts.positions[name] for name in plain.positions],
+        list(plain.positions.values()),
+        atol=1e-5,
+    )
+
+
+CHAIN = """
+<robot name="r">
+  <link name="l0"/><link name="l1"/><link name="l2"/><link name="l3"/>
+  <joint name="jC" type="prismatic"><parent link="l0"/><child link="l1"/>
+    <limit lower="-9" upper="9" effort="1" velocity="1"/><mimic joint="jB" multiplier="-2"/></joint>
+  <joint name="jB" type="prismatic"><parent link="l1"/><child link="l2"/>
+    <limit lower="-9" upper="9" effort="1" velocity="1"/><mimic joint="jA" offset="0.5"/></joint>
+  <joint name="jA" type="prismatic"><parent link="l2"/><child link="l3"/>
+    <limit lower="1" upper="2" effort="1" velocity="1"/></joint>
+</robot>"""
+
+
+def test_followers_of_followers_are_where_they_are_put(robot, spec):
+    assert robot(CHAIN).positions == {"jA": 1.0, "jB": 1.5, "jC": -3.0}
+    told = robot(CHAIN, spec=spec(joint_order=("jA",), default_pose={"jA": 2.0}))
+    assert told.positions == {"jA": 2.0, "jB": 2.5, "jC": -5.0}

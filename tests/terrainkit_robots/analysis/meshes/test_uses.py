@@ -1,0 +1,135 @@
+from dataclasses import replace
+
+import pytest
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.meshes.uses import (
+    is_lost,
+    mesh_uses,
+    meshes_by_file,
+    meshes_by_name,
+    relative_name,
+    renamed,
+    replaced,
+)
+from terrainkit_robots.description.fix import SetAttribute, WriteFile
+from terrainkit_robots.description.load import load_robot
+
+TWO_LINKS = """<robot name="r">
+  <link name="a">
+    <visual><geometry><mesh filename="m/foot.stl"/></geometry></visual>
+    <collision><geometry><mesh filename="./m/foot.stl"/></geometry></collision>
+  </link>
+  <link name="b">
+    <collision><geometry><mesh filename="m/foot.stl"/></geometry></collision>
+    <visual><geometry><mesh filename="m/hand.stl"/></geometry></visual>
+    <visual><geometry><box size="1 1 1"/></geometry></visual>
+  </link>
+</robot>"""
+
+
+@pytest.fixture
+def robot(tmp_path):
+    """Return a function that reads a robot, beside which there is m/foot.stl."""
+
+    def make(text=TWO_LINKS, name="robot.urdf"):
+        (tmp_path / "m").mkdir()
+        (tmp_path / "m/foot.stl").write_bytes(b"x")
+        (tmp_path / name).write_text(text)
+        return Facts(load_robot(tmp_path / name))
+
+    return make
+
+
+def test_every_use(robot):
+    uses = [(use.link.name, use.mesh.filename, use.collides) for use in mesh_uses(robot())]
+    assert uses == [
+        ("a", "./m/foot.stl", True),
+        ("a", "m/foot.stl", False),
+        ("b", "m/foot.stl", True),
+        ("b", "m/hand.stl", False),
+    ]
+
+
+def test_one_for_each_name(robot):
+    used = meshes_by_name(robot())
+    assert [(u.name, len(u.uses), u.source.line) for u in used] == [
+        ("./m/foot.stl", 1, 4),
+        ("m/foot.stl", 2, 3),
+        ("m/hand.stl", 1, 8),
+    ]
+    assert [u.strict for u in used] == [True, True, False]
+    assert [is_lost(u) for u in used] == [False, False, True]
+
+
+def test_one_for_each_file_that_is_there(robot):
+    (used,) = meshes_by_file(robot())
+    assert used.name == "m/foot.stl"
+    assert used.source.line == 3
+    assert len(used.uses) == 3
+    assert used.role == "collision mesh of a, b"
+    assert [use.link.name for use in used.collisions] == ["a", "b"]
+
+
+def test_edits_of_every_use(robot):
+    facts = robot()
+    (used,) = meshes_by_file(facts)
+    write, *edits = replaced(facts, used.uses, "_hull.stl", lambda: b"hull")
+    assert isinstance(write, WriteFile)
+    assert write.path.name == "foot_hull.stl"
+    assert write.content() == b"hull"
+    assert [edit.source.line for edit in edits] == [3, 4, 7]
+    assert {(e.name, e.value) for e in edits if isinstance(e, SetAttribute)} == {
+        ("filename", "m/foot_hull.stl")
+    }
+
+
+def test_a_name_that_is_taken_is_left(robot, tmp_path):
+    facts = robot()
+    (tmp_path / "m/foot_hull.stl").write_bytes(b"somebody's")
+    (used,) = meshes_by_file(facts)
+    write, *_ = replaced(facts, used.uses, "_hull.stl", bytes)
+    assert write.path.name == "foot_hull_2.stl"
+
+
+def test_names_relative_to_the_robot(robot, tmp_path):
+    facts = robot()
+    assert relative_name(facts, tmp_path / "m/foot.stl") == "m/foot.stl"
+    assert relative_name(facts, tmp_path.parent / "x/foot.stl") == "../x/foot.stl"
+
+
+def test_names_relative_to_a_link_to_the_robot(robot, tmp_path):
+    robot()
+    elsewhere = tmp_path / "far/away"
+    elsewhere.mkdir(parents=True)
+    (tmp_path / "linked").symlink_to(elsewhere)
+    (elsewhere / "robot.urdf").write_text(TWO_LINKS)
+    facts = Facts(load_robot(tmp_path / "linked/robot.urdf"))
+    name = relative_name(facts, tmp_path / "m/foot.stl")
+    assert (tmp_path / "linked" / name).samefile(tmp_path / "m/foot.stl")
+
+
+def test_names_in_mjcf_start_at_meshdir(robot):
+    text = """<mujoco><compiler meshdir="m"/>
+      <asset><mesh name="f" file="foot.stl"/></asset>
+      <worldbody><body name="a"><freejoint/><geom type="mesh" mesh="f" mass="1"/></body></worldbody>
+    </mujoco>"""
+    facts = robot(text, "robot.xml")
+    (used,) = meshes_by_file(facts)
+    assert used.strict
+    write, edit = replaced(facts, used.uses, "_hull.stl", bytes)
+    assert write.path.name == "foot_hull.stl"
+    assert (edit.name, edit.value) == ("file", "foot_hull.stl")
+
+
+def test_what_xacro_made_is_not_edited(robot):
+    facts = Facts(replace(robot().model, kind="xacro"))
+    (used,) = meshes_by_file(facts)
+    assert renamed(facts, used.uses, "x") is None
+    assert replaced(facts, used.uses, ".stl", bytes) is None
+
+
+def test_what_is_not_well_formed_is_not_edited(robot):
+    facts = robot(TWO_LINKS.replace("</robot>", ""))
+    (used,) = meshes_by_file(facts)
+    assert replaced(facts, used.uses, ".stl", bytes) is None

@@ -1,0 +1,49 @@
+import mujoco
+import numpy as np
+import pytest
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.simulator_conventions.armature import moved_by_joints
+from terrainkit_robots.description import bundled
+from terrainkit_robots.description.load import load_robot
+
+
+def test_a_point_mass_on_a_rod(mjcf):
+    # 2 kg at 0.5 m from the axis of j1: 0.5 kg m2 and its own 0.001; about its own axis only that.
+    inertial = '<inertial pos="0 0 0" mass="2" diaginertia="0.001 0.001 0.001"/>'
+    facts = mjcf(
+        '<body name="b"><freejoint/><geom size="0.1"/>'
+        '<body name="arm"><joint name="j1" axis="0 0 1"/>'
+        '<inertial pos="0 0 0" mass="1e-9" diaginertia="1e-9 1e-9 1e-9"/>'
+        f'<body name="tip" pos="0.5 0 0"><joint name="j2" axis="0 0 3"/>{inertial}</body>'
+        "</body></body>"
+    )
+    moved = {each.joint.name: each.inertia for each in moved_by_joints(facts)}
+    assert moved == pytest.approx({"j1": 0.501, "j2": 0.001}, rel=1e-6)
+
+
+def test_joints_with_armature_are_left_out(mjcf):
+    geom = '<geom size="0.1" mass="1"/>'
+    facts = mjcf(
+        f'<body name="b"><freejoint/>{geom}<body name="a">{geom}<joint name="j" armature="0.01"/>'
+        f'</body><body name="s">{geom}<joint name="slide" type="slide"/></body></body>'
+    )
+    (moved,) = moved_by_joints(facts)
+    assert (moved.joint.name, moved.inertia) == ("slide", pytest.approx(1.0))
+
+
+@pytest.mark.parametrize("name", ["quadruped", "biped"])
+def test_against_the_mass_matrix_of_mujoco(name):
+    path = bundled.find(name)
+    # With the base held, the diagonal of the mass matrix is the inertia about each axis.
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    matrix = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, matrix)
+    diagonal = {model.joint(i).name: matrix[model.jnt_dofadr[i]] for i in range(model.njnt)}
+    moved = moved_by_joints(Facts(load_robot(path)))
+    assert moved
+    for each in moved:
+        at = model.joint(each.joint.name).dofadr[0]
+        assert each.inertia == pytest.approx(diagonal[each.joint.name][at], rel=1e-6)

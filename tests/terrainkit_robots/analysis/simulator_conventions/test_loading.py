@@ -1,0 +1,151 @@
+import os
+import struct
+from pathlib import Path
+
+import pytest
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.simulator_conventions.loading import (
+    NotTriedError,
+    refused_by_mujoco,
+    refused_by_yourdfpy,
+)
+from terrainkit_robots.description import bundled
+from terrainkit_robots.description.load import load_robot
+
+BODY = '<body><freejoint/><geom size="0.1"/></body>'
+
+
+def facts_of(folder, text, name="robot.xml"):
+    path = folder / name
+    path.write_text(text)
+    return Facts(load_robot(path))
+
+
+@pytest.mark.parametrize("name", ["quadruped", "biped"])
+def test_the_bundled_robots_load(name):
+    for suffix in (".urdf", ".xml"):
+        facts = Facts(load_robot(bundled.find(name).with_suffix(suffix)))
+        assert refused_by_mujoco(facts) is None
+    assert refused_by_yourdfpy(Facts(load_robot(bundled.find(name)))) is None
+
+
+def test_the_words_of_mujoco_and_the_element(tmp_path):
+    text = bundled.find("quadruped").read_text().replace('ixx="', 'ixx="9', 1)
+    refusal = refused_by_mujoco(facts_of(tmp_path, text, "robot.urdf"))
+    assert refusal.words == "inertia must satisfy A + B >= C; use 'balanceinertia' to fix"
+    assert refusal.element == "base"
+
+
+def test_the_words_of_yourdfpy(tmp_path):
+    text = (
+        '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="revolute"/></robot>'
+    )
+    refusal = refused_by_yourdfpy(facts_of(tmp_path, text, "robot.urdf"))
+    assert refusal is not None
+    assert len(refusal.words.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("inside", "why"),
+    [
+        ('<worldbody><replicate count="9"><body/></replicate></worldbody>', "<replicate>"),
+        (
+            '<worldbody><body><composite type="cable" count="9 1 1"/></body></worldbody>',
+            "<composite>",
+        ),
+        ('<extension><plugin plugin="mujoco.pid"/></extension>', "<extension>"),
+        ('<asset><hfield name="h" nrow="9" ncol="9" size="1 1 1 1"/></asset>', "<hfield"),
+        ('<custom><numeric name="n" size="9"/></custom>', "<numeric size"),
+        ('<size nuser_geom="1000000"/>', "<size nuser_geom"),
+        (
+            '<asset><texture name="t" type="2d" builtin="flat" width="9999" height="9"/></asset>',
+            "a texture",
+        ),
+    ],
+)
+def test_what_could_be_costly_is_not_tried(tmp_path, inside, why):
+    text = f"<mujoco>{inside}<worldbody>{BODY}</worldbody></mujoco>"
+    with pytest.raises(NotTriedError, match=why):
+        refused_by_mujoco(facts_of(tmp_path, text))
+
+
+def test_too_many_bodies_are_not_tried(tmp_path):
+    links = "".join(f'<link name="l{k}"/>' for k in range(601))
+    facts = facts_of(tmp_path, f'<robot name="r">{links}</robot>', "robot.urdf")
+    with pytest.raises(NotTriedError, match="600 bodies"):
+        refused_by_mujoco(facts)
+
+
+def mesh_of(name, folder=""):
+    return (
+        f'<robot name="r"><mujoco><compiler meshdir="{folder}"/></mujoco><link name="a">'
+        f'<collision><geometry><mesh filename="{name}"/></geometry></collision></link></robot>'
+    )
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
+@pytest.mark.parametrize(("name", "folder"), [("m.stl", ""), ("else/m.stl", ""), ("m.stl", "in")])
+def test_a_pipe_is_never_opened(tmp_path, name, folder):
+    (tmp_path / "in").mkdir()
+    os.mkfifo(tmp_path / (folder or ".") / "m.stl")
+    with pytest.raises(NotTriedError, match=r"m\.stl is not given to MuJoCo"):
+        refused_by_mujoco(facts_of(tmp_path, mesh_of(name, folder), "robot.urdf"))
+
+
+def test_a_device_is_never_opened(tmp_path):
+    if not Path("/dev/zero").exists():
+        pytest.skip("no devices here")
+    with pytest.raises(NotTriedError, match="zero is not given"):
+        refused_by_mujoco(facts_of(tmp_path, mesh_of("/dev/zero"), "robot.urdf"))
+
+
+def test_meshes_of_many_bytes_are_not_tried(tmp_path):
+    with (tmp_path / "m.stl").open("wb") as file:
+        file.truncate(33 * 2**20)
+    with pytest.raises(NotTriedError, match="33,554,432 bytes"):
+        refused_by_mujoco(facts_of(tmp_path, mesh_of("m.stl"), "robot.urdf"))
+
+
+def test_a_picture_of_many_pixels_is_not_tried(tmp_path):
+    head = b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sII", 13, b"IHDR", 99999, 99999)
+    (tmp_path / "t.png").write_bytes(head)
+    text = f'<mujoco><asset><texture type="2d" name="t" file="t.png"/></asset><worldbody>{BODY}'
+    with pytest.raises(NotTriedError, match="pixels"):
+        refused_by_mujoco(facts_of(tmp_path, f"{text}</worldbody></mujoco>"))
+
+
+def test_what_is_included_is_looked_at_as_well(tmp_path):
+    (tmp_path / "part.xml").write_text('<mujoco><size nkey="99999999"/></mujoco>')
+    text = f'<mujoco><include file="part.xml"/><worldbody>{BODY}</worldbody></mujoco>'
+    with pytest.raises(NotTriedError, match="nkey"):
+        refused_by_mujoco(facts_of(tmp_path, text))
+
+
+def test_entities_are_not_given_to_yourdfpy(tmp_path):
+    text = '<!DOCTYPE robot [<!ENTITY a "b">]><robot name="&a;"><link name="a"/></robot>'
+    with pytest.raises(NotTriedError, match="entities"):
+        refused_by_yourdfpy(facts_of(tmp_path, text, "robot.urdf"))
+
+
+def test_xacro_has_no_file_to_be_read(tmp_path):
+    text = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r"><link name="a"/></robot>'
+    facts = facts_of(tmp_path, text, "robot.xacro")
+    for ask in (refused_by_mujoco, refused_by_yourdfpy):
+        with pytest.raises(NotTriedError, match="xacro"):
+            ask(facts)
+
+
+def test_a_file_that_is_gone_is_not_tried(tmp_path):
+    facts = facts_of(tmp_path, '<robot name="r"><link name="a"/></robot>', "robot.urdf")
+    facts.model.file.unlink()
+    for ask in (refused_by_mujoco, refused_by_yourdfpy):
+        with pytest.raises(NotTriedError, match="there is no file"):
+            ask(facts)
+
+
+def test_nothing_is_written_beside(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    facts = facts_of(tmp_path, mesh_of("missing.stl"), "robot.urdf")
+    assert "Error opening file" in refused_by_mujoco(facts).words
+    assert [path.name for path in tmp_path.iterdir()] == ["robot.urdf"]

@@ -1,0 +1,12 @@
+from terrainkit_robots.analysis.simulator_conventions.order_table import order_table
+
+
+def test_a_row_for_each_joint_with_its_number_everywhere(urdf):
+    facts = urdf("jc: b > c", "ja: b > a", "jk: c > k")
+    assert order_table(facts) == (
+        ("joint", "file", "MuJoCo", "Isaac Gym", "Isaac Lab", "Genesis"),
+        ("jc", "0", "0", "1", "1", "0"),
+        ("ja", "1", "2", "0", "0", "2"),
+        ("jk", "2", "1", "2", "2", "1"),
+        ("", "", "certain", "to be verified", "to be verified", "certain"),
+    )

@@ -1,0 +1,309 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from terrainkit_robots.analysis.bodies.kinematics import body_poses
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.symmetry.mirror import Mirror, swap_sides
+from terrainkit_robots.description import bundled
+from terrainkit_robots.description.load import load_robot
+
+FILE = Path("/robots/robot.urdf")
+BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]
+PAIRS = {
+    "a1/urdf/a1.urdf": 6,
+    "go2/urdf/go2.urdf": 6,
+    "go2_mjcf/go2.xml": 6,
+    "h1/urdf/h1.urdf": 5,
+    "h1/h1.xml": 5,
+    "g1/g1_29dof.urdf": 13,
+    "g1/g1_29dof.xml": 13,
+    "anymal_c/urdf/anymal_c.urdf": 6,
+    "cassie/urdf/cassie.urdf": 6,
+    **dict.fromkeys(BUNDLED, 6),
+}
+every_robot = pytest.mark.parametrize("name", PAIRS)
+
+
+def load(name, robot_file):
+    stem, suffix = Path(name).stem, Path(name).suffix
+    path = bundled.find(stem).with_suffix(suffix) if name in BUNDLED else robot_file(name)
+    return Facts(load_robot(path))
+
+
+def facts(*joints):
+    """Return a robot of joints (parent, child, xyz, axis, kind); the trunk is called `trunk`."""
+    links = ["trunk", *(child for _, child, *_ in joints)]
+    text = "".join(f'<link name="{name}"/>' for name in links)
+    for number, (parent, child, xyz, axis, *kind) in enumerate(joints):
+        text += (
+            f'<joint name="j{number}" type="{kind[0] if kind else "continuous"}">'
+            f'<parent link="{parent}"/><child link="{child}"/><origin xyz="{xyz}"/>'
+            f'<axis xyz="{axis}"/></joint>'
+        )
+    return Facts(load_robot(FILE, contents={FILE: f'<robot name="r">{text}</robot>'.encode()}))
+
+
+def pairs(robot):
+    return [
+        (robot.bodies[p.left].name, robot.bodies[p.right].name, p.sign) for p in robot.mirror.pairs
+    ]
+
+
+# Names
+
+
+@pytest.mark.parametrize(
+    ("name", "other"),
+    [
+        ("left_knee", "right_knee"),
+        ("LeftKnee", "RightKnee"),
+        ("LEFT_KNEE", "RIGHT_KNEE"),
+        ("knee_left", "knee_right"),
+        ("FL_calf", "FR_calf"),
+        ("RL_calf", "RR_calf"),
+        ("LF_KFE", "RF_KFE"),
+        ("LH_KFE", "RH_KFE"),
+        ("lf_foot", "rf_foot"),
+        ("hl.hx", "hr.hx"),
+        ("l_knee", "r_knee"),
+        ("knee_l", "knee_r"),
+        ("leg_left_6_link", "leg_right_6_link"),
+        ("L_hip", "R_hip"),
+        ("FLHip", "FRHip"),
+        ("LLeg_knee", "RLeg_knee"),
+        ("fl1", "fr1"),
+        ("left/hip", "right/hip"),
+    ],
+)
+def test_left_and_right_change_places(name, other):
+    assert swap_sides(name) == other
+    assert swap_sides(other) == name
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "trunk",
+        "",
+        "calf",
+        "roll",
+        "pelvis",
+        "leftover",
+        "upright",
+        "bright",
+        "link_3",
+        "shelf",
+        "4",
+    ],
+)
+def test_names_without_a_side_stay(name):
+    assert swap_sides(name) == name
+
+
+@given(st.text(max_size=20))
+def test_twice_is_back(name):
+    assert swap_sides(swap_sides(name)) == name
+
+
+# Planes
+
+
+def test_the_image_of_a_vector():
+    mirror = Mirror(normal=np.array([0.0, 1.0, 0.0]), pairs=())
+    assert mirror.image(np.array([1.0, 2.0, 3.0])).tolist() == [1, -2, 3]
+    both = np.array([[1.0, 2.0, 3.0], [0.0, -1.0, 0.0]])
+    assert mirror.image(both).tolist() == [[1, -2, 3], [0, 1, 0]]
+    assert mirror.image(mirror.image(both)).tolist() == both.tolist()
+
+
+@every_robot
+def test_robots_are_mirrored_left_to_right(name, robot_file):
+    robot = load(name, robot_file)
+    assert robot.mirror.normal.tolist() == [0, 1, 0]
+    assert len(robot.mirror.pairs) == PAIRS[name]
+    for pair in robot.mirror.pairs:
+        assert robot.at_zero[pair.left][1, 3] > robot.at_zero[pair.right][1, 3]
+        assert swap_sides(robot.bodies[pair.left].name) == robot.bodies[pair.right].name
+
+
+@every_robot
+def test_mirrored_positions_look_mirrored(name, robot_file):
+    # Each pair is put at equal or opposite positions, as its sign says; everything else at zero.
+    robot = load(name, robot_file)
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        positions = {}
+        for pair in robot.mirror.pairs:
+            left, right = (robot.bodies[i].joint for i in (pair.left, pair.right))
+            assert pair.sign in (1, -1)
+            positions[left.name] = rng.uniform(-0.5, 0.5)
+            positions[right.name] = pair.sign * positions[left.name]
+        poses = body_poses(robot.bodies, positions)
+        for pair in robot.mirror.pairs:
+            image = robot.mirror.image(poses[pair.left][:3, 3])
+            np.testing.assert_allclose(image, poses[pair.right][:3, 3], atol=2e-3)
+
+
+def test_the_twin_of_a_body(robot_file):
+    robot = load("go2/urdf/go2.urdf", robot_file)
+    index = {body.top.name: body.index for body in robot.bodies}
+    assert robot.mirror.twin(index["FL_hip"]) == (index["FR_hip"], -1)
+    assert robot.mirror.twin(index["FR_hip"]) == (index["FL_hip"], -1)
+    assert robot.mirror.twin(index["RL_calf"]) == (index["RR_calf"], 1)
+    assert robot.mirror.twin(0) is None
+
+
+# Pairs, by hand
+
+
+@pytest.mark.parametrize(
+    ("axis", "other", "sign"),
+    [
+        # A turn to the left is mirrored by one to the right, but both nod alike.
+        ("0 1 0", "0 1 0", 1),
+        ("0 1 0", "0 -1 0", -1),
+        ("1 0 0", "1 0 0", -1),
+        ("1 0 0", "-1 0 0", 1),
+        ("0 0 1", "0 0 1", -1),
+        ("0 0 1", "0 0 -1", 1),
+        ("1 0 0", "0 1 0", 0),
+        ("1 1 0", "-1 1 0", 1),
+    ],
+)
+def test_the_sign_of_hinges(axis, other, sign):
+    robot = facts(("trunk", "left", "0 1 0", axis), ("trunk", "right", "0 -1 0", other))
+    assert pairs(robot) == [("left", "right", sign)]
+
+
+@pytest.mark.parametrize(
+    ("axis", "other", "sign"),
+    [
+        ("0 1 0", "0 -1 0", 1),
+        ("0 1 0", "0 1 0", -1),
+        ("1 0 0", "1 0 0", 1),
+        ("0 0 1", "0 0 -1", -1),
+    ],
+)
+def test_the_sign_of_slides(axis, other, sign):
+    robot = facts(
+        ("trunk", "left", "0 1 0", axis, "prismatic"),
+        ("trunk", "right", "0 -1 0", other, "prismatic"),
+    )
+    assert pairs(robot) == [("left", "right", sign)]
+
+
+def test_places_are_enough():
+    robot = facts(("trunk", "x", "0.1 1 0", "0 1 0"), ("trunk", "q", "0.1 -1 0", "0 1 0"))
+    assert pairs(robot) == [("x", "q", 1)]
+
+
+def test_names_are_enough():
+    robot = facts(("trunk", "l_a", "0.1 1 0", "0 1 0"), ("trunk", "r_a", "0.5 -1 0", "0 1 0"))
+    assert pairs(robot) == [("l_a", "r_a", 1)]
+
+
+def test_places_come_before_names():
+    # Left and right are mixed up in the names; the places say what belongs together.
+    robot = facts(
+        ("trunk", "l_a", "1 1 0", "0 1 0"),
+        ("trunk", "r_a", "-1 -1 0", "0 1 0"),
+        ("trunk", "x", "1 -1 0", "0 1 0"),
+        ("trunk", "y", "-1 1 0", "0 1 0"),
+    )
+    assert pairs(robot) == [("l_a", "x", 1), ("y", "r_a", 1)]
+
+
+def test_of_several_at_one_place_the_name_decides():
+    robot = facts(
+        ("trunk", "left_a", "0 1 0", "0 1 0"),
+        ("trunk", "left_b", "0 1 0", "0 1 0"),
+        ("trunk", "right_b", "0 -1 0", "0 1 0"),
+        ("trunk", "right_a", "0 -1 0", "0 1 0"),
+    )
+    assert {(left, right) for left, right, _ in pairs(robot)} == {
+        ("left_a", "right_a"),
+        ("left_b", "right_b"),
+    }
+
+
+def test_what_is_in_the_middle_has_no_twin():
+    assert (
+        pairs(facts(("trunk", "head", "1 0 0", "0 1 0"), ("trunk", "tail", "-1 0 0", "0 1 0")))
+        == []
+    )
+
+
+def test_a_body_alone_has_no_twin():
+    assert pairs(facts(("trunk", "arm", "0 1 0", "0 1 0"))) == []
+
+
+def test_two_on_one_side_are_not_twins():
+    assert (
+        pairs(facts(("trunk", "l_a", "0 1 0", "0 1 0"), ("trunk", "r_a", "0 2 0", "0 1 0"))) == []
+    )
+
+
+def test_a_joint_of_another_kind_is_no_twin_by_place():
+    robot = facts(("trunk", "a", "0 1 0", "0 1 0"), ("trunk", "b", "0 -1 0", "0 1 0", "prismatic"))
+    assert pairs(robot) == []
+
+
+def test_bodies_are_in_one_pair_at_most():
+    robot = facts(
+        *(("trunk", f"l{k}", "0 1 0", "0 1 0") for k in range(3)),
+        *(("trunk", f"r{k}", "0 -1 0", "0 1 0") for k in range(2)),
+    )
+    used = [name for pair in pairs(robot) for name in pair[:2]]
+    assert len(used) == len(set(used)) == 4
+
+
+def test_a_robot_that_walks_along_y_is_mirrored_across_x():
+    legs = []
+    for name, x, y in (("fl", -0.2, 0.3), ("fr", 0.2, 0.3), ("hl", -0.2, -0.3), ("hr", 0.2, -0.3)):
+        legs += [
+            ("trunk", f"{name}_thigh_leg", f"{x} {y} 0", "1 0 0", "revolute"),
+            (f"{name}_thigh_leg", f"{name}_foot", "0 0 -0.3", "1 0 0", "revolute"),
+            (f"{name}_foot", f"{name}_tip", "0 0 -0.3", "1 0 0", "fixed"),
+        ]
+    robot = facts(*legs)
+    assert len(robot.legs) == 4
+    assert robot.mirror.normal.tolist() == [1, 0, 0]
+    assert len(robot.mirror.pairs) == 4
+
+
+def test_a_robot_beside_its_own_origin_is_mirrored_in_its_middle():
+    # The frame of the trunk is that of a sensor at its side.
+    path = bundled.find("quadruped")
+    plain = Facts(load_robot(path))
+    trunk = plain.bodies[0].top.name
+    text = path.read_text().replace(
+        "</robot>",
+        '<link name="sensor"/><joint name="mounted" type="fixed"><parent link="sensor"/>'
+        f'<child link="{trunk}"/><origin xyz="0 0.1 0"/></joint></robot>',
+    )
+    robot = Facts(load_robot(FILE, contents={FILE: text.encode()}))
+    assert robot.bodies[0].top.name == "sensor"
+    assert robot.mirror.offset == pytest.approx(0.1)
+    assert plain.mirror.offset == 0
+    assert pairs(robot) == pairs(plain)
+    assert robot.stance.positions == pytest.approx(plain.stance.positions, abs=1e-6)
+
+
+def test_robots_without_bodies_or_joints():
+    assert facts().mirror.pairs == ()
+    assert Facts(load_robot(FILE, contents={FILE: b'<robot name="r"/>'})).mirror.pairs == ()
+
+
+def test_thousands_of_bodies_are_no_trouble():
+    joints = [
+        ("trunk", f"{side}{k}", f"{k * 1e-3} {y} 0", "0 1 0")
+        for k in range(1000)
+        for side, y in (("l", 1), ("r", -1))
+    ]
+    robot = facts(*joints)
+    assert robot.limbs == ()
+    assert len(robot.mirror.pairs) == 1000

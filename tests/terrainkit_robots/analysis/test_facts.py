@@ -1,0 +1,194 @@
+import math
+from pathlib import Path
+
+import pytest
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description import bundled
+from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.runner import lint
+from terrainkit_robots.mesh.mesh_cache import Meshes
+
+URDF, MJCF = Path("/robots/robot.urdf"), Path("/robots/robot.xml")
+
+
+def facts(text, file=URDF):
+    return Facts(load_robot(file, contents={file: text.encode()}))
+
+
+def link(name, mass=1.0):
+    inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+    return f'<link name="{name}"><inertial><mass value="{mass}"/>{inertia}</inertial></link>'
+
+
+def joint(name, parent, child, kind="revolute", more=""):
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f"{more}</joint>"
+    )
+
+
+ROBOT = (
+    '<robot name="r">'
+    + link("a")
+    + link("b", 2)
+    + link("c", 3)
+    + link("d", 4)
+    + joint("ab", "a", "b", "fixed")
+    + joint("bc", "b", "c", more='<limit lower="0.2" upper="1"/>')
+    + joint("ad", "a", "d", "prismatic", '<mimic joint="bc" multiplier="2"/>')
+    + "</robot>"
+)
+
+
+def test_facts_of_a_small_robot():
+    robot = facts(ROBOT)
+    assert [body.name for body in robot.bodies] == ["b", "c", "d"]
+    assert [each.name for each in robot.links] == ["a", "b", "c", "d"]
+    assert [each.name for each in robot.joints] == ["bc", "ad"]
+    assert [each.name for each in robot.actuated] == ["bc"]
+    assert robot.total_mass == 10
+    assert {name: body.index for name, body in robot.body_of.items()} == {
+        "a": 0,
+        "b": 0,
+        "c": 1,
+        "d": 2,
+    }
+    assert len(robot.at_zero) == 3
+    assert robot.limbs == robot.legs == ()
+    assert robot.stance is None
+    assert robot.positions["bc"] == 0.2
+
+
+def test_facts_of_nothing():
+    robot = facts('<robot name="r"/>')
+    assert robot.bodies == robot.links == robot.joints == robot.actuated == ()
+    assert robot.body_of == robot.positions == {}
+    assert robot.total_mass == 0
+    assert robot.at_zero == robot.limbs == robot.legs == robot.mirror.pairs == ()
+    assert robot.stance is None
+    assert robot.overlaps.overlaps({}) == []
+
+
+def test_what_is_no_robot_has_no_facts():
+    robot = facts("nothing of the kind")
+    assert robot.bodies == robot.legs == ()
+    assert robot.model.problems
+
+
+def test_each_fact_is_worked_out_once():
+    robot = facts(ROBOT)
+    for name in ("tree", "bodies", "at_zero", "limbs", "legs", "mirror", "positions", "overlaps"):
+        assert getattr(robot, name) is getattr(robot, name)
+
+
+def test_only_what_hangs_together_is_the_robot():
+    robot = facts(ROBOT.replace("</robot>", link("stray", 100) + "</robot>"))
+    assert robot.total_mass == 10
+    assert "stray" not in robot.body_of
+
+
+@pytest.mark.parametrize("mass", ["", "x", "1e308"])
+def test_a_mass_that_is_not_known_counts_as_none(mass):
+    assert facts(ROBOT.replace('<mass value="4"/>', f'<mass value="{mass}"/>')).total_mass == 6
+
+
+def test_a_mass_that_hangs_on_a_mesh_is_not_known():
+    text = (
+        '<mujoco><asset><mesh name="m" file="lost.stl"/></asset><worldbody><body name="a">'
+        '<freejoint/><geom size="0.1" mass="2"/><body name="b"><joint name="j"/>'
+        '<geom type="mesh" mesh="m"/></body></body></worldbody></mujoco>'
+    )
+    assert math.isnan(facts(text, MJCF).total_mass)
+    assert facts(text.replace('type="mesh" mesh="m"', 'size="0.1" mass="1"'), MJCF).total_mass == 3
+
+
+# Motors of MJCF
+
+
+def mjcf(actuators):
+    return (
+        '<mujoco><worldbody><body name="a"><freejoint/><geom size="0.1"/><body name="b">'
+        '<joint name="i"/><geom size="0.1"/><body name="c"><joint name="j"/><geom size="0.1"/>'
+        '</body></body></body></worldbody><tendon><fixed name="t"><joint joint="i" coef="1"/>'
+        f"</fixed></tendon><actuator>{actuators}</actuator></mujoco>"
+    )
+
+
+@pytest.mark.parametrize(
+    ("actuators", "driven"),
+    [
+        ("", ["i", "j"]),
+        ('<motor joint="j"/>', ["j"]),
+        ('<motor joint="j"/><position joint="i"/>', ["i", "j"]),
+        ('<motor tendon="t"/>', ["i", "j"]),
+        ('<motor tendon="t"/><motor joint="i"/>', ["i"]),
+    ],
+)
+def test_joints_that_a_motor_drives(actuators, driven):
+    assert [each.name for each in facts(mjcf(actuators), MJCF).actuated] == driven
+
+
+def test_the_positions_of_a_keyframe_are_where_the_robot_starts():
+    path = bundled.find("quadruped").with_suffix(".xml")
+    robot = Facts(load_robot(path))
+    assert robot.positions == {each.name: robot.model.home[each.name] for each in robot.joints}
+    assert robot.stance.positions == robot.positions
+
+
+# Meshes
+
+
+def test_no_mesh_is_opened_before_one_is_needed(robot_file):
+    meshes = Meshes()
+    robot = Facts(load_robot(robot_file("g1/g1_29dof.urdf")), meshes)
+    assert len(robot.bodies) == 30
+    assert robot.total_mass > 30
+    assert len(robot.at_zero) == 30
+    assert not meshes.opened
+
+
+def test_a_mesh_is_opened_twice_at_most(robot_file):
+    meshes = Meshes()
+    robot = Facts(load_robot(robot_file("g1/g1_29dof.urdf")), meshes)
+    assert robot.stance is not None
+    assert meshes.opened
+    assert max(meshes.opened.values()) <= 2
+
+
+# Size
+
+
+def test_a_robot_of_thousands_of_links_is_no_trouble():
+    # Two chains of 1,000 links beside each other, with shapes: limbs, mirrors and overlaps of them.
+    parts = [link("trunk")]
+    for side, y in (("left", 0.01), ("right", -0.01)):
+        at = "trunk"
+        for k in range(1000):
+            name = f"{side}_{k}"
+            parts.append(
+                link(name).replace(
+                    "</link>",
+                    '<collision><geometry><sphere radius="0.01"/></geometry></collision></link>',
+                )
+            )
+            parts.append(joint(f"{name}_joint", at, name, more=f'<origin xyz="0 {y} 0"/>'))
+            at = name
+    robot = facts(f'<robot name="r">{"".join(parts)}</robot>')
+    assert robot.legs == ()
+    assert len(robot.mirror.pairs) == 1000
+    assert robot.positions
+
+
+@pytest.mark.parametrize("value", ["1e29", "-1e29", "1e-300", "0"])
+@pytest.mark.parametrize("attribute", ["mass value", "xyz", "rpy", "radius", "lower", "ixx"])
+def test_numbers_without_measure_break_no_fact_and_no_rule(value, attribute):
+    text = bundled.find("quadruped").read_text()
+    name = attribute.split()[-1]
+    start = text.index(f"<mass {name}=" if " " in attribute else f"{name}=", text.index("<joint"))
+    begin = text.index('"', start) + 1
+    end = text.index('"', begin)
+    count = len(text[begin:end].split())
+    robot = facts(text[:begin] + " ".join([value] * count) + text[end:])
+    report = lint(robot)
+    assert report.crashed == ()

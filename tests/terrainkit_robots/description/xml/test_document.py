@@ -1,0 +1,366 @@
+import os
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lxml import etree
+
+from terrainkit_robots.description.xml import document as xml_document
+from terrainkit_robots.description.xml.document import (
+    RobotFileError,
+    parse_xml,
+    read_bytes,
+    without_mark,
+)
+
+
+@pytest.fixture
+def file(tmp_path):
+    return tmp_path / "robot.urdf"
+
+
+def parse(file, text):
+    return parse_xml(file, text if isinstance(text, bytes) else text.encode())
+
+
+def lines(document):
+    """Return the line of each element, in the order in which they start."""
+    return [document.source(e).line for e in document.root.iter(etree.Element)]
+
+
+def codes(document):
+    return [problem.code for problem in document.problems]
+
+
+# Lines
+
+
+def test_an_element_is_on_the_line_of_its_bracket(file):
+    document = parse(file, '<robot name="r">\n  <link name="a"/>\n\n  <link name="b"/>\n</robot>\n')
+    assert lines(document) == [1, 2, 4]
+    assert document.problems == ()
+
+
+def test_attributes_over_several_lines_do_not_move_it(file):
+    text = '<robot\n  name="r"\n  >\n  <link\n     name="a"\n  ><inertial\n/></link>\n</robot>'
+    assert lines(parse(file, text)) == [1, 4, 6]
+
+
+def test_comments_and_instructions_count_as_lines_only(file):
+    text = (
+        '<?xml version="1.0"?>\n<!-- <robot> <link/>\n -->\n<?pi <a>?>\n'
+        "<robot>\n<!--\n<link/>\n--><link/>\n<![CDATA[ <link> ]]>\n<joint/></robot>\n<!-- end -->"
+    )
+    assert lines(parse(file, text)) == [5, 8, 10]
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_lines_end_in_any_way(file, end):
+    text = end.join(["<robot>", "<!-- a", "comment -->", "<link", 'name="a"/>', "<link/>"])
+    assert lines(parse(file, text + "</robot>")) == [1, 4, 6]
+
+
+def test_elements_are_numbered_as_they_start(file):
+    document = parse(file, "<robot><link><visual/></link><!-- a --><joint/></robot>")
+    order = [(e.tag, document.source(e).element) for e in document.root.iter(etree.Element)]
+    assert order == [("robot", 0), ("link", 1), ("visual", 2), ("joint", 3)]
+
+
+def test_sources_name_the_file(file):
+    document = parse(file, "<robot><link/></robot>")
+    assert {source.file for source in document.sources.values()} == {file}
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "iso-8859-1"])
+def test_an_encoding_is_read_as_declared(file, encoding):
+    text = f'<?xml version="1.0" encoding="{encoding}"?>\n<robot name="Käfer">\n<link/>\n</robot>'
+    document = parse(file, text.encode(encoding))
+    assert document.root.get("name") == "Käfer"
+    assert lines(document) == [2, 3]
+
+
+@st.composite
+def documents(draw):
+    """Return a well-formed document, and the line on which each of its elements starts."""
+    pieces, lines = [], []
+    breaks = st.sampled_from(["", "\n", "\n\n", " ", "<!-- <x>\n -->", "&lt;", "text\n"])
+
+    def element(depth):
+        lines.append("".join(pieces).count("\n") + 1)
+        tag = draw(st.sampled_from(["robot", "link", "joint", "a-b", "xacro:macro"]))
+        pieces.extend(["<", tag, draw(st.sampled_from(["", " ", "\n"]))])
+        if draw(st.booleans()):
+            pieces.extend([" name=", draw(st.sampled_from(["\n", ""])), "'a\n>b'"])
+        if draw(st.booleans()):
+            pieces.append("/>")
+            return
+        pieces.append(">")
+        for _ in range(draw(st.integers(0, 3 if depth < 3 else 0))):
+            pieces.append(draw(breaks))
+            element(depth + 1)
+        pieces.append(draw(breaks))
+        pieces.append(f"</{tag}\n>")
+
+    pieces.append(draw(st.sampled_from(["", "<?xml version='1.0'?>\n", "\n\n", "<!--\n-->"])))
+    element(0)
+    return "".join(pieces), lines
+
+
+@settings(max_examples=100, deadline=None)
+@given(documents())
+def test_every_element_is_on_its_line(tmp_path_factory, document):
+    text, wanted = document
+    assert lines(parse(tmp_path_factory.getbasetemp() / "r.urdf", text)) == wanted
+
+
+# What stands before the document
+
+
+@pytest.mark.parametrize(
+    "ahead", [b"\xef\xbb\xbf", b"\n \xef\xbb\xbf", b"\xef\xbb\xbf\xef\xbb\xbf\n"]
+)
+def test_a_byte_order_mark_is_told_and_read_past(file, ahead):
+    text = b'<?xml version="1.0"?>\n<robot>\n<link/></robot>'
+    document = parse(file, ahead + text)
+    assert codes(document) == ["XML009"]
+    assert document.problems[0].source.line == 1
+    above = ahead.count(b"\n")
+    assert lines(document) == [2 + above, 3 + above]
+
+
+def test_space_before_the_declaration_is_told(file):
+    assert codes(parse(file, "\n<?xml version='1.0'?><robot/>")) == ["XML009"]
+
+
+def test_space_before_a_document_without_declaration_is_fine(file):
+    document = parse(file, "\n\n  <robot/>")
+    assert codes(document) == []
+    assert lines(document) == [3]
+
+
+@pytest.mark.parametrize("ahead", [b"\xef\xbb\xbf", b" \n", b"\n\xef\xbb\xbf \xef\xbb\xbf"])
+def test_what_stands_before_can_be_taken_away(file, ahead):
+    text = b'<?xml version="1.0"?>\n<robot/>'
+    problem = parse(file, ahead + text).problems[0]
+    (edit,) = without_mark(problem).edits
+    assert (ahead + text)[: edit.start] + edit.replacement + (ahead + text)[edit.end :] == text
+    assert parse(file, text).problems == ()
+
+
+# Broken documents
+
+
+def test_of_a_broken_document_the_rest_is_read(file):
+    document = parse(file, '<robot>\n<link name="a">\n</robot>\n')
+    assert codes(document)[0] == "XML001"
+    assert document.problems[0].source.line == 3
+    assert "mismatch" in document.problems[0].message
+    assert [link.get("name") for link in document.root.iter("link")] == ["a"]
+
+
+def test_elements_of_a_broken_document_have_lines_but_cannot_be_edited(file):
+    document = parse(file, "<robot>\n<link>\n<visual/>\n</robot>")
+    assert lines(document) == [1, 2, 3]
+    assert {source.element for source in document.sources.values()} == {None}
+
+
+def test_lines_of_a_broken_document_count_from_the_top_of_the_file(file):
+    assert lines(parse(file, b"\n\n\xef\xbb\xbf<robot>\n<link>\n</robot>")) == [3, 4]
+
+
+def test_each_line_with_a_mistake_is_told_once(file):
+    document = parse(file, '<robot>\n<link name=a b=c/>\n<link x="1" x="2"/>\n</robot>')
+    assert [p.source.line for p in document.problems] == [2, 3]
+    assert set(codes(document)) == {"XML001"}
+
+
+def test_not_every_mistake_of_a_hopeless_file_is_told(file):
+    document = parse(file, "<robot>" + "\n<link name=a/>" * 500 + "</robot>")
+    assert 1 < len(document.problems) <= 20
+
+
+def test_an_ampersand_is_a_mistake_that_is_read_past(file):
+    document = parse(file, '<robot name="a & b">\n<link name="c"/></robot>')
+    assert codes(document) == ["XML001"]
+    assert len(document.root) == 1
+
+
+def test_a_prefix_without_namespace_is_no_mistake_of_syntax(file):
+    document = parse(file, "<robot>\n<xacro:macro/>\n<link/></robot>")
+    assert codes(document) == []
+    assert lines(document) == [1, 2, 3]
+
+
+@pytest.mark.parametrize("data", [b"", b" \n\t", b"\xef\xbb\xbf", b"\xef\xbb\xbf \n"])
+def test_nothing_is_told_as_empty(file, data):
+    document = parse(file, data)
+    assert document.root is None
+    assert codes(document) == ["XML001"]
+    assert "empty" in document.problems[0].message
+
+
+@pytest.mark.parametrize(
+    "data",
+    [b"just text", b"\x00" * 100, b"\x7fELF\x02\x01\x01", bytes(range(256)), b"{}", b"<", b"<<<"],
+)
+def test_what_is_no_xml_is_told(file, data):
+    document = parse(file, data)
+    assert document.root is None
+    assert set(codes(document)) == {"XML001"}
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.binary(max_size=60))
+def test_any_bytes_are_read_without_an_exception(tmp_path_factory, data):
+    document = parse(tmp_path_factory.getbasetemp() / "r.urdf", data)
+    assert (document.root is None) <= bool(document.problems)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 90), st.integers(0, 8), st.binary(max_size=4))))
+def test_damage_is_told_or_harmless(tmp_path_factory, cuts):
+    data = b'<?xml version="1.0"?>\n<robot name="r">\n<link name="a">\n</link><!-- b --></robot>\n'
+    for at, length, other in cuts:
+        data = data[:at] + other + data[at + length :]
+    document = parse(tmp_path_factory.getbasetemp() / "r.urdf", data)
+    if document.root is not None:
+        assert all(
+            0 <= line <= data.count(b"\n") + data.count(b"\r") + 1 for line in lines(document)
+        )
+    try:
+        etree.fromstring(data)
+    except etree.XMLSyntaxError:
+        assert document.problems
+
+
+# Size
+
+
+def test_a_large_file_is_not_looked_at(file, monkeypatch):
+    monkeypatch.setattr(xml_document, "MOST_BYTES", 2**20)
+    document = parse(file, b"<robot>" + b" " * 2**20 + b"</robot>")
+    assert document.root is None
+    assert codes(document) == ["XML001"]
+    assert "1 MiB" in document.problems[0].message
+
+
+def test_a_document_of_very_many_elements_is_not_looked_at(file, monkeypatch):
+    monkeypatch.setattr(xml_document, "MOST_ELEMENTS", 1000)
+    document = parse(file, "<robot>" + "<link/>" * 1000 + "</robot>")
+    assert document.root is None
+    assert "1000 elements" in document.problems[0].message
+    assert parse(file, "<robot>" + "<link/>" * 999 + "</robot>").root is not None
+
+
+def test_a_deep_document_is_told_and_is_no_trouble(file):
+    document = parse(file, "<a>" * 100_000 + "</a>" * 100_000)
+    assert "XML001" in codes(document)
+
+
+def test_a_million_links_are_no_trouble(file):
+    assert parse(file, b"<robot>" + b"<link/>\n" * 1_000_000 + b"</robot>").root is None
+
+
+# Trust
+
+BOMB = """<?xml version="1.0"?>
+<!DOCTYPE robot [
+<!ENTITY a "lollollollollollollollollollollol">
+<!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;">
+<!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b;&b;&b;">
+<!ENTITY d "&c;&c;&c;&c;&c;&c;&c;&c;&c;&c;">
+<!ENTITY e "&d;&d;&d;&d;&d;&d;&d;&d;&d;&d;">
+<!ENTITY f "&e;&e;&e;&e;&e;&e;&e;&e;&e;&e;">
+<!ENTITY g "&f;&f;&f;&f;&f;&f;&f;&f;&f;&f;">
+<!ENTITY h "&g;&g;&g;&g;&g;&g;&g;&g;&g;&g;">
+]>
+"""
+
+
+@pytest.mark.parametrize("body", ["<robot>&h;<link/></robot>", '<robot name="&h;"/>'])
+def test_an_entity_bomb_does_not_go_off(file, body):
+    document = parse(file, BOMB + body)
+    assert "XML010" in codes(document)
+    assert len(etree.tostring(document.root)) < 10_000 if document.root is not None else True
+
+
+def test_entities_are_told_on_their_line(file):
+    document = parse(file, BOMB + "<robot/>")
+    problem = next(p for p in document.problems if p.code == "XML010")
+    assert problem.source.line == 2
+
+
+def test_elements_in_an_entity_are_not_there(file):
+    text = '<!DOCTYPE robot [<!ENTITY a "<link/><link/>">]>\n<robot>&a;\n<joint/></robot>'
+    document = parse(file, text)
+    assert [e.tag for e in document.root.iter(etree.Element)] == ["robot", "joint"]
+    assert lines(document)[1] == 3
+
+
+def test_other_files_are_not_read(file, tmp_path):
+    (tmp_path / "secret").write_text("a secret")
+    (tmp_path / "secret.dtd").write_text('<!ENTITY b "a secret">')
+    text = (
+        f'<!DOCTYPE robot SYSTEM "{tmp_path}/secret.dtd" '
+        f'[<!ENTITY a SYSTEM "file://{tmp_path}/secret">]>\n<robot>&a;&b;</robot>'
+    )
+    document = parse(file, text)
+    assert "XML010" in codes(document)
+    assert b"a secret" not in etree.tostring(document.root)
+
+
+# Files
+
+
+def test_bytes_are_read_as_they_are(file):
+    file.write_bytes(b"\xef\xbb\xbf\r\n<robot/>")
+    assert read_bytes(file) == b"\xef\xbb\xbf\r\n<robot/>"
+
+
+def test_no_more_is_read_than_is_needed(file, monkeypatch):
+    monkeypatch.setattr(xml_document, "MOST_BYTES", 1000)
+    file.write_bytes(b" " * 5000)
+    assert len(read_bytes(file)) == 1001
+
+
+def test_a_file_that_is_not_there(file):
+    with pytest.raises(RobotFileError, match=r"there is no file .*robot\.urdf"):
+        read_bytes(file)
+
+
+def test_a_folder_is_no_robot(tmp_path):
+    with pytest.raises(RobotFileError, match="is a folder"):
+        read_bytes(tmp_path)
+
+
+def test_a_pipe_is_not_waited_for(file):
+    os.mkfifo(file)
+    with pytest.raises(RobotFileError, match="not a plain file"):
+        read_bytes(file)
+
+
+def test_a_device_is_no_robot(file):
+    file.symlink_to("/dev/zero")
+    with pytest.raises(RobotFileError, match="not a plain file"):
+        read_bytes(file)
+
+
+def test_a_circle_of_links_is_told(file, tmp_path):
+    file.symlink_to(tmp_path / "other")
+    (tmp_path / "other").symlink_to(file)
+    with pytest.raises(RobotFileError, match="cannot read"):
+        read_bytes(file)
+
+
+@pytest.mark.parametrize("name", ["a\0b", "a" * 5000])
+def test_an_impossible_name_is_told(tmp_path, name):
+    with pytest.raises(RobotFileError, match="cannot read"):
+        read_bytes(tmp_path / name)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
+def test_a_file_without_permission_is_told(file):
+    file.write_text("<robot/>")
+    file.chmod(0)
+    with pytest.raises(RobotFileError, match=r"cannot read .*ermission"):
+        read_bytes(file)

@@ -1,0 +1,106 @@
+import subprocess
+from importlib import metadata
+
+import numpy as np
+import pytest
+import trimesh
+
+from terrainkit.errors import TerrainkitError
+from terrainkit_robots.export.collision_simplification import convex_parts as module
+from terrainkit_robots.export.collision_simplification.convex_parts import convex_parts
+from terrainkit_robots.mesh.surface import MeshError, Surface, signed_volume
+
+
+def surface_of(mesh):
+    return Surface(points=np.asarray(mesh.vertices), faces=np.asarray(mesh.faces))
+
+
+# an angle: two boxes of 3 x 1 x 1 and 1 x 1 x 2
+ANGLE = surface_of(
+    trimesh.creation.extrude_polygon(
+        trimesh.path.polygons.Polygon([(0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)]), 1.0
+    )
+)
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    """Return the commands that were run."""
+    made, run = [], subprocess.run
+
+    def counted(command, **options):
+        made.append(command)
+        return run(command, **options)
+
+    monkeypatch.setattr(module.subprocess, "run", counted)
+    return made
+
+
+def test_an_angle_is_two_boxes(capfd):
+    parts = convex_parts(ANGLE, None)
+    volumes = sorted(signed_volume(part) for part in parts)
+    assert sum(volumes) == pytest.approx(5, rel=0.02)
+    assert len(parts) == 2
+    assert volumes == pytest.approx([2, 3], rel=0.05)
+    for part in parts:
+        assert len(part.points) <= module.PARAMETERS["max_ch_vertex"]
+        assert trimesh.Trimesh(part.points, part.faces).is_convex
+    assert capfd.readouterr() == ("", "")
+
+
+def test_kept_by_content(tmp_path, calls):
+    first = convex_parts(ANGLE, tmp_path)
+    again = convex_parts(Surface(points=ANGLE.points.copy(), faces=ANGLE.faces.copy()), tmp_path)
+    assert len(calls) == 1
+    for a, b in zip(first, again, strict=True):
+        np.testing.assert_array_equal(a.points, b.points)
+        np.testing.assert_array_equal(a.faces, b.faces)
+    other = convex_parts(Surface(points=2 * ANGLE.points, faces=ANGLE.faces), tmp_path)
+    assert len(calls) == 2
+    assert sum(map(signed_volume, other)) == pytest.approx(8 * sum(map(signed_volume, first)))
+
+
+def test_the_same_parts_each_time():
+    first, second = convex_parts(ANGLE, None), convex_parts(ANGLE, None)
+    assert [part.points.tobytes() for part in first] == [part.points.tobytes() for part in second]
+
+
+def test_another_version_makes_other_keys(monkeypatch):
+    before = module._key(ANGLE)
+    monkeypatch.setattr(metadata, "version", lambda _: "0.0.1")
+    assert module._key(ANGLE) != before
+
+
+def test_a_key_follows_from_parameters(monkeypatch):
+    before = module._key(ANGLE)
+    monkeypatch.setattr(module, "PARAMETERS", {**module.PARAMETERS, "threshold": 0.06})
+    assert module._key(ANGLE) != before
+
+
+def test_a_damaged_file_is_made_anew(tmp_path, calls):
+    convex_parts(ANGLE, tmp_path)
+    (file,) = tmp_path.iterdir()
+    file.write_bytes(file.read_bytes()[:200])
+    assert len(convex_parts(ANGLE, tmp_path)) == 2
+    assert len(calls) == 2
+
+
+class TestFailures:
+    def test_too_long(self, monkeypatch, tmp_path):
+        monkeypatch.setattr(module, "_MOST_SECONDS", 0.01)
+        with pytest.raises(MeshError, match=r"keeps CoACD busy for over 0\.01 s"):
+            convex_parts(ANGLE, tmp_path)
+        assert not list(tmp_path.iterdir())
+
+    def test_an_end_of_the_process(self, monkeypatch):
+        monkeypatch.setattr(module, "PARAMETERS", {"no_such_parameter": 1})
+        with pytest.raises(MeshError, match=r"is too much for CoACD: .*no_such_parameter"):
+            convex_parts(ANGLE, None)
+
+    def test_not_installed(self, monkeypatch):
+        def missing(name):
+            raise metadata.PackageNotFoundError(name)
+
+        monkeypatch.setattr(metadata, "version", missing)
+        with pytest.raises(TerrainkitError, match="need the package coacd"):
+            convex_parts(ANGLE, None)

@@ -1,0 +1,115 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from terrainkit_robots.export.collision_simplification import decomposition_cache as module
+from terrainkit_robots.export.collision_simplification.decomposition_cache import (
+    PartCache,
+    cache_folder,
+    packed,
+    unpacked,
+)
+from terrainkit_robots.mesh.surface import Surface
+
+BOX = trimesh.creation.box([1, 2, 3])
+PART = Surface(points=np.asarray(BOX.vertices), faces=np.asarray(BOX.faces))
+
+
+def assert_same(found, wanted):
+    assert found is not None
+    assert len(found) == len(wanted)
+    for a, b in zip(found, wanted, strict=True):
+        np.testing.assert_array_equal(a.points, b.points)
+        np.testing.assert_array_equal(a.faces, b.faces)
+
+
+def test_what_is_put_is_got_again_by_its_key(tmp_path):
+    cache = PartCache(tmp_path / "deep" / "cache")
+    assert cache.get("a") is None
+    cache.put("a", [PART, PART])
+    assert_same(PartCache(tmp_path / "deep" / "cache").get("a"), [PART, PART])
+    assert cache.get("b") is None
+    assert [file.name for file in (tmp_path / "deep" / "cache").iterdir()] == ["a.npz"]
+
+
+DAMAGES = {
+    "cut off": lambda data: data[: len(data) // 2],
+    "empty": lambda data: data[:0],
+    "of something else": lambda data: data[::-1],
+    "with zeros in it": lambda data: data[:100] + bytes(50) + data[150:],
+    "with ones in it": lambda data: data[:100] + b"\xff" * 50 + data[150:],
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_file_counts_as_none_and_is_written_anew(tmp_path, damage):
+    cache = PartCache(tmp_path)
+    cache.put("a", [PART])
+    file = tmp_path / "a.npz"
+    file.write_bytes(DAMAGES[damage](file.read_bytes()))
+    assert cache.get("a") is None
+    cache.put("a", [PART])
+    assert_same(cache.get("a"), [PART])
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        Surface(points=PART.points * np.nan, faces=PART.faces),
+        Surface(points=PART.points, faces=PART.faces + 1),
+        Surface(points=PART.points, faces=-PART.faces),
+        Surface(points=PART.points[:, :2], faces=PART.faces),
+        Surface(points=PART.points[:3], faces=PART.faces[:1] * 0),
+    ],
+)
+def test_parts_that_are_none_count_as_damaged(part):
+    assert unpacked(packed([PART])) is not None
+    assert unpacked(packed([PART, part])) is None
+    assert unpacked(packed([])) is None
+
+
+def test_nothing_is_unpickled(tmp_path):
+    class Evil:
+        def __reduce__(self):
+            return Path.touch, (tmp_path / "executed",)
+
+    np.savez(tmp_path / "a.npz", points_0=np.array([Evil()], dtype=object))
+    assert PartCache(tmp_path).get("a") is None
+    assert not (tmp_path / "executed").exists()
+
+
+def test_a_long_file_is_not_read(tmp_path, monkeypatch):
+    cache = PartCache(tmp_path)
+    cache.put("a", [PART])
+    monkeypatch.setattr(module, "_MOST_BYTES", 10)
+    assert cache.get("a") is None
+
+
+def test_no_folder_keeps_nothing():
+    cache = PartCache(None)
+    cache.put("a", [PART])
+    assert cache.get("a") is None
+
+
+def test_where_nothing_can_be_written_nothing_is_kept(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    cache = PartCache(tmp_path / "file" / "cache")
+    cache.put("a", [PART])
+    assert cache.get("a") is None
+
+
+class TestFolder:
+    @pytest.fixture(autouse=True)
+    def linux(self, monkeypatch):
+        monkeypatch.setattr(module.sys, "platform", "linux")
+
+    def test_is_where_the_system_says(self, monkeypatch, tmp_path):
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+        assert cache_folder() == tmp_path / "terrainkit" / "coacd"
+
+    @pytest.mark.parametrize("named", ["", "not/absolute"])
+    def test_is_in_the_home_else(self, monkeypatch, named):
+        monkeypatch.setenv("XDG_CACHE_HOME", named)
+        assert cache_folder() == Path.home() / ".cache" / "terrainkit" / "coacd"

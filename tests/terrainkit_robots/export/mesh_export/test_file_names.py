@@ -1,0 +1,41 @@
+import pytest
+
+from terrainkit_robots.export.mesh_export.file_names import FileNames
+
+
+def test_one_content_is_one_file():
+    names = FileNames("meshes")
+    assert names.add("hip", ".stl", b"1") == "meshes/hip.stl"
+    assert names.add("thigh", ".stl", b"1") == "meshes/hip.stl"
+    assert names.files == {"meshes/hip.stl": b"1"}
+
+
+def test_distinct_contents_have_distinct_names_also_without_suffix_and_capitals():
+    names = FileNames("meshes")
+    added = [
+        names.add(stem, suffix, bytes([k]))
+        for k, (stem, suffix) in enumerate(
+            [("hip", ".stl"), ("HIP", ".stl"), ("hip", ".obj"), ("hip_2", ".stl")]
+        )
+    ]
+    stems = [name.removeprefix("meshes/").rpartition(".")[0].lower() for name in added]
+    assert added[0] == "meshes/hip.stl"
+    assert len(set(stems)) == 4
+
+
+@pytest.mark.parametrize(
+    ("wanted", "name"),
+    [
+        ("left hip", "m/left_hip.stl"),
+        ("../../etc/passwd", "m/etc_passwd.stl"),
+        ('a"><b', "m/a_b.stl"),
+        ("\u0441\u0442\u043e\u043f\u0430", "m/mesh.stl"),
+        ("", "m/mesh.stl"),
+        ("-rf", "m/rf.stl"),
+        ("NUL", "m/NUL_mesh.stl"),
+        ("hip.v2", "m/hip_v2.stl"),
+        ("x" * 500, f"m/{'x' * 80}.stl"),
+    ],
+)
+def test_names_are_safe(wanted, name):
+    assert FileNames("m").add(wanted, ".stl", b"") == name

@@ -1,0 +1,288 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from terrainkit_robots.analysis.bodies.kinematics import body_poses
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description import bundled
+from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.description.xml.document import RobotFileError
+from terrainkit_robots.export.canonical import normal_form
+
+MASS = '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>'
+
+
+def facts(tmp_path, text):
+    path = tmp_path / ("robot.xml" if "<mujoco" in text else "robot.urdf")
+    path.write_text(text)
+    return Facts(load_robot(path))
+
+
+def mjcf(body, more=""):
+    return f"""<mujoco model="r"><compiler angle="radian"/><worldbody>
+      <body name="base">{MASS}<geom size="0.1" mass="0"/>{body}</body></worldbody>{more}</mujoco>"""
+
+
+def link_poses(robot, positions):
+    poses = body_poses(robot.bodies, positions)
+    return {
+        link.name: pose @ local
+        for body, pose in zip(robot.bodies, poses, strict=True)
+        for link, local in zip(body.links, body.poses, strict=True)
+    }
+
+
+ROBOTS = [
+    "a1/urdf/a1.urdf",
+    "go2/urdf/go2.urdf",
+    "go2_mjcf/go2.xml",
+    "h1/urdf/h1.urdf",
+    "h1/h1.xml",
+    "g1/g1_29dof.urdf",
+    "g1/g1_29dof.xml",
+    "anymal_c/urdf/anymal_c.urdf",
+    "cassie/urdf/cassie.urdf",
+]
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_the_normal_form_is_the_same_robot(name, robot_file):
+    check_same(Facts(load_robot(robot_file(name))))
+
+
+@pytest.mark.parametrize("name", ["quadruped", "biped"])
+@pytest.mark.parametrize("suffix", [".urdf", ".xml"])
+def test_the_normal_form_of_a_bundled_robot_is_the_same_robot(name, suffix):
+    check_same(Facts(load_robot(bundled.find(name).with_suffix(suffix))))
+
+
+def check_same(source):
+    form = normal_form(source)
+    made = Facts(form.model)
+    assert made.total_mass == pytest.approx(source.total_mass)
+    assert [leg.foot for leg in made.legs] == [leg.foot for leg in source.legs]
+    assert [j.name for j in made.actuated] == [j.name for j in source.actuated]
+    rng = np.random.default_rng(1)
+    positions = {joint.name: float(rng.uniform(-1, 1)) for joint in source.joints}
+    here, there = link_poses(made, positions), link_poses(source, positions)
+    assert here.keys() == there.keys()
+    for link, pose in here.items():
+        np.testing.assert_allclose(pose, there[link], atol=1e-12)
+    # Doing it again changes nothing: the form is one.
+    again = normal_form(made)
+    assert again.notes == ()
+    assert [j.name for j in again.model.joints] == [j.name for j in form.model.joints]
+
+
+def test_a_reference_goes_into_the_origin(tmp_path):
+    robot = facts(
+        tmp_path,
+        mjcf(
+            f'<body name="leg" pos="0 0 -0.2">{MASS}'
+            '<joint name="j" axis="0 2 0" pos="0 0 0.1" ref="0.5" range="-1 1"/></body>'
+        ),
+    )
+    (joint,) = normal_form(robot).model.joints
+    assert joint.reference == 0
+    np.testing.assert_allclose(joint.axis, [0, 1, 0])
+    # At q = 0.5 the leg is where the file has it; at 0 it is turned back about (0, 0, -0.1).
+    c, s = np.cos(-0.5), np.sin(-0.5)
+    np.testing.assert_allclose(joint.origin[:3, 3], [-0.1 * s, 0, -0.1 - 0.1 * c], atol=1e-12)
+    (body,) = [b for b in Facts(normal_form(robot).model).bodies if b.joint is not None]
+    at = body_poses(Facts(normal_form(robot).model).bodies, {"j": 0.5})[body.index]
+    np.testing.assert_allclose(at[:3, 3], [0, 0, -0.2], atol=1e-12)
+
+
+def test_a_joint_without_a_motor_is_fixed_and_told(tmp_path):
+    robot = facts(tmp_path, mjcf(f'<body name="ball">{MASS}<joint name="b" type="ball"/></body>'))
+    form = normal_form(robot)
+    assert [joint.kind for joint in form.model.joints] == ["fixed"]
+    assert any("b" in note and "ball" in note for note in form.notes)
+
+
+def test_the_effort_of_a_mjcf_is_that_of_its_motor(tmp_path):
+    robot = facts(
+        tmp_path,
+        mjcf(
+            f'<body name="leg">{MASS}<joint name="j" axis="0 1 0" range="-1 1"/></body>',
+            '<actuator><motor joint="j" gear="2" ctrlrange="-10 10"/></actuator>',
+        ),
+    )
+    form = normal_form(robot)
+    (joint,) = form.model.joints
+    assert joint.limit.effort == 20
+    assert [motor.joint for motor in form.model.actuators] == ["j"]
+
+
+def test_what_is_beside_the_robot_is_left_out_and_told(tmp_path):
+    text = mjcf(f'<body name="leg">{MASS}<joint name="j"/></body>').replace(
+        "</worldbody>", f'<body name="crate">{MASS}<freejoint/></body></worldbody>'
+    )
+    form = normal_form(facts(tmp_path, text))
+    assert [link.name for link in form.model.links] == ["base", "leg"]
+    assert any("crate" in note for note in form.notes)
+
+
+@pytest.mark.parametrize(
+    ("joint", "floating"),
+    [
+        ("<freejoint/>", True),
+        ("", False),
+    ],
+)
+def test_a_mjcf_says_itself_whether_it_floats(tmp_path, joint, floating):
+    text = mjcf(f'<body name="arm">{MASS}<joint name="j" range="-1 1"/></body>')
+    robot = facts(tmp_path, text.replace('<body name="base">', f'<body name="base">{joint}'))
+    assert normal_form(robot).model.floating is floating
+
+
+def test_an_arm_is_bolted_down_and_a_car_is_not(tmp_path):
+    link = (
+        '<link name="{}"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" '
+        'ixy="0" ixz="0" iyz="0"/></inertial></link>'
+    )
+    joint = (
+        '<joint name="j" type="{}"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/>{}</joint>'
+    )
+    limit = '<limit lower="-1" upper="1" effort="5" velocity="5"/>'
+    links = link.format("a") + link.format("b")
+    arm = f'<robot name="r">{links}{joint.format("revolute", limit)}</robot>'
+    car = f'<robot name="r">{links}{joint.format("continuous", "")}</robot>'
+    assert normal_form(facts(tmp_path, arm)).model.floating is False
+    assert normal_form(facts(tmp_path, car)).model.floating is True
+    assert normal_form(facts(tmp_path, arm), floating=True).model.floating is True
+
+
+CHAIN = """<robot name="r">{}<joint name="a" type="{}"><parent link="base"/><child link="one"/>
+  <axis xyz="0 0 1"/><limit lower="{}" upper="{}" effort="5" velocity="5"/></joint>{}</robot>"""
+
+
+@pytest.mark.parametrize(
+    ("kind", "ends", "joints", "floating"),
+    [
+        ("revolute", (-1e16, 1e16), 1, True),  # a propeller, as exporters write it
+        ("continuous", (0, 0), 1, True),
+        ("revolute", (-1, 1), 2, True),  # a wheel that is steered
+        ("revolute", (-1, 1), 3, False),  # the wrist of an arm
+        ("prismatic", (-1e16, 1e16), 1, False),
+    ],
+)
+def test_a_wheel_is_on_the_base_or_on_what_steers_it(tmp_path, kind, ends, joints, floating):
+    names = ["base", "one", "two", "three"][: joints + 1]
+    links = "".join(
+        f'<link name="{name}"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" '
+        'ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        for name in names
+    )
+    more = [
+        f'<joint name="{name}" type="continuous"><parent link="{above}"/><child link="{name}"/>'
+        '<origin xyz="0.1 0 0"/><axis xyz="0 1 0"/></joint>'
+        for above, name in pairwise(names[1:])
+    ]
+    robot = facts(tmp_path, CHAIN.format(links, kind, *ends, "".join(more)))
+    assert normal_form(robot).model.floating is floating
+
+
+def test_a_mass_from_a_mesh_is_what_mujoco_makes_of_it(tmp_path):
+    import trimesh
+
+    trimesh.creation.box((0.1, 0.2, 0.3)).export(tmp_path / "box.stl")
+    text = """<mujoco><asset><mesh name="box" file="box.stl"/></asset><worldbody>
+      <body name="base"><geom type="mesh" mesh="box" density="1000"/></body>
+    </worldbody></mujoco>"""
+    robot = facts(tmp_path, text)
+    assert np.isnan(robot.total_mass)
+    (link,) = normal_form(robot).model.links
+    assert link.inertial.mass == pytest.approx(6.0, rel=1e-5)
+    moments = 6.0 / 12 * np.array([0.01 + 0.04, 0.01 + 0.09, 0.04 + 0.09])
+    assert sorted(np.linalg.eigvalsh(link.inertial.inertia)) == pytest.approx(moments, rel=1e-4)
+
+
+def test_there_has_to_be_a_robot(tmp_path):
+    with pytest.raises(RobotFileError, match="wanted a robot"):
+        normal_form(facts(tmp_path, '<robot name="r"/>'))
+
+
+def test_two_joints_of_one_name_get_two(tmp_path):
+    text = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
+      <joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>
+      <joint name="j" type="fixed"><parent link="a"/><child link="c"/></joint></robot>"""
+    form = normal_form(facts(tmp_path, text))
+    assert [joint.name for joint in form.model.joints] == ["j", "c_joint"]
+    assert form.notes == ("named the joint above c c_joint: there are two j",)
+
+
+@pytest.mark.parametrize(("name", "wanted"), [("my robot/../x", "my_robot_.._x"), ("..", "robot")])
+def test_the_name_is_one_on_every_disk(tmp_path, name, wanted):
+    form = normal_form(facts(tmp_path, f'<robot name="{name}"><link name="a"/></robot>'))
+    assert form.model.name == wanted
+
+
+def test_a_link_called_world_gets_another_name(tmp_path):
+    text = """<robot name="r"><link name="world"/><link name="world_link"/>
+      <joint name="j" type="fixed"><parent link="world"/><child link="world_link"/></joint>
+      </robot>"""
+    form = normal_form(facts(tmp_path, text))
+    assert [link.name for link in form.model.links] == ["world_link_2", "world_link"]
+    assert form.model.joints[0].parent == "world_link_2"
+    assert form.model.floating is False
+    assert form.notes == ("named the link world world_link_2: MuJoCo has a world of its own",)
+
+
+DYNAMICS = """<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous">
+  <parent link="a"/><child link="b"/><dynamics damping="{0}" friction="{0}"/></joint></robot>"""
+
+
+@pytest.mark.parametrize(("written", "wanted"), [("0.3", 0.3), ("-0.3", 0.0), ("nan", 0.0)])
+def test_friction_and_damping_are_kept_where_they_slow(tmp_path, written, wanted):
+    (joint,) = normal_form(facts(tmp_path, DYNAMICS.format(written))).model.joints
+    assert (joint.friction, joint.damping) == (wanted, wanted)
+
+
+@pytest.mark.parametrize(
+    ("leads", "notes"),
+    [
+        (("k", "j"), ("j", "k")),
+        (("j", "j"), ("j",)),
+        (("nobody", "j"), ("j",)),
+    ],
+)
+def test_a_joint_that_follows_itself_or_nobody_is_free_and_told(tmp_path, leads, notes):
+    joint = """<joint name="{}" type="continuous"><parent link="a"/><child link="{}"/>
+      <mimic joint="{}"/></joint>"""
+    joints = joint.format("j", "b", leads[0]) + joint.format("k", "c", leads[1])
+    text = f'<robot name="r"><link name="a"/><link name="b"/><link name="c"/>{joints}</robot>'
+    form = normal_form(facts(tmp_path, text))
+    free = [joint.name for joint in form.model.joints if joint.mimic is None]
+    assert free == list(notes)
+    why = {"nobody": "there is no 'nobody'"}.get(leads[0], "it would follow itself in the end")
+    assert form.notes == tuple(f"{name} follows no other joint: {why}" for name in notes)
+
+
+MESH = '<mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/>'
+
+
+def test_a_texture_without_end_costs_nothing(tmp_path):
+    """It would take 2.4 GB, for a mass."""
+    text = f"""<mujoco><asset>{MESH}
+      <texture name="t" type="2d" builtin="flat" width="20000" height="20000"/>
+      <material name="p" texture="t"/></asset>
+      <worldbody><body name="base"><geom type="mesh" mesh="m" material="p"/></body></worldbody>
+    </mujoco>"""
+    (link,) = normal_form(facts(tmp_path, text)).model.links
+    assert link.inertial.mass == pytest.approx(1000 / 6)
+
+
+def test_a_body_without_a_name_is_told(tmp_path):
+    text = f"""<mujoco><asset>{MESH}</asset><worldbody><body>
+      <geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
+    with pytest.raises(RobotFileError, match="a body without a name has its mass from a mesh"):
+        normal_form(facts(tmp_path, text))
+
+
+def test_a_mesh_that_mujoco_does_not_find_is_told(tmp_path):
+    text = """<mujoco><asset><mesh name="m" file="no.stl"/></asset><worldbody><body name="base">
+      <geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
+    with pytest.raises(RobotFileError, match="masses are to come from meshes, and MuJoCo does not"):
+        normal_form(facts(tmp_path, text))

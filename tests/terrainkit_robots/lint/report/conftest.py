@@ -1,0 +1,96 @@
+"""Reports with everything in them that a format has to cope with."""
+
+from pathlib import Path
+
+import pytest
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.fix import Fix
+from terrainkit_robots.description.model import RobotModel, Source
+from terrainkit_robots.lint.report.repaired import Repaired
+from terrainkit_robots.lint.runner import Finding, Report, Skipped
+from terrainkit_robots.lint.selection import Suppressed, UnusedSuppression
+from terrainkit_robots.lint.suppressions import read_comments
+
+NASTY = 'a,b:c%d|e{0}<b>@me`*_\x1b[31m\r\n::error::x\u202e\udc80"'
+"""A name with something in it for each format to trip over."""
+
+
+@pytest.fixture
+def model():
+    def make(name="r", file="robot.urdf"):
+        path = Path(file)
+        return RobotModel(name=name, kind="urdf", file=path, source=Source(file=path, line=1))
+
+    return make
+
+
+@pytest.fixture
+def finding():
+    def make(code="INR002", name="negative-mass", severity="error", **changes):
+        fields = {
+            "certainty": "proven",
+            "subject": "calf",
+            "message": "the mass is -1 kg; wanted above 0",
+            "hint": "Weigh it.",
+            "file": Path("robot.urdf"),
+            "line": 12,
+            "measured": {"mass": -1.0},
+        }
+        return Finding(code=code, name=name, severity=severity, **fields | changes)
+
+    return make
+
+
+@pytest.fixture
+def report(model, finding):
+    """An error, two warnings and a note; a finding ignored by a comment, a rule not asked."""
+    fix = Fix(safety="safe", description="take the lead off", edits=())
+    quiet = finding(line=30, subject="hatch")
+    (comment,) = read_comments(
+        Path("robot.urdf"), b"<robot><!-- terrainkit: ignore INR002 so --></robot>"
+    )
+    return Report(
+        facts=Facts(model()),
+        findings=(
+            finding(),
+            finding("JNT007", "degrees", "warning", line=40, certainty="likely", fix=fix),
+            finding("JNT007", "degrees", "warning", line=0, subject=""),
+            finding("LEG001", "legs", "info", line=1, measured={"legs": 4}),
+        ),
+        skipped=(
+            Skipped(code="SYM001", reason="no legs were found"),
+            Skipped(code="SYM002", reason="no legs were found"),
+            Suppressed(code="INR002", reason="ignored: so", comment=comment, finding=quiet),
+            UnusedSuppression(code="INR999", reason="comment at robot.urdf:3: no such rule"),
+        ),
+    )
+
+
+@pytest.fixture
+def nasty(model, finding):
+    """A robot whose names want to break out, with numbers that no format has."""
+    path = Path(f"dir with space/{NASTY.replace(chr(0), '')}.urdf")
+    bad = finding(
+        subject=NASTY,
+        message=f"{NASTY} is wrong",
+        hint=NASTY,
+        file=path,
+        measured={NASTY: float("nan"), "large": float("inf"), "text": NASTY},
+    )
+    return Report(
+        facts=Facts(model(NASTY, str(path))),
+        findings=(bad,),
+        skipped=(Skipped(code="SYM001", reason=NASTY),),
+    )
+
+
+@pytest.fixture
+def repaired(model, finding):
+    """What is left once one fix was made and another was not."""
+    fix = Fix(safety="safe", description="name it", edits=())
+    done = finding("XML003", "unnamed-robot", "warning", fix=fix)
+    left = finding("JNT009", "unit-axis", "warning", fix=fix)
+    return Repaired(
+        facts=Facts(model()), findings=(left,), fixed=(done,), unfixed=((left, "no space"),)
+    )

@@ -1,0 +1,89 @@
+import json
+import math
+
+import pytest
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.report.facts_json import facts_json, number
+
+
+def record(path):
+    made = facts_json(Facts(load_robot(path)))
+    json.dumps(made, allow_nan=False)
+    return made
+
+
+def test_a_quadruped(robot_file):
+    facts = record(robot_file("go2/urdf/go2.urdf"))
+    assert facts["total_mass"] == pytest.approx(15.0191, abs=1e-3)
+    assert (facts["links"], facts["bodies"], facts["joints"]) == (29, 13, 12)
+    assert facts["feet"] == ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]
+    assert facts["legs"][0]["joints"] == [
+        {"name": "FL_hip_joint", "role": "roll"},
+        {"name": "FL_thigh_joint", "role": "hip"},
+        {"name": "FL_calf_joint", "role": "knee"},
+    ]
+    # Two bones of 0.213 m, and the foot's radius of 0.022 m below.
+    assert facts["leg_length"] == pytest.approx(0.448, abs=1e-3)
+    # The hips are 2 (0.0465 + 0.0955) m apart, and the feet are below them.
+    assert facts["standing_width"] == pytest.approx(0.284, abs=1e-3)
+    assert facts["spawn_height"] == pytest.approx(facts["standing_height"] + 0.01)
+    assert set(facts["holding_torques"]) == set(facts["standing_pose"])
+    assert {"left": "FL_hip_joint", "right": "FR_hip_joint", "sign": -1} in facts["mirrored_joints"]
+    # legged_gym's A1: 12 actions, 48 observations without the height scan.
+    assert (facts["action_size"], facts["observation_size"]) == (12, 48)
+
+
+def test_a_robot_without_legs_has_the_same_keys(robot_file, tmp_path):
+    file = tmp_path / "arm.urdf"
+    file.write_text('<robot name="arm"><link name="only"/></robot>')
+    facts = record(file)
+    assert facts.keys() == record(robot_file("go2/urdf/go2.urdf")).keys()
+    assert (facts["legs"], facts["feet"], facts["leg_length"]) == ([], [], None)
+    assert facts["standing_pose"] is facts["spawn_height"] is facts["holding_torques"] is None
+
+
+def test_joint_orders_by_simulator(robot_file):
+    orders = record(robot_file("a1/urdf/a1.urdf"))["joint_orders"]
+    assert list(orders) == ["file", "mujoco", "isaac_gym", "isaac_lab", "genesis"]
+    legs = {name: [joint[:2] for joint in orders[name]["joints"]] for name in list(orders)[1:]}
+    assert [joint[:2] for joint in orders["file"]][::3] == ["FR", "FL", "RR", "RL"]
+    assert legs["mujoco"][::3] == legs["genesis"][::3] == ["FR", "FL", "RR", "RL"]
+    assert legs["isaac_gym"][::3] == legs["isaac_lab"][:4] == ["FL", "FR", "RL", "RR"]
+    assert orders["mujoco"]["bodies"][:5] == ["base", "FR_hip", "FR_thigh", "FR_calf", "FL_hip"]
+    assert orders["mujoco"]["certain"] is True
+    assert orders["isaac_lab"]["certain"] is False
+    assert all(orders[name]["reason"] for name in legs)
+
+
+@pytest.mark.parametrize("mass", ["1e308", "1e400", "nan", "-1"])
+def test_numbers_beyond_all_bounds_are_none_or_finite(tmp_path, mass):
+    file = tmp_path / "robot.urdf"
+    inertial = f'<inertial><mass value="{mass}"/></inertial>'
+    file.write_text(f'<robot name="r"><link name="a">{inertial}</link></robot>')
+    total = record(file)["total_mass"]
+    assert total is None or math.isfinite(total)
+
+
+@pytest.mark.parametrize(
+    ("value", "kept"),
+    [(1 / 3, 0.333333), (1234567.8, 1234570.0), (0.0, 0.0), (math.inf, None), (math.nan, None)],
+)
+def test_six_digits_are_kept(value, kept):
+    assert number(value) == kept
+
+
+def test_gains_need_a_simulation(robot_file):
+    robot = Facts(load_robot(robot_file("go2/urdf/go2.urdf")))
+    assert facts_json(robot)["suggested_gains"] is None
+    gains = facts_json(robot, simulated=True)["suggested_gains"]
+    assert list(gains) == [joint.name for joint in robot.actuated]
+    assert gains["FL_calf_joint"]["stiffness"] == 60
+    assert gains["FL_calf_joint"]["reason"]
+
+
+def test_a_robot_that_cannot_be_simulated_gets_no_gains(tmp_path):
+    path = tmp_path / "robot.urdf"
+    path.write_text('<robot name="r"/>')
+    assert facts_json(Facts(load_robot(path)), simulated=True)["suggested_gains"] is None

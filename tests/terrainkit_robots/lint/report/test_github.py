@@ -1,0 +1,30 @@
+from terrainkit_robots.lint.report.github import write
+
+
+def test_each_finding_is_a_command_with_its_level(report):
+    assert write([report]).splitlines() == [
+        "::error file=robot.urdf,line=12,title=INR002 negative-mass::"
+        "the mass is -1 kg; wanted above 0%0AWeigh it.",
+        "::warning file=robot.urdf,line=40,title=JNT007 degrees::"
+        "the mass is -1 kg; wanted above 0%0AWeigh it.",
+        "::warning file=robot.urdf,title=JNT007 degrees::"
+        "the mass is -1 kg; wanted above 0%0AWeigh it.",
+        "::notice file=robot.urdf,line=1,title=LEG001 legs::"
+        "the mass is -1 kg; wanted above 0%0AWeigh it.",
+    ]
+
+
+def test_no_name_ends_a_command_or_starts_one(nasty):
+    (line,) = write([nasty]).split("\n")[:-1]
+    assert line.count("\r") == 0
+    head, _, message = line.removeprefix("::error ").partition("::")
+    properties = dict(part.split("=", 1) for part in head.split(","))
+    assert list(properties) == ["file", "line", "title"]
+    assert properties["file"].startswith("dir with space/a%2Cb%3Ac%25d|e")
+    assert message.startswith("a,b:c%25d|e")
+    assert "%0D%0A::error::x" in message
+    line.encode()
+
+
+def test_nothing_found_is_no_text():
+    assert write([]) == ""

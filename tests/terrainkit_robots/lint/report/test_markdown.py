@@ -1,0 +1,45 @@
+import re
+
+from terrainkit_robots.lint.report.markdown import write
+
+
+def rows(text):
+    """Return the cells of each row of the table of findings."""
+    table = re.findall(r"^\| (?:error|warning|note) \|.*\|$", text, re.MULTILINE)
+    return [re.split(r"(?<!\\)\|", row)[1:-1] for row in table]
+
+
+def test_each_finding_is_a_row(report):
+    text = write([report])
+    assert text.startswith(
+        "## robot.urdf\n\n**1 error, 2 warnings, 1 note** (fixable: 1 with --fix)"
+    )
+    assert [cell.strip() for cell in rows(text)[0]] == [
+        "error",
+        "INR002 negative-mass",
+        "robot.urdf:12",
+        "the mass is -1 kg; wanted above 0",
+        "Weigh it.",
+    ]
+    assert len(rows(text)) == 4
+    assert "\n- SYM001, SYM002: no legs were found\n" in text
+
+
+def test_no_name_breaks_a_row_or_becomes_markup_or_calls_people(nasty):
+    text = write([nasty])
+    (row,) = rows(text)
+    assert len(row) == 5
+    for wrong in ("<b>", "@me", "\x1b", "\r", "\u202e"):
+        assert wrong not in text
+    assert re.search(r"(?<!\\)[`*]", text.replace("**1 error**", "")) is None
+    text.encode()
+
+
+def test_what_was_fixed_and_what_was_not(repaired):
+    text = write([repaired])
+    assert "Fixed:\n\n- XML003: unnamed-robot: the mass is -1 kg; wanted above 0\n" in text
+    assert "Could not be fixed:\n\n- JNT009: calf: no space\n" in text
+
+
+def test_robots_are_sections(report):
+    assert write([report, report]).count("\n## robot.urdf\n") == 1  # and one at the very start

@@ -1,0 +1,54 @@
+import pytest
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description import bundled
+from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.report.robot_summary import robot_summary
+from terrainkit_robots.lint.runner import lint
+
+
+def summary(path):
+    return dict(robot_summary(lint(Facts(load_robot(path)), [])))
+
+
+def test_a_quadruped():
+    lines = summary(bundled.find("quadruped"))
+    assert lines["robot"] == "quadruped (URDF)"
+    assert lines["size"] == "15.02 kg, 17 links in 13 rigid bodies, 12 joints"
+    assert lines["legs"] == "4, 0.448 m long: FL_foot, FR_foot, RL_foot, RR_foot"
+    assert list(lines) == ["robot", "size", "legs", "stands", "  roll", "  hip", "  knee"]
+    # The calf's 5.1 N m of the 45.43 N m that the motor has behind its lever.
+    assert lines["  knee"].startswith("-1.4")
+
+
+def test_two_joints_of_one_role_are_told_apart():
+    assert "  roll 2" in summary(bundled.find("biped"))
+
+
+def test_a_robot_without_legs_and_without_a_name(tmp_path):
+    (tmp_path / "robot.urdf").write_text('<robot><link name="a"/></robot>')
+    assert summary(tmp_path / "robot.urdf") == {
+        "robot": "without a name (URDF)",
+        "size": "0 kg, 1 link in 1 rigid body, 0 joints",
+        "legs": "none were found",
+    }
+
+
+@pytest.mark.parametrize("value", ["1e300", "1e-300", "1e11", "nan", "-1e308"])
+@pytest.mark.parametrize("words", ['effort="{}"', 'upper="{}"', 'mass value="{}"', 'xyz="0 0 {}"'])
+def test_numbers_out_of_all_proportion_stay_short(tmp_path, words, value):
+    text = bundled.find("quadruped").read_text()
+    start = words.partition("{")[0]
+    head, _, rest = text.partition(start)
+    (tmp_path / "robot.urdf").write_text(f"{head}{start}{value}{rest[rest.index(chr(34)) :]}")
+    for line in summary(tmp_path / "robot.urdf").values():
+        assert max(map(len, line.split())) < 25
+
+
+def test_gains_are_suggested_once_a_robot_may_be_simulated():
+    report = lint(Facts(load_robot(bundled.find("quadruped"))), [])
+    assert report.simulated
+    told = dict(robot_summary(report))
+    assert "kp 60, kd 2: FL_hip_joint" in told["  roll"]
+    static = lint(Facts(load_robot(bundled.find("quadruped"))), [], simulate=False)
+    assert "kp" not in dict(robot_summary(static))["  roll"]

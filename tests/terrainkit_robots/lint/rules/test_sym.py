@@ -1,0 +1,75 @@
+import re
+
+import pytest
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.rule import rules
+
+ALL = [
+    "a1/urdf/a1.urdf",
+    "go2/urdf/go2.urdf",
+    "go2_mjcf/go2.xml",
+    "h1/urdf/h1.urdf",
+    "h1/h1.xml",
+    "g1/g1_29dof.urdf",
+    "g1/g1_29dof.xml",
+    "anymal_c/urdf/anymal_c.urdf",
+    "cassie/urdf/cassie.urdf",
+]
+
+
+def found(path, text=None):
+    """Return code and subject of what SYM finds."""
+    contents = {} if text is None else {path: text.encode()}
+    facts = Facts(load_robot(path, contents=contents))
+    return [
+        (rule.code, defect.subject)
+        for rule in rules()
+        if rule.family == "SYM"
+        for defect in rule.check(facts)
+    ]
+
+
+def edited(text, tag, name, pattern, replacement):
+    """Return the text with one change inside the link or joint of that name."""
+    start = re.search(rf'<{tag}\s+name="{name}"', text).start()
+    end = text.index(f"</{tag}>", start)
+    block, count = re.subn(pattern, replacement, text[start:end], count=1)
+    assert count == 1
+    return text[:start] + block + text[end:]
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_real_robots_are_the_same_left_and_right(robot_file, name):
+    assert found(robot_file(name)) == []
+
+
+@pytest.mark.parametrize("leg", ["FL", "FR", "RL", "RR"])
+@pytest.mark.parametrize(
+    ("tag", "name", "pattern", "replacement", "finding"),
+    [
+        ("link", "thigh", r'<mass\s+value="[^"]*"', '<mass value="1.4"', "SYM001"),
+        ("link", "thigh", r'<origin\s+xyz="\S+ ', '<origin xyz="0.03 ', "SYM002"),
+        ("joint", "thigh_joint", r'upper="[^"]*"', 'upper="2"', "SYM004"),
+        ("joint", "thigh_joint", r'effort="[^"]*"', 'effort="20"', "SYM005"),
+        ("joint", "calf_joint", r"-0\.213", "-0.18", "SYM006"),
+        ("joint", "thigh_joint", r'rpy="0 0 0"', 'rpy="0 0.3 0"', "SYM006"),
+        ("joint", "thigh_joint", r'rpy="0 0 0"', 'rpy="0.3 0 0"', "SYM006"),
+        ("joint", "thigh_joint", r'axis\s+xyz="0 1 0"', 'axis xyz="0 -1 0"', "SYM007"),
+        ("joint", "hip_joint", r'axis\s+xyz="1 0 0"', 'axis xyz="-1 0 0"', "SYM007"),
+        ("joint", "calf_joint", r'axis\s+xyz="0 1 0"', 'axis xyz="0.2 0.98 0"', "SYM007"),
+    ],
+)
+def test_the_odd_leg_of_four_is_named(robot_file, leg, tag, name, pattern, replacement, finding):
+    path = robot_file("go2/urdf/go2.urdf")
+    text = edited(path.read_text(), tag, f"{leg}_{name}", pattern, replacement)
+    assert found(path, text) == [(finding, f"{leg}_{name}")]
+
+
+def test_what_hangs_below_a_defect_is_not_told_again(robot_file):
+    path = robot_file("g1/g1_29dof.urdf")
+    text = path.read_text()
+    turned = edited(text, "joint", "left_hip_roll_joint", r'rpy="[^"]*"', 'rpy="0.2 -0.1749 0"')
+    assert {code for code, _ in found(path, turned)} == {"SYM006"}
+    assert len(found(path, turned)) == 1

@@ -1,0 +1,131 @@
+import re
+
+import pytest
+
+from terrainkit.errors import ConfigError
+from terrainkit_robots.lint import rule as module
+from terrainkit_robots.lint.rule import FAMILIES, Violation, get_rule, rule, rules
+
+PAGE = """A mass is negative.
+
+    Simulators divide
+    by it.
+
+    And it is not physical.
+
+    Fix:
+        Write the mass
+        of the part.
+
+    Source:
+        A book, chapter 3.
+    """
+
+
+@pytest.fixture
+def empty(monkeypatch):
+    """Return the registry, empty."""
+    registry = {}
+    monkeypatch.setattr(module, "_RULES", registry)
+    return registry
+
+
+def check(text=PAGE):
+    def negative(robot):
+        yield Violation(subject="a", source=robot.model.source, message="b")
+
+    negative.__doc__ = text
+    return negative
+
+
+def test_a_rule_has_a_page(empty):
+    rule("INR099", "negative-mass", "error", fixes="safe", needs=("legs",))(check())
+    made = empty["INR099"]
+    assert (made.code, made.name, made.severity) == ("INR099", "negative-mass", "error")
+    assert (made.fixes, made.needs, made.family) == ("safe", ("legs",), "INR")
+    assert made.title == "A mass is negative."
+    assert made.why == "Simulators divide by it.\n\nAnd it is not physical."
+    assert made.how_to_fix == "Write the mass of the part."
+    assert made.reference == "A book, chapter 3."
+
+
+def test_a_rule_fixes_nothing_and_needs_nothing_unless_told(empty):
+    rule("INR099", "n", "error")(check())
+    assert (empty["INR099"].fixes, empty["INR099"].needs) == ("no", ())
+
+
+def test_the_function_stays_as_it_is(empty):
+    function = check()
+    assert rule("INR099", "n", "error")(function) is function
+    assert empty
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        None,
+        "",
+        "A title.",
+        "A title.\n\nWhy.",
+        "A title.\n\nWhy.\n\nFix:\n    This.",
+        "A title.\n\nWhy.\n\nSource:\n    That.",
+        "A title.\n\nFix:\n    This.\n\nSource:\n    That.",
+        "A title\nover lines.\n\nWhy.\n\nFix:\n    This.\n\nSource:\n    That.",
+    ],
+)
+def test_a_page_that_lacks_something_is_told(empty, text):
+    rule("INR099", "n", "error")(check(text))
+    with pytest.raises(ConfigError, match="INR099: the docstring lacks"):
+        _ = empty["INR099"].why
+
+
+def test_two_rules_of_one_code_are_told(empty):
+    rule("INR099", "one", "error")(check())
+    other = check()
+    other.__module__ = "elsewhere"
+    with pytest.raises(ConfigError, match="two rules are called INR099"):
+        rule("INR099", "two", "error")(other)
+    assert empty["INR099"].name == "one"
+
+
+# All of them
+
+
+def test_rules_are_ordered_by_family_and_number():
+    families = list(FAMILIES)
+    order = [(families.index(each.family), each.code) for each in rules()]
+    assert order == sorted(order)
+    assert {each.family for each in rules()} == set(FAMILIES)
+
+
+def test_codes_and_names_are_used_once():
+    assert len({each.code for each in rules()}) == len(rules())
+    assert len({each.name for each in rules()}) == len(rules())
+
+
+@pytest.mark.parametrize("each", rules(), ids=lambda each: each.code)
+def test_every_rule_is_well_formed(each):
+    assert re.fullmatch(r"[A-Z]{3}\d{3}", each.code)
+    assert re.fullmatch(r"[a-z]+(-[a-z0-9]+)*", each.name)
+    for text in (each.title, each.why, each.how_to_fix, each.reference):
+        assert text.isascii(), text
+    assert each.title[0].isupper()
+    for text in (each.title, each.why, each.how_to_fix):
+        assert text.endswith(".")
+
+
+@pytest.mark.parametrize("word", ["INR001", "inr001", "Inr001"])
+def test_a_rule_is_found_by_code(word):
+    assert get_rule(word).code == "INR001"
+
+
+@pytest.mark.parametrize("each", rules()[:10], ids=lambda each: each.code)
+def test_a_rule_is_found_by_name(each):
+    assert get_rule(each.name) is each
+    assert get_rule(each.name.upper()) is each
+
+
+@pytest.mark.parametrize("word", ["", "INR", "INR999", "no-such-rule"])
+def test_a_rule_that_is_not_there_is_told_with_those_that_are(word):
+    with pytest.raises(ConfigError, match=r"no rule .*; there are: .*XML001"):
+        get_rule(word)

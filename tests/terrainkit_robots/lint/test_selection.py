@@ -1,0 +1,234 @@
+import pytest
+
+from terrainkit.errors import ConfigError
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.rule import rules
+from terrainkit_robots.lint.selection import (
+    Suppressed,
+    UnusedSuppression,
+    lint_selected,
+    select_rules,
+)
+from terrainkit_robots.lint.settings import Settings, matching
+
+LINK = '<link name="{name}"><inertial><mass value="-1"/></inertial></link>'
+
+
+def codes(found):
+    return {each.code for each in found}
+
+
+def check(path, text, **settings):
+    """Return the report of what INR002, negative-mass, finds in `text`."""
+    path.write_text(text)
+    wanted = Settings(**{"select": ("INR002",)} | settings)
+    return lint_selected(Facts(load_robot(path)), wanted)
+
+
+@pytest.fixture
+def file(tmp_path):
+    return tmp_path / "robot.urdf"
+
+
+def test_without_a_word_every_rule_is_asked():
+    chosen, left_out = select_rules(Settings())
+    assert chosen == rules()
+    assert left_out == ()
+
+
+def test_what_is_ignored_is_left_out_of_what_is_selected_with_its_reason():
+    settings = Settings(select=("INR",), ignore={"INR002": "a balloon", "JNT": "no joints"})
+    chosen, left_out = select_rules(settings)
+    assert codes(chosen) == codes(matching("INR")) - {"INR002"}
+    assert [(s.code, s.reason) for s in left_out] == [("INR002", "ignored: a balloon")]
+
+
+def test_an_ignored_word_that_is_no_rule_is_an_error():
+    with pytest.raises(ConfigError, match="no rule 'NOPE1'"):
+        select_rules(Settings(ignore={"NOPE1": "why"}))
+
+
+def test_only_the_selected_rules_are_asked(file):
+    text = f"<robot>{LINK.format(name='a')}</robot>"
+    assert codes(check(file, text).findings) == {"INR002"}
+    assert codes(check(file, text, select=("XML003",)).findings) == {"XML003"}
+
+
+NOTE = "<!-- terrainkit: ignore INR002 a balloon -->"
+A, B = LINK.format(name="a"), LINK.format(name="b")
+
+
+@pytest.mark.parametrize(
+    ("text", "left"),
+    [
+        (f"{NOTE}\n{A}\n{B}", ["b"]),
+        (f"{A}\n{NOTE}\n{B}", ["a"]),
+        (f"{A}\n{NOTE}\n\n{B}", ["a"]),
+        (f"{A} {NOTE}\n{B}", ["b"]),
+        (f"{A}\n{NOTE} {B}", ["a"]),
+        (f"{A}\n<!-- other -->{NOTE}<!-- words -->\n{B}", ["a"]),
+        (
+            "<link name='a'>\n"
+            + NOTE
+            + "\n<inertial>\n<mass value='-1'/>\n</inertial></link>\n"
+            + B,
+            ["b"],
+        ),
+        (
+            "<link name='a'> "
+            + NOTE
+            + "\n<visual/><inertial>\n<mass value='-1'/></inertial></link>",
+            [],
+        ),
+        (
+            "<link name='a'>\n<inertial>\n<mass value='-1'/></inertial>\n"
+            + NOTE
+            + "\n</link>\n"
+            + B,
+            ["b"],
+        ),
+        ("<link name='a'>\n<inertial>\n<mass value='-1'/> " + NOTE + "\n</inertial></link>", []),
+        (f"<link name='c'/>\n{NOTE}\n<link name='d'/>\n{B}", ["b"]),
+        (f"{A}\n{B}\n{NOTE}", ["a", "b"]),
+        (f"{A}\n<!-- terrainkit: ignore negative-mass a balloon -->\n{B}", ["a"]),
+        (f"{A}\n<!-- terrainkit: ignore INR001, INR002: a balloon -->\n{B}", ["a"]),
+        (f"{A}\n<!--terrainkit:ignore inr002\n   a\n   balloon-->\n{B}", ["a"]),
+        (f"{A}\n<!-- terrainkit says: ignore INR002 x -->\n{B}", ["a", "b"]),
+    ],
+)
+def test_a_comment_quiets_a_rule_for_what_it_is_on_in_or_above(file, text, left):
+    report = check(file, f'<robot name="r">\n{text}\n</robot>\n')
+    assert [finding.subject for finding in report.findings] == left
+    ignored = [skipped for skipped in report.skipped if isinstance(skipped, Suppressed)]
+    assert len(ignored) + len(left) == text.count("-1")
+    assert {each.comment.reason for each in ignored} <= {"a balloon"}
+
+
+def test_a_comment_quiets_no_other_rule(file):
+    text = f"<robot>\n{NOTE.replace('INR002', 'XML003')}\n{A}\n</robot>"
+    assert codes(check(file, text).findings) == {"INR002"}
+
+
+def test_what_is_said_of_an_ignored_finding(file):
+    report = check(file, f'<robot name="r">\n<link name="x"/>\n{NOTE}\n{A}\n</robot>')
+    (ignored,) = report.skipped
+    assert ignored.reason == "ignored for a (robot.urdf:4): a balloon"
+    assert ignored.finding.subject == "a"
+    assert report.verdict == "pass"
+
+
+def test_above_the_root_it_speaks_of_the_robot_and_not_of_all_that_is_in_it(file):
+    comment = "<!-- terrainkit: ignore XML003, INR002 a test -->"
+    for text in (
+        f"{comment}\n<robot>\n<link name='x'/>\n{A}",
+        f"<robot> {comment}\n<link name='x'/>\n{A}",
+    ):
+        report = check(file, f"{text}\n</robot>", select=("INR002", "XML003"))
+        assert codes(report.findings) == {"INR002"}
+        assert codes(s for s in report.skipped if isinstance(s, Suppressed)) == {"XML003"}
+
+
+def test_in_mjcf_a_body_in_a_body_is_another_part(tmp_path):
+    inertial = '<inertial mass="-1" pos="0 0 0" diaginertia="1 1 1"/>'
+    text = f"""<mujoco>
+      <worldbody>
+        <body name="trunk"> {NOTE}
+          <freejoint/>
+          {inertial}
+          <body name="arm"><joint axis="0 0 1"/>
+            {inertial}
+          </body>
+        </body>
+      </worldbody>
+    </mujoco>"""
+    report = check(tmp_path / "robot.xml", text)
+    assert [finding.subject for finding in report.findings] == ["arm"]
+
+
+def test_a_file_with_syntax_errors_has_comments_too(file):
+    report = check(file, f'<robot name="r">\n{NOTE}\n{A}\n{B}\n<oops>\n</robot>')
+    assert [finding.subject for finding in report.findings] == ["b"]
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-8-sig"])
+def test_a_file_in_another_encoding_has_comments_too(file, encoding):
+    file.write_bytes(f'<robot name="r">\n{NOTE}\n{A}\n{B}\n</robot>'.encode(encoding))
+    report = lint_selected(Facts(load_robot(file)), Settings(select=("INR002",)))
+    assert [finding.subject for finding in report.findings] == ["b"]
+
+
+def test_what_is_read_instead_of_a_file_has_its_own_comments(file):
+    text = f'<robot name="r">\n{A}\n</robot>'
+    file.write_text(text)
+    contents = {file: text.replace("\n<link", f"\n{NOTE} <link").encode()}
+    facts = Facts(load_robot(file, contents=contents))
+    assert lint_selected(facts, Settings(select=("INR002",)), contents).findings == ()
+    assert len(lint_selected(facts, Settings(select=("INR002",))).findings) == 1
+
+
+@pytest.mark.parametrize(
+    ("comment", "said"),
+    [
+        ("ignore INR002", "it gives no reason; wanted <!-- terrainkit: ignore INR002 reason -->"),
+        ("ignore INR999 it is light", "there is no rule 'INR999'; wanted"),
+        ("ignore", "it names no rule; wanted <!-- terrainkit: ignore CODE reason -->"),
+        ("disable INR002 it is light", "it says 'disable'; wanted"),
+        ("", "it says ''; wanted"),
+    ],
+)
+def test_a_comment_that_can_quiet_nothing_is_told(file, comment, said):
+    report = check(file, f'<robot name="r">\n<!-- terrainkit: {comment} -->\n{A}\n</robot>')
+    assert codes(report.findings) == {"INR002"}
+    (idle,) = report.skipped
+    assert isinstance(idle, UnusedSuppression)
+    assert idle.reason.startswith(f"comment at {file}:2: ")
+    assert said in idle.reason
+
+
+def test_a_comment_with_nothing_to_quiet_is_told(file):
+    text = f'<robot name="r">\n{NOTE}\n<link name="a"/>\n</robot>'
+    (idle,) = check(file, text).skipped
+    assert idle.reason == f"comment at {file}:2: there is no INR002 to ignore here"
+
+
+def test_a_comment_on_a_rule_that_is_not_asked_is_not_told(file):
+    text = f'<robot name="r">\n{NOTE}\n<link name="a"/>\n</robot>'
+    assert check(file, text, select=("XML003",)).skipped == ()
+    ignoring = check(file, text, ignore={"INR002": "here"})
+    assert [type(s).__name__ for s in ignoring.skipped] == ["Skipped"]
+
+
+def test_a_file_without_comments_is_not_parsed_again(file, monkeypatch):
+    import terrainkit_robots.description.xml.document as xml_document
+
+    file.write_text(f'<robot name="r">{A}</robot>')
+    facts = Facts(load_robot(file))
+    monkeypatch.setattr(xml_document, "parse_xml", lambda *_: pytest.fail("parsed"))
+    assert codes(lint_selected(facts, Settings(select=("INR002",))).findings) == {"INR002"}
+
+
+def test_long_words_are_cut(file):
+    long = "X" * 10**6
+    report = check(
+        file, f'<robot name="r">\n<!-- terrainkit: ignore {long} {long} -->\n{A}</robot>'
+    )
+    assert len(report.skipped[0].reason) < 1000
+
+
+def test_in_xacro_a_comment_stands_where_the_finding_is(tmp_path):
+    text = f"""<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r">
+      <xacro:macro name="part" params="n">
+        <link name="${{n}}"> {NOTE}
+          <inertial>
+            <mass value="-1"/>
+          </inertial>
+        </link>
+      </xacro:macro>
+      <xacro:part n="a"/>
+      <xacro:part n="b"/>
+      {B.replace('"b"', '"c"')}
+    </robot>"""
+    report = check(tmp_path / "robot.xacro", text)
+    assert [finding.subject for finding in report.findings] == ["c"]
+    assert [s.finding.subject for s in report.skipped if isinstance(s, Suppressed)] == ["a", "b"]

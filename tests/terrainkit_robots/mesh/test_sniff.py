@@ -1,0 +1,119 @@
+import os
+import struct
+
+import pytest
+
+from terrainkit_robots.mesh.sniff import header_of, read_header
+
+
+def stl(faces, data=None):
+    return bytes(80) + struct.pack("<I", faces) + (bytes(50 * faces) if data is None else data)
+
+
+ASCII = b"solid x\nfacet normal 0 0 1\nouter loop\nendloop\nendfacet\nendsolid x\n"
+DAE = b"<?xml version='1.0'?><COLLADA></COLLADA>\n"
+LFS = b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 1050284\n"
+
+
+@pytest.mark.parametrize(
+    ("suffix", "data", "kind", "faces"),
+    [
+        pytest.param(".stl", stl(2), "stl", 2, id="binary STL"),
+        pytest.param(".STL", b"solid".ljust(80) + stl(1)[80:], "stl", 1, id="that says solid"),
+        pytest.param(".stl", ASCII, "ascii-stl", None, id="ASCII STL"),
+        pytest.param(".obj", b"# nothing\n", "obj", None, id="OBJ"),
+        pytest.param(".dae", DAE, "dae", None, id="COLLADA"),
+        pytest.param(".msh", struct.pack("<4i", 1, 0, 0, 0) + bytes(12), "msh", None, id="MSH"),
+        pytest.param(".ply", b"ply\nelement face 7\nend_header\n", "ply", 7, id="PLY"),
+        pytest.param(".glb", b"glTF" + struct.pack("<II", 2, 12), "glb", None, id="GLB"),
+        pytest.param(".fbx", b"Kaydara", "other", None, id="something else"),
+    ],
+)
+def test_sound_files(suffix, data, kind, faces):
+    header = header_of(suffix, data)
+    assert (header.format, header.faces, header.state) == (kind, faces, "fine")
+    assert header.size == len(data)
+    assert not header.problem
+
+
+@pytest.mark.parametrize(
+    ("suffix", "data", "problem"),
+    [
+        pytest.param(".stl", stl(2)[:-1], "claims 2 faces, which take 184 bytes", id="cut off"),
+        pytest.param(".stl", stl(2) + b"\0", "and has 185 bytes", id="too long"),
+        pytest.param(".stl", stl(0), "has no faces", id="no faces"),
+        pytest.param(".stl", stl(2**32 - 1, b""), "claims 4,294,967,295 faces", id="4 billion"),
+        pytest.param(
+            ".stl", b"\0" * 10, "has 10 bytes, and the header", id="shorter than a header"
+        ),
+        pytest.param(".stl", b"v 0 0 0\n" * 20, "is text, and not an STL", id="an OBJ"),
+        pytest.param(".stl", b"solid x\nendsolid x\n", "without a single facet", id="solid air"),
+        pytest.param(".stl", ASCII[:-12], "does not end with endsolid", id="ASCII, cut off"),
+        pytest.param(".obj", stl(1), "is not of text", id="an STL as OBJ"),
+        pytest.param(".dae", DAE[:-4], "was cut off", id="COLLADA, cut off"),
+        pytest.param(".dae", b"<robot/>", "does not start with a COLLADA", id="other XML"),
+        pytest.param(".msh", struct.pack("<4i", 9, 0, 0, 0), "do not fit its 16 bytes", id="MSH"),
+        pytest.param(".msh", struct.pack("<4i", -1, 1, 0, 0), "do not fit", id="negative MSH"),
+        pytest.param(".msh", b"", "is empty: it has 0 bytes", id="empty"),
+        pytest.param(".ply", b"plx\n", "does not start with ply", id="PLY"),
+        pytest.param(".glb", b"glTF" + bytes(90), "does not fit its 94 bytes", id="GLB"),
+        pytest.param(".stl", b"\n <!DOCTYPE html>\n<html>", "is a web page", id="a web page"),
+    ],
+)
+def test_broken_files(suffix, data, problem):
+    header = header_of(suffix, data)
+    assert header.state == ("broken" if data else "empty")
+    assert problem in header.problem
+
+
+def test_a_longer_stl_has_all_its_faces():
+    assert header_of(".stl", stl(2) + b"\0").faces == 2
+    assert header_of(".stl", stl(2)[:-1]).faces is None
+
+
+@pytest.mark.parametrize("suffix", [".stl", ".dae", ".obj", ".fbx"])
+def test_a_pointer_of_git_lfs(suffix):
+    header = header_of(suffix, LFS)
+    assert header.state == "lfs"
+    assert "1,050,284 bytes" in header.problem
+
+
+def test_only_the_ends_are_read(tmp_path):
+    path = tmp_path / "a.dae"
+    with path.open("wb") as stream:  # a hole of 4 GB that no disk holds
+        stream.write(DAE[:-11])
+        stream.seek(4 * 2**30)
+        stream.write(DAE[-11:])
+    header = read_header(path)
+    assert (header.state, header.size) == ("fine", 4 * 2**30 + 11)
+
+
+class TestOtherThanFiles:
+    def test_nothing(self, tmp_path):
+        assert read_header(tmp_path / "a.stl").state == "missing"
+
+    @pytest.mark.parametrize("name", ["a" * 300, "a\0b", "\ud800"])
+    def test_no_name_of_a_file(self, tmp_path, name):
+        assert read_header(tmp_path / name).state == "missing"
+
+    def test_a_folder(self, tmp_path):
+        (tmp_path / "a.stl").mkdir()
+        assert read_header(tmp_path / "a.stl").problem == "is a folder, not a file"
+
+    def test_a_pipe_that_nobody_writes_to(self, tmp_path):
+        os.mkfifo(tmp_path / "a.stl")
+        assert read_header(tmp_path / "a.stl").problem == "is a pipe, not a file"
+
+    def test_a_device(self, tmp_path):
+        (tmp_path / "a.stl").symlink_to("/dev/zero")
+        assert read_header(tmp_path / "a.stl").problem == "is a device, not a file"
+
+    def test_a_loop_of_links(self, tmp_path):
+        (tmp_path / "a.stl").symlink_to("a.stl")
+        assert read_header(tmp_path / "a.stl").state == "missing"
+
+    @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may read all")
+    def test_a_file_that_is_closed(self, tmp_path):
+        (tmp_path / "a.stl").write_bytes(stl(1))
+        (tmp_path / "a.stl").chmod(0)
+        assert read_header(tmp_path / "a.stl").state == "closed"

@@ -1,0 +1,162 @@
+import math
+
+import pytest
+
+from terrainkit.errors import ConfigError
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.runner import lint
+from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
+from terrainkit_robots.spec.robot_spec import JOINT_TABLES, unit_of
+from terrainkit_robots.spec.spec_file import from_toml, to_toml
+
+ARM = """
+<robot name="arm">
+  <link name="base"><inertial><mass value="1"/>
+    <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="lower"/><link name="upper"/><link name="follower"/>
+  <joint name="turn" type="revolute"><parent link="base"/><child link="lower"/>
+    <axis xyz="0 0 1"/><limit lower="0.5" upper="2.5" effort="10" velocity="3"/></joint>
+  <joint name="spin" type="continuous"><parent link="lower"/><child link="upper"/>
+    <axis xyz="0 1 0"/></joint>
+  <joint name="mimic" type="revolute"><parent link="upper"/><child link="follower"/>
+    <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/>
+    <mimic joint="turn"/></joint>
+</robot>"""
+
+
+def derived(facts, gains, **changed):
+    return derive_spec(facts, gains=gains(facts, **changed), floating=True)
+
+
+def test_a_quadruped(bundled, gains):
+    facts = bundled("quadruped.urdf")
+    spec = derived(facts, gains)
+    legs = ("FL", "FR", "RL", "RR")
+    assert spec.joint_order == tuple(
+        f"{leg}_{part}_joint" for leg in legs for part in ("hip", "thigh", "calf")
+    )
+    assert spec.base == "base"
+    assert spec.feet == tuple(f"{leg}_foot" for leg in legs)
+    assert spec.shanks == tuple(f"{leg}_calf" for leg in legs)
+    assert spec.thighs == tuple(f"{leg}_thigh" for leg in legs)
+    assert spec.termination_contacts == ("base",)
+    assert spec.penalized_contacts == (*spec.thighs, *spec.shanks)
+    assert spec.default_pose == pytest.approx(dict(facts.stance.positions), abs=1e-5)
+    assert spec.effort["FL_calf_joint"] == 45.43
+    assert spec.velocity["FL_hip_joint"] == 30.1
+    assert spec.soft_limits["FL_hip_joint"] == pytest.approx((-0.94248, 0.94248))
+    assert spec.base_height_target == pytest.approx(facts.stance.height, abs=1e-5)
+    assert spec.spawn_height == pytest.approx(facts.stance.height + 0.01, abs=1e-5)
+    assert spec.foot_radius == pytest.approx(0.022)
+    assert spec.stance_width == pytest.approx(0.284, abs=1e-3)
+    assert (spec.urdf, spec.mjcf, spec.floating) == ("robot.urdf", "robot.xml", True)
+    assert spec.provenance["effort"].origin == "declared"
+    assert spec.provenance["effort"].reason == "in quadruped.urdf"
+    assert spec.provenance["default_pose"].origin == "solved"
+
+
+def test_a_biped(bundled, gains):
+    spec = derived(bundled("biped.urdf"), gains)
+    assert spec.base == "pelvis"
+    assert spec.feet == ("left_ankle_roll_link", "right_ankle_roll_link")
+    assert spec.shanks == ("left_knee_link", "right_knee_link")
+    assert spec.thighs == ("left_hip_yaw_link", "right_hip_yaw_link")
+    assert spec.penalized_contacts == (*spec.thighs, *spec.shanks)
+
+
+def test_a_robot_without_legs(robot, gains):
+    spec = derived(robot(ARM), gains)
+    assert spec.joint_order == ("turn", "spin")
+    assert spec.feet == spec.shanks == spec.thighs == spec.penalized_contacts == ()
+    assert spec.base_height_target is spec.spawn_height is spec.leg_length is None
+    assert spec.stance_width is spec.foot_radius is None
+    assert spec.default_pose == {"turn": 0.5, "spin": 0.0}
+    assert spec.soft_limits == {"turn": (0.5, 2.4)}  # the pose is at the limit, and allowed
+    assert spec.reset_range == (1.0, 1.5)
+    assert spec.provenance["default_pose"].origin == "suggested"
+    assert from_toml(to_toml(spec)) == spec
+
+
+@pytest.mark.parametrize("name", ["quadruped.urdf", "quadruped.xml", "biped.urdf", "biped.xml"])
+def test_a_spec_fits_the_robot_that_it_is_of(bundled, gains, name):
+    facts = bundled(name)
+    spec = derived(facts, gains)
+    assert from_toml(to_toml(spec)) == spec
+    report = lint(bundled(name, spec=spec), simulate=False)
+    assert report.crashed == ()
+    own = [f for f in report.findings if f.severity != "info"]
+    assert [f.message for f in own] == []
+    for table in JOINT_TABLES:
+        assert tuple(spec.per_joint(table)) == spec.joint_order
+
+
+@pytest.mark.parametrize("name", ["quadruped.urdf", "biped.xml"])
+def test_every_number_has_an_origin(bundled, gains, name):
+    spec = derived(bundled(name), gains)
+    for field in type(spec).__dataclass_fields__:
+        if unit_of(field):
+            assert spec.provenance[field].reason, field
+    assert spec.provenance["mirror"].origin == "measured"
+
+
+def test_a_keyframe_is_declared(robot, gains):
+    text = """<mujoco model="m"><worldbody><body name="trunk"><freejoint/>
+        <geom type="box" size=".1 .1 .1"/>
+        <body name="one"><joint name="a" axis="0 1 0"/><geom type="box" size=".1 .1 .1"/></body>
+        </body></worldbody><keyframe><key qpos="0 0 1 1 0 0 0 0.3"/></keyframe></mujoco>"""
+    spec = derived(robot(text), gains)
+    assert spec.default_pose == {"a": 0.3}
+    assert spec.provenance["default_pose"].origin == "declared"
+
+
+def test_the_reset_range_stays_within_the_limits(bundled, gains):
+    facts = bundled("quadruped.urdf")
+    spec = derived(facts, gains)
+    limits = {joint.name: joint.range for joint in facts.actuated}
+    assert spec.reset_range != (0.5, 1.5)
+    for name, position in spec.default_pose.items():
+        for factor in spec.reset_range:
+            assert limits[name][0] <= factor * position <= limits[name][1]
+    assert "calf_joint" in spec.provenance["reset_range"].reason
+
+
+def test_what_is_missing_is_an_error(robot, gains):
+    facts = robot(ARM)
+    with pytest.raises(ConfigError, match="no gains for spin; wanted some for each actuated joint"):
+        derive_spec(facts, gains={"turn": gains(facts)["turn"]}, floating=False)
+    nothing = robot('<robot name="r"/>')
+    with pytest.raises(ConfigError, match="r has no bodies"):
+        derive_spec(nothing, gains={}, floating=False)
+
+
+@pytest.mark.parametrize("value", ["1e29", "1e-300", "-1"])
+@pytest.mark.parametrize("old", ['effort="23.7"', 'radius="0.022"', 'lower="-2.7227"'])
+def test_numbers_without_measure_break_nothing(bundled, gains, tmp_path, old, value):
+    new = f'{old.split("=")[0]}="{value}"'
+    facts = bundled("quadruped.urdf", (old, new), tmp_path=tmp_path)
+    spec = derived(facts, gains)
+    assert from_toml(to_toml(spec)) == spec
+    assert all(math.isfinite(v) for table in JOINT_TABLES for v in getattr(spec, table).values())
+
+
+@pytest.mark.parametrize(
+    ("file", "base", "torso"),
+    [
+        ("go2/urdf/go2.urdf", "base", ()),
+        ("g1/g1_29dof.urdf", "pelvis", ("torso_link",)),
+        ("h1/urdf/h1.urdf", "pelvis", ()),
+        ("anymal_c/urdf/anymal_c.urdf", "base", ()),
+        ("a1/urdf/a1.urdf", "base", ()),
+    ],
+)
+def test_robots_of_others(robot_file, gains, file, base, torso):
+    facts = Facts(load_robot(robot_file(file)))
+    spec = derived(facts, gains)
+    assert spec.base == base
+    assert spec.termination_contacts == (base, *torso)
+    assert len(spec.feet) == len(spec.shanks) == len(spec.thighs) == len(facts.legs)
+    assert set(spec.mirror) == set(spec.joint_order)
+    for name, twin in spec.mirror.items():
+        assert spec.mirror[twin.joint].joint == name
+    assert from_toml(to_toml(spec)) == spec

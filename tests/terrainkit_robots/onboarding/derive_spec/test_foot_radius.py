@@ -1,0 +1,37 @@
+import pytest
+
+from terrainkit_robots.onboarding.derive_spec.foot_radius import foot_radius
+
+
+def test_of_a_ball_it_is_the_radius(bundled):
+    assert foot_radius(bundled("quadruped.urdf")) == pytest.approx(0.022)
+    assert foot_radius(bundled("quadruped.xml")) == pytest.approx(0.022)
+
+
+@pytest.mark.parametrize(
+    ("geometry", "radius"),
+    [
+        ('<box size="0.2 0.06 0.03"/>', 0.03),
+        ('<cylinder radius="0.04" length="0.02"/>', 0.04),
+        ('<sphere radius="0.05"/>', 0.05),
+    ],
+)
+def test_of_other_shapes(bundled, tmp_path, geometry, radius):
+    text = '<geometry><sphere radius="0.022"/></geometry>'
+    facts = bundled("quadruped.urdf", (text, f"<geometry>{geometry}</geometry>"), tmp_path=tmp_path)
+    assert foot_radius(facts) == pytest.approx(radius, rel=0.05)
+
+
+def test_of_a_sole_it_is_half_the_width(bundled):
+    facts = bundled("biped.urdf")
+    radius = foot_radius(facts)
+    (width,) = {
+        shape.geometry.size[1]
+        for shape in facts.body_of["left_ankle_roll_link"].collisions
+        if shape.geometry.shape == "box"
+    } or {radius}
+    assert radius == pytest.approx(width)
+
+
+def test_without_legs_there_is_none(robot):
+    assert foot_radius(robot('<robot name="r"><link name="a"/></robot>')) is None

@@ -1,0 +1,181 @@
+import ast
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+
+from terrainkit.errors import ConfigError
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.mesh.mesh_cache import Meshes
+from terrainkit_robots.onboarding import frameworks as package
+from terrainkit_robots.onboarding.frameworks import frameworks
+from terrainkit_robots.onboarding.frameworks.frameworks import (
+    config_of,
+    config_text,
+    file_name,
+    names,
+)
+
+LEGGED = ("legged_gym", "leggedgym_ex")
+
+
+def test_a_module_that_is_added_is_a_framework(tmp_path, monkeypatch, robots):
+    (tmp_path / "brand_new.py").write_text(
+        "LEGGED_ONLY = False\ndef config_text(robot):\n    return f'# {robot.title}'\n"
+    )
+    (tmp_path / "mere_help.py").write_text("def config_text(robot):\n    return ''\n")
+    monkeypatch.setattr(package, "__path__", [*package.__path__, str(tmp_path)])
+    frameworks.names.cache_clear()
+    try:
+        assert set(names()) - {"brand_new"} == {*LEGGED, "isaaclab", "mjlab", "genesis"}
+        assert config_text("brand_new", robots.quadruped()) == "# quad 4"
+        with pytest.raises(ConfigError, match="for others there are: brand_new, genesis"):
+            config_text("legged_gym", robots.plain(()))
+    finally:
+        frameworks.names.cache_clear()
+
+
+def test_the_names_are_those_of_the_modules_in_their_order():
+    assert names() == ("genesis", "isaaclab", "legged_gym", "leggedgym_ex", "mjlab")
+    assert file_name("mjlab") == "mjlab_config.py"
+    with pytest.raises(ConfigError, match="no framework 'gazebo'; there are: genesis, isaaclab, "):
+        config_text("gazebo", None)
+    with pytest.raises(ConfigError, match="no framework"):
+        file_name("../../evil")
+
+
+@pytest.mark.parametrize("framework", LEGGED)
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"feet": ()},
+            "has no legs; .* trains legged robots; for others there are: genesis, isaaclab, mjlab$",
+        ),
+        ({"joint_order": ()}, "has no legs"),
+        ({"floating": False}, "the base of quad 4 is fixed"),
+        ({"spawn_height": None}, "lacks a spawn_height or a base_height_target"),
+        ({"stiffness": {".*_hip_joint": 1.0}}, "matched by no key of stiffness"),
+        ({"feet": ("FL_paw", "FR_paw")}, "are no bodies: 'FL_paw', 'FR_paw'; there are: 'base'"),
+        ({"feet": ("FL_hip", "RR_calf")}, "none is in all of 'FL_hip', 'RR_calf'"),
+    ],
+)
+def test_what_cannot_be_configured_is_told_in_a_line(robots, framework, changes, message):
+    with pytest.raises(ConfigError, match=message) as caught:
+        config_text(framework, robots.quadruped(**changes), bodies=robots.bodies)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("framework", ["isaaclab", "mjlab", "genesis"])
+def test_robots_without_legs_have_a_configuration(robots, framework):
+    text = config_text(framework, robots.plain(("shoulder", "elbow")))
+    compile(text, "config", "exec")
+    assert '"shoulder"' in text
+
+
+def test_robots_without_joints(robots):
+    spec = robots.plain(())
+    for framework in ("mjlab", "genesis"):
+        compile(config_text(framework, spec), "config", "exec")
+    with pytest.raises(ConfigError, match="no joints"):
+        config_text("isaaclab", spec)
+
+
+@pytest.mark.parametrize("framework", names())
+def test_nothing_is_injected(robots, framework):
+    """Statement by statement, a hostile robot's file is that of a harmless one."""
+    hostile = config_text(framework, robots.hostile())
+    harmless = config_text(
+        framework,
+        robots.plain(
+            tuple(f"joint_{number}" for number in range(len(robots.HOSTILE))),
+            floating=True,
+            feet=("l_foot", "r_foot"),
+            penalized_contacts=("p", "q"),
+            termination_contacts=("t",),
+            spawn_height=0.5,
+            base_height_target=0.45,
+        ),
+    )
+    assert _shape(hostile) == _shape(harmless)
+
+
+def _shape(text):
+    kept = (ast.stmt, ast.alias, ast.Attribute, ast.arg, ast.keyword, ast.Call)
+    nodes = [node for node in ast.walk(ast.parse(text)) if isinstance(node, kept)]
+    return [
+        (type(node), getattr(node, "attr", None) or getattr(node, "arg", None)) for node in nodes
+    ]
+
+
+@pytest.mark.parametrize("framework", names())
+def test_files_are_formatted_and_the_same_every_time(robots, framework, tmp_path):
+    long = {"name": "a very long name " * 8, "urdf": "u" * 70 + ".urdf", "mjcf": "m" * 70 + ".xml"}
+    one_joint = robots.plain(
+        ("j" * 84,),
+        floating=True,
+        feet=("f" * 80 + "_foot",),
+        base="b" * 66,
+        spawn_height=1.0,
+        base_height_target=1.0,
+    )
+    specs = {
+        "plain": robots.quadruped(),
+        "wheeled": robots.wheeled(),
+        "long": robots.quadruped(**long),
+        "hostile": robots.hostile(),
+        "one": one_joint,
+    }
+    if framework not in LEGGED:
+        specs["arm"] = robots.plain(("joint1", "joint10"))
+    if framework in ("mjlab", "genesis"):
+        specs["none"] = robots.plain(())
+    for name, spec in specs.items():
+        text = config_text(framework, spec)
+        assert text == config_text(framework, spec)
+        assert text.isascii() or name == "hostile"
+        (tmp_path / f"{name}.py").write_text(text, encoding="utf-8")
+    ruff = [sys.executable, "-m", "ruff"]
+    for words in (["format", "--diff"], ["check"]):
+        done = subprocess.run(
+            [*ruff, *words, "--isolated", "--no-cache", tmp_path], capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_soft_limits_are_a_share_of_the_range(robots):
+    ranges = {f"{leg}_calf_joint": (-2.75, -0.75) for leg in ("FL", "FR", "RL", "RR")}
+    text = config_text("mjlab", robots.quadruped(), ranges=ranges)
+    assert "soft_joint_pos_limit_factor=0.75," in text
+    assert "soft_joint_pos_limit_factor=0.9," in config_text("mjlab", robots.quadruped())
+
+
+@pytest.mark.parametrize("framework", LEGGED)
+def test_joints_without_a_motor_keep_a_robot_from_frameworks_that_drive_all(robots, framework):
+    with pytest.raises(ConfigError, match=f"no motor drives tail_joint of .*; {framework} drives"):
+        config_text(framework, robots.quadruped(), undriven=["tail_joint"])
+
+
+def test_joints_without_a_motor_are_found(robots, bundled_xml):
+    facts = Facts(load_robot(bundled_xml.with_suffix(".urdf")), Meshes())
+    spec = robots.quadruped()
+    fewer = replace(spec, joint_order=spec.joint_order[:-1])
+    with pytest.raises(ConfigError, match=f"no motor drives {spec.joint_order[-1]} of"):
+        config_of("legged_gym", facts, fewer)
+
+
+def test_bodies_and_ranges_come_from_the_facts(robots, bundled_xml):
+    """The calves range over 1.88 rad, of which the spec leaves 1.5 free."""
+    facts = Facts(load_robot(bundled_xml.with_suffix(".urdf")), Meshes())
+    spec = robots.quadruped()
+    text = config_of("legged_gym", facts, spec)
+    assert "soft_dof_pos_limit = 0.7958" in text
+    ranges = {joint.name: joint.range for joint in facts.model.joints if joint.moves}
+    assert text == config_text("legged_gym", spec, bodies=robots.bodies, ranges=ranges)
+
+
+@pytest.mark.parametrize("framework", LEGGED)
+def test_isaac_gym_and_its_python_3_8_can_read_them(robots, framework):
+    ast.parse(config_text(framework, robots.hostile()), feature_version=(3, 8))

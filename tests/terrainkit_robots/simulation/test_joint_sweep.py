@@ -1,0 +1,101 @@
+import math
+
+import pytest
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description import bundled
+from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.simulation.joint_sweep import sweep
+from terrainkit_robots.simulation.sim_model import plant
+
+CRANE = """
+<robot name="crane">
+  <link name="mast">
+    <collision><origin xyz="0 0.5 0"/><geometry><box size="1 0.02 0.2"/></geometry></collision>
+  </link>
+  <link name="turntable">
+    <inertial><mass value="1"/>
+      <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <joint name="lift" type="revolute">
+    <parent link="mast"/><child link="turntable"/><axis xyz="1 0 0"/>
+    <limit lower="-0.1" upper="0.1" effort="10" velocity="10"/>
+  </joint>
+  <link name="boom">
+    <inertial><origin xyz="0.6 0 0"/><mass value="3"/>
+      <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision>
+      <origin xyz="0.6 0 0"/><geometry><sphere radius="0.01"/></geometry>
+    </collision>
+  </link>
+  <joint name="swing" type="revolute">
+    <parent link="turntable"/><child link="boom"/><axis xyz="0 0 1"/>
+    <limit lower="-1.5" upper="1.5" effort="10" velocity="10"/>
+  </joint>
+  <link name="hook">
+    <inertial><origin xyz="0.2 0 0"/><mass value="0.5"/>
+      <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <joint name="hook_joint" type="revolute">
+    <parent link="boom"/><child link="hook"/><origin xyz="0.6 0 0"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="2" effort="10" velocity="10"/>
+  </joint>
+</robot>
+"""
+
+
+@pytest.fixture
+def crane(tmp_path):
+    path = tmp_path / "robot.urdf"
+    path.write_text(CRANE)
+    return {reach.joint: reach for reach in sweep(plant(Facts(load_robot(path))))}
+
+
+def test_a_wall_stops_a_boom(crane):
+    swing = crane["swing"]
+    # The tip is 0.6 m out, and the wall's face is at y = 0.49: it meets from asin(0.48 / 0.6) on.
+    assert swing.reached[1] == pytest.approx(math.asin(0.48 / 0.6), abs=3 / 40)
+    assert swing.reached[0] == pytest.approx(-1.5)
+    assert swing.blocked[0] is None
+    assert set(swing.blocked[1]) == {"mast", "boom"}
+    assert swing.share == pytest.approx((swing.reached[1] + 1.5) / 3)
+
+
+def test_gravity_is_held(crane):
+    hook = crane["hook_joint"]
+    assert hook.load == pytest.approx(0.5 * 9.81 * 0.2)
+    assert hook.largest_load == pytest.approx(0.5 * 9.81 * 0.2)
+    assert hook.effort == 10
+    assert hook.share == pytest.approx(1)
+    assert crane["swing"].largest_load == pytest.approx(0, abs=1e-9)
+
+
+def test_all_limited_joints_are_swept_in_the_order_of_the_motors():
+    facts = Facts(load_robot(bundled.find("biped")))
+    scene = plant(facts)
+    reaches = sweep(scene)
+    assert tuple(reach.joint for reach in reaches) == scene.drives
+    assert reaches == sweep(scene)
+    for reach in reaches:
+        assert reach.limits[0] <= reach.reached[0] <= reach.reached[1] <= reach.limits[1]
+        assert reach.load < reach.effort
+
+
+def test_left_and_right_reach_the_same():
+    reaches = {r.joint: r for r in sweep(plant(Facts(load_robot(bundled.find("quadruped")))))}
+    left, right = reaches["FL_hip_joint"], reaches["FR_hip_joint"]
+    assert left.reached[0] == pytest.approx(-right.reached[1], abs=1e-9)
+    assert left.share < 0.9  # the feet meet under the trunk
+    assert set(left.blocked[0]) == {"FL_foot", "FR_foot"}
+
+
+def test_a_joint_that_follows_is_moved_along(tmp_path):
+    text = CRANE.replace(
+        '<parent link="boom"/><child link="hook"/>',
+        '<mimic joint="swing" multiplier="0.5"/><parent link="boom"/><child link="hook"/>',
+    )
+    path = tmp_path / "robot.urdf"
+    path.write_text(text)
+    reaches = {reach.joint: reach for reach in sweep(plant(Facts(load_robot(path))))}
+    assert set(reaches) == {"lift", "swing"}
+    assert reaches["swing"].share < 1

@@ -1,0 +1,241 @@
+import math
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description import bundled
+from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.fixes.apply import fix_robot
+from terrainkit_robots.lint.runner import lint
+from terrainkit_robots.mesh.mesh_cache import Meshes
+from terrainkit_robots.simulation.pd_gains import suggest_gains
+from terrainkit_robots.simulation.sim_model import TIME_STEP, plant
+from terrainkit_robots.simulation.time_step import longest_step
+
+BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]
+
+# What the robots are trained with, by joint: stiffness and damping of legged_gym (a1 with those of
+# walk-these-ways, anymal_c, cassie), of unitree_rl_gym and Isaac Lab (go2, h1, g1).
+TRAINED = {
+    "a1/urdf/a1.urdf": {".*": ((20, 40), (0.5, 1))},
+    "go2/urdf/go2.urdf": {".*": ((20, 40), (0.5, 1))},
+    "go2_mjcf/go2.xml": {".*": ((20, 40), (0.5, 1))},
+    "cassie/urdf/cassie.urdf": {
+        "hip_(abduction|rotation).*": ((100, 100), (3, 3)),
+        "hip_flexion.*|thigh.*|ankle.*": ((200, 200), (6, 6)),
+        "toe.*": ((40, 40), (1, 1)),
+    },
+    "h1/urdf/h1.urdf": {
+        ".*hip.*": ((150, 200), (2, 5)),
+        ".*knee.*": ((200, 300), (4, 6)),
+        ".*ankle.*": ((20, 40), (2, 4)),
+    },
+    "g1/g1_29dof.urdf": {
+        ".*hip.*": ((100, 100), (2, 2)),
+        ".*knee.*": ((150, 150), (4, 4)),
+        ".*ankle.*": ((40, 40), (1, 2)),
+        ".*(shoulder|elbow).*": ((40, 40), (1, 2)),
+    },
+}
+
+REFUSED = ["cassie/urdf/cassie.urdf"]  # by MuJoCo, for their inertias
+
+WHEELED = """
+<robot name="car">
+  <link name="body">
+    <inertial><mass value="5"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <link name="wheel">
+    <inertial><mass value="1"/>
+      <inertia ixx="0.01" iyy="0.02" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision>
+      <origin rpy="1.5708 0 0"/><geometry><cylinder radius="0.2" length="0.05"/></geometry>
+    </collision>
+  </link>
+  <joint name="axle" type="continuous">
+    <parent link="body"/><child link="wheel"/><axis xyz="0 1 0"/>
+    {limit}
+  </joint>
+</robot>
+"""
+
+ARM = """
+<robot name="arm">
+  <link name="pole"/>
+  <link name="arm">
+    <inertial><origin xyz="0.5 0 0"/><mass value="2"/>
+      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <joint name="shoulder" type="{kind}">
+    <parent link="pole"/><child link="arm"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" effort="{effort}" velocity="10"/>
+  </joint>
+</robot>
+"""
+
+GANTRY = """
+<robot name="gantry">
+  <link name="frame"/>
+  <link name="slider">
+    <inertial><mass value="2"/>
+      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <joint name="rail" type="prismatic">
+    <parent link="frame"/><child link="slider"/><axis xyz="1 0 0"/>
+    <limit lower="-1" upper="1" effort="10" velocity="10"/>
+  </joint>
+  <!-- and -->
+  <link name="arm">
+    <inertial><origin xyz="0.1 0 0"/><mass value="4"/>
+      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <joint name="swing" type="revolute">
+    <parent link="frame"/><child link="arm"/><origin xyz="0 1 0"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" effort="100" velocity="10"/>
+  </joint>
+</robot>
+"""
+
+
+@cache
+def read(path):
+    return Facts(load_robot(path))
+
+
+def written(folder, text):
+    path = folder / "robot.urdf"
+    path.write_text(text)
+    return read(path)
+
+
+def path_of(name, robot_file):
+    stem, suffix = Path(name).stem, Path(name).suffix
+    return bundled.find(stem).with_suffix(suffix) if name in BUNDLED else robot_file(name)
+
+
+def facts_of(name, robot_file):
+    path = path_of(name, robot_file)
+    return repaired(path) if name in REFUSED else read(path)
+
+
+@cache
+def repaired(path):
+    def look(contents):
+        return lint(Facts(load_robot(path, contents=contents), Meshes(contents)), simulate=False)
+
+    return fix_robot(path, look, unsafe=True).report.facts
+
+
+every_robot = pytest.mark.parametrize(
+    "name", [*BUNDLED, "a1/urdf/a1.urdf", "go2/urdf/go2.urdf", "g1/g1_29dof.urdf"]
+)
+
+
+@pytest.mark.parametrize("name", TRAINED)
+def test_they_are_within_a_factor_of_what_people_train_with(name, robot_file):
+    found = suggest_gains(facts_of(name, robot_file))
+    for pattern, ((softest, stiffest), (least, most)) in TRAINED[name].items():
+        joints = [joint for joint in found if re.fullmatch(pattern, joint)]
+        assert joints
+        for joint in joints:
+            gain = found[joint]
+            assert softest / 2 <= gain.stiffness <= 2 * stiffest, (joint, gain)
+            assert least / 2.1 <= gain.damping <= 2.1 * most, (joint, gain)
+
+
+@every_robot
+def test_every_motor_has_one_and_twins_have_the_same(name, robot_file):
+    facts = facts_of(name, robot_file)
+    found = suggest_gains(facts)
+    assert tuple(found) == plant(facts).drives
+    for pair in facts.mirror.pairs:
+        left, right = (facts.bodies[index].joint for index in (pair.left, pair.right))
+        assert found[left.name] == found[right.name]
+
+
+@every_robot
+def test_they_are_round_and_say_why(name, robot_file):
+    for gain in suggest_gains(facts_of(name, robot_file)).values():
+        for value in (gain.stiffness, gain.damping):
+            digits = f"{value:.6e}".split("e")[0].rstrip("0").rstrip(".")
+            assert digits in {"1", "1.5", "2", "2.5", "3", "4", "5", "6", "8"}, gain
+        assert gain.reason.startswith("kp ")
+        assert "; kd " in gain.reason
+
+
+@every_robot
+def test_explicit_control_is_stable_with_them_at_the_time_step_of_training(name, robot_file):
+    facts = facts_of(name, robot_file)
+    assert longest_step(plant(facts), suggest_gains(facts)).seconds > 1.1 * TIME_STEP
+
+
+@every_robot
+def test_armature_is_never_less_than_declared(name, robot_file):
+    facts = facts_of(name, robot_file)
+    found = suggest_gains(facts)
+    for joint in facts.actuated:
+        assert found[joint.name].armature >= joint.armature
+
+
+def test_a_light_calf_gets_the_armature_that_its_motor_has():
+    light = suggest_gains(read(bundled.find("quadruped")))
+    assert light["FL_calf_joint"].armature == pytest.approx(0.01)
+    assert "armature" in light["FL_calf_joint"].reason
+    declared = suggest_gains(read(bundled.find("quadruped").with_suffix(".xml")))
+    assert declared["FL_calf_joint"].armature == pytest.approx(0.01)
+    assert "armature" not in declared["FL_calf_joint"].reason
+
+
+def test_an_arm_holds_its_weight_within_a_degree(tmp_path):
+    gain = suggest_gains(written(tmp_path, ARM.format(kind="revolute", effort="1000")))["shoulder"]
+    torque = 2 * 9.81 * 0.5
+    assert gain.stiffness == pytest.approx(torque / 0.02, rel=0.12)  # 490, rounded to 500
+    inertia = 0.01 + 2 * 0.5**2
+    critical = 2 * math.sqrt(torque / 0.02 * inertia)
+    assert gain.damping == pytest.approx(min(critical, torque / 0.02 / 20), rel=0.12)
+
+
+def test_a_weak_motor_is_not_asked_for_all_it_has_at_a_small_error(tmp_path):
+    gain = suggest_gains(written(tmp_path, ARM.format(kind="revolute", effort="10")))["shoulder"]
+    assert gain.stiffness == pytest.approx(20)
+    assert "effort of 10 N m at an error of 0.5 rad" in gain.reason
+
+
+@pytest.mark.parametrize(("effort", "why"), [("1e5", "N within 0.002 m"), ("10", "10 N at an err")])
+def test_a_slide_is_told_newtons_and_metres(tmp_path, effort, why):
+    gain = suggest_gains(written(tmp_path, ARM.format(kind="prismatic", effort=effort)))["shoulder"]
+    assert gain.stiffness == pytest.approx(min(2 * 9.81 / 0.002, float(effort) / 0.05), rel=0.12)
+    assert why in gain.reason
+    assert not re.search(r"N m|rad|kg m2", gain.reason)
+
+
+def test_slides_and_hinges_that_are_equally_stiff_are_not_damped_alike(tmp_path):
+    """What slides moves 2 kg, and what turns, equally stiff, 0.05 kg m2."""
+    found = suggest_gains(written(tmp_path, GANTRY))
+    assert found["rail"].stiffness == found["swing"].stiffness == 200
+    alone = written(tmp_path, GANTRY.split("<!-- and -->")[0] + "</robot>")
+    assert found["rail"].damping == suggest_gains(alone)["rail"].damping
+    assert found["rail"].damping > found["swing"].damping
+
+
+@pytest.mark.parametrize(
+    ("limit", "damping"),
+    [('<limit effort="5" velocity="10"/>', 0.5), ("", 0.02 / 0.05)],
+)
+def test_a_wheel_is_told_a_speed(limit, damping, tmp_path):
+    gain = suggest_gains(written(tmp_path, WHEELED.format(limit=limit)))["axle"]
+    assert gain.stiffness == 0
+    assert gain.damping == pytest.approx(damping, rel=0.12)
+
+
+def test_a_wheel_with_a_strong_motor_is_damped_as_the_time_step_bears(tmp_path):
+    text = WHEELED.format(limit='<limit effort="500" velocity="1"/>')
+    gain = suggest_gains(written(tmp_path, text))["axle"]
+    assert gain.damping == pytest.approx(0.5 * 0.02 / TIME_STEP, rel=0.12)
+
+
+def test_without_joints_there_are_none(tmp_path):
+    assert suggest_gains(written(tmp_path, '<robot name="r"><link name="a"/></robot>')) == {}
