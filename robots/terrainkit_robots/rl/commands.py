@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit_robots.rl.rotation import wrap_to_pi
 from terrainkit_robots.rl.task import Commands, Task
 from terrainkit_robots.rl.terrain import Terrain
+from terrainkit_robots.transforms import wrap_to_pi
 
 FloatArray = NDArray[np.float32]
 Ids = NDArray[np.int64]

@@ -12,10 +12,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit_robots.rl.rotation import quat_rotate_inverse
 from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.task import Task
+from terrainkit_robots.transforms import quat_rotate_inverse
 
 FloatArray = NDArray[np.float32]
 

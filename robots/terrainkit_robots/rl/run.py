@@ -23,7 +23,7 @@ from terrainkit.errors import ConfigError, ExportError, listing
 from terrainkit.toml_text import parse_toml
 from terrainkit_robots.mesh.sniff import open_regular
 from terrainkit_robots.rl import registry
-from terrainkit_robots.rl.scene import SPEC_FILE, Robot, robot_from_spec
+from terrainkit_robots.rl.scene import SPEC_FILE, Robot
 from terrainkit_robots.rl.task import Task
 from terrainkit_robots.rl.task_file import read_task, to_toml
 from terrainkit_robots.spec.spec_file import read_spec
@@ -130,7 +130,9 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
         **({"terrain_sha256": _sha256(Path(source))} if source.endswith(".xml") else {}),
         "seed": task.runner.seed,
         "begun": datetime.now().astimezone().isoformat(timespec="seconds"),
-        "versions": {name: version(name) for name in ("terrainkit", "mujoco", "rsl-rl-lib", "torch")},
+        "versions": {
+            name: version(name) for name in ("terrainkit", "mujoco", "rsl-rl-lib", "torch")
+        },
         "robot_sha256": _robot_digests(robot_folder),
     }
     import tomli_w
@@ -196,7 +198,7 @@ def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
             )
     robot_name, terrain = about["robot"], about["terrain"]
     found = registry.find(robot_name)
-    robot = robot_from_spec(read_spec(folder / SPEC_FILE), found.folder)
+    robot = Robot.from_spec(read_spec(folder / SPEC_FILE), found.folder)
     if not robot.mjcf.is_file():
         raise ConfigError(f"the robot of {folder} is missing: there is no file {robot.mjcf}")
     if terrain != "plane":
@@ -371,6 +373,11 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
         raise
     except Exception as error:  # whatever torch raises for a damaged file
         raise ConfigError(f"{path} is not a checkpoint of terrainkit, or is damaged") from error
+    return _checked(path, state)
+
+
+def _checked(path: Path, state: Any) -> dict[str, Any]:
+    """Return a checkpoint's content after checking its keys."""
     if not isinstance(state, dict) or state.get("format") != CHECKPOINT_FORMAT:
         raise ConfigError(f"{path} is not a checkpoint of terrainkit")
     if state.get("version") != FORMAT_VERSION:
@@ -408,7 +415,9 @@ def _to_plain(value: Any) -> Any:
 
 def _robot_digests(folder: Path) -> dict[str, str]:
     """Return the SHA-256 of a robot's spec and model by file name."""
-    return {name: _sha256(folder / name) for name in (SPEC_FILE, read_spec(folder / SPEC_FILE).mjcf)}
+    return {
+        name: _sha256(folder / name) for name in (SPEC_FILE, read_spec(folder / SPEC_FILE).mjcf)
+    }
 
 
 def _sha256(path: Path) -> str:

@@ -59,6 +59,51 @@ class Robot:
     upper: FloatArray
     """Upper soft limits [rad], shape (j,)."""
 
+    @classmethod
+    def from_spec(cls, spec: RobotSpec, folder: Path) -> "Robot":
+        """Return the robot that a spec in `folder` describes.
+
+        Raises:
+            ConfigError: If the spec is incomplete.
+        """
+        if not spec.floating:
+            raise ConfigError(f"base of {spec.name}: got a fixed base; expected a floating base")
+        if not spec.feet:
+            raise ConfigError(f"feet of {spec.name}: got none; expected one for each leg")
+        if spec.spawn_height is None or spec.base_height_target is None:
+            raise ConfigError(
+                f"the spec of {spec.name} lacks spawn_height or base_height_target; "
+                "terrainkit onboard measures both"
+            )
+
+        def array(table: str) -> FloatArray:
+            return np.array(list(spec.per_joint(table).values()), np.float32)
+
+        soft = match_joints(spec.soft_limits, spec.joint_order).values
+        limits = [soft.get(name, (-np.inf, np.inf)) for name in spec.joint_order]
+        lower, upper = np.array(limits, np.float32).T
+        return cls(
+            spec=spec,
+            mjcf=folder / spec.mjcf,
+            default_pose=array("default_pose"),
+            wheels=(array("stiffness") == 0) & (array("damping") > 0),
+            effort=array("effort"),
+            velocity=array("velocity"),
+            lower=lower,
+            upper=upper,
+        )
+
+    @classmethod
+    def load(cls, folder: Path) -> "Robot":
+        """Load the robot in an onboarded folder.
+
+        Raises:
+            ConfigError: If there is no robot.toml, or it is incomplete.
+        """
+        if not (folder / SPEC_FILE).exists():
+            raise ConfigError(f"{folder}: got no {SPEC_FILE}; expected an onboarded robot's folder")
+        return cls.from_spec(read_spec(folder / SPEC_FILE), folder)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Scene:
@@ -88,51 +133,6 @@ class Scene:
     sensors: dict[str, slice]
     """Range in sensordata of `foot_position`, `foot_velocity`, `foot_force`, `penalized_force` and
     `termination_force`, three numbers per body. Forces act on what the robot touches [N]."""
-
-
-def robot_from_spec(spec: RobotSpec, folder: Path) -> Robot:
-    """Return the robot that a spec in `folder` describes.
-
-    Raises:
-        ConfigError: If the spec is incomplete.
-    """
-    if not spec.floating:
-        raise ConfigError(f"base of {spec.name}: got a fixed base; expected a floating base")
-    if not spec.feet:
-        raise ConfigError(f"feet of {spec.name}: got none; expected one for each leg")
-    if spec.spawn_height is None or spec.base_height_target is None:
-        raise ConfigError(
-            f"the spec of {spec.name} lacks spawn_height or base_height_target; "
-            "terrainkit onboard measures both"
-        )
-
-    def array(table: str) -> FloatArray:
-        return np.array(list(spec.per_joint(table).values()), np.float32)
-
-    soft = match_joints(spec.soft_limits, spec.joint_order).values
-    limits = [soft.get(name, (-np.inf, np.inf)) for name in spec.joint_order]
-    lower, upper = np.array(limits, np.float32).T
-    return Robot(
-        spec=spec,
-        mjcf=folder / spec.mjcf,
-        default_pose=array("default_pose"),
-        wheels=(array("stiffness") == 0) & (array("damping") > 0),
-        effort=array("effort"),
-        velocity=array("velocity"),
-        lower=lower,
-        upper=upper,
-    )
-
-
-def read_robot(folder: Path) -> Robot:
-    """Return the robot in an onboarded folder.
-
-    Raises:
-        ConfigError: If there is no robot.toml, or it is incomplete.
-    """
-    if not (folder / SPEC_FILE).exists():
-        raise ConfigError(f"{folder} has no {SPEC_FILE}; terrainkit onboard writes such a folder")
-    return robot_from_spec(read_spec(folder / SPEC_FILE), folder)
 
 
 def build_scene(robot: Robot, terrain: Terrain, task: Task) -> Scene:
@@ -190,7 +190,8 @@ def _attach(robot: Robot, terrain: Terrain, task: Task) -> tuple[Any, Any]:
         spec.delete(element)
     ground = terrain.spec()
     for each in (spec, ground):  # both, or MuJoCo warns about differences
-        each.option = option = mujoco.MjSpec().option
+        each.option = mujoco.MjSpec().option  # gravity, wind: the same for every robot
+        option = each.option
         option.timestep = task.sim.dt
         option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL

@@ -86,31 +86,33 @@ class Simulation:
 def check_memory(task: Task, robot: Robot, *, scan: bool, ngeom: int) -> None:
     """Check that training with the task's environments fits in memory.
 
-    The estimate is accurate to a factor of two.
-
     Raises:
         CapacityError: If it does not fit; the message names a number of environments that does.
     """
+    num_envs, message = task.env.num_envs, ""
+    while num_envs:
+        try:
+            needed = num_envs * bytes_per_env(task, robot, scan=scan, ngeom=ngeom)
+            require_memory(needed, f"training with {num_envs} environments")
+        except CapacityError as error:
+            message, num_envs = message or str(error), num_envs // 2
+        else:
+            break
+    if message:
+        raise CapacityError(
+            f"{message}; env.num_envs {num_envs} would fit" if num_envs else message
+        )
+
+
+def bytes_per_env(task: Task, robot: Robot, *, scan: bool, ngeom: int) -> int:
+    """Estimate the memory that training takes for each environment, within a factor of two."""
     joints, feet = len(robot.default_pose), len(robot.spec.feet)
     points = len(task.terrain.measured_points_x) * len(task.terrain.measured_points_y)
     observations = 29 + 7 * joints + 3 * feet + 2 * scan * points
     physics = 40 + 45 * joints + 37 * feet + 3 * ngeom
-    steps, widths = task.runner.num_steps_per_env, task.policy
-    samples = steps / task.algorithm.num_mini_batches * (1 + (task.algorithm.symmetry != "none"))
-    hidden = sum(widths.actor_hidden_dims) + sum(widths.critic_hidden_dims)
+    steps, algorithm, policy = task.runner.num_steps_per_env, task.algorithm, task.policy
+    samples = steps / algorithm.num_mini_batches * (1 if algorithm.symmetry == "none" else 2)
+    hidden = sum(policy.actor_hidden_dims) + sum(policy.critic_hidden_dims)
     learning = max(3 * steps * observations, samples * (5 * hidden + 2 * observations))
     storage = steps * (observations + 3 * joints + 7)
-    bytes_per_env = round(8 * physics + 4 * (12 * observations + storage + learning))
-    num_envs, message = task.env.num_envs, ""
-    while True:
-        try:
-            require_memory(num_envs * bytes_per_env, f"training with {num_envs} environments")
-        except CapacityError as error:
-            message = message or str(error)
-            if num_envs == 1:
-                raise CapacityError(message) from None
-            num_envs //= 2
-            continue
-        if message:
-            raise CapacityError(f"{message}; env.num_envs {num_envs} would fit")
-        return
+    return round(8 * physics + 4 * (12 * observations + storage + learning))

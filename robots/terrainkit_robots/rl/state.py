@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit_robots.rl.rotation import projected_gravity, quat_rotate_inverse, quat_to_yaw
 from terrainkit_robots.rl.simulation import Simulation
 from terrainkit_robots.rl.task import Task
 from terrainkit_robots.rl.terminations import (
@@ -15,6 +14,7 @@ from terrainkit_robots.rl.terminations import (
     terrain_out_of_bounds,
 )
 from terrainkit_robots.rl.terrain import Terrain
+from terrainkit_robots.transforms import projected_gravity, quat_rotate_inverse, quat_to_yaw
 
 FloatArray = NDArray[np.float32]
 BoolArray = NDArray[np.bool_]

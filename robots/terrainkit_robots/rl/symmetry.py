@@ -8,7 +8,7 @@ Symmetric Robot Policies, 2024.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -44,8 +44,18 @@ class SignedPermutation:
         return values[:, self.index] * self.sign
 
 
-def mirror_maps(env: "LeggedEnv") -> tuple[dict[str, SignedPermutation], SignedPermutation]:
-    """Return the mirror map of each observation group, and that of the actions.
+class MirrorMaps(NamedTuple):
+    """The mirror maps of an environment."""
+
+    groups: dict[str, SignedPermutation]
+    """Of each observation group."""
+
+    actions: SignedPermutation
+    """Of the actions."""
+
+
+def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
+    """Return the mirror maps of an environment.
 
     Raises:
         ConfigError: If left and right of the robot or its height scan differ.
@@ -81,7 +91,7 @@ def mirror_maps(env: "LeggedEnv") -> tuple[dict[str, SignedPermutation], SignedP
             sign.append(part.sign)
             start += width
         groups[name] = _map(np.concatenate(index), np.concatenate(sign))
-    return groups, joints
+    return MirrorMaps(groups, joints)
 
 
 Tensors = tuple[torch.Tensor, torch.Tensor]
@@ -141,9 +151,14 @@ def _joint_map(robot: Robot) -> SignedPermutation:
     pairs = [mirror[name] for name in spec.joint_order]
     for name, pair in zip(spec.joint_order, pairs, strict=True):
         back = mirror.get(pair.joint)
-        if pair.joint not in position or back is None or (back.joint, back.sign) != (
-            name,
-            pair.sign,
+        if (
+            pair.joint not in position
+            or back is None
+            or (back.joint, back.sign)
+            != (
+                name,
+                pair.sign,
+            )
         ):
             raise ConfigError(
                 f"mirror of {spec.name}: {name} is paired with {pair.joint!r}, which is not a "
@@ -161,7 +176,9 @@ def _check_control(env: "LeggedEnv", joints: SignedPermutation) -> None:
         "damping": -model.actuator_biasprm[:, 2],
         "effort": model.actuator_forcerange[:, 1],
     }
-    checks = [("default_pose", pose, pose[joints.index] * joints.sign, np.full(len(pose), TOLERANCE))]
+    checks = [
+        ("default_pose", pose, pose[joints.index] * joints.sign, np.full(len(pose), TOLERANCE))
+    ]
     checks += [(t, own, own[joints.index], TOLERANCE * np.abs(own)) for t, own in tables.items()]
     for table, own, mirrored, tolerance in checks:
         different = np.flatnonzero(np.abs(own - mirrored) > tolerance)

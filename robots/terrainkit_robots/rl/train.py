@@ -23,7 +23,7 @@ from terrainkit_robots.rl.run import (
     parts_to_load,
     rewrite_task,
 )
-from terrainkit_robots.rl.scene import read_robot
+from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.task import Task
 from terrainkit_robots.rl.terrain import load_terrain
 
@@ -88,7 +88,7 @@ def train(
     device = resolve_device(device)
     if device != "cpu" and int(os.environ.get("WORLD_SIZE", "1")) > 1:
         device = resolve_device(f"cuda:{os.environ.get('LOCAL_RANK', '0')}")
-    model = continued.robot if continued else read_robot(registry.find(robot).folder)
+    model = continued.robot if continued else Robot.load(registry.find(robot).folder)
     torch.set_num_threads(share.env.num_threads)
     torch.manual_seed(share.runner.seed)
     env = LeggedEnv(share, model, load_terrain(terrain, task.terrain.collision), device)
@@ -130,7 +130,9 @@ def _process_share(task: Task) -> Task:
     rank, count = int(os.environ.get("RANK", "0")), int(os.environ.get("WORLD_SIZE", "1"))
     num_envs, local_count = task.env.num_envs, int(os.environ.get("LOCAL_WORLD_SIZE", "1"))
     if num_envs < count:
-        raise ConfigError(f"env.num_envs: got {num_envs}; expected one for each of {count} processes")
+        raise ConfigError(
+            f"env.num_envs: got {num_envs}; expected one for each of {count} processes"
+        )
     available = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0)
     threads = task.env.num_threads or max(1, len(available) // local_count)
     num_envs = num_envs // count + (rank < num_envs % count)

@@ -7,11 +7,11 @@ import torch
 from terrainkit.errors import ConfigError, TerrainkitWarning
 from terrainkit_robots.policy.actor import actor_of, policy_of
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
 from terrainkit_robots.rl.registry import find
-from terrainkit_robots.rl.run_folder import create_run, open_run
+from terrainkit_robots.rl.run import create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.task import Env, Task
+from terrainkit_robots.rl.terrain import Plane
 
 
 @pytest.fixture

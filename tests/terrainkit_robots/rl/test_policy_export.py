@@ -17,10 +17,10 @@ from terrainkit_robots.policy.actor import policy_of
 from terrainkit_robots.policy.export import METADATA, export_policy
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
 from terrainkit_robots.rl.registry import find
-from terrainkit_robots.rl.run_folder import create_run, open_run
+from terrainkit_robots.rl.run import create_run, open_run
 from terrainkit_robots.rl.task import Env, Task
+from terrainkit_robots.rl.terrain import Plane
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ import pytest
 from terrainkit.errors import ConfigError
 from terrainkit_cli.main import COMMANDS
 from terrainkit_robots.description import bundled
-from terrainkit_robots.rl import registry, rewards, robot
+from terrainkit_robots.rl import registry, rewards, scene
 from terrainkit_robots.rl.task import Env, Task
 from terrainkit_robots.rl.task_file import from_toml, to_toml, values_of
 
@@ -43,7 +43,7 @@ def test_bundled_robots_are_registered_and_can_be_trained(name):
     found = registry.find(name)
     assert (found.name, found.folder) == (name, bundled.find(name).parent)
     assert name in registry.names()
-    read = robot.load_robot(found.folder)
+    read = scene.Robot.load(found.folder)
     assert read.mjcf.is_file()
     assert len(read.default_pose) == 12
 
@@ -79,7 +79,7 @@ def test_a_task_is_an_instance_of_task(tmp_path):
 def test_a_folder_is_a_task_of_its_own(tmp_path, monkeypatch, kind):
     folder = tmp_path / "quadruped"
     folder.mkdir()
-    (folder / "robot.toml").write_bytes((QUADRUPED / "robot.toml").read_bytes())
+    (folder / "robot.toml").write_bytes((QUADRUPED / "scene.toml").read_bytes())
     found = registry.find(kind(folder))
     assert (found.name, found.folder, found.task) == ("quadruped", folder, Task())
     monkeypatch.chdir(tmp_path)
@@ -175,7 +175,7 @@ def test_the_task_of_the_guide_is_found_saved_and_trained_with(guide):
     import torch
 
     from terrainkit_robots.rl.env import LeggedEnv
-    from terrainkit_robots.rl.ground import Plane
+    from terrainkit_robots.rl.terrain import Plane
 
     assert (guide.name, guide.folder) == ("trotter", QUADRUPED)
     assert guide.task.rewards.trot == 0.5
@@ -183,7 +183,7 @@ def test_the_task_of_the_guide_is_found_saved_and_trained_with(guide):
     assert "# One diagonal pair of feet on the ground" in text
     assert from_toml(text.replace("trot = 0.5", "trot = 2.0"), guide.task).rewards.trot == 2.0
     task = replace(guide.task, env=Env(num_envs=4, num_threads=1))
-    env = LeggedEnv(task, robot.load_robot(guide.folder), Plane())
+    env = LeggedEnv(task, scene.Robot.load(guide.folder), Plane())
     function, scale = env.rewards["trot"]
     assert scale == 0.5
     env.state.foot_force[..., 2] = [[9, 0, 0, 9], [9, 9, 9, 9], [0, 6, 6, 0], [0, 4, 4, 0]]

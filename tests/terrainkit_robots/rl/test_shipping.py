@@ -6,13 +6,12 @@ import torch
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots.policy.actor import policy_of
 from terrainkit_robots.policy.bundle import ship
-from terrainkit_robots.rl.checkpoint import read_checkpoint
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane, read_ground
 from terrainkit_robots.rl.registry import find, names
-from terrainkit_robots.rl.run_folder import create_run, open_run
+from terrainkit_robots.rl.run import create_run, open_run, read_checkpoint
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.task import Env, Policy, Runner, Task
+from terrainkit_robots.rl.terrain import Plane, load_terrain
 
 SHIPPING = [name for name in names() if find(name).shipped.is_dir()]
 TASK = Task(
@@ -60,7 +59,7 @@ def test_a_checkpoint_may_be_asked_for(trained, tmp_path):
 
 def test_a_map_is_made_again_and_no_folder_of_this_machine_is_named(map_file, tmp_path):
     run = create_run(tmp_path / "run", TASK, "quadruped", map_file)
-    ground = read_ground(run.terrain)
+    ground = load_terrain(run.terrain)
     LeggedRunner(LeggedEnv(TASK, run.robot, ground), run.folder).learn(1)
     shipped = ship(open_run(run.folder), tmp_path / "elsewhere")
     map_file.unlink()
@@ -71,7 +70,7 @@ def test_a_map_is_made_again_and_no_folder_of_this_machine_is_named(map_file, tm
     moved = shipped.folder.rename(tmp_path / "moved")
     again = open_run(moved)
     assert again.terrain == str(moved / "map.toml")
-    assert (read_ground(again.terrain).env_origins == ground.env_origins).all()
+    assert (load_terrain(again.terrain).env_origins == ground.env_origins).all()
 
 
 def test_what_is_found_on_this_machine_alone_is_refused(quadruped, trained, tmp_path):

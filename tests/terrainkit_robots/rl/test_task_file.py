@@ -9,13 +9,7 @@ import pytest
 from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.section import Section
 from terrainkit_robots.rl.task import Commands, Rewards, Task
-from terrainkit_robots.rl.task_file import (
-    from_toml,
-    may_be_none,
-    read_task,
-    to_toml,
-    values_of,
-)
+from terrainkit_robots.rl.task_file import from_toml, may_be_none, read_task, to_toml, values_of
 
 
 @dataclass(frozen=True, kw_only=True)
