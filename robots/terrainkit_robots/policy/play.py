@@ -22,10 +22,10 @@ from terrainkit_robots.policy.recorder import Recorder
 from terrainkit_robots.policy.rollout import timetable, walk
 from terrainkit_robots.policy.score import Evaluation, summed_up
 from terrainkit_robots.policy.trials import roll_out
+from terrainkit_robots.rendering.video import DEFAULT_SIZE, VideoSpec
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.runner import single_torch_thread
 from terrainkit_robots.rl.task import Commands
-from terrainkit_robots.rl.video import SIZE, Film
 
 if TYPE_CHECKING:
     from terrainkit_robots.rl.run import Run
@@ -49,7 +49,7 @@ class Played:
     evaluation: Evaluation
     """How the robots did."""
 
-    film: Film | None
+    film: VideoSpec | None
     """What is to be drawn; None if no film was wanted."""
 
 
@@ -60,7 +60,7 @@ def play(
     *,
     filmed: bool = True,
     robots: int = ROBOTS,
-    size: tuple[int, int] = SIZE,
+    size: tuple[int, int] = DEFAULT_SIZE,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Played:
     """Roll the policy of a run.

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit_robots.rendering.video import Shot, VideoSpec
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.video import Film, Shot
 from terrainkit_robots.transforms import quat_to_yaw
 
 FloatArray = NDArray[np.float32]
@@ -68,7 +68,7 @@ class Recorder:
         turned[:, 3:7] = _turned(yaw, poses[:, 3:7])
         return turned
 
-    def film(self, robots: int, size: tuple[int, int]) -> Film:
+    def film(self, robots: int, size: tuple[int, int]) -> VideoSpec:
         """Return the film, which follows so many robots on a map."""
         env = self._env
         frames = len(self._poses)
@@ -79,7 +79,7 @@ class Recorder:
             chosen = visited(env, robots)
             each = max(1, frames // len(chosen))
             shots = tuple(self._visit(robot, each) for robot in chosen)
-        return Film(
+        return VideoSpec(
             model=env.scene.model,
             poses=np.stack(self._poses),
             shots=shots,

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit_robots.rl.task import Commands, Task
+from terrainkit_robots.rl.config import Commands, Task
 from terrainkit_robots.rl.terrain import Terrain
 from terrainkit_robots.transforms import wrap_to_pi
 

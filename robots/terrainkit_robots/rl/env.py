@@ -11,6 +11,7 @@ from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.commands import VelocityCommand, uses_heading
+from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.curriculum import TerrainCurriculum
 from terrainkit_robots.rl.events import Pushes, apply_params, sample_params, sample_reset_state
 from terrainkit_robots.rl.observations import (
@@ -23,7 +24,6 @@ from terrainkit_robots.rl.rewards import active_rewards
 from terrainkit_robots.rl.scene import Robot, build_scene
 from terrainkit_robots.rl.simulation import Simulation, check_memory
 from terrainkit_robots.rl.state import Sensors, State
-from terrainkit_robots.rl.task import Task
 from terrainkit_robots.rl.terminations import terrain_out_of_bounds
 from terrainkit_robots.rl.terrain import Terrain
 from terrainkit_robots.transforms import quat_to_yaw

@@ -9,9 +9,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit_robots.rl.config import Rewards
 from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.state import State
-from terrainkit_robots.rl.task import Rewards
 
 FloatArray = NDArray[np.float32]
 

@@ -22,10 +22,9 @@ from terrainkit.atomic import atomic_write
 from terrainkit.errors import ConfigError, ExportError, listing
 from terrainkit.toml_text import parse_toml
 from terrainkit_robots.mesh.sniff import open_regular
-from terrainkit_robots.rl import registry
+from terrainkit_robots.rl import tasks
+from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.scene import SPEC_FILE, Robot
-from terrainkit_robots.rl.task import Task
-from terrainkit_robots.rl.task_file import read_task, to_toml
 from terrainkit_robots.spec.spec_file import read_spec
 from terrainkit_robots.text import free_name
 
@@ -105,8 +104,8 @@ def resolve_robot(robot: str | Path) -> str:
     Raises:
         ConfigError: If there is no such robot.
     """
-    found = registry.find(robot)
-    return str(robot) if str(robot) in registry.names() else str(found.folder.resolve())
+    found = tasks.get_task(robot)
+    return str(robot) if str(robot) in tasks.task_names() else str(found.folder.resolve())
 
 
 def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | Path) -> Run:
@@ -122,7 +121,7 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
         ConfigError: If there is no such robot, or the terrain's file cannot be read.
         ExportError: If the folder is not empty, or cannot be written.
     """
-    robot_folder, source = registry.find(robot_name).folder, resolve_terrain(terrain)
+    robot_folder, source = tasks.get_task(robot_name).folder, resolve_terrain(terrain)
     about = {
         "format_version": FORMAT_VERSION,
         "robot": resolve_robot(robot_name),
@@ -139,7 +138,7 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
 
     files = {
         RUN_FILE: tomli_w.dumps(about),
-        TASK_FILE: to_toml(task),
+        TASK_FILE: task.to_toml(),
         SPEC_FILE: _read_text(robot_folder / SPEC_FILE),
     }
     if (config := _map_config(source)) is not None:
@@ -175,7 +174,7 @@ def write_run_folder(folder: Path, files: Mapping[str, bytes]) -> None:
 def rewrite_task(run: Run, task: Task) -> None:
     """Replace the task in a run's folder."""
     with atomic_write(run.folder / TASK_FILE, overwrite=True) as path:
-        path.write_text(to_toml(task), encoding="utf-8")
+        path.write_text(task.to_toml(), encoding="utf-8")
 
 
 def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
@@ -197,7 +196,7 @@ def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
                 f"{folder / RUN_FILE}: {key}: got {about.get(key, 'nothing')!r}; expected a string"
             )
     robot_name, terrain = about["robot"], about["terrain"]
-    found = registry.find(robot_name)
+    found = tasks.get_task(robot_name)
     robot = Robot.from_spec(read_spec(folder / SPEC_FILE), found.folder)
     if not robot.mjcf.is_file():
         raise ConfigError(f"the robot of {folder} is missing: there is no file {robot.mjcf}")
@@ -216,7 +215,7 @@ def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
         selected = saved[checkpoint]
     return Run(
         folder=folder,
-        task=read_task(folder / TASK_FILE, default=found.task),
+        task=Task.load(folder / TASK_FILE, found.task),
         robot=robot,
         robot_name=robot_name,
         terrain=terrain,
@@ -229,7 +228,7 @@ def _resolve_run(name: str | Path) -> tuple[Path, Path | None]:
 
     A run in the working directory takes precedence over a shipped policy of the same name.
     """
-    path, is_robot = Path(name), str(name) in registry.names()
+    path, is_robot = Path(name), str(name) in tasks.task_names()
     try:
         if (path / RUN_FILE).is_file() or (path.is_dir() and not is_robot):
             return path, None
@@ -240,9 +239,9 @@ def _resolve_run(name: str | Path) -> tuple[Path, Path | None]:
     if not is_robot:
         raise ConfigError(
             f"run: got {name}; expected a folder that terrainkit train wrote, a checkpoint in "
-            f"one, or a robot: {listing(registry.names())}"
+            f"one, or a robot: {listing(tasks.task_names())}"
         )
-    shipped = registry.find(str(name)).shipped
+    shipped = tasks.get_task(str(name)).trained_run
     if not shipped.is_dir():
         raise ConfigError(
             f"no policy is shipped with {name}; terrainkit train {name} writes a run with one"
@@ -252,7 +251,7 @@ def _resolve_run(name: str | Path) -> tuple[Path, Path | None]:
 
 def is_shipped(run: Run) -> bool:
     """Return whether a run is part of a package, so that its folder must not be written."""
-    return run.folder.resolve() == registry.find(run.robot_name).shipped.resolve()
+    return run.folder.resolve() == tasks.get_task(run.robot_name).trained_run.resolve()
 
 
 def changed_robot_files(run: Run) -> tuple[str, ...]:
@@ -264,7 +263,7 @@ def changed_robot_files(run: Run) -> tuple[str, ...]:
     recorded = _read_about(run.folder).get("robot_sha256")
     if not isinstance(recorded, dict):  # a run of an earlier version
         return ()
-    current = _robot_digests(registry.find(run.robot_name).folder)
+    current = _robot_digests(tasks.get_task(run.robot_name).folder)
     names = sorted({*recorded, *current})
     return tuple(name for name in names if recorded.get(name) != current.get(name))
 

@@ -20,9 +20,9 @@ from rsl_rl.runners import OnPolicyRunner
 from rsl_rl.utils.logger import Logger
 
 from terrainkit.errors import ConfigError, listing
+from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import checkpoint_name, read_checkpoint, save_checkpoint
-from terrainkit_robots.rl.task import Task
 
 OBS_GROUPS = {"actor": ["policy"], "critic": ["privileged"]}
 """Observation groups of each network."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.rl.task import Task
+from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.terrain import Terrain, collides
 from terrainkit_robots.spec.per_joint import match_joints
 from terrainkit_robots.spec.robot_spec import RobotSpec

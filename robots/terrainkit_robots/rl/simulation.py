@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from terrainkit.capacity import require_memory
 from terrainkit.errors import CapacityError, ConfigError
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.scene import Robot, Scene
-from terrainkit_robots.rl.task import Task
 
 Ids = NDArray[np.int64]
 

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.simulation import Simulation
-from terrainkit_robots.rl.task import Task
 from terrainkit_robots.rl.terminations import (
     bad_orientation,
     illegal_contact,

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit_robots.rl.task import Termination
+from terrainkit_robots.rl.config import Termination
 from terrainkit_robots.rl.terrain import Terrain
 
 FloatArray = NDArray[np.float32]

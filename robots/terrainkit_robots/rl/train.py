@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from terrainkit.errors import ConfigError, ExportError, TerrainkitError
-from terrainkit_robots.rl import registry
+from terrainkit_robots.rl import tasks
+from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.run import (
     Run,
     can_continue,
@@ -24,7 +25,6 @@ from terrainkit_robots.rl.run import (
     rewrite_task,
 )
 from terrainkit_robots.rl.scene import Robot
-from terrainkit_robots.rl.task import Task
 from terrainkit_robots.rl.terrain import load_terrain
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def train(
     from terrainkit_robots.rl.env import LeggedEnv
     from terrainkit_robots.rl.runner import LeggedRunner, resolve_device, stop_on_signal
 
-    task = registry.find(robot).task if task is None else task
+    task = tasks.get_task(robot).task if task is None else task
     if task.runner.logger == "wandb" and find_spec("wandb") is None:
         raise ConfigError("runner.logger: wandb is not installed: pip install wandb")
     continued = resume if resume and can_continue(resume, robot, terrain, task) else None
@@ -88,7 +88,7 @@ def train(
     device = resolve_device(device)
     if device != "cpu" and int(os.environ.get("WORLD_SIZE", "1")) > 1:
         device = resolve_device(f"cuda:{os.environ.get('LOCAL_RANK', '0')}")
-    model = continued.robot if continued else Robot.load(registry.find(robot).folder)
+    model = continued.robot if continued else Robot.load(tasks.get_task(robot).folder)
     torch.set_num_threads(share.env.num_threads)
     torch.manual_seed(share.runner.seed)
     env = LeggedEnv(share, model, load_terrain(terrain, task.terrain.collision), device)
@@ -157,7 +157,7 @@ def _run_folder(
             if task != continued.task:
                 rewrite_task(continued, task)
             return continued.folder
-    folder = folder or default_folder(registry.find(robot).name)
+    folder = folder or default_folder(tasks.get_task(robot).name)
     return create_run(folder, task, robot, terrain).folder
 
 

@@ -17,12 +17,7 @@ pytest.importorskip("torch", reason="the extra `train` is not installed")
 import torch
 
 from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
-from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.registry import find
-from terrainkit_robots.rl.run import Run, create_run
-from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.scene import Robot
-from terrainkit_robots.rl.task import (
+from terrainkit_robots.rl.config import (
     DomainRand,
     Env,
     InitState,
@@ -32,6 +27,11 @@ from terrainkit_robots.rl.task import (
     Runner,
     Task,
 )
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.run import Run, create_run
+from terrainkit_robots.rl.runner import LeggedRunner
+from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import MapTerrain, Plane, Terrain
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
@@ -88,12 +88,12 @@ CART = """
 
 @pytest.fixture(scope="session")
 def quadruped() -> Robot:
-    return Robot.load(find("quadruped").folder)
+    return Robot.load(get_task("quadruped").folder)
 
 
 @pytest.fixture(scope="session")
 def biped() -> Robot:
-    return Robot.load(find("biped").folder)
+    return Robot.load(get_task("biped").folder)
 
 
 @pytest.fixture(scope="session")

@@ -12,10 +12,10 @@ import torch
 from terrainkit.errors import ConfigError
 from terrainkit_robots.description import bundled
 from terrainkit_robots.rl.commands import VelocityCommand, sample_commands, uses_heading
+from terrainkit_robots.rl.config import Commands, Control, DomainRand, Env, InitState, Rewards, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.rewards import REWARDS
 from terrainkit_robots.rl.scene import Robot
-from terrainkit_robots.rl.task import Commands, Control, DomainRand, Env, InitState, Rewards, Task
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.transforms import quat_to_yaw
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from terrainkit_robots.rl.config import Control
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.task import Control
 from terrainkit_robots.rl.terrain import Plane
 
 # Joints of the cart: wheel_axle, rear_hinge, front_hinge.

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError
 from terrainkit_robots.description import bundled
 from terrainkit_robots.rl.commands import VelocityCommand, sample_commands
+from terrainkit_robots.rl.config import Commands, DomainRand, Env, InitState, Task, Terrain
 from terrainkit_robots.rl.curriculum import TerrainCurriculum
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.scene import Robot
-from terrainkit_robots.rl.task import Commands, DomainRand, Env, InitState, Task, Terrain
 from terrainkit_robots.rl.terrain import Plane
 
 torch.set_num_threads(1)

@@ -14,8 +14,8 @@ from terrainkit_robots.policy.evaluate import (
     forward_command,
     prepared,
 )
+from terrainkit_robots.rl.config import Algorithm, Commands, DomainRand, Runner, Task, Terrain
 from terrainkit_robots.rl.run import open_run
-from terrainkit_robots.rl.task import Algorithm, Commands, DomainRand, Runner, Task, Terrain
 
 
 def test_nothing_of_a_robot_is_random_in_an_evaluation():

@@ -5,8 +5,8 @@ import pytest
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError, TerrainkitError
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.rl.config import InitState
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.task import InitState
 from terrainkit_robots.rl.terrain import HeightGrid, MapTerrain, ModelTerrain, Plane, load_terrain
 
 EXACT = 1e-3

@@ -10,6 +10,7 @@ import torch
 from made_states import made_state, shapes
 
 from terrainkit_robots.description import bundled
+from terrainkit_robots.rl.config import Env, Noise, Normalization, ObsScales, Task, Terrain
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import (
     ObservationTerm,
@@ -19,7 +20,6 @@ from terrainkit_robots.rl.observations import (
 )
 from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.state import State
-from terrainkit_robots.rl.task import Env, Noise, Normalization, ObsScales, Task, Terrain
 from terrainkit_robots.rl.terrain import Plane
 
 torch.set_num_threads(1)

@@ -6,11 +6,11 @@ import pytest
 import torch
 
 from terrainkit.errors import ConfigError
+from terrainkit_robots.rl.config import DomainRand
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.events import RandomizedParams
 from terrainkit_robots.rl.scene import build_scene
 from terrainkit_robots.rl.simulation import Simulation
-from terrainkit_robots.rl.task import DomainRand
 from terrainkit_robots.rl.terrain import MapTerrain, Plane
 
 

@@ -8,8 +8,8 @@ import torch
 
 from terrainkit_robots.policy.description import description
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.rl.config import Control, Env, Noise, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.task import Control, Env, Noise, Task
 from terrainkit_robots.rl.terrain import Plane
 
 SMALL = Task(env=Env(num_envs=4, num_threads=1))

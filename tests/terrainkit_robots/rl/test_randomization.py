@@ -9,11 +9,11 @@ import pytest
 import torch
 
 from terrainkit_robots.description import bundled
+from terrainkit_robots.rl.config import Control, DomainRand, Env, InitState, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.events import Pushes, RandomizedParams, apply_params, sample_params
 from terrainkit_robots.rl.scene import Robot, build_scene
 from terrainkit_robots.rl.simulation import Simulation
-from terrainkit_robots.rl.task import Control, DomainRand, Env, InitState, Task
 from terrainkit_robots.rl.terrain import Plane
 
 torch.set_num_threads(1)

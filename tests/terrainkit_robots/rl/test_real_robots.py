@@ -4,11 +4,11 @@ import torch
 
 from terrainkit_robots.onboarding.pipeline import Wishes, bring_in
 from terrainkit_robots.policy.export import export_policy
+from terrainkit_robots.rl.config import Env, Runner, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.scene import Robot
-from terrainkit_robots.rl.task import Env, Runner, Task
 from terrainkit_robots.rl.terrain import Plane
 
 TASK = Task(

@@ -5,8 +5,8 @@ import pytest
 import torch
 
 from terrainkit_robots.policy.recorder import Recorder, visited
+from terrainkit_robots.rl.config import InitState
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.task import InitState
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.transforms import quat_to_yaw
 

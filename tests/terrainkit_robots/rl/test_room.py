@@ -4,24 +4,24 @@ import sys
 import pytest
 
 from terrainkit.errors import CapacityError
+from terrainkit_robots.rl.config import Env, Runner, Task
 from terrainkit_robots.rl.simulation import bytes_per_env, check_memory
-from terrainkit_robots.rl.task import Env, Runner, Task
 
 MEASURED = """
 import re, sys
 from pathlib import Path
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.terrain import Plane
-from terrainkit_robots.rl.registry import find
+from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.task import Algorithm, Env, Runner, Task, Terrain
+from terrainkit_robots.rl.config import Algorithm, Env, Runner, Task, Terrain
 
 def peak():
     status = Path("/proc/self/status").read_text()  # ru_maxrss counts who started it, too
     return 1024 * int(re.search(r"VmHWM:\\s*(\\d+) kB", status)[1])
 
-robot, few, many = Robot.load(find("quadruped").folder), 64, 1024
+robot, few, many = Robot.load(get_task("quadruped").folder), 64, 1024
 terrain = Terrain(measure_heights=sys.argv[1] == "True")
 peaks = []
 for count in (few, many):

@@ -11,11 +11,11 @@ import pytest
 import torch
 
 from terrainkit.errors import ConfigError
+from terrainkit_robots.rl.config import Algorithm, Env, Policy, Rewards, Runner, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import open_run, policy_state, read_checkpoint, save_checkpoint
 from terrainkit_robots.rl.runner import LeggedRunner, runner_config
 from terrainkit_robots.rl.scene import Robot
-from terrainkit_robots.rl.task import Algorithm, Env, Policy, Rewards, Runner, Task
 from terrainkit_robots.rl.terrain import Plane, Terrain
 
 Make = Callable[..., LeggedRunner]
@@ -256,7 +256,7 @@ from dataclasses import replace
 from pathlib import Path
 import terrainkit_robots.rl.runner as runner
 from terrainkit_robots.rl.run import open_run
-from terrainkit_robots.rl.task import Env, Runner, Task
+from terrainkit_robots.rl.config import Env, Runner, Task
 from terrainkit_robots.rl.train import train
 
 kept = {}

@@ -6,10 +6,10 @@ import pytest
 import torch
 
 from terrainkit.errors import ConfigError
+from terrainkit_robots.rl.config import Asset, Control, Rewards, Sim
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.scene import Robot, build_scene
 from terrainkit_robots.rl.simulation import Simulation
-from terrainkit_robots.rl.task import Asset, Control, Rewards, Sim
 from terrainkit_robots.rl.terrain import MapTerrain, ModelTerrain, Plane
 
 

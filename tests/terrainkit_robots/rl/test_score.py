@@ -11,7 +11,7 @@ from terrainkit_robots.policy import trials
 from terrainkit_robots.policy.evaluate import Asked, prepared
 from terrainkit_robots.policy.score import score_of, summed_up, write_evaluation
 from terrainkit_robots.policy.trials import Outcome, roll_out
-from terrainkit_robots.rl.task import Commands
+from terrainkit_robots.rl.config import Commands
 
 
 def still(env):

@@ -22,11 +22,11 @@ from terrainkit_robots.policy.smoke_test import (
     stands,
     training,
 )
+from terrainkit_robots.rl.config import Control, Env, Rewards, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.registry import find
 from terrainkit_robots.rl.rewards import REWARDS
 from terrainkit_robots.rl.scene import Robot, lowest_point
-from terrainkit_robots.rl.task import Control, Env, Rewards, Task
+from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
 
 
@@ -346,7 +346,7 @@ def test_a_file_with_errors_is_not_trained(tmp_path):
 @pytest.mark.usefixtures("quick")
 def test_a_folder_whose_spec_was_edited_badly_fails(tmp_path):
     folder = tmp_path / "mine"
-    shutil.copytree(find("quadruped").folder, folder)
+    shutil.copytree(get_task("quadruped").folder, folder)
     spec = folder / "robot.toml"
     text = spec.read_text()
     assert "spawn_height = 0.34626" in text

@@ -4,10 +4,10 @@ import pytest
 import torch
 
 from terrainkit import MapConfig, generate
+from terrainkit_robots.rl.config import InitState
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.events import sample_reset_state
 from terrainkit_robots.rl.scene import build_scene
-from terrainkit_robots.rl.task import InitState
 from terrainkit_robots.rl.terrain import MapTerrain, Plane
 from terrainkit_robots.transforms import quat_to_yaw
 

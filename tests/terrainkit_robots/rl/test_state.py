@@ -6,9 +6,9 @@ import pytest
 import torch
 
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.rl.config import DomainRand, InitState
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.state import State
-from terrainkit_robots.rl.task import DomainRand, InitState
 from terrainkit_robots.rl.terrain import Plane
 
 

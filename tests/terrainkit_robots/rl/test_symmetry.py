@@ -11,11 +11,11 @@ from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.description import bundled
-from terrainkit_robots.rl import task as sections
+from terrainkit_robots.rl import config as sections
+from terrainkit_robots.rl.config import DomainRand, Env, Noise, Sim, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.symmetry import MirrorMaps, augment, mirror_maps
-from terrainkit_robots.rl.task import DomainRand, Env, Noise, Sim, Task
 from terrainkit_robots.rl.terrain import Plane, Terrain
 from terrainkit_robots.spec.robot_spec import Twin
 

@@ -8,9 +8,9 @@ import pytest
 import torch
 
 from terrainkit_robots.description import bundled
+from terrainkit_robots.rl.config import DomainRand, Env, InitState, Task, Termination
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.scene import Robot
-from terrainkit_robots.rl.task import DomainRand, Env, InitState, Task, Termination
 from terrainkit_robots.rl.terminations import (
     bad_orientation,
     illegal_contact,

@@ -14,7 +14,8 @@ import torch
 
 import terrainkit
 from terrainkit.errors import CapacityError, ConfigError, ExportError
-from terrainkit_robots.rl import registry, runner
+from terrainkit_robots.rl import runner, tasks
+from terrainkit_robots.rl.config import Algorithm, Env, Policy, Runner, Task, Terrain
 from terrainkit_robots.rl.run import (
     checkpoints,
     open_run,
@@ -23,7 +24,6 @@ from terrainkit_robots.rl.run import (
     save_checkpoint,
 )
 from terrainkit_robots.rl.runner import TrainingProgress
-from terrainkit_robots.rl.task import Algorithm, Env, Policy, Runner, Task, Terrain
 from terrainkit_robots.rl.train import train
 
 
@@ -186,7 +186,7 @@ def test_from_an_earlier_checkpoint_nothing_is_overwritten(task, tmp_path):
 @pytest.mark.parametrize("name", ["quadruped.xml", "robot.toml"])
 def test_a_robot_that_has_changed_begins_a_new_run_elsewhere(task, tmp_path, name):
     mine, run = tmp_path / "mine", tmp_path / "run"
-    shutil.copytree(registry.find("quadruped").folder, mine)
+    shutil.copytree(tasks.get_task("quadruped").folder, mine)
     train(mine, "plane", lasting(task, 1), folder=run)
     (mine / name).write_text((mine / name).read_text() + "\n")
     with pytest.raises(ConfigError, match=rf"mine has another {name} than .*run was trained with"):
@@ -400,7 +400,7 @@ def test_processes_share_the_environments(task, tmp_path, monkeypatch):
 def test_a_spec_that_does_not_fit_its_robot_is_told(task, tmp_path):
     mine = tmp_path / "mine"
     mine.mkdir()
-    for path in registry.find("quadruped").folder.iterdir():
+    for path in tasks.get_task("quadruped").folder.iterdir():
         if path.is_file():
             (mine / path.name).write_bytes(path.read_bytes())
     model = mine / "quadruped.xml"

@@ -5,8 +5,8 @@ import torch
 from terrainkit_robots.policy.evaluate import Asked, evaluation_task, prepared
 from terrainkit_robots.policy.score import score_of
 from terrainkit_robots.policy.trials import SETTLING, roll_out
+from terrainkit_robots.rl.config import Commands, Control, Sim
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.task import Commands, Control, Sim
 from terrainkit_robots.rl.terrain import Plane
 
 
