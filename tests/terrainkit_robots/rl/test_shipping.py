@@ -10,7 +10,7 @@ from terrainkit_robots.rl.config import Env, Policy, Runner, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import create_run, open_run, read_checkpoint
 from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.tasks import get_task
+from terrainkit_robots.rl.tasks import get_task, task_names
 from terrainkit_robots.rl.terrain import Plane, load_terrain
 
 SHIPPING = [name for name in task_names() if get_task(name).shipped.is_dir()]
