@@ -18,7 +18,7 @@ if TYPE_CHECKING:
         EvaluationResult,
         RolloutMetrics,
     )
-    from terrainkit_robots.rl.run_folder import Run
+    from terrainkit_robots.rl.run import Run
 
 _NO_COMMAND = (-math.inf, -math.inf, -math.inf)
 """No command; not None, since tyro's errors about a union name its members."""
@@ -72,7 +72,7 @@ class PolicyCommand(Command):
         if not self.policy:
             raise ConfigError("RUN is missing; expected a run, a checkpoint, or a robot's name")
         require_training()
-        from terrainkit_robots.rl.run_folder import open_run
+        from terrainkit_robots.rl.run import open_run
 
         return open_run(self.policy, number_given(self.checkpoint))
 

@@ -104,7 +104,7 @@ class Export(Command):
 
         require_training("onnx", "onnxruntime")
         from terrainkit_robots.policy.export import export_policy
-        from terrainkit_robots.rl.run_folder import is_shipped, open_run
+        from terrainkit_robots.rl.run import is_shipped, open_run
 
         run = open_run(self.subject, number_given(self.checkpoint))
         default = run.folder / "exported"
@@ -138,11 +138,11 @@ def is_run(subject: str) -> bool:
             return False
     except OSError as error:
         raise ConfigError(f"cannot read {subject}: {error.strerror or error}") from error
-    from terrainkit_robots.rl import registry
+    from terrainkit_robots.rl import tasks
 
-    if subject not in registry.names():
+    if subject not in tasks.task_names():
         raise ConfigError(
             f"no map, run or robot {subject}; expected a map (.npz), a run, a checkpoint, or "
-            f"one of: {listing(registry.names())}"
+            f"one of: {listing(tasks.task_names())}"
         )
     return True

@@ -8,7 +8,7 @@ pytest.importorskip("torch", reason="the extra `train` is not installed")
 from terrainkit_cli import training_extra
 from terrainkit_cli.evaluate_command import headline, result_rows
 from terrainkit_robots.policy.evaluate import EvaluationConfig, EvaluationResult, RolloutMetrics
-from terrainkit_robots.rl import run_folder
+from terrainkit_robots.rl import run as run_module
 
 QUICK = ("--seconds", "0.04", "--num-envs", "1")
 
@@ -73,7 +73,7 @@ def test_evaluate_writes_json_to_a_file(here, tmp_path, monkeypatch):
     before = (tmp_path / "result.json").read_text()
     assert json.loads(before)["seconds"] == 0.04
     with monkeypatch.context() as patch:
-        patch.setattr(run_folder, "open_run", None)  # the file is checked before any work
+        patch.setattr(run_module, "open_run", None)  # the file is checked before any work
         code, _, err = here(*words)
     assert code == 2
     assert "result.json exists" in one_line(err)
@@ -102,9 +102,9 @@ def test_evaluate_bundled_policy_by_name(here):
     ("words", "message"),
     [
         ((), "RUN is missing; expected"),
-        (("walk", "--checkpoint", "5"), "there are: 3, 7"),
+        (("walk", "--checkpoint", "5"), "expected one of: 3, 7"),
         (("walk", "--seconds", "-1"), "seconds: got -1; expected more than 0"),
-        (("walk", "--checkpoint", "-5"), "there are: 3, 7"),
+        (("walk", "--checkpoint", "-5"), "expected one of: 3, 7"),
         (("walk", "--num-envs", "-3"), "num_envs: got -3"),
         (("walk", "--num-envs", "0"), "num_envs: got 0"),
         (("walk", "--terrain", "moon"), "moon"),

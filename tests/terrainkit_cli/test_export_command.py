@@ -11,13 +11,12 @@ pytest.importorskip("torch", reason="the extra `train` is not installed")
 import torch
 
 from terrainkit_cli import training_extra
-from terrainkit_robots.rl import registry
+from terrainkit_robots.rl import tasks
+from terrainkit_robots.rl.config import Env, Policy, Runner, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.registry import SHIPPED
-from terrainkit_robots.rl.run_folder import create_run
+from terrainkit_robots.rl.run import create_run
 from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.task import Env, Policy, Runner, Task
+from terrainkit_robots.rl.terrain import Plane
 
 FILES = ["policy.json", "policy.onnx", "policy.pt"]
 
@@ -100,14 +99,14 @@ def test_export_overwrites_only_if_told(here, tmp_path):
 
 
 def test_export_bundled_policy_by_name(here, trained, tmp_path, monkeypatch):
-    bundled = registry.find("quadruped")
+    bundled = tasks.get_task("quadruped")
     folder = tmp_path / "package"
-    shutil.copytree(bundled.folder, folder, ignore=shutil.ignore_patterns(SHIPPED))
-    monkeypatch.setitem(registry._registered, "quadruped", replace(bundled, folder=folder))
+    shutil.copytree(bundled.folder, folder, ignore=shutil.ignore_patterns(tasks.TRAINED_FOLDER))
+    monkeypatch.setitem(tasks._registered, "quadruped", replace(bundled, folder=folder))
     run = here("export", "quadruped")
     assert run.returncode == 2
     assert "no policy is shipped with quadruped" in run.stderr
-    shipped = registry.find("quadruped").shipped
+    shipped = tasks.get_task("quadruped").trained_run
     shutil.copytree(trained, shipped)
     run = here("export", "quadruped")
     assert run.returncode == 0, run.stderr
@@ -131,7 +130,7 @@ def test_export_map(here, tmp_path):
         (("unicorn",), "no map, run or robot unicorn; expected a map (.npz), a run"),
         (("unicorn",), "or one of: biped, quadruped"),
         (("none.npz", "-o", "a.stl"), "no file none.npz"),
-        (("none.pt",), "no run none.pt"),
+        (("none.pt",), "run: got none.pt"),
         (("empty",), "empty has no run.toml"),
         (("text.txt", "-o", "a.stl"), "text.txt"),
         (("map.npz",), "--output is missing; expected a file"),
@@ -141,8 +140,8 @@ def test_export_map(here, tmp_path):
         ),
         (("run", "--collision", "boxes"), "--collision: got the run run; expected a map"),
         (("run", "--y-up"), "--y-up: got the run run; expected a map"),
-        (("run", "--checkpoint", 7), "run has no checkpoint 7; there are: 1, 2"),
-        (("run", "--checkpoint", -7), "run has no checkpoint -7"),
+        (("run", "--checkpoint", 7), "run: got checkpoint 7; expected one of: 1, 2"),
+        (("run", "--checkpoint", -7), "run: got checkpoint -7"),
         (("run", "-o", "nowhere/policy"), "there is no folder nowhere"),
         (("run", "-o", "text.txt"), "text.txt exists"),
         (("x" * 5000,), "cannot read"),

@@ -9,7 +9,7 @@ from terrainkit.errors import ConfigError
 from terrainkit_cli import training_extra
 from terrainkit_robots.policy import smoke_test as module
 from terrainkit_robots.policy.smoke_test import Check, SmokeTestResult
-from terrainkit_robots.rl.registry import find
+from terrainkit_robots.rl.tasks import get_task
 
 GOOD = Check("spawn height", True, "1.0 cm", "within 2.0 cm")
 BAD = Check("observation policy", False, "44 numbers", "45 numbers")
@@ -39,7 +39,7 @@ def calls(monkeypatch):
 
 
 def test_failed_check_is_shown_with_its_expectation(here, tmp_path):
-    shutil.copytree(find("quadruped").folder, tmp_path / "mine")
+    shutil.copytree(get_task("quadruped").folder, tmp_path / "mine")
     spec = tmp_path / "mine" / "robot.toml"
     text = spec.read_text()
     spec.write_text(text.replace("spawn_height = 0.34626", "spawn_height = 0.64626"))

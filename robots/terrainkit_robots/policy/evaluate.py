@@ -21,13 +21,12 @@ from terrainkit_robots.policy.rollout import (
     FloatArray,
     Progress,
 )
-from terrainkit_robots.rl.device import require_device
+from terrainkit_robots.rl.config import Commands, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import read_ground
-from terrainkit_robots.rl.observations import sees_heights
-from terrainkit_robots.rl.run_folder import Run, same_ground
-from terrainkit_robots.rl.task import Commands, Task
-from terrainkit_robots.rl.threads import one_thread
+from terrainkit_robots.rl.observations import uses_height_scan
+from terrainkit_robots.rl.run import Run, is_same_terrain
+from terrainkit_robots.rl.runner import resolve_device, single_torch_thread
+from terrainkit_robots.rl.terrain import load_terrain
 
 MAX_SECONDS = 3600.0
 """Longest evaluation [s]."""
@@ -45,7 +44,7 @@ class EvaluationConfig:
 
     Attributes:
         seconds: Duration of the rollout [s].
-        terrain: Terrain as `read_ground` takes it; None for that of the training.
+        terrain: Terrain as `load_terrain` takes it; None for that of the training.
         num_envs: Number of robots; None for one per command of the grid, or several per patch.
         command: Command for all robots: forward and left velocity [m/s], yaw rate [rad/s].
         random_commands: Whether commands are sampled as in training.
@@ -147,7 +146,7 @@ class EvaluationResult:
         return json.dumps(document, indent=2) + "\n"
 
 
-@one_thread()
+@single_torch_thread()
 def evaluate(
     run: Run, config: EvaluationConfig | None = None, progress: Progress = lambda _: None
 ) -> EvaluationResult:
@@ -161,7 +160,7 @@ def evaluate(
     env, commands = make_evaluation_env(run, config)
     rollout = EvaluationRollout(env)
     rollout.run(load_policy(run, env), config.seconds, commands, progress)
-    has_grid = env.ground.level and config.command is None
+    has_grid = env.terrain.is_flat and config.command is None
     return summarize(run, config, rollout, commands if has_grid else None)
 
 
@@ -178,23 +177,23 @@ def make_evaluation_env(
     Returns:
         The environment, and commands of shape (n, 3); None for the task's random commands.
     """
-    device, task = require_device(config.device), run.task
-    if config.terrain is None and not (is_flat(run) or same_ground(run, run.terrain)):
+    device, task = resolve_device(config.device), run.task
+    if config.terrain is None and not (is_flat(run) or is_same_terrain(run, run.terrain)):
         raise ConfigError(
             f"terrain: {run.terrain} changed after {run.folder} was trained; expected --terrain"
         )
     # The policy keeps the observations of its training, whatever terrain it walks on.
-    scan = sees_heights(task.terrain, level=is_flat(run))
+    scan = uses_height_scan(task, is_flat=is_flat(run))
     collision = task.terrain.collision
     if config.terrain is not None and collision == "plane":
         collision = "auto"
-    terrain = read_ground(config.terrain or run.terrain, collision)
+    terrain = load_terrain(config.terrain or run.terrain, collision)
     commands = None
     if config.command is not None:
         commands = np.array([config.command], np.float32)
     elif not config.random_commands:
         forward = np.array([[0.75 * task.commands.lin_vel_x[1], 0, 0]], np.float32)
-        commands = command_grid(task.commands) if terrain.level else forward
+        commands = command_grid(task.commands) if terrain.is_flat else forward
     rows, cols = terrain.env_origins.shape[:2]
     n = config.num_envs
     if n is None and commands is not None and len(commands) > 1:
@@ -206,8 +205,8 @@ def make_evaluation_env(
     task = replace(task, terrain=replace(task.terrain, collision=collision, measure_heights=scan))
     env = LeggedEnv(task, run.robot, terrain, device)
     patches = _assign(rows * cols, n, config.seed)
-    env.careers.levels[:], env.careers.columns[:] = np.divmod(patches, cols)
-    env.begin_all()
+    env.curriculum.levels[:], env.curriculum.columns[:] = np.divmod(patches, cols)
+    env.reset()
     return env, None if commands is None else commands[_assign(len(commands), n, config.seed)]
 
 
@@ -276,8 +275,8 @@ def summarize(
     """
     env = rollout.env
     groups: dict[str, list[RolloutMetrics]] = {}
-    levels, names = env.careers.levels, env.ground.terrain_names
-    terrains = names[levels, env.careers.columns]
+    levels, names = env.curriculum.levels, env.terrain.terrain_names
+    terrains = names[levels, env.curriculum.columns]
 
     def add_group(table: str, mask: BoolArray, **key: Any) -> None:
         if mask.any():
@@ -286,7 +285,7 @@ def summarize(
     keys = [] if commands is None else [tuple(round(float(v), 4) for v in c) for c in commands]
     for key in dict.fromkeys(keys):
         add_group("by_command", np.array([k == key for k in keys]), command=key)
-    if not env.ground.level:
+    if not env.terrain.is_flat:
         types, all_levels = dict.fromkeys(names.ravel().tolist()), np.unique(levels).tolist()
         for name in types:
             add_group("by_terrain", terrains == name, terrain=name)
@@ -315,7 +314,7 @@ def mean_metrics(rollout: EvaluationRollout, mask: BoolArray, **key: Any) -> Rol
         **key,
         robots=int(mask.sum()),
         falls=int(rollout.falls[mask].sum()),
-        success=None if rollout.env.ground.level else float(rollout.success[mask].mean()),
+        success=None if rollout.env.terrain.is_flat else float(rollout.success[mask].mean()),
         lin_vel_error=errors[0],
         lin_vel_error_1s=errors[1],
         ang_vel_error=errors[2],

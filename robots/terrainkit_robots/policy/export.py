@@ -18,11 +18,10 @@ from terrainkit.atomic import atomic_write, check_target
 from terrainkit.errors import ExportError
 from terrainkit_robots.policy.evaluate import evaluation_task
 from terrainkit_robots.policy.load import load_policy
-from terrainkit_robots.rl.checkpoint import read_checkpoint
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import read_ground
-from terrainkit_robots.rl.run_folder import Run
-from terrainkit_robots.rl.threads import one_thread
+from terrainkit_robots.rl.run import Run, read_checkpoint
+from terrainkit_robots.rl.runner import single_torch_thread
+from terrainkit_robots.rl.terrain import load_terrain
 
 FloatArray = NDArray[np.float32]
 
@@ -78,7 +77,7 @@ class ExportResult:
     num_actions: int
 
 
-@one_thread()
+@single_torch_thread()
 def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> ExportResult:
     """Export the policy of a run to a folder, which is created if it does not exist.
 
@@ -93,7 +92,7 @@ def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> ExportR
     for file in files if folder.is_dir() else (folder,):
         check_target(file, overwrite=overwrite and folder.is_dir())
     task = evaluation_task(run.task, num_envs=8)
-    env = LeggedEnv(task, run.robot, read_ground(run.terrain, task.terrain.collision))
+    env = LeggedEnv(task, run.robot, load_terrain(run.terrain, task.terrain.collision))
     actor = load_policy(run, env)
     iteration = read_checkpoint(run.checkpoint)["iteration"] if run.checkpoint else 0
     text = json.dumps(describe_policy(env) | {"iteration": iteration}, indent=2) + "\n"
@@ -222,8 +221,8 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
             "position_unit": _joint_units(env),
             "drive": drive.tolist(),
             "default_position": _floats(env.robot.default_pose),
-            "action_offset": _floats(env.control.middle),
-            "action_scale": _floats(env.control.scale),
+            "action_offset": _floats(env.action_offset),
+            "action_scale": _floats(env.action_scale),
             "gain": _floats(model.actuator_gainprm[:, 0]),
             "stiffness": _floats(stiffness),
             "damping": _floats(damping),
@@ -239,8 +238,8 @@ def _observation_parts(env: LeggedEnv) -> list[dict[str, Any]]:
     units = _UNITS | {"dof_pos": _joint_units(env)}
     units["dof_vel"] = [f"{unit}/s" for unit in units["dof_pos"]]
     parts, start = [], 0
-    for term in env.groups["policy"]:
-        size = term.read(env.state).shape[1]
+    for term in env.obs_groups["policy"]:
+        size = term.function(env.state).shape[1]
         part = {
             "name": term.name,
             "start": start,
@@ -253,7 +252,7 @@ def _observation_parts(env: LeggedEnv) -> list[dict[str, Any]]:
             # The term itself is evaluated far below, on and far above the ground.
             scans = [np.full_like(env.state.height_scan, height) for height in (-1e3, 0.0, 1e3)]
             low, zero, high = (
-                float(term.read(replace(env.state, height_scan=scan))[0, 0]) for scan in scans
+                float(term.function(replace(env.state, height_scan=scan))[0, 0]) for scan in scans
             )
             part |= {"offset": _floats(np.full(size, -zero)), "clip": [low, high]}
         parts.append(part)

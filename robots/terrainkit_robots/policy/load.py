@@ -5,11 +5,10 @@ import warnings
 from rsl_rl.models import MLPModel
 
 from terrainkit.errors import ConfigError, TerrainkitWarning
-from terrainkit_robots.rl.checkpoint import read_checkpoint
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.policy import GROUPS, actor_config, fitting, refuse_other
-from terrainkit_robots.rl.robot import SPEC_FILE
-from terrainkit_robots.rl.run_folder import Run, changed_robot
+from terrainkit_robots.rl.run import Run, changed_robot_files, read_checkpoint
+from terrainkit_robots.rl.runner import OBS_GROUPS, actor_config, check_checkpoint, network_errors
+from terrainkit_robots.rl.scene import SPEC_FILE
 
 
 def load_policy(run: Run, env: LeggedEnv) -> MLPModel:
@@ -28,14 +27,14 @@ def load_policy(run: Run, env: LeggedEnv) -> MLPModel:
     if run.checkpoint is None:
         raise ConfigError(f"run {run.folder}: got no checkpoint; expected a trained run")
     # The run has its own copy of the spec, so only a change of the model matters.
-    if files := [name for name in changed_robot(run) if name != SPEC_FILE]:
+    if files := [name for name in changed_robot_files(run) if name != SPEC_FILE]:
         changed = f"{' and '.join(files)} of {run.robot_name} changed"
         message = f"{changed} after the run {run.folder} was trained"
         warnings.warn(message, TerrainkitWarning, stacklevel=2)
     state = read_checkpoint(run.checkpoint)
-    refuse_other(run.checkpoint, state, env, GROUPS["actor"])
-    with fitting(run.checkpoint):
+    check_checkpoint(run.checkpoint, state, env, OBS_GROUPS["actor"])
+    with network_errors(run.checkpoint):
         obs, config = env.get_observations(), actor_config(run.task)
-        actor = MLPModel(obs, GROUPS, "actor", env.num_actions, **config)
+        actor = MLPModel(obs, OBS_GROUPS, "actor", env.num_actions, **config)
         actor.load_state_dict(state["actor_state_dict"])
     return actor.to(env.device).eval()

@@ -29,10 +29,10 @@ from terrainkit_robots.policy.rollout import (
     rollout,
 )
 from terrainkit_robots.rendering.video import DEFAULT_SIZE, Shot, VideoSpec
+from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.run_folder import Run
-from terrainkit_robots.rl.task import Commands
-from terrainkit_robots.rl.threads import one_thread
+from terrainkit_robots.rl.run import Run
+from terrainkit_robots.rl.runner import single_torch_thread
 
 DEFAULT_SECONDS, DEFAULT_ROBOTS = 12.0, 4
 """Default duration [s], and default number of robots that a video of a map follows."""
@@ -49,7 +49,7 @@ class PlayResult:
     video: VideoSpec | None
 
 
-@one_thread()
+@single_torch_thread()
 def play(
     run: Run,
     config: EvaluationConfig | None = None,
@@ -92,7 +92,7 @@ def play(
     )
 
 
-@one_thread()
+@single_torch_thread()
 def view(run: Run, config: EvaluationConfig | None = None) -> None:
     """Show one robot in MuJoCo's viewer in real time, until its window is closed.
 
@@ -123,7 +123,7 @@ def view(run: Run, config: EvaluationConfig | None = None) -> None:
             start = time.monotonic()
             next(steps)
             with viewer.lock():
-                data.qpos[:], data.qvel[:] = env.physics.qpos[0], env.physics.qvel[0]
+                data.qpos[:], data.qvel[:] = env.sim.qpos[0], env.sim.qvel[0]
                 mujoco.mj_forward(model, data)
             viewer.sync()
             time.sleep(max(0.0, env.cfg.dt - (time.monotonic() - start)))
@@ -165,11 +165,11 @@ class PoseRecorder:
 
     def record(self) -> None:
         """Record the state after a step, at the frame rate of the video."""
-        fallen = self.env.steps == 0
+        fallen = self.env.steps_since_reset == 0
         frame = -(-self.num_steps // self.stride)
         self.first_fall[fallen] = np.minimum(self.first_fall[fallen], frame)
         if self.num_steps % self.stride == 0:
-            self.poses.append(self.env.physics.qpos.astype(np.float32))
+            self.poses.append(self.env.sim.qpos.astype(np.float32))
             self.commands.append(self.env.commands.copy())
         self.num_steps += 1
 
@@ -177,7 +177,7 @@ class PoseRecorder:
         """Return a video of the formation on a plane, or of some robots in turn on a map."""
         env, poses = self.env, np.stack(self.poses)
         frames, n = poses.shape[:2]
-        if env.ground.level:
+        if env.terrain.is_flat:
             side = int(np.ceil(np.sqrt(n)))
             row, col = np.divmod(np.arange(n), side)
             spacing = 2.4 * max(0.5, float(env.robot.spec.base_height_target or 0.5))
@@ -193,8 +193,8 @@ class PoseRecorder:
     def _make_shot(self, robot: int, length: int) -> Shot:
         """Return the first frames of a robot, up to its first fall."""
         env = self.env
-        level, column = env.careers.levels[robot], env.careers.columns[robot]
-        caption, rows = str(env.ground.terrain_names[level, column]), len(env.ground.env_origins)
+        level, column = env.curriculum.levels[robot], env.curriculum.columns[robot]
+        caption, rows = str(env.terrain.terrain_names[level, column]), len(env.terrain.env_origins)
         if rows > 1:
             caption += f", level {level} of {rows - 1}"
         stop = int(np.clip(self.first_fall[robot], 1, length))
@@ -203,10 +203,10 @@ class PoseRecorder:
 
 def select_tracked_robots(env: LeggedEnv, count: int) -> list[int]:
     """Return robots for a video: on different terrains first, near the middle level."""
-    levels, names = env.careers.levels, env.ground.terrain_names
+    levels, names = env.curriculum.levels, env.terrain.terrain_names
     by_terrain: dict[str, list[int]] = {name: [] for name in names.ravel().tolist()}
     for robot in np.argsort(np.abs(levels - (len(names) - 1) / 2), kind="stable"):
-        by_terrain[names[levels[robot], env.careers.columns[robot]]].append(int(robot))
+        by_terrain[names[levels[robot], env.curriculum.columns[robot]]].append(int(robot))
     queues = [queue for queue in by_terrain.values() if queue]
     if count < len(queues):
         queues = [queues[round(k)] for k in np.linspace(0, len(queues) - 1, count)]

@@ -39,7 +39,7 @@ def rollout(
     previous: object = ...  # neither commands nor None, so that the first entry is applied
     for commands in schedule:
         if commands is not previous:
-            env.hold_commands(commands)
+            env.set_commands(commands)
             previous = commands
         state, obs = env.state, env.get_observations()
         with torch.inference_mode():
@@ -78,8 +78,8 @@ class EvaluationRollout:
 
     def __init__(self, env: LeggedEnv) -> None:
         n, dt = env.num_envs, env.cfg.dt
-        self.env, self.start_xy = env, env.start.copy()
-        self.half_patch = np.inf if env.ground.level else env.ground.patch_length / 2
+        self.env, self.start_xy = env, env.start_pos.copy()
+        self.half_patch = np.inf if env.terrain.is_flat else env.terrain.patch_length / 2
         self.falls, self.crossed = np.zeros(n, bool), np.zeros(n, bool)
         self.distance, self.commanded_distance = np.zeros(n), np.zeros(n)
         self.error_sums, self.error_counts = np.zeros((4, n)), np.zeros((4, n), np.int64)
@@ -125,15 +125,15 @@ class EvaluationRollout:
         velocity = np.column_stack([state.base_lin_vel[:, :2], state.base_ang_vel[:, 2]])
         self._update_errors(commands, velocity - commands, active)
         distance = np.linalg.norm(state.base_pos[:, :2] - self.start_xy, axis=1)
-        commanded = np.linalg.norm(self.env.careers.asked, axis=1)
+        commanded = np.linalg.norm(self.env.curriculum.commanded, axis=1)
         self.distance[active] = distance[active]
         self.commanded_distance[active] = commanded[active]
         self.crossed |= active & (distance > self.half_patch)
 
     def _update_errors(self, commands: FloatArray, error: FloatArray, active: BoolArray) -> None:
         # A heading command changes the yaw rate at every step, which is no new command.
-        orders = self.env.orders
-        axes = 2 if orders.headings and orders.held is None else 3
+        command = self.env.velocity_command
+        axes = 2 if command.heading_command and command.fixed is None else 3
         same = (commands[:, :axes] == self._last_commands[:, :axes]).all(axis=1)
         self._command_steps = np.where(same, self._command_steps + 1, 1)
         self._last_commands[:] = commands

@@ -15,15 +15,13 @@ import torch
 from terrainkit.errors import ConfigError, TerrainkitError
 from terrainkit_robots.policy.evaluate import evaluation_task
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.rl import registry
+from terrainkit_robots.rl import tasks
+from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.robot import Robot, read_robot
-from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.scene import lowest_point
+from terrainkit_robots.rl.runner import LeggedRunner, single_torch_thread
+from terrainkit_robots.rl.scene import Robot, lowest_point
 from terrainkit_robots.rl.state import State
-from terrainkit_robots.rl.task import Task
-from terrainkit_robots.rl.threads import one_thread
+from terrainkit_robots.rl.terrain import Plane
 
 if TYPE_CHECKING:
     from terrainkit_robots.lint.settings import Settings
@@ -88,8 +86,8 @@ def smoke_test(
     if not Path(name).is_file():
         if spec is not None:
             raise ConfigError(f"spec: {name} has its own robot.toml; expected a robot file")
-        task_spec = registry.find(name)
-        return check_robot(read_robot(task_spec.folder), task_spec.task)
+        task_spec = tasks.get_task(name)
+        return check_robot(Robot.load(task_spec.folder), task_spec.task)
     from terrainkit_robots.onboarding.pipeline import Wishes, bring_in, keeps_out
 
     with tempfile.TemporaryDirectory() as folder:
@@ -101,11 +99,11 @@ def smoke_test(
         check = Check("can be onboarded", passed, measured, "no errors that change the robot")
         if onboarded.folder is None:
             return SmokeTestResult(onboarded.report.facts.model.title, (check,))
-        result = check_robot(read_robot(onboarded.folder), Task())
+        result = check_robot(Robot.load(onboarded.folder), Task())
     return replace(result, checks=(check, *result.checks))
 
 
-@one_thread()
+@single_torch_thread()
 def check_robot(robot: Robot, task: Task) -> SmokeTestResult:
     """Check whether a robot can be trained for a task on a plane."""
     mini_batches = min(task.algorithm.num_mini_batches, NUM_ENVS)
@@ -163,8 +161,8 @@ def check_spawn_height(env: LeggedEnv) -> Check:
 def check_observations(env: LeggedEnv) -> Iterator[Check]:
     """Check that each observation group has the size of its terms, and is finite."""
     for name, obs in env.get_observations().items():
-        terms = env.groups[name]
-        size = sum(term.read(env.state).shape[1] for term in terms)
+        terms = env.obs_groups[name]
+        size = sum(term.function(env.state).shape[1] for term in terms)
         finite = bool(torch.isfinite(obs).all())
         passed = tuple(obs.shape) == (env.num_envs, size) and finite
         measured = f"{obs.shape[1]} numbers{'' if finite else ', some not finite'}"
@@ -174,7 +172,7 @@ def check_observations(env: LeggedEnv) -> Iterator[Check]:
 
 def check_stand(env: LeggedEnv) -> Check:
     """Check that the robots stand for one second with zero action."""
-    env.hold_commands(np.zeros((env.num_envs, 3), np.float32))
+    env.set_commands(np.zeros((env.num_envs, 3), np.float32))
     target, fall_time, height = float(env.robot.spec.base_height_target or 1.0), None, np.inf
     for step in range(round(1 / env.cfg.dt)):
         _, _, dones, extras = env.step(torch.zeros(env.num_envs, env.num_actions))
@@ -198,12 +196,12 @@ def check_rewards(env: LeggedEnv) -> Iterator[Check]:
     """
     commands = env.commands.copy()
     commands[::4] = 0  # for the rewards of standing robots
-    env.hold_commands(commands)
+    env.set_commands(commands)
     values: dict[str, list[Any]] = {name: [] for name in env.rewards}
     for _ in random_steps(env, _RANDOM_STEPS):
         for name, (reward, _) in env.rewards.items():
             values[name].append(reward(env.state, env.robot, env.cfg.rewards))
-    env.hold_commands(None)
+    env.set_commands(None)
     state = random_state(env.state, env.cfg.runner.seed)
     for name, (reward, _) in env.rewards.items():
         low, high = np.min(values[name]), np.max(values[name])

@@ -15,13 +15,13 @@ import torch
 
 from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
 from terrainkit_robots.policy.evaluate import evaluation_task
+from terrainkit_robots.rl.config import Control, Env, Normalization, Policy, Runner, Sim, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Ground, MapGround, Plane
-from terrainkit_robots.rl.registry import find
-from terrainkit_robots.rl.robot import Robot, read_robot
-from terrainkit_robots.rl.run_folder import Run, create_run, open_run
+from terrainkit_robots.rl.run import Run, create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.task import Control, Env, Normalization, Policy, Runner, Sim, Task
+from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.tasks import get_task
+from terrainkit_robots.rl.terrain import MapTerrain, Plane, Terrain
 
 torch.set_num_threads(1)
 
@@ -35,12 +35,12 @@ SMALL = Task(
 
 @pytest.fixture(scope="session")
 def quadruped() -> Robot:
-    return read_robot(find("quadruped").folder)
+    return Robot.load(get_task("quadruped").folder)
 
 
 @pytest.fixture(scope="session")
 def biped() -> Robot:
-    return read_robot(find("biped").folder)
+    return Robot.load(get_task("biped").folder)
 
 
 @pytest.fixture(scope="session")
@@ -52,8 +52,8 @@ def small_map() -> TerrainMap:
 
 
 @pytest.fixture(scope="session")
-def map_terrain(small_map: TerrainMap) -> Ground:
-    return MapGround(small_map)
+def map_terrain(small_map: TerrainMap) -> Terrain:
+    return MapTerrain(small_map)
 
 
 @pytest.fixture
@@ -105,7 +105,9 @@ class SlidingEnv(LeggedEnv):
         state.base_lin_vel[:, :2] = self.velocities[:, :2]
         state.base_ang_vel[:, 2] = self.velocities[:, 2]
         distance = self.velocities[:, 0] * np.float32(time)
-        state.base_pos[:, :2] = self.start + np.column_stack([distance, np.zeros(self.num_envs)])
+        state.base_pos[:, :2] = self.start_pos + np.column_stack(
+            [distance, np.zeros(self.num_envs)]
+        )
         dones = torch.from_numpy(np.isclose(self.fall_times, time))
         return obs, rewards, dones, {"time_outs": torch.zeros_like(dones)}
 
@@ -113,7 +115,7 @@ class SlidingEnv(LeggedEnv):
 @pytest.fixture
 def make_sliding(quadruped: Robot) -> Callable[..., SlidingEnv]:
     def make(
-        velocities: Any, fall_times: Any = None, terrain: Ground | None = None, **parts: Any
+        velocities: Any, fall_times: Any = None, terrain: Terrain | None = None, **parts: Any
     ) -> SlidingEnv:
         # One physics step per policy step, since the physics does not matter.
         task = replace(SMALL, sim=Sim(dt=0.02), control=Control(decimation=1), **parts)

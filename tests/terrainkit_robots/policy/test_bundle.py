@@ -6,14 +6,13 @@ import torch
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots.policy.bundle import bundle_policy
 from terrainkit_robots.policy.load import load_policy
-from terrainkit_robots.rl.checkpoint import read_checkpoint
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane, read_ground
-from terrainkit_robots.rl.registry import find, names
-from terrainkit_robots.rl.run_folder import create_run, open_run
+from terrainkit_robots.rl.run import create_run, open_run, read_checkpoint
 from terrainkit_robots.rl.runner import LeggedRunner
+from terrainkit_robots.rl.tasks import get_task, task_names
+from terrainkit_robots.rl.terrain import Plane, load_terrain
 
-BUNDLED = [name for name in names() if find(name).shipped.is_dir()]
+BUNDLED = [name for name in task_names() if get_task(name).trained_run.is_dir()]
 
 
 def test_bundle_policy_acts_as_the_run(trained, tmp_path):
@@ -29,14 +28,14 @@ def test_bundle_policy_acts_as_the_run(trained, tmp_path):
 
 def test_bundle_policy_drops_the_training_state(trained, tmp_path):
     bundle = bundle_policy(trained, tmp_path / "bundle")
-    dropped = read_checkpoint(trained.checkpoint).keys() - read_checkpoint(bundle.checkpoint).keys()
-    assert "optimizer_state_dict" in dropped
+    assert "optimizer_state_dict" in read_checkpoint(trained.checkpoint)
+    assert "optimizer_state_dict" not in read_checkpoint(bundle.checkpoint)
     assert bundle.checkpoint.stat().st_size < trained.checkpoint.stat().st_size / 2
 
 
 def test_bundle_policy_keeps_the_map_and_no_local_paths(make_run, map_file, tmp_path):
     run = make_run(map_file)
-    terrain = read_ground(run.terrain)
+    terrain = load_terrain(run.terrain)
     LeggedRunner(LeggedEnv(run.task, run.robot, terrain), run.folder).learn(1)
     bundle = bundle_policy(open_run(run.folder), tmp_path / "bundle")
     map_file.unlink()
@@ -45,7 +44,7 @@ def test_bundle_policy_keeps_the_map_and_no_local_paths(make_run, map_file, tmp_
     for path in bundle.folder.iterdir():
         assert str(tmp_path).encode() not in path.read_bytes()
     moved = open_run(bundle.folder.rename(tmp_path / "moved"))
-    assert (read_ground(moved.terrain).env_origins == terrain.env_origins).all()
+    assert (load_terrain(moved.terrain).env_origins == terrain.env_origins).all()
 
 
 def test_bundle_policy_rejects_local_terrains_and_robots(quadruped, trained, tmp_path):
@@ -80,11 +79,13 @@ def test_bundled_policies_include_the_quadruped():
 
 @pytest.mark.parametrize("name", BUNDLED)
 def test_bundled_policy_is_small_and_matches_its_robot(name):
-    spec = find(name)
-    assert sum(path.stat().st_size for path in spec.shipped.iterdir()) < 2e6
-    assert len(list(spec.shipped.glob("*.pt"))) == 1
+    spec = get_task(name)
+    assert sum(path.stat().st_size for path in spec.trained_run.iterdir()) < 2e6
+    assert len(list(spec.trained_run.glob("*.pt"))) == 1
     torch.load(open_run(name).checkpoint, weights_only=True)
-    info = tomllib.loads((spec.shipped / "run.toml").read_text())
+    info = tomllib.loads((spec.trained_run / "run.toml").read_text())
     assert info["robot"] == name
     assert info["terrain"] in ("plane", "map.toml")
-    assert (spec.shipped / "robot.toml").read_bytes() == (spec.folder / "robot.toml").read_bytes()
+    assert (spec.trained_run / "robot.toml").read_bytes() == (
+        spec.folder / "robot.toml"
+    ).read_bytes()

@@ -16,8 +16,8 @@ from terrainkit_robots.policy.evaluate import (
     summarize,
 )
 from terrainkit_robots.policy.rollout import EvaluationRollout
-from terrainkit_robots.rl.run_folder import open_run
-from terrainkit_robots.rl.task import Commands, DomainRand, Task, Terrain
+from terrainkit_robots.rl.config import Commands, DomainRand, Task, Terrain
+from terrainkit_robots.rl.run import open_run
 
 
 def run_still(run, config, seconds=0.1, **options):
@@ -42,8 +42,8 @@ def test_evaluation_env_is_not_randomized(make_run):
     env, _ = make_evaluation_env(run, EvaluationConfig(num_envs=3, seconds=30, seed=5))
     assert env.cfg.env.episode_length_s > 30
     assert env.cfg.runner.seed == 5
-    assert not env.differences.added_mass.any()
-    assert (env.differences.strength == 1).all()
+    assert not env.params.added_mass.any()
+    assert (env.params.strength == 1).all()
     assert not env.joint_offset.any()
     default_pose = np.tile(env.robot.default_pose, (3, 1))
     np.testing.assert_allclose(env.state.dof_pos, default_pose, atol=1e-6)
@@ -82,12 +82,12 @@ def test_map_patches_get_equal_numbers_of_robots(
 ):
     config = EvaluationConfig(num_envs=num_envs)
     env, commands = make_evaluation_env(make_run(map_file), config, max_patch_envs=max_patch_envs)
-    patches = zip(env.careers.levels.tolist(), env.careers.columns.tolist(), strict=True)
+    patches = zip(env.curriculum.levels.tolist(), env.curriculum.columns.tolist(), strict=True)
     counts = np.unique(list(patches), axis=0, return_counts=True)[1]
     assert (counts == per_patch).all()
     assert len(counts) == min(6, env.num_envs)
     assert (commands == np.float32([0.75 * env.cfg.commands.lin_vel_x[1], 0, 0])).all()
-    origins = env.ground.env_origins[env.careers.levels, env.careers.columns]
+    origins = env.terrain.env_origins[env.curriculum.levels, env.curriculum.columns]
     distance = np.abs(env.state.base_pos - origins)[:, :2].max()
     assert distance <= env.cfg.init_state.position + 1e-5
 
@@ -102,7 +102,7 @@ def test_policy_keeps_its_observations_on_another_terrain(make_run, map_file):
     for run, terrain, width in cases:
         env, _ = make_evaluation_env(run, EvaluationConfig(num_envs=1, terrain=terrain))
         assert env.get_observations()["policy"].shape == (1, width)
-        assert env.ground.level == (terrain in ("plane", None))
+        assert env.terrain.is_flat == (terrain in ("plane", None))
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_evaluation_env_ignores_the_map_of_a_flat_run(make_run, map_file):
     (run.folder / "map.toml").unlink()
     map_file.write_text("gone")
     env, _ = make_evaluation_env(run, EvaluationConfig(num_envs=1))
-    assert env.ground.level
+    assert env.terrain.is_flat
 
 
 def test_evaluate_requires_a_checkpoint(make_run):
@@ -197,7 +197,7 @@ def test_summary_counts_terrains_of_a_randomized_map(make_run, tmp_path):
     )
     run, config = make_run(path), EvaluationConfig(num_envs=9)
     rollout, _ = run_still(run, config)
-    groups, names = summarize(run, config, rollout).groups, rollout.env.ground.terrain_names
+    groups, names = summarize(run, config, rollout).groups, rollout.env.terrain.terrain_names
     assert len({tuple(row) for row in names}) > 1
     for group in groups["by_terrain"]:
         assert group.robots == (names == group.terrain).sum()
@@ -213,7 +213,7 @@ def test_bundled_quadruped_follows_commands():
     assert result.metrics.ang_vel_error < 0.25
 
 
-def test_evaluate_uses_one_thread():
+def test_evaluate_uses_single_torch_thread():
     before, during = torch.get_num_threads(), []
     torch.set_num_threads(2)
     try:

@@ -13,16 +13,17 @@ from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots.policy import export as module
+from terrainkit_robots.policy.evaluate import evaluation_task
 from terrainkit_robots.policy.export import METADATA_KEY, describe_policy, export_policy
 from terrainkit_robots.policy.load import load_policy
 from terrainkit_robots.policy.rollout import rollout
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.rl.config import Control, DomainRand, Env, Noise, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.registry import find
-from terrainkit_robots.rl.robot import robot_of
-from terrainkit_robots.rl.run_folder import open_run
-from terrainkit_robots.rl.task import Control, DomainRand, Env, Noise, Task
+from terrainkit_robots.rl.run import open_run
+from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.tasks import get_task
+from terrainkit_robots.rl.terrain import Plane
 
 DOCS = Path(__file__).parents[3] / "docs" / "exported_policy.md"
 FILES = ["policy.json", "policy.onnx", "policy.pt"]
@@ -97,7 +98,7 @@ def test_json_describes_the_policy(exported):
 
 def measure_terms(env, config):
     """Return the raw observation terms of each robot from the state of the physics alone."""
-    qpos, qvel = np.array(env.physics.qpos), np.array(env.physics.qvel)
+    qpos, qvel = np.array(env.sim.qpos), np.array(env.sim.qvel)
     rotations = np.zeros((len(qpos), 9))
     for rotation, pose in zip(rotations, qpos, strict=True):
         mujoco.mju_quat2Mat(rotation, pose[3:7])
@@ -115,7 +116,7 @@ def measure_terms(env, config):
         x, y = np.array(config["height_scan"]["points"]).T
         world_x = qpos[:, :1] + np.cos(yaw) * x - np.sin(yaw) * y
         world_y = qpos[:, 1:2] + np.sin(yaw) * x + np.cos(yaw) * y
-        ground = env.ground.height(world_x.astype(np.float32), world_y.astype(np.float32))
+        ground = env.terrain.height(world_x.astype(np.float32), world_y.astype(np.float32))
         terms["height_scan"] = qpos[:, 2:3] - ground
     return terms
 
@@ -147,9 +148,9 @@ def test_json_reproduces_the_torques(quadruped, wheels, control_type, drive):
     robot = quadruped
     if wheels:  # a joint without stiffness is driven by velocity
         stiffness = robot.spec.per_joint("stiffness") | {robot.spec.joint_order[0]: 0.0}
-        robot = robot_of(replace(robot.spec, stiffness=stiffness), robot.mjcf.parent)
+        robot = Robot.from_spec(replace(robot.spec, stiffness=stiffness), robot.mjcf.parent)
     control = Control(control_type=control_type, damping=1.5)
-    env = LeggedEnv(replace(SMALL, control=control), robot, Plane())
+    env = LeggedEnv(evaluation_task(replace(SMALL, control=control), 1), robot, Plane())
     config = describe_policy(env)
     joints = {name: np.array(value) for name, value in config["joints"].items()}
     assert config["control_type"] == control_type
@@ -162,7 +163,7 @@ def test_json_reproduces_the_torques(quadruped, wheels, control_type, drive):
         action = rng.normal(0, 2, 12).astype(np.float32)
         data.qpos[scene.joint_qpos] = rng.normal(0, 0.5, 12)
         data.qvel[scene.joint_qvel] = rng.normal(0, 5, 12)
-        data.ctrl[:] = env.control.told(action[None], np.zeros((1, 12), np.float32))[0]
+        data.ctrl[:] = env.to_ctrl(action[None])[0]
         with quiet_mujoco():
             mujoco.mj_forward(model, data)
         target = joints["action_offset"] + joints["action_scale"] * action
@@ -196,7 +197,7 @@ def test_docs_example_runs_a_policy(exported, quadruped, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
 def test_docs_example_walks_with_bundled_policies(name, tmp_path, monkeypatch):
-    if not find(name).shipped.is_dir():
+    if not get_task(name).trained_run.is_dir():
         pytest.skip(f"no bundled policy of {name}")
     run = open_run(name)
     export_policy(run, tmp_path / "exported")

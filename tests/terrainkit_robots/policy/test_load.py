@@ -5,12 +5,12 @@ import torch
 
 from terrainkit.errors import ConfigError, TerrainkitWarning
 from terrainkit_robots.policy.load import load_policy
+from terrainkit_robots.rl.config import Env, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.registry import find
-from terrainkit_robots.rl.run_folder import create_run, open_run
+from terrainkit_robots.rl.run import create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.task import Env, Task
+from terrainkit_robots.rl.tasks import get_task
+from terrainkit_robots.rl.terrain import Plane
 
 
 @pytest.fixture
@@ -43,7 +43,7 @@ def test_load_policy_requires_a_checkpoint(make_run, env):
 @pytest.mark.parametrize(("name", "warns"), [("quadruped.xml", True), ("robot.toml", False)])
 def test_load_policy_warns_about_a_changed_model(trained, env, tmp_path, name, warns):
     robot = tmp_path / "robot"
-    shutil.copytree(find("quadruped").folder, robot)
+    shutil.copytree(get_task("quadruped").folder, robot)
     folder = create_run(tmp_path / "run", trained.task, robot, "plane").folder
     shutil.copy(trained.checkpoint, folder)
     (robot / name).write_text((robot / name).read_text() + "\n")

@@ -16,7 +16,7 @@ from terrainkit_robots.policy.play import (
     select_tracked_robots,
     view,
 )
-from terrainkit_robots.rl.task import Commands, Env, Terrain
+from terrainkit_robots.rl.config import Commands, Env, Terrain
 
 
 @pytest.fixture(autouse=True)
@@ -89,7 +89,7 @@ def test_shot_ends_at_the_first_fall(make_run, map_file):
     for step in range(20):
         env.step(torch.zeros(2, 12))
         if step in (11, 15):
-            env.steps[1] = 0  # as after a fall
+            env.steps_since_reset[1] = 0  # as after a fall
         recorder.record()
     stops = {shot.robot: shot.stop for shot in recorder.make_video(1, (128, 72)).shots}
     assert stops in ({0: 10}, {1: 6})
@@ -100,8 +100,8 @@ def test_shot_ends_at_the_first_fall(make_run, map_file):
 def test_tracked_robots_cover_all_terrains_first(make_run, map_file):
     env, _ = make_evaluation_env(make_run(map_file), EvaluationConfig(num_envs=12))
     robots = select_tracked_robots(env, 3)
-    assert env.careers.columns[robots].tolist() == [0, 1, 0]
-    assert env.careers.levels[robots].tolist() == [1, 1, 1]
+    assert env.curriculum.columns[robots].tolist() == [0, 1, 0]
+    assert env.curriculum.levels[robots].tolist() == [1, 1, 1]
     assert select_tracked_robots(env, 1) == robots[:1]
     assert sorted(select_tracked_robots(env, 100)) == list(range(12))
 

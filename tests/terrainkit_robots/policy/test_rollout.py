@@ -11,9 +11,9 @@ from terrainkit_robots.policy.rollout import (
     command_schedule,
     rollout,
 )
+from terrainkit_robots.rl.config import Commands, Env, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.task import Commands, Env, Task
+from terrainkit_robots.rl.terrain import Plane
 
 FORWARD = np.array([[1, 0, 0]], np.float32)
 
@@ -50,9 +50,9 @@ def test_rollout_applies_the_schedule(env):
 
 def test_rollout_is_lazy(env):
     steps = rollout(env, still, repeat(None))
-    assert env.steps.tolist() == [0, 0]
+    assert env.steps_since_reset.tolist() == [0, 0]
     next(steps)
-    assert env.steps.tolist() == [1, 1]
+    assert env.steps_since_reset.tolist() == [1, 1]
 
 
 def test_rollout_yields_falls_but_not_timeouts(env):
@@ -63,10 +63,10 @@ def test_rollout_yields_falls_but_not_timeouts(env):
 
     falls = [falls for _, _, falls in rollout(env, collapse, repeat(None, 50))]
     assert np.any(falls, axis=0).tolist() == [True, False]
-    env.begin_all()
+    env.reset()
     env.episode_length_buf[:] = env.max_episode_length - 1
     ((_, _, falls),) = rollout(env, still, [None])
-    assert env.steps.tolist() == [0, 0]
+    assert env.steps_since_reset.tolist() == [0, 0]
     assert falls.tolist() == [False, False]
 
 

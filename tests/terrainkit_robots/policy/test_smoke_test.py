@@ -21,12 +21,12 @@ from terrainkit_robots.policy.smoke_test import (
     random_state,
     smoke_test,
 )
+from terrainkit_robots.rl.config import Control, Env, Rewards, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.registry import find
 from terrainkit_robots.rl.rewards import REWARDS
-from terrainkit_robots.rl.robot import robot_of
-from terrainkit_robots.rl.task import Control, Env, Rewards, Task
+from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.tasks import get_task
+from terrainkit_robots.rl.terrain import Plane
 
 TASK = Task(env=Env(num_envs=16, num_threads=1))
 
@@ -36,7 +36,7 @@ def failed(result):
 
 
 def replace_spec(robot, **values):
-    return robot_of(replace(robot.spec, **values), robot.mjcf.parent)
+    return Robot.from_spec(replace(robot.spec, **values), robot.mjcf.parent)
 
 
 def still_env(robot, **parts):
@@ -243,7 +243,7 @@ def test_smoke_test_rejects_a_file_with_errors(tmp_path):
 @pytest.mark.usefixtures("quick")
 def test_smoke_test_of_a_folder_uses_its_spec(tmp_path):
     folder = tmp_path / "robot"
-    shutil.copytree(find("quadruped").folder, folder)
+    shutil.copytree(get_task("quadruped").folder, folder)
     text = (folder / "robot.toml").read_text()
     edited = text.replace("spawn_height = 0.34626", "spawn_height = 0.64626")
     assert edited != text
