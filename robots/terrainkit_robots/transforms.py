@@ -62,6 +62,25 @@ def quat_to_matrix(quat: Matrix) -> Matrix:
     )
 
 
+def rpy_to_matrix(rpy: Matrix) -> Matrix:
+    """Return the rotation matrix of roll, pitch and yaw, as in URDF.
+
+    Args:
+        rpy: Roll, pitch and yaw [rad] about the fixed axes x, y and z, shape (3,).
+
+    Returns:
+        Rotation matrix Rz(yaw) Ry(pitch) Rx(roll), shape (3, 3).
+    """
+    (sr, sp, sy), (cr, cp, cy) = np.sin(rpy), np.cos(rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
 def matrix_to_rpy(rotation: Matrix) -> Matrix:
     """Return the roll, pitch and yaw of a rotation, as in URDF.
 

@@ -11,7 +11,7 @@ from terrainkit.errors import ConfigError
 from terrainkit_cli.parse import UsageError, parse
 from terrainkit_cli.robot_options import Output, Text
 from terrainkit_cli.task_options import TaskCommand
-from terrainkit_robots.rl import registry
+from terrainkit_robots.rl import registry, tasks
 from terrainkit_robots.rl.task import Commands, Env, Rewards, Task
 from terrainkit_robots.rl.task_file import from_toml, values_of
 
@@ -61,7 +61,7 @@ class RoverTask(Task):
 
 @pytest.fixture
 def rover(monkeypatch, tmp_path):
-    monkeypatch.setattr(registry, "_registered", dict(registry._registered))
+    monkeypatch.setattr(tasks, "_registered", dict(tasks._registered))
     return registry.register("rover", tmp_path, RoverTask(env=Env(num_envs=17)))
 
 

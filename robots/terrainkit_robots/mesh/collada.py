@@ -14,9 +14,9 @@ from terrainkit_robots.mesh.surface import (
     MeshError,
     Points,
     Surface,
-    fan,
-    numbers,
-    whole_numbers,
+    parse_float_list,
+    parse_int_list,
+    triangulate_fan,
 )
 from terrainkit_robots.transforms import Matrix, axis_angle_to_matrix
 
@@ -128,7 +128,7 @@ def _shown(element: "etree._Element", ids: Mapping[str, "etree._Element"]) -> st
 
 
 def _transform(element: "etree._Element") -> Matrix:
-    values = numbers((element.text or "").encode())
+    values = parse_float_list((element.text or "").encode())
     wanted = _TRANSFORMS[_tag(element)]
     if values.size != wanted or not np.isfinite(values).all():
         raise MeshError(f"has a {_tag(element)} of {values.size} numbers where {wanted} are wanted")
@@ -169,7 +169,7 @@ def _positions(vertices: "etree._Element", ids: Mapping[str, "etree._Element"]) 
         array = source.find("{*}float_array") if source is not None else None
         if source is None or array is None:
             continue
-        values = numbers((array.text or "").encode())
+        values = parse_float_list((array.text or "").encode())
         accessor = source.find("{*}technique_common/{*}accessor")
         stride = int(_number(accessor, "stride", 3))
         offset = int(_number(accessor, "offset", 0))
@@ -197,14 +197,14 @@ def _faces(element: "etree._Element", corners: int) -> Faces:
         return indices[: len(indices) // 3 * 3].reshape(-1, 3)
     vcount = element.find("{*}vcount")
     if vcount is not None:
-        counts = whole_numbers((vcount.text or "").encode())
+        counts = parse_int_list((vcount.text or "").encode())
     if (counts < 0).any() or counts.sum() != len(indices):
         raise MeshError("has polygons whose counts do not fit their corners")
-    return fan(indices, counts)
+    return triangulate_fan(indices, counts)
 
 
 def _indices(p: "etree._Element", width: int, offset: int) -> Faces:
-    values = whole_numbers((p.text or "").encode())
+    values = parse_int_list((p.text or "").encode())
     return values[: values.size // width * width].reshape(-1, width)[:, offset]
 
 

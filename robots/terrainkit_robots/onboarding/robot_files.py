@@ -10,9 +10,9 @@ from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.bodies.shapes import lowest
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.export.actuator import Drive
-from terrainkit_robots.export.canonical import normal_form
-from terrainkit_robots.export.fixed_joint_merge import fused
+from terrainkit_robots.export.actuator import ActuatorConfig
+from terrainkit_robots.export.canonical import to_canonical
+from terrainkit_robots.export.fixed_joint_merge import merge_fixed_joints
 from terrainkit_robots.export.mjcf import Extras, Site, mjcf_text, scene_text
 from terrainkit_robots.export.sites import foot_sites, imu_notes, imu_site
 from terrainkit_robots.mesh.mesh_cache import Meshes
@@ -84,19 +84,19 @@ def make_robot_files(
         TerrainkitError: if the file contains no robot, a mesh cannot be read, the overriding spec
             belongs to another robot, or MuJoCo rejects the robot.
     """
-    from terrainkit_robots.export.collision_simplification.simplify import treat
-    from terrainkit_robots.export.mesh_export.mesh_export import pack
-    from terrainkit_robots.export.unsupported import leftovers
+    from terrainkit_robots.export.collision_simplification.simplify import simplify_collisions
+    from terrainkit_robots.export.mesh_export.mesh_export import export_meshes
+    from terrainkit_robots.export.unsupported import unsupported_elements
     from terrainkit_robots.export.urdf import urdf_text
     from terrainkit_robots.spec.spec_file import to_toml
 
     if floating is None and override is not None:
         floating = override.spec.floating
-    canonical = normal_form(source, floating=floating)
-    simplified = treat(
+    canonical = to_canonical(source, floating=floating)
+    simplified = simplify_collisions(
         canonical.model, source.meshes, collision, cache=cache_dir, progress=progress
     )
-    exported = pack(simplified.model, simplified.meshes)
+    exported = export_meshes(simplified.model, simplified.meshes)
     meshes = Meshes({Path(name): data for name, data in exported.files.items()})
     spec_notes: tuple[str, ...] = ()
     if override is not None:
@@ -117,7 +117,7 @@ def make_robot_files(
         notes=(
             *spec_notes,
             *canonical.notes,
-            *leftovers(source.model),
+            *unsupported_elements(source.model),
             *simplified.notes,
             *exported.notes,
             *contact_notes,
@@ -134,7 +134,7 @@ def _make_spec(facts: Facts, override: SpecOverride | None) -> "RobotSpec":
     """
     from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
     from terrainkit_robots.simulation.pd_gains import suggest_gains
-    from terrainkit_robots.spec.given import with_origins
+    from terrainkit_robots.spec.provenance import with_provenance
 
     try:
         gains = suggest_gains(facts)
@@ -145,7 +145,7 @@ def _make_spec(facts: Facts, override: SpecOverride | None) -> "RobotSpec":
     if override is None:
         return derived
     spec = replace(override.spec, floating=floating, urdf=URDF, mjcf=MJCF)
-    return with_origins(spec, derived, override.file)
+    return with_provenance(spec, derived, override.file)
 
 
 def _check_override(facts: Facts, override: SpecOverride) -> tuple[str, ...]:
@@ -189,10 +189,10 @@ def _set_motor_limits(model: "RobotModel", spec: "RobotSpec") -> "RobotModel":
 
 def _mjcf_text(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[str]]) -> str:
     """Return robot.xml, in which pairs of links are excluded from contact."""
-    merged = fused(replace(facts.model, excluded=excluded), keep=spec.feet)
+    merged = merge_fixed_joints(replace(facts.model, excluded=excluded), keep=spec.feet)
     columns = {name: spec.per_joint(name) for name in _ACTUATOR_FIELDS}
     actuators = {
-        joint: Drive(**{name: values[joint] for name, values in columns.items()})
+        joint: ActuatorConfig(**{name: values[joint] for name, values in columns.items()})
         for joint in spec.joint_order
     }
     bodies = {link.name for link in merged.model.links}
@@ -206,7 +206,7 @@ def _mjcf_text(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[st
         imu = replace(imu, name=f"{imu.name}_site")
     height = _base_height(facts)
     extras = Extras(
-        drives=actuators,
+        actuators=actuators,
         feet=foot_sites(facts, spec.feet),
         imu=imu,
         frames=tuple(frames),

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from terrainkit.errors import ExportError
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.legs.stance import stands_alone
-from terrainkit_robots.export.base_link import rooted
-from terrainkit_robots.export.canonical import has_unknown, normal_form
+from terrainkit_robots.export.base_link import with_world_base
+from terrainkit_robots.export.canonical import has_unknown_inertia, to_canonical
 from terrainkit_robots.onboarding.equivalence import (
     Equivalence,
     compare_models,
@@ -103,9 +103,9 @@ def _rooted_source(source: "Facts", floating: bool) -> "Facts":
     """Return the source with a base link, and with the masses that are computed from meshes."""
     from terrainkit_robots.analysis.facts import Facts
 
-    if not any(has_unknown(link.inertial) for link in source.links):
-        return rooted(source, floating=floating)
-    return Facts(normal_form(source, floating=floating).model, source.meshes)
+    if not any(has_unknown_inertia(link.inertial) for link in source.links):
+        return with_world_base(source, floating=floating)
+    return Facts(to_canonical(source, floating=floating).model, source.meshes)
 
 
 def _load_model(path: Path) -> Any:

@@ -9,7 +9,7 @@ import pytest
 
 from terrainkit import TerrainMap
 from terrainkit.errors import ConfigError, ExportError, MapFileError
-from terrainkit_robots.rl import registry
+from terrainkit_robots.rl import registry, tasks
 from terrainkit_robots.rl.ground import read_ground
 from terrainkit_robots.rl.robot import read_robot
 from terrainkit_robots.rl.run_folder import (
@@ -172,7 +172,7 @@ def test_a_task_is_rewritten_whole(run, task):
 
 
 def test_a_shipped_policy_is_found_by_the_name_of_its_robot(tmp_path, task, monkeypatch):
-    monkeypatch.setattr(registry, "_registered", dict(registry._registered))
+    monkeypatch.setattr(tasks, "_registered", dict(tasks._registered))
     mine = tmp_path / "mine"
     shutil.copytree(registry.find("quadruped").folder, mine)
     shipped = registry.register("rover_of_this_test", mine).shipped
@@ -208,7 +208,7 @@ def test_what_is_no_run_is_told(tmp_path):
     [
         ("format_version = 1", "format_version = 2", "format_version is 2; wanted 1"),
         ('robot = "quadruped"', "robot = 3", "robot is 3; wanted a text"),
-        ('robot = "quadruped"', 'robot = "gone"', "no robot 'gone'"),
+        ('robot = "quadruped"', 'robot = "gone"', "folder 'gone'"),
         ('terrain = "plane"', "", "terrain is 'missing'; wanted a text"),
         ("seed", "seed =", "not a TOML file"),
     ],

@@ -14,7 +14,7 @@ _SLACK = 1e-10
 """Points that stick out by less than this share of the squared radius are inside."""
 
 
-def smallest_ball(points: Matrix) -> tuple[Matrix, float]:
+def bounding_sphere(points: Matrix) -> tuple[Matrix, float]:
     """Return the center, shape (d,), and the radius of the smallest ball around points [m].
 
     The point that is farthest out joins those that the ball rests on; of these, which are never

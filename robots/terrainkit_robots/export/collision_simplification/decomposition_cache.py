@@ -44,7 +44,7 @@ def cache_folder() -> Path:
     return kept / "terrainkit" / "coacd"
 
 
-class PartCache:
+class DecompositionCache:
     """Parts by key; a file that is damaged counts as none."""
 
     def __init__(self, folder: Path | None) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from terrainkit_robots.description.model import ShapeKind
-from terrainkit_robots.export.collision_simplification.bounding_sphere import smallest_ball
+from terrainkit_robots.export.collision_simplification.bounding_sphere import bounding_sphere
 from terrainkit_robots.export.collision_simplification.oriented_box import (
     frame_about,
     oriented_box,
@@ -64,7 +64,7 @@ def _candidates(points: Matrix, normals: Matrix | None) -> Iterator[FittedPrimit
 
 
 def _sphere(points: Matrix) -> FittedPrimitive:
-    center, radius = smallest_ball(points)
+    center, radius = bounding_sphere(points)
     pose = np.eye(4)
     pose[:3, 3] = center
     return FittedPrimitive(
@@ -76,7 +76,7 @@ def _rods(points: Matrix, axis: Matrix) -> tuple[FittedPrimitive, FittedPrimitiv
     """Return the capsule and the cylinder around points along an axis."""
     frame = frame_about(axis)
     local = points @ frame
-    center, radius = smallest_ball(local[:, :2])
+    center, radius = bounding_sphere(local[:, :2])
     # where the round end of a capsule may begin, so that it still covers each point
     away = ((local[:, :2] - center) ** 2).sum(axis=1)
     end = np.sqrt(np.maximum(radius**2 - away, 0))

@@ -15,7 +15,7 @@ import numpy as np
 from terrainkit_robots.description.model import Geometry, Link, MeshFile, RobotModel
 from terrainkit_robots.export.collision_simplification.convex_parts import convex_parts
 from terrainkit_robots.export.collision_simplification.fitted_primitive import fitted_primitive
-from terrainkit_robots.export.mesh_export.decimate import coarser
+from terrainkit_robots.export.mesh_export.decimate import decimate
 from terrainkit_robots.export.mesh_export.file_names import FileNames
 from terrainkit_robots.export.mesh_export.mesh_bytes import has_no_volume, scaled
 from terrainkit_robots.mesh.hull import convex_hull
@@ -69,7 +69,7 @@ class VolumeError:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Treated:
+class SimplifiedRobot:
     """A robot with other collision shapes."""
 
     model: RobotModel
@@ -88,14 +88,14 @@ class Treated:
     """What became of each collision mesh, a sentence each."""
 
 
-def treat(
+def simplify_collisions(
     model: RobotModel,
     meshes: Meshes,
     how: How = "keep",
     *,
     cache: Path | None = None,
     progress: Progress = lambda items, _: items,
-) -> Treated:
+) -> SimplifiedRobot:
     """Return a robot with its collision meshes made fit to collide with.
 
     A mesh that cannot be read or is flat stays as it is: it is told when it is packed.
@@ -109,7 +109,7 @@ def treat(
         progress: Draws a bar while it passes on the meshes.
     """
     if how == "keep":
-        return Treated(model=model, meshes=meshes)
+        return SimplifiedRobot(model=model, meshes=meshes)
     work = _Work(meshes, how, cache)
     uses = {
         (shape.mesh.path, shape.mesh.scale): shape.mesh
@@ -118,13 +118,13 @@ def treat(
         if shape.shape == "mesh" and shape.mesh is not None
     }
     for mesh in progress(uses.values(), len(uses)):
-        work.treat(mesh)
+        work.simplify(mesh)
     links = tuple(work.link(link) for link in model.links)
     contents = {Path(name): data for name, data in work.names.files.items()}
-    return Treated(
+    return SimplifiedRobot(
         model=replace(model, links=links),
         contents=contents,
-        meshes=meshes.beside(contents),
+        meshes=meshes.with_contents(contents),
         errors=tuple(work.errors),
         notes=tuple(work.notes),
     )
@@ -143,7 +143,7 @@ class _Work:
         self.errors: list[VolumeError] = []
         self.notes: list[str] = []
 
-    def treat(self, mesh: MeshFile) -> None:
+    def simplify(self, mesh: MeshFile) -> None:
         """Find what is to be in the place of a mesh."""
         try:
             if has_no_volume(self._meshes, mesh):
@@ -217,7 +217,7 @@ class _Work:
     def _welded(self, path: Path) -> Surface:
         surface = self._meshes.surface(path)
         if len(surface.faces) > _MOST_WELDED:
-            return welded(coarser(surface, _MOST_WELDED))
+            return welded(decimate(surface, _MOST_WELDED))
         return self._meshes.welded(path)
 
     def _is_far_from_convex(self, mesh: MeshFile) -> bool:
@@ -239,7 +239,7 @@ def _instead(shape: Geometry, other: Geometry) -> Geometry:
         size=other.size,
         mesh=other.mesh,
         origin=shape.origin @ other.origin,
-        fitted=False,
+        fit_to_mesh=False,
     )
 
 

@@ -28,7 +28,7 @@ from terrainkit_robots.analysis.inertia.physical import (
 from terrainkit_robots.analysis.inertia.placeholder import is_identity, placeholders
 from terrainkit_robots.analysis.inertia.repair import repair
 from terrainkit_robots.description.model import Inertial, Link
-from terrainkit_robots.description.xml.unparsed import Unread
+from terrainkit_robots.description.xml.unparsed import UnparsedNumbers
 from terrainkit_robots.lint.rule import Severity, Violation, rule
 from terrainkit_robots.text import names
 from terrainkit_robots.transforms import Matrix
@@ -81,7 +81,7 @@ def massless_body(robot: Facts) -> Iterator[Violation]:
         MuJoCo 4.0: "mass and inertia of moving bodies must be larger than mjMINVAL", and
         "missing element: 'mass'".
     """
-    unread = Unread(robot.model)
+    unread = UnparsedNumbers(robot.model)
     for link in robot.model.links:
         if (
             link.inertial
@@ -212,7 +212,7 @@ def not_positive_definite(robot: Facts) -> Iterator[Violation]:
     Source:
         MuJoCo 4.0: "inertia must have positive eigenvalues", "missing element: 'inertia'".
     """
-    unread = Unread(robot.model)
+    unread = UnparsedNumbers(robot.model)
     main = {id(main_link(body)) for body in robot.bodies}
     for link in robot.model.links:
         if not _mass_in_reach(link) or unread.has(link.name, *_SIX):

@@ -18,7 +18,7 @@ from terrainkit_robots.analysis.legs.joint_roles import (
 from terrainkit_robots.analysis.legs.stance import GRAVITY
 from terrainkit_robots.description.fix import Fix, SetAttribute
 from terrainkit_robots.description.model import JOINT_TYPES, Joint, Limit
-from terrainkit_robots.description.xml.unparsed import Unread
+from terrainkit_robots.description.xml.unparsed import UnparsedNumbers
 from terrainkit_robots.lint.rule import Violation, rule
 from terrainkit_robots.lint.rules.inr import (
     center_of_mass_outside,
@@ -170,7 +170,7 @@ def zero_axis(robot: Facts) -> Iterator[Violation]:
     Source:
         MuJoCo 4.0: "axis too small"; http://wiki.ros.org/urdf/XML/joint for the default.
     """
-    unread = Unread(robot.model)
+    unread = UnparsedNumbers(robot.model)
     for joint in robot.model.joints:
         if joint.moves and _axis_length(joint) < _TINY and not unread.at(joint.axis_source):
             assert joint.axis is not None
@@ -248,7 +248,7 @@ def missing_limit(robot: Facts) -> Iterator[Violation]:
         http://wiki.ros.org/urdf/XML/joint: limit is required. MuJoCo 4.0, tried: lower = upper, or
         one of them missing, gives an unlimited joint; its own format refuses that.
     """
-    unread = Unread(robot.model)
+    unread = UnparsedNumbers(robot.model)
     for joint in robot.model.joints:
         what = _lacking(joint, robot.model.kind == "mjcf")
         if what and not unread.has(joint.name, "lower", "upper", "range"):
@@ -298,7 +298,7 @@ def inverted_limit(robot: Facts) -> Iterator[Violation]:
     Source:
         MuJoCo 4.0, tried: jnt_limited is false.
     """
-    unread = Unread(robot.model)
+    unread = UnparsedNumbers(robot.model)
     for joint in robot.model.joints:
         if joint.kind not in ("revolute", "prismatic") or joint.limit is None:
             continue
@@ -356,7 +356,7 @@ def no_effort(robot: Facts) -> Iterator[Violation]:
     Source:
         http://wiki.ros.org/urdf/XML/joint: effort is required.
     """
-    unread = Unread(robot.model)
+    unread = UnparsedNumbers(robot.model)
     for joint in _with_limit(robot):
         assert joint.limit is not None
         effort = joint.limit.effort
@@ -408,7 +408,7 @@ def no_velocity(robot: Facts) -> Iterator[Violation]:
     Source:
         http://wiki.ros.org/urdf/XML/joint: velocity is required.
     """
-    unread = Unread(robot.model)
+    unread = UnparsedNumbers(robot.model)
     for joint in _with_limit(robot):
         assert joint.limit is not None
         speed = joint.limit.velocity

@@ -21,12 +21,16 @@ from terrainkit_robots.analysis.meshes.uses import (
     replaced,
 )
 from terrainkit_robots.description.fix import Edit, Fix
-from terrainkit_robots.description.package_resolver import is_absolute, names_package, right_letters
+from terrainkit_robots.description.package_resolver import (
+    filename_on_disk,
+    is_absolute,
+    is_package_uri,
+)
 from terrainkit_robots.description.xml.document import read_bytes
 from terrainkit_robots.lint.rule import Severity, Violation, rule
 from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes, TooLargeError
 from terrainkit_robots.mesh.sniff import MUJOCO_SUFFIXES
-from terrainkit_robots.mesh.surface import FLAT, binary_stl, clustered, thickness
+from terrainkit_robots.mesh.surface import FLAT, binary_stl, cluster_vertices, thickness
 from terrainkit_robots.text import names
 
 _MOST_FACES = 200_000
@@ -168,7 +172,7 @@ def package_uri(robot: Facts) -> Iterator[Violation]:
     groups: dict[tuple[str, str], list[tuple[UsedMesh, Fix | None]]] = {}
     for used in meshes_by_name(robot):
         host = used.name.lower().startswith("file:") and not is_absolute(used.name)
-        if not (host or names_package(used.name)) or is_lost(used):
+        if not (host or is_package_uri(used.name)) or is_lost(used):
             continue
         # a file of that name in another folder need not be the one that ROS would find
         fix = _relative_fix(robot, used, "safe" if _ends_alike(used) else "unsafe")
@@ -217,13 +221,13 @@ def filename_case(robot: Facts) -> Iterator[Violation]:
         POSIX file names are compared byte by byte.
     """
     for used in meshes_by_name(robot):
-        right = None if is_lost(used) else right_letters(used.name, used.mesh.path)
+        right = None if is_lost(used) else filename_on_disk(used.name, used.mesh.path)
         if right is None:
             continue
         slashes = right == used.name.replace("\\", "/")
         how = "has backslashes" if slashes else "has other letters than the file"
         # a package path is made relative, with the right letters, by MSH003
-        edits = None if names_package(used.name) else renamed(robot, used.uses, right)
+        edits = None if is_package_uri(used.name) else renamed(robot, used.uses, right)
         yield Violation(
             subject=used.name,
             source=used.source,
@@ -426,7 +430,7 @@ def _simplified(meshes: Meshes, used: UsedMesh) -> Callable[[], bytes]:
         surface = meshes.surface(used.mesh.path)
         cells = _GRID
         while True:
-            coarse = clustered(surface, cells)
+            coarse = cluster_vertices(surface, cells)
             if not len(coarse.faces):
                 raise MeshError("has nothing left once its corners are merged")
             share = _SIMPLIFIED / len(coarse.faces)
@@ -491,7 +495,7 @@ def flat_mesh(robot: Facts) -> Iterator[Violation]:
     """
     for used in meshes_by_file(robot):
         for use in used.collisions:
-            if not robot.meshes.readable(use.mesh) or not robot.meshes.is_flat(use.mesh):
+            if not robot.meshes.is_readable(use.mesh) or not robot.meshes.is_flat(use.mesh):
                 continue
             corners = robot.meshes.vertices(use.mesh)
             flat = thickness(corners)

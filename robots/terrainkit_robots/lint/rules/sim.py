@@ -224,7 +224,7 @@ def yourdfpy_load_failure(robot: Facts) -> Iterator[Violation]:
 
 def _check_unchanged(robot: Facts) -> None:
     """Refuse what is not on disk yet: both open files by themselves."""
-    if any(robot.meshes.is_held(path) for path in robot.model.sources):
+    if any(robot.meshes.has_contents(path) for path in robot.model.sources):
         raise CannotCheckError("the file is to be changed; ask again once it is written")
 
 

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from terrainkit_robots.description.urdf.reader import rotation_of
 from terrainkit_robots.export.collision_simplification.fitted_primitive import fitted_primitive
+from terrainkit_robots.transforms import rpy_to_matrix
 
-TURN = rotation_of(np.array([0.3, -0.4, 0.5]))
+TURN = rpy_to_matrix(np.array([0.3, -0.4, 0.5]))
 SOLIDS = {
     "sphere": (trimesh.creation.icosphere(subdivisions=4, radius=0.2), (0.2,)),
     "capsule": (trimesh.creation.capsule(radius=0.1, height=0.6, count=[64, 64]), (0.1, 0.3)),

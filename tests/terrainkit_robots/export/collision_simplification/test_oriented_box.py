@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from terrainkit_robots.description.urdf.reader import rotation_of
 from terrainkit_robots.export.collision_simplification.oriented_box import (
     frame_about,
     oriented_box,
     principal_axes,
 )
+from terrainkit_robots.transforms import rpy_to_matrix
 
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1.0)])
 HALF = np.array([0.3, 0.1, 0.05])
@@ -21,7 +21,7 @@ def test_a_box_along_the_axes_stays_there():
 
 @pytest.mark.parametrize("rpy", [(0.3, -0.4, 0.5), (0, 0, 0.7), (1.2, 0.1, -2)])
 def test_a_turned_box_is_found(rpy):
-    turn = rotation_of(np.array(rpy))
+    turn = rpy_to_matrix(np.array(rpy))
     pose, half = oriented_box((CORNERS * HALF) @ turn.T, turn.T)
     assert np.sort(half) == pytest.approx(np.sort(HALF), rel=0.01)
     assert np.linalg.det(pose[:3, :3]) == pytest.approx(1)
@@ -36,7 +36,7 @@ def test_all_points_are_inside():
 
 
 def test_around_what_is_flat():
-    turn = rotation_of(np.array([0.3, -0.4, 0.5]))
+    turn = rpy_to_matrix(np.array([0.3, -0.4, 0.5]))
     pose, half = oriented_box((CORNERS * [0.3, 0.1, 0]) @ turn.T)
     assert np.sort(half) == pytest.approx([0, 0.1, 0.3], rel=0.01, abs=1e-9)
     assert np.abs(pose[:3, :3].T @ turn[:, 2]).max() == pytest.approx(1, abs=1e-6)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from terrainkit_robots.spec.robot_spec import JOINT_TABLES, Provenance, RobotSpec
 
 
-def with_origins(spec: RobotSpec, derived: RobotSpec, file: str) -> RobotSpec:
+def with_provenance(spec: RobotSpec, derived: RobotSpec, file: str) -> RobotSpec:
     """Return a spec whose values have their true origin: as derived, or given.
 
     Args:
