@@ -3,7 +3,7 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.export.base_link import with_world_base
-from terrainkit_robots.onboarding.pipeline import Wishes, bring_in
+from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
 from terrainkit_robots.spec.spec_file import read_spec
 
 MASS = '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/><geom size="0.1" mass="0"/>'
@@ -34,7 +34,7 @@ def facts(tmp_path, text):
 def brought_in(tmp_path, text, **wishes):
     robot = facts(tmp_path, text)
     folder = tmp_path / "robot"
-    done = bring_in(robot.model.file, Wishes(target=folder, pictures=False, **wishes))
+    done = onboard(robot.model.file, folder, OnboardOptions(render_pictures=False, **wishes))
     return done, read_spec(folder / "robot.toml")
 
 
