@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Container, Iterable, Sequence
-from pathlib import Path
 
 _MOST_LETTERS = 100
 """Longer names are cut, and compared with no other: they come from a program, or are no names."""
@@ -75,10 +74,3 @@ def _most_alike(lower: str, others: Sequence[str], near: float) -> str:
         if matcher.ratio() > score:
             best, score = other, matcher.ratio()
     return best
-
-
-def display_path(path: Path) -> str:
-    """Return a path relative to the working directory if it is below it, else unchanged."""
-    working_dir = Path.cwd()
-    below = path.is_absolute() and path.is_relative_to(working_dir)
-    return str(path.relative_to(working_dir) if below else path)

@@ -1,11 +1,9 @@
 """GitHub annotations: workflow commands that put each finding beside its line."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from terrainkit_robots.lint.report.plain import encodable
 from terrainkit_robots.lint.runner import Finding, Report
-from terrainkit_robots.text import display_path
 
 _LEVELS = {"error": "error", "warning": "warning", "info": "notice"}
 
@@ -16,7 +14,7 @@ def write(reports: Sequence[Report]) -> str:
 
 
 def _line(finding: Finding) -> str:
-    properties = {"file": Path(display_path(finding.file)).as_posix()}
+    properties = {"file": finding.file.as_posix()}
     if finding.line:
         properties["line"] = str(finding.line)
     properties["title"] = f"{finding.code} {finding.name}"

@@ -9,7 +9,6 @@ from terrainkit_robots.lint.report.facts_json import facts_json
 from terrainkit_robots.lint.report.plain import encodable
 from terrainkit_robots.lint.report.repaired import fixed, unfixed
 from terrainkit_robots.lint.runner import Finding, Report
-from terrainkit_robots.text import display_path
 
 SCHEMA_VERSION = 1
 """Raised when a key changes its meaning or goes; new keys may come without."""
@@ -30,7 +29,7 @@ def record(report: Report) -> dict[str, Any]:
     return {
         "schema_version": SCHEMA_VERSION,
         "tool": {"name": "terrainkit", "version": __version__},
-        "file": display_path(model.file),
+        "file": str(model.file),
         "kind": model.kind,
         "verdict": report.verdict,
         "facts": facts_json(report.facts, simulated=report.simulated),
@@ -51,7 +50,7 @@ def finding_record(finding: Finding) -> dict[str, Any]:
         "subject": finding.subject,
         "message": finding.message,
         "hint": finding.hint,
-        "file": display_path(finding.file),
+        "file": str(finding.file),
         "line": finding.line,
         "measured": dict(finding.measured),
         "fix": finding.fix.safety if finding.fix is not None else None,

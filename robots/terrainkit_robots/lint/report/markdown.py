@@ -8,7 +8,6 @@ from terrainkit_robots.lint.report.repaired import fixed, unfixed
 from terrainkit_robots.lint.report.robot_summary import robot_summary
 from terrainkit_robots.lint.report.tally import WORDS, fixable, grouped, place, tally
 from terrainkit_robots.lint.runner import Finding, Report
-from terrainkit_robots.text import display_path
 
 
 def write(reports: Sequence[Report]) -> str:
@@ -17,7 +16,7 @@ def write(reports: Sequence[Report]) -> str:
 
 
 def _section(report: Report) -> Iterator[str]:
-    yield f"## {cell(display_path(report.facts.model.file))}\n"
+    yield f"## {cell(str(report.facts.model.file))}\n"
     repairs = fixable(report.findings)
     yield f"**{tally([report])}**{f' ({repairs})' if repairs else ''}\n"
     yield "| | |\n|---|---|"

@@ -11,7 +11,6 @@ from terrainkit_robots.lint.report.json_report import sound
 from terrainkit_robots.lint.rule import FAMILIES, Rule, Severity, rules
 from terrainkit_robots.lint.runner import Finding, Report, Skipped
 from terrainkit_robots.lint.selection import Suppressed, UnusedSuppression
-from terrainkit_robots.text import display_path
 
 SCHEMA = (
     "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
@@ -47,7 +46,7 @@ def _run(reports: Sequence[Report]) -> dict[str, Any]:
         "results": results,
         "properties": {
             "facts": {
-                display_path(r.facts.model.file): facts_json(r.facts, simulated=r.simulated) for r in reports
+                str(r.facts.model.file): facts_json(r.facts, simulated=r.simulated) for r in reports
             }
         },
     }
@@ -114,7 +113,6 @@ def _location(file: Path, line: int = 0, subject: str = "") -> dict[str, Any]:
 
 def uri(file: Path) -> str:
     """Return a file as a URI: relative to where the reader is, unless it is absolute."""
-    file = Path(display_path(file))
     return file.as_uri() if file.is_absolute() else quote_from_bytes(bytes(file), safe="/")
 
 

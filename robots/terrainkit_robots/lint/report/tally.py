@@ -1,14 +1,12 @@
 """Tallies: how many findings there are of each severity, in words."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from itertools import groupby
+from collections.abc import Sequence
 
 from terrainkit_robots.lint.rule import Severity
 from terrainkit_robots.lint.runner import Finding, Report, Skipped
 from terrainkit_robots.lint.selection import UnusedSuppression
 from terrainkit_robots.text import count as count
-from terrainkit_robots.text import display_path
 
 WORDS: dict[Severity, str] = {"error": "error", "warning": "warning", "info": "note"}
 """What each severity is called; the order is that of reports."""
@@ -31,20 +29,9 @@ def fixable(findings: Sequence[Finding]) -> str:
     return f"fixable: {', '.join(parts)}" if parts else ""
 
 
-def by_rule(
-    findings: Sequence[Finding],
-) -> Iterator[tuple[tuple[Severity, str, str], list[Finding]]]:
-    """Yield severity, code and name of each rule with its findings, errors first."""
-    order = list(WORDS)
-    ranked = sorted(findings, key=lambda f: (order.index(f.severity), f.code))  # stable
-    for key, group in groupby(ranked, key=lambda f: (f.severity, f.code, f.name)):
-        yield key, list(group)
-
-
 def place(finding: Finding) -> str:
-    """Return the file and the line of a finding, in the format that editors and terminals open."""
-    file = display_path(finding.file)
-    return f"{file}:{finding.line}" if finding.line else file
+    """Return where it is, as editors and terminals open it."""
+    return f"{finding.file}:{finding.line}" if finding.line else str(finding.file)
 
 
 def grouped(skipped: Sequence[Skipped]) -> list[tuple[bool, str, str]]:

@@ -3,14 +3,15 @@
 import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 from terrainkit_robots.lint.report.plain import plain
 from terrainkit_robots.lint.report.repaired import fixed, unfixed
 from terrainkit_robots.lint.report.robot_summary import robot_summary
-from terrainkit_robots.lint.report.tally import WORDS, by_rule, fixable, grouped, place, tally
+from terrainkit_robots.lint.report.tally import WORDS, fixable, grouped, place, tally
 from terrainkit_robots.lint.rule import Severity
 from terrainkit_robots.lint.runner import Finding, Report
-from terrainkit_robots.text import count, display_path
+from terrainkit_robots.text import count
 
 WIDTH = 100
 """Width of a line [characters]; only what cannot be broken is longer."""
@@ -54,7 +55,7 @@ def lines(reports: Sequence[Report], width: int = WIDTH) -> Iterator[Line]:
 
 
 def _robot(report: Report, width: int) -> Iterator[Line]:
-    file = plain(display_path(report.facts.model.file))
+    file = plain(str(report.facts.model.file))
     yield (Span(file, "bold"),)
     model = report.facts.model  # of a file that is no robot there is nothing to sum up
     for label, text in robot_summary(report) if model.links or not model.problems else ():
@@ -66,7 +67,7 @@ def _robot(report: Report, width: int) -> Iterator[Line]:
         for finding in fixed(report):
             yield from _item(finding, f"{finding.code}, {_repair(finding)}", width)
         yield ()
-    for (severity, code, name), found in by_rule(report.findings):
+    for (severity, code, name), found in _by_rule(report.findings):
         yield Span(WORDS[severity], _STYLES[severity]), Span(f" {code} {name}")
         yield from _rule(found, width)
         yield ()
@@ -75,6 +76,16 @@ def _robot(report: Report, width: int) -> Iterator[Line]:
     if told:
         yield ()
     yield _sum(f"{file}: ", [report], report.findings)
+
+
+def _by_rule(
+    findings: Sequence[Finding],
+) -> Iterator[tuple[tuple[Severity, str, str], list[Finding]]]:
+    """Yield severity, code and name of each rule with its findings, the errors first."""
+    order = list(WORDS)
+    ranked = sorted(findings, key=lambda f: (order.index(f.severity), f.code))  # stable
+    for key, group in groupby(ranked, key=lambda f: (f.severity, f.code, f.name)):
+        yield key, list(group)
 
 
 def _rule(findings: Sequence[Finding], width: int) -> Iterator[Line]:
@@ -93,7 +104,7 @@ def _rule(findings: Sequence[Finding], width: int) -> Iterator[Line]:
 
 def _item(finding: Finding, text: str, width: int) -> Iterator[Line]:
     where = Span(f"  {plain(place(finding))}: ", "cyan")
-    if len(plain(display_path(finding.file))) > width // 3:  # by the file, so that all its rows are alike
+    if len(plain(str(finding.file))) > width // 3:  # by the file, so that all its rows are alike
         yield (Span(where.text.rstrip(), where.style),)
         where = Span(" " * 6)
     yield from _wrapped(where, text, width, indent=6)
