@@ -148,16 +148,16 @@ class Onboard(Command):
 
 def _blocking_errors(result: "OnboardResult") -> str:
     """Return a report on the errors that prevent onboarding."""
-    from terrainkit_robots.lint.report import as_text
+    from terrainkit_robots.lint.report import format_reports
     from terrainkit_robots.onboarding.pipeline import is_blocking
 
     errors = tuple(filter(is_blocking, result.report.findings))
-    return as_text([replace(result.report, findings=errors)], "text")
+    return format_reports([replace(result.report, findings=errors)], "text")
 
 
 def _problems(result: "OnboardResult") -> list[str]:
     """Return why a robot that was written is not ready for training."""
-    from terrainkit_robots.lint.report.tally import count
+    from terrainkit_robots.text import count
 
     errors = [finding for finding in result.report.findings if finding.severity == "error"]
     codes = ", ".join(dict.fromkeys(finding.code for finding in errors))

@@ -17,9 +17,9 @@ from terrainkit_cli.task_options import TaskCommand
 from terrainkit_cli.training_extra import require_training
 
 if TYPE_CHECKING:
-    from terrainkit_robots.rl.run_folder import Run
+    from terrainkit_robots.rl.run import Run
     from terrainkit_robots.rl.task import Task
-    from terrainkit_robots.rl.training import Trained
+    from terrainkit_robots.rl.train import TrainResult
 
 Whole = Annotated[str, plain("INT")]
 
@@ -86,11 +86,11 @@ class Train(TaskCommand):
     def run(self) -> int:
         """Train, and say what to do next."""
         require_training()
-        from terrainkit_robots.rl.training import train
+        from terrainkit_robots.rl.train import train
 
         run = self._resumed
         robot, terrain, task = self._robot(run), self._terrain(run), self.task()
-        with render.training() as watch:
+        with render.training() as show_progress:
             trained = train(
                 robot,
                 terrain,
@@ -98,14 +98,14 @@ class Train(TaskCommand):
                 folder=Path(self.log_dir) if self.log_dir else None,
                 resume=run,
                 device=self.device,
-                watch=watch,
+                progress_callback=show_progress,
             )
         _tell(trained, task)
         return 128 + trained.signal if trained.signal else 0
 
     @cached_property  # read once, or a checkpoint that is written meanwhile would count for a part
     def _resumed(self) -> "Run | None":
-        from terrainkit_robots.rl.run_folder import open_run
+        from terrainkit_robots.rl.run import open_run
 
         return open_run(self.resume) if self.resume else None
 
@@ -141,7 +141,7 @@ class Train(TaskCommand):
         return self.terrain or ("plane" if run is None else run.terrain)
 
 
-def _tell(trained: "Trained", task: "Task") -> None:
+def _tell(trained: "TrainResult", task: "Task") -> None:
     """Say what was done, and what can be done with it."""
     if trained.folder is None:  # the first of several processes says it
         return

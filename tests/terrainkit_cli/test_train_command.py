@@ -20,8 +20,8 @@ from terrainkit.errors import ConfigError
 from terrainkit_cli import render
 from terrainkit_cli.main import main
 from terrainkit_cli.training_extra import require_training
-from terrainkit_robots.rl.progress import Progress
-from terrainkit_robots.rl.run_folder import checkpoints, open_run
+from terrainkit_robots.rl.run import checkpoints, open_run
+from terrainkit_robots.rl.runner import TrainingProgress
 
 Train = Callable[..., int]
 
@@ -197,7 +197,7 @@ def test_a_task_file_comes_before_options(train, tmp_path):
     assert (rewards.torques, rewards.dof_vel) == (-0.125, -0.25)
 
 
-PROGRESS = Progress(
+PROGRESS = TrainingProgress(
     folder=Path("logs/rover"),
     iteration=20,
     last=400,
@@ -216,7 +216,7 @@ PROGRESS = Progress(
 def test_without_a_terminal_progress_is_a_line_now_and_then(capsys):
     with render.training() as watch:
         for iteration in range(1, 24):
-            watch(Progress(**{**vars(PROGRESS), "iteration": iteration, "last": 23}))
+            watch(TrainingProgress(**{**vars(PROGRESS), "iteration": iteration, "last": 23}))
     out, err = capsys.readouterr()
     assert out == ""
     assert [line.split(":")[0] for line in err.splitlines()] == [
@@ -234,7 +234,7 @@ def test_without_a_terminal_progress_is_a_line_now_and_then(capsys):
 def test_what_robots_are_rewarded_for_is_a_line_less_often(capsys):
     with render.training() as watch:
         for iteration in range(1, 101):
-            watch(Progress(**{**vars(PROGRESS), "iteration": iteration}))
+            watch(TrainingProgress(**{**vars(PROGRESS), "iteration": iteration}))
     terms = [line for line in capsys.readouterr().err.splitlines() if "env steps/s" not in line]
     told = "success stairs 75%, tracking_lin_vel +0.500 /s, torques -0.062 /s"
     assert terms == [f"iteration 50/400: {told}", f"iteration 100/400: {told}"]

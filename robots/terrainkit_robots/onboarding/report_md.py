@@ -9,9 +9,14 @@ from typing import TYPE_CHECKING
 from terrainkit_robots.analysis.bodies.joint_order import permutation
 from terrainkit_robots.analysis.simulator_conventions.joint_order import simulator_orders
 from terrainkit_robots.analysis.simulator_conventions.order_table import order_table
-from terrainkit_robots.lint.report.markdown import cell, titled_list
-from terrainkit_robots.lint.report.plain import encodable, plain
-from terrainkit_robots.lint.report.tally import WORDS, by_rule, grouped, place, tally
+from terrainkit_robots.lint.report.escape import escape_control, escape_surrogates
+from terrainkit_robots.lint.report.grouping import group_findings
+from terrainkit_robots.lint.report.markdown import cell, finding_row, titled_list
+from terrainkit_robots.lint.report.summary import (
+    SEVERITY_LABELS,
+    group_skipped,
+    summarize_findings,
+)
 from terrainkit_robots.onboarding.joint_table import format_number, joint_table
 from terrainkit_robots.text import count, display_path
 
@@ -21,10 +26,6 @@ if TYPE_CHECKING:
     from terrainkit_robots.onboarding.robot_files import RobotFiles
     from terrainkit_robots.onboarding.verify import Verification
     from terrainkit_robots.simulation.standing import Standing
-
-_MAX_FINDINGS = 10
-"""Largest number of findings of one rule that are listed."""
-
 
 def report_markdown(result: "OnboardResult") -> str:
     """Return the text of report.md for a robot that was written."""
@@ -40,7 +41,7 @@ def report_markdown(result: "OnboardResult") -> str:
         _findings(result),
         _next_steps(result, robot),
     )
-    return encodable("\n".join(line for section in sections for line in section))
+    return escape_surrogates("\n".join(line for section in sections for line in section))
 
 
 def _table(rows: Sequence[Sequence[str]]) -> Iterator[str]:
@@ -218,20 +219,17 @@ def _joint_orders(robot: "RobotFiles") -> Iterator[str]:
 
 
 def _findings(result: "OnboardResult") -> Iterator[str]:
-    report = result.report
+    report, severities = result.report, list(SEVERITY_LABELS)
     yield "## Findings\n"
-    yield f"**{tally([report])}** in the source file, after the fixes.\n"
-    for (severity, code, name), findings in by_rule(report.findings):
-        yield f"### {cell(f'{code} {name}')} ({WORDS[severity]})\n"
-        for finding in findings[:_MAX_FINDINGS]:
-            likely = " (likely)" if finding.certainty == "likely" else ""
-            yield f"- {cell(place(finding))}: {cell(finding.message + likely)}"
-        if len(findings) > _MAX_FINDINGS:
-            yield f"- and {len(findings) - _MAX_FINDINGS} more"
-        hints = dict.fromkeys(finding.hint for finding in findings[:_MAX_FINDINGS] if finding.hint)
-        yield "".join(f"\n*How to fix:* {cell(hint)}\n" for hint in hints)
-    skipped = [(codes, reason) for _, codes, reason in grouped(report.skipped)]
-    yield from titled_list("Skipped or ignored", skipped)
+    yield f"**{summarize_findings([report])}** in the source file, after the fixes.\n"
+    if report.findings:
+        yield "| | rule | location | finding | how to fix |\n|---|---|---|---|---|"
+        findings = sorted(report.findings, key=lambda f: (severities.index(f.severity), f.code))
+        groups = group_findings(report.facts.model, findings)
+        yield from (finding_row(group) for group in groups)
+        yield ""
+    skipped = [(codes, reason) for _, codes, reason in group_skipped(report.skipped)]
+    yield from titled_list("Not checked or ignored", skipped)
 
 
 def _next_steps(result: "OnboardResult", robot: "RobotFiles") -> Iterator[str]:
@@ -240,7 +238,7 @@ def _next_steps(result: "OnboardResult", robot: "RobotFiles") -> Iterator[str]:
         "Edit robot.toml to change body names, the default pose, gains and limits. Run these "
         "commands in this folder.\n"
     )
-    urdf, mjcf = (shlex.quote(plain(name)) for name in (robot.spec.urdf, robot.spec.mjcf))
+    urdf, mjcf = (shlex.quote(escape_control(name)) for name in (robot.spec.urdf, robot.spec.mjcf))
     commands = [
         ("view the robot", "python -m mujoco.viewer --mjcf=scene.xml"),
         ("check an edited robot.toml", f"terrainkit check-robot {urdf} --spec robot.toml"),

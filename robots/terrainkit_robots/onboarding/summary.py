@@ -4,9 +4,9 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from terrainkit_robots.lint.report.tally import count, tally
+from terrainkit_robots.lint.report.summary import summarize_findings
 from terrainkit_robots.onboarding.equivalence import NUM_POSES
-from terrainkit_robots.text import names
+from terrainkit_robots.text import count, names
 
 if TYPE_CHECKING:
     from terrainkit_robots.onboarding.pipeline import OnboardResult
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
     """Yield a label and a sentence for each step."""
-    yield "checked", tally([result.report])
+    yield "checked", summarize_findings([result.report])
     if result.fixed:
         codes = dict.fromkeys(finding.code for finding in result.fixed)
         yield "fixed", f"{count(len(result.fixed), 'finding')}: {names(codes)}"
