@@ -162,7 +162,9 @@ def _problems(result: "OnboardResult") -> list[str]:
     errors = [finding for finding in result.report.findings if finding.severity == "error"]
     codes = ", ".join(dict.fromkeys(finding.code for finding in errors))
     remain = "remains" if len(errors) == 1 else "remain"
-    problems = [f"{count(len(errors), 'error')} {remain} ({codes}); see report.md"] if errors else []
+    problems = (
+        [f"{count(len(errors), 'error')} {remain} ({codes}); see report.md"] if errors else []
+    )
     verification = result.verification
     if verification is not None and not verification.is_stable:
         problems.append(f"the robot does not stand: {'; '.join(verification.failures)}")

@@ -289,7 +289,10 @@ class Rule(Command):
             render.result(f"{family}: {description}")
             members = [rule for rule in rules() if rule.family == family]
             render.table(
-                [(f"  {r.code}", r.name, r.severity, _FIX_OPTIONS[r.fixes], r.title) for r in members]
+                [
+                    (f"  {r.code}", r.name, r.severity, _FIX_OPTIONS[r.fixes], r.title)
+                    for r in members
+                ]
             )
             render.result("")
         render.result("Run `terrainkit rule CODE` for details.")

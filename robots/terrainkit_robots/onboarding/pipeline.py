@@ -1,4 +1,4 @@
-"""The onboarding pipeline: check a robot file, repair it, write its folder and verify the result."""
+"""The onboarding pipeline: check a robot file, fix it, write its folder and verify the result."""
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from terrainkit_robots.onboarding.verify import Verification
     from terrainkit_robots.simulation.standing import Standing
 
+
 def report_markdown(result: "OnboardResult") -> str:
     """Return the text of report.md for a robot that was written."""
     assert result.robot is not None
@@ -72,9 +73,14 @@ def _properties(robot: "RobotFiles") -> Iterator[str]:
     joints = count(len(spec.joint_order), "actuated joint")
     num_bodies = sum(not body.virtual for body in facts.bodies)
     bodies = f"{num_bodies:,} rigid {'body' if num_bodies == 1 else 'bodies'}"
-    mass = f"weighs {format_number(facts.total_mass, 4)} kg and " if _is_known(facts.total_mass) else ""
+    mass = (
+        f"weighs {format_number(facts.total_mass, 4)} kg and "
+        if _is_known(facts.total_mass)
+        else ""
+    )
     yield f"{cell(spec.name)} {mass}has {bodies} and {joints}."
-    yield f"Its base, {cell(spec.base)}, is {'floating' if spec.floating else 'fixed to the world'}."
+    base = "floating" if spec.floating else "fixed to the world"
+    yield f"Its base, {cell(spec.base)}, is {base}."
     if not facts.legs:
         yield (
             "No legs were found, so there are no feet, no standing pose and no spawn height, and "
@@ -160,7 +166,7 @@ def _equivalence(verification: "Verification | None") -> Iterator[str]:
     rows = [
         (
             each.file,
-            f"{each.mass:+.3%}",
+            f"{round(each.mass, 5) + 0.0:+.3%}",
             f"{each.inertia:.3%} at {each.joint}" if each.joint else "",
             f"{1000 * each.distance:.2g} mm at {each.link}",
             f"{math.degrees(each.angle):.2g} deg at {each.rotated_link}",

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from terrainkit_robots.onboarding.frameworks.naming import package_name
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
+from terrainkit_robots.onboarding.frameworks.naming import package_name
 from terrainkit_robots.onboarding.frameworks.source import (
     HERE,
     WRITTEN,

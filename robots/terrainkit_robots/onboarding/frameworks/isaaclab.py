@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 
 from terrainkit.errors import ConfigError
+from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.initial_state import initial_state
 from terrainkit_robots.onboarding.frameworks.naming import class_name, constant_name, package_name
 from terrainkit_robots.onboarding.frameworks.patterns import usd_patterns
-from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.source import (
     HERE,
     WRITTEN,

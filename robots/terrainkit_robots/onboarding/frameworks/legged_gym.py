@@ -1,8 +1,8 @@
 """legged_gym: the configuration class of a robot on rough terrain in Isaac Gym."""
 
 from terrainkit_robots.onboarding.frameworks import legged_robot
-from terrainkit_robots.onboarding.frameworks.naming import class_name, package_name
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
+from terrainkit_robots.onboarding.frameworks.naming import class_name, package_name
 from terrainkit_robots.onboarding.frameworks.source import (
     WRITTEN,
     docstring,

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit_robots.onboarding.frameworks.naming import package_name
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
+from terrainkit_robots.onboarding.frameworks.naming import package_name
 from terrainkit_robots.onboarding.frameworks.source import (
     assign,
     assign_sum,
@@ -78,7 +78,9 @@ def gains(robot: ConfigRobot, if_clashing: str) -> list[str]:
     stiffness, damping = robot.of_every_joint("stiffness"), robot.of_every_joint("damping")
     pairs = {joint: (stiffness[joint], damping[joint]) for joint in robot.spec.joint_order}
     found = gain_keys(robot.spec.joint_order, pairs)
-    scale, differ = robot.one_for_all(robot.scales(robot.position_joints).values(), "median", depth=2)
+    scale, differ = robot.one_for_all(
+        robot.scales(robot.position_joints).values(), "median", depth=2
+    )
     undriven = ""
     if robot.velocity_joints:
         wants = "wants a speed, which P does not tell it"

@@ -1,8 +1,8 @@
 """LeggedGym-Ex: the configuration class of a robot, for Isaac Gym, Genesis and Isaac Lab."""
 
 from terrainkit_robots.onboarding.frameworks import legged_robot
-from terrainkit_robots.onboarding.frameworks.naming import class_name, package_name
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
+from terrainkit_robots.onboarding.frameworks.naming import class_name, package_name
 from terrainkit_robots.onboarding.frameworks.source import (
     WRITTEN,
     assign,

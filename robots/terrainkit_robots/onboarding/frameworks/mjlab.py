@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 
+from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.initial_state import initial_state
 from terrainkit_robots.onboarding.frameworks.naming import constant_name, package_name
 from terrainkit_robots.onboarding.frameworks.patterns import mjlab_patterns
-from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.source import (
     HERE,
     WRITTEN,
