@@ -2,27 +2,27 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from terrainkit_robots.lint.report.plain import encodable, plain
+from terrainkit_robots.lint.report.escape import escape_control, escape_surrogates
 
 ANYTHING = st.text(st.characters(codec=None, categories=None), max_size=30)
 """Control characters and halves of surrogate pairs, too."""
 
 
 @given(ANYTHING)
-def test_what_is_printed_is_one_line_that_no_terminal_acts_on(text):
-    shown = plain(text)
+def test_escape_control_returns_printable_text(text):
+    shown = escape_control(text)
     assert shown.isprintable()
     shown.encode()
 
 
 @given(ANYTHING)
-def test_what_is_written_can_be_encoded(text):
-    encodable(text).encode()
+def test_escape_surrogates_returns_encodable_text(text):
+    escape_surrogates(text).encode()
 
 
 @pytest.mark.parametrize("text", ["FL_calf", "größe", "脚", "a b", ""])
-def test_words_stay_what_they_are(text):
-    assert plain(text) == encodable(text) == text
+def test_plain_words_are_unchanged(text):
+    assert escape_control(text) == escape_surrogates(text) == text
 
 
 @pytest.mark.parametrize(
@@ -34,5 +34,5 @@ def test_words_stay_what_they_are(text):
         ("\udc80", "\\udc80"),
     ],
 )
-def test_what_a_terminal_would_act_on_is_written_out(text, shown):
-    assert plain(text) == shown
+def test_escape_control_escapes_terminal_characters(text, shown):
+    assert escape_control(text) == shown
