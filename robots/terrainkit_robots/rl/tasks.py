@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from terrainkit.errors import ConfigError, known_names, shorten
 from terrainkit_robots.description import bundled
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.rl.robot import SPEC_FILE
+from terrainkit_robots.rl.scene import SPEC_FILE
 from terrainkit_robots.spec.spec_file import read_spec
 
 if TYPE_CHECKING:

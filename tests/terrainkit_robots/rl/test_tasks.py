@@ -13,7 +13,7 @@ from terrainkit.errors import ConfigError
 from terrainkit.schema import flatten
 from terrainkit_cli.main import COMMANDS
 from terrainkit_robots.description import bundled
-from terrainkit_robots.rl import rewards, robot, tasks
+from terrainkit_robots.rl import rewards, scene, tasks
 from terrainkit_robots.rl.config import Env, Task
 from terrainkit_robots.rl.tasks import get_task, register_task, task_names
 
@@ -44,7 +44,7 @@ def test_bundled_robots_have_a_task(name):
     found = get_task(name)
     assert (found.name, found.folder) == (name, bundled.find(name).parent)
     assert name in task_names()
-    read = robot.read_robot(found.folder)
+    read = scene.Robot.load(found.folder)
     assert read.mjcf.is_file()
     assert len(read.default_pose) == 12
 
@@ -176,7 +176,7 @@ def test_task_of_the_guide_can_be_trained(guide):
     import torch
 
     from terrainkit_robots.rl.env import LeggedEnv
-    from terrainkit_robots.rl.ground import Plane
+    from terrainkit_robots.rl.terrain import Plane
 
     assert (guide.name, guide.folder) == ("trotter", QUADRUPED)
     assert guide.task.rewards.trot == 0.5
@@ -184,7 +184,7 @@ def test_task_of_the_guide_can_be_trained(guide):
     assert "# One diagonal pair of feet on the ground" in text
     assert Task.from_toml(text.replace("trot = 0.5", "trot = 2.0"), guide.task).rewards.trot == 2.0
     task = replace(guide.task, env=Env(num_envs=4, num_threads=1))
-    env = LeggedEnv(task, robot.read_robot(guide.folder), Plane())
+    env = LeggedEnv(task, scene.Robot.load(guide.folder), Plane())
     function, scale = env.rewards["trot"]
     assert scale == 0.5
     env.state.foot_force[..., 2] = [[9, 0, 0, 9], [9, 9, 9, 9], [0, 6, 6, 0], [0, 4, 4, 0]]
