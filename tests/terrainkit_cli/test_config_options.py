@@ -8,12 +8,13 @@ import pytest
 import tyro
 
 from terrainkit.errors import ConfigError
+from terrainkit.schema import field_types, flatten
+from terrainkit_cli.config_options import TaskCommand
 from terrainkit_cli.parse import UsageError, parse
 from terrainkit_cli.robot_options import Output, Text
-from terrainkit_cli.task_options import TaskCommand
-from terrainkit_robots.rl import registry, tasks
-from terrainkit_robots.rl.task import Commands, Env, Rewards, Task
-from terrainkit_robots.rl.task_file import from_toml, values_of
+from terrainkit_robots.rl import tasks
+from terrainkit_robots.rl.config import Commands, Env, Rewards, Task
+from terrainkit_robots.rl.tasks import get_task, register_task
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,21 +63,21 @@ class RoverTask(Task):
 @pytest.fixture
 def rover(monkeypatch, tmp_path):
     monkeypatch.setattr(tasks, "_registered", dict(tasks._registered))
-    return registry.register("rover", tmp_path, RoverTask(env=Env(num_envs=17)))
+    return register_task("rover", tmp_path, RoverTask(env=Env(num_envs=17)))
 
 
-def read(*words):
+def parse_words(*words):
     """Return the command that words describe, as `terrainkit train` reads them."""
     return parse(Train.options(words), "terrainkit train", list(words))
 
 
 def changes(command):
     """Return what the command line changed, by name."""
-    before = dict(values_of(command.start_task()))
-    return {name: new for name, new in values_of(command.task()) if new != before[name]}
+    before = dict(flatten(command.default_config()))
+    return {name: new for name, new in flatten(command.changed_config()) if new != before[name]}
 
 
-def test_values_of_the_task_are_options():
+def test_each_value_of_the_task_has_an_option():
     words = (
         "quadruped --rewards.tracking-lin-vel 1.25 --commands.lin-vel-x -1 2 --terrain rough.npz "
         "--terrain.collision plane --rewards.dof-acc -1e-8 --domain-rand.friction none "
@@ -84,7 +85,7 @@ def test_values_of_the_task_are_options():
         "--policy.actor-hidden-dims 64 32 --algorithm.symmetry loss --env.num-envs=64 "
         "--normalization.obs-scales.lin-vel 1 --commands.heading-command true --robot x -o y"
     )
-    made = read(*words.split())
+    made = parse_words(*words.split())
     assert (made.robot, made.terrain, made.quick) == ("quadruped", "rough.npz", True)
     assert (made.named, made.output) == ("x", "y")
     assert changes(made) == {
@@ -103,50 +104,64 @@ def test_values_of_the_task_are_options():
     }
 
 
-def shown(value):
-    if isinstance(value, tuple):
-        return [word for part in value for word in shown(part)]
-    return [str(value).lower() if isinstance(value, bool) or value is None else str(value)]
+def words_of(name, annotation, value):
+    """Return the words on the command line that set a value."""
+    *sections, last = name.replace("_", "-").split(".")
+    if annotation is bool:
+        return ["--" + ".".join([*sections, last if value else f"no-{last}"])]
+    values = value if isinstance(value, tuple) else (value,)
+    words = [str(each).lower() if each is None else str(each) for each in values]
+    return ["--" + ".".join([*sections, last]), *words]
 
 
-def test_every_value_can_be_given_as_it_is():
+def test_every_default_can_be_given():
     words = ["quadruped"]
-    for name, value in values_of(Task()):
-        words += [f"--{name.replace('_', '-')}", *shown(value)]
-    assert read(*words).task() == Task()
+    for name, value in flatten(Task()):
+        section = getattr(Task(), name.partition(".")[0])
+        annotation = field_types(type(section)).get(name.partition(".")[2])
+        words += words_of(name, annotation, value)
+    assert parse_words(*words).changed_config() == Task()
 
 
-def test_the_robot_may_come_last_and_nothing_has_to_be_given():
-    made = read("--rewards.tracking-lin-vel", "2", "--commands.lin-vel-y", "0", "1", "quadruped")
+def test_robot_may_come_last():
+    made = parse_words(
+        "--rewards.tracking-lin-vel", "2", "--commands.lin-vel-y", "0", "1", "quadruped"
+    )
     assert made.robot == "quadruped"
-    assert made.task().commands == Commands(lin_vel_y=(0.0, 1.0))
-    own = registry.find("quadruped").task
-    assert read("quadruped").task() == Train(robot="quadruped").task() == own
-    assert read().robot == ""
+    assert made.changed_config().commands == Commands(lin_vel_y=(0.0, 1.0))
+    own = get_task("quadruped").task
+    assert (
+        parse_words("quadruped").changed_config()
+        == Train(robot="quadruped").changed_config()
+        == own
+    )
+    assert parse_words().robot == ""
 
 
-def test_a_file_goes_before_the_robots_task_and_options_before_both(tmp_path, rover):
+def test_options_override_file_and_task(tmp_path, rover):
     path = tmp_path / "mine.toml"
     path.write_text("laps = 4\n[rewards]\nwheel_slip = -3\ntorques = -1\n")
-    made = read("rover", "--config", str(path), "--rewards.torques", "-2")
-    assert made.start_task() == from_toml(path.read_text(), rover.task)
-    task = made.task()
+    made = parse_words("rover", "--config", str(path), "--rewards.torques", "-2")
+    assert made.default_config() == Task.from_toml(path.read_text(), rover.task)
+    task = made.changed_config()
     assert (task.laps, task.rewards.wheel_slip, task.rewards.torques) == (4, -3.0, -2.0)
     assert task.env.num_envs == 17
 
 
 @pytest.mark.parametrize("words", [("rover", "--laps", "5"), ("--laps", "5", "rover")])
-def test_a_task_of_ones_own_has_its_own_options(rover, words):
-    made = read(*words, "--rewards.wheel-slip", "-1", "--rewards.tracking-lin-vel", "3")
+def test_custom_task_has_its_own_options(rover, words):
+    made = parse_words(*words, "--rewards.wheel-slip", "-1", "--rewards.tracking-lin-vel", "3")
     rewards = RoverRewards(wheel_slip=-1.0, tracking_lin_vel=3.0)
-    assert made.task() == replace(rover.task, laps=5, rewards=rewards)
+    assert made.changed_config() == replace(rover.task, laps=5, rewards=rewards)
 
 
-def test_an_onboarded_folder_has_the_standard_task(tmp_path):
+def test_onboarded_folder_has_the_default_task(tmp_path):
     folder = tmp_path / "mine"
     folder.mkdir()
-    shutil.copy(registry.find("quadruped").folder / "robot.toml", folder)
-    assert read(str(folder), "--env.num-envs", "8").task() == Task(env=Env(num_envs=8))
+    shutil.copy(get_task("quadruped").folder / "robot.toml", folder)
+    assert parse_words(str(folder), "--env.num-envs", "8").changed_config() == Task(
+        env=Env(num_envs=8)
+    )
 
 
 @pytest.mark.parametrize(
@@ -163,47 +178,62 @@ def test_an_onboarded_folder_has_the_standard_task(tmp_path):
         (("quadruped", "rough.npz"), r"Unrecognized .*rough\.npz"),
     ],
 )
-def test_an_option_that_is_not_there_is_told_on_one_line(words, told):
+def test_unknown_option_suggests_nearest_one(words, told):
     with pytest.raises(UsageError, match=told) as error:
-        read(*words)
+        parse_words(*words)
     assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("--rewards.torques", "x"), r"^rewards\.torques is 'x'; wanted a number$"),
-        (("--rewards.tracking-sigma", "0"), r"^rewards\.tracking_sigma is 0\.0; wanted a number a"),
-        (("--commands.lin-vel-x", "2", "1"), r"^commands\.lin_vel_x .*wanted the lower number fir"),
-        (("--domain-rand.friction", "1"), r"^domain_rand\.friction has 1 values; wanted 2"),
-        (("--env.num-envs", "1e3"), r"^env\.num_envs is 1000\.0; wanted a whole number"),
-        (("--terrain.collision", "mesh"), r"^terrain\.collision is 'mesh'; wanted one of: auto, "),
-        (("--asset.self-collisions", "yes"), r"^asset\.self_collisions is 'yes'; wanted true or f"),
-        (("--normalization.obs-scales.lin-vel", "-1"), r"^normalization\.obs_scales\.lin_vel is"),
-        (("--env.episode-length-s", "0.001"), r"^env\.episode_length_s is 0\.001; wanted one step"),
+        (("--rewards.torques", "x"), r"^--rewards\.torques: got 'x'; expected a number$"),
+        (
+            ("--rewards.tracking-sigma", "0"),
+            r"^--rewards\.tracking-sigma: got 0; expected a number > 0",
+        ),
+        (
+            ("--commands.lin-vel-x", "2", "1"),
+            r"^--commands\.lin-vel-x: got \(2, 1\).*the lower one first",
+        ),
+        (
+            ("--domain-rand.friction", "1"),
+            r"^--domain-rand\.friction: got \(1,\); expected 2 values",
+        ),
+        (("--env.num-envs", "1e3"), r"^--env\.num-envs: got 1000\.0; expected an integer"),
+        (
+            ("--terrain.collision", "mesh"),
+            r"^--terrain\.collision: got 'mesh'; expected one of: auto, ",
+        ),
+        (("--terrain.measure-heights", "yes"), r"-heights: got 'yes'; expected true or false, or"),
+        (
+            ("--normalization.obs-scales.lin-vel", "-1"),
+            r"^--normalization\.obs-scales\.lin-vel: got -1",
+        ),
+        (("--env.episode-length-s", "0.001"), r"^env\.episode_length_s: got 0\.001; expected at"),
     ],
 )
-def test_a_value_that_is_out_of_range_is_named(words, told):
+def test_invalid_value_is_named(words, told):
     with pytest.raises(ConfigError, match=told):
-        read("quadruped", *words).task()
+        parse_words("quadruped", *words).changed_config()
 
 
-def test_what_the_task_starts_from_has_to_be_there(tmp_path):
-    with pytest.raises(ConfigError, match=r"no robot 'quadrupd', .*did you mean quadruped\?"):
-        read("quadrupd", "--rewards.torques", "1")
+def test_unknown_robot_or_file_is_rejected(tmp_path):
+    with pytest.raises(ConfigError, match=r"folder 'quadrupd'; did you mean 'quadruped'\?"):
+        parse_words("quadrupd", "--rewards.torques", "1")
     with pytest.raises(ConfigError, match=r"cannot read .*missing\.toml"):
-        read("quadruped", "--config", str(tmp_path / "missing.toml"))
+        parse_words("quadruped", "--config", str(tmp_path / "missing.toml"))
 
 
 @pytest.mark.usefixtures("rover")
-def test_help_shows_the_values_of_the_robot_that_is_named(capsys):
+def test_help_shows_values_of_the_task(capsys):
     with pytest.raises(SystemExit) as end:
-        read("rover", "--help")
+        parse_words("rover", "--help")
     assert end.value.code in (0, None)
     told = " ".join(capsys.readouterr().out.replace("│", " ").split())
     assert "Train a policy. On a ground." in told
     assert "--terrain PATH The ground: an option" in told
-    assert "--env.num-envs INT Environments that are stepped together" in told
+    assert "--env.num-envs INT Number of parallel environments" in told
     assert "(default: 17)" in told
     assert "--rewards.wheel-slip FLOAT Wheels that slide. (default: -0.5)" in told
     assert "--laps INT A value that is in no section. (default: 3)" in told
@@ -211,17 +241,17 @@ def test_help_shows_the_values_of_the_robot_that_is_named(capsys):
     assert "(default: 0.5 1.25)" in told
 
 
-def test_help_is_given_whatever_is_missing(capsys):
+def test_help_works_without_a_valid_task(capsys):
     for words in (("--help",), ("-h", "no_such_robot")):
         with pytest.raises(SystemExit):
-            read(*words)
+            parse_words(*words)
         assert "--rewards.tracking-lin-vel FLOAT" in capsys.readouterr().out
 
 
-def test_neither_torch_nor_mujoco_nor_typeguard_is_imported():
+def test_torch_mujoco_typeguard_are_not_imported():
     code = (
         "import sys; from dataclasses import dataclass\n"
-        "from terrainkit_cli.task_options import TaskCommand\n"
+        "from terrainkit_cli.config_options import TaskCommand\n"
         "assert not {'terrainkit_robots.rl', 'mujoco'} & set(sys.modules)\n"
         "@dataclass(frozen=True, kw_only=True)\n"
         "class Train(TaskCommand):\n"
@@ -230,3 +260,14 @@ def test_neither_torch_nor_mujoco_nor_typeguard_is_imported():
         "assert not {'torch', 'mujoco', 'typeguard', 'rsl_rl'} & set(sys.modules)\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_flags_can_be_set_and_cleared(tmp_path):
+    path = tmp_path / "task.toml"
+    path.write_text("[asset]\nself_collisions = true\n")
+    words = ("quadruped", "--config", str(path))
+    assert parse_words(*words).changed_config().asset.self_collisions
+    cleared = parse_words(*words, "--asset.no-self-collisions").changed_config()
+    assert not cleared.asset.self_collisions
+    before = parse_words("--asset.self-collisions", "quadruped")
+    assert (before.robot, before.changed_config().asset.self_collisions) == ("quadruped", True)
