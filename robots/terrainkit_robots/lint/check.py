@@ -38,7 +38,7 @@ def check_robot(
         ConfigError: if the settings name an unknown rule, `against` is not a robot, or the spec is
             invalid.
     """
-    from terrainkit_robots.spec.spec_file import read_spec
+    from terrainkit_robots.spec.robot_spec import RobotSpec
 
     path, contents = Path(path), contents or {}
     if settings is None:
@@ -51,7 +51,7 @@ def check_robot(
             reason = f": {model.problems[0].message}" if model.problems else ""
             raise ConfigError(f"{against} does not describe a robot{reason}")
         other = Facts(model)
-    robot_spec = read_spec(Path(spec)) if spec is not None else None
+    robot_spec = RobotSpec.load(Path(spec)) if spec is not None else None
     model = load_robot(path, packages=packages, xacro_arguments=arguments, contents=contents)
     facts = Facts(model, Meshes(contents), against=other, spec=robot_spec)
     return lint_selected(facts, settings, contents)

@@ -145,7 +145,7 @@ def onboard(
     """
     from terrainkit_robots.onboarding.report_md import report_markdown
     from terrainkit_robots.onboarding.verify import verify
-    from terrainkit_robots.spec.spec_file import read_spec
+    from terrainkit_robots.spec.robot_spec import RobotSpec
 
     path, options = Path(path), options or OnboardOptions()
     config_names = {name: config_file_name(name) for name in options.frameworks}
@@ -153,7 +153,7 @@ def onboard(
         check_folder(Path(output), overwrite=options.overwrite)
     override = None
     if options.spec is not None:
-        override = SpecOverride(spec=read_spec(options.spec), file=str(options.spec))
+        override = SpecOverride(spec=RobotSpec.load(options.spec), file=str(options.spec))
     options.on_step(f"checking {path.name}")
     report, fixed = _fix_in_memory(path, options)
     for rule in report.crashed:

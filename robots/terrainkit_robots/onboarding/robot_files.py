@@ -88,7 +88,6 @@ def make_robot_files(
     from terrainkit_robots.export.mesh_export.mesh_export import export_meshes
     from terrainkit_robots.export.unsupported import unsupported_elements
     from terrainkit_robots.export.urdf import urdf_text
-    from terrainkit_robots.spec.spec_file import to_toml
 
     if floating is None and override is not None:
         floating = override.spec.floating
@@ -108,7 +107,7 @@ def make_robot_files(
         URDF: urdf_text(facts.model, feet=spec.feet),
         MJCF: _mjcf_text(facts, spec, excluded),
         SCENE: scene_text(facts.model.name, MJCF, height=max(_base_height(facts), 0.1)),
-        SPEC: to_toml(spec),
+        SPEC: spec.to_toml(),
     }
     return RobotFiles(
         facts=facts,

@@ -19,7 +19,7 @@ from terrainkit_robots.onboarding.frameworks.frameworks import framework_names
 from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
 from terrainkit_robots.onboarding.summary import summarize
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.spec.spec_file import read_spec
+from terrainkit_robots.spec.robot_spec import RobotSpec
 
 REAL = [
     "a1/urdf/a1.urdf",
@@ -73,7 +73,7 @@ def check_folder(file, onboarded):
     assert result.verification.joints_locked == (len(facts.legs) == 2)
     source = Facts(load_robot(file))
     urdf, mjcf = (load_robot(folder / name) for name in ("robot.urdf", "robot.xml"))
-    spec = read_spec(folder / "robot.toml")
+    spec = RobotSpec.load(folder / "robot.toml")
     assert not urdf.problems
     assert not mjcf.problems
     # The two files are consistent with each other and with the spec.
@@ -165,7 +165,7 @@ def test_onboard_applies_edited_spec(onboarded, tmp_path):
     angle = first.robot.spec.per_joint("default_pose")["FL_thigh_joint"]
     old = f"FL_thigh_joint = {angle:g}"
     edited = edit_spec(first, tmp_path, (old, "FL_thigh_joint = 0.85"))
-    expected = read_spec(edited)
+    expected = RobotSpec.load(edited)
     result = onboard(QUADRUPED, tmp_path / "robot", replace(options(), spec=edited))
     spec = result.robot.spec
     assert replace(spec, provenance={}) == replace(expected, provenance={})
@@ -210,7 +210,7 @@ def onboard_arm(tmp_path, *replacements, **changes):
 
 def test_onboard_arm_without_legs(tmp_path):
     result = onboard_arm(tmp_path)
-    spec = read_spec(result.folder / "robot.toml")
+    spec = RobotSpec.load(result.folder / "robot.toml")
     assert (spec.feet, spec.floating, spec.base_height_target) == ((), False, None)
     assert result.verification.standing is None
     assert dict(summarize(result))["standing"] == "not simulated: the robot has no legs"
