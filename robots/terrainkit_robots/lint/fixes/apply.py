@@ -335,7 +335,7 @@ def _diff(path: Path, before: bytes, after: bytes) -> Iterator[str]:
 
 
 def _lines(data: bytes) -> list[str]:
-    """Return the lines with their line ends. Other separators, such as U+2028, do not split lines."""
+    """Return the lines with their line ends. Other separators (U+2028) do not split lines."""
     try:
         text = data.decode()
     except UnicodeDecodeError:
