@@ -52,9 +52,7 @@ class TestSetAttribute:
         ("before", "after"),
         [
             pytest.param('<a x="1"/>', '<a x="2"/>', id="plain"),
-            pytest.param(
-                "<a  x =\n '1' ></a>", "<a  x =\n '2' ></a>", id="keeps quotes"
-            ),
+            pytest.param("<a  x =\n '1' ></a>", "<a  x =\n '2' ></a>", id="keeps quotes"),
             pytest.param('<a y="x" xx="x" x=""/>', '<a y="x" xx="x" x="2"/>', id="exact name"),
             pytest.param('<a y=">" x="/>"/>', '<a y=">" x="2"/>', id="brackets in quotes"),
             pytest.param('<a y="x=\'1\'" x="1"/>', '<a y="x=\'1\'" x="2"/>', id="quotes in quotes"),
@@ -270,9 +268,7 @@ class TestEncodings:
 
     @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
     def test_utf_16_is_rejected(self, encoding):
-        with pytest.raises(
-            EditError, match=r"not supported|not well-formed"
-        ):
+        with pytest.raises(EditError, match=r"not supported|not well-formed"):
             edited("<a/>".encode(encoding), set_to(0, "x", "1"))
 
     @pytest.mark.parametrize("name", ["shift_jis", "no-such-encoding"])
