@@ -87,24 +87,25 @@ def smoke_test(
         if spec is not None:
             raise ConfigError(f"spec: {name} has its own robot.toml; expected a robot file")
         task_spec = tasks.get_task(name)
-        return check_robot(Robot.load(task_spec.folder), task_spec.task)
-    from terrainkit_robots.onboarding.pipeline import Wishes, bring_in, keeps_out
+        return run_checks(Robot.load(task_spec.folder), task_spec.task)
+    from terrainkit_robots.onboarding.pipeline import OnboardOptions, is_blocking, onboard
 
     with tempfile.TemporaryDirectory() as folder:
-        options = Wishes(target=Path(folder) / "robot", spec=spec, pictures=False)
-        onboarded = bring_in(Path(name), replace(options, settings=settings or options.settings))
-        codes = [finding.code for finding in onboarded.report.findings if keeps_out(finding)]
+        options = OnboardOptions(spec=spec, render_pictures=False)
+        options = replace(options, settings=settings or options.settings)
+        onboarded = onboard(Path(name), Path(folder) / "robot", options)
+        codes = [finding.code for finding in onboarded.report.findings if is_blocking(finding)]
         measured = f"{len(codes)} errors: {', '.join(dict.fromkeys(codes))}" if codes else "yes"
         passed = onboarded.folder is not None
         check = Check("can be onboarded", passed, measured, "no errors that change the robot")
         if onboarded.folder is None:
             return SmokeTestResult(onboarded.report.facts.model.title, (check,))
-        result = check_robot(Robot.load(onboarded.folder), Task())
+        result = run_checks(Robot.load(onboarded.folder), Task())
     return replace(result, checks=(check, *result.checks))
 
 
 @single_torch_thread()
-def check_robot(robot: Robot, task: Task) -> SmokeTestResult:
+def run_checks(robot: Robot, task: Task) -> SmokeTestResult:
     """Check whether a robot can be trained for a task on a plane."""
     mini_batches = min(task.algorithm.num_mini_batches, NUM_ENVS)
     task = replace(

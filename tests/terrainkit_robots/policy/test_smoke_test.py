@@ -14,11 +14,11 @@ from terrainkit_robots.policy.smoke_test import (
     check_memory,
     check_observations,
     check_rewards,
-    check_robot,
     check_spawn_height,
     check_stand,
     check_training,
     random_state,
+    run_checks,
     smoke_test,
 )
 from terrainkit_robots.rl.config import Control, Env, Rewards, Task
@@ -49,7 +49,7 @@ def env(quadruped):
 
 
 def test_bundled_robot_can_be_trained(biped):
-    result = check_robot(biped, Task())
+    result = run_checks(biped, Task())
     assert result.passed, failed(result)
     assert result.robot == "biped"
     names = [check.name for check in result.checks]
@@ -66,7 +66,7 @@ def test_bundled_robot_can_be_trained(biped):
 
 
 def test_invalid_spec_fails_the_first_check(quadruped):
-    result = check_robot(replace_spec(quadruped, penalized_contacts=("tail",)), Task())
+    result = run_checks(replace_spec(quadruped, penalized_contacts=("tail",)), Task())
     (check,) = result.checks
     assert not result.passed
     assert check.name == "environment initializes"
@@ -215,7 +215,7 @@ def quick(monkeypatch):
     def check(robot, _):
         return SmokeTestResult(robot.spec.name, (check_spawn_height(still_env(robot)),))
 
-    monkeypatch.setattr(module, "check_robot", check)
+    monkeypatch.setattr(module, "run_checks", check)
 
 
 @pytest.mark.usefixtures("quick")

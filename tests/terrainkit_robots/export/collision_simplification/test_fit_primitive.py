@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from terrainkit_robots.export.collision_simplification.fitted_primitive import fitted_primitive
+from terrainkit_robots.export.collision_simplification.fit_primitive import fit_primitive
 from terrainkit_robots.transforms import rpy_to_matrix
 
-TURN = rpy_to_matrix(np.array([0.3, -0.4, 0.5]))
+ROTATION = rpy_to_matrix(np.array([0.3, -0.4, 0.5]))
 SOLIDS = {
     "sphere": (trimesh.creation.icosphere(subdivisions=4, radius=0.2), (0.2,)),
     "capsule": (trimesh.creation.capsule(radius=0.1, height=0.6, count=[64, 64]), (0.1, 0.3)),
@@ -15,12 +15,12 @@ SOLIDS = {
 
 
 @pytest.mark.parametrize("shape", SOLIDS)
-@pytest.mark.parametrize("turned", [False, True])
-def test_each_primitive_is_found_again(shape, turned):
+@pytest.mark.parametrize("rotated", [False, True])
+def test_fit_primitive_recovers_shape(shape, rotated):
     mesh, size = SOLIDS[shape]
-    turn = TURN if turned else np.eye(3)
-    points = np.asarray(mesh.vertices) @ turn.T + [1, 2, 3]
-    fitted = fitted_primitive(points, turn.T)
+    rotation = ROTATION if rotated else np.eye(3)
+    points = np.asarray(mesh.vertices) @ rotation.T + [1, 2, 3]
+    fitted = fit_primitive(points)
     assert fitted.shape == shape
     assert sorted(fitted.size) == pytest.approx(sorted(size), rel=0.02)
     assert fitted.volume == pytest.approx(mesh.volume, rel=0.03)
@@ -29,7 +29,7 @@ def test_each_primitive_is_found_again(shape, turned):
 
 
 def outside(fitted, points):
-    """Return by how much the farthest point sticks out [m]."""
+    """Rerotation the distance of the farthest point outside [m]."""
     local = (points - fitted.pose[:3, 3]) @ fitted.pose[:3, :3]
     size = fitted.size
     match fitted.shape:
@@ -46,7 +46,7 @@ def outside(fitted, points):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_all_points_are_inside(seed):
+def test_fit_primitive_encloses_points(seed):
     rng = np.random.default_rng(seed)
-    points = rng.uniform(-1, 1, (300, 3)) * rng.uniform(0.1, 1, 3) @ TURN
-    assert outside(fitted_primitive(points), points) < 1e-9
+    points = rng.uniform(-1, 1, (300, 3)) * rng.uniform(0.1, 1, 3) @ ROTATION
+    assert outside(fit_primitive(points), points) < 1e-9
