@@ -132,13 +132,14 @@ def smoke_of(name: str, *, settings: "Settings | None" = None, spec: Path | None
             raise ConfigError(f"a spec for {name}, which has one; wanted it for a robot's file")
         found = registry.find(name)
         return smoke(Robot.load(found.folder), found.task, Plane())
-    from terrainkit_robots.onboarding.pipeline import Wishes, bring_in, keeps_out
+    from terrainkit_robots.onboarding.pipeline import OnboardOptions, is_blocking, onboard
 
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "robot"
-        wishes = Wishes(target=target, spec=spec, pictures=False)
-        done = bring_in(Path(name), replace(wishes, settings=settings or wishes.settings))
-        errors = list(filter(keeps_out, done.report.findings))
+        options = OnboardOptions(spec=spec, render_pictures=False)
+        options = replace(options, settings=settings or options.settings)
+        done = onboard(Path(name), target, options)
+        errors = list(filter(is_blocking, done.report.findings))
         if done.folder is None:
             codes = ", ".join(dict.fromkeys(error.code for error in errors))
             return Smoke(
