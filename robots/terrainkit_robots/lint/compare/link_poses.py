@@ -20,8 +20,8 @@ from terrainkit_robots.lint.compare.urdf_poses import urdf_poses
 from terrainkit_robots.transforms import Matrix, invert_poses, pose_error
 
 MAX_DISTANCE, MAX_ANGLE = 1e-3, math.radians(0.1)
-"""Tolerances for equal poses [m], [rad]. Files contain lengths rounded to 0.1 mm, and angles with three
-decimals, or 1.57 for a quarter turn."""
+"""Tolerances for equal poses [m], [rad]. Files round lengths to 0.1 mm, and angles to three
+decimals."""
 
 _MAX_ROTATION, _MAX_TRANSLATION = math.pi, 0.2
 """Largest positions of joints in both directions [rad], [m], within the limits of the joint."""
