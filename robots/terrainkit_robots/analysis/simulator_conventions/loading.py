@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from terrainkit_robots.description.mjcf.document import MAX_ELEMENTS, harmless
+from terrainkit_robots.description.mjcf.document import MAX_ELEMENTS, is_allowed
 from terrainkit_robots.description.xml.document import RobotFileError, parse_xml, read_bytes
 from terrainkit_robots.mesh.sniff import open_regular
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -168,11 +168,11 @@ def _check_element(element: "etree._Element") -> None:
     tag = str(element.tag)
     if tag in ("include", "model"):
         return  # the file that it names is looked at as well
-    if tag in _COSTLY or not harmless(tag):
+    if tag in _COSTLY or not is_allowed(tag):
         raise NotTriedError(f"a file with <{tag}> is not given to MuJoCo")
     attributes = {str(name): str(value) for name, value in element.attrib.items()}
     for name, text in attributes.items():
-        if (not harmless(tag, name) and name != "user") or "octree" in name:
+        if (not is_allowed(tag, name) and name != "user") or "octree" in name:
             raise NotTriedError(f"<{tag} {name}=...> is not given to MuJoCo")
         allocated = tag == "size" and (name.startswith("nuser") or name == "nkey")
         if allocated and _number(text) > _LARGEST_SIZE:
