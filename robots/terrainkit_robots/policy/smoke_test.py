@@ -24,10 +24,11 @@ from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.events import sample_reset_state
 from terrainkit_robots.rl.rewards import Reward
 from terrainkit_robots.rl.runner import LeggedRunner, single_torch_thread
-from terrainkit_robots.rl.scene import Robot, lowest_point
+from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.task import Rewards, Task
 from terrainkit_robots.rl.terrain import Plane, Terrain
+from terrainkit_robots.simulation.geoms import lowest_point
 
 if TYPE_CHECKING:
     from terrainkit_robots.lint.settings import Settings
