@@ -38,10 +38,8 @@ class TaskSpec:
     name: str
     """Name of the task. For a folder it is the name in its robot.toml, which a registered task may
     have too: store the folder to find it again."""
-
     folder: Path
     """Folder with robot.toml."""
-
     task: Task
     """Configuration of training."""
 
