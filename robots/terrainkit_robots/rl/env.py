@@ -91,7 +91,9 @@ class LeggedEnv(VecEnv):
         default = {"P": spec_scale, "V": robot.velocity, "T": robot.effort}[kind]
         scales = default if scale is None else np.full(joints, scale)
         self.action_scale = scales.astype(np.float32)
-        self.action_offset = robot.default_pose * self.is_position_controlled
+        self.action_offset = np.where(
+            self.is_position_controlled, robot.default_pose, np.float32(0)
+        )
 
     @property
     def episode_length_buf(self) -> torch.Tensor:

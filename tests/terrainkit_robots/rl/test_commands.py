@@ -173,9 +173,9 @@ class TestExpandRange:
         assert expanded((-2.0, 3.0), 0.9, settings) == (-2.0, 3.0)
 
     def test_needs_room(self) -> None:
-        with pytest.raises(ConfigError, match="max_curriculum is 1, and lin_vel_x from -1 to 1"):
+        with pytest.raises(ConfigError, match="max_curriculum: got 1; expected more than lin_vel_x, -1 to 1"):
             Commands(curriculum=True)
-        with pytest.raises(ConfigError, match=r"max_curriculum is 0\.3, "):
+        with pytest.raises(ConfigError, match=r"max_curriculum: got 0\.3; "):
             Commands(curriculum=True, lin_vel_x=(-0.4, 0.8), max_curriculum=0.3)
         Commands(curriculum=True, lin_vel_x=(-1.0, 0.5))
         Commands(curriculum=True, lin_vel_x=(0.0, 1.5))

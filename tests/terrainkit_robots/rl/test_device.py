@@ -15,7 +15,7 @@ def test_the_cpu_is_always_there(name):
 
 @pytest.mark.parametrize("name", ["gpu", "abacus", "", "meta", "cuda:99", "cuda:-1"])
 def test_what_is_not_there_is_told_with_what_is(name):
-    with pytest.raises(ConfigError, match=f"device '{name}'; here there is: cpu"):
+    with pytest.raises(ConfigError, match=f"device: got '{name}'; expected one of: cpu"):
         resolve_device(name)
 
 
@@ -25,5 +25,5 @@ def test_gpus_are_counted(monkeypatch, name, there):
     if there:
         assert resolve_device(name) == name
     else:
-        with pytest.raises(ConfigError, match="'cuda:2'; here there is: cpu, cuda:0, cuda:1"):
+        with pytest.raises(ConfigError, match="'cuda:2'; expected one of: cpu, cuda:0, cuda:1"):
             resolve_device(name)

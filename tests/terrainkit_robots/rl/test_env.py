@@ -165,7 +165,7 @@ class TestEndings:
             assert torch.isfinite(observed[name]).all()
             assert torch.equal(observed[name][others], expected[name][others])
         assert torch.equal(rewards[others], expected_rewards[others])
-        np.testing.assert_array_equal(env.sim.qpos[others], twin.physics.qpos[others])
+        np.testing.assert_array_equal(env.sim.qpos[others], twin.sim.qpos[others])
 
     def test_tilt_counts_from_its_limit(self, quadruped, calm):
         env = LeggedEnv(calm(3, termination=Termination(tilt=0.5)), quadruped, Plane())
@@ -283,7 +283,7 @@ class TestSeeds:
         assert not torch.equal(
             first.get_observations()["policy"], second.get_observations()["policy"]
         )
-        assert not np.array_equal(first.differences.friction, second.differences.friction)
+        assert not np.array_equal(first.params.friction, second.params.friction)
 
     def test_neither_numpys_nor_torchs_own_numbers_are_drawn(self, quadruped, lively):
         np.random.seed(0)  # noqa: NPY002
@@ -355,12 +355,14 @@ class TestGoingOn:
         env.velocity_command.lin_vel_x = (-1.3, 1.3)
         other = LeggedEnv(lively(7), quadruped, map_ground)
         other.load_state_dict(env.state_dict())
-        assert (other.careers.levels == 2).all()
-        assert other.orders.lin_vel_x == (-1.3, 1.3)
+        assert (other.curriculum.levels == 2).all()
+        assert other.velocity_command.lin_vel_x == (-1.3, 1.3)
         assert (other.episode_length_buf == 0).all()
         still(other)
 
-    @pytest.mark.parametrize(("part", "name"), [("arrays", "push_in"), ("state", "push_vel")])
+    @pytest.mark.parametrize(
+        ("part", "name"), [("arrays", "steps_until_push"), ("state", "push_vel")]
+    )
     def test_a_state_of_another_version_is_refused(self, quadruped, lively, part, name):
         saved = LeggedEnv(lively(3), quadruped, Plane()).state_dict()
         del saved[part][name]
@@ -371,7 +373,7 @@ class TestGoingOn:
     def test_a_state_of_other_rewards_is_refused(self, quadruped, lively):
         saved = LeggedEnv(lively(3), quadruped, Plane()).state_dict()
         task = lively(3, rewards=Rewards(termination=-1.0))
-        with pytest.raises(ConfigError, match="rew_termination is of another robot or task"):
+        with pytest.raises(ConfigError, match="rew_termination belongs to another robot or task"):
             LeggedEnv(task, quadruped, Plane()).load_state_dict(saved)
 
     def test_a_state_of_another_robot_or_map_is_refused(self, quadruped, biped, lively, map_ground):

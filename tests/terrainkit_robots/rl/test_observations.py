@@ -322,7 +322,8 @@ class TestEnvironment:
         env.sim.qvel[:] = 0
         env.sim.qvel[:, 6 + 2] = 2.0
         env.actions[0] = 0.25
-        env.state = env._look(np.arange(3), fresh=True)
-        seen = env._observe()["policy"][0]
+        env.state = env._compute_state(np.arange(3), after_reset=True)
+        env._compute_observations()
+        seen = env.get_observations()["policy"][0]
         expected = [2, 0, 0.125, 0, 0, -1, *[0] * 15, 0, 0, 0.1, *[0] * 9, *[0.25] * 12]
         assert seen.tolist() == pytest.approx(expected, abs=1e-6)

@@ -275,7 +275,7 @@ class TestEvery:
     def test_tells_its_unit(self, name: str) -> None:
         """What is no pure number has its unit in brackets at the end of the docstring."""
         told = str(REWARDS[name].__doc__)
-        assert told.startswith("Return ")
+        assert told.startswith(("Reward ", "Penalize ", "Count "))
         assert told.endswith(".")
         pure = {
             "tracking_lin_vel",

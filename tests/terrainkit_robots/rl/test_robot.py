@@ -44,8 +44,8 @@ class TestRefused:
     @pytest.mark.parametrize(
         ("changes", "message"),
         [
-            ({"floating": False}, "cart has a fixed base"),
-            ({"feet": ()}, "cart has no feet"),
+            ({"floating": False}, "base of cart: got a fixed base"),
+            ({"feet": ()}, "feet of cart: got none"),
             ({"spawn_height": None}, "lacks spawn_height or base_height_target"),
             ({"base_height_target": None}, "lacks spawn_height or base_height_target"),
             ({"effort": {"wheel_axle": 3.0}}, "effort"),
@@ -58,9 +58,9 @@ class TestRefused:
         assert "\n" not in str(caught.value)
 
     def test_a_folder_without_a_spec(self, tmp_path):
-        with pytest.raises(ConfigError, match=r"has no robot\.toml; wanted a folder that terrain"):
+        with pytest.raises(ConfigError, match=r"got no robot\.toml; expected an onboarded"):
             Robot.load(tmp_path)
 
     def test_a_folder_that_is_not_there(self, tmp_path):
-        with pytest.raises(ConfigError, match=r"has no robot\.toml"):
+        with pytest.raises(ConfigError, match=r"got no robot\.toml"):
             Robot.load(tmp_path / "nowhere")

@@ -58,7 +58,7 @@ def differences(a: Any, b: Any, path: str = "") -> list[str]:
         assert len(a) == len(b)
         return [d for k in range(len(a)) for d in differences(a[k], b[k], f"{path}[{k}]")]
     same = np.array_equal(a, b, equal_nan=np.asarray(a).dtype.kind == "f")
-    return [] if same or path == ".curves.total_time" else [path]
+    return [] if same or path == ".logger.tot_time" else [path]
 
 
 def test_resuming_continues_exactly(make, tmp_path):
@@ -155,21 +155,21 @@ def test_nothing_is_printed(make, capfd):
 
 def test_whoever_watches_is_told(make, task, map_ground):
     seen: list[Any] = []
-    make(task, map_ground, watch=seen.append).learn(4)
+    make(task, map_ground, progress_callback=seen.append).learn(4)
     last = seen[-1]
     assert [progress.iteration for progress in seen] == [1, 2, 3, 4]
-    assert (last.last, last.remaining) == (4, 0)
+    assert (last.max_iterations, last.eta) == (4, 0)
     assert last.reward is not None
     assert 0 < last.episode_length <= 0.3
     assert set(last.levels) == {"stairs", "rough_slope"}
     assert "tracking_lin_vel" in last.rewards
     assert last.steps_per_second > 0
-    assert 0 < last.learning < 1
+    assert 0 < last.learning_fraction < 1
 
 
 def test_stopping_writes_a_checkpoint(make, tmp_path):
     calls = iter([False, False, True])
-    runner = make(stop=lambda: next(calls))
+    runner = make(should_stop=lambda: next(calls))
     runner.learn(100)
     assert runner.current_learning_iteration == 2
     assert [path.name for path in tmp_path.glob("*.pt")] == ["model_2.pt"]
@@ -184,7 +184,9 @@ def test_networks_that_diverge_are_told_at_once(make, task, tmp_path):
 
 def test_a_checkpoint_of_another_robot_is_told(make, biped, tmp_path):
     make().save()
-    with pytest.raises(ConfigError, match=r"is of another robot, quadruped, whose joints are: .*_"):
+    with pytest.raises(
+        ConfigError, match=r"belongs to another robot, quadruped: got the joints .*_"
+    ):
         make(robot=biped).load(tmp_path / "model_0.pt")
 
 
@@ -192,7 +194,7 @@ def test_a_checkpoint_of_another_task_is_told(make, task, tmp_path, map_ground):
     make().save()
     path = tmp_path / "model_0.pt"
     with pytest.raises(
-        ConfigError, match=r"is of another task: its observations policy are 45 numb"
+        ConfigError, match=r"belongs to another task: got 45 policy observations; exp"
     ):
         make(ground=map_ground).load(path)
     wide = replace(task, policy=replace(task.policy, actor_hidden_dims=(32,)))
@@ -220,7 +222,7 @@ def test_a_checkpoint_with_parts_that_are_no_state_is_told(make, tmp_path):
         {"optimizer_state_dict": {}},
         {"processes": []},
         {"processes": [{"env": 3}]},
-        {"curves": {}},
+        {"logger": {}},
     ):
         save_checkpoint(tmp_path / "changed.pt", read_checkpoint(path) | change)
         with pytest.raises(ConfigError, match=r"changed\.pt does not fit"):
@@ -303,6 +305,6 @@ def test_two_processes_learn_the_same_weights_from_robots_of_their_own(tmp_path)
     assert differences(first["qpos"], second["qpos"])
     assert (first["folder"], second["folder"]) == (str(tmp_path / "run"), "None")
     state = read_checkpoint(tmp_path / "run" / "model_2.pt")
-    assert [len(each["env"]["observed"]["policy"]) for each in state["processes"]] == [3, 2]
+    assert [len(each["env"]["observations"]["policy"]) for each in state["processes"]] == [3, 2]
     assert len(list((tmp_path / "run").glob("events.*"))) == 1
     assert open_run(tmp_path / "run").task.env.num_envs == 5

@@ -106,7 +106,7 @@ class TestPlaces:
             '<mujoco><worldbody><geom type="plane" size="5 5 0.1"/></worldbody>'
             "<sensor><clock/></sensor></mujoco>"
         )
-        ground = ModelTerrain(path, cell=0.1, reach=1.0)
+        ground = ModelTerrain(path, cell=0.1, half_size=1.0)
         scene = build_scene(cart, ground, calm())
         foot = scene.model.sensor("foot_position_sole of wheel")
         assert foot.adr[0] == scene.sensors["foot_position"].start
@@ -167,7 +167,7 @@ class TestCollisions:
             '<mujoco><worldbody><geom name="floor" type="plane" size="5 5 0.1" '
             f'contype="{affinity[0]}" conaffinity="{affinity[1]}"/></worldbody></mujoco>'
         )
-        scene = build_scene(cart, ModelTerrain(path, cell=0.1, reach=1.0), calm())
+        scene = build_scene(cart, ModelTerrain(path, cell=0.1, half_size=1.0), calm())
         qpos = scene.home.copy()
         qpos[2] = 0.15
         assert any("ground/floor" in pair for pair in contacts(scene.model, qpos))
@@ -215,11 +215,11 @@ class TestRefused:
         ("changes", "message"),
         [
             ({"base": "torso"}, "has no body 'torso', the base of its spec"),
-            ({"base": "front"}, "front is not free to move; wanted a freejoint"),
-            ({"feet": ("hoof",)}, "feet of cart has 'hoof'; the bodies of cart.xml are: "),
-            ({"termination_contacts": ("x",)}, "termination_contacts of cart has 'x'"),
-            ({"penalized_contacts": ("x",)}, "penalized_contacts of cart has 'x'"),
-            ({"mjcf": "gone.xml"}, "MuJoCo does not read .*gone.xml"),
+            ({"base": "front"}, "front has no freejoint of its own"),
+            ({"feet": ("hoof",)}, "feet of cart: got 'hoof'; the bodies of cart.xml are: "),
+            ({"termination_contacts": ("x",)}, "termination_contacts of cart: got 'x'"),
+            ({"penalized_contacts": ("x",)}, "penalized_contacts of cart: got 'x'"),
+            ({"mjcf": "gone.xml"}, "MuJoCo cannot read .*gone.xml"),
         ],
     )
     def test_a_spec_of_another_robot(self, cart, calm, changes, message):
@@ -254,6 +254,6 @@ class TestRefused:
 
     def test_a_file_that_is_no_robot(self, cart, calm, tmp_path):
         (tmp_path / "cart.xml").write_text("<mujoco><worldbody>")
-        with pytest.raises(ConfigError, match="MuJoCo does not read"):
+        with pytest.raises(ConfigError, match="MuJoCo cannot read"):
             build_scene(Robot.from_spec(cart.spec, tmp_path), Plane(), calm())
         assert not (tmp_path / "MUJOCO_LOG.TXT").exists()

@@ -42,7 +42,7 @@ def sensed(cart, moving):
             )  # fmt: skip
         model = spec.compile()
     found = []
-    for qpos, qvel in zip(moving.physics.qpos, moving.physics.qvel, strict=True):
+    for qpos, qvel in zip(moving.sim.qpos, moving.sim.qvel, strict=True):
         data = mujoco.MjData(model)
         data.qpos[:], data.qvel[:] = qpos, qvel
         mujoco.mj_forward(model, data)
@@ -207,7 +207,7 @@ class TestCopies:
         first = LeggedEnv(lively(4), quadruped, Plane()).state
         before = first.base_pos.copy()
         other = LeggedEnv(lively(2, init_state=InitState(position=3.0)), quadruped, Plane()).state
-        first.put(np.array([1, 3]), other)
+        first.update(np.array([1, 3]), other)
         np.testing.assert_array_equal(first.base_pos[[1, 3]], other.base_pos)
         np.testing.assert_array_equal(first.base_pos[[0, 2]], before[[0, 2]])
 

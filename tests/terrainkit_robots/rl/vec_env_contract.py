@@ -173,9 +173,9 @@ class VecEnvContract:
         self, env: VecEnv, more_envs: int, more_actions: int
     ) -> None:
         wrong = torch.zeros(env.num_envs + more_envs, env.num_actions + more_actions)
-        with pytest.raises(ConfigError, match="actions have shape"):
+        with pytest.raises(ConfigError, match="shape of the actions"):
             env.step(wrong)
 
     def test_a_single_row_of_actions_is_not_spread(self, env: VecEnv) -> None:
-        with pytest.raises(ConfigError, match="actions have shape"):
+        with pytest.raises(ConfigError, match="shape of the actions"):
             env.step(torch.zeros(env.num_actions))

@@ -189,7 +189,7 @@ def test_a_robot_that_has_changed_begins_a_new_run_elsewhere(task, tmp_path, nam
     shutil.copytree(tasks.get_task("quadruped").folder, mine)
     train(mine, "plane", lasting(task, 1), folder=run)
     (mine / name).write_text((mine / name).read_text() + "\n")
-    with pytest.raises(ConfigError, match=rf"mine has another {name} than .*run was trained with"):
+    with pytest.raises(ConfigError, match=rf"{name} of .*mine changed since .*run was trained"):
         train(mine, "plane", task, resume=open_run(run))
     assert list(checkpoints(run)) == [1]
     other = tmp_path / "other"
@@ -254,15 +254,15 @@ def test_robots_stay_on_their_levels_of_a_map_whatever_the_task(task, tmp_path, 
     train("quadruped", path, task, folder=tmp_path / "run")
     run = open_run(tmp_path / "run")
     before = read_checkpoint(run.checkpoint)
-    careers = before["processes"][0]["env"]["careers"]
-    top = len(careers["success"]) - 1
-    careers["levels"][:] = top
+    curriculum = before["processes"][0]["env"]["curriculum"]
+    top = len(curriculum["success"]) - 1
+    curriculum["levels"][:] = top
     save_checkpoint(run.checkpoint, before)
     rewarded = replace(task, rewards=replace(task.rewards, base_height=-1.0))
     for ground, levels in ((path, {top}), (copied, {top}), (other, {0})):
         folder = tmp_path / f"from_{ground.stem}"
         train("quadruped", ground, rewarded, resume=run, folder=folder)
-        after = read_checkpoint(open_run(folder).checkpoint)["processes"][0]["env"]["careers"]
+        after = read_checkpoint(open_run(folder).checkpoint)["processes"][0]["env"]["curriculum"]
         assert set(after["levels"].tolist()) == levels
 
 
@@ -302,13 +302,15 @@ def test_a_policy_alone_is_gone_on_with_in_a_new_run(task, tmp_path):
 
 def test_a_run_that_is_done_says_so(task, tmp_path):
     train("quadruped", "plane", task, folder=tmp_path / "run")
-    with pytest.raises(ConfigError, match=r"4 iterations are done; runner\.max_iterations is 4"):
+    with pytest.raises(
+        ConfigError, match=r"runner\.max_iterations: got 4; expected more than the 4"
+    ):
         train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
 
 
 def test_a_run_of_another_robot_is_told(task, tmp_path):
     train("quadruped", "plane", lasting(task, 1), folder=tmp_path / "run")
-    with pytest.raises(ConfigError, match="is of another robot, quadruped"):
+    with pytest.raises(ConfigError, match="belongs to another robot, quadruped"):
         train("biped", "plane", task, resume=open_run(tmp_path / "run"), folder=tmp_path / "b")
     assert not (tmp_path / "b").exists()
 
@@ -377,7 +379,7 @@ def test_too_many_environments_are_refused_before_anything_is_made(task, tmp_pat
 def test_wandb_has_to_be_installed(task, tmp_path, monkeypatch):
     monkeypatch.setattr("terrainkit_robots.rl.train.find_spec", lambda _: None)
     task = replace(task, runner=replace(task.runner, logger="wandb"))
-    with pytest.raises(ConfigError, match="wandb, which is not installed: pip install wandb"):
+    with pytest.raises(ConfigError, match="wandb is not installed: pip install wandb"):
         train("quadruped", "plane", task, folder=tmp_path / "run")
 
 
@@ -385,14 +387,14 @@ def test_wandb_has_to_be_installed(task, tmp_path, monkeypatch):
 def test_a_device_that_is_not_there_is_told(task, tmp_path, device):
     if torch.cuda.is_available():
         pytest.skip("there is one")
-    with pytest.raises(ConfigError, match=f"device '{device}'; here there is: cpu"):
+    with pytest.raises(ConfigError, match=f"device: got '{device}'; expected one of: cpu"):
         train("quadruped", "plane", task, folder=tmp_path / "run", device=device)
 
 
 def test_processes_share_the_environments(task, tmp_path, monkeypatch):
     monkeypatch.setenv("WORLD_SIZE", "9")
     with pytest.raises(
-        ConfigError, match=r"env\.num_envs is 4; wanted one for each of 9 processes"
+        ConfigError, match=r"env\.num_envs: got 4; expected one for each of 9 processes"
     ):
         train("quadruped", "plane", task, folder=tmp_path / "run")
 

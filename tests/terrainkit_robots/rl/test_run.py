@@ -71,7 +71,7 @@ def test_a_robot_that_is_gone_is_told(tmp_path, task):
     shutil.copytree(tasks.get_task("quadruped").folder, mine)
     folder = create_run(tmp_path / "run", task, mine, "plane").folder
     (mine / "quadruped.xml").unlink()
-    with pytest.raises(ConfigError, match=r"is gone: there is no file .*quadruped\.xml"):
+    with pytest.raises(ConfigError, match=r"is missing: there is no file .*quadruped\.xml"):
         open_run(folder)
 
 
@@ -131,13 +131,15 @@ def test_checkpoints_are_in_the_order_of_their_iterations(run):
     assert open_run(run).checkpoint == run / "model_100.pt"
     assert open_run(run, 9).checkpoint == run / checkpoint_name(9)
     assert open_run(run / "model_10.pt").checkpoint == run / "model_10.pt"
-    with pytest.raises(ConfigError, match="has no checkpoint 11; there are: 9, 10, 100"):
+    with pytest.raises(ConfigError, match="got checkpoint 11; expected one of: 9, 10, 100"):
         open_run(run, 11)
 
 
 def test_a_run_that_is_there_is_never_overwritten(run, task):
     before = sorted((path.name, path.read_bytes()) for path in run.iterdir())
-    with pytest.raises(ExportError, match="exists; another folder would do, or --resume"):
+    with pytest.raises(
+        ExportError, match="exists; choose another folder, or continue with --resume"
+    ):
         create_run(run, task, "quadruped", "plane")
     assert sorted((path.name, path.read_bytes()) for path in run.iterdir()) == before
 
@@ -175,7 +177,7 @@ def test_a_shipped_policy_is_found_by_the_name_of_its_robot(tmp_path, task, monk
     monkeypatch.setattr(tasks, "_registered", dict(tasks._registered))
     mine = tmp_path / "mine"
     shutil.copytree(tasks.get_task("quadruped").folder, mine)
-    shipped = tasks.register_task("rover_of_this_test", mine).shipped
+    shipped = tasks.register_task("rover_of_this_test", mine).trained_run
     with pytest.raises(ConfigError, match="no policy is shipped with rover_of_this_test"):
         open_run("rover_of_this_test")
     create_run(shipped, task, "rover_of_this_test", "plane")
@@ -189,27 +191,29 @@ def test_a_run_goes_before_a_robot_of_its_name_and_any_other_folder_does_not(
 ):
     monkeypatch.chdir(tmp_path)
     Path("quadruped").mkdir()
-    assert open_run("quadruped").folder == tasks.get_task("quadruped").shipped
+    assert open_run("quadruped").folder == tasks.get_task("quadruped").trained_run
     create_run(Path("quadruped"), task, "biped", "plane")
     assert open_run("quadruped").robot_name == "biped"
 
 
 def test_what_is_no_run_is_told(tmp_path):
-    with pytest.raises(ConfigError, match=r"no run nothing: neither a folder .* biped, quadruped"):
+    with pytest.raises(
+        ConfigError, match=r"run: got nothing; expected a folder .* biped, quadruped"
+    ):
         open_run("nothing")
-    with pytest.raises(ConfigError, match=r"has no run\.toml; wanted a folder that terrainkit tr"):
+    with pytest.raises(ConfigError, match=r"has no run\.toml; terrainkit train writes"):
         open_run(tmp_path)
-    with pytest.raises(ConfigError, match=r"cannot read|no run"):
+    with pytest.raises(ConfigError, match=r"cannot read|run: got"):
         open_run("a\0b")
 
 
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("format_version = 1", "format_version = 2", "format_version is 2; wanted 1"),
-        ('robot = "quadruped"', "robot = 3", "robot is 3; wanted a text"),
+        ("format_version = 1", "format_version = 2", "format_version: got 2; expected 1"),
+        ('robot = "quadruped"', "robot = 3", "robot: got 3; expected a string"),
         ('robot = "quadruped"', 'robot = "gone"', "folder 'gone'"),
-        ('terrain = "plane"', "", "terrain is 'missing'; wanted a text"),
+        ('terrain = "plane"', "", "terrain: got 'nothing'; expected a string"),
         ("seed", "seed =", "not a TOML file"),
     ],
 )

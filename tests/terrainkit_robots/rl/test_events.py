@@ -298,7 +298,7 @@ class TestEnvironment:
 
     def test_pushes_may_come_at_any_time_of_an_episode(self) -> None:
         pushes = Pushes(DomainRand(push_interval_s=0.1), 2000, 0.02)
-        pushes.begin(np.random.default_rng(0), np.arange(2000))
+        pushes.reset(np.random.default_rng(0), np.arange(2000))
         times, counts = np.unique(pushes.steps_until_push, return_counts=True)
         assert times.tolist() == [1, 2, 3, 4, 5]
         np.testing.assert_allclose(counts, 400, rtol=0.15)
@@ -306,10 +306,10 @@ class TestEnvironment:
     def test_a_new_episode_has_a_time_of_its_own(self) -> None:
         pushes = Pushes(DomainRand(push_interval_s=15), 6, 0.02)
         rng = np.random.default_rng(0)
-        pushes.begin(rng, np.arange(6))
+        pushes.reset(rng, np.arange(6))
         before = pushes.steps_until_push.copy()
         pushes.velocity[:] = 1
-        pushes.begin(rng, np.array([1, 4]))
+        pushes.reset(rng, np.array([1, 4]))
         assert np.flatnonzero(pushes.steps_until_push != before).tolist() == [1, 4]
         assert pushes.velocity[:, 0].tolist() == [1, 0, 1, 1, 0, 1]
 

@@ -4,10 +4,11 @@ import pytest
 
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError, TerrainkitError
+from terrainkit.surface import HeightfieldSurface
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import InitState
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.terrain import HeightGrid, MapTerrain, ModelTerrain, Plane, load_terrain
+from terrainkit_robots.rl.terrain import MapTerrain, ModelTerrain, Plane, load_terrain
 
 EXACT = 1e-3
 
@@ -48,38 +49,47 @@ def scanned(tmp_path_factory):
           </worldbody>
         </mujoco>
     """)
-    return ModelTerrain(path, cell=0.02, reach=1.5)
+    return ModelTerrain(path, cell=0.02, half_size=1.5)
 
 
 class TestHeightGrid:
     def test_by_hand_on_both_triangles(self):
         # The diagonal goes from (0, 0) to (1, 1): the far corner at (0, 1) is on the upper side.
-        grid = HeightGrid(
-            heights=np.array([[0.0, 1.0], [2.0, 4.0]], np.float32), first=(10.0, 20.0), cell=0.5
+        grid = HeightfieldSurface(
+            heights=np.array([[0.0, 1.0], [2.0, 4.0]], np.float32),
+            first_sample=(10.0, 20.0),
+            cell=0.5,
         )
         x = np.array([10.0, 10.5, 10.0, 10.5, 10.25, 10.375, 10.125], np.float32)
         y = np.array([20.0, 20.0, 20.5, 20.5, 20.25, 20.125, 20.375], np.float32)
         # (0.75, 0.25): 0 + 0.75 * 2 + 0.25 * (4 - 2); (0.25, 0.75): 0 + 0.75 * 1 + 0.25 * (4 - 1)
-        np.testing.assert_allclose(grid.at(x, y), [0, 2, 1, 4, 2, 2.0, 1.5], atol=1e-6)
+        np.testing.assert_allclose(grid.height(x, y), [0, 2, 1, 4, 2, 2.0, 1.5], atol=1e-6)
 
     def test_goes_on_level_beyond_its_samples(self):
-        grid = HeightGrid(
-            heights=np.array([[0.0, 1.0], [2.0, 4.0]], np.float32), first=(0.0, 0.0), cell=1.0
+        grid = HeightfieldSurface(
+            heights=np.array([[0.0, 1.0], [2.0, 4.0]], np.float32),
+            first_sample=(0.0, 0.0),
+            cell=1.0,
         )
         x, y = np.float32([-5, 9, -5, 0.5]), np.float32([-5, 9, 9, 1e6])
-        np.testing.assert_allclose(grid.at(x, y), [0, 4, 1, 2.5])
+        np.testing.assert_allclose(grid.height(x, y), [0, 4, 1, 2.5])
 
     def test_numbers_stay_single(self):
         # Twice the width would cost twice the time.
-        grid = HeightGrid(heights=np.zeros((4, 5), np.float32), first=(0.0, 0.0), cell=1.0)
-        assert grid.at(np.ones((2, 3), np.float32), np.ones((2, 3), np.float32)).dtype == np.float32
+        grid = HeightfieldSurface(
+            heights=np.zeros((4, 5), np.float32), first_sample=(0.0, 0.0), cell=1.0
+        )
+        assert (
+            grid.height(np.ones((2, 3), np.float32), np.ones((2, 3), np.float32)).dtype
+            == np.float32
+        )
 
 
 class TestPlane:
     def test_is_level_and_endless(self):
         xy = np.float32([[0, 0], [1e4, -1e4]])
         assert (Plane().height(xy[:, 0], xy[:, 1]) == 0).all()
-        assert Plane().level
+        assert Plane().is_flat
         np.testing.assert_allclose(rays(compiled(Plane()), xy[:1]), [0], atol=1e-9)
 
     def test_has_one_place_to_start(self):
@@ -189,7 +199,7 @@ class TestScannedGround:
         path.write_text(
             '<mujoco><worldbody><geom type="box" size=".5 .5 .1"/></worldbody></mujoco>'
         )
-        ground = ModelTerrain(path, cell=0.1, reach=1.0)
+        ground = ModelTerrain(path, cell=0.1, half_size=1.0)
         found = ground.height(np.float32([0, 0.9]), np.float32([0, 0]))
         np.testing.assert_allclose(found, [0.1, 0.1 - 10], atol=1e-6)
 
@@ -202,7 +212,7 @@ class TestScannedGround:
             f'<geom type="plane" size="0 0 1" euler="{turn}" pos="{x} 0 0"/>'
             "</worldbody></mujoco>"
         )
-        ground = ModelTerrain(path, cell=1.0, reach=12.0)
+        ground = ModelTerrain(path, cell=1.0, half_size=12.0)
         corners = np.float32([[-12, -12], [-12, 12], [12, -12], [12, 12]])
         found = ground.height(corners[:, 0], corners[:, 1])
         np.testing.assert_allclose(found, rays(compiled(ground), corners), atol=1e-4)
@@ -210,19 +220,19 @@ class TestScannedGround:
     @pytest.mark.parametrize(
         ("text", "message"),
         [
-            ("<mujoco/>", "has no ground under the origin"),
-            ("<mujoco", "MuJoCo does not read"),
-            ("<robot name='x'/>", "MuJoCo does not read|has no ground under the origin"),
-            ("", "MuJoCo does not read"),
+            ("<mujoco/>", "no ground at the origin"),
+            ("<mujoco", "MuJoCo cannot read"),
+            ("<robot name='x'/>", "MuJoCo cannot read|no ground at the origin"),
+            ("", "MuJoCo cannot read"),
             (
                 '<mujoco><worldbody><geom type="plane" size="1 1 1"/><body pos="0 0 1"><freejoint/>'
                 '<geom size="0.1"/></body></worldbody></mujoco>',
-                "has 6 degrees of freedom; wanted ground that stays",
+                "got 6 degrees of freedom; expected a static model",
             ),
             (
                 '<mujoco><worldbody><geom type="box" pos="3 0 0" size="1 1 1"/></worldbody>'
                 "</mujoco>",
-                "has no ground under the origin",
+                "no ground at the origin",
             ),
         ],
     )
@@ -230,7 +240,7 @@ class TestScannedGround:
         path = tmp_path / "ground.xml"
         path.write_text(text)
         with pytest.raises(ConfigError, match=message) as caught:
-            ModelTerrain(path, cell=0.1, reach=0.5)
+            ModelTerrain(path, cell=0.1, half_size=0.5)
         assert "\n" not in str(caught.value)
         assert not (tmp_path / "MUJOCO_LOG.TXT").exists()
 
@@ -242,7 +252,7 @@ class TestScannedGround:
             '<geom type="plane" size="5 5 0.1" pos="0 0 -1"/>'
             '<geom type="box" size="0.5 0.5 3"/></worldbody></mujoco>'
         )
-        ground = ModelTerrain(path, cell=0.1, reach=0.5)
+        ground = ModelTerrain(path, cell=0.1, half_size=0.5)
         np.testing.assert_allclose(ground.env_origins[0, 0], [0, 0, 3], atol=1e-6)
 
     def test_what_is_only_seen_is_no_ground(self, tmp_path):
@@ -252,7 +262,7 @@ class TestScannedGround:
             '<geom type="box" size="3 3 0.1" pos="0 0 0.5" contype="0" conaffinity="0"/>'
             "</worldbody></mujoco>"
         )
-        ground = ModelTerrain(path, cell=0.1, reach=0.5)
+        ground = ModelTerrain(path, cell=0.1, half_size=0.5)
         np.testing.assert_allclose(ground.env_origins[0, 0], [0, 0, 0], atol=1e-6)
 
     def test_what_is_only_touched_is_ground(self, tmp_path):
@@ -262,7 +272,7 @@ class TestScannedGround:
             '<mujoco><worldbody><geom type="plane" size="5 5 0.1" pos="0 0 -1"/>'
             '<geom type="box" size="3 3 0.1" rgba="1 1 1 0"/></worldbody></mujoco>'
         )
-        ground = ModelTerrain(path, cell=0.1, reach=0.5)
+        ground = ModelTerrain(path, cell=0.1, half_size=0.5)
         np.testing.assert_allclose(ground.env_origins[0, 0], [0, 0, 0.1], atol=1e-6)
 
 
@@ -293,9 +303,9 @@ class TestReadGround:
     @pytest.mark.parametrize(
         ("name", "message"),
         [
-            ("moon", "terrain 'moon'; wanted plane, a map"),
-            ("", "terrain ''; wanted plane, a map"),
-            ("map.obj", "wanted plane, a map"),
+            ("moon", "terrain: got 'moon'; expected plane, a map"),
+            ("", "terrain: got ''; expected plane, a map"),
+            ("map.obj", "expected plane, a map"),
             ("none.npz", "none.npz"),
             ("none.toml", "none.toml"),
             ("none.xml", "there is no file"),
@@ -335,7 +345,7 @@ class TestHeightScan:
         mujoco.mju_mulQuat(quat, turn, pitch)
         env.sim.qpos[0, :2] += (0.83, 0.41)
         env.sim.qpos[0, 3:7] = quat
-        state = env._look(np.arange(1))
+        state = env._compute_state(np.arange(1))
         assert state.height_scan.shape == (1, 187)
         np.testing.assert_allclose(state.height_scan[0], self.cast(env, yaw), atol=EXACT)
         assert np.ptp(state.height_scan) > 0.05
@@ -343,7 +353,7 @@ class TestHeightScan:
     def test_base_height_is_that_above_the_ground_below(self, quadruped, calm, mixed_map):
         env = LeggedEnv(calm(6), quadruped, MapTerrain(mixed_map))
         env.sim.qpos[:, :2] += np.random.default_rng(0).uniform(-1, 1, (6, 2))
-        state = env._look(np.arange(6))
+        state = env._compute_state(np.arange(6))
         under = rays(
             compiled(env.terrain), env.sim.qpos[:, :2], np.array([1, 0, 0, 0, 0, 0], np.uint8)
         )

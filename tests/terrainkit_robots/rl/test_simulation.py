@@ -151,7 +151,7 @@ class TestRandomization:
         )
 
     def test_is_drawn_within_its_ranges(self, varied):
-        found = varied.differences
+        found = varied.params
         assert found.friction.shape == found.added_mass.shape == found.strength.shape == (5, 1)
         assert found.stiffness.shape == found.damping.shape == found.com_shift.shape == (5, 3)
         for values, low, high in (
@@ -167,7 +167,7 @@ class TestRandomization:
             assert np.ptp(values) > 0.1 * (high - low)
 
     def test_reaches_every_simulation(self, varied):
-        scene, found = varied.scene, varied.differences
+        scene, found = varied.scene, varied.params
         nominal, base, hinge, wheel = scene.model, scene.base, 1, 0
         for k in range(5):
             model = varied.sim.batch.get_model(k)
@@ -192,7 +192,7 @@ class TestRandomization:
     def test_what_follows_from_it_is_computed_anew(self, varied):
         base = varied.scene.base
         nominal = varied.scene.model.body_subtreemass[base]
-        for k, (added,) in enumerate(varied.differences.added_mass):
+        for k, (added,) in enumerate(varied.params.added_mass):
             model = varied.sim.batch.get_model(k)
             assert model.body_subtreemass[base] == pytest.approx(nominal + added)
 
@@ -245,4 +245,4 @@ class TestRandomization:
 
     def test_every_difference_has_a_row_for_each_robot(self, varied):
         for field in fields(RandomizedParams):
-            assert len(getattr(varied.differences, field.name)) == 5
+            assert len(getattr(varied.params, field.name)) == 5
