@@ -14,7 +14,7 @@ import numpy as np
 
 from terrainkit_robots.description.model import Geometry, Link, MeshFile, RobotModel
 from terrainkit_robots.export.collision_simplification.convex_parts import convex_parts
-from terrainkit_robots.export.collision_simplification.fitted_primitive import fitted_primitive
+from terrainkit_robots.export.collision_simplification.fit_primitive import fit_primitive
 from terrainkit_robots.export.mesh_export.decimate import decimate
 from terrainkit_robots.export.mesh_export.file_names import FileNames
 from terrainkit_robots.export.mesh_export.mesh_bytes import has_no_volume, scaled
@@ -26,7 +26,6 @@ from terrainkit_robots.mesh.surface import (
     signed_volume,
     welded,
 )
-from terrainkit_robots.transforms import Matrix
 
 How = Literal["keep", "hull", "coacd", "primitives"]
 
@@ -41,9 +40,6 @@ _FAR_FROM_CONVEX = 2.0
 
 _MOST_WELDED = 500_000
 """Of more faces the corners are not compared; the mesh is made coarser first."""
-
-_MOST_NORMALS = 40
-"""Sides of a hull, the largest first, along which a box is tried."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,7 +182,7 @@ class _Work:
 
     def _primitive(self, mesh: MeshFile) -> tuple[tuple[Geometry, ...], str, float]:
         hull = self._hull(mesh, None)
-        fitted = fitted_primitive(hull.points.astype(np.float64), _largest_sides(hull))
+        fitted = fit_primitive(hull.points.astype(np.float64))
         shape = Geometry(
             source=mesh.source, shape=fitted.shape, size=fitted.size, origin=fitted.pose
         )
@@ -251,20 +247,3 @@ def _named_once(shapes: Iterable[Geometry]) -> Iterable[Geometry]:
         yield (
             shape if count == 1 or not shape.name else replace(shape, name=f"{shape.name}_{count}")
         )
-
-
-def _largest_sides(hull: Surface) -> Matrix:
-    """Return the normals of the largest sides of a hull, shape (n, 3); each direction once."""
-    corners = hull.points[hull.faces].astype(np.float64)
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = np.linalg.norm(normals, axis=1)
-    whole = areas > 1e-12 * areas.max()
-    directions = normals[whole] / areas[whole, None]
-    # a side and the one across from it are one direction
-    first = np.abs(directions).argmax(axis=1)
-    directions *= np.sign(np.take_along_axis(directions, first[:, None], axis=1))
-    cells, which = np.unique(np.round(directions, 2), axis=0, return_inverse=True)
-    sizes = np.bincount(which.ravel(), areas[whole], minlength=len(cells))
-    largest = np.argsort(-sizes, kind="stable")[:_MOST_NORMALS]
-    chosen = cells[largest]
-    return np.asarray(chosen / np.linalg.norm(chosen, axis=1, keepdims=True))

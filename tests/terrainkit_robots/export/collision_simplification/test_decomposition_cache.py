@@ -1,3 +1,4 @@
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -100,16 +101,10 @@ def test_where_nothing_can_be_written_nothing_is_kept(tmp_path):
     assert cache.get("a") is None
 
 
-class TestFolder:
-    @pytest.fixture(autouse=True)
-    def linux(self, monkeypatch):
-        monkeypatch.setattr(module.sys, "platform", "linux")
-
-    def test_is_where_the_system_says(self, monkeypatch, tmp_path):
-        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-        assert cache_folder() == tmp_path / "terrainkit" / "coacd"
-
-    @pytest.mark.parametrize("named", ["", "not/absolute"])
-    def test_is_in_the_home_else(self, monkeypatch, named):
-        monkeypatch.setenv("XDG_CACHE_HOME", named)
-        assert cache_folder() == Path.home() / ".cache" / "terrainkit" / "coacd"
+@pytest.mark.skipif(sys.platform != "linux", reason="XDG folders")
+@pytest.mark.parametrize("variable", ["", "not/absolute"])
+def test_cache_folder_follows_xdg(monkeypatch, tmp_path, variable):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert cache_folder() == tmp_path / "terrainkit" / "coacd"
+    monkeypatch.setenv("XDG_CACHE_HOME", variable)
+    assert cache_folder() == Path.home() / ".cache" / "terrainkit" / "coacd"
