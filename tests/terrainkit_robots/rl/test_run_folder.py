@@ -175,7 +175,7 @@ def test_a_shipped_policy_is_found_by_the_name_of_its_robot(tmp_path, task, monk
     monkeypatch.setattr(tasks, "_registered", dict(tasks._registered))
     mine = tmp_path / "mine"
     shutil.copytree(tasks.get_task("quadruped").folder, mine)
-    shipped = tasks.register_task("rover_of_this_test", mine).shipped
+    shipped = tasks.register_task("rover_of_this_test", mine).trained_run
     with pytest.raises(ConfigError, match="no policy is shipped with rover_of_this_test"):
         open_run("rover_of_this_test")
     create_run(shipped, task, "rover_of_this_test", "plane")
@@ -189,7 +189,7 @@ def test_a_run_goes_before_a_robot_of_its_name_and_any_other_folder_does_not(
 ):
     monkeypatch.chdir(tmp_path)
     Path("quadruped").mkdir()
-    assert open_run("quadruped").folder == tasks.get_task("quadruped").shipped
+    assert open_run("quadruped").folder == tasks.get_task("quadruped").trained_run
     create_run(Path("quadruped"), task, "biped", "plane")
     assert open_run("quadruped").robot_name == "biped"
 
