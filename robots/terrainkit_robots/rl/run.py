@@ -129,10 +129,10 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
         },
         "robot_sha256": _robot_digests(robot_folder),
     }
-    import tomli_w
+    import tomlkit
 
     files = {
-        RUN_FILE: tomli_w.dumps(about),
+        RUN_FILE: tomlkit.dumps(about),
         TASK_FILE: task.to_toml(),
         SPEC_FILE: read_text(robot_folder / SPEC_FILE),
     }

@@ -48,8 +48,6 @@ class TaskSpec:
         """Folder of the run with the bundled trained policy; it may not exist."""
         return self.folder / TRAINED_FOLDER / self.name
 
-    shipped = trained_run
-
 
 def register_task(name: str, folder: str | Path, task: Task | None = None) -> TaskSpec:
     """Register a task; a second call replaces the configuration.
