@@ -62,6 +62,52 @@ def quat_to_matrix(quat: Matrix) -> Matrix:
     )
 
 
+def matrix_to_quat(rotation: Matrix) -> Matrix:
+    """Return the quaternion of a rotation.
+
+    The largest element is computed first, as in MuJoCo, so that no division loses accuracy.
+
+    Args:
+        rotation: Rotation matrix, shape (3, 3).
+
+    Returns:
+        Unit quaternion (w, x, y, z) with w >= 0, shape (4,).
+    """
+    trace = rotation.trace()
+    # Products of the quaternion with its largest element, times 4.
+    products = np.empty((4, 4))
+    products[0] = [
+        1 + trace,
+        rotation[2, 1] - rotation[1, 2],
+        rotation[0, 2] - rotation[2, 0],
+        rotation[1, 0] - rotation[0, 1],
+    ]
+    products[1:, 0] = products[0, 1:]
+    products[1:, 1:] = rotation + rotation.T + (1 - trace) * np.eye(3)
+    quat = products[int(products.diagonal().argmax())]
+    quat = quat / np.linalg.norm(quat)
+    return quat if quat[0] >= 0 else -quat
+
+
+def rpy_to_matrix(rpy: Matrix) -> Matrix:
+    """Return the rotation matrix of roll, pitch and yaw, as in URDF.
+
+    Args:
+        rpy: Roll, pitch and yaw [rad], shape (3,).
+
+    Returns:
+        Rz(yaw) Ry(pitch) Rx(roll), shape (3, 3).
+    """
+    (sr, sp, sy), (cr, cp, cy) = np.sin(rpy), np.cos(rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
 def matrix_to_rpy(rotation: Matrix) -> Matrix:
     """Return the roll, pitch and yaw of a rotation, as in URDF.
 
