@@ -19,8 +19,8 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Geometry, Inertial, Link, RobotModel
 from terrainkit_robots.description.xml.document import RobotFileError
-from terrainkit_robots.export.actuator import Drive
-from terrainkit_robots.export.canonical import normal_form
+from terrainkit_robots.export.actuator import ActuatorConfig
+from terrainkit_robots.export.canonical import to_canonical
 from terrainkit_robots.export.mjcf import Extras, floor_text, mjcf_text
 from terrainkit_robots.mesh.mesh_cache import MeshError
 from terrainkit_robots.mesh.surface import binary_stl
@@ -131,18 +131,18 @@ def make_sim_model(facts: Facts) -> SimModel:
             f"bodies: got {len(facts.bodies)}; expected at most {_MAX_BODIES} to simulate it"
         )
     try:
-        model, assets = _keep_collision_shapes(normal_form(facts).model, facts)
+        model, assets = _keep_collision_shapes(to_canonical(facts).model, facts)
     except RobotFileError as error:
         raise CannotCheckError(str(error)) from None
-    drives = {motor.joint: Drive(stiffness=0, damping=0) for motor in model.actuators}
+    actuators = {motor.joint: ActuatorConfig(stiffness=0, damping=0) for motor in model.actuators}
     for joint in model.joints:
-        if joint.name in drives:
+        if joint.name in actuators:
             effort = joint.limit.effort if joint.limit else None
-            drives[joint.name] = Drive(
+            actuators[joint.name] = ActuatorConfig(
                 stiffness=0, damping=0, effort=effort, armature=joint.armature
             )
     extras = Extras(
-        drives=drives,
+        actuators=actuators,
         excluded=model.excluded,
         home=facts.positions,
         height=facts.stance.height if facts.stance else 1.0,
@@ -213,7 +213,7 @@ def _keep_collision_shapes(
             try:
                 hull = facts.meshes.hull(path, _MAX_HULL_VERTICES)
             except MeshError as error:
-                if facts.meshes.readable(shape.mesh) and facts.meshes.is_flat(shape.mesh):
+                if facts.meshes.is_readable(shape.mesh) and facts.meshes.is_flat(shape.mesh):
                     return None  # a flat mesh has no volume, and no simulator accepts it
                 raise CannotCheckError(f"its collision mesh {path.name} {error}") from None
             files[path] = f"{len(files)}.stl"

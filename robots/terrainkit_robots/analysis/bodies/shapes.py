@@ -57,7 +57,7 @@ def support(geometry: Geometry, direction: Matrix, meshes: "Meshes") -> float:
 def has_bounds(geometry: Geometry, meshes: "Meshes") -> bool:
     """Return whether a shape is a primitive with valid sizes or a mesh that can be read."""
     if geometry.shape == "mesh":
-        return geometry.mesh is not None and meshes.readable(geometry.mesh)
+        return geometry.mesh is not None and meshes.is_readable(geometry.mesh)
     return (
         len(geometry.size) == _SIZE_COUNTS.get(geometry.shape, -1)
         and bool(np.isfinite(geometry.size).all())

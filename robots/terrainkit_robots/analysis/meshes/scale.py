@@ -92,7 +92,7 @@ class MeshScales:
         if self.robot_size <= 0 or use.link.name not in self._tree.links:
             return None
         try:
-            estimate = self._meshes.glance(use.mesh)
+            estimate = self._meshes.partial_diagonal(use.mesh)
             if estimate is not None and _MAX_SMALL_SIZE < estimate < _MIN_LARGE_SIZE:
                 return None  # the file does not have to be read completely
             diagonal = self._meshes.diagonal(use.mesh)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from terrainkit_robots.description.fix import Edit, SetAttribute, WriteFile
 from terrainkit_robots.description.model import Geometry, Link, MeshFile, RobotModel, Source
-from terrainkit_robots.description.package_resolver import is_absolute, names_package, right_letters
+from terrainkit_robots.description.package_resolver import is_absolute, is_package_uri, filename_on_disk
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.mesh.sniff import Header
 from terrainkit_robots.text import names
@@ -82,7 +82,7 @@ def mesh_uses(model: RobotModel) -> Iterator[MeshUse]:
                         link=link,
                         geometry=geometry,
                         mesh=geometry.mesh,
-                        is_collision=may_collide and geometry.contacts and not geometry.fitted,
+                        is_collision=may_collide and geometry.contacts and not geometry.fit_to_mesh,
                     )
 
 
@@ -123,9 +123,9 @@ def is_in_other_folder(mesh: MeshFile) -> bool:
     """Return whether the file was found by a search, in another folder than its name says."""
     return (
         mesh.found_by == "search"
-        and not names_package(mesh.filename)
+        and not is_package_uri(mesh.filename)
         and not is_absolute(mesh.filename)
-        and right_letters(mesh.filename, mesh.path) is None
+        and filename_on_disk(mesh.filename, mesh.path) is None
     )
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.bodies.tree import Tree
-from terrainkit_robots.description.mjcf.document import MOST_ELEMENTS, harmless
+from terrainkit_robots.description.mjcf.document import MAX_ELEMENTS, harmless
 from terrainkit_robots.description.model import RobotModel
 from terrainkit_robots.description.xml.document import RobotFileError, parse_xml, read_bytes
 from terrainkit_robots.mesh.sniff import open_regular
@@ -98,9 +98,9 @@ def yourdfpy_load_error(model: RobotModel, tree: Tree) -> LoadError | None:
     if model.kind != "urdf":
         raise NotAttemptedError("the expanded text of xacro has no file that yourdfpy could read")
     elements = len(model.links) + len(model.joints)
-    if elements > MOST_ELEMENTS:
+    if elements > MAX_ELEMENTS:
         raise NotAttemptedError(
-            f"number of elements: got {elements}; expected at most {MOST_ELEMENTS} for yourdfpy"
+            f"number of elements: got {elements}; expected at most {MAX_ELEMENTS} for yourdfpy"
         )
     if tree.cycles:
         raise NotAttemptedError("a tree with a cycle is not passed to yourdfpy")
@@ -155,9 +155,9 @@ def _check_cost(sources: tuple[Path, ...]) -> None:
             if not isinstance(element.tag, str):
                 continue
             elements += 1
-            if elements > MOST_ELEMENTS:
+            if elements > MAX_ELEMENTS:
                 raise NotAttemptedError(
-                    f"number of elements: expected at most {MOST_ELEMENTS} for MuJoCo"
+                    f"number of elements: expected at most {MAX_ELEMENTS} for MuJoCo"
                 )
             _check_element(element)
             folders |= {Path(v) for k, v in element.attrib.items() if k in _FOLDER_ATTRIBUTES}
