@@ -144,7 +144,7 @@ def stands(proof: Proof | None) -> str:
         return f"not simulated: {proof.unknown}" if proof else ""
     seen = proof.standing
     tilt = f"{math.degrees(seen.tilt):.1f} degrees" + (", held" if proof.locked else "")
-    on = f", {names(seen.touching, 2)} on the ground" if seen.touching else ""
+    on = f", {names(seen.other_contacts, 2)} on the ground" if seen.other_contacts else ""
     return f"{'yes' if proof.stood else 'NO'}: {tilt}{on}"
 
 

@@ -86,8 +86,7 @@ def matrix_to_quat(rotation: Matrix) -> Matrix:
     products[1:, 0] = products[0, 1:]
     products[1:, 1:] = rotation + rotation.T + (1 - trace) * np.eye(3)
     quat = products[int(products.diagonal().argmax())]
-    quat = quat / np.linalg.norm(quat)
-    return quat if quat[0] >= 0 else -quat
+    return np.asarray(quat / np.copysign(np.linalg.norm(quat), quat[0]))
 
 
 def rpy_to_matrix(rpy: Matrix) -> Matrix:

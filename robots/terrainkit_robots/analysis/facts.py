@@ -208,8 +208,9 @@ class Facts:
         A position comes from the spec, the first keyframe, the solved standing pose, or is the
         value within the limits that is closest to zero, in this order.
         """
+        spec_pose = None if self.spec is None else self.spec.default_pose
         actuated = [joint.name for joint in self.actuated]
-        return default_positions(self.leg_model, self.spec and self.spec.default_pose, actuated)
+        return default_positions(self.leg_model, spec_pose, actuated)
 
     def effort_limit(self, joint: Joint) -> float | None:
         """Return the effort limit of a joint [N m] or [N]. None if it is unlimited."""

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
-from terrainkit_robots.analysis.bodies.mimic_joints import follower_positions
-from terrainkit_robots.analysis.inertia.composite_inertia import carried_inertias
-from terrainkit_robots.analysis.legs.standing_pose import range_of
+from terrainkit_robots.analysis.bodies.mimic_joints import mimic_positions
+from terrainkit_robots.analysis.inertia.composite_inertia import composite_inertias
+from terrainkit_robots.analysis.legs.standing_pose import joint_range
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.transforms import Matrix
 
@@ -105,7 +105,9 @@ def expected(source: "Facts", written: "Facts") -> Expected:
     draws, renamed = _draws(written), _renamed(source, written)
     inertias = {
         body.joint.name: inertia
-        for body, inertia in zip(source.bodies, carried_inertias(source), strict=True)
+        for body, inertia in zip(
+            source.bodies, composite_inertias(source.bodies, source.zero_poses), strict=True
+        )
         if body.joint is not None and math.isfinite(inertia) and inertia > 0
     }
     return Expected(
@@ -133,9 +135,9 @@ def _draws(facts: "Facts") -> dict[str, Matrix]:
     rng = np.random.default_rng(0)
     drawn: dict[str, Matrix] = {}
     for joint in facts.joints:
-        lower, upper = np.clip(range_of(joint), -_WIDEST, _WIDEST)
+        lower, upper = np.clip(joint_range(joint), -_WIDEST, _WIDEST)
         drawn[joint.name] = rng.uniform(lower, upper, POSES)
-    return drawn | follower_positions(facts.joints, drawn)
+    return drawn | mimic_positions(facts.joints, drawn)
 
 
 def _renamed(source: "Facts", written: "Facts") -> dict[str, str]:

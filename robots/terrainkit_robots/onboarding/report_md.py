@@ -7,7 +7,6 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.bodies.joint_order import permutation
-from terrainkit_robots.analysis.simulator_conventions.joint_order import simulator_orders
 from terrainkit_robots.analysis.simulator_conventions.order_table import order_table
 from terrainkit_robots.lint.report.escape import escape_control, escape_surrogates
 from terrainkit_robots.lint.report.grouping import group_findings
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     from terrainkit_robots.onboarding.pipeline import BroughtIn
     from terrainkit_robots.onboarding.robot_files import Onboarded
     from terrainkit_robots.onboarding.verify import Proof
-    from terrainkit_robots.simulation.standing import Standing
+    from terrainkit_robots.simulation.standing import StandResult
 
 
 def report_page(done: "BroughtIn") -> str:
@@ -143,19 +142,19 @@ def _standing(proof: "Proof | None", made: "Onboarded") -> Iterator[str]:
     yield from _table([("what", "measured"), *_seen(seen, unit, locked=proof.locked)])
 
 
-def _seen(seen: "Standing", unit: str, *, locked: bool) -> Iterator[tuple[str, str]]:
-    blew_up = "; then its numbers blew up" if seen.blew_up else ""
+def _seen(seen: "StandResult", unit: str, *, locked: bool) -> Iterator[tuple[str, str]]:
+    blew_up = "; then its numbers blew up" if seen.diverged else ""
     yield "simulated", f"{shown(seen.seconds)} s{blew_up}"
-    tilts = (shown(math.degrees(tilt), 2) for tilt in (seen.tilt, seen.largest_tilt))
+    tilts = (shown(math.degrees(tilt), 2) for tilt in (seen.tilt, seen.max_tilt))
     yield "tilt", "{} deg at the end, {} deg at most".format(*tilts)
-    sink = f"{1000 * seen.sink:.1f} mm below the start"
+    sink = f"{1000 * seen.height_loss:.1f} mm below the start"
     yield "height of the base", f"{shown(seen.height)} m at the end, {sink}"
     yield "drift", f"{1000 * seen.drift:.1f} mm"
-    yield "touched the ground", ", ".join(seen.touching) or "only the feet"
+    yield "touched the ground", ", ".join(seen.other_contacts) or "only the feet"
     if locked:
         return
-    if seen.saturated:
-        yield "largest torque", f"{seen.saturation:.0%} of the effort of {seen.saturated}"
+    if seen.saturated_joint:
+        yield "largest torque", f"{seen.saturation:.0%} of the effort of {seen.saturated_joint}"
     yield "farthest joint from its target", f"{shown(seen.joint_error, 2)} {unit}"
 
 
@@ -199,11 +198,11 @@ def _joints(made: "Onboarded") -> Iterator[str]:
 
 
 def _orders(made: "Onboarded") -> Iterator[str]:
-    orders = simulator_orders(made.facts)
+    orders = made.facts.simulator_orders
     if not made.spec.joint_order or not any(order.joints for order in orders):
         return
     yield "## Joint order by simulator\n"
-    yield from _table(order_table(made.facts))
+    yield from _table(order_table(made.facts.file_order, made.facts.simulator_orders))
     for order in orders:
         sure = "certain" if order.certain else "to be verified"
         yield f"- {order.simulator} ({sure}): {cell(order.reason)}"

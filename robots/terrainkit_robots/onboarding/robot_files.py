@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
-from terrainkit_robots.analysis.bodies.shapes import lowest
+from terrainkit_robots.analysis.bodies.shapes import min_height
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.export.actuator import ActuatorConfig
@@ -222,7 +222,7 @@ def _excluded(facts: Facts) -> tuple[frozenset[frozenset[str]], tuple[str, ...]]
     """Return pairs of links that are not to touch, and what to say of them."""
     declared = facts.model.excluded
     try:
-        found = facts.overlaps.overlaps(facts.positions)
+        found = facts.overlap_scene.detect(facts.positions)
     except CannotCheckError as error:
         return declared, (f"did not look for shapes inside each other: {error}",)
     pairs = {frozenset((o.first.link, o.second.link)): o.depth for o in found if o.depth > _AT_REST}
@@ -249,7 +249,7 @@ def _clearance(facts: Facts, positions: Mapping[str, float]) -> float:
     """Return how high the base is when the lowest shape touches the ground [m]."""
     poses = body_poses(facts.bodies, positions)
     depths = [
-        lowest(shape, pose, facts.meshes)
+        min_height(shape, pose, facts.meshes)
         for body, pose in zip(facts.bodies, poses, strict=True)
         for shape in (*body.collisions, *body.visuals)
     ]

@@ -11,19 +11,19 @@ from typing import TYPE_CHECKING, Any
 
 from terrainkit.errors import ExportError
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
-from terrainkit_robots.analysis.legs.stance import stands_alone
+from terrainkit_robots.analysis.legs.stance import is_statically_stable
 from terrainkit_robots.export.base_link import with_world_base
 from terrainkit_robots.export.canonical import has_unknown_inertia, to_canonical
 from terrainkit_robots.onboarding.equivalence import Agreement, agreement, expected
 from terrainkit_robots.onboarding.robot_files import MJCF, SCENE, URDF
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.simulation.assessment import judge
+from terrainkit_robots.simulation.assessment import assess
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
     from terrainkit_robots.onboarding.robot_files import Onboarded
-    from terrainkit_robots.simulation.pd_gains import Gain
-    from terrainkit_robots.simulation.standing import Standing
+    from terrainkit_robots.simulation.gain import Gain
+    from terrainkit_robots.simulation.standing import StandResult
     from terrainkit_robots.spec.robot_spec import RobotSpec
 
 _SECONDS = 5.0
@@ -37,7 +37,7 @@ class Proof:
     agreements: tuple[Agreement, ...]
     """How far each is from the source."""
 
-    standing: "Standing | None" = None
+    standing: "StandResult | None" = None
     """How the robot of scene.xml stood; None without legs, or with a base that cannot fall."""
 
     locked: bool = False
@@ -51,7 +51,7 @@ class Proof:
         """Return why it does not stand; nothing if it does, or has no legs."""
         if self.standing is None:
             return (f"it could not be simulated: {self.unknown}",) if self.unknown else ()
-        return judge(self.standing).faults
+        return assess(self.standing).failures
 
     @property
     def stood(self) -> bool:
@@ -65,8 +65,8 @@ def prove(source: "Facts", made: "Onboarded", folder: Path) -> Proof:
     Raises:
         ExportError: if MuJoCo does not load them, or they are another robot than the source.
     """
-    from terrainkit_robots.simulation.sim_model import plant_of
-    from terrainkit_robots.simulation.standing import footholds, stand_still
+    from terrainkit_robots.simulation.sim_model import SimModel
+    from terrainkit_robots.simulation.standing import contact_regions, stand_test
 
     floating = bool(made.facts.model.floating)
     # MuJoCo compiles without the interpreter's lock. The scene includes the MJCF, which is compiled
@@ -80,13 +80,13 @@ def prove(source: "Facts", made: "Onboarded", folder: Path) -> Proof:
             raise ExportError(f"{each.file} would be another robot: {'; '.join(each.faults)}")
     if not made.facts.legs or not floating:
         return Proof(agreements=agreements)
-    locked = not stands_alone(made.facts)
+    locked = not is_statically_stable(made.facts.legs)
     try:
-        standing = stand_still(
-            plant_of(scene.result(), base=made.facts.bodies[0].top.name),
+        standing = stand_test(
+            SimModel.from_mujoco(scene.result(), base=made.facts.bodies[0].top.name),
             _gains(made.spec),
             positions=made.facts.positions,
-            feet=footholds(made.facts),
+            regions=contact_regions(made.facts),
             seconds=_SECONDS,
             joints_locked=locked,
         )
@@ -115,7 +115,7 @@ def _loaded(path: Path) -> Any:
 
 
 def _gains(spec: "RobotSpec") -> "dict[str, Gain]":
-    from terrainkit_robots.simulation.pd_gains import Gain
+    from terrainkit_robots.simulation.gain import Gain
 
     stiffness, damping, armature = map(spec.per_joint, ("stiffness", "damping", "armature"))
     return {

@@ -14,8 +14,8 @@ class Gain:
     """Derivative gain [N m s/rad] or [N s/m]."""
 
     armature: float
-    """Reflected inertia of the rotor [kg m2] or [kg]: as declared, or more if the joint is too light
-    for its gains."""
+    """Reflected inertia of the rotor [kg m2] or [kg]: as declared, or more if the joint is too
+    light for its gains."""
 
     reason: str
     """How the gains were computed."""

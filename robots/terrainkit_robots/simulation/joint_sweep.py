@@ -128,7 +128,7 @@ class _Sweep:
         mujoco.mj_fwdVelocity(model, data)  # at zero velocity the bias force is gravity
 
     def _contact_pairs(self, depth: float) -> Sequence[tuple[int, int]]:
-        """Return the pairs of bodies that penetrate deeper than `depth` [m], without ignored ones."""
+        """Return the pairs of bodies that overlap deeper than `depth` [m], except ignored ones."""
         model, data = self._rollout.model, self._rollout.data
         deep = data.contact.geom[data.contact.dist < -depth]
         pairs = {tuple(sorted(pair)) for pair in model.geom_bodyid[deep].tolist()}

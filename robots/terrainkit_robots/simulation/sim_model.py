@@ -160,7 +160,7 @@ def make_sim_model(facts: Facts) -> SimModel:
 
 
 def _compiler_message(error: str) -> str:
-    """Return an error of the compiler on one line, with the element but without our line numbers."""
+    """Return an error of the compiler on one line, with the element but without line numbers."""
     message, _, location = error.partition("\nElement ")
     name = re.match(r"name '(.*?)(?:', id -?\d+(?:, line -?\d+)?)?$", location, re.DOTALL)
     subject = f"{short(' '.join(name[1].split()))}: " if name else ""
@@ -196,9 +196,7 @@ def _merge_inertials(model: RobotModel) -> RobotModel:
     return replace(model, links=tuple(with_body_inertial(link) for link in model.links))
 
 
-def _keep_collision_shapes(
-    model: RobotModel, facts: Facts
-) -> tuple[RobotModel, dict[str, bytes]]:
+def _keep_collision_shapes(model: RobotModel, facts: Facts) -> tuple[RobotModel, dict[str, bytes]]:
     """Return a robot with only its collision shapes, with hulls for meshes, and the mesh files."""
     assets: dict[str, bytes] = {}
     files: dict[Path, str] = {}

@@ -240,7 +240,9 @@ class _Monitor:
             height_loss=-float(motion[2]),
             drift=float(np.hypot(motion[0], motion[1])),
             leg_length=min((region.leg_length for region in self.regions), default=math.inf),
-            other_contacts=tuple(rollout.model.body(body).name for body in sorted(self.other_bodies)),
+            other_contacts=tuple(
+                rollout.model.body(body).name for body in sorted(self.other_bodies)
+            ),
             lifted_feet=tuple(foot for foot in feet if foot not in self.contact_feet),
             saturation=saturation,
             saturated_joint=rollout.sim.actuated[joint] if saturation > 0 else "",

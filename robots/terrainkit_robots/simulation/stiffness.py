@@ -22,8 +22,8 @@ from terrainkit_robots.simulation.time_step import (
 from terrainkit_robots.simulation.units import PRISMATIC, JointUnits
 
 _UPRIGHT_FACTOR = 1.5
-"""Stiffness of a leg over m g l / n, the rate at which gravity tips it over: weight times leg length
-over the number of legs. A weaker spring does not hold it upright."""
+"""Stiffness of a leg over m g l / n, the rate at which gravity tips it over: weight times leg
+length over the number of legs. A weaker spring does not hold it upright."""
 
 _MIN_LEG_ERROR = 1.0
 """Error at which a joint of a leg reaches its effort limit, at least [rad]. Published gains of all
@@ -33,8 +33,8 @@ _MIN_ERROR = 0.5
 """The same for arms, hands and waists, which track positions [rad]."""
 
 _MAX_LEG_SAG = 0.09
-"""Deflection of a joint in the standing pose, at most [rad]. Bent legs bend further as they sag: a1,
-go2 and the bundled quadruped collapse from 0.13 rad on, with any damping."""
+"""Deflection of a joint in the standing pose, at most [rad]. Bent legs bend further as they sag:
+a1, go2 and the bundled quadruped collapse from 0.13 rad on, with any damping."""
 
 _MIN_HOLDING_ERROR = 0.3
 """Error at which the holding torque may reach the effort limit [rad]; anymal_c and b1 need it."""
@@ -46,7 +46,7 @@ _MIN_FREQUENCY = 20.0
 """Natural frequency of a joint without load, such as a steering joint, at least [rad/s]."""
 
 _LEVER = 0.1
-"""Lever at which a prismatic joint corresponds to a revolute one [m]: 1 rad corresponds to 0.1 m."""
+"""Lever at which a prismatic joint corresponds to a revolute one [m]: 1 rad is 0.1 m."""
 
 _MIN_STIFFNESS_SHARE = 0.75
 """If a joint is stable at less than this share of the required stiffness, it gets an armature."""
@@ -186,9 +186,7 @@ def _make_target(
     )
 
 
-def _limit_by_effort(
-    required: _Requirement, effort: float, units: JointUnits
-) -> tuple[float, str]:
+def _limit_by_effort(required: _Requirement, effort: float, units: JointUnits) -> tuple[float, str]:
     error = required.min_error * _lever(units)
     limit = effort / error
     if required.stiffness <= limit:

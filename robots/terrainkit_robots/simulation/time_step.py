@@ -1,8 +1,8 @@
 """Compute the inertia of each joint, and the longest time step at which PD control is stable.
 
-Training computes torque = kp (target - q) - kd dq once per time step. A light joint responds so fast
-that the torque comes too late, and oscillates. Actuators of a simulator that integrates the damping
-implicitly, such as MuJoCo's implicitfast, do not have this problem.
+Training computes torque = kp (target - q) - kd dq once per time step. A light joint responds so
+fast that the torque comes too late, and oscillates. Actuators of a simulator that integrates the
+damping implicitly, such as MuJoCo's implicitfast, do not have this problem.
 """
 
 from collections.abc import Mapping
@@ -17,8 +17,8 @@ from terrainkit_robots.simulation.gain import Gain
 from terrainkit_robots.simulation.sim_model import TIME_STEP, SimModel
 
 _MAX_FREQUENCY_STEP = 0.4
-"""Natural frequency times time step, at most. A joint with critical damping oscillates from 0.83 on,
-and joints that move along reduce its inertia."""
+"""Natural frequency times time step, at most. A joint with critical damping oscillates from 0.83
+on, and joints that move along reduce its inertia."""
 
 
 @dataclass(frozen=True, kw_only=True)

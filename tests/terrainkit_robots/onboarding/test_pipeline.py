@@ -259,7 +259,7 @@ def test_what_takes_too_long_to_stand_is_written_and_told(tmp_path, monkeypatch)
     def refuse(*_arguments, **_more):
         raise CannotCheckError("300 contacts at once")
 
-    monkeypatch.setattr("terrainkit_robots.simulation.standing.stand_still", refuse)
+    monkeypatch.setattr("terrainkit_robots.simulation.standing.stand_test", refuse)
     done = bring_in(bundled.find("quadruped"), wishes(tmp_path))
     assert not done.proof.stood
     assert dict(summary(done))["stands"] == "not known: 300 contacts at once"

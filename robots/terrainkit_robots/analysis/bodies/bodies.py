@@ -170,7 +170,7 @@ def merge_bodies(tree: Tree) -> tuple[Body, ...]:
 
 
 def _base_index(tree: Tree) -> int:
-    """Return the index of the base in the order: 1 if an empty root has a floating joint, else 0."""
+    """Return 1 if the first link is an empty root with a floating joint, which is not the base."""
     root = tree.links[tree.order[0]]
     joints = tree.child_joints[root.name]
     empty = root.inertial is None and not root.collisions

@@ -33,9 +33,7 @@ class BodyBounds:
         self, bodies: Sequence[Body], zero_poses: Sequence[Matrix], meshes: Meshes
     ) -> None:
         self._meshes = meshes
-        self._frames: list[list[Matrix]] = [
-            [pose[:3, 3] for pose in body.poses] for body in bodies
-        ]
+        self._frames: list[list[Matrix]] = [[pose[:3, 3] for pose in body.poses] for body in bodies]
         for body in bodies:
             if body.parent is not None:
                 anchor = np.zeros(3) if body.joint is None else body.joint.anchor

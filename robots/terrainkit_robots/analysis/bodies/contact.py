@@ -105,9 +105,9 @@ def _extreme_points(shape: BodyShape, pose: Matrix, meshes: Meshes) -> Matrix:
 
 
 def convex_hull(points: Matrix) -> Matrix:
-    """Return the convex hull of points in the plane, counter-clockwise, shape (n, 2).
+    """Return the convex hull of points in the plane, shape (n, 2).
 
-    Collinear points have the two ends as their hull.
+    It is counter-clockwise from the lowest x. Collinear points have their two ends as hull.
     """
     from scipy.spatial import ConvexHull, QhullError
 
@@ -115,9 +115,10 @@ def convex_hull(points: Matrix) -> Matrix:
     if len(points) < 3:
         return points
     try:
-        return np.asarray(points[ConvexHull(points).vertices])
+        order = ConvexHull(points).vertices
     except QhullError:
         return points[[0, -1]]
+    return np.asarray(points[np.roll(order, -order.argmin())])
 
 
 def margin(point: Matrix, polygon: Matrix) -> float:

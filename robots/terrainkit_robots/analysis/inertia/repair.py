@@ -68,7 +68,9 @@ class InertiaRepair:
     def _location(self) -> Mapping[str, tuple[Body, int]]:
         """The body of each link, and the index of the link in it."""
         return {
-            link.name: (body, index) for body in self.bodies for index, link in enumerate(body.links)
+            link.name: (body, index)
+            for body in self.bodies
+            for index, link in enumerate(body.links)
         }
 
     def _mirrored(self, link: Link) -> Matrix | None:

@@ -216,9 +216,7 @@ def _make_limb(
     links = [link.name for i in leaf.chain for link in bodies[i].links]
     leg_names, other_names = _count_names([*links, *(joint.name for joint in leaf.joints)])
     has_mirror_image = any(
-        other is not leaf
-        and _is_mirrored(leaf, other, size)
-        and not is_branch(leaf, other, size)
+        other is not leaf and _is_mirrored(leaf, other, size) and not is_branch(leaf, other, size)
         for other in leaves
     )
     score += 0.5 * has_mirror_image

@@ -60,9 +60,7 @@ class Stance:
         return self.height + 0.01
 
 
-def compute_stance(
-    robot: LegModel, positions: Mapping[str, float], *, total_mass: float
-) -> Stance:
+def compute_stance(robot: LegModel, positions: Mapping[str, float], *, total_mass: float) -> Stance:
     """Return the stance of a robot with legs.
 
     Args:

@@ -26,8 +26,8 @@ _DEFAULT_HEIGHT_RATIO = 0.75
 """The same ratio for all other numbers of legs."""
 
 _PRECISION = np.array([0.02, 0.02, 0.1])
-"""Distance of the foot from its target that costs 1, along x, y and z, over the leg length. The foot
-must be below the mass; the height is only a preference."""
+"""Distance of the foot from its target that costs 1, along x, y and z, over the leg length. The
+foot must be below the mass; the height is only a preference."""
 
 _GRID_SIZE = 21
 """Number of positions of a joint in each round of the search."""
@@ -97,9 +97,7 @@ def _leg_pairs(robot: LegModel) -> list[tuple[Leg, Leg | None, Sequence[int]]]:
     for index, leg in enumerate(legs):
         if index in done:
             continue
-        images = [
-            (i, 1) if uses[i] > 1 else robot.mirror.counterpart(i) for i in leg.limb.chain
-        ]
+        images = [(i, 1) if uses[i] > 1 else robot.mirror.counterpart(i) for i in leg.limb.chain]
         chain = tuple(image[0] for image in images if image is not None)
         other = next((k for k, o in enumerate(legs) if o.limb.chain == chain), None)
         signs = [image[1] for image in images if image is not None]

@@ -13,7 +13,7 @@ from terrainkit_robots.analysis.bodies.bodies import Body, BodyShape
 from terrainkit_robots.analysis.bodies.shapes import bounds
 from terrainkit_robots.analysis.bodies.tree import Tree
 from terrainkit_robots.analysis.meshes.uses import MeshUse
-from terrainkit_robots.description.model import Geometry, Link
+from terrainkit_robots.description.model import Geometry
 from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes
 from terrainkit_robots.transforms import Matrix
 
@@ -112,9 +112,7 @@ class MeshScales:
             return None
         local = max(nearby, _MIN_JOINT_DISTANCE_RATIO * self.robot_size)
         if use.link.name not in self._tree.parent_joint or local >= self.robot_size:
-            found = ScaleMismatch(
-                diagonal=diagonal, reference=self.robot_size, description=_ROBOT
-            )
+            found = ScaleMismatch(diagonal=diagonal, reference=self.robot_size, description=_ROBOT)
         else:
             found = ScaleMismatch(diagonal=diagonal, reference=local, description=_JOINTS)
         return found if found.ratio > MAX_RATIO else None
@@ -133,9 +131,7 @@ class MeshScales:
             reference, description = max((below, _JOINTS), (other_shapes, _OTHER_SHAPES))
             return ScaleMismatch(diagonal=diagonal, reference=reference, description=description)
         if diagonal < _MIN_VISIBLE_RATIO * self.robot_size:
-            return ScaleMismatch(
-                diagonal=diagonal, reference=self.robot_size, description=_ROBOT
-            )
+            return ScaleMismatch(diagonal=diagonal, reference=self.robot_size, description=_ROBOT)
         return None
 
     def _largest_diagonal(self, shapes: Sequence[Geometry]) -> float | None:

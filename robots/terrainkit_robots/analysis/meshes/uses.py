@@ -8,7 +8,11 @@ from pathlib import Path
 
 from terrainkit_robots.description.fix import Edit, SetAttribute, WriteFile
 from terrainkit_robots.description.model import Geometry, Link, MeshFile, RobotModel, Source
-from terrainkit_robots.description.package_resolver import is_absolute, is_package_uri, filename_on_disk
+from terrainkit_robots.description.package_resolver import (
+    filename_on_disk,
+    is_absolute,
+    is_package_uri,
+)
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.mesh.sniff import Header
 from terrainkit_robots.text import names
@@ -97,9 +101,7 @@ def meshes_by_file(model: RobotModel, meshes: Meshes) -> list[UsedMesh]:
     return [each for each in used if not is_missing(each)]
 
 
-def _group(
-    model: RobotModel, meshes: Meshes, key: Callable[[MeshFile], object]
-) -> list[UsedMesh]:
+def _group(model: RobotModel, meshes: Meshes, key: Callable[[MeshFile], object]) -> list[UsedMesh]:
     groups: dict[object, list[MeshUse]] = {}
     for use in mesh_uses(model):
         groups.setdefault(key(use.mesh), []).append(use)
@@ -142,7 +144,7 @@ def relative_name(model: RobotModel, path: Path) -> str:
 def rename_edits(
     model: RobotModel, uses: Iterable[MeshUse], name: str
 ) -> tuple[SetAttribute, ...] | None:
-    """Return the edits that change the name of a file in its uses; None if they are not editable."""
+    """Return the edits that change the name of a file; None if its uses are not editable."""
     edits: dict[Source, SetAttribute] = {}
     for use in uses:
         source = use.mesh.source

@@ -108,7 +108,7 @@ def merged_joints(fixed: Iterable[Joint], simulator: Simulator) -> frozenset[Joi
     return frozenset(joint for joint in fixed if not (joint.dont_collapse and reads_attribute))
 
 
-def merged_feet(
+def find_merged_feet(
     tree: Tree, bodies: Sequence[Body], legs: Sequence[Leg], fixed: Sequence[Joint]
 ) -> tuple[MergedFoot, ...]:
     """Return the feet with collision shapes that at least one simulator merges."""

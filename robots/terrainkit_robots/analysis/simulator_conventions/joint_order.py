@@ -42,6 +42,8 @@ _Names = tuple[str, ...]
 _Key = Callable[[Joint], object]
 _ChildJoints = dict[str, tuple[Joint, ...]]
 
+_SAME_ORDER = "siblings have the same order by name and in the file"
+
 
 @dataclass(frozen=True, kw_only=True)
 class SimulatorOrder:
@@ -145,7 +147,7 @@ class _Robot:
                 )
             case "Isaac Lab":
                 if self._is_unique(_breadth_first, (None, self._file_index, _joint_name)):
-                    return True, "breadth first; siblings have the same order by name and in the file"
+                    return True, f"breadth first; {_SAME_ORDER}"
                 likely = (
                     "siblings by the name of the joint, as in importers up to Isaac Sim 5.1"
                     if self.is_urdf
@@ -155,7 +157,7 @@ class _Robot:
             case "Isaac Gym":
                 keys = (None, self._file_index, _joint_name, _link_name)
                 if self._is_unique(_depth_first, keys):
-                    return True, "depth first; siblings have the same order by name and in the file"
+                    return True, f"depth first; {_SAME_ORDER}"
                 likely = (
                     "siblings by the name of the joint, as in the lists published for A1 and Go1"
                     if self.is_urdf
@@ -175,7 +177,9 @@ class _Robot:
         if any(body.virtual for body in self.bodies):
             return False  # importers turn several joints into one
         orders = {
-            tuple(id(joint) for joint in traverse(_sort_siblings(tree, key), tree.base) if joint.moves)
+            tuple(
+                id(joint) for joint in traverse(_sort_siblings(tree, key), tree.base) if joint.moves
+            )
             for tree in self._possible_trees()
             for key in keys
         }

@@ -106,7 +106,7 @@ def yourdfpy_load_error(model: RobotModel, tree: Tree) -> LoadError | None:
         raise NotAttemptedError("a tree with a cycle is not passed to yourdfpy")
     document = parse_xml(model.file, _read(model.file))
     if document.root is None or any(p.code in _UNSAFE_PROBLEMS for p in document.problems):
-        raise NotAttemptedError("a file that is malformed or has entities is not passed to yourdfpy")
+        raise NotAttemptedError("a malformed file, or one with entities, is not passed to yourdfpy")
     from lxml import etree
 
     data = etree.tostring(document.root)

@@ -174,7 +174,7 @@ def _pairs_by_position(
         if not lateral[body.index] or points[body.index] @ mirror.normal < 0:
             continue
         distances = np.linalg.norm(points - images[body.index], axis=1)
-        near = np.flatnonzero(lateral & (distances <= tolerance))
+        near = np.flatnonzero(lateral & (distances <= tolerance)).tolist()
         candidates = [
             bodies[k]
             for k in near

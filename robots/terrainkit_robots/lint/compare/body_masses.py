@@ -35,7 +35,7 @@ def body_gap(one: Facts, other: Facts, pairing: Pairing, ours: Body, theirs: Bod
     is closer counts.
     """
     frames = [
-        from_link(robot, base) @ robot.at_zero[body.index]
+        from_link(robot, base) @ robot.zero_poses[body.index]
         for robot, base, body in zip((one, other), pairing.base, (ours, theirs), strict=True)
     ]
     own = [np.eye(4), np.eye(4)]

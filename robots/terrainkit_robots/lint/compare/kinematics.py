@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.mimic_joints import follower_positions
+from terrainkit_robots.analysis.bodies.mimic_joints import mimic_positions
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint
@@ -116,7 +116,7 @@ def random_positions(
         drawn = generator.uniform(*_bounds(one, other), poses)
         ours[one.name] = np.zeros(poses) if one.name in held else drawn
     moving = [replace(one, mimic=None) if one.name in held else one for one, _ in pairing.joints]
-    ours |= follower_positions(moving, ours)
+    ours |= mimic_positions(moving, ours)
     return ours, {other.name: ours[one.name] for one, other in pairing.joints}
 
 

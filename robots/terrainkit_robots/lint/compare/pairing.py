@@ -52,7 +52,7 @@ def from_link(robot: Facts, link: str) -> Matrix:
     """Return the trunk's frame as a link sees it with all joints at 0, shape (4, 4)."""
     body = robot.body_of[link]
     place = next(p for part, p in zip(body.links, body.poses, strict=True) if part.name == link)
-    return invert_poses(robot.at_zero[body.index] @ place)
+    return invert_poses(robot.zero_poses[body.index] @ place)
 
 
 def _by_name(robot: Facts) -> dict[str, Joint]:

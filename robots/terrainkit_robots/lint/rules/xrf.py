@@ -7,16 +7,10 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.joint_order import (
-    actuator_order,
-    is_moved,
-    permutation,
-    tree_order,
-)
-from terrainkit_robots.analysis.cached_fact import per_robot
+from terrainkit_robots.analysis.bodies.joint_order import is_reordered, permutation
+from terrainkit_robots.analysis.cached_fact import cached_fact
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.legs.effort import effort_of
 from terrainkit_robots.description.model import Joint, Mimic, Source
 from terrainkit_robots.lint.compare.body_masses import body_gap, dropped_mass, is_known, share
 from terrainkit_robots.lint.rule import Severity, Violation, rule
@@ -55,7 +49,7 @@ _MOST_NAMED = 3
 _T = TypeVar("_T")
 
 
-@per_robot
+@cached_fact
 def _pairing_or_none(robot: Facts) -> "Pairing | None":
     from terrainkit_robots.lint.compare.pairing import pair_robots
 
@@ -152,7 +146,7 @@ def _split(joints: Sequence[Joint], other: Facts) -> Iterator[tuple[bool, list[J
 
 def _held_by(robot: Facts, joint: Joint) -> Source | None:
     """Return where it is written that the link below a joint of the other robot does not move."""
-    above = robot.tree.above.get(joint.child)
+    above = robot.tree.parent_joint.get(joint.child)
     return above.source if above is not None and above.kind == "fixed" else None
 
 
@@ -251,7 +245,7 @@ def _axis_from(link: str, robot: Facts, joint: Joint) -> Matrix:
     """Return the axis of a joint as a link sees it with all joints at 0."""
     from terrainkit_robots.lint.compare.pairing import from_link
 
-    pose = from_link(robot, link) @ robot.at_zero[robot.body_of[joint.child].index]
+    pose = from_link(robot, link) @ robot.zero_poses[robot.body_of[joint.child].index]
     return pose[:3, :3] @ joint.direction
 
 
@@ -373,9 +367,9 @@ def joint_order_differs(robot: Facts) -> Iterator[Violation]:
     """
     common = [(one.name, other.name) for one, other in _joints(robot)]
     ours = dict(common)
-    theirs = [name for name in tree_order(_other(robot)) if name in ours.values()]
+    theirs = [joint.name for joint in _other(robot).joints if joint.name in ours.values()]
     places = permutation(list(ours.values()), theirs)
-    if places is None or not is_moved(places):
+    if places is None or not is_reordered(places):
         return
     there = _there(robot)
     few = len(common) < max(len(robot.joints), len(_other(robot).joints))
@@ -414,8 +408,8 @@ def actuator_order_differs(robot: Facts) -> Iterator[Violation]:
     """
     other, there = _other(robot), _there(robot)
     partner = dict(_pairing(robot).joint_names.pairs)
-    ours = [partner[name] for name in actuator_order(robot) if name in partner]
-    theirs = actuator_order(other)
+    ours = [partner[name] for name in robot.actuator_order if name in partner]
+    theirs = other.actuator_order
     common = [name for name in theirs if name in ours]
     places = permutation([name for name in ours if name in common], common)
     inside = [
@@ -425,7 +419,7 @@ def actuator_order_differs(robot: Facts) -> Iterator[Violation]:
     ]
     if not common:  # one of them, or none, is a MJCF with actuators
         yield from (_actuators(robot, told) for told in inside)
-    elif places and is_moved(places):
+    elif places and is_reordered(places):
         told = (
             f"the actuators come in another order than those of {there}: "
             f"{_paste('theirs', 'ours', places)}; back again: "
@@ -438,10 +432,10 @@ def actuator_order_differs(robot: Facts) -> Iterator[Violation]:
 
 def _against_joints(robot: Facts) -> str:
     """Return how the actuators of a file are ordered against its own joints; nothing if alike."""
-    driven = actuator_order(robot)
-    joints = [name for name in tree_order(robot) if name in driven]
+    driven = robot.actuator_order
+    joints = [joint.name for joint in robot.joints if joint.name in driven]
     places = permutation(joints, driven)
-    if places is None or not is_moved(places):
+    if places is None or not is_reordered(places):
         return ""
     return (
         f"{_paste('ctrl', 'joints', places)}, where joints are "
@@ -470,7 +464,7 @@ def effort_differs(robot: Facts) -> Iterator[Violation]:
     """
     other, there = _other(robot), _there(robot)
     alike = [(a, b) for a, b in _joints(robot) if _alike(robot, a, b)]
-    efforts = {a.name: (effort_of(robot, a), effort_of(other, b)) for a, b in alike}
+    efforts = {a.name: (robot.effort_limit(a), other.effort_limit(b)) for a, b in alike}
 
     def gap(one: Joint, _: Joint) -> tuple[object, ...] | None:
         a, b = efforts[one.name]

@@ -4,9 +4,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from terrainkit_robots.analysis.bodies.joint_order import actuator_order, is_moved, permutation
+from terrainkit_robots.analysis.bodies.joint_order import is_reordered, permutation
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.legs.effort import effort_of
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.rule import Violation, rule
 from terrainkit_robots.spec.per_joint import match_joints
@@ -110,11 +109,11 @@ def spec_joint_order(robot: Facts) -> Iterator[Violation]:
         The order of the actuators in a MJCF, else that of the tree, depth first as in MuJoCo.
     """
     ours = _spec(robot).joint_order
-    order, what = actuator_order(robot), "actuators"
+    order, what = robot.actuator_order, "actuators"
     if set(order) != set(ours):
         order, what = tuple(joint.name for joint in robot.actuated), "joints"
     places = permutation(ours, order)
-    if places is None or not is_moved(places):
+    if places is None or not is_reordered(places):
         return
     first = next(k for k, place in enumerate(places) if place != k)
     yield Violation(
@@ -279,7 +278,7 @@ def spec_motor_limits(robot: Facts) -> Iterator[Violation]:
     Source:
         Limits of the description, and the force ranges of a MJCF's actuators.
     """
-    yield from _stronger(robot, "effort", lambda j: effort_of(robot, j), lambda j: j.effort_unit)
+    yield from _stronger(robot, "effort", lambda j: robot.effort_limit(j), lambda j: j.effort_unit)
     yield from _stronger(robot, "velocity", _velocity_of, lambda j: j.speed_unit)
 
 
@@ -319,9 +318,7 @@ def spec_mirror(robot: Facts) -> Iterator[Violation]:
     Source:
         A reflection turns a rotation by q about an axis a into one by -q about the reflected a.
     """
-    from terrainkit_robots.analysis.symmetry.mirror_map import mirror_map
-
-    mirror, measured = _spec(robot).mirror, mirror_map(robot)
+    mirror, measured = _spec(robot).mirror, robot.mirror_map
     known = [joint.name for joint in robot.actuated]
     for name, twin in mirror.items():
         unknown = next((each for each in (name, twin.joint) if each not in known), None)
