@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.annotations import show
 from terrainkit.errors import ConfigError, known_names
 from terrainkit.grid import Grid
 from terrainkit.parameter import (
@@ -78,7 +79,7 @@ class Terrain(ABC):
         if isinstance(value, tuple):
             if not parameter.ramps or len(value) != 2:
                 expected = "one value or a pair (easy, hard)" if parameter.ramps else "one value"
-                raise ConfigError(f"{cls.kind()}.{name}: got {value}; expected {expected}")
+                raise ConfigError(f"{cls.kind()}.{name}: got {show(value)}; expected {expected}")
             easy, hard = (convert_parameter(cls.kind(), name, end, parameter) for end in value)
             return at_difficulty((easy, hard), difficulty)
         return value

@@ -26,8 +26,8 @@ from terrainkit_robots.analysis.simulator_conventions.joint_order import (
 from terrainkit_robots.analysis.symmetry.mirror import Mirror, detect_mirror
 from terrainkit_robots.analysis.symmetry.mirror_map import mirror_map
 from terrainkit_robots.analysis.symmetry.mirror_pairs import (
-    MirrorJoint,
     MirrorPair,
+    MirrorSide,
     mirror_pairs,
     outlier_first,
 )
@@ -36,7 +36,7 @@ from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.transforms import Matrix
 
 if TYPE_CHECKING:
-    from terrainkit_robots.spec.robot_spec import RobotSpec, Twin
+    from terrainkit_robots.spec.robot_spec import MirrorJoint, RobotSpec
 
 
 class Facts:
@@ -224,7 +224,7 @@ class Facts:
         return detect_mirror(self.legs, self.bodies, self.zero_poses)
 
     @cached_property
-    def mirror_map(self) -> "Mapping[str, Twin]":
+    def mirror_map(self) -> "Mapping[str, MirrorJoint]":
         """The mirrored joint of each actuated joint that has one, by name."""
         return mirror_map(self.bodies, self.actuated, self.mirror, self.zero_poses)
 
@@ -234,8 +234,8 @@ class Facts:
         return mirror_pairs(self.bodies, self.zero_poses, self.mirror, self.leg_bodies)
 
     def outlier_first(
-        self, left: MirrorJoint, right: MirrorJoint, value: Callable[[Body], Matrix | None]
-    ) -> tuple[MirrorJoint, MirrorJoint]:
+        self, left: MirrorSide, right: MirrorSide, value: Callable[[Body], Matrix | None]
+    ) -> tuple[MirrorSide, MirrorSide]:
         """Return the two joints, the one whose value deviates more from the other legs first."""
         return outlier_first(left, right, value, self.bodies, self.legs, self.mirror)
 

@@ -10,9 +10,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from terrainkit.errors import ConfigError
-from terrainkit.schema import (
-    Config,
+from terrainkit.annotations import (
     Fraction,
     Interval,
     NonNegativeFloat,
@@ -20,6 +18,8 @@ from terrainkit.schema import (
     PositiveFloat,
     PositiveInt,
 )
+from terrainkit.errors import ConfigError
+from terrainkit.schema import Config
 
 MAX_SCAN_POINTS = 10_000
 """Largest number of points of the height scan."""

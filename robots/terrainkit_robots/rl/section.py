@@ -1,6 +1,6 @@
 """Former path of the base class of the sections."""
 
+from terrainkit.annotations import PositiveFloat as Positive
 from terrainkit.schema import Config as Section
-from terrainkit.schema import PositiveFloat as Positive
 
 __all__ = ["Positive", "Section"]

@@ -1,6 +1,7 @@
 """Former path of the TOML functions of a task."""
 
-from terrainkit.schema import Config, field_docs, flatten, replace, without_none
+from terrainkit.annotations import parse_annotation
+from terrainkit.schema import Config, field_docs, flatten, replace
 from terrainkit_robots.rl.config import Task
 
 NONE = "none"
@@ -14,4 +15,4 @@ changed = replace
 
 def may_be_none(kind: object) -> bool:
     """Return whether an annotation accepts None."""
-    return without_none(kind) is not kind
+    return parse_annotation(kind).is_optional

@@ -10,7 +10,7 @@ from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.kinematics import joint_axis
 from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.analysis.symmetry.mirror import Mirror
-from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorJoint, MirrorPair
+from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair, MirrorSide
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.transforms import Matrix
 
@@ -42,8 +42,8 @@ _MIN_PARALLEL_COSINE = 0.9
 class Misalignment:
     """A pair of joints that are not mirror images."""
 
-    left: MirrorJoint
-    right: MirrorJoint
+    left: MirrorSide
+    right: MirrorSide
 
     is_axis: bool
     """Whether the declared axes differ; otherwise the origins do."""
@@ -93,7 +93,7 @@ def _has_zero_axis(joint: Joint) -> bool:
     return joint.axis is not None and not np.abs(joint.axis).max() > 1e-6
 
 
-def _is_half_turn(left: MirrorJoint, right: MirrorJoint) -> bool:
+def _is_half_turn(left: MirrorSide, right: MirrorSide) -> bool:
     """Return whether one joint is the other rotated by half a turn, as in fingers of a gripper."""
     if left.body.parent != right.body.parent:
         return False
@@ -154,7 +154,7 @@ def limits_match(a: tuple[float, float], b: tuple[float, float], sign: int) -> b
     return all(abs(x - y) <= tolerance for x, y in zip(a, mirrored, strict=True))
 
 
-def has_opposite_axes(left: MirrorJoint, right: MirrorJoint) -> bool:
+def has_opposite_axes(left: MirrorSide, right: MirrorSide) -> bool:
     """Return whether two axes point in opposite directions, instead of in the same one."""
     return bool(left.axis @ right.axis < 0)
 

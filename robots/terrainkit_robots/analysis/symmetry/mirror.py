@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from terrainkit_robots.analysis.bodies.kinematics import joint_axis
 from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.transforms import Matrix
+
+Sign = Literal[-1, 0, 1]
 
 MAX_MIRROR_ERROR = 0.02
 """Distance of a joint from the mirror image of its counterpart, at most, over the size of the
@@ -52,7 +55,7 @@ class BodyPair:
     right: int
     """Index of the body on the negative side."""
 
-    sign: int
+    sign: Sign
     """+1 if equal joint positions are mirrored, -1 if opposite ones are, 0 if neither."""
 
 
@@ -80,14 +83,14 @@ class Mirror:
         """Index of the mirror image of each body that has one, by index."""
         return {p.left: p.right for p in self.pairs} | {p.right: p.left for p in self.pairs}
 
-    def counterpart(self, index: int) -> tuple[int, int] | None:
+    def counterpart(self, index: int) -> tuple[int, Sign] | None:
         """Return the index of the mirror image of a body, and the sign of the pair."""
         for pair in self.pairs:
             if index in (pair.left, pair.right):
                 return (pair.right if index == pair.left else pair.left), pair.sign
         return None
 
-    def joint_sign(self, joint: Joint, axis: Matrix, other: Matrix) -> int:
+    def joint_sign(self, joint: Joint, axis: Matrix, other: Matrix) -> Sign:
         """Return how two joints of a kind mirror each other.
 
         A reflection turns a rotation by q about an axis into a rotation by -q about the reflected
@@ -231,7 +234,7 @@ def swap_sides(name: str) -> str:
 
 def _pair_sign(
     mirror: Mirror, bodies: Sequence[Body], zero_poses: Sequence[Matrix], left: int, right: int
-) -> int:
+) -> Sign:
     """Return the sign of the joints of two bodies, 0 if they are not comparable."""
     a, b = bodies[left].joint, bodies[right].joint
     if a is None or b is None or a.kind != b.kind or not a.moves:

@@ -6,9 +6,9 @@ import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.kinematics import joint_axis
-from terrainkit_robots.analysis.symmetry.mirror import MAX_MIRROR_ERROR, Mirror
+from terrainkit_robots.analysis.symmetry.mirror import MAX_MIRROR_ERROR, Mirror, Sign
 from terrainkit_robots.description.model import Joint
-from terrainkit_robots.spec.robot_spec import Twin
+from terrainkit_robots.spec.robot_spec import MirrorJoint
 from terrainkit_robots.transforms import Matrix
 
 
@@ -17,7 +17,7 @@ def mirror_map(
     actuated: Sequence[Joint],
     mirror: Mirror,
     zero_poses: Sequence[Matrix],
-) -> dict[str, Twin]:
+) -> dict[str, MirrorJoint]:
     """Return the mirrored joint of each actuated joint that has one, by name.
 
     A joint in the mirror plane mirrors itself: with sign -1 if it yaws, with +1 if it pitches.
@@ -32,7 +32,7 @@ def mirror_map(
     points = np.array([pose[:3, 3] for pose in zero_poses]).reshape(-1, 3)
     size = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
     tolerance = max(MAX_MIRROR_ERROR * size, 1e-3)
-    found: dict[str, Twin] = {}
+    found: dict[str, MirrorJoint] = {}
     for body in bodies:
         joint = body.joint
         if joint is None or joint.name not in names:
@@ -41,15 +41,15 @@ def mirror_map(
         if counterpart is None:
             sign = _own_sign(mirror, body, zero_poses[body.index], tolerance)
             if sign:
-                found[joint.name] = Twin(joint=joint.name, sign=sign)
+                found[joint.name] = MirrorJoint(joint=joint.name, sign=sign)
             continue
         other, sign = bodies[counterpart[0]].joint, counterpart[1]
         if sign and other is not None and other.name in names:
-            found[joint.name] = Twin(joint=other.name, sign=sign)
+            found[joint.name] = MirrorJoint(joint=other.name, sign=sign)
     return {joint.name: found[joint.name] for joint in actuated if joint.name in found}
 
 
-def _own_sign(mirror: Mirror, body: Body, pose: Matrix, tolerance: float) -> int:
+def _own_sign(mirror: Mirror, body: Body, pose: Matrix, tolerance: float) -> Sign:
     """Return how a joint in the mirror plane mirrors itself, 0 for a joint outside of the plane."""
     assert body.joint is not None
     anchor, axis = joint_axis(body, pose)

@@ -8,13 +8,13 @@ import numpy as np
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.kinematics import joint_axis
 from terrainkit_robots.analysis.legs.legs import Leg
-from terrainkit_robots.analysis.symmetry.mirror import Mirror, swap_sides
+from terrainkit_robots.analysis.symmetry.mirror import Mirror, Sign, swap_sides
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.transforms import Matrix
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class MirrorJoint:
+class MirrorSide:
     """A joint of a pair and its body, all joints at 0, in the frame of the trunk."""
 
     body: Body
@@ -39,10 +39,10 @@ class MirrorJoint:
 class MirrorPair:
     """Two joints that are mirror images of each other, or are named so."""
 
-    left: MirrorJoint
-    right: MirrorJoint
+    left: MirrorSide
+    right: MirrorSide
 
-    sign: int
+    sign: Sign
     """+1 if equal positions are mirrored, -1 if opposite ones are, 0 if neither."""
 
     @property
@@ -86,7 +86,7 @@ def mirror_pairs(
 
 def _mirror_joint(
     bodies: Sequence[Body], zero_poses: Sequence[Matrix], mirror: Mirror, index: int
-) -> MirrorJoint | None:
+) -> MirrorSide | None:
     body, pose = bodies[index], zero_poses[index]
     if body.joint is None or body.parent is None:
         return None
@@ -95,7 +95,7 @@ def _mirror_joint(
     if parent.index not in mirror.counterparts:  # on the mirror plane
         origin = origin - (origin @ mirror.normal - mirror.offset) * mirror.normal
     point, axis = joint_axis(body, pose)
-    return MirrorJoint(
+    return MirrorSide(
         body=body,
         joint=body.joint,
         point=point,
@@ -106,13 +106,13 @@ def _mirror_joint(
 
 
 def outlier_first(
-    left: MirrorJoint,
-    right: MirrorJoint,
+    left: MirrorSide,
+    right: MirrorSide,
     value: Callable[[Body], Matrix | None],
     bodies: Sequence[Body],
     legs: Sequence[Leg],
     mirror: Mirror,
-) -> tuple[MirrorJoint, MirrorJoint]:
+) -> tuple[MirrorSide, MirrorSide]:
     """Return two mirrored joints, the one that deviates more from the legs on its side first.
 
     The right joint is first if there are no other legs to compare with.
@@ -130,7 +130,7 @@ def outlier_first(
     left_bodies = {pair.left for pair in mirror.pairs}
     right_bodies = {pair.right for pair in mirror.pairs}
 
-    def deviation(joint: MirrorJoint) -> float:
+    def deviation(joint: MirrorSide) -> float:
         own, side = value(joint.body), left_bodies if joint is left else right_bodies
         if own is None:
             return np.inf

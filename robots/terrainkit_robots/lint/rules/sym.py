@@ -25,7 +25,7 @@ from terrainkit_robots.analysis.symmetry.asymmetry import (
     has_opposite_axes,
     limits_match,
 )
-from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorJoint
+from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorSide
 from terrainkit_robots.description.model import Joint, Source
 from terrainkit_robots.lint.rule import Check, Measured, Violation, rule
 from terrainkit_robots.lint.rules.inr import (
@@ -95,7 +95,7 @@ def mass_asymmetry(robot: Facts) -> Iterator[Violation]:
         )
 
 
-def _have_masses(left: MirrorJoint, right: MirrorJoint) -> bool:
+def _have_masses(left: MirrorSide, right: MirrorSide) -> bool:
     """Return whether both bodies have valid masses; the INR rules report the others."""
     inertials = [link.inertial for joint in (left, right) for link in joint.body.links]
     masses = [inertial.mass for inertial in inertials if inertial is not None]
@@ -162,11 +162,11 @@ def com_asymmetry(robot: Facts) -> Iterator[Violation]:
         )
 
 
-def _com_error(robot: Facts, left: MirrorJoint, right: MirrorJoint) -> float:
+def _com_error(robot: Facts, left: MirrorSide, right: MirrorSide) -> float:
     return float(np.linalg.norm(robot.mirror.image(left.arm) - right.arm))
 
 
-def _max_com_error(left: MirrorJoint, right: MirrorJoint) -> float:
+def _max_com_error(left: MirrorSide, right: MirrorSide) -> float:
     radii = [
         math.sqrt(max(float(joint.body.principal[2]), 0.0) / joint.body.mass)
         for joint in (left, right)
@@ -201,7 +201,7 @@ def _features(robot: Facts, body: Body) -> Counter[tuple[object, ...]]:
     return Counter([*shapes, *mounts])
 
 
-def _is_merged(left: MirrorJoint, right: MirrorJoint) -> bool:
+def _is_merged(left: MirrorSide, right: MirrorSide) -> bool:
     """Return whether one of two bodies has several links with mass."""
     return any(
         sum(link.inertial is not None and bool(link.inertial.mass) for link in joint.body.links) > 1
@@ -265,7 +265,7 @@ def inertia_asymmetry(robot: Facts) -> Iterator[Violation]:
         )
 
 
-def _has_comparable_parts(robot: Facts, left: MirrorJoint, right: MirrorJoint) -> bool:
+def _has_comparable_parts(robot: Facts, left: MirrorSide, right: MirrorSide) -> bool:
     """Return whether merged bodies agree in mass and center of mass; else moments must differ."""
     if not _is_merged(left, right):
         return True
@@ -486,7 +486,7 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
 
 
 def _axis_violation(
-    left: MirrorJoint, right: MirrorJoint, message: str, measured: Measured
+    left: MirrorSide, right: MirrorSide, message: str, measured: Measured
 ) -> Violation:
     joint = right.joint
     return _violation(
@@ -554,7 +554,7 @@ class _Reported:
         violations = (violation for check in self._checks for violation in check(self._robot))
         return {violation.subject for violation in violations if violation.severity != "info"}
 
-    def has(self, left: MirrorJoint, right: MirrorJoint) -> bool:
+    def has(self, left: MirrorSide, right: MirrorSide) -> bool:
         """Return whether a link or joint of one of two bodies is reported."""
         names = {link.name for joint in (left, right) for link in joint.body.links}
         return not self._names.isdisjoint(names | {left.joint.name, right.joint.name})

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
-from terrainkit_robots.spec.robot_spec import Twin
+from terrainkit_robots.spec.robot_spec import MirrorJoint
 
 WAIST = """
 <robot name="r">
@@ -34,7 +34,7 @@ def waist(robot, axis, kind="revolute", y=0):
     ],
 )
 def test_a_joint_in_the_plane_is_its_own_twin(robot, axis, kind, sign):
-    assert waist(robot, axis, kind) == {"w": Twin(joint="w", sign=sign)}
+    assert waist(robot, axis, kind) == {"w": MirrorJoint(joint="w", sign=sign)}
 
 
 def test_a_joint_of_one_arm_has_no_twin(robot):
