@@ -20,6 +20,7 @@ COMMANDS = {
     "rule": "robot_commands",
     "onboard": "onboard_command",
     "train": "train_command",
+    "smoke-test": "smoke_test_command",
     "evaluate": "evaluate_command",
     "play": "play_command",
 }
@@ -76,7 +77,7 @@ def _put_aside(name: str) -> None:
 
 def _run(arguments: list[str]) -> int:
     from terrainkit import __version__
-    from terrainkit.errors import known_names, shorten
+    from terrainkit.text import known_names, shorten
 
     name = arguments[0] if arguments else "--help"
     if name in ("-h", "--help"):

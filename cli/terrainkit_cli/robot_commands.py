@@ -92,19 +92,10 @@ class CheckRobot(Command):
     diff: bool = False
     """Print the changes of --fix or --unsafe-fixes without writing them."""
 
-    train_smoke: bool = False
-    """In place of all that, see in seconds whether the robot can be trained: it starts on its feet,
-    stands, is rewarded, and learns a few times. FILE may also be a folder that terrainkit onboard
-    wrote, or any robot with a task. Exit code 1 if a check fails. As text or json."""
-
     def run(self) -> int:
         """Check each file and print the reports."""
         if not self.files:
             raise ConfigError("FILE is missing; expected robot files, quadruped or biped")
-        if self.train_smoke:
-            from terrainkit_cli.train_smoke import check_training
-
-            return check_training(self)
         if self.diff and self.format != "text":
             raise ConfigError(f"--diff prints a diff and cannot be combined with {self.format}")
         if len(self.files) > 1 and (self.against or self.spec):

@@ -5,13 +5,12 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.legs.effort import effort_of
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.spec.column import Column, rounded
 from terrainkit_robots.spec.robot_spec import MirrorJoint, Provenance
 
 if TYPE_CHECKING:
-    from terrainkit_robots.simulation.pd_gains import Gain
+    from terrainkit_robots.simulation.gain import Gain
 
 _DEFAULT_ERROR = {"revolute": 1.0, "prismatic": 0.1}
 """Position error at which a motor of unknown effort saturates [rad] or [m]."""
@@ -43,7 +42,7 @@ def derive_effort(
         gains: PD gains of each joint.
         mirror: The joint on the other side of each joint.
     """
-    in_file = {joint.name: _valid_limit(effort_of(robot, joint)) for joint in robot.actuated}
+    in_file = {joint.name: _valid_limit(robot.effort_limit(joint)) for joint in robot.actuated}
     torques = robot.stance.torques if robot.stance is not None else {}
     column = Column()
     for joint in robot.actuated:

@@ -8,7 +8,6 @@ import numpy as np
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.symmetry.mirror_map import mirror_map
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.onboarding.derive_spec import named_bodies
 from terrainkit_robots.onboarding.derive_spec.actuator_limits import (
@@ -23,7 +22,7 @@ from terrainkit_robots.spec.robot_spec import Provenance, RobotSpec
 from terrainkit_robots.text import names
 
 if TYPE_CHECKING:
-    from terrainkit_robots.simulation.pd_gains import Gain
+    from terrainkit_robots.simulation.gain import Gain
 
 _SOFT_LIMIT_FACTOR = 0.9
 """Share of the joint range within the soft limits, as in legged_gym and Isaac Lab."""
@@ -58,7 +57,7 @@ def derive_spec(
     missing = [joint.name for joint in facts.actuated if joint.name not in gains]
     if missing:
         raise ConfigError(f"gains of {names(missing)} are missing; expected all actuated joints")
-    mirror = mirror_map(facts)
+    mirror = facts.mirror_map
     columns = _columns(facts, gains)
     columns["effort"] = derive_effort(facts, gains, mirror)
     columns["velocity"] = derive_velocity(facts, mirror)

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.bodies import Placed
-from terrainkit_robots.analysis.bodies.contact import sole
+from terrainkit_robots.analysis.bodies.bodies import BodyShape
+from terrainkit_robots.analysis.bodies.contact import contact_points
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
-from terrainkit_robots.analysis.bodies.shapes import has_extent, lowest, reach
+from terrainkit_robots.analysis.bodies.shapes import has_bounds, min_height, support
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.transforms import Matrix
@@ -34,15 +34,15 @@ def _leg_radius(robot: Facts, leg: Leg, poses: Sequence[Matrix]) -> float:
     """Return the radius of one foot, or 0 if it is unknown."""
     body = robot.bodies[leg.limb.chain[-1]]
     pose = poses[body.index]
-    shapes = [shape for shape in body.collisions if has_extent(shape.geometry, robot.meshes)]
+    shapes = [shape for shape in body.collisions if has_bounds(shape.geometry, robot.meshes)]
     if not shapes:
         return 0.0
-    width = float(np.ptp(sole(body, pose, robot.meshes) @ leg.pitch))
-    touching = min(shapes, key=lambda shape: lowest(shape, pose, robot.meshes))
+    width = float(np.ptp(contact_points(body, pose, robot.meshes) @ leg.pitch))
+    touching = min(shapes, key=lambda shape: min_height(shape, pose, robot.meshes))
     return max(width / 2, _rolling_radius(robot, touching, pose, leg.pitch))
 
 
-def _rolling_radius(robot: Facts, shape: Placed, pose: Matrix, axis: Matrix) -> float:
+def _rolling_radius(robot: Facts, shape: BodyShape, pose: Matrix, axis: Matrix) -> float:
     """Return the radius on which a shape rolls about an axis; 0 for a flat sole."""
     geometry, rotation = shape.geometry, (pose @ shape.pose)[:3, :3]
     match geometry.shape:
@@ -51,5 +51,5 @@ def _rolling_radius(robot: Facts, shape: Placed, pose: Matrix, axis: Matrix) -> 
         case "cylinder" if abs(rotation[2, 2]) < _MAX_AXIS_Z:
             return geometry.size[0]
         case "ellipsoid":
-            return reach(geometry, rotation.T @ axis, robot.meshes)
+            return support(geometry, rotation.T @ axis, robot.meshes)
     return 0.0

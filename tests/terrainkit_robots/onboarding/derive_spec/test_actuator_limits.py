@@ -1,7 +1,6 @@
 import pytest
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.symmetry.mirror_map import mirror_map
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.onboarding.derive_spec.actuator_limits import (
     derive_action_scale,
@@ -25,14 +24,14 @@ def with_first_limit(bundled, tmp_path, *, limit):
 
 def test_derive_effort_from_file(bundled, gains):
     facts = bundled("quadruped.urdf")
-    column = derive_effort(facts, gains(facts), mirror_map(facts))
+    column = derive_effort(facts, gains(facts), facts.mirror_map)
     assert column.values["FR_calf_joint"] == 45.43
     assert dict(column.provenance("effort"))["effort"].reason == "in quadruped.urdf"
 
 
 def test_derive_effort_from_mirror_joint(bundled, gains, tmp_path):
     facts = with_first_limit(bundled, tmp_path, limit='<limit lower="-1" upper="1"/>')
-    twins = mirror_map(facts)
+    twins = facts.mirror_map
     effort = derive_effort(facts, gains(facts), twins)
     speed = derive_velocity(facts, twins)
     assert effort.values["FL_hip_joint"] == 23.7
@@ -46,7 +45,7 @@ def test_derive_effort_from_mirror_joint(bundled, gains, tmp_path):
 
 def test_derive_effort_from_stiffness_or_torque(bundled, gains, tmp_path):
     facts = bundled("quadruped.urdf", (HIP, ""), tmp_path=tmp_path)
-    twins = mirror_map(facts)
+    twins = facts.mirror_map
     column = derive_effort(facts, gains(facts, stiffness=40.0), twins)
     assert column.values["FL_hip_joint"] == 40.0
     assert "the stiffness at an error of 1 rad" in column.origins["FL_hip_joint"].reason
@@ -82,7 +81,7 @@ def test_derive_armature_from_file_or_gains(bundled, gains):
 )
 def test_derive_action_scale_from_effort(bundled, gains, stiffness, scale, reason):
     facts = bundled("quadruped.urdf")
-    gain, twins = gains(facts, stiffness=stiffness), mirror_map(facts)
+    gain, twins = gains(facts, stiffness=stiffness), facts.mirror_map
     effort, velocity = derive_effort(facts, gain, twins), derive_velocity(facts, twins)
     column = derive_action_scale(facts, gain, effort, velocity)
     assert column.values["FL_hip_joint"] == pytest.approx(scale, rel=0.01)
@@ -93,7 +92,7 @@ def test_derive_action_scale_of_short_range(bundled, gains, tmp_path):
     facts = with_first_limit(
         bundled, tmp_path, limit='<limit lower="-0.1" upper="0.1" effort="23.7" velocity="30.1"/>'
     )
-    gain, twins = gains(facts, stiffness=10.0), mirror_map(facts)
+    gain, twins = gains(facts, stiffness=10.0), facts.mirror_map
     effort, velocity = derive_effort(facts, gain, twins), derive_velocity(facts, twins)
     column = derive_action_scale(facts, gain, effort, velocity)
     assert column.values["FL_hip_joint"] == pytest.approx(0.05)
