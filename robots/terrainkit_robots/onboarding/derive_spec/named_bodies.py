@@ -80,7 +80,7 @@ def _is_upper(robot: Facts, body: Body) -> bool:
     """
     if body.index in robot.leg_bodies or body.virtual or not body.collisions:
         return False
-    if robot.mirror.counterpart(body.index) is not None:
+    if robot.mirror.image_body(body.index) is not None:
         return False
     carried = _carried(robot, body.index)
     pairs = robot.mirror.pairs
