@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from terrainkit.curriculum import update_levels
     from terrainkit.errors import TerrainkitError, TerrainkitWarning
     from terrainkit.generation import generate
-    from terrainkit.patch import Patch, tile
+    from terrainkit.patch import Patch, make_patch
     from terrainkit.terrain_map import TerrainMap
 
 __all__ = [
@@ -26,8 +26,8 @@ __all__ = [
     "TerrainkitError",
     "TerrainkitWarning",
     "generate",
+    "make_patch",
     "read_config",
-    "tile",
     "update_levels",
 ]
 __version__ = "0.1.0"
@@ -41,7 +41,7 @@ _MODULES = {
     "TerrainkitWarning": "errors",
     "generate": "generation",
     "read_config": "config_text",
-    "tile": "patch",
+    "make_patch": "patch",
     "update_levels": "curriculum",
 }
 """Module of each public name, so that only those in use are imported: a robot needs no terrain."""

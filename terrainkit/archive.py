@@ -14,13 +14,13 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.capacity import require_memory
 from terrainkit.errors import MapFileError, TerrainkitError
+from terrainkit.memory import check_memory
 
-_LONGEST_HEADER = 10_000
+MAX_HEADER_BYTES = 10_000
 """Most that a header may take [bytes]; those of numpy's own take a hundred."""
 
-LONGEST_TEXT = 64 << 20
+MAX_TEXT_BYTES = 64 << 20
 """Most that a text may take [bytes]."""
 
 
@@ -37,7 +37,7 @@ def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
 
 
 @contextmanager
-def opened(name: str | Path) -> Iterator["Archive"]:
+def open_archive(name: str | Path) -> Iterator["Archive"]:
     """Yield the .npz file `name`.
 
     Raises:
@@ -69,7 +69,7 @@ class _Capped:
     def read(self, size: int) -> bytes:
         """Return the next `size` bytes, or raise ValueError if they reach too far."""
         if size > self._left:
-            raise ValueError(f"its header is longer than {_LONGEST_HEADER} bytes")
+            raise ValueError(f"its header is longer than {MAX_HEADER_BYTES} bytes")
         self._left -= size
         return self._file.read(size)
 
@@ -121,7 +121,7 @@ class Archive:
         shape: tuple[int | None, ...],
         limit: int | None,
     ) -> None:
-        start: Any = _Capped(member, _LONGEST_HEADER)
+        start: Any = _Capped(member, MAX_HEADER_BYTES)
         version = np.lib.format.read_magic(start)
         read = {
             (1, 0): np.lib.format.read_array_header_1_0,
@@ -145,7 +145,7 @@ class Archive:
         needed = math.prod(found) * dtype.itemsize
         if limit is not None and needed > limit:
             raise MapFileError(f"{self.path}: {key} takes {needed} bytes; {limit} at most")
-        require_memory(needed, f"{key} in {self.path}")
+        check_memory(needed, f"{key} in {self.path}")
 
     def expect(self, key: str, wanted: float | tuple[float, ...]) -> None:
         """Raise MapFileError unless the numbers under `key` are those that the config says."""
@@ -155,7 +155,7 @@ class Archive:
                 f"{self.path}: {key} is {found.tolist()}, but its config says {wanted}"
             )
 
-    def text(self, key: str, *, limit: int = LONGEST_TEXT) -> str:
+    def text(self, key: str, *, limit: int = MAX_TEXT_BYTES) -> str:
         """Return the text under `key`, which may take `limit` bytes."""
         return str(self.array(key, "U", (), limit=limit))
 

@@ -9,7 +9,7 @@ import numpy as np
 from terrainkit import registry
 from terrainkit.coerce import coerce
 from terrainkit.errors import ConfigError
-from terrainkit.parameter import LARGEST, Range, Value
+from terrainkit.parameter import MAX_VALUE, Range, Value
 from terrainkit.terrain import Terrain
 
 
@@ -38,9 +38,9 @@ class TerrainChoice:
             object.__setattr__(self, name, coerce(name, getattr(self, name), kind))
         if not self.name:
             object.__setattr__(self, "name", self.terrain)
-        if not 0 <= self.proportion <= LARGEST:
+        if not 0 <= self.proportion <= MAX_VALUE:
             raise ConfigError(
-                f"{self.name}: proportion is {self.proportion:g}; wanted 0 to {LARGEST:g}"
+                f"{self.name}: proportion is {self.proportion:g}; wanted 0 to {MAX_VALUE:g}"
             )
         if not isinstance(self.parameters, Mapping):
             raise ConfigError(f"{self.name}: parameters is {self.parameters!r}; wanted a mapping")
@@ -52,7 +52,7 @@ class TerrainChoice:
 
     def at(self, difficulty: float) -> Terrain:
         """Return the terrain at `difficulty`, 0 to 1."""
-        return registry.find(self.terrain).at(difficulty, self.parameters)
+        return registry.get_terrain(self.terrain).at(difficulty, self.parameters)
 
 
 def _plain(value: Any) -> Any:

@@ -10,27 +10,27 @@ from terrainkit.choice import TerrainChoice
 from terrainkit.coerce import coerce
 from terrainkit.errors import ConfigError, listing
 from terrainkit.grid import Grid, whole_cells
-from terrainkit.parameter import LARGEST
+from terrainkit.parameter import MAX_VALUE
 
-_MOST_CELLS = 10**6
+MAX_CELLS = 10**6
 """Cells along a side of a map, beyond which no memory is large enough to ask about it."""
 
 _BOUNDS: dict[str, tuple[float, float]] = {
-    "rows": (1, LARGEST),
-    "cols": (1, LARGEST),
-    "patch_size": (1e-4, LARGEST),
-    "cell": (1e-4, LARGEST),
-    "border": (0, LARGEST),
+    "rows": (1, MAX_VALUE),
+    "cols": (1, MAX_VALUE),
+    "patch_size": (1e-4, MAX_VALUE),
+    "cell": (1e-4, MAX_VALUE),
+    "border": (0, MAX_VALUE),
     "difficulty_range": (0, 1),
     "difficulty_jitter": (0, 1),
     "random_difficulties": (0, 1),
     "selected_difficulty": (0, 1),
     "seed": (0, 2**63 - 1),
-    "slope_threshold": (1e-4, LARGEST),
-    "spawn_radius": (1e-4, LARGEST),
-    "spawn_tolerance": (0, LARGEST),
-    "static_friction": (0, LARGEST),
-    "dynamic_friction": (0, LARGEST),
+    "slope_threshold": (1e-4, MAX_VALUE),
+    "spawn_radius": (1e-4, MAX_VALUE),
+    "spawn_tolerance": (0, MAX_VALUE),
+    "static_friction": (0, MAX_VALUE),
+    "dynamic_friction": (0, MAX_VALUE),
     "restitution": (0, 1),
 }
 """Least and most that a field, or each number of it, may be."""
@@ -59,7 +59,7 @@ class MapConfig:
     """Distance between two samples [m]; must divide the patch and the border."""
 
     border: float = 25.0
-    """Width of the level ground around the patches [m]."""
+    """Width of the level ground neighborhood the patches [m]."""
 
     preset: str = "legged_gym"
     """Mix of terrains by name: legged_gym, rough, stairs or all."""
@@ -94,7 +94,7 @@ class MapConfig:
     """Grade between two samples above which the ground is a vertical wall; None for no walls."""
 
     spawn_radius: float = 0.5
-    """Radius of the free, level disc around each spawn origin [m]."""
+    """Radius of the free, level disc neighborhood each spawn origin [m]."""
 
     spawn_tolerance: float = 0.01
     """Largest difference in height within that disc [m]."""
@@ -120,7 +120,7 @@ class MapConfig:
     @cached_property
     def mix(self) -> tuple[TerrainChoice, ...]:
         """The terrains in use: one's own, or the preset's."""
-        return self.terrains or presets.find(self.preset)
+        return self.terrains or presets.get_preset(self.preset)
 
     @property
     def contact(self) -> dict[str, float]:
@@ -192,9 +192,9 @@ class MapConfig:
 
     def _check_grid(self) -> None:
         for axis, cells in zip("xy", self.grid.shape, strict=True):
-            if cells > _MOST_CELLS:
+            if cells > MAX_CELLS:
                 raise ConfigError(
-                    f"the map has {cells:.7g} cells along {axis}; wanted at most {_MOST_CELLS}"
+                    f"the map has {cells:.7g} cells along {axis}; wanted at most {MAX_CELLS}"
                 )
 
     def _check_mix(self) -> None:

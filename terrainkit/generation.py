@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import registry
-from terrainkit.capacity import require_memory
 from terrainkit.config import MapConfig
 from terrainkit.errors import TerrainkitWarning, listing
 from terrainkit.layout import assign_patch, terrain_columns
+from terrainkit.memory import check_memory
 from terrainkit.parameter import parameters_of
 from terrainkit.patch import Parameters, build_patch
 from terrainkit.terrain_map import TerrainMap
@@ -34,11 +34,11 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
 
     Raises:
         ConfigError: if a terrain does not fit in a patch, or leaves no room to spawn.
-        CapacityError: if the map would not fit in memory; nothing was allocated.
+        MemoryLimitError: if the map would not fit in memory; nothing was allocated.
     """
     grid, mix = config.grid, config.mix
     size = (config.rows, config.cols)
-    require_memory(_bytes_needed(config), f"a map of {grid.shape[0]} x {grid.shape[1]} samples")
+    check_memory(_bytes_needed(config), f"a map of {grid.shape[0]} x {grid.shape[1]} samples")
     columns = terrain_columns(config)
     heights = np.zeros(grid.shape, dtype=np.float32)
     origins = np.empty((*size, 3), dtype=np.float32)
@@ -72,7 +72,7 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
 def _warn_of_deviations(
     config: MapConfig, kinds: NDArray[np.int32], parameters: NDArray[np.object_]
 ) -> None:
-    known = [parameters_of(registry.find(choice.terrain)) for choice in config.mix]
+    known = [parameters_of(registry.get_terrain(choice.terrain)) for choice in config.mix]
     counts: Counter[str] = Counter()
     records: list[Parameters] = parameters.ravel().tolist()
     for kind, record in zip(kinds.flat, records, strict=True):
@@ -100,7 +100,7 @@ def _warn_of_moved_spawns(
     records: list[Parameters] = parameters.ravel().tolist()
     for (row, col), record in zip(np.ndindex(*kinds.shape), records, strict=True):
         choice = config.mix[kinds[row, col]]
-        terrain = registry.find(choice.terrain)(**record.requested)
+        terrain = registry.get_terrain(choice.terrain)(**record.requested)
         wanted = terrain.spawn(config.patch_grid(row, col))
         if np.abs(origins[row, col, :2] - wanted).max() > config.cell:
             counts[choice.name] += 1

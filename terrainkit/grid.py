@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 
-_WHOLE = 1e-5
+_CELL_TOLERANCE = 1e-5
 """How far from a whole number of cells a size may be, for sizes that floats cannot hold (0.1)."""
 
 
@@ -61,7 +61,7 @@ class Grid:
 
         Truncating instead is how a gap of 0.3 m becomes one of 0.2 m: 0.3 / 0.1 is 2.999...
         """
-        return max(least, math.floor(length / self.cell + 0.5 + _WHOLE))
+        return max(least, math.floor(length / self.cell + 0.5 + _CELL_TOLERANCE))
 
     def length(self, count: int) -> float:
         """Return `count` cells in metres, to the nanometre: 3 cells of 0.1 m are 0.3 m."""
@@ -77,10 +77,10 @@ class Grid:
 
     def _centered(self, size: float, k: int) -> int:
         odd = self.shape[k] % 2
-        return max(0, 2 * math.floor((size / self.cell - odd) / 2 + 0.5 + _WHOLE) + odd)
+        return max(0, 2 * math.floor((size / self.cell - odd) / 2 + 0.5 + _CELL_TOLERANCE) + odd)
 
     def rings(self, inner: tuple[int, int]) -> NDArray[np.int64]:
-        """Return in which ring around the centered block `inner` each cell lies, shape `shape`.
+        """Return in which ring neighborhood the centered block `inner` each cell lies, shape `shape`.
 
         0 is the block itself, 1 the cells that touch its sides or corners, and so on.
         """
@@ -110,7 +110,7 @@ def whole_cells(name: str, length: float, cell: float, *, least: int = 1) -> int
     if not math.isfinite(count):
         raise ConfigError(f"{name} {length:g} m cannot be counted in cells of {cell:g} m")
     nearest = round(count)
-    if nearest < least or abs(count - nearest) > _WHOLE + 1e-9 * count:
+    if nearest < least or abs(count - nearest) > _CELL_TOLERANCE + 1e-9 * count:
         low = max(least, math.floor(count))
         raise ConfigError(
             f"{name} {length:g} m is not a whole number of cells of {cell:g} m; "

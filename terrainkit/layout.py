@@ -11,16 +11,16 @@ _LAYOUT_STREAM = (1,)
 """Sets a patch's layout draws apart from those that its terrain makes from the same numbers."""
 
 
-def apportion(proportions: list[float], seats: int) -> list[int]:
-    """Return how many of `seats` each proportion gets, by largest remainder (Hamilton's method).
+def allocate_columns(proportions: list[float], num_columns: int) -> list[int]:
+    """Return how many of `num_columns` each proportion gets, by largest remainder (Hamilton's method).
 
-    The counts sum to `seats`; each is its exact share rounded down or up. Ties go to the earlier.
+    The counts sum to `num_columns`; each is its exact share rounded down or up. Ties go to the earlier.
     """
-    shares = np.array(proportions) / sum(proportions) * seats
+    shares = np.array(proportions) / sum(proportions) * num_columns
     counts = np.floor(shares).astype(int)
     # Rounded, so that remainders that are equal on paper tie and do not hang on the last bit.
     remainders = np.round(shares - counts, 9)
-    for k in np.argsort(-remainders, kind="stable")[: seats - counts.sum()]:
+    for k in np.argsort(-remainders, kind="stable")[: num_columns - counts.sum()]:
         counts[k] += 1
     return [int(n) for n in counts]
 
@@ -35,12 +35,12 @@ def terrain_columns(config: MapConfig) -> list[int]:
         ConfigError: if a terrain of a mix of one's own gets no column.
     """
     mix = config.mix
-    counts = apportion([choice.proportion for choice in mix], config.cols)
-    starved = [c.name for c, n in zip(mix, counts, strict=True) if n == 0 and c.proportion > 0]
-    if starved and config.mode != "randomized":
+    counts = allocate_columns([choice.proportion for choice in mix], config.cols)
+    missing = [c.name for c, n in zip(mix, counts, strict=True) if n == 0 and c.proportion > 0]
+    if missing and config.mode != "randomized":
         message = (
             f"{config.cols} columns are too few for {len(mix)} terrains at these proportions: "
-            f"no column for {listing(starved)}"
+            f"no column for {listing(missing)}"
         )
         if config.terrains:
             raise ConfigError(message)

@@ -1,4 +1,4 @@
-"""Noise on a coarse lattice, interpolated to the cells of a patch."""
+"""Noise on a coarse node_grid, interpolated to the cells of a patch."""
 
 import math
 from dataclasses import dataclass
@@ -14,8 +14,8 @@ STEP = 0.005
 
 
 @dataclass(frozen=True, kw_only=True)
-class LatticeNoise:
-    """Uniform noise drawn at the nodes of a lattice, like Isaac Gym's `random_uniform_terrain`.
+class ValueNoise:
+    """Uniform noise drawn at the nodes of a node_grid, like Isaac Gym's `random_uniform_terrain`.
 
     A whole number of intervals spans the patch, and a whole number of steps the amplitude.
     """
@@ -29,24 +29,24 @@ class LatticeNoise:
     spacing: float
     """Distance between two nodes [m]."""
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.float64]:
-        """Return the noise [m], shape `plot.shape`; interpolated bilinearly between nodes.
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.float64]:
+        """Return the noise [m], shape `grid.shape`; interpolated bilinearly between nodes.
 
         How many draws it takes, and their pattern, depend on the spacing alone.
         """
-        x, y = self._intervals(plot)
+        x, y = self._intervals(grid)
         nodes = rng.random((x + 1, y + 1))
         if self._levels is None:
             nodes = (2 * nodes - 1) * self.amplitude
         else:
             nodes = (np.floor(nodes * (2 * self._levels + 1)) - self._levels) * self.step
         for k in (0, 1):
-            nodes = _interpolate(nodes, plot.shape[k], axis=k)
+            nodes = _interpolate(nodes, grid.shape[k], axis=k)
         return nodes
 
-    def realized(self, plot: Grid) -> dict[str, Realized]:
-        """Return amplitude and spacing as they are on `plot`."""
-        counts = zip(plot.size, self._intervals(plot), strict=True)
+    def realized(self, grid: Grid) -> dict[str, Realized]:
+        """Return amplitude and spacing as they are on `grid`."""
+        counts = zip(grid.size, self._intervals(grid), strict=True)
         x, y = (round(extent / count, 9) for extent, count in counts)
         largest = self.amplitude if self._levels is None else round(self._levels * self.step, 9)
         return {"amplitude": largest, "spacing": x if x == y else (x, y)}
@@ -57,10 +57,10 @@ class LatticeNoise:
             return None
         return math.floor(self.amplitude / self.step + 1e-9)  # the margin is for 0.05 / 0.005
 
-    def _intervals(self, plot: Grid) -> tuple[int, int]:
+    def _intervals(self, grid: Grid) -> tuple[int, int]:
         # Nodes closer than the cells would be drawn and never seen.
-        spacing = max(self.spacing, plot.cell)
-        x, y = (max(1, math.floor(extent / spacing + 0.5 + 1e-9)) for extent in plot.size)
+        spacing = max(self.spacing, grid.cell)
+        x, y = (max(1, math.floor(extent / spacing + 0.5 + 1e-9)) for extent in grid.size)
         return x, y
 
 

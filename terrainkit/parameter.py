@@ -20,7 +20,7 @@ Range = tuple[float, float]
 Realized = float | int | bool | tuple[float, float]
 
 
-LARGEST = 1e6
+MAX_VALUE = 1e6
 """Largest number that a parameter takes: far beyond any ground, and far from overflow."""
 
 _MOST = 10_000
@@ -57,12 +57,12 @@ class Parameter:
         """Return the default at `difficulty`, 0 to 1."""
         return at_difficulty((self.easy, self.hard), difficulty)
 
-    def realized(self, value: Value, plot: Grid) -> Realized:
-        """Return what the cells of `plot` make of `value`: a pair (x, y) where the axes differ."""
+    def realized(self, value: Value, grid: Grid) -> Realized:
+        """Return what the cells of `grid` make of `value`: a pair (x, y) where the axes differ."""
         if self.snap == "cells":
-            return plot.length(plot.cells(value, least=0 if self.zero else 1))
+            return grid.length(grid.cells(value, least=0 if self.zero else 1))
         if self.snap == "centered":
-            x, y = (plot.length(count) for count in plot.centered(value))
+            x, y = (grid.length(count) for count in grid.centered(value))
             return x if x == y else (x, y)
         return value
 
@@ -153,7 +153,7 @@ def checked(owner: str, name: str, value: object, parameter: Parameter) -> Value
         parameter: What is known of it.
     """
     number: Value = coerce(f"{owner}: {name}", value, type(parameter.easy))
-    most = LARGEST if isinstance(number, float) else _MOST
+    most = MAX_VALUE if isinstance(number, float) else _MOST
     if not 0 <= number <= most or (number == 0 and not parameter.zero):
         least = "0" if parameter.zero else "above 0"
         raise ConfigError(f"{owner}: {name} is {number:g}; wanted {least} to {most:g}")

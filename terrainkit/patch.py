@@ -49,7 +49,7 @@ class Patch:
     """Spawn origin (x, y, z) [m], shape (3,)."""
 
 
-def tile(config: MapConfig, row: int, col: int) -> Patch:
+def make_patch(config: MapConfig, row: int, col: int) -> Patch:
     """Return patch (row, col) of the map of `config`, without making the rest.
 
     Raises:
@@ -69,7 +69,7 @@ def build_patch(
     The draws come from the seed, the row and the column alone, so the patch has the same bytes in
     whatever order, process or company it is built.
     """
-    from terrainkit.spawn import find_spawn, room_error
+    from terrainkit.spawn import find_spawn, no_spawn_error
 
     terrain = choice.at(difficulty)
     _refuse_walls(terrain, config)
@@ -85,7 +85,7 @@ def build_patch(
         threshold=config.wall_threshold,
     )
     if origin is None:
-        raise room_error(choice.name, grid, config.spawn_radius, config.spawn_tolerance)
+        raise no_spawn_error(choice.name, grid, config.spawn_radius, config.spawn_tolerance)
     return Patch(
         terrain=choice.name,
         difficulty=difficulty,

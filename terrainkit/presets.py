@@ -25,28 +25,28 @@ _MIXES = {
 """Proportion of each terrain, by preset."""
 
 
-def names() -> tuple[str, ...]:
+def preset_names() -> tuple[str, ...]:
     """Return the name of each preset."""
     return (*_MIXES, "all")
 
 
-def find(name: str) -> tuple[TerrainChoice, ...]:
+def get_preset(name: str) -> tuple[TerrainChoice, ...]:
     """Return the mix called `name`; "all" holds each terrain, upright and inverted, once.
 
     Raises:
         ConfigError: if there is none, listing those that exist.
     """
-    if name not in names():
-        raise ConfigError(f"no preset {name!r}; there are: {listing(names())}")
+    if name not in preset_names():
+        raise ConfigError(f"no preset {name!r}; there are: {listing(preset_names())}")
     mix = dict.fromkeys(_all(), 1.0) if name == "all" else _MIXES[name]
     return tuple(_choice(terrain, proportion) for terrain, proportion in mix.items())
 
 
 def _all() -> list[str]:
     mix = []
-    for terrain in registry.names():
+    for terrain in registry.terrain_names():
         mix.append(terrain)
-        if "inverted" in parameters_of(registry.find(terrain)):
+        if "inverted" in parameters_of(registry.get_terrain(terrain)):
             mix.append(terrain + registry.INVERTED)
     return mix
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.atomic import atomic_write
+from terrainkit.atomic_write import atomic_write
 from terrainkit.errors import ExportError
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ _PAPER = (250, 249, 246)
 _MARGIN = (250, 60, 30, 70)
 """Paper to the left, below, to the right and above the ground [px]."""
 
-_MOST_PIXELS = 10_000
+MAX_PIXELS = 10_000
 """Largest side of the ground in a picture [px]."""
 
 _LINE, _WORD = 18, 80
@@ -61,8 +61,8 @@ def write_preview(
     path = Path(path)
     if path.suffix.lower() != ".png":
         raise ExportError(f"a preview is a .png; got {path}")
-    if not 100 <= width <= _MOST_PIXELS:
-        raise ExportError(f"width is {width}; wanted 100 to {_MOST_PIXELS}")
+    if not 100 <= width <= MAX_PIXELS:
+        raise ExportError(f"width is {width}; wanted 100 to {MAX_PIXELS}")
     terrain_map.require_finite()
     with atomic_write(path, overwrite=overwrite) as temporary:
         _, data = cv2.imencode(".png", cv2.cvtColor(preview(terrain_map, width), cv2.COLOR_RGB2BGR))
@@ -76,11 +76,11 @@ def preview(terrain_map: "TerrainMap", width: int = 1600) -> Picture:
     cell = terrain_map.config.cell
     extent = heights.shape[0] * cell
     # A map that is much higher than wide gets a picture that is narrower than asked.
-    width = max(1, min(width, _MOST_PIXELS * heights.shape[0] // heights.shape[1]))
+    width = max(1, min(width, MAX_PIXELS * heights.shape[0] // heights.shape[1]))
     if heights.shape[0] > width:
-        heights, cell = _shrunk(heights, width), extent / width
+        heights, cell = _downsample(heights, width), extent / width
     # Downwards rows, and every sample a square of whole pixels.
-    factor = max(1, min(-(-width // heights.shape[0]), _MOST_PIXELS // max(heights.shape)))
+    factor = max(1, min(-(-width // heights.shape[0]), MAX_PIXELS // max(heights.shape)))
     ground = (
         relief(heights, cell).swapaxes(0, 1)[::-1].repeat(factor, axis=0).repeat(factor, axis=1)
     )
@@ -133,7 +133,7 @@ def _without_border(
     return heights, (lower[0] + cut * config.cell, lower[1] + cut * config.cell)
 
 
-def _shrunk(heights: NDArray[np.float32], width: int) -> NDArray[np.float32]:
+def _downsample(heights: NDArray[np.float32], width: int) -> NDArray[np.float32]:
     """Return the heights averaged over fewer samples, `width` along x."""
     import cv2
 

@@ -36,24 +36,24 @@ def rectangle_cover(wanted: Mask, allowed: Mask) -> list[Span]:
             spans.append((i0, i1, j0, j1))
             continue
         inside = labels[i0:i1, j0:j1] == k
-        part = _cover_part(wanted[i0:i1, j0:j1] & inside, inside)
+        part = _cover_component(wanted[i0:i1, j0:j1] & inside, inside)
         spans += [(i0 + a, i0 + b, j0 + c, j0 + d) for a, b, c, d in part]
     return spans
 
 
-def _cover_part(wanted: Mask, allowed: Mask) -> list[Span]:
+def _cover_component(wanted: Mask, allowed: Mask) -> list[Span]:
     # Rows and columns that repeat the one before add nothing but work.
     x, y = _changes(wanted, allowed, axis=0), _changes(wanted, allowed, axis=1)
     corner = np.ix_(x[:-1], y[:-1])
-    candidates = np.array(list(_largest_rectangles(allowed[corner])))
+    candidates = np.array(list(_maximal_rectangles(allowed[corner])))
     area = np.outer(np.diff(x), np.diff(y))
     missing = np.where(wanted[corner], area, 0)
     chosen: list[NDArray[np.int64]] = []
     while missing.any():
-        i0, i1, j0, j1 = chosen_one = candidates[np.argmax(_sums(missing, candidates))]
+        i0, i1, j0, j1 = chosen_one = candidates[np.argmax(_span_sums(missing, candidates))]
         missing[i0:i1, j0:j1] = 0
         chosen.append(chosen_one)
-    kept = _needed(np.array(chosen), wanted[corner])
+    kept = _drop_redundant(np.array(chosen), wanted[corner])
     return [(int(x[a]), int(x[b]), int(y[c]), int(y[d])) for a, b, c, d in kept]
 
 
@@ -63,7 +63,7 @@ def _changes(wanted: Mask, allowed: Mask, axis: int) -> NDArray[np.int64]:
     return np.concatenate([[0], np.flatnonzero(differ) + 1, [wanted.shape[axis]]])
 
 
-def _largest_rectangles(allowed: Mask) -> Iterator[Span]:
+def _maximal_rectangles(allowed: Mask) -> Iterator[Span]:
     """Yield the rectangles within `allowed` that cannot grow in any direction."""
     rows = len(allowed)
     empty = np.zeros(allowed.shape[1], dtype=bool)
@@ -81,7 +81,7 @@ def _largest_rectangles(allowed: Mask) -> Iterator[Span]:
                     yield i0, i1, int(j0), int(j1)
 
 
-def _sums(values: NDArray[np.int64], spans: NDArray[np.int64]) -> NDArray[np.int64]:
+def _span_sums(values: NDArray[np.int64], spans: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the sum of `values` within each span, from a summed-area table."""
     table = np.zeros((values.shape[0] + 1, values.shape[1] + 1), dtype=np.int64)
     table[1:, 1:] = values.cumsum(axis=0).cumsum(axis=1)
@@ -90,7 +90,7 @@ def _sums(values: NDArray[np.int64], spans: NDArray[np.int64]) -> NDArray[np.int
     return sums
 
 
-def _needed(spans: NDArray[np.int64], wanted: Mask) -> NDArray[np.int64]:
+def _drop_redundant(spans: NDArray[np.int64], wanted: Mask) -> NDArray[np.int64]:
     """Return the spans without those whose wanted cells others hold, smallest tried first."""
     depth = np.zeros(wanted.shape, dtype=np.int64)
     for i0, i1, j0, j1 in spans:

@@ -23,12 +23,12 @@ INVERTED = "_inverted"
 
 
 @cache
-def names() -> tuple[str, ...]:
+def terrain_names() -> tuple[str, ...]:
     """Return the name of each terrain of ours, in alphabetical order; imports none of them."""
     return tuple(sorted(module.name for module in pkgutil.iter_modules(terrains.__path__)))
 
 
-def plugins() -> dict[str, "EntryPoint"]:
+def plugin_terrains() -> dict[str, "EntryPoint"]:
     """Return the entry point of each terrain that another installed package brings, by name."""
     from importlib.metadata import entry_points
 
@@ -36,20 +36,24 @@ def plugins() -> dict[str, "EntryPoint"]:
 
 
 @cache
-def find(name: str) -> type[Terrain]:
+def get_terrain(name: str) -> type[Terrain]:
     """Return the terrain called `name`; ours go before those of other packages.
 
     Raises:
         ConfigError: if there is none, listing those that exist.
     """
-    if name in names():
-        return _ours(name)
-    others = plugins()
+    if name in terrain_names():
+        return _own_terrain(name)
+    others = plugin_terrains()
     if name not in others:
         upright = name.removesuffix(INVERTED)
-        if upright != name and upright in names() and "inverted" in parameters_of(find(upright)):
+        if (
+            upright != name
+            and upright in terrain_names()
+            and "inverted" in parameters_of(get_terrain(upright))
+        ):
             raise ConfigError(f"no terrain {name!r}; it is {upright} with inverted = true")
-        raise ConfigError(f"no terrain {name!r}; there are: {listing([*names(), *others])}")
+        raise ConfigError(f"no terrain {name!r}; there are: {listing([*terrain_names(), *others])}")
     try:
         found = others[name].load()
     except (ImportError, AttributeError) as error:
@@ -61,7 +65,7 @@ def find(name: str) -> type[Terrain]:
     return found
 
 
-def _ours(name: str) -> type[Terrain]:
+def _own_terrain(name: str) -> type[Terrain]:
     module = importlib.import_module(f"{terrains.__name__}.{name}")
     found = [
         value

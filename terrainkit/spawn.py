@@ -12,7 +12,7 @@ from terrainkit.surface import surface_at
 
 def find_spawn(
     heights: NDArray[np.float32],
-    plot: Grid,
+    grid: Grid,
     wanted: tuple[float, float],
     *,
     radius: float,
@@ -25,17 +25,17 @@ def find_spawn(
     others by `tolerance` at most, so the disc is level and no wall or step reaches into it.
 
     Args:
-        heights: Heights on `plot` [m], shape `plot.shape`.
-        plot: Grid of the patch; the disc stays inside it.
+        heights: Heights on `grid` [m], shape `grid.shape`.
+        grid: Grid of the patch; the disc stays inside it.
         wanted: Where the terrain would like the origin, x and y [m].
         radius: Radius of the disc [m].
         tolerance: Largest difference in height within it [m].
         threshold: Difference between neighbours above which there is a wall [m].
     """
-    reach = radius / plot.cell
-    place = tuple((w - low) / plot.cell - 0.5 for w, low in zip(wanted, plot.lower, strict=True))
-    if _inside(wanted, plot, radius):
-        low, high = _extremes(heights, place, reach)
+    reach = radius / grid.cell
+    place = tuple((w - low) / grid.cell - 0.5 for w, low in zip(wanted, grid.lower, strict=True))
+    if _inside(wanted, grid, radius):
+        low, high = _height_range(heights, place, reach)
         if low == high:
             return *wanted, high
         if high - low <= tolerance:
@@ -46,25 +46,25 @@ def find_spawn(
     if not len(candidates):
         return None
     i, j = candidates[np.argmin(((candidates - place) ** 2).sum(axis=1))]
-    return float(plot.axis(0)[i]), float(plot.axis(1)[j]), float(heights[i, j])
+    return float(grid.axis(0)[i]), float(grid.axis(1)[j]), float(heights[i, j])
 
 
-def room_error(terrain: str, plot: Grid, radius: float, tolerance: float) -> ConfigError:
+def no_spawn_error(terrain: str, grid: Grid, radius: float, tolerance: float) -> ConfigError:
     """Return the error for a terrain that leaves no room to start."""
     return ConfigError(
         f"{terrain}: no level disc of radius {radius:g} m (within {tolerance:g} m) in a patch of "
-        f"{plot.size[0]:g} m x {plot.size[1]:g} m; wanted a larger platform or a smaller "
+        f"{grid.size[0]:g} m x {grid.size[1]:g} m; wanted a larger platform or a smaller "
         "spawn_radius"
     )
 
 
-def _inside(point: tuple[float, float], plot: Grid, radius: float) -> bool:
-    margin = radius + plot.cell / 2  # the last half cell leans towards the next patch
-    sides = zip(point, plot.lower, plot.upper, strict=True)
+def _inside(point: tuple[float, float], grid: Grid, radius: float) -> bool:
+    margin = radius + grid.cell / 2  # the last half cell leans towards the next patch
+    sides = zip(point, grid.lower, grid.upper, strict=True)
     return all(low + margin <= p <= high - margin for p, low, high in sides)
 
 
-def _extremes(
+def _height_range(
     heights: NDArray[np.float32], place: tuple[float, ...], reach: float
 ) -> tuple[float, float]:
     """Return the lowest and the highest sample that rule a point within `reach` of `place`."""
@@ -75,14 +75,16 @@ def _extremes(
     square = heights[slice(*spans[0]), slice(*spans[1])]
     if square.min() != square.max():
         x, y = (np.arange(*span) - p for span, p in zip(spans, place, strict=True))
-        square = square[_in_reach(x[:, None], y[None, :], reach)]
+        square = square[_touches_disc(x[:, None], y[None, :], reach)]
     return float(square.min()), float(square.max())
 
 
-def _in_reach(x: NDArray[np.floating], y: NDArray[np.floating], reach: float) -> NDArray[np.bool_]:
+def _touches_disc(
+    x: NDArray[np.floating], y: NDArray[np.floating], reach: float
+) -> NDArray[np.bool_]:
     """Return whether samples at these offsets rule a point of the disc of radius `reach`.
 
-    A sample rules the four quads around it, so it counts if any point of that square, one sample
+    A sample rules the four quads neighborhood it, so it counts if any point of that square, one sample
     to each side, is in the disc.
     """
     beyond_x, beyond_y = (np.clip(np.abs(offset) - 1, 0, None) for offset in (x, y))
@@ -103,7 +105,7 @@ def _level_cells(heights: NDArray[np.float32], reach: float, tolerance: float) -
     # Row by row of the disc: OpenCV takes the extremes along a row in a time that does not grow
     # with its length, so the search takes the radius, not its square.
     for di in range(-margin, margin + 1):
-        ruling = offsets[_in_reach(np.array(float(di)), offsets, reach)]
+        ruling = offsets[_touches_disc(np.array(float(di)), offsets, reach)]
         if not len(ruling):
             continue
         kernel = np.ones((1, len(ruling)), dtype=np.uint8)

@@ -26,7 +26,7 @@ def surface_at(
 
     Between four samples without a wall the ground is two triangles that share the diagonal from
     (i, j) to (i + 1, j + 1), the one along which MuJoCo splits a cell. A quad with a wall is a fan
-    of triangles around its center; see :mod:`terrainkit.walls`. Beyond the outermost samples the
+    of triangles neighborhood its center; see :mod:`terrainkit.walls`. Beyond the outermost samples the
     ground goes on level.
 
     Args:

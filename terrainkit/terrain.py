@@ -85,60 +85,60 @@ class Terrain(ABC):
         """Return the parameters by name, as asked."""
         return {name: getattr(self, name) for name in parameters_of(type(self))}
 
-    def realized(self, plot: Grid) -> dict[str, Realized]:
-        """Return the parameters by name, as the cells of `plot` hold them."""
+    def realized(self, grid: Grid) -> dict[str, Realized]:
+        """Return the parameters by name, as the cells of `grid` hold them."""
         parameters = parameters_of(type(self)).items()
-        return {name: p.realized(getattr(self, name), plot) for name, p in parameters}
+        return {name: p.realized(getattr(self, name), grid) for name, p in parameters}
 
-    def build(self, plot: Grid, rng: "np.random.Generator") -> NDArray[np.float32]:
-        """Return the heights of the patch on `plot` [m], float32, shape `plot.shape`.
+    def build(self, grid: Grid, rng: "np.random.Generator") -> NDArray[np.float32]:
+        """Return the heights of the patch on `grid` [m], float32, shape `grid.shape`.
 
-        The same terrain, plot and state of `rng` give the same bytes on every machine.
+        The same terrain, grid and state of `rng` give the same bytes on every machine.
 
         Raises:
-            ConfigError: if the plot is too small, or its cells too large, to hold the terrain.
+            ConfigError: if the grid is too small, or its cells too large, to hold the terrain.
         """
-        self.check_fit(plot)
+        self.check_fit(grid)
         # Adding 0 turns -0.0 into 0.0: equal heights must be equal bytes.
-        heights = np.asarray(self.heights(plot, rng), dtype=np.float32) + np.float32(0)
-        if heights.shape != plot.shape or not np.isfinite(heights).all():
+        heights = np.asarray(self.heights(grid, rng), dtype=np.float32) + np.float32(0)
+        if heights.shape != grid.shape or not np.isfinite(heights).all():
             raise ConfigError(
-                f"{self.kind()}: heights() returned shape {heights.shape}; wanted {plot.shape}, "
+                f"{self.kind()}: heights() returned shape {heights.shape}; wanted {grid.shape}, "
                 "every number finite"
             )
         return heights
 
-    def check_fit(self, plot: Grid) -> None:
-        """Raise ConfigError if `plot` cannot hold a block of this terrain."""
+    def check_fit(self, grid: Grid) -> None:
+        """Raise ConfigError if `grid` cannot hold a block of this terrain."""
         for name, parameter in parameters_of(type(self)).items():
             if parameter.snap == "centered":
-                self._check_centered(name, getattr(self, name), plot)
+                self._check_centered(name, getattr(self, name), grid)
 
-    def _check_centered(self, name: str, value: float, plot: Grid) -> None:
-        counts = plot.centered(value)
-        if value > min(plot.size) + plot.cell / 2:
-            x, y = plot.size
+    def _check_centered(self, name: str, value: float, grid: Grid) -> None:
+        counts = grid.centered(value)
+        if value > min(grid.size) + grid.cell / 2:
+            x, y = grid.size
             raise ConfigError(
                 f"{self.kind()}: {name} {value:g} m does not fit in a patch of {x:g} m x {y:g} m"
             )
-        if all(count >= n for count, n in zip(counts, plot.shape, strict=True)):
-            x, y = plot.size
+        if all(count >= n for count, n in zip(counts, grid.shape, strict=True)):
+            x, y = grid.size
             raise ConfigError(
                 f"{self.kind()}: {name} {value:g} m leaves nothing of a patch of {x:g} m x {y:g} m"
             )
         if min(counts) == 0:
             raise ConfigError(
-                f"{self.kind()}: {name} {value:g} m cannot be held by cells of {plot.cell:g} m; "
-                f"wanted {plot.cell:g} m or more"
+                f"{self.kind()}: {name} {value:g} m cannot be held by cells of {grid.cell:g} m; "
+                f"wanted {grid.cell:g} m or more"
             )
 
-    def spawn(self, plot: Grid) -> tuple[float, float]:
+    def spawn(self, grid: Grid) -> tuple[float, float]:
         """Return where a robot should start, x and y [m]: in the middle, by default."""
-        return plot.center
+        return grid.center
 
     @abstractmethod
-    def heights(self, plot: Grid, rng: "np.random.Generator") -> NDArray[np.floating]:
-        """Return the heights on `plot` [m], shape `plot.shape`, drawing nothing but from `rng`.
+    def heights(self, grid: Grid, rng: "np.random.Generator") -> NDArray[np.floating]:
+        """Return the heights on `grid` [m], shape `grid.shape`, drawing nothing but from `rng`.
 
         Draw first and scale after: the pattern then stays the same as the difficulty rises.
         Somewhere there must be room for a robot to start; see :mod:`terrainkit.spawn`.

@@ -11,13 +11,13 @@ from terrainkit.config import MapConfig
 from terrainkit.curriculum import Assignment, assign_levels, update_levels
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit.grid import Grid
-from terrainkit.parameter import LARGEST
+from terrainkit.parameter import MAX_VALUE
 from terrainkit.patch import Patch
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from terrainkit.boxes import BoxCover
+    from terrainkit.box_decomposition import BoxDecomposition
     from terrainkit.mesh import TriMesh
     from terrainkit.surface import SurfacePoints
 
@@ -95,12 +95,12 @@ class TerrainMap:
         mesh = (merged_mesh if merged else full_mesh)(self.heights, self.grid, threshold)
         return closed_mesh(mesh) if closed else mesh
 
-    def boxes(self) -> "BoxCover":
-        """Return the level parts of the ground as boxes; see :mod:`terrainkit.boxes`."""
-        from terrainkit.boxes import box_cover
+    def boxes(self) -> "BoxDecomposition":
+        """Return the level parts of the ground as boxes; see :mod:`terrainkit.box_decomposition`."""
+        from terrainkit.box_decomposition import decompose_boxes
 
         config = self.config
-        return box_cover(self.heights, self.grid, config.wall_threshold, self._seams())
+        return decompose_boxes(self.heights, self.grid, config.wall_threshold, self._patch_edges())
 
     def height_field_raw(self, vertical_scale: float = 0.005) -> NDArray[np.int16]:
         """Return the heights as Isaac Gym's `add_heightfield` wants them.
@@ -142,14 +142,14 @@ class TerrainMap:
         for name in ("heights", "env_origins"):
             values = getattr(self, name)
             # One pass each: NaN makes both comparisons false.
-            if not (values.min() >= -LARGEST and values.max() <= LARGEST):
+            if not (values.min() >= -MAX_VALUE and values.max() <= MAX_VALUE):
                 raise ExportError(
-                    f"{name} holds numbers that are not finite, or beyond {LARGEST:g} m; "
+                    f"{name} holds numbers that are not finite, or beyond {MAX_VALUE:g} m; "
                     "terrainkit check says where"
                 )
 
-    def tile(self, row: int, col: int) -> Patch:
-        """Return patch (row, col) of this map; :func:`terrainkit.tile` makes one without a map.
+    def patch(self, row: int, col: int) -> Patch:
+        """Return patch (row, col) of this map; :func:`terrainkit.make_patch` makes one without a map.
 
         Raises:
             IndexError: if there is no such patch.
@@ -181,7 +181,7 @@ class TerrainMap:
         self,
         levels: ArrayLike,
         distance: ArrayLike,
-        commanded: ArrayLike,
+        command_distance: ArrayLike,
         *,
         seed: int | Sequence[int],
         top_levels: int = 3,
@@ -190,7 +190,7 @@ class TerrainMap:
         return update_levels(
             levels,
             distance,
-            commanded,
+            command_distance,
             rows=len(self.difficulty),
             patch_length=self.config.patch_size[0],
             seed=seed,
@@ -214,7 +214,7 @@ class TerrainMap:
 
         return read_map(cls, path)
 
-    def _seams(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _patch_edges(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return the first cell of each patch along x and y, and the end of the last."""
         (rows, cols), border = self.difficulty.shape, self.config.border_cells
         x, y = self.config.patch_shape

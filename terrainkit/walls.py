@@ -45,13 +45,13 @@ def wall_edges(
     return x, y
 
 
-def joined_corners(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def connected_corners(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return which corners of a quad are joined by edges without a wall, shape (n, 4, 4).
 
     Args:
         walls: Whether each edge is a wall, shape (n, 4).
     """
-    joined: NDArray[np.bool_] = _joined_cases()[walls @ _CASE]
+    joined: NDArray[np.bool_] = _connected_cases()[walls @ _CASE]
     return joined
 
 
@@ -69,7 +69,7 @@ def center_heights(corners: NDArray[np.floating], walls: NDArray[np.bool_]) -> N
     return centers
 
 
-def _joined(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _merge_spans(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
     joined = np.eye(4, dtype=bool)
     for _ in range(3):
         for k in range(4):
@@ -94,10 +94,10 @@ _CASE = np.array([1, 2, 4, 8])
 
 
 @cache
-def _joined_cases() -> NDArray[np.bool_]:
-    return np.array([_joined((case & _CASE) > 0) for case in range(16)])
+def _connected_cases() -> NDArray[np.bool_]:
+    return np.array([_merge_spans((case & _CASE) > 0) for case in range(16)])
 
 
 @cache
 def _center_cases() -> NDArray[np.float64]:
-    return np.array([_center_weights(joined) for joined in _joined_cases()])
+    return np.array([_center_weights(joined) for joined in _connected_cases()])

@@ -113,7 +113,7 @@ class Evaluate(PolicyCommand):
 
     def run(self) -> int:
         """Measure, and print or write the result."""
-        from terrainkit.atomic import check_target
+        from terrainkit.atomic_write import check_target
 
         output = Path(self.output) if self.output else None
         if output is not None:

@@ -283,7 +283,7 @@ def _repaired(
 
 def _check_output(output: Path, inputs: Sequence[Path]) -> None:
     """Raise an error if the report cannot be written, or would replace what it is about."""
-    from terrainkit.atomic import check_target
+    from terrainkit.atomic_write import check_target
 
     check_target(output, overwrite=True)
     for path in inputs:
@@ -292,7 +292,7 @@ def _check_output(output: Path, inputs: Sequence[Path]) -> None:
 
 
 def _write(output: Path, text: str) -> None:
-    from terrainkit.atomic import atomic_write
+    from terrainkit.atomic_write import atomic_write
 
     with atomic_write(output, overwrite=True) as path:
         path.write_bytes(text.encode("utf-8", "backslashreplace"))

@@ -30,7 +30,7 @@ def check_training(command: "CheckRobot") -> int:
     require_training()
     settings = _settings(command)
     if command.output:
-        from terrainkit.atomic import check_target
+        from terrainkit.atomic_write import check_target
 
         check_target(Path(command.output), overwrite=True)  # before the wait
     found: list[tuple[str, Smoke]] = []
@@ -42,7 +42,7 @@ def check_training(command: "CheckRobot") -> int:
                 found.append((name, smoke))
     text = _as_json(found) if command.format == "json" else _as_text(found)
     if command.output:
-        from terrainkit.atomic import atomic_write
+        from terrainkit.atomic_write import atomic_write
 
         with atomic_write(Path(command.output), overwrite=True) as path:
             path.write_text(text, encoding="utf-8")

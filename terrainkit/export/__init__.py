@@ -13,9 +13,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from terrainkit.atomic import atomic_write, check_target
-from terrainkit.capacity import require_memory
+from terrainkit.atomic_write import atomic_write, check_target
 from terrainkit.errors import ExportError, listing
+from terrainkit.memory import check_memory
 
 if TYPE_CHECKING:
     from terrainkit.terrain_map import TerrainMap
@@ -37,8 +37,8 @@ def export(
             target cannot be written; whatever was there is as it was.
     """
     path = Path(path)
-    write = find(path).export
-    known = options_of(path)
+    write = get_exporter(path).export
+    known = export_options(path)
     for name in options:
         if name not in known:
             raise ExportError(f"{path.suffix} has no option {name!r}; it has: {listing(known)}")
@@ -48,16 +48,16 @@ def export(
     return path
 
 
-def check(path: str | Path, samples: int, *, overwrite: bool = False) -> None:
+def check_export(path: str | Path, samples: int, *, overwrite: bool = False) -> None:
     """Raise what :func:`export` would for a map of so many samples, before it is made."""
-    exporter = find(Path(path))
+    exporter = get_exporter(Path(path))
     check_target(Path(path), overwrite=overwrite)
-    require_memory(samples * exporter.BYTES_PER_SAMPLE, f"writing {samples} samples to {path}")
+    check_memory(samples * exporter.BYTES_PER_SAMPLE, f"writing {samples} samples to {path}")
 
 
-def find(path: Path) -> ModuleType:
+def get_exporter(path: Path) -> ModuleType:
     """Return the exporter for the suffix of `path`, or raise the error that lists them."""
-    exporters = suffixes()
+    exporters = exporters_by_suffix()
     if path.suffix.lower() not in exporters:
         raise ExportError(
             f"no format for {path.suffix or 'a name without suffix'!r} ({path}); "
@@ -66,14 +66,14 @@ def find(path: Path) -> ModuleType:
     return exporters[path.suffix.lower()]
 
 
-def options_of(path: Path) -> tuple[str, ...]:
+def export_options(path: Path) -> tuple[str, ...]:
     """Return the names of the options that the format of `path` has."""
-    parameters = inspect.signature(find(path).export).parameters.values()
+    parameters = inspect.signature(get_exporter(path).export).parameters.values()
     return tuple(p.name for p in parameters if p.kind is p.KEYWORD_ONLY)
 
 
 @cache
-def suffixes() -> dict[str, ModuleType]:
+def exporters_by_suffix() -> dict[str, ModuleType]:
     """Return the exporter for each suffix."""
     modules = (
         importlib.import_module(f"{__name__}.{module.name}")

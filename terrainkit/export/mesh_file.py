@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terrainkit.mesh.lattice import BYTES_PER_NODE
+from terrainkit.mesh.node_grid import BYTES_PER_NODE
 
 if TYPE_CHECKING:
     from terrainkit.terrain_map import TerrainMap

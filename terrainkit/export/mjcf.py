@@ -13,9 +13,9 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.boxes import BoxCover, around, level_cells
-from terrainkit.capacity import require_memory
+from terrainkit.box_decomposition import BoxDecomposition, level_cells, neighborhood
 from terrainkit.coerce import coerce
+from terrainkit.memory import check_memory
 from terrainkit.mesh.closed import THICKNESS
 
 if TYPE_CHECKING:
@@ -32,10 +32,10 @@ BYTES_PER_SAMPLE = 100
 """Most that writing holds for each sample: its elevation, as a number and as text."""
 
 _RINGS = 2
-"""Samples around the patches that the heightfield takes in. The ground of the border's first cell
+"""Samples neighborhood the patches that the heightfield takes in. The ground of the border's first cell
 leans towards the patch, so the heightfield has to reach beyond that cell."""
 
-_FEW_BOXES = 1800
+MAX_BOXES = 1800
 """Up to so many boxes cost less than a heightfield with cells of 0.1 m: a step with n boxes was
 measured to cost 1.07 + 0.00035 n of one on a plane, with the heightfield 1.71."""
 
@@ -53,12 +53,12 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
 
     Raises:
         ConfigError: if there is no such way of collision.
-        CapacityError: if the map would not fit in memory.
+        MemoryLimitError: if the map would not fit in memory.
     """
     collision = coerce("collision", collision, Collision)
     samples = terrain_map.heights.size
-    require_memory(samples * BYTES_PER_SAMPLE, f"a MuJoCo model of {samples} samples")
-    cover = box_cover_of(terrain_map, collision)
+    check_memory(samples * BYTES_PER_SAMPLE, f"a MuJoCo model of {samples} samples")
+    cover = collision_boxes(terrain_map, collision)
     root = ET.Element("mujoco", model="terrain")
     _add_class(root, terrain_map)
     asset = ET.SubElement(root, "asset")
@@ -76,7 +76,7 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
     ET.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
 
 
-def box_cover_of(terrain_map: "TerrainMap", collision: Collision) -> BoxCover | None:
+def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecomposition | None:
     """Return the boxes that stand for the ground, or None for a heightfield; see `export`."""
     if collision == "hfield":
         return None
@@ -85,7 +85,7 @@ def box_cover_of(terrain_map: "TerrainMap", collision: Collision) -> BoxCover | 
         if not level_cells(terrain_map.heights, terrain_map.grid, threshold).all():
             return None
         cover = terrain_map.boxes()
-        return cover if len(cover.centers) <= _FEW_BOXES else None
+        return cover if len(cover.centers) <= MAX_BOXES else None
     return terrain_map.boxes()
 
 
@@ -117,7 +117,7 @@ def _add_class(root: ET.Element, terrain_map: "TerrainMap") -> None:
 def _add_hfield(
     asset: ET.Element, body: ET.Element, terrain_map: "TerrainMap", heights: NDArray[np.float32]
 ) -> None:
-    """Add the patches and `_RINGS` of samples around them; the border beyond is boxes."""
+    """Add the patches and `_RINGS` of samples neighborhood them; the border beyond is boxes."""
     cell, border = terrain_map.config.cell, terrain_map.config.border_cells
     # Padding gives the rings where there is no border.
     padded = np.pad(heights, _RINGS, mode="edge")
@@ -144,7 +144,7 @@ def _add_hfield(
 def _border_boxes(
     terrain_map: "TerrainMap",
 ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Return middle and half size of the boxes around the heightfield."""
+    """Return middle and half size of the boxes neighborhood the heightfield."""
     grid, config = terrain_map.grid, terrain_map.config
     margin = config.border - (_RINGS - 0.5) * config.cell  # a heightfield ends at a sample
     if margin <= 0:
@@ -163,9 +163,9 @@ def _border_boxes(
     return boxes
 
 
-def without_boxes(heights: NDArray[np.float32], cover: BoxCover) -> NDArray[np.float32]:
+def without_boxes(heights: NDArray[np.float32], cover: BoxDecomposition) -> NDArray[np.float32]:
     """Return the heights with those samples sunk into their boxes that have no say elsewhere."""
-    sunk = np.logical_and.reduce(around(cover.covered))
+    sunk = np.logical_and.reduce(neighborhood(cover.covered))
     return np.where(sunk, heights.min() - np.float32(THICKNESS / 2), heights)
 
 

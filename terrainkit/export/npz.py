@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import registry
-from terrainkit.archive import LONGEST_TEXT, Archive, opened, write_arrays
+from terrainkit.archive import MAX_TEXT_BYTES, Archive, open_archive, write_arrays
 from terrainkit.config import MapConfig
 from terrainkit.config_text import from_toml, to_toml
 from terrainkit.errors import ConfigError, MapFileError, listing
-from terrainkit.mesh.lattice import BYTES_PER_NODE
+from terrainkit.mesh.node_grid import BYTES_PER_NODE
 from terrainkit.mesh.tri_mesh import TriMesh
-from terrainkit.parameter import LARGEST, Realized, Value, parameters_of
+from terrainkit.parameter import MAX_VALUE, Realized, Value, parameters_of
 from terrainkit.patch import Parameters
 
 if TYPE_CHECKING:
@@ -27,10 +27,10 @@ SUFFIXES = (".npz",)
 BYTES_PER_SAMPLE = BYTES_PER_NODE
 FORMAT_VERSION = 1
 
-_MOST_FACES = 20
+MAX_FACES_PER_SAMPLE = 20
 """Most triangles, and vertices, that a mesh can have for each sample of its map."""
 
-_TEXT_OF_A_PATCH = 8192
+MAX_PATCH_RECORD_BYTES = 8192
 """Most that the record of the parameters of a patch may take [bytes]."""
 
 _Map = TypeVar("_Map", bound="TerrainMap")
@@ -71,9 +71,9 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
 
     Raises:
         MapFileError: if the file is missing, foreign, truncated, or not a whole map.
-        CapacityError: if what it says it holds would not fit in memory.
+        MemoryLimitError: if what it says it holds would not fit in memory.
     """
-    with opened(path) as archive:
+    with open_archive(path) as archive:
         config = _config(archive)
         size, grid = (config.rows, config.cols), config.grid
         for key, wanted in (
@@ -83,11 +83,11 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
             ("lower", grid.lower),
         ):
             archive.expect(key, wanted)
-        names = archive.array("terrain_names", "U", (len(config.mix),), limit=LONGEST_TEXT)
+        names = archive.array("terrain_names", "U", (len(config.mix),), limit=MAX_TEXT_BYTES)
         kinds = archive.array("terrain_types", "i4", size)
         if kinds.min() < 0 or kinds.max() >= len(names):
             raise MapFileError(f"{path}: terrain_types points beyond the {len(names)} names")
-        solids = len(archive.array("boxes", "f4", (None, 10), limit=LONGEST_TEXT))
+        solids = len(archive.array("boxes", "f4", (None, 10), limit=MAX_TEXT_BYTES))
         if solids:
             raise MapFileError(
                 f"{path} has {solids} solids beside its heights; this terrainkit reads none"
@@ -109,10 +109,10 @@ def read_mesh(path: str | Path) -> TriMesh:
 
     Raises:
         MapFileError: if there is none, or a triangle points beyond the vertices.
-        CapacityError: if what it says it holds would not fit in memory.
+        MemoryLimitError: if what it says it holds would not fit in memory.
     """
-    with opened(path) as archive:
-        limit = _MOST_FACES * 12 * math.prod(n + 2 for n in _config(archive).grid.shape)
+    with open_archive(path) as archive:
+        limit = MAX_FACES_PER_SAMPLE * 12 * math.prod(n + 2 for n in _config(archive).grid.shape)
         vertices = archive.array("vertices", "f4", (None, 3), limit=limit)
         triangles = archive.array("triangles", "i4", (None, 3), limit=limit)
     if triangles.size and not (triangles.min() >= 0 and triangles.max() < len(vertices)):
@@ -144,9 +144,11 @@ def _all_parameters(
     archive: Archive, config: MapConfig, kinds: NDArray[np.int32]
 ) -> NDArray[np.object_]:
     table = np.empty(kinds.shape, dtype=object)
-    wanted = [set(parameters_of(registry.find(choice.terrain))) for choice in config.mix]
+    wanted = [set(parameters_of(registry.get_terrain(choice.terrain))) for choice in config.mix]
     try:
-        rows = json.loads(archive.text("parameters", limit=(table.size + 16) * _TEXT_OF_A_PATCH))
+        rows = json.loads(
+            archive.text("parameters", limit=(table.size + 16) * MAX_PATCH_RECORD_BYTES)
+        )
         for row, col in np.ndindex(table.shape):
             table[row, col] = _parameters(rows[row][col], wanted[kinds[row, col]])
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
@@ -170,6 +172,6 @@ def _realized(value: Any) -> Realized:
 
 
 def _number(value: Any) -> Value:
-    if not isinstance(value, int | float) or not abs(value) <= LARGEST:
+    if not isinstance(value, int | float) or not abs(value) <= MAX_VALUE:
         raise ValueError("a value is not a number within bounds")
     return value

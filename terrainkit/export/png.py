@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 SUFFIXES = (".png",)
 BYTES_PER_SAMPLE = 20
 
-_COARSEST = 0.002
+MAX_HEIGHT_PER_LEVEL = 0.002
 """Largest height of a grey level that still holds the ground to a millimetre [m]."""
 
 
@@ -33,10 +33,10 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
     heights, config = terrain_map.heights, terrain_map.config
     low = float(heights.min())
     scale = (float(heights.max()) - low) / np.iinfo(np.uint16).max
-    if scale > _COARSEST:
+    if scale > MAX_HEIGHT_PER_LEVEL:
         raise ExportError(
             f"heights span {heights.max() - low:g} m; a .png holds "
-            f"{_COARSEST * np.iinfo(np.uint16).max:g} m to a millimetre"
+            f"{MAX_HEIGHT_PER_LEVEL * np.iinfo(np.uint16).max:g} m to a millimetre"
         )
     # Picture rows go down, y goes up.
     levels = np.rint((heights.T[::-1] - low) / (scale or 1.0)).astype(np.uint16)

@@ -5,8 +5,8 @@ from typing import Self
 
 import numpy as np
 
-from terrainkit.mesh.lattice import Lattice
-from terrainkit.mesh.loops import Ids, Loops, Mask, laid_out, runs
+from terrainkit.mesh.node_grid import NodeGrid
+from terrainkit.mesh.polygons import Ids, Mask, Polygons, runs, segment_indices
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,20 +53,20 @@ class Rectangles:
         for i in (self.i0, self.i1):
             kept[i, self.j0] = kept[i, self.j1] = True
 
-    def loops(self, lattice: Lattice, kept: Mask) -> Loops:
+    def polygons(self, node_grid: NodeGrid, kept: Mask) -> Polygons:
         """Return the rims, of those nodes that are `kept`."""
-        ny = lattice.z.shape[1]
+        ny = node_grid.z.shape[1]
         low, high = self.i0 * ny, self.i1 * ny
         # Four sides, each from its first corner to just before the next.
         first = np.stack([low + self.j0, high + self.j0, high + self.j1, low + self.j1], axis=1)
         length = np.tile(np.stack([self.i1 - self.i0, self.j1 - self.j0], axis=1), 2)
-        side, k = laid_out(length.ravel())
+        side, k = segment_indices(length.ravel())
         nodes = first.ravel()[side] + k * np.array([ny, 1, -ny, -1])[side % 4]
         keep = kept.ravel()[nodes]
-        x = (lattice.x[self.i0] + lattice.x[self.i1]) / 2
-        y = (lattice.y[self.j0] + lattice.y[self.j1]) / 2
-        z = (lattice.z[self.i0, self.j0] + lattice.z[self.i1, self.j1]) / 2
-        return Loops(
+        x = (node_grid.x[self.i0] + node_grid.x[self.i1]) / 2
+        y = (node_grid.y[self.j0] + node_grid.y[self.j1]) / 2
+        z = (node_grid.z[self.i0, self.j0] + node_grid.z[self.i1, self.j1]) / 2
+        return Polygons(
             vertices=nodes[keep],
             owner=side[keep] // 4,
             centers=np.column_stack([x, y, z]).astype(np.float32),

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.mesh.lattice import Lattice
-from terrainkit.mesh.loops import Ids, Loops, Mask, laid_out, runs
+from terrainkit.mesh.node_grid import NodeGrid
+from terrainkit.mesh.polygons import Ids, Mask, Polygons, runs, segment_indices
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _View:
-    """The lattice as seen from a wall: i counts across the wall, j along it."""
+    """The node_grid as seen from a wall: i counts across the wall, j along it."""
 
     across: NDArray[np.float64]
     along: NDArray[np.float64]
@@ -43,27 +43,27 @@ class WallRuns:
     view: _View
 
     @classmethod
-    def across_x(cls, lattice: Lattice, straight: Mask) -> "WallRuns":
+    def across_x(cls, node_grid: NodeGrid, straight: Mask) -> "WallRuns":
         """Return the walls across x; quads not worth a run are struck from `straight`."""
         view = _View(
-            across=lattice.x,
-            along=lattice.y,
-            z=lattice.z,
-            node_step=(lattice.z.shape[1], 1),
-            middle=lattice.middle_x,
+            across=node_grid.x,
+            along=node_grid.y,
+            z=node_grid.z,
+            node_step=(node_grid.z.shape[1], 1),
+            middle=node_grid.midpoint_x,
             mirrored=False,
         )
         return cls._found(view, straight)
 
     @classmethod
-    def across_y(cls, lattice: Lattice, straight: Mask) -> "WallRuns":
+    def across_y(cls, node_grid: NodeGrid, straight: Mask) -> "WallRuns":
         """Return the walls across y; quads not worth a run are struck from `straight`."""
         view = _View(
-            across=lattice.y,
-            along=lattice.x,
-            z=lattice.z.T,
-            node_step=(1, lattice.z.shape[1]),
-            middle=lambda i, j: lattice.middle_y(j, i),
+            across=node_grid.y,
+            along=node_grid.x,
+            z=node_grid.z.T,
+            node_step=(1, node_grid.z.shape[1]),
+            middle=lambda i, j: node_grid.midpoint_y(j, i),
             mirrored=True,
         )
         return cls._found(view, straight.T)
@@ -81,13 +81,13 @@ class WallRuns:
         for j in (self.j0, self.j1):
             nodes[self.i, j] = nodes[self.i + 1, j] = True
 
-    def strips(self, kept: Mask) -> list[Loops]:
+    def strips(self, kept: Mask) -> list[Polygons]:
         """Return the level strips, half a cell wide, on both sides of each wall."""
         return [self._strip(side, kept.T if self.view.mirrored else kept) for side in (0, 1)]
 
-    def _strip(self, side: int, kept: Mask) -> Loops:
+    def _strip(self, side: int, kept: Mask) -> Polygons:
         view, i = self.view, self.i + side
-        owner, k = laid_out(self.j1 - self.j0 + 3)
+        owner, k = segment_indices(self.j1 - self.j0 + 3)
         # Two vertices at the foot or the top of the wall, then the nodes on the way back.
         j = np.minimum(self.j1[owner], self.j1[owner] + 2 - k)
         vertices = view.node(i[owner], j)
@@ -96,7 +96,7 @@ class WallRuns:
         keep = (k < 2) | kept[i[owner], j]
         across = (view.across[self.i] + view.across[self.i + 1] + 2 * view.across[i]) / 4
         along = (view.along[self.j0] + view.along[self.j1]) / 2
-        return Loops(
+        return Polygons(
             vertices=vertices[keep],
             owner=owner[keep],
             centers=view.positions(across, along, view.z[i, self.j0]),

@@ -13,7 +13,7 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class Obstacles(Terrain):
-    """Rectangular blocks and trenches at random places, around a platform that is kept free.
+    """Rectangular blocks and trenches at random places, neighborhood a platform that is kept free.
 
     Each is as high as `height`, half as high, or as deep; where two meet, the later one stands.
     """
@@ -33,20 +33,20 @@ class Obstacles(Terrain):
     platform: float = parameter.platform(3.0)
     """Side of the level square in the middle [m]."""
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the blocks, each wholly inside the patch, with the platform cleared after."""
-        narrowest, widest = plot.cells(self.min_width), plot.cells(self.max_width)
-        if not narrowest <= widest <= min(plot.shape):
+        narrowest, widest = grid.cells(self.min_width), grid.cells(self.max_width)
+        if not narrowest <= widest <= min(grid.shape):
             raise ConfigError(
                 f"obstacles: min_width {self.min_width:g} m and max_width {self.max_width:g} m do "
-                f"not fit one another or a patch of {plot.size[0]:g} m x {plot.size[1]:g} m"
+                f"not fit one another or a patch of {grid.size[0]:g} m x {grid.size[1]:g} m"
             )
         draws = rng.random((self.number, 5))
         sides = narrowest + (draws[:, :2] * (widest - narrowest + 1)).astype(np.int64)
-        starts = (draws[:, 2:4] * (np.array(plot.shape) - sides + 1)).astype(np.int64)
+        starts = (draws[:, 2:4] * (np.array(grid.shape) - sides + 1)).astype(np.int64)
         levels = self.height * np.array([-1.0, -0.5, 0.5, 1.0])[(draws[:, 4] * 4).astype(np.int64)]
-        ground = np.zeros(plot.shape)
+        ground = np.zeros(grid.shape)
         for (i, j), (di, dj), level in zip(starts, sides, levels, strict=True):
             ground[i : i + di, j : j + dj] = level
-        ground[plot.middle(plot.centered(self.platform))] = 0.0
+        ground[grid.middle(grid.centered(self.platform))] = 0.0
         return ground

@@ -20,8 +20,8 @@ class Pit(Terrain):
     side: float = parameter.platform(4.0)
     """Side of the pit [m]."""
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return 0, and `-depth` inside the pit."""
-        ground = np.zeros(plot.shape)
-        ground[plot.middle(plot.centered(self.side))] = -self.depth
+        ground = np.zeros(grid.shape)
+        ground[grid.middle(grid.centered(self.side))] = -self.depth
         return ground

@@ -12,7 +12,7 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class PyramidSlope(Terrain):
-    """Four even slopes around a central platform, of one grade everywhere off it.
+    """Four even slopes neighborhood a central platform, of one grade everywhere off it.
 
     The lowest part of the rim is at height 0 (the highest, if inverted).
     """
@@ -26,8 +26,8 @@ class PyramidSlope(Terrain):
     inverted: bool = parameter.switch()
     """Turn it upside down: the platform is the bottom, and the robot climbs to leave it."""
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the sides, falling by `grade` times a cell from ring to ring."""
-        rings = plot.rings(plot.centered(self.platform))
-        rise: NDArray[np.floating] = self.grade * plot.cell * (rings.max() - rings)
+        rings = grid.rings(grid.centered(self.platform))
+        rise: NDArray[np.floating] = self.grade * grid.cell * (rings.max() - rings)
         return -rise if self.inverted else rise

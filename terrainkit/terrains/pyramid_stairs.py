@@ -13,7 +13,7 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class PyramidStairs(Terrain):
-    """Square steps around a central platform, each of one height and one width.
+    """Square steps neighborhood a central platform, each of one height and one width.
 
     The outermost tread takes what the steps leave over, so it is never the narrower one; it is at
     height 0.
@@ -31,16 +31,16 @@ class PyramidStairs(Terrain):
     inverted: bool = parameter.switch()
     """Turn it upside down: the platform is the bottom, and the robot climbs to leave it."""
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the treads, counted outwards from the platform."""
-        width = plot.cells(self.step_width)
-        rings = plot.rings(plot.centered(self.platform))
+        width = grid.cells(self.step_width)
+        rings = grid.rings(grid.centered(self.platform))
         risers = rings.max() // width
         if risers == 0:
             raise ConfigError(
                 f"pyramid_stairs: no step of {self.step_width:g} m fits between the platform of "
                 f"{self.platform:g} m and the edge of a patch of "
-                f"{plot.size[0]:g} m x {plot.size[1]:g} m"
+                f"{grid.size[0]:g} m x {grid.size[1]:g} m"
             )
         rise: NDArray[np.floating] = self.step_height * (
             risers - np.minimum(-(-rings // width), risers)

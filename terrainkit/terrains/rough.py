@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.grid import Grid
-from terrainkit.noise import STEP, LatticeNoise
+from terrainkit.noise import STEP, ValueNoise
 from terrainkit.parameter import Realized
 from terrainkit.terrain import Terrain
 
 
 @dataclass(frozen=True, kw_only=True)
 class Rough(Terrain):
-    """Uniform noise around height 0, with a level platform to start from."""
+    """Uniform noise neighborhood height 0, with a level platform to start from."""
 
     amplitude: float = parameter.height(0.02, 0.1, slack=STEP)
     """Largest height above or below 0 [m]; of it there are whole steps."""
@@ -28,14 +28,14 @@ class Rough(Terrain):
     platform: float = parameter.platform(2.0)
     """Side of the level square in the middle [m]."""
 
-    def realized(self, plot: Grid) -> dict[str, Realized]:
+    def realized(self, grid: Grid) -> dict[str, Realized]:
         """Return the parameters as built: whole steps, and whole intervals across the patch."""
-        return super().realized(plot) | self._noise().realized(plot)
+        return super().realized(grid) | self._noise().realized(grid)
 
-    def _noise(self) -> LatticeNoise:
-        return LatticeNoise(amplitude=self.amplitude, step=self.step, spacing=self.spacing)
+    def _noise(self) -> ValueNoise:
+        return ValueNoise(amplitude=self.amplitude, step=self.step, spacing=self.spacing)
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the noise, fading out over one spacing towards the platform."""
-        noise = self._noise().heights(plot, rng)
-        return noise * plot.fade(plot.centered(self.platform), self.spacing)
+        noise = self._noise().heights(grid, rng)
+        return noise * grid.fade(grid.centered(self.platform), self.spacing)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.grid import Grid
-from terrainkit.noise import STEP, LatticeNoise
+from terrainkit.noise import STEP, ValueNoise
 from terrainkit.parameter import Realized
 from terrainkit.terrain import Terrain
 from terrainkit.terrains.pyramid_slope import PyramidSlope
@@ -35,16 +35,16 @@ class RoughSlope(Terrain):
     inverted: bool = parameter.switch()
     """Turn it upside down: the platform is the bottom, and the robot climbs to leave it."""
 
-    def realized(self, plot: Grid) -> dict[str, Realized]:
+    def realized(self, grid: Grid) -> dict[str, Realized]:
         """Return the parameters as built: whole steps, and whole intervals across the patch."""
-        return super().realized(plot) | self._noise().realized(plot)
+        return super().realized(grid) | self._noise().realized(grid)
 
-    def _noise(self) -> LatticeNoise:
-        return LatticeNoise(amplitude=self.amplitude, step=self.step, spacing=self.spacing)
+    def _noise(self) -> ValueNoise:
+        return ValueNoise(amplitude=self.amplitude, step=self.step, spacing=self.spacing)
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the slope plus the noise, which fades out towards the platform."""
         slope = PyramidSlope(grade=self.grade, platform=self.platform, inverted=self.inverted)
-        noise = self._noise().heights(plot, rng)
-        fade = plot.fade(plot.centered(self.platform), self.spacing)
-        return slope.heights(plot, rng) + noise * fade
+        noise = self._noise().heights(grid, rng)
+        fade = grid.fade(grid.centered(self.platform), self.spacing)
+        return slope.heights(grid, rng) + noise * fade

@@ -27,19 +27,19 @@ class Slope(Terrain):
     inverted: bool = parameter.switch()
     """Fall along x instead of rising."""
 
-    def spawn(self, plot: Grid) -> tuple[float, float]:
+    def spawn(self, grid: Grid) -> tuple[float, float]:
         """Return the middle of the level start."""
-        return plot.lower[0] + plot.length(plot.cells(self.landing)) / 2, plot.center[1]
+        return grid.lower[0] + grid.length(grid.cells(self.landing)) / 2, grid.center[1]
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return a clipped ramp, the same for every y."""
-        landing = plot.cells(self.landing)
-        run = plot.shape[0] - 2 * landing
+        landing = grid.cells(self.landing)
+        run = grid.shape[0] - 2 * landing
         if run < 1:
             raise ConfigError(
                 f"slope: two landings of {self.landing:g} m leave no slope in a patch "
-                f"{plot.size[0]:g} m long"
+                f"{grid.size[0]:g} m long"
             )
-        steps = np.clip(np.arange(plot.shape[0]) - landing + 1, 0, run)
-        rise = self.grade * plot.cell * steps
-        return np.broadcast_to((-rise if self.inverted else rise)[:, None], plot.shape)
+        steps = np.clip(np.arange(grid.shape[0]) - landing + 1, 0, run)
+        rise = self.grade * grid.cell * steps
+        return np.broadcast_to((-rise if self.inverted else rise)[:, None], grid.shape)

@@ -30,20 +30,20 @@ class Stairs(Terrain):
     inverted: bool = parameter.switch()
     """Descend along x instead of climbing."""
 
-    def spawn(self, plot: Grid) -> tuple[float, float]:
+    def spawn(self, grid: Grid) -> tuple[float, float]:
         """Return the middle of the level start."""
-        return plot.lower[0] + plot.length(plot.cells(self.landing)) / 2, plot.center[1]
+        return grid.lower[0] + grid.length(grid.cells(self.landing)) / 2, grid.center[1]
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the treads, one riser at the end of the landing and one every `step_width`."""
-        landing, width = plot.cells(self.landing), plot.cells(self.step_width)
-        run = plot.shape[0] - 2 * landing
+        landing, width = grid.cells(self.landing), grid.cells(self.step_width)
+        run = grid.shape[0] - 2 * landing
         if run < 0:
             raise ConfigError(
                 f"stairs: two landings of {self.landing:g} m do not fit in a patch "
-                f"{plot.size[0]:g} m long"
+                f"{grid.size[0]:g} m long"
             )
         risers = run // width + 1
-        treads = np.clip((np.arange(plot.shape[0]) - landing) // width + 1, 0, risers)
+        treads = np.clip((np.arange(grid.shape[0]) - landing) // width + 1, 0, risers)
         rise = self.step_height * treads
-        return np.broadcast_to((-rise if self.inverted else rise)[:, None], plot.shape)
+        return np.broadcast_to((-rise if self.inverted else rise)[:, None], grid.shape)

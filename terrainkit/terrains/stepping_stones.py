@@ -12,7 +12,7 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class SteppingStones(Terrain):
-    """Square stones in rows across x, each row shifted at random, around a platform.
+    """Square stones in rows across x, each row shifted at random, neighborhood a platform.
 
     Stones that meet the edge of the patch are cut by it.
     """
@@ -32,14 +32,14 @@ class SteppingStones(Terrain):
     platform: float = parameter.platform(4.0)
     """Side of the level square in the middle [m]."""
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the stones: a row is `stone` cells deep, and `distance` cells from the next."""
-        stone, distance = plot.cells(self.stone), plot.cells(self.distance)
+        stone, distance = grid.cells(self.stone), grid.cells(self.distance)
         pitch = stone + distance
-        shifts = (rng.random(plot.shape[0]) * pitch).astype(np.int64)
-        tops = (2 * rng.random(plot.shape) - 1) * self.variation
-        row, x = np.divmod(np.arange(plot.shape[0])[:, None], pitch)
-        column, y = np.divmod(np.arange(plot.shape[1])[None, :] + shifts[row], pitch)
-        ground = np.where((x < stone) & (y < stone), tops[row, column % plot.shape[1]], -self.depth)
-        ground[plot.middle(plot.centered(self.platform))] = 0.0
+        shifts = (rng.random(grid.shape[0]) * pitch).astype(np.int64)
+        tops = (2 * rng.random(grid.shape) - 1) * self.variation
+        row, x = np.divmod(np.arange(grid.shape[0])[:, None], pitch)
+        column, y = np.divmod(np.arange(grid.shape[1])[None, :] + shifts[row], pitch)
+        ground = np.where((x < stone) & (y < stone), tops[row, column % grid.shape[1]], -self.depth)
+        ground[grid.middle(grid.centered(self.platform))] = 0.0
         return ground

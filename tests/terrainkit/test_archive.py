@@ -3,7 +3,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from terrainkit.archive import opened
+from terrainkit.archive import open_archive
 from terrainkit.errors import MapFileError
 
 
@@ -23,7 +23,7 @@ def path(tmp_path):
 
 @pytest.fixture
 def archive(path):
-    with opened(path) as archive:
+    with open_archive(path) as archive:
         yield archive
 
 
@@ -87,7 +87,7 @@ def test_other_numbers_are_refused(archive, key, wanted):
 
 
 def test_the_name_of_a_file_may_be_a_text(path):
-    with opened(str(path)) as archive:
+    with open_archive(str(path)) as archive:
         assert archive.path == path
 
 
@@ -98,6 +98,6 @@ def test_a_header_that_claims_to_be_huge_is_not_read(tmp_path):
         file.writestr("heights.npy", header + b" " * 10**6)
     with (
         pytest.raises(MapFileError, match="its header is longer than 10000 bytes"),
-        opened(path) as archive,
+        open_archive(path) as archive,
     ):
         archive.array("heights", "f4", (3,))

@@ -12,7 +12,7 @@ FLAT, GAP = TerrainChoice(terrain="flat"), TerrainChoice(terrain="gap")
 
 def test_the_default_is_legged_gyms_map():
     config = MapConfig()
-    assert config.mix == presets.find("legged_gym")
+    assert config.mix == presets.get_preset("legged_gym")
     # 10 x 8 m of patches and 2 x 25 m of border are 130 m, at 0.1 m.
     assert config.grid.shape == (1300, 1300)
 

@@ -5,9 +5,9 @@ from terrainkit.curriculum import assign_levels, update_levels
 from terrainkit.errors import ConfigError
 
 
-def update(levels, distance, commanded, *, rows=10, seed=0, **options):
+def update(levels, distance, command_distance, *, rows=10, seed=0, **options):
     return update_levels(
-        levels, distance, commanded, rows=rows, patch_length=8.0, seed=seed, **options
+        levels, distance, command_distance, rows=rows, patch_length=8.0, seed=seed, **options
     )
 
 
@@ -63,7 +63,7 @@ def test_a_level_that_is_not_on_the_map_is_refused(highest):
 
 
 @pytest.mark.parametrize(
-    ("distance", "commanded", "level"),
+    ("distance", "command_distance", "level"),
     [
         (4.1, 8.0, 6),  # over half of the 8 m patch
         (4.0, 8.0, 5),  # just half
@@ -75,8 +75,8 @@ def test_a_level_that_is_not_on_the_map_is_refused(highest):
         (1.0, 2.1, 4),
     ],
 )
-def test_who_walks_far_moves_up_and_who_falls_short_moves_down(distance, commanded, level):
-    assert update([5], [distance], [commanded]).tolist() == [level]
+def test_who_walks_far_moves_up_and_who_falls_short_moves_down(distance, command_distance, level):
+    assert update([5], [distance], [command_distance]).tolist() == [level]
 
 
 def test_each_environment_moves_on_its_own():

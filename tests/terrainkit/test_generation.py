@@ -9,9 +9,9 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from terrainkit import MapConfig, TerrainChoice, TerrainkitWarning, generate, tile
+from terrainkit import MapConfig, TerrainChoice, TerrainkitWarning, generate, make_patch
 from terrainkit.config import Mode
-from terrainkit.errors import CapacityError, ConfigError, TerrainkitError
+from terrainkit.errors import ConfigError, MemoryLimitError, TerrainkitError
 
 OBSTACLES, ROUGH, STAIRS = (
     TerrainChoice(terrain=name) for name in ("obstacles", "rough", "stairs")
@@ -73,7 +73,7 @@ def test_the_border_is_level_at_zero():
 
 @pytest.mark.parametrize(("row", "col"), [(0, 0), (1, 2), (2, 0), (2, 3)])
 def test_a_tile_alone_equals_its_slice_of_the_map(row, col):
-    terrain_map, patch = generate(SMALL), tile(SMALL, row, col)
+    terrain_map, patch = generate(SMALL), make_patch(SMALL, row, col)
     i, j = 10 + 80 * row, 10 + 60 * col
     assert patch.heights.tobytes() == terrain_map.heights[i : i + 80, j : j + 60].tobytes()
     assert patch.origin.tobytes() == terrain_map.env_origins[row, col].tobytes()
@@ -93,7 +93,7 @@ def test_editing_one_column_leaves_the_others_identical():
 def test_more_rows_leave_the_draws_of_the_first_ones_alone():
     few = MapConfig(rows=2, cols=2, border=0.0, terrains=(OBSTACLES,))
     many = MapConfig(rows=5, cols=3, border=0.0, terrains=(OBSTACLES,))
-    assert tile(few, 0, 1).heights.tobytes() == tile(many, 0, 1).heights.tobytes()
+    assert make_patch(few, 0, 1).heights.tobytes() == make_patch(many, 0, 1).heights.tobytes()
 
 
 def test_centered_moves_the_map_and_changes_nothing_else():
@@ -116,7 +116,9 @@ def test_every_mode_makes_a_map(mode):
 def test_a_map_too_large_for_memory_says_what_it_needs_before_it_takes_anything():
     config = MapConfig(rows=10_000, cols=10_000, terrains=(STAIRS,))
     tracemalloc.start()
-    with pytest.raises(CapacityError, match="a map of 800500 x 800500 samples needs") as caught:
+    with pytest.raises(
+        MemoryLimitError, match="a map of 800500 x 800500 samples needs"
+    ) as caught:
         generate(config)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()

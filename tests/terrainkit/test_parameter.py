@@ -116,7 +116,7 @@ def test_a_value_that_cannot_be_is_refused(name, value, message):
     ("name", "value"),
     [
         ("rise", 0),
-        ("rise", parameter.LARGEST),
+        ("rise", parameter.MAX_VALUE),
         ("gap", 0.0),
         ("grade", 0.0),
         ("number", 1),

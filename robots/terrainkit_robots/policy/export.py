@@ -64,7 +64,7 @@ from numpy.typing import NDArray
 from rsl_rl.models import MLPModel
 from tensordict import TensorDict
 
-from terrainkit.atomic import atomic_write, check_target
+from terrainkit.atomic_write import atomic_write, check_target
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots.policy.actor import actor_of
 from terrainkit_robots.policy.description import ONNX, TORCHSCRIPT, description, width_of

@@ -200,7 +200,7 @@ def write_evaluation(evaluation: Evaluation, path: Path, *, overwrite: bool = Fa
     Raises:
         ExportError: if the file is there and `overwrite` is not set, or cannot be written.
     """
-    from terrainkit.atomic import atomic_write
+    from terrainkit.atomic_write import atomic_write
 
     with atomic_write(path, overwrite=overwrite) as target:
         target.write_text(evaluation.as_json())

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from terrainkit.atomic import atomic_write
+from terrainkit.atomic_write import atomic_write
 from terrainkit.errors import ConfigError
 
 FORMAT = "terrainkit checkpoint"

@@ -49,7 +49,7 @@ class LeggedEnv(VecEnv):
 
         Raises:
             ConfigError: if the robot or the task does not fit.
-            CapacityError: if so many environments do not fit in memory.
+            MemoryLimitError: if so many environments do not fit in memory.
         """
         self.cfg, self.robot, self.ground = task, robot, ground
         self.num_envs, self.num_actions = task.env.num_envs, len(robot.default_pose)

@@ -157,10 +157,10 @@ class MapGround(Ground):
         return self._grid.at(x, y)
 
     def _looked_up(self) -> HeightGrid:
-        from terrainkit.export.mjcf import box_cover_of, without_boxes
+        from terrainkit.export.mjcf import collision_boxes, without_boxes
 
         heights, tops = np.ascontiguousarray(self._map.heights), None
-        cover = box_cover_of(self._map, self._collision)
+        cover = collision_boxes(self._map, self._collision)
         if cover is not None:
             tops = np.where(cover.covered, heights, np.float32(-np.inf))
             heights = without_boxes(heights, cover)

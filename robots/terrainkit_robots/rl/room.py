@@ -1,7 +1,7 @@
 """The memory that training takes, known before any of it is taken."""
 
-from terrainkit.capacity import require_memory
-from terrainkit.errors import CapacityError
+from terrainkit.errors import MemoryLimitError
+from terrainkit.memory import check_memory
 from terrainkit_robots.rl.robot import Robot
 from terrainkit_robots.rl.task import Task
 
@@ -17,7 +17,7 @@ gradients of both, and what is computed of them."""
 
 
 def require_room(task: Task, robot: Robot, *, scan: bool, geoms: int) -> None:
-    """Raise CapacityError if the environments of a task do not fit in memory.
+    """Raise MemoryLimitError if the environments of a task do not fit in memory.
 
     Args:
         task: The task, with as many environments as this process has.
@@ -28,15 +28,15 @@ def require_room(task: Task, robot: Robot, *, scan: bool, geoms: int) -> None:
     each = bytes_each(task, robot, scan=scan, geoms=geoms)
     asked = task.env.num_envs
     try:
-        require_memory(asked * each, f"training with {asked} environments")
-    except CapacityError as error:
+        check_memory(asked * each, f"training with {asked} environments")
+    except MemoryLimitError as error:
         while asked > 1:
             asked //= 2
             try:
-                require_memory(asked * each, "")
-            except CapacityError:
+                check_memory(asked * each, "")
+            except MemoryLimitError:
                 continue
-            raise CapacityError(f"{error}; env.num_envs {asked} would fit") from None
+            raise MemoryLimitError(f"{error}; env.num_envs {asked} would fit") from None
         raise
 
 

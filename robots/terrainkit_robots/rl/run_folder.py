@@ -227,7 +227,7 @@ def same_ground(run: Run, terrain: str | Path) -> bool:
 
 def rewrite_task(run: Run, task: Task) -> None:
     """Note in a run's folder that it goes on with another task."""
-    from terrainkit.atomic import atomic_write
+    from terrainkit.atomic_write import atomic_write
 
     with atomic_write(run.folder / TASK_FILE, overwrite=True) as path:
         path.write_text(to_toml(task), encoding="utf-8")

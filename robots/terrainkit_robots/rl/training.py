@@ -90,7 +90,7 @@ def train(
 
     Raises:
         ConfigError: if something does not fit together, or training diverges.
-        CapacityError: if so many environments do not fit in memory.
+        MemoryLimitError: if so many environments do not fit in memory.
         ExportError: if the folder exists, or the disk is full.
     """
     wait_asleep()

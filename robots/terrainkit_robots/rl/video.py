@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.atomic import atomic_write
+from terrainkit.atomic_write import atomic_write
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots import gl_backend
 from terrainkit_robots.onboarding.pictures import PicturesError
@@ -98,7 +98,7 @@ def check_video(path: Path, *, overwrite: bool = False) -> None:
         ConfigError: if it is not an mp4.
         ExportError: if the file is there and `overwrite` is not set, or cannot be written.
     """
-    from terrainkit.atomic import check_target
+    from terrainkit.atomic_write import check_target
 
     if path.suffix != SUFFIX:
         raise ConfigError(f"a video {path.name}; wanted a name that ends in {SUFFIX}")

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from terrainkit import MapConfig, TerrainChoice, TerrainMap, generate
 from terrainkit.config_text import from_toml
-from terrainkit.errors import CapacityError, MapFileError
+from terrainkit.errors import MemoryLimitError, MapFileError
 from terrainkit.export.npz import read_mesh
 
 
@@ -485,5 +485,5 @@ def test_a_map_beyond_the_memory_is_not_read(good, bad):
         "heights": npy_that_declares("<f4", (900_002, 900_002)),
     }
     repack(good, bad, changes)
-    with pytest.raises(CapacityError, match=r"heights in .* needs .* GB of memory"):
+    with pytest.raises(MemoryLimitError, match=r"heights in .* needs .* GB of memory"):
         TerrainMap.load(bad)

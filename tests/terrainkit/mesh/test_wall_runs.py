@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from terrainkit.grid import Grid
-from terrainkit.mesh.lattice import Lattice
+from terrainkit.mesh.node_grid import NodeGrid
 from terrainkit.mesh.wall_runs import WallRuns
 
 
@@ -20,9 +20,9 @@ def across_y(request):
 def lattice_and_runs(heights, straight, *, across_y):
     heights = heights.T if across_y else heights
     straight = straight.T if across_y else straight
-    lattice = Lattice.of(heights, Grid(shape=heights.shape, cell=1.0), 0.5)
+    node_grid = NodeGrid.of(heights, Grid(shape=heights.shape, cell=1.0), 0.5)
     find = WallRuns.across_y if across_y else WallRuns.across_x
-    return lattice, find(lattice, straight), straight
+    return node_grid, find(node_grid, straight), straight
 
 
 def straight_quads():
@@ -33,9 +33,9 @@ def straight_quads():
 
 @pytest.mark.parametrize("height", [2.0, -2.0])
 def test_a_straight_wall_is_one_panel_that_faces_the_low_side(across_y, height):
-    lattice, found, _ = lattice_and_runs(cliff(height), straight_quads(), across_y=across_y)
+    node_grid, found, _ = lattice_and_runs(cliff(height), straight_quads(), across_y=across_y)
     panels = found.panels()
-    corners = lattice.middles()[panels - lattice.z.size].astype(float)
+    corners = node_grid.midpoints()[panels - node_grid.z.size].astype(float)
     doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     # 4 m long and 2 m high, in two triangles; downhill is against the axis where it rises.
     assert doubled[:, 1 if across_y else 0].tolist() == [-4.0 * height] * 2
@@ -52,8 +52,8 @@ def test_a_wall_one_quad_long_is_left_alone(across_y):
 
 
 def test_the_strips_beside_a_wall_keep_the_nodes_that_others_need(across_y):
-    lattice, found, _ = lattice_and_runs(cliff(2.0), straight_quads(), across_y=across_y)
-    kept = np.zeros(lattice.z.shape, dtype=bool)
+    node_grid, found, _ = lattice_and_runs(cliff(2.0), straight_quads(), across_y=across_y)
+    kept = np.zeros(node_grid.z.shape, dtype=bool)
     found.keep_ends(kept)
     assert kept.sum() == 4
     low, high = found.strips(kept)

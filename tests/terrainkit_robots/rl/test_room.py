@@ -3,7 +3,7 @@ import sys
 
 import pytest
 
-from terrainkit.errors import CapacityError
+from terrainkit.errors import MemoryLimitError
 from terrainkit_robots.rl.room import bytes_each, require_room
 from terrainkit_robots.rl.task import Env, Runner, Task
 
@@ -53,10 +53,11 @@ def test_the_estimate_is_near_what_is_taken(quadruped, scan):
 
 
 def test_what_would_fit_is_said(quadruped, monkeypatch):
-    monkeypatch.setattr("terrainkit.capacity._free_memory", lambda: 1 << 30)
+    monkeypatch.setattr("terrainkit.memory._free_memory", lambda: 1 << 30)
     task = Task(env=Env(num_envs=40_000))
     with pytest.raises(
-        CapacityError, match=r"with 40000 environments needs .*; env\.num_envs 5000 would fit"
+        MemoryLimitError,
+        match=r"with 40000 environments needs .*; env\.num_envs 5000 would fit",
     ):
         require_room(task, quadruped, scan=False, geoms=50)
     require_room(Task(env=Env(num_envs=5000)), quadruped, scan=False, geoms=50)

@@ -13,7 +13,7 @@ import pytest
 import torch
 
 import terrainkit
-from terrainkit.errors import CapacityError, ConfigError, ExportError
+from terrainkit.errors import ConfigError, ExportError, MemoryLimitError
 from terrainkit_robots.rl import registry, training
 from terrainkit_robots.rl.checkpoint import only_policy, read_checkpoint, save_checkpoint
 from terrainkit_robots.rl.progress import Progress
@@ -360,7 +360,9 @@ def test_training_that_diverges_points_at_the_last_checkpoint(task, tmp_path):
 
 def test_too_many_environments_are_refused_before_anything_is_made(task, tmp_path):
     many = replace(task, env=replace(task.env, num_envs=100_000_000))
-    with pytest.raises(CapacityError, match=r"100000000 environments needs .* GB .* would fit"):
+    with pytest.raises(
+        MemoryLimitError, match=r"100000000 environments needs .* GB .* would fit"
+    ):
         train("quadruped", "plane", many, folder=tmp_path / "run")
     assert not (tmp_path / "run").exists()
 

@@ -10,7 +10,7 @@ LEG = 0.5
 """Change of height beyond which more makes no difference: no leg bridges it [m]."""
 
 
-def hardness(heights: NDArray[np.float32], cell: float, start: float) -> float:
+def measured_difficulty(heights: NDArray[np.float32], cell: float, start: float) -> float:
     r"""Return how hard a patch is to walk [m]: 0 for level ground, growing with everything else.
 
     .. math:: H = \operatorname{mean}_{p, \delta} \min(|h(p + \delta) - h(p)|, L)

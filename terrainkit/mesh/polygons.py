@@ -1,4 +1,4 @@
-"""Loops: rectangles as rings of vertices, many at a time, and their triangles."""
+"""Polygons: rectangles as rings of vertices, many at a time, and their triangles."""
 
 from dataclasses import dataclass
 
@@ -10,11 +10,11 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Loops:
+class Polygons:
     """Flat rectangles, each with all the vertices that its rim needs."""
 
     vertices: Ids
-    """Vertices of all loops one after the other, in order around each, shape (v,)."""
+    """Vertices of all polygons one after the other, in order neighborhood each, shape (v,)."""
 
     owner: Ids
     """Which loop each vertex belongs to, ascending, shape (v,)."""
@@ -49,7 +49,7 @@ class Loops:
         return triangles[:, ::-1] if self.clockwise else triangles, self.centers[~bare]
 
 
-def laid_out(lengths: Ids) -> tuple[Ids, Ids]:
+def segment_indices(lengths: Ids) -> tuple[Ids, Ids]:
     """Return the owner and the place within it of items laid end to end, `lengths` of each."""
     owner = np.repeat(np.arange(len(lengths)), lengths)
     return owner, np.arange(len(owner)) - np.repeat(np.cumsum(lengths) - lengths, lengths)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from terrainkit.atomic import atomic_write
+from terrainkit.atomic_write import atomic_write
 from terrainkit.errors import ExportError
 
 

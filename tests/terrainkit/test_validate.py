@@ -5,8 +5,8 @@ import pytest
 
 import terrainkit as tk
 from terrainkit import presets
-from terrainkit.audit import audit
 from terrainkit.mesh import TriMesh
+from terrainkit.validate import audit
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +42,7 @@ def test_a_map_of_ours_has_nothing_wrong(config):
     assert found(terrain_map, terrain_map.mesh(merged=False)) == []
 
 
-@pytest.mark.parametrize("preset", presets.names())
+@pytest.mark.parametrize("preset", presets.preset_names())
 def test_no_preset_builds_something_else_than_it_asks_for(preset):
     terrain_map = tk.generate(tk.MapConfig(rows=10, cols=17, border=0.0, preset=preset))
     assert found(terrain_map) == []
@@ -112,7 +112,7 @@ def test_a_difficulty_that_falls(sound):
 
 
 def test_a_width_that_the_patch_cannot_hold_is_named():
-    # A moat of 1 m around a platform of 3 m: a patch of 8 m x 4 m has 0.5 m for it along y.
+    # A moat of 1 m neighborhood a platform of 3 m: a patch of 8 m x 4 m has 0.5 m for it along y.
     config = tk.MapConfig(
         rows=2, cols=1, patch_size=(8.0, 4.0), terrains=(tk.TerrainChoice(terrain="gap"),)
     )

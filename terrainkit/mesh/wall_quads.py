@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.mesh.lattice import Lattice
+from terrainkit.mesh.node_grid import NodeGrid
 from terrainkit.walls import center_heights
 
 Ids = NDArray[np.int64]
 
-_PINCH = 1 / 128
+_SADDLE_OFFSET = 1 / 128
 """How far towards their corners the walls of two high corners that meet in a point are pulled.
 
 Four walls meet where two opposite corners are higher than the other two. Left so, their common edge
@@ -20,7 +20,7 @@ has an edge of its own.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Quads:
+class _WallQuads:
     """K cut quads: numbers of their vertices, corner by corner and edge by edge."""
 
     corners: Ids
@@ -32,7 +32,7 @@ class _Quads:
     walls: NDArray[np.bool_]
     """Whether each edge is a wall, shape (K, 4)."""
 
-    middles: Ids
+    midpoints: Ids
     """Middle of each wall on the side of its first and its second corner, shape (K, 4, 2)."""
 
     xy: NDArray[np.float64]
@@ -43,35 +43,37 @@ class _Quads:
         """Position of the center, x and y [m], shape (K, 2)."""
         return (self.xy[:, 0] + self.xy[:, 2]) / 2
 
-    def __getitem__(self, which: NDArray[np.bool_]) -> "_Quads":
-        return _Quads(**{name: value[which] for name, value in vars(self).items()})
+    def __getitem__(self, which: NDArray[np.bool_]) -> "_WallQuads":
+        return _WallQuads(**{name: value[which] for name, value in vars(self).items()})
 
-    def rolled(self) -> "_Quads":
+    def rotate_corners(self) -> "_WallQuads":
         """Return the quads with corner 1 as corner 0."""
-        return _Quads(**{name: np.roll(value, -1, axis=1) for name, value in vars(self).items()})
+        return _WallQuads(
+            **{name: np.roll(value, -1, axis=1) for name, value in vars(self).items()}
+        )
 
 
-def cut_quads(lattice: Lattice, numbers: Ids, first: int) -> tuple[Ids, NDArray[np.float32]]:
+def wall_quads(node_grid: NodeGrid, numbers: Ids, first: int) -> tuple[Ids, NDArray[np.float32]]:
     """Return the triangles of the cut quads `numbers`, and the vertices that they add.
 
     Args:
-        lattice: What the quads are part of.
+        node_grid: What the quads are part of.
         numbers: Flat index of each quad, shape (K,).
         first: Number that the first added vertex takes.
 
     Returns:
         Triangles, shape (T, 3), and positions of the added vertices [m], shape (V, 3).
     """
-    quads = _gather(lattice, numbers)
+    quads = _gather(node_grid, numbers)
     z0, z1, z2, z3 = quads.z.T
     all_walls = quads.walls.all(axis=1)
     even_high = all_walls & (np.minimum(z0, z2) > np.maximum(z1, z3))
     odd_high = all_walls & (np.minimum(z1, z3) > np.maximum(z0, z2))
     triangles, vertices = [], []
     for build, part in (
-        (_fans, quads[~(even_high | odd_high)]),
-        (_saddles, quads[even_high]),
-        (_saddles, quads[odd_high].rolled()),
+        (_fan_faces, quads[~(even_high | odd_high)]),
+        (_saddle_faces, quads[even_high]),
+        (_saddle_faces, quads[odd_high].rotate_corners()),
     ):
         faces, added = build(part, first)
         first += len(added)
@@ -80,26 +82,26 @@ def cut_quads(lattice: Lattice, numbers: Ids, first: int) -> tuple[Ids, NDArray[
     return np.concatenate(triangles), np.concatenate(vertices)
 
 
-def _gather(lattice: Lattice, numbers: Ids) -> _Quads:
-    i, j = np.divmod(numbers, lattice.z.shape[1] - 1)
-    corners = lattice.corners(i, j)
+def _gather(node_grid: NodeGrid, numbers: Ids) -> _WallQuads:
+    i, j = np.divmod(numbers, node_grid.z.shape[1] - 1)
+    corners = node_grid.corners(i, j)
     low_side = np.stack(
         [
-            lattice.middle_x(i, j),
-            lattice.middle_y(i + 1, j),
-            lattice.middle_x(i, j + 1),
-            lattice.middle_y(i, j),
+            node_grid.midpoint_x(i, j),
+            node_grid.midpoint_y(i + 1, j),
+            node_grid.midpoint_x(i, j + 1),
+            node_grid.midpoint_y(i, j),
         ],
         axis=1,
     )
     # Edges 0 and 1 run along x and y, edges 2 and 3 against them.
     backwards = np.array([0, 0, 1, 1])
-    x, y = lattice.x, lattice.y
-    return _Quads(
+    x, y = node_grid.x, node_grid.y
+    return _WallQuads(
         corners=corners,
-        z=lattice.z.ravel()[corners],
-        walls=lattice.walls(i, j),
-        middles=np.stack([low_side + backwards, low_side + 1 - backwards], axis=2),
+        z=node_grid.z.ravel()[corners],
+        walls=node_grid.walls(i, j),
+        midpoints=np.stack([low_side + backwards, low_side + 1 - backwards], axis=2),
         xy=np.stack(
             [
                 np.stack([x[i], x[i + 1], x[i + 1], x[i]], axis=1),
@@ -110,17 +112,17 @@ def _gather(lattice: Lattice, numbers: Ids) -> _Quads:
     )
 
 
-def _fans(quads: _Quads, first: int) -> tuple[Ids, NDArray[np.float32]]:
-    """Return a fan around the center of each quad, which has one vertex for each height there."""
+def _fan_faces(quads: _WallQuads, first: int) -> tuple[Ids, NDArray[np.float32]]:
+    """Return a fan neighborhood the center of each quad, which has one vertex for each height there."""
     heights = center_heights(quads.z, quads.walls).astype(np.float32)
-    column = _Column.of(heights, quads.center, first)
+    column = _VerticalLine.of(heights, quads.center, first)
     triangles = []
     for k in range(4):
         after = (k + 1) % 4
         wall = quads.walls[:, k]
         joined = [column.vertex(k), quads.corners[:, k], quads.corners[:, after]]
         triangles.append(np.column_stack(joined)[~wall])
-        a, b = quads.middles[:, k].T
+        a, b = quads.midpoints[:, k].T
         near = [column.vertex(k), quads.corners[:, k], a]
         far = [column.vertex(after), b, quads.corners[:, after]]
         triangles += [np.column_stack(near)[wall], np.column_stack(far)[wall]]
@@ -128,13 +130,13 @@ def _fans(quads: _Quads, first: int) -> tuple[Ids, NDArray[np.float32]]:
     return np.concatenate(triangles), column.positions
 
 
-def _saddles(quads: _Quads, first: int) -> tuple[Ids, NDArray[np.float32]]:
+def _saddle_faces(quads: _WallQuads, first: int) -> tuple[Ids, NDArray[np.float32]]:
     """Return the quads whose corners 0 and 2 stand above 1 and 3, with two centers each."""
-    pull = (quads.xy[:, 0] - quads.center) * _PINCH
-    west = _Column.of(quads.z[:, [0, 1, 3]], quads.center + pull, first)
-    east = _Column.of(quads.z[:, [2, 1, 3]], quads.center - pull, first + len(west.positions))
+    pull = (quads.xy[:, 0] - quads.center) * _SADDLE_OFFSET
+    west = _VerticalLine.of(quads.z[:, [0, 1, 3]], quads.center + pull, first)
+    east = _VerticalLine.of(quads.z[:, [2, 1, 3]], quads.center - pull, first + len(west.positions))
     c0, c1, c2, c3 = quads.corners.T
-    (m0, n0), (m1, n1), (m2, n2), (m3, n3) = (quads.middles[:, k].T for k in range(4))
+    (m0, n0), (m1, n1), (m2, n2), (m3, n3) = (quads.midpoints[:, k].T for k in range(4))
     every = np.ones(len(c0), dtype=bool)
     floor = quads.z[:, 1] != quads.z[:, 3]
     triangles = [
@@ -161,7 +163,7 @@ def _rows(*faces: tuple[Ids, Ids, Ids]) -> list[Ids]:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Column:
+class _VerticalLine:
     """The vertices on one vertical line in each of K quads, one for each different height."""
 
     positions: NDArray[np.float32]
@@ -174,7 +176,9 @@ class _Column:
     """Which vertex, counted upwards, each of the h heights given is, shape (K, h)."""
 
     @classmethod
-    def of(cls, heights: NDArray[np.float32], xy: NDArray[np.float64], first: int) -> "_Column":
+    def of(
+        cls, heights: NDArray[np.float32], xy: NDArray[np.float64], first: int
+    ) -> "_VerticalLine":
         order = np.argsort(heights, axis=1, kind="stable")
         upwards = np.take_along_axis(heights, order, axis=1)
         new = np.ones(heights.shape, dtype=bool)

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 from terrainkit import MapConfig, TerrainChoice, generate
-from terrainkit.boxes import box_cover, level_cells
+from terrainkit.box_decomposition import decompose_boxes, level_cells
 from terrainkit.grid import Grid
 from terrainkit.surface import surface_at
 
@@ -29,8 +29,8 @@ def points_in_cells(cells, cell, lower):
 
 
 def cover_of(heights, threshold):
-    seams = tuple(np.array([0, n // 2, n]) for n in heights.shape)
-    return box_cover(heights, Grid(shape=heights.shape, cell=1.0), threshold, seams)
+    patch_edges = tuple(np.array([0, n // 2, n]) for n in heights.shape)
+    return decompose_boxes(heights, Grid(shape=heights.shape, cell=1.0), threshold, patch_edges)
 
 
 def level_of(heights, threshold):
@@ -144,7 +144,7 @@ def test_a_slope_is_boxes_under_its_level_ends_alone():
 def test_many_heights_are_covered_too():
     # 60 columns of cells, each a level of its own: more than are searched over the whole block.
     heights = np.repeat(np.arange(60, dtype=np.float32)[:, None], 20, axis=1)
-    cover = box_cover(
+    cover = decompose_boxes(
         heights, Grid(shape=(60, 20), cell=0.1), 0.075, (np.array([0, 60]), np.array([0, 20]))
     )
     assert cover.complete

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from terrainkit.grid import Grid
 from terrainkit.mesh.closed import THICKNESS
-from terrainkit.mesh.lattice import Lattice
+from terrainkit.mesh.node_grid import NodeGrid
 from terrainkit.rectangle_cover import rectangle_cover
-from terrainkit.walls import joined_corners
+from terrainkit.walls import connected_corners
 
-_MANY_HEIGHTS = 50
-"""Heights in a block above which a box is searched only around the cells of its height, or the time
+MAX_HEIGHTS_PER_BLOCK = 50
+"""Heights in a block above which a box is searched only neighborhood the cells of its height, or the time
 would grow with the square of their number. Below, it may run on under higher ground to the edge of
 the block, and be joined with one beyond."""
 
@@ -25,7 +25,7 @@ _Span = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class BoxCover:
+class BoxDecomposition:
     """Boxes under the level parts of the ground.
 
     Boxes may overlap below the ground: a pyramid of stairs is a stack of them, one for each step.
@@ -47,12 +47,12 @@ class BoxCover:
         return bool(self.covered.all())
 
 
-def box_cover(
+def decompose_boxes(
     heights: NDArray[np.float32],
     grid: Grid,
     threshold: float,
-    seams: tuple[NDArray[np.int64], NDArray[np.int64]],
-) -> BoxCover:
+    patch_edges: tuple[NDArray[np.int64], NDArray[np.int64]],
+) -> BoxDecomposition:
     """Return the level parts of the ground as boxes.
 
     A cell is level if its whole square is: then its top is exactly that of a box. Within a patch
@@ -63,13 +63,13 @@ def box_cover(
         heights: Samples [m], shape `grid.shape`.
         grid: Where they stand.
         threshold: Difference between neighbours above which there is a wall [m].
-        seams: Cells along x and along y where patches meet; no box is searched across them.
+        patch_edges: Cells along x and along y where patches meet; no box is searched across them.
     """
     level = level_cells(heights, grid, threshold)
-    low = _lowest(heights, level)
+    low = _lower_bound(heights, level)
     edges = [
         np.unique(np.concatenate([[0], lines, [n]]))
-        for lines, n in zip(seams, heights.shape, strict=True)
+        for lines, n in zip(patch_edges, heights.shape, strict=True)
     ]
     spans: dict[float, list[_Span]] = {}
     for i0, i1 in zip(edges[0], edges[0][1:], strict=False):
@@ -78,38 +78,38 @@ def box_cover(
             for height, (a, b, c, d) in _cover_block(heights[block], level[block], low[block]):
                 span = (int(i0 + a), int(i0 + b), int(j0 + c), int(j0 + d))
                 spans.setdefault(height, []).append(span)
-    joined = [(span, height) for height in sorted(spans) for span in _joined(spans[height])]
+    joined = [(span, height) for height in sorted(spans) for span in _merge_spans(spans[height])]
     return _solids(joined, grid, float(heights.min()) - THICKNESS, level)
 
 
 def level_cells(heights: NDArray[np.float32], grid: Grid, threshold: float) -> NDArray[np.bool_]:
     """Return which cells are level all over, shape of `heights`.
 
-    A cell takes a quarter of each of the four quads around its sample, and is level if the corner
+    A cell takes a quarter of each of the four quads neighborhood its sample, and is level if the corner
     that it has in each is joined, without a wall between, to none but corners of its own height.
     """
-    lattice = Lattice.of(heights, grid, threshold)
-    i, j = np.nonzero(lattice.cut)
-    corners = lattice.z.ravel()[lattice.corners(i, j)]
+    node_grid = NodeGrid.of(heights, grid, threshold)
+    i, j = np.nonzero(node_grid.cut)
+    corners = node_grid.z.ravel()[node_grid.corners(i, j)]
     same = corners[:, :, None] == corners[:, None, :]
-    at_cut = (same | ~joined_corners(lattice.walls(i, j))).all(axis=2)
+    at_cut = (same | ~connected_corners(node_grid.walls(i, j))).all(axis=2)
 
-    level = np.ones(lattice.z.shape, dtype=bool)
+    level = np.ones(node_grid.z.shape, dtype=bool)
     quads = (slice(None, -1), slice(1, None))
     for k, (a, b) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1))):
-        corner = lattice.even_x & lattice.even_y
+        corner = node_grid.level_x & node_grid.level_y
         corner[i, j] = at_cut[:, k]
         level[quads[a], quads[b]] &= corner
     return level[1:-1, 1:-1]
 
 
-def _lowest(heights: NDArray[np.float32], level: NDArray[np.bool_]) -> NDArray[np.float32]:
+def _lower_bound(heights: NDArray[np.float32], level: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Return a height that the ground of each cell is nowhere below [m]."""
-    return np.where(level, heights, np.minimum.reduce(around(heights)))
+    return np.where(level, heights, np.minimum.reduce(neighborhood(heights)))
 
 
-def around(values: NDArray[_Cell]) -> list[NDArray[_Cell]]:
-    """Return what is in each cell and in the eight around it, nine arrays of the same shape."""
+def neighborhood(values: NDArray[_Cell]) -> list[NDArray[_Cell]]:
+    """Return what is in each cell and in the eight neighborhood it, nine arrays of the same shape."""
     padded = np.pad(values, 1, mode="edge")
     nx, ny = values.shape
     return [padded[i : i + nx, j : j + ny] for i in range(3) for j in range(3)]
@@ -128,7 +128,7 @@ def _cover_block(
     groups = zip(values, np.split(i, first[1:]), np.split(j, first[1:]), strict=True)
     for height, rows, cols in groups:
         part = (slice(0, heights.shape[0]), slice(0, heights.shape[1]))
-        if len(values) > _MANY_HEIGHTS:
+        if len(values) > MAX_HEIGHTS_PER_BLOCK:
             part = (slice(rows.min(), rows.max() + 1), slice(cols.min(), cols.max() + 1))
         wanted = level[part] & (heights[part] == height)
         for a, b, c, d in rectangle_cover(wanted, low[part] >= height):
@@ -136,37 +136,41 @@ def _cover_block(
             yield float(height), (int(i0 + a), int(i0 + b), int(j0 + c), int(j0 + d))
 
 
-def _joined(spans: list[_Span]) -> list[_Span]:
+def _merge_spans(spans: list[_Span]) -> list[_Span]:
     """Return the spans with those that share a whole side made one."""
     before = -1
     while len(spans) != before:
         before = len(spans)
         for turned in (False, True):
-            spans = _joined_along(spans, turned=turned)
+            spans = _merge_spans_along(spans, turned=turned)
     return spans
 
 
-def _joined_along(spans: list[_Span], *, turned: bool) -> list[_Span]:
+def _merge_spans_along(spans: list[_Span], *, turned: bool) -> list[_Span]:
     """Return the spans with those of the same j0 and j1 joined (of the same i0, i1 if `turned`)."""
     result: list[_Span] = []
-    for i0, i1, j0, j1 in sorted(map(_turn, spans) if turned else spans, key=lambda s: (s[2:], s)):
+    for i0, i1, j0, j1 in sorted(
+        map(_swap_axes, spans) if turned else spans, key=lambda s: (s[2:], s)
+    ):
         if result and result[-1][2:] == (j0, j1) and i0 <= result[-1][1]:
             result[-1] = (result[-1][0], max(result[-1][1], i1), j0, j1)
         else:
             result.append((i0, i1, j0, j1))
-    return [_turn(span) for span in result] if turned else result
+    return [_swap_axes(span) for span in result] if turned else result
 
 
-def _turn(span: _Span) -> _Span:
+def _swap_axes(span: _Span) -> _Span:
     i0, i1, j0, j1 = span
     return j0, j1, i0, i1
 
 
 def _solids(
     boxes: list[tuple[_Span, float]], grid: Grid, bottom: float, level: NDArray[np.bool_]
-) -> BoxCover:
+) -> BoxDecomposition:
     spans = np.array([span for span, _ in boxes], dtype=np.float64).reshape(-1, 4)
     tops = np.array([height for _, height in boxes], dtype=np.float64)
     lower = np.column_stack([spans[:, [0, 2]] * grid.cell + grid.lower, np.full(len(tops), bottom)])
     upper = np.column_stack([spans[:, [1, 3]] * grid.cell + grid.lower, tops])
-    return BoxCover(centers=(lower + upper) / 2, half_sizes=(upper - lower) / 2, covered=level)
+    return BoxDecomposition(
+        centers=(lower + upper) / 2, half_sizes=(upper - lower) / 2, covered=level
+    )
