@@ -33,7 +33,7 @@ from lxml import etree
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.runner import Finding, lint
 from terrainkit_robots.mesh.mesh_cache import Meshes
 
@@ -134,7 +134,7 @@ def _healthy(path: Path) -> tuple[Healthy, tuple[Finding, ...], Clean, Meshes]:
     while len(times) < 3 and sum(times) < 1:
         meshes = Meshes()
         start = time.perf_counter()
-        facts = Facts(read_robot(file), meshes)
+        facts = Facts(load_robot(file), meshes)
         report = lint(facts, simulate=False)
         times.append(time.perf_counter() - start)
     loud = Counter(finding.severity for finding in report.findings)
@@ -198,7 +198,7 @@ def _check(
     signal.signal(signal.SIGALRM, _too_long)
     signal.alarm(_LONGEST)
     try:
-        model = read_robot(file, contents={file: text})
+        model = load_robot(file, contents={file: text})
         findings = lint(Facts(model, meshes), simulate=False).findings
     except Exception as error:  # a crash or a hang is a miss, and is told
         crash = f"{type(error).__name__}: {error}"

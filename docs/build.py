@@ -162,7 +162,7 @@ def draw_robot(name: str) -> None:
 
 def draw_walk(policy: str) -> None:
     """Film a policy on stairs, and put moments of it side by side."""
-    up = terrainkit.TerrainChoice(terrain="pyramid_stairs", parameters={"inverted": True})
+    up = terrainkit.SubTerrain(terrain="pyramid_stairs", parameters={"inverted": True})
     stairs = terrainkit.MapConfig(
         rows=1, cols=1, border=4, mode="selected", selected_difficulty=0.33, terrains=(up,)
     )

@@ -9,25 +9,23 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from terrainkit.choice import TerrainChoice
     from terrainkit.config import MapConfig
-    from terrainkit.config_text import read_config
     from terrainkit.curriculum import update_levels
     from terrainkit.errors import TerrainkitError, TerrainkitWarning
     from terrainkit.generation import generate
     from terrainkit.patch import Patch, make_patch
+    from terrainkit.sub_terrain import SubTerrain
     from terrainkit.terrain_map import TerrainMap
 
 __all__ = [
     "MapConfig",
     "Patch",
-    "TerrainChoice",
+    "SubTerrain",
     "TerrainMap",
     "TerrainkitError",
     "TerrainkitWarning",
     "generate",
     "make_patch",
-    "read_config",
     "update_levels",
 ]
 __version__ = "0.1.0"
@@ -35,12 +33,11 @@ __version__ = "0.1.0"
 _MODULES = {
     "MapConfig": "config",
     "Patch": "patch",
-    "TerrainChoice": "choice",
+    "SubTerrain": "sub_terrain",
     "TerrainMap": "terrain_map",
     "TerrainkitError": "errors",
     "TerrainkitWarning": "errors",
     "generate": "generation",
-    "read_config": "config_text",
     "make_patch": "patch",
     "update_levels": "curriculum",
 }

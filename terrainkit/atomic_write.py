@@ -1,6 +1,8 @@
-"""Atomic writes: what is written is there whole, or not at all."""
+"""Write files atomically: completely or not at all."""
 
+import os
 import shutil
+import socket
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,13 +10,15 @@ from pathlib import Path
 
 from terrainkit.errors import ExportError
 
+_PREFIX = ".terrainkit-"
+
 
 @contextmanager
 def atomic_write(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
-    """Yield a path of the same name to write to, and move it to `path` once the block is through.
+    """Yield a temporary path to write to, and move it to `path` when the block ends.
 
-    Files that the block writes beside it, such as a sidecar, move along. If the block raises,
-    nothing has changed.
+    Files that the block writes beside the temporary path, such as a sidecar, are moved as well. If
+    the block raises, nothing changes. Temporary folders of killed processes are removed.
 
     Raises:
         ExportError: if a target exists and `overwrite` is not set, or cannot be written.
@@ -23,18 +27,19 @@ def atomic_write(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
     name = path.name
     try:
         if path.is_symlink():
-            path = path.resolve()  # through the link, which stays one
+            path = path.resolve()  # keep the link, replace its target
     except (OSError, RuntimeError) as error:  # before Python 3.13 a loop is a RuntimeError
         raise ExportError(f"cannot write {path}: {error}") from error
     if path.is_symlink():
-        raise ExportError(f"cannot write {path}: it leads to itself")
+        raise ExportError(f"cannot write {path}: the link points to itself")
+    remove_stale_folders(path.parent)
     try:
-        # Beside the target, so that moving there is a rename on the same disk.
-        folder = Path(tempfile.mkdtemp(prefix=".terrainkit-", dir=path.parent))
+        # On the same file system as the target, so that moving is a rename.
+        folder = make_temporary_folder(path.parent)
     except OSError as error:
         raise ExportError(f"cannot write {path}: {error.strerror or error}") from error
     try:
-        yield folder / name  # whose suffix may name the format
+        yield folder / name  # the suffix may select the format
         if name != path.name:
             (folder / name).rename(folder / path.name)
         written = sorted(folder.iterdir())
@@ -49,17 +54,41 @@ def atomic_write(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
 
 
 def check_target(path: Path, *, overwrite: bool) -> None:
-    """Raise ExportError if a file cannot or may not be written at `path`."""
+    """Raise ExportError if `path` cannot be written, or exists and may not be replaced."""
     try:
         if path.is_dir():
             raise ExportError(f"cannot write {path}: it is a folder")
         if path.exists() and not path.is_file():
-            raise ExportError(f"cannot write {path}: it is there, and not a plain file")
+            raise ExportError(f"cannot write {path}: it exists and is not a regular file")
         if path.exists() and not overwrite:
             raise ExportError(
-                f"{path} exists; another name would do, or --overwrite (overwrite=True)"
+                f"{path} exists; choose another name, or use --overwrite (overwrite=True)"
             )
         if not path.parent.is_dir():
-            raise ExportError(f"cannot write {path}: there is no folder {path.parent}")
+            raise ExportError(f"cannot write {path}: the folder {path.parent} does not exist")
     except OSError as error:
         raise ExportError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def make_temporary_folder(parent: Path) -> Path:
+    """Create a temporary folder in `parent`, whose name records the host and the process."""
+    return Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{_host()}-{os.getpid()}-", dir=parent))
+
+
+def remove_stale_folders(parent: Path) -> None:
+    """Remove the temporary folders in `parent` that killed processes of this host have left."""
+    prefix = f"{_PREFIX}{_host()}-"
+    for folder in parent.glob(f"{prefix}*-*"):
+        pid = folder.name.removeprefix(prefix).partition("-")[0]
+        if pid.isdecimal() and not _is_running(int(pid)):
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _host() -> str:
+    return "".join(c for c in socket.gethostname() if c.isalnum())
+
+
+def _is_running(pid: int) -> bool:
+    import psutil
+
+    return bool(psutil.pid_exists(pid))

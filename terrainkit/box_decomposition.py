@@ -1,4 +1,4 @@
-"""Boxes: the level parts of the ground as a few axis-aligned solids with exact vertical walls."""
+"""Decompose the level parts of the ground into few axis-aligned boxes with vertical walls."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,36 +14,36 @@ from terrainkit.rectangle_cover import rectangle_cover
 from terrainkit.walls import connected_corners
 
 MAX_HEIGHTS_PER_BLOCK = 50
-"""Heights in a block above which a box is searched only neighborhood the cells of its height, or the time
-would grow with the square of their number. Below, it may run on under higher ground to the edge of
-the block, and be joined with one beyond."""
+"""Number of heights in a block above which boxes are searched only around the cells of their
+height, since the time would grow with its square. Below it, a box may extend under higher ground to
+the edge of the block, where it can merge with one in the next block."""
 
 _Cell = TypeVar("_Cell", bound=np.generic)
 
 _Span = tuple[int, int, int, int]
-"""Cells i0 to i1 along x and j0 to j1 along y, ends not included."""
+"""Cells i0 to i1 along x and j0 to j1 along y, ends excluded."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BoxDecomposition:
     """Boxes under the level parts of the ground.
 
-    Boxes may overlap below the ground: a pyramid of stairs is a stack of them, one for each step.
+    Boxes may overlap below the surface: pyramid stairs are a stack of one box per step.
     """
 
     centers: NDArray[np.float64]
-    """Middle of each box [m], shape (n, 3)."""
+    """Center of each box [m], shape (n, 3)."""
 
     half_sizes: NDArray[np.float64]
-    """Half of its size along x, y and z [m], shape (n, 3)."""
+    """Half of the size along x, y and z [m], shape (n, 3)."""
 
     covered: NDArray[np.bool_]
-    """Cells whose whole ground is the top of a box, shape (nx, ny). The others are not level, and
-    are left to a heightfield."""
+    """Whether the whole cell is the top of a box, shape (nx, ny). The other cells are not level and
+    need a heightfield."""
 
     @property
     def complete(self) -> bool:
-        """Whether the boxes hold all of the ground."""
+        """Whether the boxes cover all of the ground."""
         return bool(self.covered.all())
 
 
@@ -55,15 +55,15 @@ def decompose_boxes(
 ) -> BoxDecomposition:
     """Return the level parts of the ground as boxes.
 
-    A cell is level if its whole square is: then its top is exactly that of a box. Within a patch
-    the boxes of each height come from :func:`~terrainkit.rectangle_cover.rectangle_cover`, which
-    may run them under higher ground; those that share a whole side are joined across patches.
+    A cell is level if its whole square is level. Within a patch, the boxes of each height are found
+    by :func:`~terrainkit.rectangle_cover.rectangle_cover`, and may extend under higher ground.
+    Boxes of different patches that share a whole side are merged.
 
     Args:
         heights: Samples [m], shape `grid.shape`.
-        grid: Where they stand.
-        threshold: Difference between neighbours above which there is a wall [m].
-        patch_edges: Cells along x and along y where patches meet; no box is searched across them.
+        grid: Positions of the samples.
+        threshold: Difference between neighboring samples above which there is a wall [m].
+        patch_edges: Cells along x and along y where patches meet. Boxes are searched per patch.
     """
     level = level_cells(heights, grid, threshold)
     low = _lower_bound(heights, level)
@@ -78,18 +78,18 @@ def decompose_boxes(
             for height, (a, b, c, d) in _cover_block(heights[block], level[block], low[block]):
                 span = (int(i0 + a), int(i0 + b), int(j0 + c), int(j0 + d))
                 spans.setdefault(height, []).append(span)
-    joined = [(span, height) for height in sorted(spans) for span in _merge_spans(spans[height])]
-    return _solids(joined, grid, float(heights.min()) - THICKNESS, level)
+    merged = [(span, height) for height in sorted(spans) for span in _merge_spans(spans[height])]
+    return _make_boxes(merged, grid, float(heights.min()) - THICKNESS, level)
 
 
 def level_cells(heights: NDArray[np.float32], grid: Grid, threshold: float) -> NDArray[np.bool_]:
-    """Return which cells are level all over, shape of `heights`.
+    """Return which cells are level, shape of `heights`.
 
-    A cell takes a quarter of each of the four quads neighborhood its sample, and is level if the corner
-    that it has in each is joined, without a wall between, to none but corners of its own height.
+    A cell consists of a quarter of each of the four quads around its sample. It is level if, in
+    each quad, its corner is connected without a wall only to corners of the same height.
     """
-    node_grid = NodeGrid.of(heights, grid, threshold)
-    i, j = np.nonzero(node_grid.cut)
+    node_grid = NodeGrid.from_heights(heights, grid, threshold)
+    i, j = np.nonzero(node_grid.has_wall)
     corners = node_grid.z.ravel()[node_grid.corners(i, j)]
     same = corners[:, :, None] == corners[:, None, :]
     at_cut = (same | ~connected_corners(node_grid.walls(i, j))).all(axis=2)
@@ -104,12 +104,12 @@ def level_cells(heights: NDArray[np.float32], grid: Grid, threshold: float) -> N
 
 
 def _lower_bound(heights: NDArray[np.float32], level: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Return a height that the ground of each cell is nowhere below [m]."""
+    """Return a lower bound of the ground in each cell [m]."""
     return np.where(level, heights, np.minimum.reduce(neighborhood(heights)))
 
 
 def neighborhood(values: NDArray[_Cell]) -> list[NDArray[_Cell]]:
-    """Return what is in each cell and in the eight neighborhood it, nine arrays of the same shape."""
+    """Return the values shifted to each of the 3 x 3 neighbors, nine arrays of the same shape."""
     padded = np.pad(values, 1, mode="edge")
     nx, ny = values.shape
     return [padded[i : i + nx, j : j + ny] for i in range(3) for j in range(3)]
@@ -118,7 +118,7 @@ def neighborhood(values: NDArray[_Cell]) -> list[NDArray[_Cell]]:
 def _cover_block(
     heights: NDArray[np.float32], level: NDArray[np.bool_], low: NDArray[np.float32]
 ) -> Iterator[tuple[float, _Span]]:
-    """Yield the boxes of a block of cells, height by height."""
+    """Yield the boxes of a block of cells, in the order of their heights."""
     if not level.any():
         return
     i, j = np.nonzero(level)
@@ -130,33 +130,33 @@ def _cover_block(
         part = (slice(0, heights.shape[0]), slice(0, heights.shape[1]))
         if len(values) > MAX_HEIGHTS_PER_BLOCK:
             part = (slice(rows.min(), rows.max() + 1), slice(cols.min(), cols.max() + 1))
-        wanted = level[part] & (heights[part] == height)
-        for a, b, c, d in rectangle_cover(wanted, low[part] >= height):
+        required = level[part] & (heights[part] == height)
+        for a, b, c, d in rectangle_cover(required, low[part] >= height):
             i0, j0 = part[0].start, part[1].start
             yield float(height), (int(i0 + a), int(i0 + b), int(j0 + c), int(j0 + d))
 
 
 def _merge_spans(spans: list[_Span]) -> list[_Span]:
-    """Return the spans with those that share a whole side made one."""
+    """Merge spans that share a whole side until none do."""
     before = -1
     while len(spans) != before:
         before = len(spans)
-        for turned in (False, True):
-            spans = _merge_spans_along(spans, turned=turned)
+        for swapped in (False, True):
+            spans = _merge_spans_along(spans, swapped=swapped)
     return spans
 
 
-def _merge_spans_along(spans: list[_Span], *, turned: bool) -> list[_Span]:
-    """Return the spans with those of the same j0 and j1 joined (of the same i0, i1 if `turned`)."""
+def _merge_spans_along(spans: list[_Span], *, swapped: bool) -> list[_Span]:
+    """Merge adjacent spans of the same j0 and j1, or of the same i0 and i1 if `swapped`."""
     result: list[_Span] = []
     for i0, i1, j0, j1 in sorted(
-        map(_swap_axes, spans) if turned else spans, key=lambda s: (s[2:], s)
+        map(_swap_axes, spans) if swapped else spans, key=lambda s: (s[2:], s)
     ):
         if result and result[-1][2:] == (j0, j1) and i0 <= result[-1][1]:
             result[-1] = (result[-1][0], max(result[-1][1], i1), j0, j1)
         else:
             result.append((i0, i1, j0, j1))
-    return [_swap_axes(span) for span in result] if turned else result
+    return [_swap_axes(span) for span in result] if swapped else result
 
 
 def _swap_axes(span: _Span) -> _Span:
@@ -164,7 +164,7 @@ def _swap_axes(span: _Span) -> _Span:
     return j0, j1, i0, i1
 
 
-def _solids(
+def _make_boxes(
     boxes: list[tuple[_Span, float]], grid: Grid, bottom: float, level: NDArray[np.bool_]
 ) -> BoxDecomposition:
     spans = np.array([span for span, _ in boxes], dtype=np.float64).reshape(-1, 4)

@@ -1,139 +1,144 @@
-"""MapConfig: everything that decides the bytes of a map."""
+"""MapConfig: the settings that determine a map."""
 
 from collections import Counter
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Annotated, Any, Literal, Self
+
+from msgspec import Meta
 
 from terrainkit import presets
-from terrainkit.choice import TerrainChoice
-from terrainkit.coerce import coerce
 from terrainkit.errors import ConfigError, listing
 from terrainkit.grid import Grid, whole_cells
 from terrainkit.parameter import MAX_VALUE
+from terrainkit.schema import SORTED, Config, Fraction
+from terrainkit.sub_terrain import SubTerrain
 
 MAX_CELLS = 10**6
-"""Cells along a side of a map, beyond which no memory is large enough to ask about it."""
+"""Largest number of cells along a side of a map; memory would not hold more."""
 
-_BOUNDS: dict[str, tuple[float, float]] = {
-    "rows": (1, MAX_VALUE),
-    "cols": (1, MAX_VALUE),
-    "patch_size": (1e-4, MAX_VALUE),
-    "cell": (1e-4, MAX_VALUE),
-    "border": (0, MAX_VALUE),
-    "difficulty_range": (0, 1),
-    "difficulty_jitter": (0, 1),
-    "random_difficulties": (0, 1),
-    "selected_difficulty": (0, 1),
-    "seed": (0, 2**63 - 1),
-    "slope_threshold": (1e-4, MAX_VALUE),
-    "spawn_radius": (1e-4, MAX_VALUE),
-    "spawn_tolerance": (0, MAX_VALUE),
-    "static_friction": (0, MAX_VALUE),
-    "dynamic_friction": (0, MAX_VALUE),
-    "restitution": (0, 1),
-}
-"""Least and most that a field, or each number of it, may be."""
-
+Size = Annotated[float, Meta(ge=1e-4, le=MAX_VALUE)]
+NonNegative = Annotated[float, Meta(ge=0, le=MAX_VALUE)]
+Count = Annotated[int, Meta(ge=1, le=MAX_VALUE)]
 Mode = Literal["curriculum", "selected", "randomized"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class MapConfig:
-    """A map of rows x cols patches: rows along x by difficulty, columns along y by terrain.
+class MapConfig(Config):
+    """A map of rows x cols patches: difficulty rises with the row, columns are terrain types.
 
     Raises:
-        ConfigError: if a value cannot be used, naming the field.
+        ConfigError: if a value is invalid; the message names the field.
     """
 
-    rows: int = 10
-    """Patches along x; in a curriculum, the levels of difficulty."""
+    rows: Count = 10
+    """Patches along x; in a curriculum, the difficulty levels."""
 
-    cols: int = 10
-    """Patches along y; in a curriculum, each column holds one terrain."""
+    cols: Count = 10
+    """Patches along y; in a curriculum, each column has one terrain type."""
 
-    patch_size: tuple[float, float] = (8.0, 8.0)
+    patch_size: tuple[Size, Size] = (8.0, 8.0)
     """Size of a patch along x and y [m]."""
 
-    cell: float = 0.1
-    """Distance between two samples [m]; must divide the patch and the border."""
+    cell: Size = 0.1
+    """Distance between two height samples [m]; must divide the patch size and the border."""
 
-    border: float = 25.0
-    """Width of the level ground neighborhood the patches [m]."""
+    border: NonNegative = 25.0
+    """Width of the flat ground around the patches [m]."""
 
     preset: str = "legged_gym"
-    """Mix of terrains by name: legged_gym, rough, stairs or all."""
+    """Named set of sub-terrains: legged_gym, rough, stairs or all."""
 
-    terrains: tuple[TerrainChoice, ...] = ()
-    """Your own terrains, instead of a preset."""
+    terrains: tuple[SubTerrain, ...] = ()
+    """Custom sub-terrains, which replace the preset."""
 
     mode: Mode = "curriculum"
-    """curriculum: difficulty by row, terrain by column. selected: the only terrain of the mix
-    everywhere, at one difficulty. randomized: both drawn for each patch."""
+    """curriculum: difficulty by row, terrain type by column. selected: one terrain type at one
+    difficulty on the whole map. randomized: both sampled for each patch."""
 
-    difficulty_range: tuple[float, float] = (0.0, 1.0)
-    """Mode curriculum: difficulty of the first and of the last row, each 0 to 1."""
+    difficulty_range: Annotated[tuple[Fraction, Fraction], SORTED] = (0.0, 1.0)
+    """Mode curriculum: difficulty of the first and the last row, 0 to 1."""
 
-    difficulty_jitter: float = 0.0
-    """Mode curriculum: largest random change of the difficulty of a patch, as a share of the step
-    from row to row; the first and the last row stay exact."""
+    difficulty_jitter: Fraction = 0.0
+    """Mode curriculum: largest random change of a patch's difficulty, as a fraction of the
+    difference between rows; the first and the last row are exact."""
 
-    random_difficulties: tuple[float, ...] = (0.5, 0.75, 0.9)
-    """Mode randomized: the difficulties to draw from, each 0 to 1."""
+    random_difficulties: Annotated[tuple[Fraction, ...], Meta(min_length=1)] = (0.5, 0.75, 0.9)
+    """Mode randomized: difficulties to sample from, 0 to 1."""
 
-    selected_difficulty: float = 1.0
-    """Mode selected: the difficulty, 0 to 1, at which ranges are taken."""
+    selected_difficulty: Fraction = 1.0
+    """Mode selected: difficulty of every patch, 0 to 1."""
 
-    seed: int = 0
-    """Start of every random number in the map."""
+    seed: Annotated[int, Meta(ge=0, le=2**63 - 1)] = 0
+    """Seed of all random numbers."""
 
     centered: bool = False
-    """Put (0, 0) at the middle of the map, as Isaac Lab does, not at the corner of patch (0, 0)."""
+    """Put (0, 0) at the center of the map, as in Isaac Lab, not at the corner of patch (0, 0)."""
 
-    slope_threshold: float | None = 0.75
-    """Grade between two samples above which the ground is a vertical wall; None for no walls."""
+    slope_threshold: Size | None = 0.75
+    """Slope between two samples above which the ground becomes a vertical wall; none: no walls."""
 
-    spawn_radius: float = 0.5
-    """Radius of the free, level disc neighborhood each spawn origin [m]."""
+    spawn_radius: Size = 0.5
+    """Radius of the flat disc without obstacles around each spawn origin [m]."""
 
-    spawn_tolerance: float = 0.01
-    """Largest difference in height within that disc [m]."""
+    spawn_tolerance: NonNegative = 0.01
+    """Largest height difference within that disc [m]."""
 
-    static_friction: float = 1.0
+    static_friction: NonNegative = 1.0
     """Static friction coefficient of the ground."""
 
-    dynamic_friction: float = 1.0
+    dynamic_friction: NonNegative = 1.0
     """Dynamic friction coefficient of the ground."""
 
-    restitution: float = 0.0
+    restitution: Fraction = 0.0
     """Restitution of the ground, 0 to 1."""
 
     def __post_init__(self) -> None:
-        for f in fields(MapConfig):
-            object.__setattr__(self, f.name, coerce(f.name, getattr(self, f.name), f.type))
+        super().__post_init__()
         if self.terrains:
             object.__setattr__(self, "preset", "")
-        self._check_bounds()
         self._check_grid()
         self._check_mix()
 
+    @classmethod
+    def from_table(
+        cls, table: Mapping[str, Any], default: Self | None = None, path: str = ""
+    ) -> Self:
+        """Return the config that a TOML table describes; see :meth:`Config.from_table`."""
+        terrains = table.get("terrains", [{}])
+        if not isinstance(terrains, list) or not all(isinstance(t, Mapping) for t in terrains):
+            terrains = []
+        if not terrains:
+            raise ConfigError(
+                f"terrains: got {table['terrains']!r}; expected one or more [[terrains]] tables"
+            )
+        if "terrains" in table and "preset" in table:
+            raise ConfigError("preset, terrains: got both; expected one of them")
+        return super().from_table(table, default, path)
+
+    def to_table(self) -> dict[str, Any]:
+        """Return the values that a TOML file holds: the preset or the sub-terrains, by key."""
+        unused = "preset" if self.terrains else "terrains"
+        return {key: value for key, value in super().to_table().items() if key != unused}
+
     @cached_property
-    def mix(self) -> tuple[TerrainChoice, ...]:
-        """The terrains in use: one's own, or the preset's."""
+    def mix(self) -> tuple[SubTerrain, ...]:
+        """The sub-terrains of the map: the custom ones, or those of the preset."""
         return self.terrains or presets.get_preset(self.preset)
 
     @property
     def contact(self) -> dict[str, float]:
-        """Friction and restitution of the ground by name, for the formats that can carry them."""
+        """Friction and restitution of the ground by name."""
         names = ("static_friction", "dynamic_friction", "restitution")
         return {name: getattr(self, name) for name in names}
 
     @property
     def wall_threshold(self) -> float:
-        """Difference between two samples above which there is a wall [m]; infinite for no walls.
+        """Height difference between two samples above which there is a wall [m]; inf: no walls.
 
-        A hundredth of a millimetre of grace keeps a step of just the threshold from being a wall
-        here and a slope there: 0.05 - (-0.025) is not 0.075 in floats.
+        A tolerance of 0.01 mm keeps a step of exactly the threshold from becoming a wall through
+        rounding: 0.05 - (-0.025) is not 0.075 in floating point.
         """
         if self.slope_threshold is None:
             return float("inf")
@@ -148,7 +153,7 @@ class MapConfig:
     @cached_property
     def border_cells(self) -> int:
         """Cells of the border on each side."""
-        return whole_cells("border", self.border, self.cell, least=0)
+        return whole_cells("border", self.border, self.cell, minimum=0)
 
     @cached_property
     def grid(self) -> Grid:
@@ -178,35 +183,24 @@ class MapConfig:
         """Return the grid of patch (row, col), in the frame of the map."""
         return self.grid.block(self.patch_start(row, col), self.patch_shape)
 
-    def _check_bounds(self) -> None:
-        for name, (least, most) in _BOUNDS.items():
-            value = getattr(self, name)
-            for number in value if isinstance(value, tuple) else (value,):
-                if number is not None and not least <= number <= most:
-                    raise ConfigError(f"{name} is {number:g}; wanted {least:g} to {most:g}")
-        low, high = self.difficulty_range
-        if low > high:
-            raise ConfigError(f"difficulty_range falls from {low:g} to {high:g}; wanted it to rise")
-        if not self.random_difficulties:
-            raise ConfigError("random_difficulties is empty; wanted at least one, each 0 to 1")
-
     def _check_grid(self) -> None:
         for axis, cells in zip("xy", self.grid.shape, strict=True):
             if cells > MAX_CELLS:
                 raise ConfigError(
-                    f"the map has {cells:.7g} cells along {axis}; wanted at most {MAX_CELLS}"
+                    f"cells of the map along {axis}: got {cells:.7g}; expected at most {MAX_CELLS}"
                 )
 
     def _check_mix(self) -> None:
-        mix = self.mix
-        names = [choice.name for choice in mix]
+        names = [terrain.name for terrain in self.mix]
         (name, count), *_ = Counter(names).most_common(1)
         if count > 1:
-            raise ConfigError(f"{count} terrains of the mix are called {name!r}; wanted own names")
-        if self.mode == "selected" and len(mix) != 1:
+            raise ConfigError(f"terrains: got {count} of name {name!r}; expected unique names")
+        if self.mode == "selected" and len(names) != 1:
             raise ConfigError(
-                f"mode selected wants a mix of one terrain (--terrain); this one has {len(mix)}: "
-                f"{listing(names)}"
+                f"mode selected: got {len(names)} terrains ({listing(names)}); expected one "
+                "(--terrain)"
             )
-        if not sum(choice.proportion for choice in mix) > 0:
-            raise ConfigError(f"the proportions of {listing(names)} sum to 0; wanted more")
+        if not sum(terrain.proportion for terrain in self.mix) > 0:
+            raise ConfigError(
+                f"proportions of {listing(names)}: got a sum of 0; expected a sum above 0"
+            )

@@ -95,9 +95,7 @@ def update_levels(
     if top_levels < 1:
         raise ConfigError(f"top_levels: got {top_levels}; expected 1 or more")
     if before.size and not (before.min() >= 0 and before.max() < rows):
-        raise ConfigError(
-            f"levels: got {before.min()} to {before.max()}; expected 0 to {rows - 1}"
-        )
+        raise ConfigError(f"levels: got {before.min()} to {before.max()}; expected 0 to {rows - 1}")
     up = walked > patch_length / 2
     down = ~up & (walked < np.asarray(command_distance, dtype=np.float64) / 2)
     after = np.maximum(before + up - down, 0)

@@ -1,18 +1,20 @@
-"""The parameters of a terrain: what each field of its dataclass may be, and how it snaps to cells.
+"""Declare the parameters of a terrain: their range, and how they snap to the cells.
 
-A terrain's fields are declared with the functions below. Each takes the value at difficulty 0
-and the value at difficulty 1; one value alone holds at every difficulty.
+The fields of a terrain are declared with the functions below. Each takes the value at difficulty 0
+and the value at difficulty 1; a single value is used at every difficulty.
 """
 
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from terrainkit.coerce import coerce
+from msgspec import Meta
+
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
+from terrainkit.schema import convert
 
 Snap = Literal["none", "cells", "centered"]
 Value = float | int | bool
@@ -20,16 +22,16 @@ Range = tuple[float, float]
 Realized = float | int | bool | tuple[float, float]
 
 
-MAX_VALUE = 1e6
-"""Largest number that a parameter takes: far beyond any ground, and far from overflow."""
+MAX_VALUE = 1_000_000
+"""Largest number that a parameter accepts: far beyond any terrain, and far from overflow."""
 
-_MOST = 10_000
-"""Largest count that a parameter takes, so that building a patch takes bounded time."""
+MAX_COUNT = 10_000
+"""Largest integer that a parameter accepts, so that building a patch takes bounded time."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
-    """What is known of one field of a terrain beside its type and docstring."""
+    """The declaration of one field of a terrain, besides its type and docstring."""
 
     easy: Value
     """Default at difficulty 0."""
@@ -38,123 +40,127 @@ class Parameter:
     """Default at difficulty 1."""
 
     snap: Snap = "none"
-    """How it meets the cells: as it is, as whole cells, or as a block centered in the patch."""
+    """How the value snaps to the cells: not at all, to whole cells, or to a centered block."""
 
     zero: bool = True
-    """Whether 0 is allowed; below 0 nothing is."""
+    """Whether 0 is allowed. Negative values never are."""
 
     is_grade: bool = False
-    """Whether it is a rise over run, which is no slope any more where it makes walls."""
+    """Whether it is a rise over run, which must stay below the map's slope_threshold."""
 
-    ramps: bool = True
-    """Whether it may be given as a range (easy, hard)."""
+    allows_range: bool = True
+    """Whether the value may be a range (easy, hard)."""
 
-    slack: float = 0.0
-    """How much it may be off, in its own unit: what is made of steps may miss one of their
-    default."""
+    tolerance: float = 0.0
+    """Deviation that is not reported, in the unit of the parameter: values that are a multiple of
+    a step may differ by one default step."""
 
     def at(self, difficulty: float) -> Value:
         """Return the default at `difficulty`, 0 to 1."""
         return at_difficulty((self.easy, self.hard), difficulty)
 
     def realized(self, value: Value, grid: Grid) -> Realized:
-        """Return what the cells of `grid` make of `value`: a pair (x, y) where the axes differ."""
+        """Return `value` snapped to the cells of `grid`; a pair (x, y) where the axes differ."""
         if self.snap == "cells":
-            return grid.length(grid.cells(value, least=0 if self.zero else 1))
+            return grid.length(grid.cells(value, minimum=0 if self.zero else 1))
         if self.snap == "centered":
             x, y = (grid.length(count) for count in grid.centered(value))
             return x if x == y else (x, y)
         return value
 
-    def deviates(self, asked: Value, built: Realized, cell: float) -> bool:
-        """Return whether `built` differs from `asked` by more than it has to.
+    def deviates(self, requested: Value, realized: Realized, cell: float) -> bool:
+        """Return whether `realized` differs from `requested` by more than snapping requires.
 
-        A length on the cells may be half a cell off, or one to stay centered; any other number 5 %,
-        or its slack if anything was built at all.
+        A length may differ by half a cell, the side of a centered block by one cell. Other values
+        may differ by 5 %, or by `tolerance` unless they became 0.
         """
-        ends = built if isinstance(built, tuple) else (built,)
-        least = {"cells": cell / 2, "centered": cell, "none": 0.05 * asked}[self.snap]
-        allowed = max(least, self.slack if all(ends) else 0.0)
-        return any(abs(end - asked) > allowed + 1e-6 for end in ends)
+        values = realized if isinstance(realized, tuple) else (realized,)
+        snapping = {"cells": cell / 2, "centered": cell, "none": 0.05 * requested}[self.snap]
+        allowed = max(snapping, self.tolerance if all(values) else 0.0)
+        return any(abs(value - requested) > allowed + 1e-6 for value in values)
 
 
 def at_difficulty(value: Value | Range, difficulty: float) -> Value:
-    """Return `value` at `difficulty` 0 to 1: linear from easy to hard, exact at both ends.
+    """Interpolate a range (easy, hard) at `difficulty`, 0 to 1; exact at both ends.
 
-    Every range of every terrain is interpolated here and nowhere else.
+    A single value is returned unchanged. All ranges of all terrains are interpolated here.
     """
     if not isinstance(value, tuple):
         return value
     easy, hard = value
-    # Else 0.31 (1 - d) + 0.31 d would be 0.31000000000000005 here and there.
+    # 0.31 (1 - d) + 0.31 d can round to 0.31000000000000005.
     return easy if easy == hard else easy * (1.0 - difficulty) + hard * difficulty
 
 
-def height(easy: float, hard: float | None = None, *, slack: float = 0.0) -> Any:
-    """Declare a vertical length [m]; heights are floats, so it is met as it is, or to `slack`."""
-    return _field(easy, hard, slack=slack)
+def height(easy: float, hard: float | None = None, *, tolerance: float = 0.0) -> Any:
+    """Declare a vertical length [m], which does not snap to cells."""
+    return _field(easy, hard, tolerance=tolerance)
 
 
 def length(easy: float, hard: float | None = None, *, zero: bool = False) -> Any:
-    """Declare a horizontal length [m]; it snaps to whole cells, one or more unless `zero`."""
+    """Declare a horizontal length [m], which snaps to whole cells: at least one unless `zero`."""
     return _field(easy, hard, snap="cells", zero=zero)
 
 
 def platform(side: float) -> Any:
-    """Declare the side of a square in the middle of the patch [m], kept centered on the cells."""
+    """Declare the side of a square at the center of the patch [m], which stays centered."""
     return _field(side, snap="centered", zero=False)
 
 
 def scalar(easy: float, hard: float | None = None, *, zero: bool = True) -> Any:
-    """Declare a number that the cells leave as it is."""
+    """Declare a number that does not snap to cells."""
     return _field(easy, hard, zero=zero)
 
 
 def grade(easy: float, hard: float) -> Any:
-    """Declare a rise over run; one above the map's slope_threshold would be a wall."""
+    """Declare a rise over run, which must not exceed the map's slope_threshold."""
     return _field(easy, hard, is_grade=True)
 
 
 def count(number: int) -> Any:
-    """Declare a whole number above 0, the same at every difficulty."""
-    return _field(number, zero=False, ramps=False)
+    """Declare a positive integer that does not depend on the difficulty."""
+    return _field(number, zero=False, allows_range=False)
 
 
 def switch(*, default: bool = False) -> Any:
-    """Declare a yes or no, the same at every difficulty."""
-    return _field(default, ramps=False)
+    """Declare a boolean that does not depend on the difficulty."""
+    return _field(default, allows_range=False)
 
 
-def _field(easy: Value, hard: Value | None = None, **rest: Any) -> Any:
+def _field(easy: Value, hard: Value | None = None, **options: Any) -> Any:
     hard = easy if hard is None else hard
-    parameter = Parameter(easy=easy, hard=hard, **rest)
+    parameter = Parameter(easy=easy, hard=hard, **options)
     return dataclasses.field(default=hard, metadata={"parameter": parameter})
 
 
 @cache
 def parameters_of(terrain: type) -> Mapping[str, Parameter]:
-    """Return the parameters of a terrain's class by name, in the order of its fields."""
+    """Return the parameters of a terrain class by name, in the order of its fields."""
     for field in dataclasses.fields(terrain):
         if "parameter" not in field.metadata:
             raise ConfigError(
-                f"{terrain.__name__}: {field.name} is a plain field; wanted one declared with "
+                f"{terrain.__name__}: {field.name} is a plain field; expected one declared with "
                 "parameter.height, length, platform, grade, scalar, count or switch"
             )
     return {f.name: f.metadata["parameter"] for f in dataclasses.fields(terrain)}
 
 
-def checked(owner: str, name: str, value: object, parameter: Parameter) -> Value:
-    """Return `value` as a plain number, or raise the ConfigError that says why it cannot be.
+def convert_parameter(terrain: str, name: str, value: object, parameter: Parameter) -> Value:
+    """Return `value` as a plain number.
 
     Args:
-        owner: The terrain, for the error.
-        name: The parameter, for the error.
-        value: What was given for it.
-        parameter: What is known of it.
+        terrain: Name of the terrain, for the error message.
+        name: Name of the parameter, for the error message.
+        value: The value to convert.
+        parameter: The declaration of the parameter.
+
+    Raises:
+        ConfigError: if the value has another type or is out of range.
     """
-    number: Value = coerce(f"{owner}: {name}", value, type(parameter.easy))
-    most = MAX_VALUE if isinstance(number, float) else _MOST
-    if not 0 <= number <= most or (number == 0 and not parameter.zero):
-        least = "0" if parameter.zero else "above 0"
-        raise ConfigError(f"{owner}: {name} is {number:g}; wanted {least} to {most:g}")
+    kind = type(parameter.easy)
+    if kind is bool:
+        return bool(convert(f"{terrain}.{name}", value, bool))
+    limit = MAX_VALUE if kind is float else MAX_COUNT
+    least = Meta(ge=0, le=limit) if parameter.zero else Meta(gt=0, le=limit)
+    number: Value = convert(f"{terrain}.{name}", value, Annotated[kind, least])
     return number

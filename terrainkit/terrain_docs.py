@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from terrainkit import registry
 from terrainkit.parameter import Value, parameters_of
+from terrainkit.schema import field_docs
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,14 +53,8 @@ def terrain_doc(name: str) -> TerrainDoc:
     Raises:
         ConfigError: if there is no such terrain.
     """
-    import docstring_parser
-
     terrain = registry.get_terrain(name)
-    texts = {
-        field.arg_name: " ".join((field.description or "").split())
-        for owner in reversed(terrain.__mro__[:-1])  # a subclass inherits the descriptions
-        for field in docstring_parser.parse_from_object(owner).params
-    }
+    texts = field_docs(terrain)
     return TerrainDoc(
         name=name,
         text=inspect.getdoc(terrain) or "",

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from terrainkit import MapConfig, TerrainChoice, generate
+from terrainkit import MapConfig, SubTerrain, generate
 
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
@@ -19,9 +19,9 @@ def terrain_map():
             border=1.2,
             seed=7,
             terrains=(
-                TerrainChoice(terrain="stairs", parameters={"step_height": (0.05, 0.2)}),
-                TerrainChoice(terrain="obstacles", parameters={"platform": 1.5}),
-                TerrainChoice(terrain="rough_slope", parameters={"platform": 1.5}),
+                SubTerrain(terrain="stairs", parameters={"step_height": (0.05, 0.2)}),
+                SubTerrain(terrain="obstacles", parameters={"platform": 1.5}),
+                SubTerrain(terrain="rough_slope", parameters={"platform": 1.5}),
             ),
             static_friction=0.8,
             dynamic_friction=0.6,
@@ -41,11 +41,9 @@ def level_map():
             border=0.5,
             seed=3,
             terrains=(
-                TerrainChoice(terrain="stairs", parameters={"step_height": (0.1, 0.2)}),
-                TerrainChoice(
-                    terrain="obstacles", parameters={"height": (0.2, 0.4), "platform": 1.5}
-                ),
-                TerrainChoice(terrain="gap", parameters={"width": 0.4, "platform": 2.0}),
+                SubTerrain(terrain="stairs", parameters={"step_height": (0.1, 0.2)}),
+                SubTerrain(terrain="obstacles", parameters={"height": (0.2, 0.4), "platform": 1.5}),
+                SubTerrain(terrain="gap", parameters={"width": 0.4, "platform": 2.0}),
             ),
         )
     )

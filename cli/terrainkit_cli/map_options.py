@@ -4,11 +4,10 @@ import dataclasses
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
 
-import docstring_parser
 import tyro
 
-from terrainkit.coerce import coerce
 from terrainkit.config import MapConfig
+from terrainkit.schema import convert, field_docs, field_types, without_meta, without_none
 from terrainkit_cli.parse import value_of
 
 _LEFT_OUT = object()
@@ -16,13 +15,14 @@ _LEFT_OUT = object()
 
 def _option(name: str, kind: Any, default: object, text: str) -> tuple[str, Any, object]:
     """Return name, type and default of the option for a field of MapConfig."""
+    annotation, kind = kind, without_meta(without_none(kind))[0]
     if kind is bool:
         return name, Annotated[bool, tyro.conf.arg(help=text, help_behavior_hint="")], False
     several = get_origin(kind) is tuple
     spec = tyro.constructors.PrimitiveConstructorSpec(
         nargs=_count(kind) if several else 1,
-        metavar=_metavar(kind),
-        instance_from_str=partial(_read, name, kind, several),
+        metavar=_metavar(kind) + ("|none" if without_none(annotation) is not annotation else ""),
+        instance_from_str=partial(_read, name, annotation, several),
         is_instance=lambda _: True,
         str_from_instance=lambda _: [],
     )
@@ -35,7 +35,7 @@ def _option(name: str, kind: Any, default: object, text: str) -> tuple[str, Any,
 
 def _read(name: str, kind: Any, several: bool, words: list[str]) -> object:
     values = [value_of(word) for word in words]
-    return coerce(f"--{name.replace('_', '-')}", values if several else values[0], kind)
+    return convert(f"--{name.replace('_', '-')}", values if several else values[0], kind)
 
 
 def _count(kind: Any) -> int | Literal["*"]:
@@ -55,11 +55,13 @@ def _metavar(kind: Any) -> str:
 if TYPE_CHECKING:
     MapOptions = Any
 else:
-    _ABOUT = {p.arg_name: p for p in docstring_parser.parse_from_object(MapConfig).params}
+    _TYPES = field_types(MapConfig)
     MapOptions = dataclasses.make_dataclass(
         "MapOptions",
         [
-            _option(f.name, f.type, f.default, " ".join(_ABOUT[f.name].description.split()))
+            _option(
+                f.name, field_types(MapConfig)[f.name], f.default, field_docs(MapConfig)[f.name]
+            )
             for f in dataclasses.fields(MapConfig)
             if f.name != "terrains"
         ],

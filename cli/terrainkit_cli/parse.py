@@ -73,4 +73,4 @@ def _one_line(box: str) -> str:
     parts = " ".join(row if row.strip("─╰╯+- ") else "\n" for row in rows).split("\n")
     told = [part.strip() for part in parts]
     told = [part for part in told if part and not part.startswith(("For full", "Argument help"))]
-    return re.sub(r"^Error parsing (\S+): (?=\1 is )", "", ". ".join(told))
+    return re.sub(r"^Error parsing (\S+): (?=\1: )", "", ". ".join(told))

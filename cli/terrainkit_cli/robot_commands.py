@@ -124,7 +124,7 @@ class CheckRobot(Command):
         return int(any(check.bad for check in checks))
 
     def _settings(self) -> "Settings":
-        from terrainkit_robots.lint.selection import choose
+        from terrainkit_robots.lint.selection import select_rules
         from terrainkit_robots.lint.settings import Settings
 
         settings = Settings(
@@ -135,7 +135,7 @@ class CheckRobot(Command):
             strict=self.strict,
             simulate=not self.no_simulation,
         )
-        choose(settings)
+        select_rules(settings)
         return settings
 
     def _say(self, checks: "Sequence[_Checked]", output: Path | None) -> None:
@@ -175,13 +175,13 @@ class _Checked:
 
 def _tried(name: str, command: CheckRobot, options: "Settings") -> _Checked | None:
     """Return what there is to say of a file; None, and one line of error, if that failed."""
-    from terrainkit_robots.lint.report.facts_json import facts_record
+    from terrainkit_robots.lint.report.facts_json import facts_json
     from terrainkit_robots.lint.runner import INTERNAL
 
     try:
         check = _check(name, command, options)
         # So that what fails in it fails here.
-        facts_record(check.report.facts, simulated=check.report.simulated)
+        facts_json(check.report.facts, simulated=check.report.simulated)
         return check
     except TerrainkitError as error:
         render.error(str(error))
@@ -197,7 +197,7 @@ def _tried(name: str, command: CheckRobot, options: "Settings") -> _Checked | No
 def _check(name: str, command: CheckRobot, options: "Settings") -> _Checked:
     from terrainkit_robots.analysis.facts import Facts
     from terrainkit_robots.description import bundled
-    from terrainkit_robots.description.load import read_robot
+    from terrainkit_robots.description.load import load_robot
     from terrainkit_robots.lint.selection import lint_selected
     from terrainkit_robots.lint.settings import read_settings
     from terrainkit_robots.mesh.mesh_cache import Meshes
@@ -210,7 +210,7 @@ def _check(name: str, command: CheckRobot, options: "Settings") -> _Checked:
     spec = read_spec(Path(command.spec)) if command.spec else None
 
     def look(contents: Mapping[Path, bytes]) -> "Report":
-        model = read_robot(
+        model = load_robot(
             path,
             packages=settings.packages,
             xacro_arguments=settings.xacro_arguments,
@@ -233,11 +233,11 @@ def _check(name: str, command: CheckRobot, options: "Settings") -> _Checked:
 def _other(name: str, settings: "Settings") -> "Facts | None":
     """Return the robot to compare with; None without one."""
     from terrainkit_robots.analysis.facts import Facts
-    from terrainkit_robots.description.load import read_robot
+    from terrainkit_robots.description.load import load_robot
 
     if not name:
         return None
-    model = read_robot(
+    model = load_robot(
         find_robot(name),
         packages=settings.packages,
         xacro_arguments=settings.xacro_arguments,
@@ -312,12 +312,12 @@ class Rule(Command):
 
     def run(self) -> int:
         """Print the page of a rule, or a line for each."""
-        from terrainkit_robots.lint.rule import FAMILIES, find, rules
+        from terrainkit_robots.lint.rule import FAMILIES, get_rule, rules
 
         if self.code and self.all:
             raise ConfigError("wanted the code or the name of a rule, or --all")
         if self.code:
-            render.result(_page(find(self.code)))
+            render.result(_page(get_rule(self.code)))
             return 0
         for family, about in FAMILIES.items():
             render.result(f"{family}: {about}")

@@ -9,10 +9,10 @@ from typing import Annotated, Any
 import tyro
 
 from terrainkit import presets, registry
-from terrainkit.choice import TerrainChoice
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
 from terrainkit.parameter import Range, Value
+from terrainkit.sub_terrain import SubTerrain
 from terrainkit.terrain_map import TerrainMap
 from terrainkit_cli import render
 from terrainkit_cli.map_options import MapOptions, given
@@ -70,7 +70,7 @@ class Generate(Command):
             raise ConfigError("--set gives parameters to --terrain, which is missing")
         if self.terrain:
             parameters = _parameters(self.set)
-            options["terrains"] = (TerrainChoice(terrain=self.terrain, parameters=parameters),)
+            options["terrains"] = (SubTerrain(terrain=self.terrain, parameters=parameters),)
         elif "preset" in options:
             options["terrains"] = ()
         config = _config_of(self.config) if self.config else MapConfig()
@@ -81,9 +81,7 @@ class Generate(Command):
 def _config_of(path: str) -> MapConfig:
     if path.endswith(".npz"):
         return TerrainMap.load(path).config
-    from terrainkit.config_text import read_config
-
-    return read_config(path)
+    return MapConfig.load(path)
 
 
 def _parameters(text: str) -> dict[str, Value | Range]:
@@ -248,10 +246,10 @@ class Check(Command):
     def run(self) -> int:
         """Print what is wrong, and return 1 if anything is."""
         from terrainkit.export.npz import read_mesh
-        from terrainkit.validate import audit
+        from terrainkit.validate import validate
 
         terrain_map = TerrainMap.load(self.map)
-        findings = audit(terrain_map, read_mesh(self.map))
+        findings = validate(terrain_map, read_mesh(self.map))
         for finding in findings:
             render.result(f"{finding.check}: {finding.message}")
         if findings:

@@ -1,8 +1,8 @@
-"""Export: a map as a file, in the format that the suffix names.
+"""Write a map in the format of the file suffix.
 
-Every file in this folder that has `SUFFIXES` is an exporter; nothing else lists them. Its function
-`export(terrain_map, path, ...)` writes `path` in full; the keyword-only arguments of that function
-are the options of the format. `BYTES_PER_SAMPLE` is the most memory that it takes for each sample.
+Each module in this folder that defines `SUFFIXES` is an exporter. Its function
+`export(terrain_map, path, ...)` writes `path`; the keyword-only arguments of that function are the
+options of the format. `BYTES_PER_SAMPLE` is its peak memory per sample.
 """
 
 import importlib
@@ -28,13 +28,13 @@ def export(
 
     Args:
         terrain_map: The map.
-        path: Target; its suffix names the format.
+        path: Target; its suffix selects the format.
         overwrite: Replace an existing file.
-        **options: Options of that format.
+        **options: Options of the format.
 
     Raises:
-        ExportError: if the suffix or an option is unknown, the format cannot hold the map, or the
-            target cannot be written; whatever was there is as it was.
+        ExportError: if the suffix or an option is unknown, the format cannot represent the map, or
+            the target cannot be written; an existing target is unchanged.
     """
     path = Path(path)
     write = get_exporter(path).export
@@ -49,14 +49,18 @@ def export(
 
 
 def check_export(path: str | Path, samples: int, *, overwrite: bool = False) -> None:
-    """Raise what :func:`export` would for a map of so many samples, before it is made."""
+    """Raise the errors that :func:`export` would raise for a map of `samples` samples."""
     exporter = get_exporter(Path(path))
     check_target(Path(path), overwrite=overwrite)
     check_memory(samples * exporter.BYTES_PER_SAMPLE, f"writing {samples} samples to {path}")
 
 
 def get_exporter(path: Path) -> ModuleType:
-    """Return the exporter for the suffix of `path`, or raise the error that lists them."""
+    """Return the exporter for the suffix of `path`.
+
+    Raises:
+        ExportError: if there is none.
+    """
     exporters = exporters_by_suffix()
     if path.suffix.lower() not in exporters:
         raise ExportError(
@@ -67,14 +71,14 @@ def get_exporter(path: Path) -> ModuleType:
 
 
 def export_options(path: Path) -> tuple[str, ...]:
-    """Return the names of the options that the format of `path` has."""
+    """Return the names of the options of the format of `path`."""
     parameters = inspect.signature(get_exporter(path).export).parameters.values()
     return tuple(p.name for p in parameters if p.kind is p.KEYWORD_ONLY)
 
 
 @cache
 def exporters_by_suffix() -> dict[str, ModuleType]:
-    """Return the exporter for each suffix."""
+    """Return the exporters by suffix."""
     modules = (
         importlib.import_module(f"{__name__}.{module.name}")
         for module in pkgutil.iter_modules(__path__)

@@ -1,4 +1,4 @@
-"""The full mesh: two triangles for every quad, and the pieces of those that are cut."""
+"""The full mesh: two triangles per quad, and the faces of quads with walls."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +14,17 @@ def full_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> Tri
 
     Args:
         heights: Samples [m], shape `grid.shape`.
-        grid: Where they stand.
-        threshold: Difference between neighbours above which there is a wall [m].
+        grid: Positions of the samples.
+        threshold: Difference between neighboring samples above which there is a wall [m].
 
     Raises:
         MemoryLimitError: if the mesh would not fit in memory; nothing was allocated.
     """
-    node_grid = NodeGrid.of(heights, grid, threshold)
-    fans, centers = wall_quads(node_grid, np.flatnonzero(node_grid.cut), node_grid.vertex_count)
-    plain = np.flatnonzero(~node_grid.cut)
+    node_grid = NodeGrid.from_heights(heights, grid, threshold)
+    fans, centers = wall_quads(
+        node_grid, np.flatnonzero(node_grid.has_wall), node_grid.vertex_count
+    )
+    plain = np.flatnonzero(~node_grid.has_wall)
     triangles = np.empty((2 * len(plain) + len(fans), 3), dtype=np.int32)
     split_quads(node_grid, plain, out=triangles[: 2 * len(plain)])
     triangles[2 * len(plain) :] = fans
@@ -39,10 +41,10 @@ def full_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> Tri
 def split_quads(node_grid: NodeGrid, numbers: NDArray[np.int64], out: NDArray[np.int32]) -> None:
     """Write two triangles for each quad in `numbers` to `out`, shape (2 n, 3).
 
-    The diagonal runs from (i, j) to (i + 1, j + 1), as MuJoCo's heightfields have it.
+    The diagonal runs from (i, j) to (i + 1, j + 1), as in MuJoCo's heightfields.
     """
     ny = node_grid.z.shape[1]
-    # A row has one fewer quad than nodes, so a quad's first node is its own number plus its row.
+    # A row has one quad fewer than nodes, so the first node of a quad is its number plus its row.
     corner = (numbers + numbers // (ny - 1)).astype(np.int32)
     pairs = out.reshape(-1, 2, 3)
     pairs[:, 0, 0] = pairs[:, 1, 0] = corner

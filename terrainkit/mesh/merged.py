@@ -1,9 +1,9 @@
-"""The merged mesh: what is level becomes a few large faces, what is not stays as it is.
+"""The merged mesh: coplanar faces merged to large ones.
 
-Level quads are joined to rectangles, quads that are level along one axis to rows, and straight
-walls of one height to panels with a level strip on either side. Each of these keeps the vertices of
-its rim that a neighbour needs, so large and small faces meet vertex by vertex. Nothing moves: the
-merged surface is the full one.
+Level quads are merged to rectangles, quads that are level along one axis to rows, and straight
+walls of constant height to panels with a level strip on both sides. Each polygon keeps the boundary
+vertices that its neighbors use, so large and small faces share all vertices. The surface is exactly
+that of the full mesh.
 """
 
 import numpy as np
@@ -20,27 +20,27 @@ from terrainkit.mesh.wall_runs import WallRuns
 
 
 def merged_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> TriMesh:
-    """Return the surface with level faces merged.
+    """Return the surface with coplanar faces merged.
 
     Args:
         heights: Samples [m], shape `grid.shape`.
-        grid: Where they stand.
-        threshold: Difference between neighbours above which there is a wall [m].
+        grid: Positions of the samples.
+        threshold: Difference between neighboring samples above which there is a wall [m].
 
     Raises:
         MemoryLimitError: if the mesh would not fit in memory; nothing was allocated.
     """
-    node_grid = NodeGrid.of(heights, grid, threshold)
+    node_grid = NodeGrid.from_heights(heights, grid, threshold)
     level_x, level_y = node_grid.level_x, node_grid.level_y
     level = level_x & level_y
-    # Where the ground is level along y, walls on both edges across it make one straight wall.
+    # Where the ground is level along y, walls on both edges along x are one straight wall.
     walls_x = level_y & node_grid.walls_x[:, :-1] & node_grid.walls_x[:, 1:]
     walls_y = level_x & node_grid.walls_y[:-1] & node_grid.walls_y[1:]
-    rows_y = level_y & ~(level | node_grid.cut)
-    rows_x = level_x & ~(level | node_grid.cut)
+    rows_y = level_y & ~(level | node_grid.has_wall)
+    rows_x = level_x & ~(level | node_grid.has_wall)
 
     rectangles = [Rectangles.level(level), Rectangles.along_y(rows_y), Rectangles.along_x(rows_x)]
-    runs = [WallRuns.across_x(node_grid, walls_x), WallRuns.across_y(node_grid, walls_y)]
+    runs = [WallRuns.normal_x(node_grid, walls_x), WallRuns.normal_y(node_grid, walls_y)]
     single = ~(level | rows_x | rows_y | walls_x | walls_y)
     kept = _corners(single)
     for rectangle in rectangles:
@@ -64,12 +64,12 @@ def _corners(quads: Mask) -> Mask:
 def _assemble(
     node_grid: NodeGrid, single: Mask, polygons: list[Polygons], panels: list[Ids]
 ) -> TriMesh:
-    """Return the mesh of the quads that stand alone, the polygons and the panels between them."""
-    plain = np.flatnonzero(single & ~node_grid.cut)
+    """Return the mesh of single quads, polygons and wall panels."""
+    plain = np.flatnonzero(single & ~node_grid.has_wall)
     pairs = np.empty((2 * len(plain), 3), dtype=np.int32)
     split_quads(node_grid, plain, out=pairs)
     count = node_grid.vertex_count
-    faces, added = wall_quads(node_grid, np.flatnonzero(single & node_grid.cut), count)
+    faces, added = wall_quads(node_grid, np.flatnonzero(single & node_grid.has_wall), count)
     triangles = [pairs, *(part.astype(np.int32) for part in (faces, *panels))]
     extra = [node_grid.midpoints(), added]
     count += len(added)
@@ -84,7 +84,7 @@ def _assemble(
 def _compact(
     node_grid: NodeGrid, triangles: NDArray[np.int32], extra: NDArray[np.float32]
 ) -> TriMesh:
-    """Return the mesh without the vertices that no triangle uses.
+    """Return the mesh without unused vertices.
 
     Args:
         node_grid: Whose nodes are the first vertices.

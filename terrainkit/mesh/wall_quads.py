@@ -1,4 +1,4 @@
-"""The quads that a wall cuts, one by one: level or sloping pieces, and the walls between them."""
+"""The faces of quads with walls: level or sloping parts, and the walls between them."""
 
 from dataclasses import dataclass
 
@@ -11,17 +11,17 @@ from terrainkit.walls import center_heights
 Ids = NDArray[np.int64]
 
 _SADDLE_OFFSET = 1 / 128
-"""How far towards their corners the walls of two high corners that meet in a point are pulled.
+"""Offset of the walls of two high corners that meet in a point, as a fraction of the cell.
 
-Four walls meet where two opposite corners are higher than the other two. Left so, their common edge
-would be shared by four faces; pulled apart, by less than a millimetre in a cell of 0.1 m, each pair
-has an edge of its own.
+Four walls meet where two opposite corners are higher than the other two. Their common edge would be
+shared by four faces. With this offset, less than a millimeter in a cell of 0.1 m, each pair of
+walls has an edge of its own.
 """
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _WallQuads:
-    """K cut quads: numbers of their vertices, corner by corner and edge by edge."""
+    """The vertices of K quads with walls."""
 
     corners: Ids
     """Node at each corner, shape (K, 4)."""
@@ -33,7 +33,7 @@ class _WallQuads:
     """Whether each edge is a wall, shape (K, 4)."""
 
     midpoints: Ids
-    """Middle of each wall on the side of its first and its second corner, shape (K, 4, 2)."""
+    """Midpoint of each wall on the side of its first and second corner, shape (K, 4, 2)."""
 
     xy: NDArray[np.float64]
     """Position of each corner, x and y [m], shape (K, 4, 2)."""
@@ -47,24 +47,24 @@ class _WallQuads:
         return _WallQuads(**{name: value[which] for name, value in vars(self).items()})
 
     def rotate_corners(self) -> "_WallQuads":
-        """Return the quads with corner 1 as corner 0."""
+        """Return the quads renumbered with corner 1 as corner 0."""
         return _WallQuads(
             **{name: np.roll(value, -1, axis=1) for name, value in vars(self).items()}
         )
 
 
 def wall_quads(node_grid: NodeGrid, numbers: Ids, first: int) -> tuple[Ids, NDArray[np.float32]]:
-    """Return the triangles of the cut quads `numbers`, and the vertices that they add.
+    """Return the triangles of the quads `numbers`, and their additional vertices.
 
     Args:
-        node_grid: What the quads are part of.
+        node_grid: Nodes of the mesh.
         numbers: Flat index of each quad, shape (K,).
-        first: Number that the first added vertex takes.
+        first: Number of the first added vertex.
 
     Returns:
         Triangles, shape (T, 3), and positions of the added vertices [m], shape (V, 3).
     """
-    quads = _gather(node_grid, numbers)
+    quads = _gather_quads(node_grid, numbers)
     z0, z1, z2, z3 = quads.z.T
     all_walls = quads.walls.all(axis=1)
     even_high = all_walls & (np.minimum(z0, z2) > np.maximum(z1, z3))
@@ -82,7 +82,7 @@ def wall_quads(node_grid: NodeGrid, numbers: Ids, first: int) -> tuple[Ids, NDAr
     return np.concatenate(triangles), np.concatenate(vertices)
 
 
-def _gather(node_grid: NodeGrid, numbers: Ids) -> _WallQuads:
+def _gather_quads(node_grid: NodeGrid, numbers: Ids) -> _WallQuads:
     i, j = np.divmod(numbers, node_grid.z.shape[1] - 1)
     corners = node_grid.corners(i, j)
     low_side = np.stack(
@@ -94,7 +94,7 @@ def _gather(node_grid: NodeGrid, numbers: Ids) -> _WallQuads:
         ],
         axis=1,
     )
-    # Edges 0 and 1 run along x and y, edges 2 and 3 against them.
+    # Edges 0 and 1 point along x and y, edges 2 and 3 against them.
     backwards = np.array([0, 0, 1, 1])
     x, y = node_grid.x, node_grid.y
     return _WallQuads(
@@ -113,9 +113,9 @@ def _gather(node_grid: NodeGrid, numbers: Ids) -> _WallQuads:
 
 
 def _fan_faces(quads: _WallQuads, first: int) -> tuple[Ids, NDArray[np.float32]]:
-    """Return a fan neighborhood the center of each quad, which has one vertex for each height there."""
+    """Return fans around the center of each quad, with one vertex per height at the center."""
     heights = center_heights(quads.z, quads.walls).astype(np.float32)
-    column = _VerticalLine.of(heights, quads.center, first)
+    column = _VerticalLine.from_heights(heights, quads.center, first)
     triangles = []
     for k in range(4):
         after = (k + 1) % 4
@@ -131,10 +131,12 @@ def _fan_faces(quads: _WallQuads, first: int) -> tuple[Ids, NDArray[np.float32]]
 
 
 def _saddle_faces(quads: _WallQuads, first: int) -> tuple[Ids, NDArray[np.float32]]:
-    """Return the quads whose corners 0 and 2 stand above 1 and 3, with two centers each."""
-    pull = (quads.xy[:, 0] - quads.center) * _SADDLE_OFFSET
-    west = _VerticalLine.of(quads.z[:, [0, 1, 3]], quads.center + pull, first)
-    east = _VerticalLine.of(quads.z[:, [2, 1, 3]], quads.center - pull, first + len(west.positions))
+    """Return the faces of quads whose corners 0 and 2 are above 1 and 3, with two centers each."""
+    offset = (quads.xy[:, 0] - quads.center) * _SADDLE_OFFSET
+    west = _VerticalLine.from_heights(quads.z[:, [0, 1, 3]], quads.center + offset, first)
+    east = _VerticalLine.from_heights(
+        quads.z[:, [2, 1, 3]], quads.center - offset, first + len(west.positions)
+    )
     c0, c1, c2, c3 = quads.corners.T
     (m0, n0), (m1, n1), (m2, n2), (m3, n3) = (quads.midpoints[:, k].T for k in range(4))
     every = np.ones(len(c0), dtype=bool)
@@ -164,47 +166,47 @@ def _rows(*faces: tuple[Ids, Ids, Ids]) -> list[Ids]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _VerticalLine:
-    """The vertices on one vertical line in each of K quads, one for each different height."""
+    """The vertices on a vertical line in each of K quads, one per distinct height."""
 
     positions: NDArray[np.float32]
-    """Positions of all vertices [m], quad by quad and upwards, shape (V, 3)."""
+    """Positions of all vertices [m], by quad in ascending order, shape (V, 3)."""
 
-    lowest: Ids
+    first_vertex: Ids
     """Number of each quad's lowest vertex, shape (K,)."""
 
     rank: Ids
-    """Which vertex, counted upwards, each of the h heights given is, shape (K, h)."""
+    """Index of the vertex of each of the h heights, counted from the lowest, shape (K, h)."""
 
     @classmethod
-    def of(
+    def from_heights(
         cls, heights: NDArray[np.float32], xy: NDArray[np.float64], first: int
     ) -> "_VerticalLine":
         order = np.argsort(heights, axis=1, kind="stable")
-        upwards = np.take_along_axis(heights, order, axis=1)
+        ascending = np.take_along_axis(heights, order, axis=1)
         new = np.ones(heights.shape, dtype=bool)
-        new[:, 1:] = upwards[:, 1:] != upwards[:, :-1]
+        new[:, 1:] = ascending[:, 1:] != ascending[:, :-1]
         rank = np.empty(heights.shape, dtype=np.int64)
         np.put_along_axis(rank, order, np.cumsum(new, axis=1) - 1, axis=1)
         counts = new.sum(axis=1)
-        positions = np.column_stack([np.repeat(xy, counts, axis=0), upwards[new]])
-        lowest = first + np.cumsum(counts) - counts
-        return cls(positions=positions.astype(np.float32), lowest=lowest, rank=rank)
+        positions = np.column_stack([np.repeat(xy, counts, axis=0), ascending[new]])
+        first_vertex = first + np.cumsum(counts) - counts
+        return cls(positions=positions.astype(np.float32), first_vertex=first_vertex, rank=rank)
 
     def vertex(self, k: int) -> Ids:
         """Return the vertex of the k-th height in each quad."""
-        return self.lowest + self.rank[:, k]
+        return self.first_vertex + self.rank[:, k]
 
-    def wall(self, a: Ids, b: Ids, k: int, after: int, where: NDArray[np.bool_]) -> list[Ids]:
-        """Return the wall between the vertices `a` and `b` of an edge and this line.
+    def wall(self, a: Ids, b: Ids, k: int, after: int, mask: NDArray[np.bool_]) -> list[Ids]:
+        """Return the faces of the wall between the vertices `a` and `b` of an edge and this line.
 
-        It spans heights `k` (below or above `a`) to `after` (of `b`) here, and takes every vertex
-        in between, so that the walls that meet on the line meet vertex by vertex.
+        On the line the wall extends from height `k`, next to `a`, to height `after`, next to `b`.
+        It uses all vertices in between, so walls that meet on the line share their vertices.
         """
         end, start = self.rank[:, k], self.rank[:, after]
-        triangles = [np.column_stack([a, b, self.lowest + start])[where]]
+        triangles = [np.column_stack([a, b, self.first_vertex + start])[mask]]
         step = np.sign(end - start)
         for n in range(self.rank.shape[1] - 1):
-            more = where & (np.abs(end - start) > n)
-            at = self.lowest + start + n * step
+            more = mask & (np.abs(end - start) > n)
+            at = self.first_vertex + start + n * step
             triangles.append(np.column_stack([a, at, at + step])[more])
         return triangles

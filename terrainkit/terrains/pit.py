@@ -12,7 +12,10 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class Pit(Terrain):
-    """A square pit with vertical walls; the robot starts at the bottom and climbs out."""
+    """A square pit with vertical walls.
+
+    The robot is spawned at the bottom and climbs out.
+    """
 
     depth: float = parameter.height(0.0, 1.0)
     """Depth of the pit [m]."""
@@ -23,5 +26,5 @@ class Pit(Terrain):
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return 0, and `-depth` inside the pit."""
         ground = np.zeros(grid.shape)
-        ground[grid.middle(grid.centered(self.side))] = -self.depth
+        ground[grid.centered_slices(grid.centered(self.side))] = -self.depth
         return ground

@@ -1,4 +1,4 @@
-"""A square pyramid of stairs."""
+"""A pyramid of stairs."""
 
 from dataclasses import dataclass
 
@@ -13,10 +13,10 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class PyramidStairs(Terrain):
-    """Square steps neighborhood a central platform, each of one height and one width.
+    """Square steps of constant height and width around a central platform.
 
-    The outermost tread takes what the steps leave over, so it is never the narrower one; it is at
-    height 0.
+    The outermost tread is at height 0. It is at least as wide as the others, since it takes the
+    remaining cells.
     """
 
     step_height: float = parameter.height(0.05, 0.23)
@@ -26,13 +26,13 @@ class PyramidStairs(Terrain):
     """Run of a step [m]."""
 
     platform: float = parameter.platform(3.0)
-    """Side of the level square in the middle [m]."""
+    """Side of the level square at the center [m]."""
 
     inverted: bool = parameter.switch()
-    """Turn it upside down: the platform is the bottom, and the robot climbs to leave it."""
+    """Invert the heights: the platform is the lowest part, and the robot climbs to leave it."""
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return the treads, counted outwards from the platform."""
+        """Return the treads, counted outward from the platform."""
         width = grid.cells(self.step_width)
         rings = grid.rings(grid.centered(self.platform))
         risers = rings.max() // width

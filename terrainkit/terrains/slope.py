@@ -13,26 +13,26 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class Slope(Terrain):
-    """One even slope along x, from a level start to a level landing of the same length.
+    """A slope along x, from a level start to a level landing of the same length.
 
-    The robot starts at low x; both ends span the patch's whole width.
+    The robot is spawned at low x. The slope spans the whole width of the patch.
     """
 
     grade: float = parameter.grade(0.0, 0.4)
     """Rise over run of the slope."""
 
     landing: float = parameter.length(2.0)
-    """Length along x of the level strip at either end [m]."""
+    """Length along x of the level strips at both ends [m]."""
 
     inverted: bool = parameter.switch()
-    """Fall along x instead of rising."""
+    """Descend along x instead of climbing."""
 
     def spawn(self, grid: Grid) -> tuple[float, float]:
-        """Return the middle of the level start."""
+        """Return the center of the level start."""
         return grid.lower[0] + grid.length(grid.cells(self.landing)) / 2, grid.center[1]
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return a clipped ramp, the same for every y."""
+        """Return a clipped ramp, which is constant along y."""
         landing = grid.cells(self.landing)
         run = grid.shape[0] - 2 * landing
         if run < 1:

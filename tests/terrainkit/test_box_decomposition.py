@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from terrainkit import MapConfig, TerrainChoice, generate
+from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.box_decomposition import decompose_boxes, level_cells
 from terrainkit.grid import Grid
 from terrainkit.surface import surface_at
@@ -38,7 +38,7 @@ def level_of(heights, threshold):
 
 
 def patch(terrain, *, size=(6.0, 4.0), **parameters):
-    choice = TerrainChoice(terrain=terrain, parameters=parameters)
+    choice = SubTerrain(terrain=terrain, parameters=parameters)
     config = MapConfig(
         rows=1, cols=1, patch_size=size, border=0.0, terrains=(choice,), spawn_radius=0.3
     )
@@ -78,7 +78,7 @@ def test_a_step_that_is_no_wall_leaves_the_cells_on_both_sides_to_a_heightfield(
     assert not cover_of(heights, 2.0).complete
 
 
-def test_a_level_map_is_met_to_a_millimetre_everywhere(level_map):
+def test_a_level_map_is_met_to_a_millimeter_everywhere(level_map):
     cover = level_map.boxes()
     assert cover.complete
     place = points_in_cells(cover.covered, level_map.config.cell, level_map.grid.lower)
@@ -104,7 +104,7 @@ def test_every_box_reaches_a_metre_below_the_lowest_ground(level_map):
 
 def test_a_flat_map_is_one_box():
     config = MapConfig(
-        rows=2, cols=3, patch_size=(8.0, 4.0), border=1.0, terrains=(TerrainChoice(terrain="flat"),)
+        rows=2, cols=3, patch_size=(8.0, 4.0), border=1.0, terrains=(SubTerrain(terrain="flat"),)
     )
     cover = generate(config).boxes()
     assert cover.centers.tolist() == [pytest.approx([8.0, 6.0, -0.5])]

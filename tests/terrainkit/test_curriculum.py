@@ -50,15 +50,13 @@ def test_levels_are_seeded():
 
 
 def test_a_negative_number_of_environments_is_refused():
-    with pytest.raises(ConfigError, match="num_envs is -1; wanted 0 or more"):
+    with pytest.raises(ConfigError, match="num_envs: got -1; expected 0 or more"):
         assign_levels(-1, 10, 20, None, seed=0)
 
 
 @pytest.mark.parametrize("highest", [-1, 10])
 def test_a_level_that_is_not_on_the_map_is_refused(highest):
-    with pytest.raises(
-        ConfigError, match=f"max_init_level is {highest}; the map has levels 0 to 9"
-    ):
+    with pytest.raises(ConfigError, match=f"max_init_level: got {highest}; expected 0 to 9"):
         assign_levels(8, 10, 20, highest, seed=0)
 
 
@@ -120,7 +118,7 @@ def test_no_environments_have_no_levels():
 
 @pytest.mark.parametrize(
     ("levels", "message"),
-    [([0, 10], "levels go from 0 to 10; wanted 0 to 9"), ([-1, 3], "levels go from -1 to 3")],
+    [([0, 10], "levels: got 0 to 10; expected 0 to 9"), ([-1, 3], "levels: got -1 to 3")],
 )
 def test_levels_off_the_map_are_refused(levels, message):
     with pytest.raises(ConfigError, match=message):
@@ -128,7 +126,7 @@ def test_levels_off_the_map_are_refused(levels, message):
 
 
 def test_top_levels_below_one_are_refused():
-    with pytest.raises(ConfigError, match="top_levels is 0; wanted 1 or more"):
+    with pytest.raises(ConfigError, match="top_levels: got 0; expected 1 or more"):
         update([0], [0.0], [0.0], top_levels=0)
 
 

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from terrainkit import MapConfig, TerrainChoice, TerrainkitError, generate, registry
+from terrainkit import MapConfig, SubTerrain, TerrainkitError, generate, registry
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.measured_difficulty import measured_difficulty
@@ -36,19 +36,19 @@ coarse = pytest.mark.filterwarnings("ignore:cells of:terrainkit.TerrainkitWarnin
 
 def at_every_difficulty(terrain, parameters, grid, seed=0):
     """Return the heights at each difficulty, all from the same draws."""
-    choice = TerrainChoice(terrain=terrain, parameters=parameters)
+    choice = SubTerrain(terrain=terrain, parameters=parameters)
     return [choice.at(d).build(grid, np.random.default_rng(seed)) for d in DIFFICULTIES]
 
 
 def map_of(terrain, parameters, grid, **rest):
     """Return a map of one terrain: rows of difficulty 0, 0.5 and 1, and twenty draws of each."""
-    choice = TerrainChoice(terrain=terrain, parameters=parameters)
+    choice = SubTerrain(terrain=terrain, parameters=parameters)
     config = {"rows": 3, "cols": 20, "patch_size": grid.size, "cell": grid.cell, "border": 1.0}
     return generate(MapConfig(**config | {"terrains": (choice,)} | rest))
 
 
 def assert_spawns_are_level(terrain_map, radius):
-    """Look at the ground itself all over the disc neighborhood each origin."""
+    """Look at the ground itself all over the disc around each origin."""
     x, y, z = terrain_map.env_origins.astype(float).reshape(-1, 3, 1, 1).transpose(1, 0, 2, 3)
     r = np.linspace(0.0, radius, 21)[:, None]
     angle = np.linspace(0.0, 2 * np.pi, 64, endpoint=False)
@@ -89,8 +89,8 @@ def test_heights_are_finite_float32_of_the_shape_of_the_patch(terrain, given_par
 @pytest.mark.parametrize("size", [4.0, 7.9])
 def test_a_block_as_wide_as_the_patch_is_refused(terrain, block, size):
     grid = Grid(shape=(round(size / 0.1),) * 2, cell=0.1)
-    choice = TerrainChoice(terrain=terrain, parameters={block: size})
-    with pytest.raises(ConfigError, match=f"{block} {size:g} m leaves nothing of a patch of"):
+    choice = SubTerrain(terrain=terrain, parameters={block: size})
+    with pytest.raises(ConfigError, match=f"{block} {size:g} m fills the whole patch of"):
         choice.at(0.5).build(grid, np.random.default_rng(0))
 
 
@@ -128,7 +128,7 @@ def test_the_same_draws_make_the_same_bytes(terrain, given_parameters):
 @every_terrain
 def test_a_terrain_that_draws_is_another_with_another_seed(terrain, given_parameters):
     grid, rng = Grid(shape=(80, 80), cell=0.1), np.random.default_rng(1)
-    one = TerrainChoice(terrain=terrain, parameters=given_parameters).at(1.0)
+    one = SubTerrain(terrain=terrain, parameters=given_parameters).at(1.0)
     heights = one.build(grid, rng)
     draws = rng.random() != np.random.default_rng(1).random()
     other = one.build(grid, np.random.default_rng(2))
@@ -205,7 +205,7 @@ def test_a_number_beyond_all_measure_is_built_or_refused(terrain, parameter, val
     kind = type(parameters_of(registry.get_terrain(terrain))[parameter].easy)
     grid = Grid(shape=(80, 80), cell=0.1)
     try:
-        choice = TerrainChoice(terrain=terrain, parameters={parameter: kind(value)})
+        choice = SubTerrain(terrain=terrain, parameters={parameter: kind(value)})
         built = choice.at(1.0)
         heights = built.build(grid, np.random.default_rng(0))
     except TerrainkitError:
@@ -235,7 +235,7 @@ def test_any_patch_is_built_with_room_to_start_or_refused(variant, shape, cell, 
         border=0.0,
         selected_difficulty=difficulty,
         spawn_radius=radius,
-        terrains=(TerrainChoice(terrain=terrain, parameters=parameters),),
+        terrains=(SubTerrain(terrain=terrain, parameters=parameters),),
     )
     try:
         terrain_map = generate(config)

@@ -9,13 +9,11 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from terrainkit import MapConfig, TerrainChoice, TerrainkitWarning, generate, make_patch
+from terrainkit import MapConfig, SubTerrain, TerrainkitWarning, generate, make_patch
 from terrainkit.config import Mode
 from terrainkit.errors import ConfigError, MemoryLimitError, TerrainkitError
 
-OBSTACLES, ROUGH, STAIRS = (
-    TerrainChoice(terrain=name) for name in ("obstacles", "rough", "stairs")
-)
+OBSTACLES, ROUGH, STAIRS = (SubTerrain(terrain=name) for name in ("obstacles", "rough", "stairs"))
 NUMBERS = [field.name for field in fields(MapConfig) if field.type in (float, float | None)]
 SMALL = MapConfig(
     rows=3, cols=4, patch_size=(8.0, 6.0), border=1.0, terrains=(OBSTACLES, STAIRS), seed=5
@@ -82,7 +80,7 @@ def test_a_tile_alone_equals_its_slice_of_the_map(row, col):
 
 
 def test_editing_one_column_leaves_the_others_identical():
-    edited = TerrainChoice(terrain="stairs", parameters={"step_height": 0.3, "inverted": True})
+    edited = SubTerrain(terrain="stairs", parameters={"step_height": 0.3, "inverted": True})
     before = generate(SMALL).heights
     after = generate(replace(SMALL, terrains=(OBSTACLES, edited))).heights
     start = 10 + 2 * 60  # the third column is the first of the stairs
@@ -116,9 +114,7 @@ def test_every_mode_makes_a_map(mode):
 def test_a_map_too_large_for_memory_says_what_it_needs_before_it_takes_anything():
     config = MapConfig(rows=10_000, cols=10_000, terrains=(STAIRS,))
     tracemalloc.start()
-    with pytest.raises(
-        MemoryLimitError, match="a map of 800500 x 800500 samples needs"
-    ) as caught:
+    with pytest.raises(MemoryLimitError, match="a map of 800500 x 800500 samples needs") as caught:
         generate(config)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
@@ -172,8 +168,8 @@ def test_progress_sees_every_patch():
 
 
 def test_a_step_above_the_amplitude_makes_level_ground_which_is_told():
-    choice = TerrainChoice(terrain="rough", parameters={"amplitude": 0.004})
-    with pytest.warns(TerrainkitWarning, match=r"steps of height, .* rough\.amplitude on 1 patch"):
+    choice = SubTerrain(terrain="rough", parameters={"amplitude": 0.004})
+    with pytest.warns(TerrainkitWarning, match=r"height steps .* rough\.amplitude on 1 patch"):
         made = generate(MapConfig(rows=1, cols=1, border=0.0, terrains=(choice,)))
     assert not made.heights.any()
 
@@ -187,9 +183,9 @@ def test_a_step_above_the_amplitude_makes_level_ground_which_is_told():
     ],
 )
 def test_a_robot_that_cannot_start_where_it_should_is_told(terrain, given):
-    choice = TerrainChoice(terrain=terrain, parameters=given)
+    choice = SubTerrain(terrain=terrain, parameters=given)
     config = MapConfig(rows=3, cols=1, border=0.0, difficulty_range=(0.5, 1.0), terrains=(choice,))
-    with pytest.warns(TerrainkitWarning, match=f"where robots should start: {terrain} on 3 patch"):
+    with pytest.warns(TerrainkitWarning, match=f"at the preferred spawn: {terrain} on 3 patch"):
         generate(config)
 
 

@@ -6,15 +6,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from terrainkit import MapConfig, TerrainChoice, generate
+from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError, TerrainkitWarning
 from terrainkit.layout import allocate_columns, assign_patch, terrain_columns
 
-FLAT, GAP, PIT = (TerrainChoice(terrain=name) for name in ("flat", "gap", "pit"))
+FLAT, GAP, PIT = (SubTerrain(terrain=name) for name in ("flat", "gap", "pit"))
 
 
 def mix(**proportions):
-    return tuple(TerrainChoice(terrain=name, proportion=p) for name, p in proportions.items())
+    return tuple(SubTerrain(terrain=name, proportion=p) for name, p in proportions.items())
 
 
 def difficulties(config, col=0):
@@ -80,7 +80,7 @@ def test_legged_gyms_ten_columns():
 
 def test_a_terrain_of_ones_own_mix_without_a_column_is_an_error_that_names_it():
     with pytest.raises(
-        ConfigError, match=r"2 columns are too few for 3 terrains .*: no column for pit$"
+        ConfigError, match=r"2 columns are too few for 3 sub-terrains .*: no column for pit$"
     ):
         terrain_columns(MapConfig(cols=2, terrains=(FLAT, GAP, PIT)))
 
@@ -88,7 +88,7 @@ def test_a_terrain_of_ones_own_mix_without_a_column_is_an_error_that_names_it():
 def test_a_terrain_of_a_preset_without_a_column_is_a_warning_that_names_it():
     with pytest.warns(
         TerrainkitWarning,
-        match=r"4 columns are too few for 5 terrains .*: no column for wave \(preset rough\)",
+        match=r"4 columns are too few for 5 sub-terrains .*: no column for wave \(preset rough\)",
     ):
         columns = terrain_columns(MapConfig(cols=4, preset="rough"))
     assert columns == [0, 1, 2, 3]

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit.measured_difficulty import LEG, measured_difficulty
+from terrainkit.measured_difficulty import MAX_STEP_HEIGHT, measured_difficulty
 
 
 def ground(rows):
@@ -33,7 +33,9 @@ def test_steps_beyond_a_stride_do_not():
 def test_what_no_leg_bridges_is_all_the_same(depth):
     # Half of the steps and half of the heights are the whole leg.
     edge = ground([[0, 0], [-depth, -depth]])
-    assert measured_difficulty(edge, 0.3, 0.0) == pytest.approx(LEG / 2 + LEG / 2)
+    assert measured_difficulty(edge, 0.3, 0.0) == pytest.approx(
+        MAX_STEP_HEIGHT / 2 + MAX_STEP_HEIGHT / 2
+    )
 
 
 def test_height_counts_from_where_the_robot_starts():

@@ -26,9 +26,7 @@ def test_the_error_is_one_to_catch_as_memory_error_too():
 
 
 def test_a_map_beyond_the_memory_is_refused_before_it_is_begun():
-    with pytest.raises(
-        MemoryLimitError, match=r"a map of \d+ x \d+ samples needs .* GB of memory"
-    ):
+    with pytest.raises(MemoryLimitError, match=r"a map of \d+ x \d+ samples needs .* GB of memory"):
         generate(MapConfig(rows=10_000, cols=10_000))
 
 
@@ -55,9 +53,7 @@ def test_the_limit_of_a_control_group_counts(group, name):
     group("job/step", "max")
     group(name, 3 * 10**9)
     check_memory(9 * 10**8, "a map")
-    with pytest.raises(
-        MemoryLimitError, match=r"a map needs 1\.1 GB of memory; 1\.0 GB free"
-    ):
+    with pytest.raises(MemoryLimitError, match=r"a map needs 1\.1 GB of memory; 1\.0 GB free"):
         check_memory(11 * 10**8, "a map")
 
 

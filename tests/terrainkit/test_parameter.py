@@ -89,27 +89,27 @@ def test_a_platform_is_a_pair_where_only_one_axis_is_odd():
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("rise", -0.1, r"hurdle: rise is -0\.1; wanted 0 to 1e\+06"),
-        ("rise", 1.1e6, r"hurdle: rise is 1\.1e\+06; wanted 0 to 1e\+06"),
-        ("rise", math.nan, r"hurdle: rise is nan; wanted 0 to 1e\+06"),
-        ("rise", math.inf, r"hurdle: rise is inf; wanted 0 to 1e\+06"),
-        ("rise", "high", "hurdle: rise is 'high'; wanted a number"),
-        ("rise", True, "hurdle: rise is True; wanted a number"),
-        ("rise", None, "hurdle: rise is None; wanted a number"),
-        ("width", 0.0, r"hurdle: width is 0; wanted above 0 to 1e\+06"),
-        ("landing", 0, r"hurdle: landing is 0; wanted above 0 to 1e\+06"),
-        ("spacing", 0.0, r"hurdle: spacing is 0; wanted above 0 to 1e\+06"),
-        ("number", 0, "hurdle: number is 0; wanted above 0 to 10000"),
-        ("number", 10_001, "hurdle: number is 10001; wanted above 0 to 10000"),
-        pytest.param("number", 10**400, "hurdle: number is a whole number beyond", id="10**400"),
-        ("number", 4.0, r"hurdle: number is 4\.0; wanted a whole number"),
-        ("number", True, "hurdle: number is True; wanted a whole number"),
-        ("inverted", 1, "hurdle: inverted is 1; wanted true or false"),
+        ("rise", -0.1, r"hurdle\.rise: got -0\.1; expected a number from 0 to 1000000"),
+        ("rise", 1.1e6, r"hurdle\.rise: got 1100000\.0; expected a number from 0 to 1000000"),
+        ("rise", math.nan, r"hurdle\.rise: got nan; expected a number from 0 to 1000000"),
+        ("rise", math.inf, r"hurdle\.rise: got inf; expected a number from 0 to 1000000"),
+        ("rise", "high", r"hurdle\.rise: got 'high'; expected a number"),
+        ("rise", True, r"hurdle\.rise: got True; expected a number"),
+        ("rise", None, r"hurdle\.rise: got None; expected a number"),
+        ("width", 0.0, r"hurdle\.width: got 0\.0; expected a number > 0 and <= 1000000"),
+        ("landing", 0, r"hurdle\.landing: got 0; expected a number > 0 and <= 1000000"),
+        ("spacing", 0.0, r"hurdle\.spacing: got 0\.0; expected a number > 0 and <= 1000000"),
+        ("number", 0, r"hurdle\.number: got 0; expected an integer > 0 and <= 10000"),
+        ("number", 10_001, r"hurdle\.number: got 10001; expected an integer > 0 and <= 10000"),
+        pytest.param("number", 10**400, r"hurdle\.number: got an integer beyond", id="10**400"),
+        ("number", 4.0, r"hurdle\.number: got 4\.0; expected an integer"),
+        ("number", True, r"hurdle\.number: got True; expected an integer"),
+        ("inverted", 1, r"hurdle\.inverted: got 1; expected true or false"),
     ],
 )
-def test_a_value_that_cannot_be_is_refused(name, value, message):
+def test_convert_parameter_rejects_invalid_values(name, value, message):
     with pytest.raises(ConfigError, match=message):
-        parameter.checked("hurdle", name, value, HURDLE[name])
+        parameter.convert_parameter("hurdle", name, value, HURDLE[name])
 
 
 @pytest.mark.parametrize(
@@ -127,5 +127,5 @@ def test_a_value_that_cannot_be_is_refused(name, value, message):
         ("inverted", np.True_),
     ],
 )
-def test_the_least_the_largest_and_numpys_numbers_are_taken(name, value):
-    parameter.checked("hurdle", name, value, HURDLE[name])
+def test_convert_parameter_accepts_limits_and_numpy_scalars(name, value):
+    parameter.convert_parameter("hurdle", name, value, HURDLE[name])

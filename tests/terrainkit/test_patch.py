@@ -3,16 +3,16 @@ import dataclasses
 import numpy as np
 import pytest
 
-from terrainkit import MapConfig, TerrainChoice, make_patch
+from terrainkit import MapConfig, SubTerrain, make_patch
 from terrainkit.errors import ConfigError, TerrainkitWarning
 from terrainkit.terrains.obstacles import Obstacles
 
-PIT = TerrainChoice(terrain="pit")
-OBSTACLES = TerrainChoice(terrain="obstacles")
+PIT = SubTerrain(terrain="pit")
+OBSTACLES = SubTerrain(terrain="obstacles")
 
 
 def test_a_patch_knows_what_it_is():
-    choice = TerrainChoice(terrain="pit", name="crater", parameters={"depth": (0.2, 0.6)})
+    choice = SubTerrain(terrain="pit", name="crater", parameters={"depth": (0.2, 0.6)})
     patch = make_patch(MapConfig(rows=3, cols=2, terrains=(choice,)), 1, 0)
     assert patch.terrain == "crater"
     assert patch.difficulty == 0.5
@@ -35,7 +35,7 @@ def test_the_origin_of_a_pit_is_on_its_floor():
 
 
 def test_what_was_asked_and_what_was_built_stand_side_by_side():
-    choice = TerrainChoice(terrain="gap", parameters={"width": 0.33, "platform": 3.1, "depth": 2.0})
+    choice = SubTerrain(terrain="gap", parameters={"width": 0.33, "platform": 3.1, "depth": 2.0})
     parameters = make_patch(MapConfig(terrains=(choice,)), 0, 0).parameters
     assert parameters.requested == {"width": 0.33, "platform": 3.1, "depth": 2.0}
     assert parameters.realized == {"width": 0.3, "platform": 3.2, "depth": 2.0}
@@ -64,16 +64,16 @@ def test_a_patch_beyond_the_map_is_an_index_error(row, col):
 
 
 def test_no_room_to_start_is_an_error_that_names_the_terrain():
-    choice = TerrainChoice(terrain="rough", name="rubble", parameters={"platform": 0.4})
+    choice = SubTerrain(terrain="rough", name="rubble", parameters={"platform": 0.4})
     with pytest.raises(
         ConfigError,
-        match=r"rubble: no level disc of radius 0\.5 m \(within 0\.01 m\) in a patch of 8 m x 8 m",
+        match=r"rubble: no disc of radius 0\.5 m is level within 0\.01 m in a patch of 8 m x 8 m",
     ):
         make_patch(MapConfig(terrains=(choice,)), 9, 0)
 
 
 def test_a_terrain_that_does_not_fit_is_an_error():
-    choice = TerrainChoice(terrain="pit", parameters={"side": 9.0})
+    choice = SubTerrain(terrain="pit", parameters={"side": 9.0})
     with pytest.raises(ConfigError, match="pit: side 9 m does not fit in a patch of 8 m x 8 m"):
         make_patch(MapConfig(terrains=(choice,)), 0, 0)
 
@@ -89,9 +89,11 @@ def test_a_patch_does_not_change():
 
 
 def test_a_slope_above_the_threshold_would_be_walls():
-    steep = TerrainChoice(terrain="pyramid_slope", parameters={"grade": 0.8})
+    steep = SubTerrain(terrain="pyramid_slope", parameters={"grade": 0.8})
     config = MapConfig(rows=1, cols=1, terrains=(steep,))
-    with pytest.raises(ConfigError, match=r"grade 0\.8 is above slope_threshold 0\.75"):
+    with pytest.raises(
+        ConfigError, match=r"grade: got 0\.8; expected at most slope_threshold \(0\.75\)"
+    ):
         make_patch(config, 0, 0)
     assert make_patch(
         dataclasses.replace(config, slope_threshold=None), 0, 0

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from terrainkit import MapConfig, TerrainChoice, generate, registry, terrains
+from terrainkit import MapConfig, SubTerrain, generate, registry, terrains
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.terrain import Terrain
@@ -31,10 +31,10 @@ def moon(tmp_path, monkeypatch):
     (tmp_path / "moon.py").write_text(MOON)
     monkeypatch.setattr(terrains, "__path__", [*terrains.__path__, str(tmp_path)])
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
-    registry.names.cache_clear()
+    registry.terrain_names.cache_clear()
     yield
-    registry.names.cache_clear()
-    registry.find.cache_clear()
+    registry.terrain_names.cache_clear()
+    registry.get_terrain.cache_clear()
     sys.modules.pop("terrainkit.terrains.moon", None)
 
 
@@ -53,12 +53,12 @@ def test_a_terrain_that_uses_another_is_still_found_by_its_own_name():
 
 
 def test_an_unknown_name_lists_those_that_exist():
-    with pytest.raises(ConfigError, match=r"no terrain 'stair'; there are: flat, gap, .*, wave$"):
+    with pytest.raises(ConfigError, match=r"did you mean 'stairs'\? There are: flat, .*, wave$"):
         registry.get_terrain("stair")
 
 
 def test_the_name_of_an_inverted_terrain_says_what_to_ask_for():
-    with pytest.raises(ConfigError, match=r"it is pyramid_stairs with inverted = true$"):
+    with pytest.raises(ConfigError, match=r"use pyramid_stairs with inverted = true$"):
         registry.get_terrain("pyramid_stairs_inverted")
 
 
@@ -92,13 +92,13 @@ class _Turned(Terrain):
 
 def test_a_plain_field_is_named():
     with pytest.raises(
-        ConfigError, match="_Careless: number is a plain field; wanted one declared"
+        ConfigError, match="_Careless: number is a plain field; expected one declared"
     ):
         _Careless()
 
 
 def test_heights_of_another_shape_are_named():
-    with pytest.raises(ConfigError, match=r"shape \(4, 8\); wanted \(8, 4\)"):
+    with pytest.raises(ConfigError, match=r"shape \(4, 8\); expected \(8, 4\)"):
         _Turned().build(Grid(shape=(8, 4), cell=1.0), np.random.default_rng(0))
 
 
@@ -111,22 +111,22 @@ def plugin(monkeypatch):
         found = {registry.ENTRY_POINTS: (point,)}
         monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: found[group])
 
-    registry.find.cache_clear()
+    registry.get_terrain.cache_clear()
     yield install
-    registry.find.cache_clear()
+    registry.get_terrain.cache_clear()
 
 
 def test_a_terrain_of_another_package_is_found_by_its_entry_point(plugin):
     plugin("terrainkit.terrains.wave:Wave")
     assert registry.get_terrain("dunes") is registry.get_terrain("wave")
-    dunes = TerrainChoice(terrain="dunes", parameters={"amplitude": 0.1})
+    dunes = SubTerrain(terrain="dunes", parameters={"amplitude": 0.1})
     assert generate(MapConfig(rows=1, cols=1, border=0.0, terrains=(dunes,))).heights.max() > 0.09
 
 
 def test_an_entry_point_that_is_no_terrain_is_named(plugin):
     plugin("math:pi")
     with pytest.raises(
-        ConfigError, match=r"dunes \(math:pi\) is 3\.14.*; wanted a subclass of Terr"
+        ConfigError, match=r"dunes \(math:pi\): got 3\.14.*; expected a subclass of Terr"
     ):
         registry.get_terrain("dunes")
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from terrainkit.grid import Grid
-from terrainkit.spawn import find_spawn, no_spawn_error
+from terrainkit.spawn import find_spawn
 from terrainkit.surface import surface_at
 
 PLOT = Grid(shape=(40, 40), cell=0.1)
@@ -149,11 +149,3 @@ def test_a_platform_smaller_than_the_disc_does_not_hold_it():
     x, y, z = spawn(heights)
     assert z == -5.0
     assert disc(heights, (x, y)).tolist() == [-5.0] * (26 * 121)
-
-
-def test_the_error_says_what_would_help():
-    error = no_spawn_error("rough", Grid(shape=(80, 40), cell=0.1), 0.5, 0.01)
-    assert str(error) == (
-        "rough: no level disc of radius 0.5 m (within 0.01 m) in a patch of 8 m x 4 m; "
-        "wanted a larger platform or a smaller spawn_radius"
-    )

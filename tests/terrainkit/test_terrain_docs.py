@@ -31,7 +31,7 @@ def test_a_terrain_of_others_has_the_words_of_its_parent_and_none_are_needed(mon
 
         number: int = parameter.count(3)
 
-    monkeypatch.setattr(registry, "find", lambda _: Hurdles)
+    monkeypatch.setattr(registry, "get_terrain", lambda _: Hurdles)
     words = {each.name: each.text for each in terrain_doc("hurdles").parameters}
     assert words["step_height"] == "Rise of a step [m]."
     assert words["number"] == ""

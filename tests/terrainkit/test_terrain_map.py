@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 
 import terrainkit
-from terrainkit import MapConfig, TerrainChoice, generate
+from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError, ExportError
 
 
 @pytest.fixture(scope="module")
 def slope_map():
     # Level to x = 1, up at grade 0.5, and level again from x = 5 on.
-    slope = TerrainChoice(terrain="slope", parameters={"grade": 0.5, "landing": 1.0})
+    slope = SubTerrain(terrain="slope", parameters={"grade": 0.5, "landing": 1.0})
     return generate(
         MapConfig(
             rows=1,
@@ -73,7 +73,9 @@ def test_points_may_be_a_list(terrain_map):
     ],
 )
 def test_points_that_are_none_are_refused(terrain_map, view, xy, shape):
-    with pytest.raises(ConfigError, match=rf"xy has shape {shape}; wanted \(\.\.\., 2\), .*finite"):
+    with pytest.raises(
+        ConfigError, match=rf"xy: got shape {shape}; expected finite values of shape \(\.\.\., 2\)"
+    ):
         getattr(terrain_map, view)(xy)
 
 
@@ -147,7 +149,7 @@ def test_raw_heights_may_take_all_of_16_bits(terrain_map, height, units):
 @pytest.mark.parametrize("height", [163.84, -163.85, 1e6])
 def test_raw_heights_beyond_16_bits_are_an_error(terrain_map, height):
     with pytest.raises(
-        ExportError, match=r"do not fit in int16 at vertical_scale 0\.005; wanted .* or more"
+        ExportError, match=r"do not fit in int16 at vertical_scale 0\.005; expected at least .*"
     ):
         with_heights(terrain_map, height).height_field_raw()
 
@@ -157,19 +159,19 @@ def test_the_vertical_scale_that_the_error_asks_for_is_enough(terrain_map, heigh
     high = with_heights(terrain_map, height)
     with pytest.raises(ExportError) as error:
         high.height_field_raw(vertical_scale=1e-5)
-    wanted = float(re.search(r"wanted (\S+) or more", str(error.value)).group(1))
+    wanted = float(re.search(r"expected at least (\S+)$", str(error.value)).group(1))
     assert high.height_field_raw(wanted)[0, 0] * wanted == pytest.approx(height, abs=wanted)
 
 
 @pytest.mark.parametrize("scale", [0.0, -0.005, np.nan, np.inf])
 def test_a_vertical_scale_must_be_above_0(terrain_map, scale):
-    with pytest.raises(ConfigError, match=f"vertical_scale is {scale:g}; wanted .*above 0"):
+    with pytest.raises(ConfigError, match=f"vertical_scale: got {scale:g}; expected a number > 0"):
         terrain_map.height_field_raw(scale)
 
 
 @pytest.mark.parametrize(("row", "col"), [(0, 0), (1, 0), (0, 1), (1, 2)])
 def test_a_tile_of_the_map_is_the_tile_made_alone(terrain_map, row, col):
-    part, alone = terrain_map.patch(row, col), terrainkit.tile(terrain_map.config, row, col)
+    part, alone = terrain_map.patch(row, col), terrainkit.make_patch(terrain_map.config, row, col)
     assert part.heights.tobytes() == alone.heights.tobytes()
     assert part.origin.tobytes() == alone.origin.tobytes()
     assert (part.terrain, part.difficulty) == (alone.terrain, alone.difficulty)

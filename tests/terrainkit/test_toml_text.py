@@ -3,11 +3,11 @@ import time
 import pytest
 
 from terrainkit.errors import ConfigError
-from terrainkit.toml_text import parsed
+from terrainkit.toml_text import parse_toml
 
 
 def test_toml_is_a_table():
-    assert parsed("a = 1\nb.c = 2.5\n[d]\ne = ['x', 0.5]") == {
+    assert parse_toml("a = 1\nb.c = 2.5\n[d]\ne = ['x', 0.5]") == {
         "a": 1,
         "b": {"c": 2.5},
         "d": {"e": ["x", 0.5]},
@@ -31,13 +31,13 @@ def test_toml_is_a_table():
 def test_what_is_none_is_refused_at_once(text, message):
     start = time.perf_counter()
     with pytest.raises(ConfigError) as caught:
-        parsed(text)
+        parse_toml(text)
     assert str(caught.value).startswith(message)
     assert time.perf_counter() - start < 1
 
 
 def test_as_many_dots_as_anybody_writes_are_read():
     numbers = [k + 0.5 for k in range(3000)]
-    assert parsed(f"a = {numbers}")["a"] == numbers
+    assert parse_toml(f"a = {numbers}")["a"] == numbers
     lines = "".join(f"a{k}.b.c = 'x...'\n" for k in range(20_000))
-    assert len(parsed(lines)) == 20_000
+    assert len(parse_toml(lines)) == 20_000

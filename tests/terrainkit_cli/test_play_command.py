@@ -4,7 +4,7 @@ import pytest
 
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
-from terrainkit import MapConfig, TerrainChoice, generate
+from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit_robots.onboarding.pictures import PicturesError
 from terrainkit_robots.policy import play
 from terrainkit_robots.rl import video
@@ -68,7 +68,7 @@ def test_without_what_writes_videos_it_says_what_to_install(here, monkeypatch):
 
 
 def test_a_table_for_a_map(here, tmp_path):
-    terrains = (TerrainChoice(terrain="flat"), TerrainChoice(terrain="stairs"))
+    terrains = (SubTerrain(terrain="flat"), SubTerrain(terrain="stairs"))
     config = MapConfig(rows=2, cols=2, patch_size=(6, 6), border=1, terrains=terrains)
     generate(config).save(tmp_path / "map.npz")
     code, out, _ = here("walk", "--terrain", "map.npz", "--no-video", "--seconds", "0.1")

@@ -15,7 +15,7 @@ import pytest
 
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
-from terrainkit import MapConfig, TerrainChoice, generate
+from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError
 from terrainkit_cli import render
 from terrainkit_cli.main import main
@@ -51,7 +51,7 @@ def run_of(folder: Path) -> Path:
 
 
 def make_map(folder: Path) -> Path:
-    terrains = (TerrainChoice(terrain="stairs"),)
+    terrains = (SubTerrain(terrain="stairs"),)
     config = MapConfig(rows=2, cols=1, patch_size=(6.0, 6.0), border=1.0, terrains=terrains)
     return generate(config).save(folder / "map.npz")
 

@@ -11,7 +11,7 @@ import pytest
 import terrainkit_robots
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled as bundled_robots
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.simulation.standing import Standing
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
@@ -94,7 +94,7 @@ def bundled():
                 text = text.replace(old, new)
             path = tmp_path / name
             path.write_text(text, encoding="utf-8")
-        return Facts(read_robot(path), spec=spec)
+        return Facts(load_robot(path), spec=spec)
 
     return read
 
@@ -106,7 +106,7 @@ def robot(tmp_path):
     def read(text, spec=None):
         path = tmp_path / ("robot.xml" if "<mujoco" in text else "robot.urdf")
         path.write_text(text, encoding="utf-8")
-        return Facts(read_robot(path), spec=spec)
+        return Facts(load_robot(path), spec=spec)
 
     return read
 

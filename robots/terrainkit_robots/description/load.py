@@ -9,7 +9,7 @@ from terrainkit_robots.description.xml.document import XmlDocument, parse_xml, r
 XACRO = "xacro"
 
 
-def read_robot(
+def load_robot(
     path: Path,
     *,
     packages: Mapping[str, Path] | None = None,

@@ -1,10 +1,10 @@
 """Rules: what each one is called, why it is there, and what it finds.
 
-A rule is a function from the facts of a robot to its defects, found by its code. Its docstring is
-its page in docs/rules.md: a title, a paragraph that says why, the sections `Fix:` and `Source:`.
+A rule is a function from the facts of a robot to its violations. Its docstring is its page in
+docs/rules.md: a title, a paragraph that says why, the sections `Fix:` and `Source:`.
 
     @rule("INR002", "negative-mass", "error")
-    def negative_mass(robot: Facts) -> Iterator[Defect]:
+    def negative_mass(robot: Facts) -> Iterator[Violation]:
         '''A mass is negative.
 
         Why this goes wrong, and where.
@@ -58,7 +58,7 @@ FAMILIES = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Defect:
+class Violation:
     """One thing that a rule found."""
 
     subject: str
@@ -86,7 +86,7 @@ class Defect:
     """How to repair it, where that can be done."""
 
 
-Check = Callable[["Facts"], Iterator[Defect]]
+Check = Callable[["Facts"], Iterator[Violation]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,7 +100,7 @@ class Rule:
     """The same in words."""
 
     severity: Severity
-    """How bad a defect is, where it does not say otherwise itself."""
+    """How bad a violation is, where it does not say otherwise itself."""
 
     check: Check
 
@@ -127,7 +127,7 @@ class Rule:
 
     @property
     def how_to_fix(self) -> str:
-        """Return what to do about a defect."""
+        """Return what to do about a violation."""
         return self._page[2]
 
     @property
@@ -188,7 +188,7 @@ def rules() -> tuple[Rule, ...]:
     return tuple(sorted(_RULES.values(), key=lambda r: (order.index(r.family), r.code)))
 
 
-def find(word: str) -> Rule:
+def get_rule(word: str) -> Rule:
     """Return the rule whose code or name is `word`.
 
     Raises:

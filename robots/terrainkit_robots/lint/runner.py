@@ -9,7 +9,7 @@ from typing import Literal
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.fix import Fix
-from terrainkit_robots.lint.rule import Certainty, Defect, Measured, Rule, Severity, rules
+from terrainkit_robots.lint.rule import Certainty, Measured, Rule, Severity, Violation, rules
 
 Verdict = Literal["pass", "warn", "fail"]
 
@@ -20,7 +20,7 @@ INTERNAL = "internal error, please report it"
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """A defect and the rule that found it: what the reports print."""
+    """A violation and the rule that found it: what the reports print."""
 
     code: str
     name: str
@@ -69,7 +69,7 @@ class Report:
 
 
 MOST_FINDINGS = 50
-"""So many defects of one rule are told: of 10,000 alike nobody reads the last."""
+"""So many violations of one rule are told: of 10,000 alike nobody reads the last."""
 
 _UNREADABLE = ("XML001", "XML002", "XML005", "XML011")
 """Problems that can leave nothing of a file."""
@@ -89,7 +89,7 @@ def lint(facts: Facts, chosen: Sequence[Rule] | None = None, *, simulate: bool =
     findings: list[Finding] = []
     skipped: list[Skipped] = []
     if chosen is None:
-        chosen = [rule for rule in rules() if not unasked(rule, facts, simulate=simulate)]
+        chosen = [rule for rule in rules() if is_applicable(rule, facts, simulate=simulate)]
     if not facts.model.links and any(p.code in _UNREADABLE for p in facts.model.problems):
         chosen = [rule for rule in chosen if rule.family == "XML"]  # there is no robot to look at
     for each in chosen:
@@ -99,10 +99,10 @@ def lint(facts: Facts, chosen: Sequence[Rule] | None = None, *, simulate: bool =
             missing = _missing(each, facts, simulate=simulate)
             if missing:
                 raise CannotCheckError(missing)
-            defects = list(islice(each.check(facts), MOST_FINDINGS + 1))
-            findings += [_finding(each, defect) for defect in defects[:MOST_FINDINGS]]
-            if len(defects) > MOST_FINDINGS:
-                reason = f"it found more than the {MOST_FINDINGS} defects that are shown"
+            violations = list(islice(each.check(facts), MOST_FINDINGS + 1))
+            findings += [_finding(each, violation) for violation in violations[:MOST_FINDINGS]]
+            if len(violations) > MOST_FINDINGS:
+                reason = f"it found more than the {MOST_FINDINGS} violations that are shown"
                 skipped.append(Skipped(code=each.code, reason=reason))
         except CannotCheckError as cannot:
             skipped.append(Skipped(code=each.code, reason=str(cannot)))
@@ -118,10 +118,10 @@ def lint(facts: Facts, chosen: Sequence[Rule] | None = None, *, simulate: bool =
     return Report(facts=facts, findings=tuple(findings), skipped=tuple(skipped), simulated=simulate)
 
 
-def unasked(rule: Rule, facts: Facts, *, simulate: bool) -> bool:
-    """Return whether nobody asks for a rule who does not name it: there is nothing for it to do."""
+def is_applicable(rule: Rule, facts: Facts, *, simulate: bool) -> bool:
+    """Return whether the inputs that a rule needs were given: other file, spec, simulation."""
     missing = _missing(rule, facts, simulate=simulate)
-    return missing in (_NO_OTHER, _NO_SPEC, _NO_SIMULATION)
+    return missing not in (_NO_OTHER, _NO_SPEC, _NO_SIMULATION)
 
 
 _NO_LEGS = "no legs were found"
@@ -143,17 +143,17 @@ def _missing(rule: Rule, facts: Facts, *, simulate: bool) -> str:
     return ""
 
 
-def _finding(rule: Rule, defect: Defect) -> Finding:
+def _finding(rule: Rule, violation: Violation) -> Finding:
     return Finding(
         code=rule.code,
         name=rule.name,
-        severity=defect.severity or rule.severity,
-        certainty=defect.certainty,
-        subject=defect.subject,
-        message=defect.message,
-        hint=defect.hint or rule.how_to_fix,
-        file=defect.source.file,
-        line=defect.source.line,
-        measured=defect.measured,
-        fix=defect.fix,
+        severity=violation.severity or rule.severity,
+        certainty=violation.certainty,
+        subject=violation.subject,
+        message=violation.message,
+        hint=violation.hint or rule.how_to_fix,
+        file=violation.source.file,
+        line=violation.source.line,
+        measured=violation.measured,
+        fix=violation.fix,
     )

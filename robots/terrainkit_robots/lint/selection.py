@@ -6,28 +6,28 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.lint.rule import Rule, rules
-from terrainkit_robots.lint.runner import Finding, Report, Skipped, lint, unasked
+from terrainkit_robots.lint.runner import Finding, Report, Skipped, is_applicable, lint
 from terrainkit_robots.lint.settings import Settings, matching
-from terrainkit_robots.lint.suppressions import IgnoreComment, read_comments
+from terrainkit_robots.lint.suppressions import SuppressionComment, read_comments
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ignored(Skipped):
+class Suppressed(Skipped):
     """A finding that a comment in the file quiets."""
 
     finding: Finding
-    comment: IgnoreComment
+    comment: SuppressionComment
 
 
 @dataclass(frozen=True, kw_only=True)
-class IdleComment(Skipped):
+class UnusedSuppression(Skipped):
     """A comment that quiets nothing; `reason` says where it is, and why."""
 
 
-def choose(settings: Settings) -> tuple[tuple[Rule, ...], tuple[Skipped, ...]]:
+def select_rules(settings: Settings) -> tuple[tuple[Rule, ...], tuple[Skipped, ...]]:
     """Return the rules to ask, and those that are left out for a reason.
 
     Raises:
@@ -60,9 +60,9 @@ def lint_selected(
     Raises:
         ConfigError: if the settings name a rule that there is not.
     """
-    chosen, left_out = choose(settings)
+    chosen, left_out = select_rules(settings)
     if not settings.select:
-        chosen = tuple(r for r in chosen if not unasked(r, facts, simulate=settings.simulate))
+        chosen = tuple(r for r in chosen if is_applicable(r, facts, simulate=settings.simulate))
     report = lint(facts, chosen, simulate=settings.simulate)
     comments = [
         comment
@@ -79,15 +79,15 @@ def lint_selected(
 
 
 def _quieted(
-    report: Report, comments: Sequence[IgnoreComment]
-) -> tuple[list[Finding], list[Ignored]]:
+    report: Report, comments: Sequence[SuppressionComment]
+) -> tuple[list[Finding], list[Suppressed]]:
     """Return the findings that are left, and those that comments quiet."""
-    by_code: dict[tuple[Path, str], list[IgnoreComment]] = {}
+    by_code: dict[tuple[Path, str], list[SuppressionComment]] = {}
     for comment in comments:
         if comment.mistake is None:
             by_code.setdefault((comment.file, comment.code), []).append(comment)
     kept: list[Finding] = []
-    ignored: list[Ignored] = []
+    ignored: list[Suppressed] = []
     for finding in report.findings:
         near = by_code.get((finding.file, finding.code), ())
         covering = next((c for c in near if c.covers(finding.line)), None)
@@ -95,7 +95,7 @@ def _quieted(
             kept.append(finding)
             continue
         why = f"ignored for {_place(finding)}: {covering.reason}"
-        ignored.append(Ignored(code=finding.code, reason=why, finding=finding, comment=covering))
+        ignored.append(Suppressed(code=finding.code, reason=why, finding=finding, comment=covering))
     return kept, ignored
 
 
@@ -105,8 +105,8 @@ def _place(finding: Finding) -> str:
 
 
 def _idle(
-    comments: Sequence[IgnoreComment], asked: Set[str], ignored: Sequence[Ignored]
-) -> Iterator[IdleComment]:
+    comments: Sequence[SuppressionComment], asked: Set[str], ignored: Sequence[Suppressed]
+) -> Iterator[UnusedSuppression]:
     """Yield the comments that quiet nothing, although their rule was asked."""
     used = {id(each.comment) for each in ignored}
     for comment in comments:
@@ -115,4 +115,4 @@ def _idle(
             why = f"there is no {comment.code} to ignore here"
         if why is not None:
             reason = f"comment at {comment.file}:{comment.line}: {why}"
-            yield IdleComment(code=comment.code, reason=reason)
+            yield UnusedSuppression(code=comment.code, reason=reason)

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit.toml_text import parsed
+from terrainkit.toml_text import parse_toml
 from terrainkit_robots.lint.rule import FAMILIES, Rule, rules
 
 
@@ -115,7 +115,7 @@ def _table(path: Path, keys: Sequence[str]) -> dict[str, Any] | None:
     if path.name == "pyproject.toml" and b"terrainkit" not in data:
         return None  # somebody else's, sound or not
     try:
-        table = parsed(data.decode())
+        table = parse_toml(data.decode())
     except UnicodeDecodeError as error:
         raise ConfigError(f"not a TOML file: {error}") from error
     for key in keys[:-1]:

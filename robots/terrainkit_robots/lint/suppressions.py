@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots.lint.rule import find
+from terrainkit_robots.lint.rule import get_rule
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -53,7 +53,7 @@ _LONGEST = 200
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class IgnoreComment:
+class SuppressionComment:
     """A comment, and the lines on which the elements start that it speaks of."""
 
     file: Path
@@ -87,7 +87,7 @@ class IgnoreComment:
         return not place or line > self.without[place - 1][1]
 
 
-def read_comments(file: Path, data: bytes | None = None) -> Iterator[IgnoreComment]:
+def read_comments(file: Path, data: bytes | None = None) -> Iterator[SuppressionComment]:
     """Yield the comments of a file that are for us, one for each code in them.
 
     Args:
@@ -118,7 +118,7 @@ def read_comments(file: Path, data: bytes | None = None) -> Iterator[IgnoreComme
         whole = [0] if root in (about, parent) else []
         for code in re.split(r"\s*,\s*", match["codes"] or "")[:_MOST_CODES]:
             known, mistake = _checked(match["word"], code[:_LONGEST], match["reason"])
-            yield IgnoreComment(
+            yield SuppressionComment(
                 file=file,
                 line=(node.sourceline or 0) - (node.text or "").count("\n"),
                 code=known,
@@ -134,7 +134,7 @@ def read_comments(file: Path, data: bytes | None = None) -> Iterator[IgnoreComme
 def _checked(word: str, code: str, reason: str) -> tuple[str, str | None]:
     """Return the code of the rule, and what is wrong with the comment."""
     try:
-        known = find(code).code
+        known = get_rule(code).code
     except ConfigError:
         known = ""
     if word != "ignore":

@@ -212,7 +212,7 @@ def keeps_out(finding: "Finding") -> bool:
 
 def _repaired(file: Path, wishes: Wishes) -> tuple[Report, tuple["Finding", ...]]:
     """Return what is found in a robot once it is repaired in memory, and what was repaired."""
-    from terrainkit_robots.description.load import read_robot
+    from terrainkit_robots.description.load import load_robot
     from terrainkit_robots.lint.fixes.apply import fix_robot
     from terrainkit_robots.lint.selection import lint_selected
     from terrainkit_robots.mesh.mesh_cache import Meshes
@@ -223,7 +223,7 @@ def _repaired(file: Path, wishes: Wishes) -> tuple[Report, tuple["Finding", ...]
     settings = replace(found_settings, select=(), simulate=False)
 
     def look(contents: Mapping[Path, bytes]) -> Report:
-        model = read_robot(
+        model = load_robot(
             file,
             packages=settings.packages,
             xacro_arguments=settings.xacro_arguments,

@@ -9,7 +9,7 @@ from pathlib import Path
 import tomli_w
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit.toml_text import parsed
+from terrainkit.toml_text import parse_toml
 from terrainkit_robots.onboarding.folder import new_folder
 from terrainkit_robots.rl import registry
 from terrainkit_robots.rl.checkpoint import only_policy, read_checkpoint, save_checkpoint
@@ -54,7 +54,7 @@ def ship(run: Run, folder: Path | str) -> Run:
         raise ConfigError(
             f"{run.folder} is on {run.terrain}, which is no map that can be made again"
         )
-    about = parsed((run.folder / RUN_FILE).read_text(encoding="utf-8"))
+    about = parse_toml((run.folder / RUN_FILE).read_text(encoding="utf-8"))
     about["terrain"] = "plane" if run.terrain == "plane" else MAP_FILE
     state = only_policy(read_checkpoint(run.checkpoint))
     make_parents(folder)

@@ -311,10 +311,10 @@ def read_ground(
 
         return MapGround(TerrainMap.load(path), collision)
     if path.suffix == ".toml":
-        from terrainkit.config_text import read_config
+        from terrainkit.config import MapConfig
         from terrainkit.generation import generate
 
-        return MapGround(generate(read_config(path)), collision)
+        return MapGround(generate(MapConfig.load(path)), collision)
     if path.suffix == ".xml":
         if not path.is_file():
             raise ConfigError(f"there is no file {path}")

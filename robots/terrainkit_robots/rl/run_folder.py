@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from terrainkit.errors import ConfigError, ExportError, listing
-from terrainkit.toml_text import parsed
+from terrainkit.toml_text import parse_toml
 from terrainkit_robots.mesh.sniff import open_regular
 from terrainkit_robots.onboarding.folder import new_folder, write_files
 from terrainkit_robots.rl import registry
@@ -120,9 +120,7 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
         SPEC_FILE: _text(registry.find(robot_name).folder / SPEC_FILE),
     }
     if (config := _map_config(ground)) is not None:
-        from terrainkit import config_text
-
-        files[MAP_FILE] = config_text.to_toml(config)
+        files[MAP_FILE] = config.to_toml()
     _refuse_existing(folder)
     make_parents(folder)
     with new_folder(folder) as made:
@@ -198,7 +196,7 @@ def changed_robot(run: Run) -> tuple[str, ...]:
     Raises:
         ConfigError: if a file cannot be read.
     """
-    noted = parsed(_text(run.folder / RUN_FILE)).get(_ROBOT)
+    noted = parse_toml(_text(run.folder / RUN_FILE)).get(_ROBOT)
     if not isinstance(noted, dict):
         return ()
     now = _digests(registry.find(run.robot_name).folder)
@@ -218,11 +216,11 @@ def same_ground(run: Run, terrain: str | Path) -> bool:
     if not noted.is_file():
         if here != run.terrain:
             return False
-        digest = parsed(_text(run.folder / RUN_FILE)).get(_GROUND)
+        digest = parse_toml(_text(run.folder / RUN_FILE)).get(_GROUND)
         return digest is None or digest == _digest(Path(here))
-    from terrainkit.config_text import read_config
+    from terrainkit.config import MapConfig
 
-    return _map_config(here) == read_config(noted)
+    return _map_config(here) == MapConfig.load(noted)
 
 
 def rewrite_task(run: Run, task: Task) -> None:
@@ -316,7 +314,7 @@ def _read_about(path: Path) -> dict[str, str]:
         raise ConfigError(
             f"{path.parent} has no {RUN_FILE}; wanted a folder that terrainkit train wrote"
         )
-    table = parsed(_text(path))
+    table = parse_toml(_text(path))
     if table.get("format_version") != FORMAT_VERSION:
         got = table.get("format_version", "missing")
         raise ConfigError(f"{path}: format_version is {got!r}; wanted {FORMAT_VERSION}")
@@ -341,9 +339,9 @@ def _text(path: Path) -> str:
 def _map_config(terrain: str) -> "MapConfig | None":
     """Return the config of the map, if the ground is one."""
     if terrain.endswith(".toml"):
-        from terrainkit.config_text import read_config
+        from terrainkit.config import MapConfig
 
-        return read_config(terrain)
+        return MapConfig.load(terrain)
     if terrain.endswith(".npz"):
         from terrainkit.terrain_map import TerrainMap
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit.toml_text import parsed
+from terrainkit.toml_text import parse_toml
 from terrainkit_robots.mesh.sniff import open_regular
 from terrainkit_robots.rl.section import Section
 from terrainkit_robots.rl.task import Task
@@ -52,7 +52,7 @@ def from_toml(text: str, default: Task | None = None) -> Task:
             kind or outside its limits.
     """
     try:
-        return _changed("", Task() if default is None else default, parsed(text))
+        return _changed("", Task() if default is None else default, parse_toml(text))
     except ConfigError as error:
         raise ConfigError(short(" ".join(str(error).split()), _MESSAGE)) from error
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, get_args, get_origin
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit.toml_text import parsed
+from terrainkit.toml_text import parse_toml
 from terrainkit_robots.mesh.sniff import open_regular
 from terrainkit_robots.spec.robot_spec import Provenance, RobotSpec, Twin, unit_of
 from terrainkit_robots.spec.toml_text import LINE, comment_text, key_text, value_text
@@ -103,7 +103,7 @@ def from_toml(text: str) -> RobotSpec:
             of another kind or out of its range.
     """
     try:
-        return _spec(parsed(text))
+        return _spec(parse_toml(text))
     except ConfigError as error:
         raise ConfigError(short(" ".join(str(error).split()), _MESSAGE)) from error
 

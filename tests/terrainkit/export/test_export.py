@@ -117,6 +117,6 @@ def test_heights_that_no_view_can_hold_are_not_exported(terrain_map, tmp_path, s
     heights = terrain_map.heights.copy()
     heights[3, 4] = height
     broken = dataclasses.replace(terrain_map, heights=heights)
-    with pytest.raises(ExportError, match="heights holds numbers that are not finite, or beyond"):
+    with pytest.raises(ExportError, match="heights has values that are not finite or beyond"):
         broken.save(tmp_path / f"a{suffix}")
     assert list(tmp_path.iterdir()) == []

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import binary_dilation
 
-from terrainkit import MapConfig, TerrainChoice, generate
+from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError
 from terrainkit.walls import wall_edges
 
@@ -79,8 +79,8 @@ def test_rays_meet_boxes_up_to_their_walls_beside_a_heightfield(terrain_map, tmp
 @pytest.mark.parametrize("border", [0.0, 0.1, 0.2, 0.3, 2.0])
 @every_collision
 def test_the_ground_reaches_to_the_edge_of_any_border(tmp_path, border, centered, collision):
-    slope = TerrainChoice(terrain="slope", parameters={"grade": 0.3, "landing": 1.0})
-    pit = TerrainChoice(terrain="pit", parameters={"side": 0.5})
+    slope = SubTerrain(terrain="slope", parameters={"grade": 0.3, "landing": 1.0})
+    pit = SubTerrain(terrain="pit", parameters={"side": 0.5})
     config = MapConfig(
         rows=1,
         cols=2,
@@ -114,14 +114,14 @@ def test_auto_takes_boxes_where_they_hold_all_of_the_ground(level_map, terrain_m
 
 
 def test_a_flat_map_is_one_box(tmp_path):
-    flat = generate(MapConfig(rows=2, cols=1, terrains=(TerrainChoice(terrain="flat"),)))
+    flat = generate(MapConfig(rows=2, cols=1, terrains=(SubTerrain(terrain="flat"),)))
     model = loaded(flat, tmp_path)
     assert model.ngeom == 1
     assert ray_cast(model, [(1.0, 2.0), (-24.9, 32.9)]).tolist() == pytest.approx([0.0, 0.0])
 
 
 def test_a_flat_map_is_a_heightfield_too(tmp_path):
-    flat = generate(MapConfig(rows=1, cols=1, terrains=(TerrainChoice(terrain="flat"),)))
+    flat = generate(MapConfig(rows=1, cols=1, terrains=(SubTerrain(terrain="flat"),)))
     model = loaded(flat, tmp_path, collision="hfield")
     assert ray_cast(model, [(1.0, 2.0), (-24.9, 32.9)]).tolist() == pytest.approx([0.0, 0.0])
 
@@ -156,7 +156,7 @@ def test_the_same_config_gives_the_same_bytes(terrain_map, tmp_path, collision):
 
 
 def test_an_unknown_collision_is_an_error_that_lists_those_there_are(terrain_map, tmp_path):
-    with pytest.raises(ConfigError, match=r"collision is 'mesh'; wanted .*: auto, hfield, boxes"):
+    with pytest.raises(ConfigError, match=r"collision: got 'mesh'; .* one of: auto, hfield, boxes"):
         terrain_map.save(tmp_path / "terrain.xml", collision="mesh")
     assert list(tmp_path.iterdir()) == []
 

@@ -8,7 +8,7 @@ from terrainkit.mesh.node_grid import NodeGrid
 @pytest.fixture
 def node_grid():
     heights = np.array([[0, 0, 5], [2, 2, 5]], dtype=np.float32)
-    return NodeGrid.of(heights, Grid(shape=(2, 3), cell=1.0, lower=(10.0, 20.0)), 2.5)
+    return NodeGrid.from_heights(heights, Grid(shape=(2, 3), cell=1.0, lower=(10.0, 20.0)), 2.5)
 
 
 def test_nodes_are_the_samples_and_a_rim_at_the_edge_of_the_map(node_grid):
@@ -30,7 +30,7 @@ def test_nodes_count_along_y_first(node_grid):
 def test_walls_reach_into_the_rim(node_grid):
     assert not node_grid.walls_x.any()
     assert node_grid.walls_y.tolist() == [[False, False, True, False]] * 4
-    assert node_grid.cut.tolist() == [[False, False, True, False]] * 3
+    assert node_grid.has_wall.tolist() == [[False, False, True, False]] * 3
 
 
 def test_every_wall_has_two_vertices_in_its_middle(node_grid):
@@ -44,7 +44,7 @@ def test_every_wall_has_two_vertices_in_its_middle(node_grid):
 
 def test_vertices_of_walls_along_x_come_before_those_along_y():
     heights = np.array([[0, 3], [9, 6]], dtype=np.float32)
-    node_grid = NodeGrid.of(heights, Grid(shape=(2, 2), cell=1.0), 0.5)
+    node_grid = NodeGrid.from_heights(heights, Grid(shape=(2, 2), cell=1.0), 0.5)
     first_x = node_grid.midpoint_x(np.array([1]), np.array([0])).item()
     first_y = node_grid.midpoint_y(np.array([0]), np.array([1])).item()
     assert first_x == 16

@@ -49,10 +49,12 @@ def test_rows_of_sloping_quads_stay_one_quad_deep():
 @pytest.fixture
 def node_grid():
     # 4 x 5 nodes at 0, 0.5, 1.5, 2 and 0, 0.5, 1.5, 2.5, 3
-    return NodeGrid.of(np.zeros((2, 3), dtype=np.float32), Grid(shape=(2, 3), cell=1.0), 0.5)
+    return NodeGrid.from_heights(
+        np.zeros((2, 3), dtype=np.float32), Grid(shape=(2, 3), cell=1.0), 0.5
+    )
 
 
-def test_a_rim_runs_anticlockwise_over_the_nodes_that_are_kept(node_grid):
+def test_a_rim_runs_counterclockwise_over_the_nodes_that_are_kept(node_grid):
     rectangle = Rectangles.level(np.ones((3, 4), dtype=bool))
     kept = np.zeros((4, 5), dtype=bool)
     rectangle.keep_corners(kept)

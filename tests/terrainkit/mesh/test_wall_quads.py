@@ -10,7 +10,7 @@ CELL = 0.1
 
 def lattice_of(rows, threshold=0.1):
     heights = np.array(rows, dtype=np.float32)
-    return NodeGrid.of(heights, Grid(shape=heights.shape, cell=CELL), threshold)
+    return NodeGrid.from_heights(heights, Grid(shape=heights.shape, cell=CELL), threshold)
 
 
 def center_quad(corners, first=100):
@@ -51,8 +51,8 @@ def test_two_high_corners_that_meet_in_a_point_are_kept_apart(corners):
     assert len(places) == 2
     assert 0 < np.abs(places - CELL).max() < 0.001
     high = vertices[vertices[:, 2] == max(corners)]
-    towards = (np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) - 0.5)[np.argmax(corners)]
-    assert ((high[:, :2] - CELL) * towards > 0).all(axis=1).any()
+    toward = (np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) - 0.5)[np.argmax(corners)]
+    assert ((high[:, :2] - CELL) * toward > 0).all(axis=1).any()
 
 
 @pytest.mark.parametrize("corners", [(1, 0, 1, 0), (3, 0, 2, 1)])

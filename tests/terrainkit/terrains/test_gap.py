@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit import MapConfig, TerrainChoice, generate
+from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.terrains.gap import Gap
@@ -24,8 +24,8 @@ def test_a_gap_of_three_tenths_is_three_cells_wide(grid, rng):
 
 
 def test_the_ground_falls_exactly_where_the_gap_is():
-    choice = TerrainChoice(terrain="gap", parameters={"width": 0.3})
-    terrain_map = generate(MapConfig(rows=1, cols=1, border=0.0, terrains=(choice,)))
+    sub_terrain = SubTerrain(terrain="gap", parameters={"width": 0.3})
+    terrain_map = generate(MapConfig(rows=1, cols=1, border=0.0, terrains=(sub_terrain,)))
     x = np.array([2.199, 2.201, 2.35, 2.499, 2.501, 5.499, 5.501, 5.799, 5.801])
     assert terrain_map.height(np.column_stack([x, np.full(9, 4.0)])).tolist() == [
         0, -5, -5, -5, 0, 0, -5, -5, 0,
@@ -39,10 +39,10 @@ def test_the_moat_goes_around_the_corners_and_has_a_floor(grid, rng):
     assert np.count_nonzero(heights) == 36**2 - 30**2
 
 
-@pytest.mark.parametrize("metres", [1, 2, 3, 4, 5])
-def test_the_platform_is_as_large_as_asked(metres, grid, rng):
-    x, y = moat(Gap(width=0.3, platform=float(metres)).build(grid, rng))
-    edge = 40 - 5 * metres
+@pytest.mark.parametrize("meters", [1, 2, 3, 4, 5])
+def test_the_platform_is_as_large_as_asked(meters, grid, rng):
+    x, y = moat(Gap(width=0.3, platform=float(meters)).build(grid, rng))
+    edge = 40 - 5 * meters
     assert x == y == [*range(edge - 3, edge), *range(80 - edge, 83 - edge)]
 
 

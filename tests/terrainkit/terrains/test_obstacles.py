@@ -94,9 +94,9 @@ def test_widths_snap_to_cells(grid):
 @pytest.mark.parametrize(
     ("shape", "widths", "message"),
     [
-        ((80, 80), (2.0, 1.0), r"min_width 2 m and max_width 1 m do not fit one another"),
-        ((80, 80), (1.0, 8.1), r"max_width 8\.1 m do not fit .* a patch of 8 m x 8 m"),
-        ((80, 19), (1.0, 2.0), r"max_width 2 m do not fit .* a patch of 8 m x 1\.9 m"),
+        ((80, 80), (2.0, 1.0), r"min_width 2 m and max_width 1 m; expected min_width <= max_width"),
+        ((80, 80), (1.0, 8.1), r"max_width 8\.1 m; expected .* the patch, 8 m x 8 m"),
+        ((80, 19), (1.0, 2.0), r"max_width 2 m; expected .* the patch, 8 m x 1\.9 m"),
     ],
 )
 def test_blocks_that_do_not_fit_are_an_error(shape, widths, message):

@@ -73,7 +73,7 @@ def test_the_grade_grows_with_the_difficulty(difficulty, peak, grid, rng):
 
 
 def test_a_platform_of_the_whole_patch_is_an_error(grid, rng):
-    with pytest.raises(ConfigError, match="platform 8 m leaves nothing of a patch of 8 m x 8"):
+    with pytest.raises(ConfigError, match="platform 8 m fills the whole patch of 8 m x 8"):
         PyramidSlope(grade=0.4, platform=8.0).build(grid, rng)
 
 
@@ -87,6 +87,6 @@ def test_a_platform_larger_than_the_patch_is_an_error(shape, size, rng):
 
 def test_a_platform_smaller_than_a_cell_is_an_error(grid, rng):
     with pytest.raises(
-        ConfigError, match=r"platform 0\.05 m cannot be held by cells of 0\.1 m; wanted 0\.1 m"
+        ConfigError, match=r"platform 0\.05 m is smaller than a cell; expected at least 0\.1 m"
     ):
         PyramidSlope(platform=0.05).build(grid, rng)

@@ -69,7 +69,7 @@ def test_a_wave_needs_four_cells(rng):
     grid = Grid(shape=(40, 15), cell=0.1)
     assert Wave(number=3, platform=0.5).build(grid, rng).any()
     with pytest.raises(
-        ConfigError, match=r"wave: 4 waves need 16 cells a side, .*; the patch has 40 x 15"
+        ConfigError, match=r"wave: 4 waves need .* 16 along both axes; the patch has 40 x 15"
     ):
         Wave(number=4, platform=0.5).build(grid, rng)
 

@@ -5,7 +5,7 @@ import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.mesh.mesh_cache import Meshes
 
@@ -13,7 +13,7 @@ URDF, MJCF = Path("/robots/robot.urdf"), Path("/robots/robot.xml")
 
 
 def facts(text, file=URDF):
-    return Facts(read_robot(file, contents={file: text.encode()}))
+    return Facts(load_robot(file, contents={file: text.encode()}))
 
 
 def link(name, mass=1.0):
@@ -131,7 +131,7 @@ def test_joints_that_a_motor_drives(actuators, driven):
 
 def test_the_positions_of_a_keyframe_are_where_the_robot_starts():
     path = bundled.find("quadruped").with_suffix(".xml")
-    robot = Facts(read_robot(path))
+    robot = Facts(load_robot(path))
     assert robot.positions == {each.name: robot.model.home[each.name] for each in robot.joints}
     assert robot.stance.positions == robot.positions
 
@@ -141,7 +141,7 @@ def test_the_positions_of_a_keyframe_are_where_the_robot_starts():
 
 def test_no_mesh_is_opened_before_one_is_needed(robot_file):
     meshes = Meshes()
-    robot = Facts(read_robot(robot_file("g1/g1_29dof.urdf")), meshes)
+    robot = Facts(load_robot(robot_file("g1/g1_29dof.urdf")), meshes)
     assert len(robot.bodies) == 30
     assert robot.total_mass > 30
     assert len(robot.at_zero) == 30
@@ -150,7 +150,7 @@ def test_no_mesh_is_opened_before_one_is_needed(robot_file):
 
 def test_a_mesh_is_opened_twice_at_most(robot_file):
     meshes = Meshes()
-    robot = Facts(read_robot(robot_file("g1/g1_29dof.urdf")), meshes)
+    robot = Facts(load_robot(robot_file("g1/g1_29dof.urdf")), meshes)
     assert robot.stance is not None
     assert meshes.opened
     assert max(meshes.opened.values()) <= 2

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.runner import INTERNAL, lint
 
 URDF = (bundled.find("quadruped") or Path()).read_text()
@@ -31,7 +31,7 @@ NASTY = [
 
 def check(path: Path) -> set[str]:
     """Return the codes of all findings; fails if a rule failed."""
-    report = lint(Facts(read_robot(path)), simulate=False)
+    report = lint(Facts(load_robot(path)), simulate=False)
     broken = [skipped for skipped in report.skipped if skipped.reason.startswith(INTERNAL)]
     assert not broken
     return {finding.code for finding in report.findings}

@@ -9,7 +9,7 @@ import pytest
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.onboarding.robot_files import onboard
 from terrainkit_robots.spec.robot_spec import RobotSpec
@@ -30,7 +30,7 @@ def urdf(name):
 
 
 def facts(name, suffix):
-    return Facts(read_robot(bundled.find(name).with_suffix(suffix)))
+    return Facts(load_robot(bundled.find(name).with_suffix(suffix)))
 
 
 def hinges(model):
@@ -299,7 +299,7 @@ def test_the_calf_has_the_power_of_the_thigh():
 
 
 def test_the_pelvis_of_the_biped_is_the_published_upper_body_at_zero(robot_file):
-    published = Facts(read_robot(robot_file(PUBLISHED["biped"])))
+    published = Facts(load_robot(robot_file(PUBLISHED["biped"])))
     upper = [
         (body, pose)
         for body, pose in zip(published.bodies, published.at_zero, strict=True)
@@ -348,7 +348,7 @@ def test_the_spec_is_what_onboarding_would_derive_but_for_what_was_edited(name):
 def test_check_robot_has_nothing_to_say_of_the_spec(name, suffix):
     path = bundled.find(name)
     spec = read_spec(path.with_name("robot.toml"))
-    robot = Facts(read_robot(path.with_suffix(suffix)), spec=spec)
+    robot = Facts(load_robot(path.with_suffix(suffix)), spec=spec)
     loud = [f for f in lint(robot).findings if f.severity != "info"]
     assert not loud, "\n".join(f"{f.code} {f.subject}: {f.message}" for f in loud)
 

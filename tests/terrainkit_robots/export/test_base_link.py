@@ -1,7 +1,7 @@
 import pytest
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.export.base_link import rooted
 from terrainkit_robots.onboarding.pipeline import Wishes, bring_in
 from terrainkit_robots.spec.spec_file import read_spec
@@ -28,7 +28,7 @@ WALKER = f"""<mujoco model="walker"><worldbody><body name="torso" pos="0 0 1">{M
 def facts(tmp_path, text):
     path = tmp_path / "robot.xml"
     path.write_text(text)
-    return Facts(read_robot(path))
+    return Facts(load_robot(path))
 
 
 def brought_in(tmp_path, text, **wishes):

@@ -6,7 +6,7 @@ import pytest
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.xml.document import RobotFileError
 from terrainkit_robots.export.canonical import normal_form
 
@@ -16,7 +16,7 @@ MASS = '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>'
 def facts(tmp_path, text):
     path = tmp_path / ("robot.xml" if "<mujoco" in text else "robot.urdf")
     path.write_text(text)
-    return Facts(read_robot(path))
+    return Facts(load_robot(path))
 
 
 def mjcf(body, more=""):
@@ -48,13 +48,13 @@ ROBOTS = [
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_the_normal_form_is_the_same_robot(name, robot_file):
-    check_same(Facts(read_robot(robot_file(name))))
+    check_same(Facts(load_robot(robot_file(name))))
 
 
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
 @pytest.mark.parametrize("suffix", [".urdf", ".xml"])
 def test_the_normal_form_of_a_bundled_robot_is_the_same_robot(name, suffix):
-    check_same(Facts(read_robot(bundled.find(name).with_suffix(suffix))))
+    check_same(Facts(load_robot(bundled.find(name).with_suffix(suffix))))
 
 
 def check_same(source):

@@ -4,7 +4,7 @@ import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.export.canonical import normal_form
 from terrainkit_robots.export.fixed_joint_merge import fused
 from terrainkit_robots.export.mjcf import Extras, mjcf_text
@@ -13,7 +13,7 @@ from terrainkit_robots.quiet_mujoco import quiet_mujoco
 
 @pytest.fixture
 def facts():
-    return Facts(normal_form(Facts(read_robot(bundled.find("quadruped")))).model)
+    return Facts(normal_form(Facts(load_robot(bundled.find("quadruped")))).model)
 
 
 def test_what_moves_as_one_is_one_body(facts):

@@ -6,7 +6,7 @@ import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.export.actuator import Drive
 from terrainkit_robots.export.canonical import normal_form
 from terrainkit_robots.export.mjcf import Extras, mjcf_text, quaternion, scene_text
@@ -23,7 +23,7 @@ def written(model, **extras):
 
 @pytest.fixture
 def quadruped():
-    facts = Facts(read_robot(bundled.find("quadruped")))
+    facts = Facts(load_robot(bundled.find("quadruped")))
     return Facts(normal_form(facts).model)
 
 
@@ -58,7 +58,7 @@ def test_several_joints_of_one_body_move_it_as_they_did(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(text)
     source = mujoco.MjModel.from_xml_path(str(path))
-    model = written(normal_form(Facts(read_robot(path)), floating=False).model)
+    model = written(normal_form(Facts(load_robot(path)), floating=False).model)
     assert [model.joint(k).name for k in range(model.njnt)] == ["a", "b", "c", "d"]
     rng = np.random.default_rng(0)
     for qpos in rng.uniform(-1, 1, (20, 4)):
@@ -141,7 +141,7 @@ def test_a_joint_that_mimics_another_follows_it(tmp_path):
       {joint.format("k", "c", '<mimic joint="j" multiplier="-2" offset="0.1"/>')}</robot>"""
     path = tmp_path / "robot.urdf"
     path.write_text(text)
-    facts = Facts(normal_form(Facts(read_robot(path))).model)
+    facts = Facts(normal_form(Facts(load_robot(path))).model)
     assert [joint.name for joint in facts.actuated] == ["j"]
     model = written(facts.model)
     assert model.neq == 1
@@ -169,7 +169,7 @@ def test_an_arm_stands_still(tmp_path):
       <joint name="j" range="-1 1"/></body></body></worldbody></mujoco>"""
     path = tmp_path / "robot.xml"
     path.write_text(text)
-    model = written(normal_form(Facts(read_robot(path))).model)
+    model = written(normal_form(Facts(load_robot(path))).model)
     assert (model.nq, model.nkey) == (1, 1)
 
 

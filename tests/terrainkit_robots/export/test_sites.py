@@ -3,13 +3,13 @@ import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.export.canonical import normal_form
 from terrainkit_robots.export.sites import foot_sites, imu_notes, imu_site
 
 
 def facts_of(name):
-    return Facts(read_robot(bundled.find(name)))
+    return Facts(load_robot(bundled.find(name)))
 
 
 def test_a_ball_foot_is_within_its_site():
@@ -34,7 +34,7 @@ def test_the_imu_is_where_its_link_is(tmp_path):
         <joint name="imu_joint" type="fixed"><parent link="trunk"/><child link="imu_link"/>
         <origin xyz="0.1 0.2 0.3"/></joint></robot>"""
     )
-    facts = Facts(read_robot(path))
+    facts = Facts(load_robot(path))
     site = imu_site(facts)
     assert site.body == "trunk"
     np.testing.assert_allclose(site.pose[:3, 3], [0.1, 0.2, 0.3])
@@ -44,7 +44,7 @@ def test_the_imu_is_where_its_link_is(tmp_path):
 def test_a_robot_without_an_imu_has_it_at_its_base(tmp_path):
     path = tmp_path / "robot.urdf"
     path.write_text('<robot name="r"><link name="trunk"/></robot>')
-    facts = Facts(read_robot(path))
+    facts = Facts(load_robot(path))
     site = imu_site(facts)
     assert site.body == "trunk"
     np.testing.assert_allclose(site.pose, np.eye(4))
@@ -65,7 +65,7 @@ IMU = """<mujoco><worldbody><body name="trunk"><freejoint/><geom size="0.1"/>
 def test_the_imu_that_the_file_names_goes_before_a_link_of_that_name(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(IMU)
-    facts = Facts(normal_form(Facts(read_robot(path))).model)
+    facts = Facts(normal_form(Facts(load_robot(path))).model)
     site = imu_site(facts)
     assert site.body == "trunk"  # of which the head is a part
     np.testing.assert_allclose(site.pose[:3, 3], [0.1, 0.2, 1.3])
@@ -78,13 +78,13 @@ def test_an_imu_beside_the_robot_is_not_its_own(tmp_path):
     text = IMU.replace("</worldbody>", f"{crate}</worldbody>")
     text = text.replace('<site name="sensed" pos="0.1 0.2 0.3"/>', "", 1)
     path.write_text(text.replace('name="imu_link"', 'name="cover"'))
-    model = normal_form(Facts(read_robot(path))).model
+    model = normal_form(Facts(load_robot(path))).model
     assert model.imu is None
     assert imu_notes(Facts(model))[0].startswith("the IMU is at the origin of trunk")
 
 
 def test_the_imu_of_go2_is_where_its_site_is(robot_file):
-    facts = Facts(normal_form(Facts(read_robot(robot_file("go2_mjcf/go2.xml")))).model)
+    facts = Facts(normal_form(Facts(load_robot(robot_file("go2_mjcf/go2.xml")))).model)
     site = imu_site(facts)
     assert site.body == "base_link"
     np.testing.assert_allclose(site.pose[:3, 3], [-0.02557, 0, 0.04232], atol=1e-12)

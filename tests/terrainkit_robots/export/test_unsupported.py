@@ -1,5 +1,5 @@
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.export.unsupported import leftovers
 
 MJCF = """<mujoco><worldbody><body name="a"><geom size="0.1"/>
@@ -12,7 +12,7 @@ MJCF = """<mujoco><worldbody><body name="a"><geom size="0.1"/>
 def test_what_is_left_out_of_a_mjcf_is_told(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(MJCF)
-    assert leftovers(read_robot(path)) == (
+    assert leftovers(load_robot(path)) == (
         "left out the element of <tendon>",
         "left out the element of <equality>",
         "left out stiffness of joints, which 1 element sets",
@@ -25,7 +25,7 @@ def test_motors_of_tendons_are_told_and_followers_are_none(tmp_path):
     text = MJCF.replace("</mujoco>", more).replace('stiffness="5"', "")
     text = text.replace("</body></body>", '<joint name="k"/></body></body>', 1)
     path.write_text(text.replace('joint1="j"', 'joint1="j" joint2="k"'))
-    model = read_robot(path)
+    model = load_robot(path)
     assert not model.problems
     assert leftovers(model) == (
         "left out the element of <tendon>",
@@ -34,7 +34,7 @@ def test_motors_of_tendons_are_told_and_followers_are_none(tmp_path):
 
 
 def test_nothing_is_left_out_of_a_urdf():
-    assert leftovers(read_robot(bundled.find("quadruped"))) == ()
+    assert leftovers(load_robot(bundled.find("quadruped"))) == ()
 
 
 def test_how_shapes_feel_is_left_out_and_told(tmp_path):
@@ -44,6 +44,6 @@ def test_how_shapes_feel_is_left_out_and_told(tmp_path):
         <geom size="0.1" friction="0.4 0.02 0.01" priority="1"/><geom size="0.1"/>
         </body></worldbody></mujoco>"""
     )
-    assert leftovers(read_robot(path)) == (
+    assert leftovers(load_robot(path)) == (
         "left out friction and contact parameters of shapes, which 2 elements set",
     )

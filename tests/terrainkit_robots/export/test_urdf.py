@@ -12,7 +12,7 @@ from lxml import etree
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import (
     Geometry,
     Inertial,
@@ -376,7 +376,7 @@ def test_an_axis_beside_the_origin_of_its_child():
 
 
 def test_the_same_text_each_time():
-    model = normal_form(Facts(read_robot(bundled.find("biped")))).model
+    model = normal_form(Facts(load_robot(bundled.find("biped")))).model
     assert urdf_text(model) == urdf_text(model)
 
 
@@ -388,7 +388,7 @@ class Written:
     """A robot and what was written of it."""
 
     def __init__(self, file, folder):
-        self.source = Facts(read_robot(file))
+        self.source = Facts(load_robot(file))
         packed = pack(normal_form(self.source).model, self.source.meshes)
         for name, data in packed.files.items():
             (folder / name).parent.mkdir(exist_ok=True)
@@ -440,7 +440,7 @@ class TestRobots:
 
     def test_the_linter_reads_it_back(self, written):
         """No problem of reading, no mesh that is lost, no other joint order."""
-        model = read_robot(written.path)
+        model = load_robot(written.path)
         facts = Facts(model, Meshes())
         assert not model.problems
         assert [j.name for j in facts.joints] == [j.name for j in written.source.joints]

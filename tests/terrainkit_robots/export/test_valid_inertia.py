@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.export.canonical import normal_form
 from terrainkit_robots.export.mjcf import Extras, mjcf_text
 from terrainkit_robots.export.urdf import urdf_text
@@ -21,7 +21,7 @@ def facts(tmp_path, links, joints=""):
     )
     path = tmp_path / "robot.urdf"
     path.write_text(f'<robot name="r">{inside}{joints}</robot>')
-    return Facts(read_robot(path))
+    return Facts(load_robot(path))
 
 
 def fixed(parent, child):

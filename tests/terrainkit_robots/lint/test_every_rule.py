@@ -12,9 +12,9 @@ import pytest
 
 import terrainkit_robots
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.fixes.apply import fix_robot, write_fixes
-from terrainkit_robots.lint.rule import FAMILIES, find, rules
+from terrainkit_robots.lint.rule import FAMILIES, get_rule, rules
 from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.mesh.mesh_cache import Meshes
 
@@ -93,12 +93,12 @@ class Case:
         if self.other_text is not None:
             file = path.parent / f"other{suffix_of(self.other_text)}"
             file.write_bytes(self.other_text.encode())
-            other = Facts(read_robot(file))
+            other = Facts(load_robot(file))
         if self.spec is not None:
             from terrainkit_robots.spec.spec_file import from_toml
 
             spec = from_toml(self.spec)
-        model = read_robot(path, contents=contents)
+        model = load_robot(path, contents=contents)
         return Facts(model, Meshes(contents), against=other, spec=spec)
 
 
@@ -234,13 +234,13 @@ def what(report):
 @every_case([case for case in ALL_CASES if case.fails])
 def test_what_is_wrong_is_found(case, tmp_path):
     path = case.write(tmp_path)
-    report = look_at(case, path, chosen=None if case.only else [find(case.code)])
+    report = look_at(case, path, chosen=None if case.only else [get_rule(case.code)])
     found = [f for f in report.findings if f.code == case.code]
     assert found, f"nothing was found; skipped: {report.skipped}"
     for finding in found:
         check_text(case, finding)
         assert finding.file.is_relative_to(tmp_path)
-        assert finding.fix is None or find(case.code).fixes != "no", "the rule is said to fix none"
+        assert finding.fix is None or get_rule(case.code).fixes != "no", "the rule claims no fix"
     for name in ("subject", "line", "severity"):
         wanted = getattr(case, name)
         if wanted is not None:
@@ -262,7 +262,7 @@ def check_text(case, finding):
 
 @every_case([case for case in ALL_CASES if not case.fails])
 def test_what_is_right_is_left_in_peace(case, tmp_path):
-    report = look_at(case, case.write(tmp_path), chosen=[find(case.code)])
+    report = look_at(case, case.write(tmp_path), chosen=[get_rule(case.code)])
     assert not report.findings, what(report)
 
 
@@ -282,12 +282,12 @@ def test_every_rule_is_asked_on_a_case_that_passes(code, tmp_path):
     for number, case in enumerate(case for case in cases_of(code) if not case.fails):
         (tmp_path / str(number)).mkdir()
         path = case.write(tmp_path / str(number))
-        skipped = look_at(case, path, chosen=[find(code)]).skipped
+        skipped = look_at(case, path, chosen=[get_rule(code)]).skipped
         if not skipped:
             return
         reasons += [each.reason for each in skipped]
     # One that only informs may have something to say whenever it is asked.
-    assert not reasons or find(code).severity == "info", f"skipped on all of them: {reasons}"
+    assert not reasons or get_rule(code).severity == "info", f"skipped on all of them: {reasons}"
 
 
 def test_every_case_belongs_to_a_rule():
@@ -300,7 +300,7 @@ def test_every_case_belongs_to_a_rule():
 
 @every_rule
 def test_every_rule_has_a_page(code):
-    rule = find(code)
+    rule = get_rule(code)
     assert re.fullmatch(r"[A-Z]{3}\d{3}", code)
     assert rule.family in FAMILIES
     assert re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", rule.name)
@@ -319,10 +319,10 @@ def test_names_are_unique():
 # Fixes.
 
 
-@every_case([case for case in ALL_CASES if case.fails and find(case.code).fixes != "no"])
+@every_case([case for case in ALL_CASES if case.fails and get_rule(case.code).fixes != "no"])
 def test_a_fix_removes_the_finding_and_brings_no_other(case, tmp_path):
     path = case.write(tmp_path)
-    unsafe = find(case.code).fixes == "unsafe"
+    unsafe = get_rule(case.code).fixes == "unsafe"
     reports = []
 
     def look(contents):
@@ -356,6 +356,6 @@ def test_every_rule_with_fixes_has_a_case_with_one(code, tmp_path):
     safeties = set()
     for number, case in enumerate(case for case in cases_of(code) if case.fails):
         (tmp_path / str(number)).mkdir()
-        report = look_at(case, case.write(tmp_path / str(number)), chosen=[find(code)])
+        report = look_at(case, case.write(tmp_path / str(number)), chosen=[get_rule(code)])
         safeties |= {finding.fix.safety for finding in report.findings if finding.fix}
-    assert find(code).fixes in safeties
+    assert get_rule(code).fixes in safeties

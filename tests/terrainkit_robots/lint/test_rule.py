@@ -4,7 +4,7 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.lint import rule as module
-from terrainkit_robots.lint.rule import FAMILIES, Defect, find, rule, rules
+from terrainkit_robots.lint.rule import FAMILIES, Violation, get_rule, rule, rules
 
 PAGE = """A mass is negative.
 
@@ -32,7 +32,7 @@ def empty(monkeypatch):
 
 def check(text=PAGE):
     def negative(robot):
-        yield Defect(subject="a", source=robot.model.source, message="b")
+        yield Violation(subject="a", source=robot.model.source, message="b")
 
     negative.__doc__ = text
     return negative
@@ -116,16 +116,16 @@ def test_every_rule_is_well_formed(each):
 
 @pytest.mark.parametrize("word", ["INR001", "inr001", "Inr001"])
 def test_a_rule_is_found_by_code(word):
-    assert find(word).code == "INR001"
+    assert get_rule(word).code == "INR001"
 
 
 @pytest.mark.parametrize("each", rules()[:10], ids=lambda each: each.code)
 def test_a_rule_is_found_by_name(each):
-    assert find(each.name) is each
-    assert find(each.name.upper()) is each
+    assert get_rule(each.name) is each
+    assert get_rule(each.name.upper()) is each
 
 
 @pytest.mark.parametrize("word", ["", "INR", "INR999", "no-such-rule"])
 def test_a_rule_that_is_not_there_is_told_with_those_that_are(word):
     with pytest.raises(ConfigError, match=r"no rule .*; there are: .*XML001"):
-        find(word)
+        get_rule(word)

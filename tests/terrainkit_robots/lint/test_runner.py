@@ -6,20 +6,20 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.fix import Fix
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import Source
-from terrainkit_robots.lint.rule import Defect, Rule, rules
+from terrainkit_robots.lint.rule import Rule, Violation, rules
 from terrainkit_robots.lint.runner import INTERNAL, MOST_FINDINGS, lint
 
 FILE = Path("/robots/robot.urdf")
 
 
 def facts(text='<robot name="r"><link name="a"/></robot>'):
-    return Facts(read_robot(FILE, contents={FILE: text.encode()}))
+    return Facts(load_robot(FILE, contents={FILE: text.encode()}))
 
 
-def defect(subject="a", line=1, **more):
-    return Defect(subject=subject, source=Source(file=FILE, line=line), message="m", **more)
+def violation(subject="a", line=1, **more):
+    return Violation(subject=subject, source=Source(file=FILE, line=line), message="m", **more)
 
 
 def rule(check, code="INR099", severity="error", *, needs=()):
@@ -48,7 +48,7 @@ def report(*chosen, robot=None):
 def test_a_finding_says_what_the_rule_and_the_defect_say():
     fix = Fix(safety="safe", description="d", edits=())
     source = Source(file=Path("/robots/part.urdf"), line=7)
-    whole = Defect(
+    whole = Violation(
         subject="calf",
         source=source,
         message="the mass is -1 kg",
@@ -66,21 +66,21 @@ def test_a_finding_says_what_the_rule_and_the_defect_say():
 
 
 def test_the_hint_is_the_rules_unless_the_defect_has_its_own():
-    found = report(rule([defect(), defect(line=2, hint="Do that.")])).findings
+    found = report(rule([violation(), violation(line=2, hint="Do that.")])).findings
     assert [each.hint for each in found] == ["Do this.", "Do that."]
 
 
 def test_a_defect_may_be_less_severe_than_its_rule():
-    found = report(rule([defect(severity="info")])).findings
+    found = report(rule([violation(severity="info")])).findings
     assert [each.severity for each in found] == ["info"]
 
 
 def test_errors_come_first_then_the_place_in_the_file():
     found = report(
-        rule([defect("a", 9), defect("b", 3)], "INR099", "warning"),
-        rule([defect("c", 9), defect("d", 3)], "INR098", "error"),
-        rule([defect("e", 1)], "INR097", "info"),
-        rule([defect("f", 3)], "INR096", "error"),
+        rule([violation("a", 9), violation("b", 3)], "INR099", "warning"),
+        rule([violation("c", 9), violation("d", 3)], "INR098", "error"),
+        rule([violation("e", 1)], "INR097", "info"),
+        rule([violation("f", 3)], "INR096", "error"),
     ).findings
     assert [each.subject for each in found] == ["f", "d", "c", "b", "a", "e"]
 
@@ -95,13 +95,13 @@ def test_errors_come_first_then_the_place_in_the_file():
     ],
 )
 def test_the_verdict_is_that_of_the_worst(severities, verdict):
-    found = [defect(severity=severity) for severity in severities]
+    found = [violation(severity=severity) for severity in severities]
     assert report(rule(found)).verdict == verdict
 
 
 def test_what_cannot_be_checked_is_told():
     def check(_):
-        yield defect()
+        yield violation()
         raise CannotCheckError("there is nothing to go by")
 
     made = report(rule(check))
@@ -111,11 +111,11 @@ def test_what_cannot_be_checked_is_told():
 
 
 def test_a_rule_for_legs_is_not_asked_of_a_robot_without():
-    made = report(rule([defect()], needs=("legs",)))
+    made = report(rule([violation()], needs=("legs",)))
     assert made.findings == ()
     assert made.skipped[0].reason == "no legs were found"
-    robot = Facts(read_robot(bundled.find("biped")))
-    assert len(report(rule([defect()], needs=("legs",)), robot=robot).findings) == 1
+    robot = Facts(load_robot(bundled.find("biped")))
+    assert len(report(rule([violation()], needs=("legs",)), robot=robot).findings) == 1
 
 
 @pytest.mark.parametrize("family", ["LEG", "SYM"])
@@ -124,10 +124,10 @@ def test_limbs_are_not_compared_where_some_are_lost(family):
         '<robot name="r"><link name="a"/><joint name="j" type="fixed"><parent link="a"/>'
         '<child link="lost"/></joint></robot>'
     )
-    made = report(rule([defect()], f"{family}099"), robot=facts(text))
+    made = report(rule([violation()], f"{family}099"), robot=facts(text))
     assert made.findings == ()
     assert "missing from the tree" in made.skipped[0].reason
-    assert len(report(rule([defect()], "INR099"), robot=facts(text)).findings) == 1
+    assert len(report(rule([violation()], "INR099"), robot=facts(text)).findings) == 1
 
 
 def test_a_rule_that_fails_costs_no_other():
@@ -135,7 +135,7 @@ def test_a_rule_that_fails_costs_no_other():
         raise ZeroDivisionError("oh")
         yield
 
-    made = report(rule(broken, "INR098"), rule([defect()]))
+    made = report(rule(broken, "INR098"), rule([violation()]))
     assert [each.code for each in made.findings] == ["INR099"]
     assert [each.code for each in made.crashed] == ["INR098"]
     assert made.crashed[0].reason == f"{INTERNAL}: ZeroDivisionError: oh"
@@ -155,12 +155,12 @@ def test_of_endless_defects_the_first_are_told():
         line = 0
         while True:
             line += 1
-            yield defect(line=line)
+            yield violation(line=line)
 
     made = report(rule(endless))
     assert [each.line for each in made.findings] == list(range(1, MOST_FINDINGS + 1))
     assert str(MOST_FINDINGS) in made.skipped[0].reason
-    exactly = report(rule([defect(line=k) for k in range(MOST_FINDINGS)]))
+    exactly = report(rule([violation(line=k) for k in range(MOST_FINDINGS)]))
     assert exactly.skipped == ()
 
 
@@ -174,7 +174,7 @@ def test_all_rules_are_asked_unless_told():
 
 def test_the_same_robot_has_the_same_findings():
     robot = bundled.find("quadruped")
-    first, second = (lint(Facts(read_robot(robot))) for _ in range(2))
+    first, second = (lint(Facts(load_robot(robot))) for _ in range(2))
     assert first.findings == second.findings
     assert first.skipped == second.skipped
 
@@ -182,6 +182,6 @@ def test_the_same_robot_has_the_same_findings():
 @pytest.mark.parametrize("name", bundled.names())
 @pytest.mark.parametrize("suffix", [".urdf", ".xml"])
 def test_no_rule_fails_on_a_bundled_robot(name, suffix):
-    made = lint(Facts(read_robot(bundled.find(name).with_suffix(suffix))))
+    made = lint(Facts(load_robot(bundled.find(name).with_suffix(suffix))))
     assert made.crashed == ()
     assert made.verdict == "pass"

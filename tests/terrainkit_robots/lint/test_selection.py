@@ -2,9 +2,14 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.rule import rules
-from terrainkit_robots.lint.selection import IdleComment, Ignored, choose, lint_selected
+from terrainkit_robots.lint.selection import (
+    Suppressed,
+    UnusedSuppression,
+    lint_selected,
+    select_rules,
+)
 from terrainkit_robots.lint.settings import Settings, matching
 
 LINK = '<link name="{name}"><inertial><mass value="-1"/></inertial></link>'
@@ -18,7 +23,7 @@ def check(path, text, **settings):
     """Return the report of what INR002, negative-mass, finds in `text`."""
     path.write_text(text)
     wanted = Settings(**{"select": ("INR002",)} | settings)
-    return lint_selected(Facts(read_robot(path)), wanted)
+    return lint_selected(Facts(load_robot(path)), wanted)
 
 
 @pytest.fixture
@@ -27,21 +32,21 @@ def file(tmp_path):
 
 
 def test_without_a_word_every_rule_is_asked():
-    chosen, left_out = choose(Settings())
+    chosen, left_out = select_rules(Settings())
     assert chosen == rules()
     assert left_out == ()
 
 
 def test_what_is_ignored_is_left_out_of_what_is_selected_with_its_reason():
     settings = Settings(select=("INR",), ignore={"INR002": "a balloon", "JNT": "no joints"})
-    chosen, left_out = choose(settings)
+    chosen, left_out = select_rules(settings)
     assert codes(chosen) == codes(matching("INR")) - {"INR002"}
     assert [(s.code, s.reason) for s in left_out] == [("INR002", "ignored: a balloon")]
 
 
 def test_an_ignored_word_that_is_no_rule_is_an_error():
     with pytest.raises(ConfigError, match="no rule 'NOPE1'"):
-        choose(Settings(ignore={"NOPE1": "why"}))
+        select_rules(Settings(ignore={"NOPE1": "why"}))
 
 
 def test_only_the_selected_rules_are_asked(file):
@@ -95,7 +100,7 @@ A, B = LINK.format(name="a"), LINK.format(name="b")
 def test_a_comment_quiets_a_rule_for_what_it_is_on_in_or_above(file, text, left):
     report = check(file, f'<robot name="r">\n{text}\n</robot>\n')
     assert [finding.subject for finding in report.findings] == left
-    ignored = [skipped for skipped in report.skipped if isinstance(skipped, Ignored)]
+    ignored = [skipped for skipped in report.skipped if isinstance(skipped, Suppressed)]
     assert len(ignored) + len(left) == text.count("-1")
     assert {each.comment.reason for each in ignored} <= {"a balloon"}
 
@@ -121,7 +126,7 @@ def test_above_the_root_it_speaks_of_the_robot_and_not_of_all_that_is_in_it(file
     ):
         report = check(file, f"{text}\n</robot>", select=("INR002", "XML003"))
         assert codes(report.findings) == {"INR002"}
-        assert codes(s for s in report.skipped if isinstance(s, Ignored)) == {"XML003"}
+        assert codes(s for s in report.skipped if isinstance(s, Suppressed)) == {"XML003"}
 
 
 def test_in_mjcf_a_body_in_a_body_is_another_part(tmp_path):
@@ -149,7 +154,7 @@ def test_a_file_with_syntax_errors_has_comments_too(file):
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-8-sig"])
 def test_a_file_in_another_encoding_has_comments_too(file, encoding):
     file.write_bytes(f'<robot name="r">\n{NOTE}\n{A}\n{B}\n</robot>'.encode(encoding))
-    report = lint_selected(Facts(read_robot(file)), Settings(select=("INR002",)))
+    report = lint_selected(Facts(load_robot(file)), Settings(select=("INR002",)))
     assert [finding.subject for finding in report.findings] == ["b"]
 
 
@@ -157,7 +162,7 @@ def test_what_is_read_instead_of_a_file_has_its_own_comments(file):
     text = f'<robot name="r">\n{A}\n</robot>'
     file.write_text(text)
     contents = {file: text.replace("\n<link", f"\n{NOTE} <link").encode()}
-    facts = Facts(read_robot(file, contents=contents))
+    facts = Facts(load_robot(file, contents=contents))
     assert lint_selected(facts, Settings(select=("INR002",)), contents).findings == ()
     assert len(lint_selected(facts, Settings(select=("INR002",))).findings) == 1
 
@@ -176,7 +181,7 @@ def test_a_comment_that_can_quiet_nothing_is_told(file, comment, said):
     report = check(file, f'<robot name="r">\n<!-- terrainkit: {comment} -->\n{A}\n</robot>')
     assert codes(report.findings) == {"INR002"}
     (idle,) = report.skipped
-    assert isinstance(idle, IdleComment)
+    assert isinstance(idle, UnusedSuppression)
     assert idle.reason.startswith(f"comment at {file}:2: ")
     assert said in idle.reason
 
@@ -198,7 +203,7 @@ def test_a_file_without_comments_is_not_parsed_again(file, monkeypatch):
     import terrainkit_robots.description.xml.document as xml_document
 
     file.write_text(f'<robot name="r">{A}</robot>')
-    facts = Facts(read_robot(file))
+    facts = Facts(load_robot(file))
     monkeypatch.setattr(xml_document, "parse_xml", lambda *_: pytest.fail("parsed"))
     assert codes(lint_selected(facts, Settings(select=("INR002",))).findings) == {"INR002"}
 
@@ -226,4 +231,4 @@ def test_in_xacro_a_comment_stands_where_the_finding_is(tmp_path):
     </robot>"""
     report = check(tmp_path / "robot.xacro", text)
     assert [finding.subject for finding in report.findings] == ["c"]
-    assert [s.finding.subject for s in report.skipped if isinstance(s, Ignored)] == ["a", "b"]
+    assert [s.finding.subject for s in report.skipped if isinstance(s, Suppressed)] == ["a", "b"]

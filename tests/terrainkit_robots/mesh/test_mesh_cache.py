@@ -6,7 +6,7 @@ import pytest
 import trimesh
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import MeshFile, Source
 from terrainkit_robots.lint.rule import rules
 from terrainkit_robots.lint.runner import lint
@@ -217,20 +217,20 @@ class TestRobots:
     @pytest.mark.parametrize("name", HEALTHY)
     def test_no_error_and_no_warning_that_is_not_agreed(self, robot_file, name):
         own = [rule for rule in rules() if rule.family == "MSH" and rule.severity != "info"]
-        findings = lint(Facts(read_robot(robot_file(name))), own).findings
+        findings = lint(Facts(load_robot(robot_file(name))), own).findings
         told = {(name, f.code, f.subject) for f in findings if f.severity != "info"}
         assert told == {agreed for agreed in AGREED if agreed[0] == name}
         assert not [f for f in findings if f.severity == "error"]
 
     @pytest.mark.parametrize("name", ["go2/urdf/go2.urdf", "h1/urdf/h1.urdf"])
     def test_rules_about_names_open_nothing(self, robot_file, name):
-        facts = Facts(read_robot(robot_file(name)))
+        facts = Facts(load_robot(robot_file(name)))
         by_name = ("MSH001", "MSH002", "MSH003", "MSH004", "MSH012")
         lint(facts, [rule for rule in rules() if rule.code in by_name])
         assert facts.meshes.opened == Counter()
 
     def test_meshes_that_are_only_drawn_are_not_read(self, robot_file):
-        facts = Facts(read_robot(robot_file("go2/urdf/go2.urdf")))
+        facts = Facts(load_robot(robot_file("go2/urdf/go2.urdf")))
         lint(facts, [rule for rule in rules() if rule.family == "MSH"])
         # each header, and the beginning of each
         assert len(facts.meshes.opened) == 7

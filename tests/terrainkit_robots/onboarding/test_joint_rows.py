@@ -5,7 +5,7 @@ import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.onboarding.joint_rows import joint_rows, shown
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
@@ -34,7 +34,7 @@ def spec_of(order, **changes):
 
 @pytest.fixture(scope="module")
 def quadruped():
-    return Facts(read_robot(bundled.find("quadruped")))
+    return Facts(load_robot(bundled.find("quadruped")))
 
 
 def arm(kind, limits):
@@ -42,7 +42,7 @@ def arm(kind, limits):
     <joint name="j" type="{kind}"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
     {limits}</joint></robot>"""
     path = bundled.find("quadruped")
-    return Facts(read_robot(path, contents={path: text.encode()}))
+    return Facts(load_robot(path, contents={path: text.encode()}))
 
 
 def test_a_leg_joint_has_its_role_limits_gains_and_what_it_holds(quadruped):
@@ -88,7 +88,7 @@ def test_units_of_hinges_and_slides_together():
     text = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
     <joint name="h" type="continuous"><parent link="a"/><child link="b"/></joint>
     <joint name="s" type="prismatic"><parent link="b"/><child link="c"/></joint></robot>"""
-    facts = Facts(read_robot(path, contents={path: text.encode()}))
+    facts = Facts(load_robot(path, contents={path: text.encode()}))
     assert joint_rows(facts, spec_of(["h", "s"]))[0][3] == "default [rad or m]"
 
 

@@ -11,7 +11,7 @@ from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.compare.kinematics import largest_difference
 from terrainkit_robots.lint.rule import rules
 from terrainkit_robots.lint.runner import lint
@@ -57,8 +57,8 @@ def check(file, tmp_path):
     folder = done.folder
     assert done.proof.stood
     assert done.proof.locked == (len(done.made.facts.legs) == 2)
-    source = Facts(read_robot(file))
-    urdf, mjcf = (read_robot(folder / name) for name in ("robot.urdf", "robot.xml"))
+    source = Facts(load_robot(file))
+    urdf, mjcf = (load_robot(folder / name) for name in ("robot.urdf", "robot.xml"))
     spec = read_spec(folder / "robot.toml")
     assert not urdf.problems
     assert not mjcf.problems

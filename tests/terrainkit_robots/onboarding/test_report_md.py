@@ -7,7 +7,7 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.fix import Fix
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.runner import Finding, Report, Skipped
 from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
 from terrainkit_robots.onboarding.equivalence import Agreement
@@ -56,7 +56,7 @@ def agreement(file, *, mass=0.0, distance=1e-6, link="FL_foot"):
 
 def facts_of(text=None):
     path = bundled.find("quadruped")
-    return Facts(read_robot(path, contents={} if text is None else {path: text.encode()}))
+    return Facts(load_robot(path, contents={} if text is None else {path: text.encode()}))
 
 
 def brought(facts, **changes):

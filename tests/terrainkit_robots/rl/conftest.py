@@ -16,7 +16,7 @@ pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 import torch
 
-from terrainkit import MapConfig, TerrainChoice, TerrainMap, generate
+from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.ground import Ground, MapGround, Plane
 from terrainkit_robots.rl.registry import find
@@ -143,8 +143,8 @@ def mixed_map() -> TerrainMap:
             border=1.2,
             seed=7,
             terrains=(
-                TerrainChoice(terrain="stairs", parameters={"step_height": (0.05, 0.2)}),
-                TerrainChoice(terrain="rough_slope", parameters={"platform": 1.5}),
+                SubTerrain(terrain="stairs", parameters={"step_height": (0.05, 0.2)}),
+                SubTerrain(terrain="rough_slope", parameters={"platform": 1.5}),
             ),
         )
     )

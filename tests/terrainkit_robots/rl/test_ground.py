@@ -2,7 +2,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from terrainkit import MapConfig, TerrainChoice, generate
+from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError, TerrainkitError
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.env import LeggedEnv
@@ -132,7 +132,7 @@ class TestMapGround:
         assert not ground.level
 
     def test_knows_the_terrain_of_each_patch_of_a_randomized_map(self):
-        choices = tuple(TerrainChoice(terrain=name) for name in ("flat", "stairs"))
+        choices = tuple(SubTerrain(terrain=name) for name in ("flat", "stairs"))
         config = MapConfig(
             mode="randomized", rows=4, cols=3, patch_size=(4, 4), border=0.5, terrains=choices
         )

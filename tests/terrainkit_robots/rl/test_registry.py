@@ -43,7 +43,7 @@ def test_bundled_robots_are_registered_and_can_be_trained(name):
     found = registry.find(name)
     assert (found.name, found.folder) == (name, bundled.find(name).parent)
     assert name in registry.names()
-    read = robot.read_robot(found.folder)
+    read = robot.load_robot(found.folder)
     assert read.mjcf.is_file()
     assert len(read.default_pose) == 12
 
@@ -183,7 +183,7 @@ def test_the_task_of_the_guide_is_found_saved_and_trained_with(guide):
     assert "# One diagonal pair of feet on the ground" in text
     assert from_toml(text.replace("trot = 0.5", "trot = 2.0"), guide.task).rewards.trot == 2.0
     task = replace(guide.task, env=Env(num_envs=4, num_threads=1))
-    env = LeggedEnv(task, robot.read_robot(guide.folder), Plane())
+    env = LeggedEnv(task, robot.load_robot(guide.folder), Plane())
     function, scale = env.rewards["trot"]
     assert scale == 0.5
     env.state.foot_force[..., 2] = [[9, 0, 0, 9], [9, 9, 9, 9], [0, 6, 6, 0], [0, 4, 4, 0]]

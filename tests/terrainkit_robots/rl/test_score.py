@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import torch
 
-from terrainkit import MapConfig, TerrainChoice, generate
+from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ExportError
 from terrainkit_robots.policy import trials
 from terrainkit_robots.policy.evaluate import Asked, prepared
@@ -83,7 +83,7 @@ def test_results_are_told_apart_by_terrain_and_level(run_of, map_file):
 
 
 def test_on_a_randomized_map_each_robot_counts_for_the_terrain_below_it(run_of, tmp_path):
-    choices = tuple(TerrainChoice(terrain=name) for name in ("flat", "pyramid_slope"))
+    choices = tuple(SubTerrain(terrain=name) for name in ("flat", "pyramid_slope"))
     made = MapConfig(
         mode="randomized", rows=3, cols=3, patch_size=(4, 4), border=0.5, terrains=choices
     )

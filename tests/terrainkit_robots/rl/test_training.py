@@ -360,9 +360,7 @@ def test_training_that_diverges_points_at_the_last_checkpoint(task, tmp_path):
 
 def test_too_many_environments_are_refused_before_anything_is_made(task, tmp_path):
     many = replace(task, env=replace(task.env, num_envs=100_000_000))
-    with pytest.raises(
-        MemoryLimitError, match=r"100000000 environments needs .* GB .* would fit"
-    ):
+    with pytest.raises(MemoryLimitError, match=r"100000000 environments needs .* GB .* would fit"):
         train("quadruped", "plane", many, folder=tmp_path / "run")
     assert not (tmp_path / "run").exists()
 

@@ -5,7 +5,7 @@ import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.simulation.assessment import judge
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import plant, plant_of
@@ -51,7 +51,7 @@ def test_what_blew_up_is_asked_nothing_else_and_others_everything(stood):
 
 @pytest.fixture(scope="module")
 def quadruped():
-    return Facts(read_robot(bundled.find("quadruped")))
+    return Facts(load_robot(bundled.find("quadruped")))
 
 
 def judged(facts, scene):

@@ -5,7 +5,7 @@ import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.simulation.drop import let_fall
 from terrainkit_robots.simulation.sim_model import plant
 
@@ -27,7 +27,7 @@ PENDULUM = """
 def read(folder, text):
     path = folder / "robot.urdf"
     path.write_text(text)
-    return plant(Facts(read_robot(path)))
+    return plant(Facts(load_robot(path)))
 
 
 def test_a_pendulum_is_fastest_at_the_bottom(tmp_path):
@@ -39,7 +39,7 @@ def test_a_pendulum_is_fastest_at_the_bottom(tmp_path):
 
 @pytest.mark.parametrize("name", bundled.names())
 def test_healthy_robots_come_down_gently_and_alike_each_time(name):
-    scene = plant(Facts(read_robot(bundled.find(name))))
+    scene = plant(Facts(load_robot(bundled.find(name))))
     before = scene.home.copy(), scene.model.geom_contype.copy()
     drop = let_fall(scene)
     assert not drop.blew_up

@@ -4,7 +4,7 @@ import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.simulation.joint_sweep import sweep
 from terrainkit_robots.simulation.sim_model import plant
 
@@ -48,7 +48,7 @@ CRANE = """
 def crane(tmp_path):
     path = tmp_path / "robot.urdf"
     path.write_text(CRANE)
-    return {reach.joint: reach for reach in sweep(plant(Facts(read_robot(path))))}
+    return {reach.joint: reach for reach in sweep(plant(Facts(load_robot(path))))}
 
 
 def test_a_wall_stops_a_boom(crane):
@@ -71,7 +71,7 @@ def test_gravity_is_held(crane):
 
 
 def test_all_limited_joints_are_swept_in_the_order_of_the_motors():
-    facts = Facts(read_robot(bundled.find("biped")))
+    facts = Facts(load_robot(bundled.find("biped")))
     scene = plant(facts)
     reaches = sweep(scene)
     assert tuple(reach.joint for reach in reaches) == scene.drives
@@ -82,7 +82,7 @@ def test_all_limited_joints_are_swept_in_the_order_of_the_motors():
 
 
 def test_left_and_right_reach_the_same():
-    reaches = {r.joint: r for r in sweep(plant(Facts(read_robot(bundled.find("quadruped")))))}
+    reaches = {r.joint: r for r in sweep(plant(Facts(load_robot(bundled.find("quadruped")))))}
     left, right = reaches["FL_hip_joint"], reaches["FR_hip_joint"]
     assert left.reached[0] == pytest.approx(-right.reached[1], abs=1e-9)
     assert left.share < 0.9  # the feet meet under the trunk
@@ -96,6 +96,6 @@ def test_a_joint_that_follows_is_moved_along(tmp_path):
     )
     path = tmp_path / "robot.urdf"
     path.write_text(text)
-    reaches = {reach.joint: reach for reach in sweep(plant(Facts(read_robot(path))))}
+    reaches = {reach.joint: reach for reach in sweep(plant(Facts(load_robot(path))))}
     assert set(reaches) == {"lift", "swing"}
     assert reaches["swing"].share < 1

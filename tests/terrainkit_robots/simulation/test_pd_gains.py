@@ -7,7 +7,7 @@ import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.fixes.apply import fix_robot
 from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.mesh.mesh_cache import Meshes
@@ -102,7 +102,7 @@ GANTRY = """
 
 @cache
 def read(path):
-    return Facts(read_robot(path))
+    return Facts(load_robot(path))
 
 
 def written(folder, text):
@@ -124,7 +124,7 @@ def facts_of(name, robot_file):
 @cache
 def repaired(path):
     def look(contents):
-        return lint(Facts(read_robot(path, contents=contents), Meshes(contents)), simulate=False)
+        return lint(Facts(load_robot(path, contents=contents), Meshes(contents)), simulate=False)
 
     return fix_robot(path, look, unsafe=True).report.facts
 

@@ -4,7 +4,7 @@ import pytest
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.rollout import Trial
@@ -15,7 +15,7 @@ INERTIAL = """<inertial><mass value="1"/>
 
 
 def quadruped():
-    return Facts(read_robot(bundled.find("quadruped")))
+    return Facts(load_robot(bundled.find("quadruped")))
 
 
 def chain(folder, count, shape=""):
@@ -28,7 +28,7 @@ def chain(folder, count, shape=""):
     ]
     path = folder / "robot.urdf"
     path.write_text(f'<robot name="r">{"".join(links + joints)}</robot>')
-    return plant(Facts(read_robot(path)))
+    return plant(Facts(load_robot(path)))
 
 
 def test_a_robot_is_put_above_the_floor():

@@ -5,7 +5,7 @@ import pytest
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.sim_model import TIME_STEP, plant, plant_of, positions_in
 
@@ -30,7 +30,7 @@ ARM = """
 @pytest.fixture(params=ROBOTS, ids=lambda robot: "".join(robot))
 def facts(request):
     name, suffix = request.param
-    return Facts(read_robot(bundled.find(name).with_suffix(suffix)))
+    return Facts(load_robot(bundled.find(name).with_suffix(suffix)))
 
 
 @pytest.fixture
@@ -38,7 +38,7 @@ def arm(tmp_path):
     def write(name="arm", ixx="0.01", effort="5"):
         path = tmp_path / "robot.urdf"
         path.write_text(ARM.format(name=name, ixx=ixx, effort=effort))
-        return Facts(read_robot(path))
+        return Facts(load_robot(path))
 
     return write
 
@@ -136,4 +136,4 @@ def test_a_robot_of_thousands_of_bodies_is_not_simulated(tmp_path):
     path = tmp_path / "robot.urdf"
     path.write_text(f'<robot name="r"><link name="l0"/>{"".join(parts)}</robot>')
     with pytest.raises(CannotCheckError, match="it has 400 bodies, and of more than 300 none"):
-        plant(Facts(read_robot(path)))
+        plant(Facts(load_robot(path)))

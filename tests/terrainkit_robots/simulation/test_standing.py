@@ -7,7 +7,7 @@ import pytest
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.fixes.apply import fix_robot
 from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.mesh.mesh_cache import Meshes
@@ -22,7 +22,7 @@ BIPEDS = ["h1/h1.xml", "g1/g1_29dof.urdf"]
 
 @cache
 def read(path):
-    return Facts(read_robot(path))
+    return Facts(load_robot(path))
 
 
 def facts_of(name, robot_file):
@@ -57,7 +57,7 @@ def test_anymal_c_stands_once_it_is_repaired(robot_file):
     path = robot_file("anymal_c/urdf/anymal_c.urdf")
 
     def look(contents):
-        return lint(Facts(read_robot(path, contents=contents), Meshes(contents)), simulate=False)
+        return lint(Facts(load_robot(path, contents=contents), Meshes(contents)), simulate=False)
 
     check(stand(fix_robot(path, look, unsafe=True).report.facts, seconds=5))
 
@@ -137,4 +137,4 @@ def test_what_is_bolted_down_does_not_stand(tmp_path):
         <limit lower="-1" upper="1" effort="10" velocity="10"/></joint></robot>"""
     )
     with pytest.raises(CannotCheckError, match="does not stand"):
-        stand(Facts(read_robot(path)))
+        stand(Facts(load_robot(path)))

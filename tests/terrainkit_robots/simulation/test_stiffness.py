@@ -3,7 +3,7 @@ import re
 import pytest
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 
 LEGS = ("FL", "FR", "RL", "RR")
@@ -11,7 +11,7 @@ LEGS = ("FL", "FR", "RL", "RR")
 
 @pytest.fixture
 def sliding(sliding_shanks):
-    return Facts(read_robot(sliding_shanks))
+    return Facts(load_robot(sliding_shanks))
 
 
 def test_what_turns_does_not_hold_the_newtons_of_what_slides(sliding):

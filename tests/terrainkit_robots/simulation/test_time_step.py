@@ -4,7 +4,7 @@ import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.simulation.pd_gains import Gain, suggest_gains
 from terrainkit_robots.simulation.sim_model import plant
 from terrainkit_robots.simulation.time_step import (
@@ -34,7 +34,7 @@ INERTIA = 0.01 + 2 * 0.5**2
 def pendulum(tmp_path):
     path = tmp_path / "robot.urdf"
     path.write_text(PENDULUM)
-    return plant(Facts(read_robot(path)))
+    return plant(Facts(load_robot(path)))
 
 
 def gain(stiffness, damping, armature=0.0):
@@ -42,7 +42,7 @@ def gain(stiffness, damping, armature=0.0):
 
 
 def quadruped():
-    facts = Facts(read_robot(bundled.find("quadruped")))
+    facts = Facts(load_robot(bundled.find("quadruped")))
     return plant(facts), suggest_gains(facts)
 
 

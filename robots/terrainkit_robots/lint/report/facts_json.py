@@ -16,7 +16,7 @@ _DIGITS = 6
 """Significant digits of each number: more than any robot is built to."""
 
 
-def facts_record(facts: "Facts", *, simulated: bool = False) -> dict[str, Any]:
+def facts_json(facts: "Facts", *, simulated: bool = False) -> dict[str, Any]:
     """Return the facts as JSON has them: SI units and radians, and None for what is not known.
 
     The keys are the same for every robot: one without legs has no feet and no standing pose.

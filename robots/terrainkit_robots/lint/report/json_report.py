@@ -5,7 +5,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from terrainkit_robots.lint.report.facts_json import facts_record
+from terrainkit_robots.lint.report.facts_json import facts_json
 from terrainkit_robots.lint.report.plain import encodable
 from terrainkit_robots.lint.report.repaired import fixed, unfixed
 from terrainkit_robots.lint.runner import Finding, Report
@@ -32,7 +32,7 @@ def record(report: Report) -> dict[str, Any]:
         "file": str(model.file),
         "kind": model.kind,
         "verdict": report.verdict,
-        "facts": facts_record(report.facts, simulated=report.simulated),
+        "facts": facts_json(report.facts, simulated=report.simulated),
         "findings": [finding_record(finding) for finding in report.findings],
         "fixed": [finding_record(finding) for finding in fixed(report)],
         "unfixed": [{**finding_record(f), "reason": reason} for f, reason in unfixed(report)],

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from terrainkit_robots.analysis.legs.effort import effort_of
-from terrainkit_robots.lint.report.facts_json import facts_record
+from terrainkit_robots.lint.report.facts_json import facts_json
 from terrainkit_robots.text import count
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def robot_summary(report: "Report") -> Iterator[tuple[str, str]]:
     """Yield labels and what is to be said of them."""
     facts = report.facts
-    record = facts_record(facts, simulated=report.simulated)
+    record = facts_json(facts, simulated=report.simulated)
     kind = {"urdf": "URDF", "xacro": "xacro", "mjcf": "MJCF"}[facts.model.kind]
     yield "robot", f"{record['name'] or 'without a name'} ({kind})"
     yield "size", ", ".join(_size(record))

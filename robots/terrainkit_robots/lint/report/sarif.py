@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote_from_bytes
 
-from terrainkit_robots.lint.report.facts_json import facts_record
+from terrainkit_robots.lint.report.facts_json import facts_json
 from terrainkit_robots.lint.report.json_report import sound
 from terrainkit_robots.lint.rule import FAMILIES, Rule, Severity, rules
 from terrainkit_robots.lint.runner import Finding, Report, Skipped
-from terrainkit_robots.lint.selection import IdleComment, Ignored
+from terrainkit_robots.lint.selection import Suppressed, UnusedSuppression
 
 SCHEMA = (
     "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
@@ -34,7 +34,7 @@ def _run(reports: Sequence[Report]) -> dict[str, Any]:
     for report in reports:
         results += [_result(finding, index) for finding in report.findings]
         for skipped in report.skipped:
-            if isinstance(skipped, Ignored):
+            if isinstance(skipped, Suppressed):
                 results.append(_suppressed(skipped, index))
             else:
                 notifications.append(_notification(skipped, report.facts.model.file))
@@ -46,8 +46,7 @@ def _run(reports: Sequence[Report]) -> dict[str, Any]:
         "results": results,
         "properties": {
             "facts": {
-                str(r.facts.model.file): facts_record(r.facts, simulated=r.simulated)
-                for r in reports
+                str(r.facts.model.file): facts_json(r.facts, simulated=r.simulated) for r in reports
             }
         },
     }
@@ -85,13 +84,13 @@ def _properties(finding: Finding) -> Iterator[tuple[str, Any]]:
         yield "fix", {"safety": finding.fix.safety, "description": finding.fix.description}
 
 
-def _suppressed(ignored: Ignored, index: dict[str, int]) -> dict[str, Any]:
+def _suppressed(ignored: Suppressed, index: dict[str, int]) -> dict[str, Any]:
     suppression = {"kind": "inSource", "justification": ignored.comment.reason}
     return {**_result(ignored.finding, index), "suppressions": [suppression]}
 
 
 def _notification(skipped: Skipped, file: Path) -> dict[str, Any]:
-    idle = isinstance(skipped, IdleComment)
+    idle = isinstance(skipped, UnusedSuppression)
     notification: dict[str, Any] = {
         "level": "warning" if idle else "note",
         "message": _message(f"{skipped.code}: {skipped.reason}"),

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from terrainkit_robots.lint.rule import Severity
 from terrainkit_robots.lint.runner import Finding, Report, Skipped
-from terrainkit_robots.lint.selection import IdleComment
+from terrainkit_robots.lint.selection import UnusedSuppression
 from terrainkit_robots.text import count as count
 
 WORDS: dict[Severity, str] = {"error": "error", "warning": "warning", "info": "note"}
@@ -41,5 +41,5 @@ def grouped(skipped: Sequence[Skipped]) -> list[tuple[bool, str, str]]:
     """
     reasons: dict[tuple[bool, str], dict[str, None]] = {}
     for each in skipped:
-        reasons.setdefault((isinstance(each, IdleComment), each.reason), {})[each.code] = None
+        reasons.setdefault((isinstance(each, UnusedSuppression), each.reason), {})[each.code] = None
     return [(amiss, ", ".join(codes), reason) for (amiss, reason), codes in reasons.items()]

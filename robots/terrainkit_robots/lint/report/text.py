@@ -17,7 +17,7 @@ WIDTH = 100
 """Width of a line [characters]; only what cannot be broken is longer."""
 
 _MOST = 10
-"""So many findings of one rule are told; a defect that a script made is there a thousand times."""
+"""Most findings of one rule that are printed."""
 
 _LONGEST = 2000
 """So much of one message is printed [characters]; names in a file can be of any length."""

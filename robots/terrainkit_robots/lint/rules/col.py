@@ -13,7 +13,7 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.analysis.legs.standing_pose import range_of
-from terrainkit_robots.lint.rule import Defect, Severity, rule
+from terrainkit_robots.lint.rule import Severity, Violation, rule
 from terrainkit_robots.transforms import Matrix
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def _silent(body: Body) -> list[Placed]:
 
 
 @rule("COL001", "no-foot-collision", "error", needs=("legs",))
-def no_foot_collision(robot: Facts) -> Iterator[Defect]:
+def no_foot_collision(robot: Facts) -> Iterator[Violation]:
     """A leg has nothing to stand on: no collision shape on its foot.
 
     What has no collision shape falls through the ground. A robot whose feet are only drawn sinks in
@@ -75,7 +75,7 @@ def no_foot_collision(robot: Facts) -> Iterator[Defect]:
         link = robot.tree.links[leg.foot]
         if not _has_contacts(body):
             if not _silent(body):  # else COL007
-                yield Defect(
+                yield Violation(
                     subject=leg.foot,
                     source=link.source,
                     message=(
@@ -84,7 +84,7 @@ def no_foot_collision(robot: Facts) -> Iterator[Defect]:
                     certainty="likely",
                 )
         elif _bare(leg, body, robot):
-            yield Defect(
+            yield Violation(
                 subject=leg.foot,
                 source=link.source,
                 message=(
@@ -107,7 +107,7 @@ def _bare(leg: Leg, body: Body, robot: Facts) -> bool:
 
 
 @rule("COL002", "no-trunk-collision", "warning", needs=("legs",))
-def no_trunk_collision(robot: Facts) -> Iterator[Defect]:
+def no_trunk_collision(robot: Facts) -> Iterator[Violation]:
     """The trunk has no collision shape.
 
     The usual termination, a contact of the trunk, never happens then: a robot that fell lies with
@@ -126,7 +126,7 @@ def no_trunk_collision(robot: Facts) -> Iterator[Defect]:
         return
     if any(_has_contacts(body) for body in robot.bodies):
         trunk = robot.bodies[0]
-        yield Defect(
+        yield Violation(
             subject=trunk.name,
             source=robot.tree.links[trunk.name].source,
             message=f"{trunk.name}, the trunk, has 0 collision shapes, and so has all that is no "
@@ -136,7 +136,7 @@ def no_trunk_collision(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("COL003", "no-collision", "error")
-def no_collision(robot: Facts) -> Iterator[Defect]:
+def no_collision(robot: Facts) -> Iterator[Violation]:
     """The robot has no collision shape at all.
 
     It falls through every ground, and touches nothing.
@@ -148,7 +148,7 @@ def no_collision(robot: Facts) -> Iterator[Defect]:
         Every simulator takes contacts from collision shapes alone.
     """
     if robot.bodies and not any(_has_contacts(body) for body in robot.bodies):
-        yield Defect(
+        yield Violation(
             subject=robot.model.title,
             source=robot.model.source,
             message=f"none of the {len(robot.links)} links has a collision shape; wanted 1 or more",
@@ -156,7 +156,7 @@ def no_collision(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("COL004", "bad-size", "error")
-def bad_size(robot: Facts) -> Iterator[Defect]:
+def bad_size(robot: Facts) -> Iterator[Violation]:
     """A shape has a size that is zero or negative.
 
     MuJoCo refuses it, PhysX makes it a point or drops it, and what was meant to touch the ground
@@ -173,7 +173,7 @@ def bad_size(robot: Facts) -> Iterator[Defect]:
             for shape in shapes:
                 wrong = [size for size in shape.size if size <= 0]
                 if wrong and shape.shape not in ("mesh", "plane"):
-                    yield Defect(
+                    yield Violation(
                         subject=link.name,
                         source=shape.size_source or shape.source,
                         message=(
@@ -186,7 +186,7 @@ def bad_size(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("COL005", "overlap", "warning")
-def overlap(robot: Facts) -> Iterator[Defect]:
+def overlap(robot: Facts) -> Iterator[Violation]:
     """Two bodies that are not neighbours are inside each other where the robot starts.
 
     Simulators filter contacts between a body and its parent, and no others. Every other overlap is
@@ -211,7 +211,7 @@ def overlap(robot: Facts) -> Iterator[Defect]:
         steps: tuple[Severity, ...] = ("info", "warning", "error" if robot.legs else "warning")
         what = "the convex hulls of " if worst.hulls else ""
         first, second = worst.first.link, worst.second.link
-        yield Defect(
+        yield Violation(
             subject=" and ".join(pair),
             source=worst.second.geometry.source,
             message=(
@@ -234,7 +234,7 @@ def _worst(robot: Facts, overlaps: "list[Overlap]") -> "dict[tuple[str, str], Ov
 
 
 @rule("COL006", "overlap-in-range", "info")
-def overlap_in_range(robot: Facts) -> Iterator[Defect]:
+def overlap_in_range(robot: Facts) -> Iterator[Violation]:
     """Two bodies overlap over a large part of the joint range.
 
     Exploration reaches every part of the range. Where bodies overlap in much of it, the range is
@@ -260,7 +260,7 @@ def overlap_in_range(robot: Facts) -> Iterator[Defect]:
     for pair, count in counts.items():
         share = count / _SAMPLES
         if share > _LARGE_SHARE:
-            yield Defect(
+            yield Violation(
                 subject=" and ".join(pair),
                 source=robot.tree.links[pair[0]].source,
                 message=(
@@ -282,7 +282,7 @@ def _spread(dimension: int) -> Matrix:
 
 
 @rule("COL007", "foot-contacts-off", "error", needs=("legs",))
-def foot_contacts_off(robot: Facts) -> Iterator[Defect]:
+def foot_contacts_off(robot: Facts) -> Iterator[Violation]:
     """The shape of a foot is there, but its contacts are switched off.
 
     With contype and conaffinity 0 a geom is only drawn. The robot sinks in until something else
@@ -308,7 +308,7 @@ def foot_contacts_off(robot: Facts) -> Iterator[Defect]:
         depth, placed = min(off, key=lambda pair: pair[0])
         if on and depth > min(on) - _SHORT:
             continue
-        yield Defect(
+        yield Violation(
             subject=placed.geometry.name or placed.link,
             source=placed.geometry.source,
             message=(

@@ -11,7 +11,7 @@ from terrainkit_robots.analysis.bodies.kinematics import ancestors
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.stance import stands_alone
-from terrainkit_robots.lint.rule import Defect, Measured, Severity, rule
+from terrainkit_robots.lint.rule import Measured, Severity, Violation, rule
 from terrainkit_robots.text import count
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ the inertia of its motor, has 0.04."""
 
 
 @rule("DYN001", "wild-drop", "error", needs=("simulation",))
-def wild_drop(robot: Facts) -> Iterator[Defect]:
+def wild_drop(robot: Facts) -> Iterator[Violation]:
     """Dropped without torque, the robot is thrown about.
 
     A robot that falls from 10 cm with limp joints comes to rest. If a joint reaches 100 rad/s,
@@ -85,7 +85,7 @@ def wild_drop(robot: Facts) -> Iterator[Defect]:
     }
     if calm:
         measured["speed_without_self_collision"] = round(alone.top_speed, 1)
-    yield Defect(
+    yield Violation(
         subject=robot.model.title,
         source=robot.model.source,
         severity=_SEVERITIES[severe - hulls],
@@ -125,7 +125,7 @@ def _has_hulls(robot: Facts) -> bool:
 
 
 @rule("DYN002", "does-not-stand", "error", needs=("simulation", "legs"))
-def does_not_stand(robot: Facts) -> Iterator[Defect]:
+def does_not_stand(robot: Facts) -> Iterator[Violation]:
     """At its standing pose, held by its motors, the robot does not stand.
 
     An episode starts like this: actions of zero, position control with the suggested gains. A robot
@@ -155,7 +155,7 @@ def does_not_stand(robot: Facts) -> Iterator[Defect]:
     elif blame and _has_hulls(robot):
         severe = max(severe - 1, 0)
     held = "with its joints locked" if locked else "held by its motors"
-    yield Defect(
+    yield Violation(
         subject=robot.model.title,
         source=robot.model.source,
         severity=_SEVERITIES[severe],
@@ -207,7 +207,7 @@ def _ask_whether_it_can(robot: Facts, *, locked: bool) -> None:
 
 
 @rule("DYN003", "short-reach", "info", needs=("simulation",))
-def short_reach(robot: Facts) -> Iterator[Defect]:
+def short_reach(robot: Facts) -> Iterator[Violation]:
     """A joint does not get to its limits, with the others at the standing pose.
 
     Bodies in its way stop it, by their collision shapes as MuJoCo takes them, or its motor cannot
@@ -232,7 +232,7 @@ def short_reach(robot: Facts) -> Iterator[Defect]:
     for reach in reaches:
         wrong = _stuck(robot, reach) or (_weak(reach) if robot.legs else "")
         if wrong:
-            yield Defect(
+            yield Violation(
                 subject=reach.joint,
                 source=sources.get(reach.joint, robot.model.source),
                 severity="warning",
@@ -245,7 +245,7 @@ def short_reach(robot: Facts) -> Iterator[Defect]:
     total = count(len(reaches), "joint")
     told = [*_first_of(short, total), *_weakest_of(weak, total)]
     if told:
-        yield Defect(
+        yield Violation(
             subject=robot.model.title,
             source=robot.model.source,
             certainty="likely",
@@ -311,7 +311,7 @@ def _weak(reach: "Reach") -> str:
 
 
 @rule("DYN004", "light-joint", "info", needs=("simulation",))
-def light_joint(robot: Facts) -> Iterator[Defect]:
+def light_joint(robot: Facts) -> Iterator[Violation]:
     """A joint is too light for its gains at the time step of training.
 
     legged_gym and Isaac Lab's explicit actuators compute the torque once per time step of 5 ms. A
@@ -341,7 +341,7 @@ def light_joint(robot: Facts) -> Iterator[Defect]:
     step = longest_step(scene, bare).seconds
     legged = {joint.name for leg in robot.legs for joint in leg.joints}
     feather = lightest in legged and light[lightest].share < _FEATHER
-    yield Defect(
+    yield Violation(
         subject=lightest,
         source=next((j.source for j in robot.joints if j.name == lightest), robot.model.source),
         severity="warning" if feather else "info",

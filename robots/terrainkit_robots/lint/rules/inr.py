@@ -29,7 +29,7 @@ from terrainkit_robots.analysis.inertia.placeholder import is_identity, placehol
 from terrainkit_robots.analysis.inertia.repair import repair
 from terrainkit_robots.description.model import Inertial, Link
 from terrainkit_robots.description.xml.unparsed import Unread
-from terrainkit_robots.lint.rule import Defect, Severity, rule
+from terrainkit_robots.lint.rule import Severity, Violation, rule
 from terrainkit_robots.text import names
 from terrainkit_robots.transforms import Matrix
 
@@ -66,7 +66,7 @@ _DENSITY = 1000.0
 
 
 @rule("INR001", "massless-body", "error")
-def massless_body(robot: Facts) -> Iterator[Defect]:
+def massless_body(robot: Facts) -> Iterator[Violation]:
     """A body that a joint moves has no mass.
 
     A force on nothing has no finite answer. MuJoCo refuses the file, PhysX puts a mass of its own
@@ -88,7 +88,7 @@ def massless_body(robot: Facts) -> Iterator[Defect]:
             and link.inertial.mass is None
             and not unread.has(link.name, "value", "mass")
         ):
-            yield Defect(
+            yield Violation(
                 subject=link.name,
                 source=link.inertial.source,
                 message=f"link {link.name} has an <inertial> without a mass; wanted both or none",
@@ -101,7 +101,7 @@ def massless_body(robot: Facts) -> Iterator[Defect]:
     yield from _empty_links(robot)
 
 
-def _empty_links(robot: Facts) -> Iterator[Defect]:
+def _empty_links(robot: Facts) -> Iterator[Violation]:
     """Yield what is to be said of links without mass that are parts of bodies with mass."""
     empty = [
         link
@@ -118,7 +118,7 @@ def _empty_links(robot: Facts) -> Iterator[Defect]:
     told: tuple[tuple[list[Link], Severity], ...] = ((parts, "warning"), (frames, "info"))
     for links, severity in told:
         if links:
-            yield Defect(
+            yield Violation(
                 subject=links[0].name,
                 source=mass_source(links[0]),
                 severity=severity,
@@ -135,8 +135,8 @@ def _inertia_of(link: Link) -> float:
     return 0.0 if inertia is None else float(np.abs(inertia).max())
 
 
-def _mass_missing(link: Link) -> Defect:
-    return Defect(
+def _mass_missing(link: Link) -> Violation:
+    return Violation(
         subject=link.name,
         source=mass_source(link),
         severity="warning",
@@ -146,13 +146,13 @@ def _mass_missing(link: Link) -> Defect:
     )
 
 
-def _massless(body: Body) -> Defect:
+def _massless(body: Body) -> Violation:
     declared = [link for link in body.links if link.inertial is not None]
     what = f"body {body.name} has a mass of {body.mass:.3g} kg"
     if not declared:
         what = f"body {body.name} has no mass: no link of it has an <inertial>"
     mover = f"joint {body.joint.name} moves it" if body.joint else "it is the trunk"
-    return Defect(
+    return Violation(
         subject=body.name,
         source=mass_source(declared[0]) if declared else body.top.source,
         message=f"{what}, and {mover}; wanted a mass above 0",
@@ -173,7 +173,7 @@ def _floats(robot: Facts) -> bool:
 
 
 @rule("INR002", "negative-mass", "error")
-def negative_mass(robot: Facts) -> Iterator[Defect]:
+def negative_mass(robot: Facts) -> Iterator[Violation]:
     """A mass is negative.
 
     It falls up, and takes from the mass of what it is fixed to. MuJoCo skips it without a word
@@ -188,7 +188,7 @@ def negative_mass(robot: Facts) -> Iterator[Defect]:
     for link in robot.model.links:
         mass = link.inertial.mass if link.inertial else None
         if mass is not None and mass < 0:
-            yield Defect(
+            yield Violation(
                 subject=link.name,
                 source=mass_source(link),
                 message=f"the mass of link {link.name} is {mass:.6g} kg; wanted 0 or more",
@@ -197,7 +197,7 @@ def negative_mass(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("INR003", "not-positive-definite", "error", fixes="unsafe")
-def not_positive_definite(robot: Facts) -> Iterator[Defect]:
+def not_positive_definite(robot: Facts) -> Iterator[Violation]:
     """An inertia is missing or zero, or negative about some axis.
 
     Turning a body about any axis takes work, so all principal moments are above zero. With one that
@@ -233,14 +233,14 @@ _SIX = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz", "diaginertia", "fullinertia")
 """Attributes that hold an inertia, in URDF and MJCF."""
 
 
-def _incomplete(robot: Facts, link: Link, inertial: Inertial) -> Defect:
+def _incomplete(robot: Facts, link: Link, inertial: Inertial) -> Violation:
     lacks, wanted = "no <inertia>", "an <inertia>"
     if robot.model.kind == "mjcf":
         lacks, wanted = "neither diaginertia nor fullinertia", "one of them"
     elif inertial.inertia_source is not None:
         lacks = f"an <inertia> without {', '.join(inertial.missing) or 'numbers'}"
         wanted = "all of ixx, iyy and izz"
-    return Defect(
+    return Violation(
         subject=link.name,
         source=inertia_source(link),
         message=f"link {link.name} has a mass of {inertial.mass:.4g} kg, but {lacks}; wanted "
@@ -248,11 +248,11 @@ def _incomplete(robot: Facts, link: Link, inertial: Inertial) -> Defect:
     )
 
 
-def _indefinite(robot: Facts, link: Link, what: str) -> Defect:
+def _indefinite(robot: Facts, link: Link, what: str) -> Violation:
     assert link.inertial is not None
     assert link.inertial.inertia is not None
     moments = principal_moments(link.inertial.inertia)
-    return Defect(
+    return Violation(
         subject=link.name,
         source=inertia_source(link),
         message=f"the inertia of link {link.name} {what}: principal moments "
@@ -276,7 +276,7 @@ def _spins_freely(robot: Facts, link: Link, main: Container[int]) -> bool:
 
 
 @rule("INR004", "triangle-inequality", "error", fixes="unsafe")
-def triangle_inequality(robot: Facts) -> Iterator[Defect]:
+def triangle_inequality(robot: Facts) -> Iterator[Violation]:
     """Principal moments break the triangle inequality: no body has such an inertia.
 
     The two smaller principal moments sum to the largest for a flat plate, and to more for anything
@@ -300,7 +300,7 @@ def triangle_inequality(robot: Facts) -> Iterator[Defect]:
             continue
         ratio = triangle_ratio(moments)
         assert link.inertial is not None
-        yield Defect(
+        yield Violation(
             subject=link.name,
             source=link.inertial.inertia_source or link.inertial.source,
             severity="error" if ratio < _IMPOSSIBLE else "warning" if ratio < _ROUNDED else "info",
@@ -312,7 +312,7 @@ def triangle_inequality(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("INR005", "placeholder-inertia", "warning")
-def placeholder_inertia(robot: Facts) -> Iterator[Defect]:
+def placeholder_inertia(robot: Facts) -> Iterator[Violation]:
     """An inertia is a placeholder: the identity, or one and the same for half of the links.
 
     A kilogram whose inertia is 1 kg m2 reaches out a metre to all sides. Motors that move such a
@@ -338,7 +338,7 @@ def placeholder_inertia(robot: Facts) -> Iterator[Defect]:
         whose = f"{len(links)} of {_count_massive(robot)} bodies ({listed})"
         if len(links) == 1:
             whose = f"body {listed}"
-        yield Defect(
+        yield Violation(
             subject=first.name,
             source=first.inertial.inertia_source or first.inertial.source,
             message=f"the inertia of {whose} is {value}; wanted {wanted}",
@@ -347,7 +347,7 @@ def placeholder_inertia(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("INR006", "too-spread-inertia", "warning")
-def too_spread_inertia(robot: Facts) -> Iterator[Defect]:
+def too_spread_inertia(robot: Facts) -> Iterator[Violation]:
     """An inertia is larger than the size of the body allows.
 
     Mass inside a body is at most half of the body's diagonal away from its middle, so the radius of
@@ -364,7 +364,7 @@ def too_spread_inertia(robot: Facts) -> Iterator[Defect]:
     for link in robot.model.links:
         largest = _inertia_of(link)
         if largest >= LARGEST:
-            yield Defect(
+            yield Violation(
                 subject=link.name,
                 source=inertia_source(link),
                 severity="error",
@@ -390,7 +390,7 @@ def too_spread_inertia(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("INR007", "too-concentrated-inertia", "warning")
-def too_concentrated_inertia(robot: Facts) -> Iterator[Defect]:
+def too_concentrated_inertia(robot: Facts) -> Iterator[Violation]:
     """An inertia is far smaller than the size of the body suggests.
 
     All the mass would sit within a twentieth of the way to the body's ends. Such a body turns at
@@ -428,9 +428,11 @@ def _main_part(body: Body) -> Body:
     return replace(body, links=body.links[place : place + 1], poses=body.poses[place : place + 1])
 
 
-def _odd_radius(body: Body, radius: float, box: Matrix, severity: Severity, wanted: str) -> Defect:
+def _odd_radius(
+    body: Body, radius: float, box: Matrix, severity: Severity, wanted: str
+) -> Violation:
     half = half_diagonal(box)
-    return Defect(
+    return Violation(
         subject=body.name,
         source=inertia_source(main_link(body)),
         severity=severity,
@@ -465,7 +467,7 @@ def _radii(robot: Facts) -> Iterator[tuple[Body, float]]:
 
 
 @rule("INR008", "center-of-mass-outside", "warning")
-def center_of_mass_outside(robot: Facts) -> Iterator[Defect]:
+def center_of_mass_outside(robot: Facts) -> Iterator[Violation]:
     """A centre of mass lies outside of its body.
 
     The origin of an <inertial> is in the frame of its link. Given in the frame of the robot or of
@@ -492,7 +494,7 @@ def center_of_mass_outside(robot: Facts) -> Iterator[Defect]:
         aside, allowed = _outside(body.center, box), _allowed(box)
         around = f"the box around it, whose diagonal is {2 * half_diagonal(box):.3g} m"
         link = main_link(body)
-        yield Defect(
+        yield Violation(
             subject=body.name,
             source=mass_source(link),
             severity="error" if aside > _ASIDE_FAR * allowed else "warning",
@@ -511,7 +513,7 @@ def _allowed(box: Matrix) -> float:
 
 
 @rule("INR009", "mass-ratio", "warning")
-def mass_ratio(robot: Facts) -> Iterator[Defect]:
+def mass_ratio(robot: Facts) -> Iterator[Violation]:
     """Neighbouring bodies differ in mass by more than a factor of 1000.
 
     The joint between them is then stiff to the solver: it needs far smaller time steps, or the
@@ -536,7 +538,7 @@ def mass_ratio(robot: Facts) -> Iterator[Defect]:
         if blamed & {light.name, heavy.name}:
             continue
         ratio = heavy.mass / light.mass
-        yield Defect(
+        yield Violation(
             subject=light.name,
             source=mass_source(main_link(light)),
             message=f"body {light.name} has {light.mass:.3g} kg and its neighbour {heavy.name} "
@@ -546,7 +548,7 @@ def mass_ratio(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("INR010", "implausible-density", "warning")
-def implausible_density(robot: Facts) -> Iterator[Defect]:
+def implausible_density(robot: Facts) -> Iterator[Violation]:
     """A mass does not fit the size of the body.
 
     Nothing on a robot is lighter than packing foam or denser than gold. A mass in grams or pounds,
@@ -562,7 +564,7 @@ def implausible_density(robot: Facts) -> Iterator[Defect]:
     for link in robot.model.links:
         mass = link.inertial.mass if link.inertial else None
         if mass is not None and mass >= LARGEST:
-            yield Defect(
+            yield Violation(
                 subject=link.name,
                 source=mass_source(link),
                 severity="error",
@@ -579,7 +581,7 @@ def implausible_density(robot: Facts) -> Iterator[Defect]:
             space, limit = found
             density = body.mass / space
             least = density > limit
-            yield Defect(
+            yield Violation(
                 subject=body.name,
                 source=mass_source(main_link(body)),
                 message=f"body {body.name} has {body.mass:.3g} kg in {space:.3g} m3: "
@@ -590,7 +592,7 @@ def implausible_density(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("INR011", "mass-drift", "warning")
-def mass_drift(robot: Facts) -> Iterator[Defect]:
+def mass_drift(robot: Facts) -> Iterator[Violation]:
     """The robot that a simulator makes of the file is heavier than the file says.
 
     A link that has collision shapes but no <inertial> gets a mass from MuJoCo, at the density of
@@ -618,7 +620,7 @@ def mass_drift(robot: Facts) -> Iterator[Defect]:
     if share <= _DRIFT:
         return
     added_to = sorted((link for link in added if added[link] > 0), key=lambda link: -added[link])
-    yield Defect(
+    yield Violation(
         subject=added_to[0].name,
         source=added_to[0].source,
         severity="error" if share > _DRIFT_FAR else "warning",

@@ -19,7 +19,7 @@ from terrainkit_robots.analysis.legs.stance import GRAVITY
 from terrainkit_robots.description.fix import Fix, SetAttribute
 from terrainkit_robots.description.model import JOINT_TYPES, Joint, Limit
 from terrainkit_robots.description.xml.unparsed import Unread
-from terrainkit_robots.lint.rule import Defect, rule
+from terrainkit_robots.lint.rule import Violation, rule
 from terrainkit_robots.lint.rules.inr import (
     center_of_mass_outside,
     implausible_density,
@@ -61,7 +61,7 @@ _WEAK, _TOO_WEAK = 0.5, 0.9
 
 
 @rule("JNT001", "unknown-joint-type", "error")
-def unknown_type(robot: Facts) -> Iterator[Defect]:
+def unknown_type(robot: Facts) -> Iterator[Violation]:
     """A joint is of a type that does not exist.
 
     MuJoCo and urdfdom refuse the file. Others take the joint as fixed and say nothing.
@@ -77,7 +77,7 @@ def unknown_type(robot: Facts) -> Iterator[Defect]:
     for joint in robot.model.joints:
         if joint.kind and joint.kind not in known:
             alike = _meant(joint.kind, known)
-            yield Defect(
+            yield Violation(
                 subject=joint.name,
                 source=joint.source,
                 message=f"joint {joint.name} is of type {short(joint.kind, 40)!r}"
@@ -107,7 +107,7 @@ def _meant(kind: str, known: frozenset[str]) -> str:
 
 
 @rule("JNT002", "prismatic-leg", "warning", needs=("legs",))
-def prismatic_leg(robot: Facts) -> Iterator[Defect]:
+def prismatic_leg(robot: Facts) -> Iterator[Violation]:
     """A leg has a joint that slides.
 
     Few legs do, and what trains legged robots expects hinges: gains, action scales and limits are
@@ -122,7 +122,7 @@ def prismatic_leg(robot: Facts) -> Iterator[Defect]:
     """
     for joint in leg_joints(robot):
         if joint.kind == "prismatic":
-            yield Defect(
+            yield Violation(
                 subject=joint.name,
                 source=joint.source,
                 certainty="likely",
@@ -131,7 +131,7 @@ def prismatic_leg(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("JNT003", "continuous-leg", "warning", needs=("legs",))
-def continuous_leg(robot: Facts) -> Iterator[Defect]:
+def continuous_leg(robot: Facts) -> Iterator[Violation]:
     """A leg has a joint without end stops.
 
     A knee that is continuous turns through the thigh. Limits are what keeps a policy out of poses
@@ -149,7 +149,7 @@ def continuous_leg(robot: Facts) -> Iterator[Defect]:
     bodies = bodies_by_joint(robot)
     for joint in leg_joints(robot):
         if joint.kind == "continuous" and not is_wheel(robot, bodies[joint.name]):
-            yield Defect(
+            yield Violation(
                 subject=joint.name,
                 source=joint.source,
                 certainty="likely",
@@ -158,7 +158,7 @@ def continuous_leg(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("JNT004", "zero-axis", "error")
-def zero_axis(robot: Facts) -> Iterator[Defect]:
+def zero_axis(robot: Facts) -> Iterator[Violation]:
     """The axis of a joint is zero, or there without numbers.
 
     Such an axis points nowhere. MuJoCo refuses the file; others divide by its length and fill the
@@ -174,7 +174,7 @@ def zero_axis(robot: Facts) -> Iterator[Defect]:
     for joint in robot.model.joints:
         if joint.moves and _axis_length(joint) < _TINY and not unread.at(joint.axis_source):
             assert joint.axis is not None
-            yield Defect(
+            yield Violation(
                 subject=joint.name,
                 source=joint.axis_source or joint.source,
                 message=f"the axis of joint {joint.name} is {_written(joint.axis)} or has no "
@@ -194,7 +194,7 @@ def _written(axis: Matrix) -> str:
 
 
 @rule("JNT005", "unnormalized-axis", "warning", fixes="safe")
-def unnormalized_axis(robot: Facts) -> Iterator[Defect]:
+def unnormalized_axis(robot: Facts) -> Iterator[Violation]:
     """The axis of a joint does not have length 1.
 
     Most simulators scale it to 1. Some take it as it stands, so that the joint moves further than
@@ -215,7 +215,7 @@ def unnormalized_axis(robot: Facts) -> Iterator[Defect]:
         assert joint.axis is not None
         source = joint.axis_source or joint.source
         edit = SetAttribute(source=source, name="xyz", value=_written(joint.direction))
-        yield Defect(
+        yield Violation(
             subject=joint.name,
             source=source,
             message=f"the axis of joint {joint.name} is {_written(joint.axis)}, of length "
@@ -232,7 +232,7 @@ def unnormalized_axis(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("JNT006", "missing-limit", "error")
-def missing_limit(robot: Facts) -> Iterator[Defect]:
+def missing_limit(robot: Facts) -> Iterator[Violation]:
     """A revolute or prismatic joint has no limits, only one, or the same one twice.
 
     What is not written counts as 0, and a range of nothing as no range at all: MuJoCo and
@@ -252,7 +252,7 @@ def missing_limit(robot: Facts) -> Iterator[Defect]:
     for joint in robot.model.joints:
         what = _lacking(joint, robot.model.kind == "mjcf")
         if what and not unread.has(joint.name, "lower", "upper", "range"):
-            yield Defect(
+            yield Violation(
                 subject=joint.name,
                 source=joint.limit.source if joint.limit else joint.source,
                 message=f"the {joint.kind} joint {joint.name} {what}; wanted lower and upper, one "
@@ -286,7 +286,7 @@ def _ends(limit: Limit) -> tuple[float, float]:
 
 
 @rule("JNT007", "inverted-limit", "error")
-def inverted_limit(robot: Facts) -> Iterator[Defect]:
+def inverted_limit(robot: Facts) -> Iterator[Violation]:
     """The lower limit of a joint is above its upper one.
 
     MuJoCo drops such limits from a URDF without a word, and refuses them in its own format; other
@@ -304,7 +304,7 @@ def inverted_limit(robot: Facts) -> Iterator[Defect]:
             continue
         lower, upper = _ends(joint.limit)
         if lower > upper and not unread.has(joint.name, "lower", "upper", "range"):
-            yield Defect(
+            yield Violation(
                 subject=joint.name,
                 source=joint.limit.source,
                 message=f"the limits of joint {joint.name} are {lower:g} to {upper:g} "
@@ -314,7 +314,7 @@ def inverted_limit(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("JNT008", "wide-range", "warning")
-def wide_range(robot: Facts) -> Iterator[Defect]:
+def wide_range(robot: Facts) -> Iterator[Violation]:
     """The range of a hinge is more than two turns.
 
     Limits in degrees look like that, and placeholders such as +-1e16. Policies whose actions are
@@ -332,7 +332,7 @@ def wide_range(robot: Facts) -> Iterator[Defect]:
             continue
         lower, upper = _ends(joint.limit)
         if upper - lower > _WIDEST:
-            yield Defect(
+            yield Violation(
                 subject=joint.name,
                 source=joint.limit.source,
                 message=f"the range of joint {joint.name} is {lower:g} to {upper:g} rad, "
@@ -342,7 +342,7 @@ def wide_range(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("JNT009", "no-effort", "error")
-def no_effort(robot: Facts) -> Iterator[Defect]:
+def no_effort(robot: Facts) -> Iterator[Violation]:
     """A joint has no torque to move with, or does not say how much.
 
     Isaac Gym, Isaac Lab and Genesis clip torques to the effort of the URDF: with 0 the joint hangs
@@ -361,7 +361,7 @@ def no_effort(robot: Facts) -> Iterator[Defect]:
         assert joint.limit is not None
         effort = joint.limit.effort
         if effort is not None and effort <= 0:
-            yield Defect(
+            yield Violation(
                 subject=joint.name,
                 source=joint.limit.source,
                 message=f"the effort of joint {joint.name} is {effort:g} {joint.effort_unit}; "
@@ -369,7 +369,7 @@ def no_effort(robot: Facts) -> Iterator[Defect]:
                 measured={"effort": effort},
             )
         elif effort is None and not unread.has(joint.name, "effort"):
-            yield Defect(
+            yield Violation(
                 subject=joint.name,
                 source=joint.limit.source,
                 severity="warning",
@@ -396,7 +396,7 @@ def _is_blank(joint: Joint) -> bool:
 
 
 @rule("JNT010", "no-velocity", "warning")
-def no_velocity(robot: Facts) -> Iterator[Defect]:
+def no_velocity(robot: Facts) -> Iterator[Violation]:
     """A joint has no speed, or does not say how much.
 
     PhysX clips the speed of a joint to this number: with 0 it stands still. Without the number a
@@ -417,7 +417,7 @@ def no_velocity(robot: Facts) -> Iterator[Defect]:
         if speed is None and unread.has(joint.name, "velocity"):
             continue
         what = "not given" if speed is None else f"{speed:g} {joint.speed_unit}"
-        yield Defect(
+        yield Violation(
             subject=joint.name,
             source=joint.limit.source,
             message=f"the velocity of joint {joint.name} is {what}; wanted what its motor reaches "
@@ -426,7 +426,7 @@ def no_velocity(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("JNT011", "placeholder-limit", "warning")
-def placeholder_limit(robot: Facts) -> Iterator[Defect]:
+def placeholder_limit(robot: Facts) -> Iterator[Violation]:
     """An effort or a velocity is a placeholder.
 
     With 1000 N m on a dog of 15 kg the torque limit limits nothing: a policy learns jumps that
@@ -452,7 +452,7 @@ def placeholder_limit(robot: Facts) -> Iterator[Defect]:
             ("velocity", joint.limit.velocity, fastest, joint.speed_unit),
         ):
             if number is not None and (number > limit or (name == "effort" and number == limit)):
-                yield Defect(
+                yield Violation(
                     subject=joint.name,
                     source=joint.limit.source,
                     message=f"the {name} of joint {joint.name} is {number:g} {unit}; wanted less "
@@ -462,7 +462,7 @@ def placeholder_limit(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("JNT012", "zero-outside-limits", "info")
-def zero_outside_limits(robot: Facts) -> Iterator[Defect]:
+def zero_outside_limits(robot: Facts) -> Iterator[Violation]:
     """Position zero is outside the limits of a joint.
 
     Whatever starts a robot at zero starts it in a pose it cannot take, and the limits throw it out
@@ -480,7 +480,7 @@ def zero_outside_limits(robot: Facts) -> Iterator[Defect]:
         first = started[0]
         assert first.limit is not None
         lower, upper = _ends(first.limit)
-        yield Defect(
+        yield Violation(
             subject=first.name,
             source=first.limit.source,
             message=f"zero is outside the limits of {names(joint.name for joint in started)}, "
@@ -492,7 +492,7 @@ def zero_outside_limits(robot: Facts) -> Iterator[Defect]:
         if joint not in started:
             assert joint.limit is not None
             lower, upper = _ends(joint.limit)
-            yield Defect(
+            yield Violation(
                 subject=joint.name,
                 source=joint.limit.source,
                 severity="warning",
@@ -511,7 +511,7 @@ def _excludes_zero(joint: Joint) -> bool:
 
 
 @rule("JNT013", "broken-mimic", "error")
-def broken_mimic(robot: Facts) -> Iterator[Defect]:
+def broken_mimic(robot: Facts) -> Iterator[Violation]:
     """A joint mimics one that is not there, that does not move, or in the end itself.
 
     MuJoCo drops the <mimic> and the joint hangs loose; it refuses one that mimics itself. In a
@@ -541,7 +541,7 @@ def broken_mimic(robot: Facts) -> Iterator[Defect]:
             what = f"{target.name}, and that in the end itself: {' -> '.join(circle[:10])}"
         else:
             continue
-        yield Defect(
+        yield Violation(
             subject=joint.name,
             source=joint.mimic.source,
             message=f"joint {joint.name} mimics {what}; wanted a joint that is driven",
@@ -559,7 +559,7 @@ def _circle(joint: Joint, joints: dict[str, Joint]) -> list[str]:
 
 
 @rule("JNT014", "safety-controller", "info")
-def safety_controller(robot: Facts) -> Iterator[Defect]:
+def safety_controller(robot: Facts) -> Iterator[Violation]:
     """A safety_controller is taken for something else.
 
     The k_position of a <safety_controller> was made for controllers that ROS 1 had. Genesis makes
@@ -575,7 +575,7 @@ def safety_controller(robot: Facts) -> Iterator[Defect]:
     if joints:
         assert joints[0].safety_controller is not None
         have = "has" if len(joints) == 1 else "have"
-        yield Defect(
+        yield Violation(
             subject=joints[0].name,
             source=joints[0].safety_controller,
             message=f"{names(joint.name for joint in joints)} {have} a safety_controller with "
@@ -585,7 +585,7 @@ def safety_controller(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("JNT015", "too-weak", "warning", needs=("legs",))
-def too_weak(robot: Facts) -> Iterator[Defect]:
+def too_weak(robot: Facts) -> Iterator[Violation]:
     """A joint needs most of its effort for standing still.
 
     The torque that holds the robot in its standing pose, over what the joint can give. From half of
@@ -617,7 +617,7 @@ def too_weak(robot: Facts) -> Iterator[Defect]:
     sure = any(leg.limb.words for leg in robot.legs)
     for joint, torque, effort in weak:
         share, unit = torque / effort, joint.effort_unit
-        yield Defect(
+        yield Violation(
             subject=joint.name,
             source=joint.limit.source if joint.limit else joint.source,
             severity="error" if share > _TOO_WEAK and sure else "warning",
@@ -629,7 +629,7 @@ def too_weak(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("JNT016", "no-actuator", "warning")
-def no_actuator(robot: Facts) -> Iterator[Defect]:
+def no_actuator(robot: Facts) -> Iterator[Violation]:
     """A joint of a MJCF file has no actuator.
 
     Nothing drives it: it swings on its damping, and the actions of an environment that is made
@@ -648,7 +648,7 @@ def no_actuator(robot: Facts) -> Iterator[Defect]:
         return
     if not robot.model.actuators:
         if robot.joints:
-            yield Defect(
+            yield Violation(
                 subject=robot.model.title,
                 source=robot.model.source,
                 severity="info",
@@ -662,7 +662,7 @@ def no_actuator(robot: Facts) -> Iterator[Defect]:
         return
     for joint in own_joints(robot):
         if joint.name not in driven and joint.mimic is None:
-            yield Defect(
+            yield Violation(
                 subject=joint.name,
                 source=joint.source,
                 severity="warning" if robot.legs else "info",
@@ -672,7 +672,7 @@ def no_actuator(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("JNT017", "unlimited-joint", "warning")
-def unlimited_joint(robot: Facts) -> Iterator[Defect]:
+def unlimited_joint(robot: Facts) -> Iterator[Violation]:
     """A hinge of a MJCF file has no range.
 
     It turns without end, and a leg through the trunk. MuJoCo needs a range, and either
@@ -691,7 +691,7 @@ def unlimited_joint(robot: Facts) -> Iterator[Defect]:
     bodies = bodies_by_joint(robot)
     for joint in own_joints(robot):
         if joint.kind == "continuous" and not is_wheel(robot, bodies[joint.name]):
-            yield Defect(
+            yield Violation(
                 subject=joint.name,
                 source=joint.source,
                 severity="warning" if robot.legs else "info",

@@ -15,7 +15,7 @@ from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.analysis.legs.limbs import Limb
 from terrainkit_robots.analysis.legs.stance import Stance
 from terrainkit_robots.description.fix import Fix, SetAttribute
-from terrainkit_robots.lint.rule import Defect, rule
+from terrainkit_robots.lint.rule import Violation, rule
 from terrainkit_robots.spec.per_joint import match_joints
 from terrainkit_robots.spec.robot_spec import RobotSpec
 from terrainkit_robots.text import names
@@ -74,7 +74,7 @@ def _kinds(limb: Limb) -> tuple[str, ...]:
 
 
 @rule("LEG001", "legs", "info", needs=("legs",))
-def legs(robot: Facts) -> Iterator[Defect]:
+def legs(robot: Facts) -> Iterator[Violation]:
     """These are the legs that were found, and what their joints do.
 
     Everything that is said of legs, feet and the standing pose rests on this. If it is wrong here,
@@ -94,7 +94,7 @@ def legs(robot: Facts) -> Iterator[Defect]:
         if len(same) == 1
         else "; ".join(f"{foot}: {roles}" for foot, roles in words.items())
     )
-    yield Defect(
+    yield Violation(
         subject=robot.model.title,
         source=robot.model.source,
         message=f"{len(found)} legs of {_mean_length(found):.3f} m; {listed}",
@@ -108,7 +108,7 @@ def _mean_length(found: tuple[Leg, ...]) -> float:
 
 
 @rule("LEG002", "leg-count", "warning", needs=("legs",))
-def leg_count(robot: Facts) -> Iterator[Defect]:
+def leg_count(robot: Facts) -> Iterator[Violation]:
     """The number of legs is not 2, 4, 6 or 8.
 
     A leg that is missing usually hangs on a joint that was named wrongly or turned fixed, or ends
@@ -123,7 +123,7 @@ def leg_count(robot: Facts) -> Iterator[Defect]:
     count = len(robot.legs)
     if count + len(_upward(robot)) in _USUAL:
         return
-    yield Defect(
+    yield Violation(
         subject=robot.model.title,
         source=robot.model.source,
         message=(
@@ -136,7 +136,7 @@ def leg_count(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("LEG003", "uneven-legs", "warning", needs=("legs",))
-def uneven_legs(robot: Facts) -> Iterator[Defect]:
+def uneven_legs(robot: Facts) -> Iterator[Violation]:
     """A leg has fewer joints than the others.
 
     A joint that was turned fixed, or was left out, makes the leg stiff there. The policy then
@@ -152,7 +152,7 @@ def uneven_legs(robot: Facts) -> Iterator[Defect]:
     usual, _ = max(counts.items(), key=lambda item: (item[1], item[0]))
     for leg in robot.legs:
         if len(leg.joints) < usual:
-            yield Defect(
+            yield Violation(
                 subject=leg.foot,
                 source=robot.tree.links[leg.foot].source,
                 message=(
@@ -165,7 +165,7 @@ def uneven_legs(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("LEG004", "foot-merged-away", "warning", fixes="safe", needs=("legs",))
-def foot_merged_away(robot: Facts) -> Iterator[Defect]:
+def foot_merged_away(robot: Facts) -> Iterator[Violation]:
     """A foot hangs on a fixed joint, and nothing tells Isaac Gym to keep it.
 
     Isaac Gym merges links across fixed joints by default. The foot is then no body of its own:
@@ -193,7 +193,7 @@ def foot_merged_away(robot: Facts) -> Iterator[Defect]:
                 description=f'Add dont_collapse="true" to joint {joint.name}.',
                 edits=(edit,),
             )
-        yield Defect(
+        yield Violation(
             subject=leg.foot,
             source=joint.source,
             message=(
@@ -206,7 +206,7 @@ def foot_merged_away(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("LEG005", "forward", "warning", needs=("legs",))
-def forward(robot: Facts) -> Iterator[Defect]:
+def forward(robot: Facts) -> Iterator[Violation]:
     """The robot does not look along +x.
 
     Commands, rewards and height scans take +x for forward and +y for left. A robot that looks
@@ -253,9 +253,9 @@ def _places(robot: Facts, words: set[str], axis: int) -> list[float]:
     return found
 
 
-def _turned(robot: Facts, message: str) -> Defect:
+def _turned(robot: Facts, message: str) -> Violation:
     trunk = robot.bodies[0]
-    return Defect(
+    return Violation(
         subject=trunk.name,
         source=robot.tree.links[trunk.name].source,
         message=message,
@@ -264,7 +264,7 @@ def _turned(robot: Facts, message: str) -> Defect:
 
 
 @rule("LEG006", "falls-over", "error", needs=("legs",))
-def falls_over(robot: Facts) -> Iterator[Defect]:
+def falls_over(robot: Facts) -> Iterator[Violation]:
     """The centre of mass is not above the feet.
 
     In the standing pose, with the legs bent so as to bring the feet below the mass, it still lies
@@ -288,7 +288,7 @@ def falls_over(robot: Facts) -> Iterator[Defect]:
         return
     trunk = robot.bodies[0]
     outside = stance.margin < 0
-    yield Defect(
+    yield Violation(
         subject=trunk.name,
         source=robot.tree.links[trunk.name].source,
         message=(
@@ -303,7 +303,7 @@ def falls_over(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("LEG007", "leg-points-up", "error", needs=("legs",))
-def leg_points_up(robot: Facts) -> Iterator[Defect]:
+def leg_points_up(robot: Facts) -> Iterator[Violation]:
     """A leg points up where its siblings point down.
 
     Its mounting is turned over: a sign or a rotation in the joint's origin is wrong. The robot
@@ -321,7 +321,7 @@ def leg_points_up(robot: Facts) -> Iterator[Defect]:
         first = limb.joints[0]
         rise = float(limb.tip[2] - start[2])
         reach = float(np.linalg.norm(limb.tip - start))
-        yield Defect(
+        yield Violation(
             subject=leaf.name,
             source=first.source,
             message=(
@@ -348,9 +348,9 @@ def _standing(robot: Facts) -> tuple[RobotSpec, Stance]:
     return spec, stance
 
 
-def _of_trunk(robot: Facts, message: str, measured: dict[str, float]) -> Defect:
+def _of_trunk(robot: Facts, message: str, measured: dict[str, float]) -> Violation:
     trunk = robot.bodies[0].top
-    return Defect(
+    return Violation(
         subject=trunk.name,
         source=trunk.source,
         message=message,
@@ -360,7 +360,7 @@ def _of_trunk(robot: Facts, message: str, measured: dict[str, float]) -> Defect:
 
 
 @rule("LEG008", "spec-spawn-height", "error", needs=("spec", "legs"))
-def spec_spawn_height(robot: Facts) -> Iterator[Defect]:
+def spec_spawn_height(robot: Facts) -> Iterator[Violation]:
     """The spec lets the robot go inside of the ground, or high above it.
 
     Inside the ground contacts throw it up at the first step. From high above it falls, and an
@@ -393,7 +393,7 @@ def spec_spawn_height(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("LEG009", "spec-target-height", "warning", needs=("spec", "legs"))
-def spec_target_height(robot: Facts) -> Iterator[Defect]:
+def spec_target_height(robot: Facts) -> Iterator[Violation]:
     """The height that rewards ask for is not the one at which the robot stands.
 
     The reward for the height and the default pose, to which all actions are added, then pull
@@ -423,7 +423,7 @@ def spec_target_height(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("LEG010", "spec-reset-range", "warning", needs=("spec", "legs"))
-def spec_reset_range(robot: Facts) -> Iterator[Defect]:
+def spec_reset_range(robot: Facts) -> Iterator[Violation]:
     """Joints start an episode outside of their limits.
 
     The default pose times a factor of the reset range is where a joint starts. Beyond a limit the
@@ -452,7 +452,7 @@ def spec_reset_range(robot: Facts) -> Iterator[Defect]:
     worst = max(outside, key=lambda name: outside[name])
     listed = names(f"{name} by {over:.3g} {found[name].unit}" for name, over in outside.items())
     lower, upper = spec.reset_range
-    yield Defect(
+    yield Violation(
         subject=worst,
         source=found[worst].source,
         message=(

@@ -23,7 +23,7 @@ from terrainkit_robots.analysis.meshes.uses import (
 from terrainkit_robots.description.fix import Edit, Fix
 from terrainkit_robots.description.package_resolver import is_absolute, names_package, right_letters
 from terrainkit_robots.description.xml.document import read_bytes
-from terrainkit_robots.lint.rule import Defect, Severity, rule
+from terrainkit_robots.lint.rule import Severity, Violation, rule
 from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes, TooLargeError
 from terrainkit_robots.mesh.sniff import MUJOCO_SUFFIXES
 from terrainkit_robots.mesh.surface import FLAT, binary_stl, clustered, thickness
@@ -54,7 +54,7 @@ _FAR_UP = 3
 
 
 @rule("MSH001", "missing-mesh", "error", fixes="unsafe")
-def missing_mesh(robot: Facts) -> Iterator[Defect]:
+def missing_mesh(robot: Facts) -> Iterator[Violation]:
     """A mesh file is not where the robot says.
 
     MuJoCo stops at the first collision mesh that it cannot open. Isaac Sim, Genesis and PyBullet go
@@ -72,7 +72,7 @@ def missing_mesh(robot: Facts) -> Iterator[Defect]:
         if is_lost(used) and not _is_written_absolute(robot, used):
             there = is_elsewhere(used.mesh)
             refused = robot.model.kind == "mjcf" and not used.collisions
-            yield Defect(
+            yield Violation(
                 subject=used.name,
                 source=used.source,
                 message=f"{_words(used)} does not exist: {_looked_for(robot, used)}"
@@ -100,7 +100,7 @@ def _looked_for(robot: Facts, used: UsedMesh) -> str:
 
 
 @rule("MSH002", "absolute-path", "error", fixes="unsafe")
-def absolute_path(robot: Facts) -> Iterator[Defect]:
+def absolute_path(robot: Facts) -> Iterator[Violation]:
     """A mesh is named by a path from the root of somebody's disk.
 
     The robot loads on one machine and no other: not in a container, not on the cluster, not at
@@ -123,7 +123,7 @@ def absolute_path(robot: Facts) -> Iterator[Defect]:
             where = f"which does not exist here; there is {used.mesh.path}"
         else:
             where = "which exists on this machine only"
-        yield Defect(
+        yield Violation(
             subject=used.name,
             source=used.source,
             message=f"the {used.role} has an absolute path, {used.name}, {where}",
@@ -151,8 +151,8 @@ def _text(path: Path) -> bytes:
         return b""
 
 
-@rule("MSH003", "package-path", "warning", fixes="safe")
-def package_path(robot: Facts) -> Iterator[Defect]:
+@rule("MSH003", "package-uri", "warning", fixes="safe")
+def package_uri(robot: Facts) -> Iterator[Violation]:
     """A mesh is named by its ROS package.
 
     `package://`, `model://` and `$(find ...)` mean something only where ROS or Gazebo is installed
@@ -181,7 +181,7 @@ def package_path(robot: Facts) -> Iterator[Defect]:
         text = (
             fix.description if fix and len(alike) == 1 else "Refer to them relative to this file."
         )
-        yield Defect(
+        yield Violation(
             subject=first.name,
             source=first.source,
             message=f"{names((each.name for each, _ in alike), 2)}: named by {place}, which MuJoCo "
@@ -203,8 +203,8 @@ def _ends_alike(used: UsedMesh) -> bool:
     return [part.lower() for part in used.mesh.path.parts[-len(parts) :]] == parts
 
 
-@rule("MSH004", "wrong-letters", "error", fixes="safe")
-def wrong_letters(robot: Facts) -> Iterator[Defect]:
+@rule("MSH004", "filename-case", "error", fixes="safe")
+def filename_case(robot: Facts) -> Iterator[Violation]:
     """The name of a mesh differs from its file's in upper and lower case, or has backslashes.
 
     It is found on Windows, and on most Macs, and nowhere where robots are trained: on Linux
@@ -224,7 +224,7 @@ def wrong_letters(robot: Facts) -> Iterator[Defect]:
         how = "has backslashes" if slashes else "has other letters than the file"
         # a package path is made relative, with the right letters, by MSH003
         edits = None if names_package(used.name) else renamed(robot, used.uses, right)
-        yield Defect(
+        yield Violation(
             subject=used.name,
             source=used.source,
             message=f"the name {used.name} of the {used.role} {how}; wanted {right}",
@@ -232,8 +232,8 @@ def wrong_letters(robot: Facts) -> Iterator[Defect]:
         )
 
 
-@rule("MSH005", "unreadable-format", "error", fixes="unsafe")
-def unreadable_format(robot: Facts) -> Iterator[Defect]:
+@rule("MSH005", "unsupported-format", "error", fixes="unsafe")
+def unsupported_format(robot: Facts) -> Iterator[Violation]:
     """A collision mesh is in a format that MuJoCo cannot read.
 
     MuJoCo reads STL, OBJ and its own MSH, by the end of the name. COLLADA (.dae), which ROS is full
@@ -254,7 +254,7 @@ def unreadable_format(robot: Facts) -> Iterator[Defect]:
         edits = None
         if _is_solid(robot.meshes, uses):
             edits = replaced(robot, uses, ".stl", _converted(robot.meshes, used))
-        yield Defect(
+        yield Violation(
             subject=used.name,
             source=used.source,
             message=f"{_words(used)} is a {suffix or 'nameless'} file; MuJoCo reads "
@@ -284,8 +284,8 @@ def _hull(meshes: Meshes, used: UsedMesh) -> Callable[[], bytes]:
     return lambda: binary_stl(meshes.hull(used.mesh.path, _HULL_CORNERS))
 
 
-@rule("MSH006", "broken-mesh", "error")
-def broken_mesh(robot: Facts) -> Iterator[Defect]:
+@rule("MSH006", "malformed-mesh", "error")
+def malformed_mesh(robot: Facts) -> Iterator[Violation]:
     """A mesh file is empty, cut off or something else than its name says.
 
     A binary STL has 84 bytes and 50 for each face; one that has not was cut off while it was copied
@@ -300,7 +300,7 @@ def broken_mesh(robot: Facts) -> Iterator[Defect]:
     for used in meshes_by_file(robot):
         problem, severity = _problem(robot.meshes, used)
         if problem:
-            yield Defect(
+            yield Violation(
                 subject=used.name,
                 source=used.source,
                 message=f"{_words(used)} {problem}",
@@ -329,7 +329,7 @@ def _problem(meshes: Meshes, used: UsedMesh) -> tuple[str, Severity]:
 
 
 @rule("MSH007", "ascii-stl", "error", fixes="safe")
-def ascii_stl(robot: Facts) -> Iterator[Defect]:
+def ascii_stl(robot: Facts) -> Iterator[Violation]:
     """A mesh is an STL of text.
 
     MuJoCo reads binary STL only, and takes the text for a number of faces. Other readers take both;
@@ -345,7 +345,7 @@ def ascii_stl(robot: Facts) -> Iterator[Defect]:
         if used.header.format == "ascii-stl" and used.header.state == "fine":
             content = _binary(robot.meshes, used)
             edits = replaced(robot, used.uses, "_binary.stl", content)
-            yield Defect(
+            yield Violation(
                 subject=used.name,
                 source=used.source,
                 message=f"{_words(used)} is an ASCII STL of {used.header.size:,} bytes; MuJoCo "
@@ -360,7 +360,7 @@ def _binary(meshes: Meshes, used: UsedMesh) -> Callable[[], bytes]:
 
 
 @rule("MSH008", "too-many-faces", "error", fixes="unsafe")
-def too_many_faces(robot: Facts) -> Iterator[Defect]:
+def too_many_faces(robot: Facts) -> Iterator[Violation]:
     """A mesh has over 200,000 faces.
 
     MuJoCo refuses such an STL. Where it is only drawn, or in another format, it is read, and costs
@@ -378,7 +378,7 @@ def too_many_faces(robot: Facts) -> Iterator[Defect]:
         if faces is None or faces <= _MOST_FACES:
             continue
         refused = used.strict and used.header.format in ("stl", "ascii-stl")
-        yield Defect(
+        yield Violation(
             subject=used.name,
             source=used.source,
             message=f"{_words(used)} has {faces:,} faces; wanted {_MOST_FACES:,} or fewer, as "
@@ -438,8 +438,8 @@ def _simplified(meshes: Meshes, used: UsedMesh) -> Callable[[], bytes]:
     return simplify
 
 
-@rule("MSH009", "heavy-collision", "warning", fixes="unsafe")
-def heavy_collision(robot: Facts) -> Iterator[Defect]:
+@rule("MSH009", "dense-collision-mesh", "warning", fixes="unsafe")
+def dense_collision_mesh(robot: Facts) -> Iterator[Violation]:
     """A collision mesh has over 20,000 faces.
 
     It is the mesh that is drawn. MuJoCo and PhysX make a hull or pieces of it each time the robot
@@ -459,7 +459,7 @@ def heavy_collision(robot: Facts) -> Iterator[Defect]:
             continue
         if robot.model.kind == "urdf" and used.mesh.path.suffix.lower() not in MUJOCO_SUFFIXES:
             continue  # what MSH005 converts gets a hull
-        yield Defect(
+        yield Violation(
             subject=used.name,
             source=used.collisions[0].mesh.source,
             message=f"{_words(used)} has {faces:,} faces; wanted {_MANY_FACES:,} or fewer",
@@ -477,7 +477,7 @@ def _hull_edits(robot: Facts, used: UsedMesh) -> Sequence[Edit] | None:
 
 
 @rule("MSH010", "flat-mesh", "error")
-def flat_mesh(robot: Facts) -> Iterator[Defect]:
+def flat_mesh(robot: Facts) -> Iterator[Violation]:
     """A collision mesh lies in a plane, and so has no hull.
 
     Simulators collide with hulls. Of a flat mesh there is none: MuJoCo and PhysX refuse it. It is
@@ -495,7 +495,7 @@ def flat_mesh(robot: Facts) -> Iterator[Defect]:
                 continue
             corners = robot.meshes.vertices(use.mesh)
             flat = thickness(corners)
-            yield Defect(
+            yield Violation(
                 subject=used.name,
                 source=use.mesh.source,
                 message=f"{_words(used)} is flat: where its {len(corners):,} corners are "
@@ -507,7 +507,7 @@ def flat_mesh(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("MSH011", "wrong-scale", "error")
-def wrong_scale(robot: Facts) -> Iterator[Defect]:
+def wrong_scale(robot: Facts) -> Iterator[Violation]:
     """A mesh is many times too large or too small for the joints around it.
 
     Millimetres were taken for metres, or a scale was left out or given twice. A collision mesh a
@@ -536,7 +536,7 @@ def wrong_scale(robot: Facts) -> Iterator[Defect]:
             if misfit is None:
                 continue
             large = misfit.ratio > 1
-            yield Defect(
+            yield Violation(
                 subject=used.name,
                 source=use.mesh.scale_source or use.mesh.source,
                 message=f"{used.name} measures {misfit.diagonal:.3g} m on link {use.link.name}, "
@@ -562,8 +562,8 @@ def _hint(misfit: Misfit) -> str:
     return "If it was scaled from millimetres twice, or is in metres, take the scale away."
 
 
-@rule("MSH012", "mirrored-scale", "warning")
-def mirrored_scale(robot: Facts) -> Iterator[Defect]:
+@rule("MSH012", "negative-scale", "warning")
+def negative_scale(robot: Facts) -> Iterator[Violation]:
     """A mesh is mirrored by a negative scale.
 
     PhysX takes no negative scale for a convex mesh, Webots none at all, and where the corners are
@@ -583,7 +583,7 @@ def mirrored_scale(robot: Facts) -> Iterator[Defect]:
         first = next((use for use in mirrored if use.collides), mirrored[0])
         harmful = first.collides and robot.model.kind != "mjcf"
         scale = " ".join(f"{factor:g}" for factor in first.mesh.scale)
-        yield Defect(
+        yield Violation(
             subject=used.name,
             source=first.mesh.scale_source or first.mesh.source,
             message=f"{_words(used)} is scaled by {scale}; wanted numbers over 0",
@@ -592,7 +592,7 @@ def mirrored_scale(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("MSH013", "lfs-pointer", "error")
-def lfs_pointer(robot: Facts) -> Iterator[Defect]:
+def lfs_pointer(robot: Facts) -> Iterator[Violation]:
     """A mesh file is a Git LFS pointer.
 
     The repository was cloned without Git LFS, or downloaded as an archive: in the place of each
@@ -606,7 +606,7 @@ def lfs_pointer(robot: Facts) -> Iterator[Defect]:
     """
     for used in meshes_by_file(robot):
         if used.header.state == "lfs":
-            yield Defect(
+            yield Violation(
                 subject=used.name,
                 source=used.source,
                 message=f"{_words(used)} {used.header.problem}",
@@ -614,8 +614,8 @@ def lfs_pointer(robot: Facts) -> Iterator[Defect]:
             )
 
 
-@rule("MSH014", "far-from-convex", "info")
-def far_from_convex(robot: Facts) -> Iterator[Defect]:
+@rule("MSH014", "nonconvex-collision", "info")
+def nonconvex_collision(robot: Facts) -> Iterator[Violation]:
     """The hull of a collision mesh is far larger than the mesh.
 
     MuJoCo, and PhysX unless it is told otherwise, collide with the hull: holes, notches and the
@@ -642,7 +642,7 @@ def far_from_convex(robot: Facts) -> Iterator[Defect]:
         except MeshError:
             continue
         if hull > _BLOATED * solid:
-            yield Defect(
+            yield Violation(
                 subject=used.name,
                 source=first.mesh.source,
                 message=f"{_words(used)} encloses {solid:.3g} m3, and its hull {hull:.3g} m3: "

@@ -9,7 +9,7 @@ from functools import cached_property
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint, Link
-from terrainkit_robots.lint.rule import Defect, rule
+from terrainkit_robots.lint.rule import Violation, rule
 from terrainkit_robots.text import names, short
 
 _FEWEST_TWINS = 4
@@ -80,8 +80,8 @@ def _trimmed(left: str, right: str) -> tuple[str, str]:
     return left, right
 
 
-@rule("NAM001", "sibling-pattern", "warning")
-def sibling_pattern(robot: Facts) -> Iterator[Defect]:
+@rule("NAM001", "inconsistent-name", "warning")
+def inconsistent_name(robot: Facts) -> Iterator[Violation]:
     """A name breaks the pattern that its siblings follow.
 
     Configurations address joints and links by patterns such as .*_thigh_joint. The one that is
@@ -182,7 +182,7 @@ class _Names:
         self._forms = Counter(sides.form(name) for name in brief)
         self._words = Counter(word for name in brief for word in set(_words(name)))
 
-    def odd(self, twins: _Twins) -> Iterator[Defect]:
+    def odd(self, twins: _Twins) -> Iterator[Violation]:
         """Yield the one of two twins whose name has a slip, if one has."""
         right, left = self._sides.right(twins.left.name), self._sides.left(twins.right.name)
         taken = self._taken[twins.what]
@@ -194,7 +194,7 @@ class _Names:
         odd, twin, wanted = twins.right, twins.left, right
         if counts[0] < counts[1]:
             odd, twin, wanted = twins.left, twins.right, left
-        yield Defect(
+        yield Violation(
             subject=odd.name,
             source=odd.source,
             message=f"{twins.what} {odd.name} is the mirror image of {twin.name}, but the names "
@@ -239,8 +239,8 @@ def _is_slip(expected: str | None, name: str) -> bool:
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
-@rule("NAM002", "identifier", "warning")
-def identifier(robot: Facts) -> Iterator[Defect]:
+@rule("NAM002", "invalid-name", "warning")
+def invalid_name(robot: Facts) -> Iterator[Violation]:
     """Names have characters that not every simulator takes.
 
     USD, and with it Isaac Sim and Isaac Lab, knows letters, digits and underscores. It puts an
@@ -270,7 +270,7 @@ def identifier(robot: Facts) -> Iterator[Defect]:
     if renamed:
         first = next(iter(renamed.values()))
         count = f"{len(renamed)} names have" if len(renamed) > 1 else "a name has"
-        yield Defect(
+        yield Violation(
             subject=first.name,
             source=first.source,
             message=f"{count} other characters than letters, digits and underscores: "
@@ -292,8 +292,8 @@ def _clashing(items: Sequence[Link | Joint]) -> dict[str, list[Link | Joint]]:
     return {valid: list(same.values()) for valid, same in groups.items() if len(same) > 1}
 
 
-def _clash(what: str, valid: str, same: Sequence[Link | Joint]) -> Defect:
-    return Defect(
+def _clash(what: str, valid: str, same: Sequence[Link | Joint]) -> Violation:
+    return Violation(
         subject=same[1].name,
         source=same[1].source,
         message=f"{what} {names(item.name for item in same)} would all be {short(valid)} in USD, "
@@ -309,8 +309,8 @@ _LEG_WORDS = ("thigh", "calf", "shank", "knee", "hip")
 """What configurations penalize contacts of."""
 
 
-@rule("NAM003", "substring-traps", "info", needs=("legs",))
-def substring_traps(robot: Facts) -> Iterator[Defect]:
+@rule("NAM003", "ambiguous-substring", "info", needs=("legs",))
+def ambiguous_substring(robot: Facts) -> Iterator[Violation]:
     """Words that configurations look for match other links than one would think.
 
     legged_gym takes every link whose name contains `foot` for a foot, ends the episode when one
@@ -326,7 +326,7 @@ def substring_traps(robot: Facts) -> Iterator[Defect]:
     """
     said = [*_said_of_feet(robot), *_said_of_others(robot)]
     if said:
-        yield Defect(
+        yield Violation(
             subject=robot.model.title,
             source=robot.model.source,
             message="; ".join(said),

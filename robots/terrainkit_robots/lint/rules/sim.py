@@ -21,7 +21,7 @@ from terrainkit_robots.analysis.simulator_conventions.joint_order import (
     file_order,
     simulator_orders,
 )
-from terrainkit_robots.lint.rule import Defect, rule
+from terrainkit_robots.lint.rule import Violation, rule
 from terrainkit_robots.text import names, short
 
 if TYPE_CHECKING:
@@ -47,8 +47,8 @@ _TELLING: tuple[tuple[str, str], ...] = (
 """Words of MuJoCo's, and the rule that says more of what they mean."""
 
 
-@rule("SIM001", "joint-orders", "info")
-def joint_orders(robot: Facts) -> Iterator[Defect]:
+@rule("SIM001", "joint-order", "info")
+def joint_order(robot: Facts) -> Iterator[Violation]:
     """A simulator lists the joints in another order than the file.
 
     A policy's observations and actions are lists of numbers in the order of the joints. One that
@@ -72,7 +72,7 @@ def joint_orders(robot: Facts) -> Iterator[Defect]:
     same = [name for name in SIMULATORS if name not in {order.simulator for order in others}]
     told = "; ".join(_order(order, file) for order in others)
     rest = f"; {_listed(same)} as the file" if same else ""
-    yield Defect(
+    yield Violation(
         subject=robot.model.title,
         source=robot.model.source,
         message=f"joints by their number in the file: {told}{rest}",
@@ -96,8 +96,8 @@ def _listed(words: Sequence[str]) -> str:
     return f"{', '.join(first)} and {last}" if first else last
 
 
-@rule("SIM002", "feet-merged", "info", needs=("legs",))
-def feet_merged(robot: Facts) -> Iterator[Defect]:
+@rule("SIM002", "merged-feet", "info", needs=("legs",))
+def merged_feet(robot: Facts) -> Iterator[Violation]:
     """A simulator merges the feet into the shanks, unless it is told not to.
 
     A foot on a fixed joint is no body of its own there: its name is not found, and contact forces
@@ -119,7 +119,7 @@ def feet_merged(robot: Facts) -> Iterator[Defect]:
     by = [s for s in SIMULATORS if any(s in merge.into for merge in merges)]
     into = next(iter(first.into.values()))
     example = f"{first.foot} into {into}" + (", ..." if len(merges) > 1 else "")
-    yield Defect(
+    yield Violation(
         subject=first.foot,
         source=first.joint.source,
         message=(
@@ -132,7 +132,7 @@ def feet_merged(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("SIM003", "genesis-armature", "info")
-def genesis_armature(robot: Facts) -> Iterator[Defect]:
+def genesis_armature(robot: Facts) -> Iterator[Violation]:
     """Genesis gives joints a rotor inertia that is larger than what they move.
 
     A joint without armature gets 0.1 kg m2 there. That is ten times the rotor of a small legged
@@ -154,7 +154,7 @@ def genesis_armature(robot: Facts) -> Iterator[Defect]:
         return
     worst = min(slowed, key=lambda each: each.inertia)
     unit = "kg" if worst.joint.kind == "prismatic" else "kg m2"
-    yield Defect(
+    yield Violation(
         subject=worst.joint.name,
         source=worst.joint.source,
         message=(
@@ -166,8 +166,8 @@ def genesis_armature(robot: Facts) -> Iterator[Defect]:
     )
 
 
-@rule("SIM004", "mujoco-refuses", "info", needs=("simulation",))
-def mujoco_refuses(robot: Facts) -> Iterator[Defect]:
+@rule("SIM004", "mujoco-load-failure", "info", needs=("simulation",))
+def mujoco_load_failure(robot: Facts) -> Iterator[Violation]:
     """MuJoCo does not load the file as it stands.
 
     MuJoCo stops at the first thing that it does not like, so that there may be more. Readers of
@@ -194,8 +194,8 @@ def mujoco_refuses(robot: Facts) -> Iterator[Defect]:
         yield _refused(robot, "MuJoCo", refusal, _more(robot, refusal.words))
 
 
-@rule("SIM005", "yourdfpy-refuses", "info", needs=("simulation",))
-def yourdfpy_refuses(robot: Facts) -> Iterator[Defect]:
+@rule("SIM005", "yourdfpy-load-failure", "info", needs=("simulation",))
+def yourdfpy_load_failure(robot: Facts) -> Iterator[Violation]:
     """The library yourdfpy does not load the file as it stands.
 
     Retargeting, planning and viewing tools in Python read URDF with it.
@@ -249,13 +249,13 @@ def _more(robot: Facts, words: str) -> str:
     return "" if all(mesh.found_by == "path" for mesh in found) else "MSH002"
 
 
-def _refused(robot: Facts, reader: str, refusal: "Refusal", code: str) -> Defect:
+def _refused(robot: Facts, reader: str, refusal: "Refusal", code: str) -> Violation:
     named = refusal.element
     sources = {each.name: each.source for each in robot.model.joints}
     sources |= {each.name: each.source for each in robot.model.links}
     source = sources.get(named) if named else None
     where = f" ({names([named])})" if named else ""
-    return Defect(
+    return Violation(
         subject=named if source is not None else robot.model.title,
         source=source or robot.model.source,
         message=f"{reader} does not load it as it stands: {short(refusal.words, 200)}{where}",

@@ -28,7 +28,7 @@ from terrainkit_robots.analysis.symmetry.asymmetry import (
 )
 from terrainkit_robots.analysis.symmetry.mirror_pairs import Twin, odd_one_first, twins
 from terrainkit_robots.description.model import Joint, Source
-from terrainkit_robots.lint.rule import Check, Defect, Measured, rule
+from terrainkit_robots.lint.rule import Check, Measured, Violation, rule
 from terrainkit_robots.lint.rules.inr import (
     center_of_mass_outside,
     implausible_density,
@@ -62,7 +62,7 @@ _STRENGTH = 0.01
 
 
 @rule("SYM001", "mass-differs", "warning")
-def mass_differs(robot: Facts) -> Iterator[Defect]:
+def mass_differs(robot: Facts) -> Iterator[Violation]:
     """A body is heavier than its mirror image.
 
     One number was mistyped, or changed on one side only. The robot leans, and a policy learns to
@@ -114,11 +114,11 @@ def _share(a: float, b: float) -> float:
 
 def _differ(
     odd: Twin, other: Twin, message: str, measured: Measured, source: Source, *, joint: bool = False
-) -> Defect:
+) -> Violation:
     """Return a defect of one of two; in the message, {other} stands for the name of the other."""
     names = [twin.joint.name if joint else twin.body.name for twin in (odd, other)]
     told = message.replace("{other}", f"its mirror image {names[1]}")
-    return Defect(
+    return Violation(
         subject=names[0],
         source=source,
         certainty="likely",
@@ -128,7 +128,7 @@ def _differ(
 
 
 @rule("SYM002", "center-of-mass-differs", "warning")
-def center_differs(robot: Facts) -> Iterator[Defect]:
+def center_differs(robot: Facts) -> Iterator[Violation]:
     """A centre of mass is not where that of its mirror image is.
 
     Mostly a sign was lost when one side was copied from the other, or the frame of one link is
@@ -214,7 +214,7 @@ def _millimeters(vector: Matrix) -> str:
 
 
 @rule("SYM003", "moments-differ", "warning")
-def moments_differ(robot: Facts) -> Iterator[Defect]:
+def moments_differ(robot: Facts) -> Iterator[Violation]:
     """The principal moments of inertia differ from those of the mirror image.
 
     A reflection changes the signs of products, but not the principal moments. If these differ, a
@@ -290,7 +290,7 @@ def _listed(moments: Matrix) -> str:
 
 
 @rule("SYM004", "limits-differ", "warning")
-def limits_differ(robot: Facts) -> Iterator[Defect]:
+def limits_differ(robot: Facts) -> Iterator[Violation]:
     """The limits of a joint are not mirrored by those of its twin.
 
     Where equal positions look mirrored, the limits are the same; where opposite ones do, as for
@@ -339,7 +339,7 @@ def _written(ends: tuple[float, float]) -> str:
 
 
 @rule("SYM005", "strength-differs", "warning")
-def strength_differs(robot: Facts) -> Iterator[Defect]:
+def strength_differs(robot: Facts) -> Iterator[Violation]:
     """The effort or the velocity of a joint differs from its twin's.
 
     The two are the same motor. The weaker one saturates first, and the robot veers to one side.
@@ -388,7 +388,7 @@ def _velocity_of(_: Facts, joint: Joint) -> float | None:
 
 
 @rule("SYM006", "joint-origin-differs", "warning")
-def joint_origin_differs(robot: Facts) -> Iterator[Defect]:
+def joint_origin_differs(robot: Facts) -> Iterator[Violation]:
     """A joint is not where the mirror image of its twin is, or its frame is turned.
 
     One leg is longer, further out or bent at zero. It stands on three legs, or leans, and what is
@@ -408,7 +408,7 @@ def joint_origin_differs(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("SYM007", "joint-axis-differs", "warning")
-def joint_axis_differs(robot: Facts) -> Iterator[Defect]:
+def joint_axis_differs(robot: Facts) -> Iterator[Violation]:
     """The axis of a joint is not mirrored by that of its twin, or points the other way.
 
     A joint that turns about another line than its twin does makes the leg walk sideways. One that
@@ -431,7 +431,7 @@ def joint_axis_differs(robot: Facts) -> Iterator[Defect]:
         if joint.name in told:
             continue
         told.add(joint.name)
-        yield Defect(
+        yield Violation(
             subject=joint.name,
             source=joint.axis_source or joint.source,
             certainty="likely",
@@ -477,7 +477,7 @@ def _axis(axis: Matrix) -> str:
     return "(" + ", ".join(f"{x:.3g}" for x in np.round(axis, 3) + 0.0) + ")"
 
 
-def _slip_defect(robot: Facts, slip: Slip) -> Defect:
+def _slip_defect(robot: Facts, slip: Slip) -> Violation:
     def offset(body: Body) -> Matrix:
         return body.mount[:3, 3]
 

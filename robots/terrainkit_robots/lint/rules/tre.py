@@ -7,7 +7,7 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.fix import Fix, InsertChild
 from terrainkit_robots.description.model import Joint, Link
-from terrainkit_robots.lint.rule import Defect, find, rule
+from terrainkit_robots.lint.rule import Violation, get_rule, rule
 from terrainkit_robots.text import closest, names, short
 
 _MOST_MEANT = 20
@@ -36,7 +36,7 @@ def _repeated(items: Sequence[Link] | Sequence[Joint]) -> Mapping[str, list[Link
 
 
 @rule("TRE001", "duplicate-name", "error")
-def duplicate_name(robot: Facts) -> Iterator[Defect]:
+def duplicate_name(robot: Facts) -> Iterator[Violation]:
     """Two links or two joints have the same name.
 
     A name is how everything else refers to a link or joint. urdfdom refuses the file; MuJoCo takes
@@ -52,14 +52,14 @@ def duplicate_name(robot: Facts) -> Iterator[Defect]:
     model = robot.model
     for problem in model.problems:
         if problem.code == "TRE001":
-            yield Defect(subject=problem.subject, source=problem.source, message=problem.message)
+            yield Violation(subject=problem.subject, source=problem.source, message=problem.message)
     for what, items in (
         ("links", [link for link in model.links if not link.virtual]),
         ("joints", model.joints),
     ):
         for name, same in _repeated(items).items():
             lines = names(str(item.source.line) for item in same)
-            yield Defect(
+            yield Violation(
                 subject=name,
                 source=same[1].source,
                 message=f"{len(same)} {what} are called {short(name)}, on lines {lines}; "
@@ -69,7 +69,7 @@ def duplicate_name(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("TRE002", "unknown-link", "error")
-def unknown_link(robot: Facts) -> Iterator[Defect]:
+def unknown_link(robot: Facts) -> Iterator[Violation]:
     """A joint names a link that is not there.
 
     The joint has no place in the tree, and all that hangs below it comes off: some readers refuse
@@ -91,7 +91,7 @@ def unknown_link(robot: Facts) -> Iterator[Defect]:
                 missing.setdefault(name, []).append((role, joint))
     for place, (name, uses) in enumerate(missing.items()):
         joints = names(f"{role} of joint {joint.name}" for role, joint in uses)
-        yield Defect(
+        yield Violation(
             subject=uses[0][1].name,
             source=uses[0][1].source,
             message=f"link {short(name)} is not there, but is the {joints}; wanted a link of the "
@@ -109,8 +109,8 @@ def _suggestion(robot: Facts, name: str) -> str:
     return f"Is link {meant} meant? Names are compared letter by letter, case included."
 
 
-@rule("TRE003", "two-parents", "error")
-def two_parents(robot: Facts) -> Iterator[Defect]:
+@rule("TRE003", "multiple-parents", "error")
+def multiple_parents(robot: Facts) -> Iterator[Violation]:
     """A link is the child of two joints.
 
     A URDF is a tree. A linkage that closes a loop cannot be written in it, and readers refuse the
@@ -130,7 +130,7 @@ def two_parents(robot: Facts) -> Iterator[Defect]:
     first = {joint.child: joint for joint in reversed(robot.model.joints)}
     for child, joints in extra.items():
         listed = names(joint.name for joint in (first[child], *joints))
-        yield Defect(
+        yield Violation(
             subject=child,
             source=joints[0].source,
             message=f"link {short(child)} is the child of {len(joints) + 1} joints, {listed}; "
@@ -140,7 +140,7 @@ def two_parents(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("TRE004", "cycle", "error")
-def cycle(robot: Facts) -> Iterator[Defect]:
+def cycle(robot: Facts) -> Iterator[Violation]:
     """Joints hang links in a circle.
 
     Each link of the circle is above all others and below them, so none of them is connected to the
@@ -162,7 +162,7 @@ def cycle(robot: Facts) -> Iterator[Defect]:
             what = (
                 f"{len(circle)} links hang in a circle" if circle[1:] else "a link hangs on itself"
             )
-            yield Defect(
+            yield Violation(
                 subject=circle[0],
                 source=closing[circle[0]].source,
                 message=f"{what}: {names(around, separator=' > ')}; wanted a tree",
@@ -170,8 +170,8 @@ def cycle(robot: Facts) -> Iterator[Defect]:
             )
 
 
-@rule("TRE005", "several-roots", "error")
-def several_roots(robot: Facts) -> Iterator[Defect]:
+@rule("TRE005", "multiple-roots", "error")
+def multiple_roots(robot: Facts) -> Iterator[Violation]:
     """A link hangs on nothing, and is not the root.
 
     urdfdom refuses a file with two roots. MuJoCo welds the second one to the world without a word,
@@ -187,7 +187,7 @@ def several_roots(robot: Facts) -> Iterator[Defect]:
         return  # bodies beside the robot are its surroundings
     root, loose = _roots(robot.tree)
     for name in loose:
-        yield Defect(
+        yield Violation(
             subject=name,
             source=robot.tree.links[name].source,
             message=f"link {short(name)} is the child of no joint, and is not the root either, "
@@ -234,7 +234,7 @@ def _groups(tree: Tree) -> dict[str, str]:
 
 
 @rule("TRE006", "no-links", "error")
-def no_links(robot: Facts) -> Iterator[Defect]:
+def no_links(robot: Facts) -> Iterator[Violation]:
     """The robot has no links.
 
     MuJoCo loads such a file as an empty world, and training goes on with nothing in it.
@@ -249,10 +249,10 @@ def no_links(robot: Facts) -> Iterator[Defect]:
     model = robot.model
     if model.links:
         return
-    if any(find(problem.code).severity == "error" for problem in model.problems):
+    if any(get_rule(problem.code).severity == "error" for problem in model.problems):
         raise CannotCheckError("the file could not be read")
     what = "bodies" if model.kind == "mjcf" else "links"
-    yield Defect(
+    yield Violation(
         subject=model.title,
         source=model.source,
         message=f"the robot has 0 {what} and {len(model.joints)} joints; wanted at least 1 of them",
@@ -260,7 +260,7 @@ def no_links(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("TRE007", "no-free-joint", "error", fixes="safe", needs=("legs",))
-def no_free_joint(robot: Facts) -> Iterator[Defect]:
+def no_free_joint(robot: Facts) -> Iterator[Violation]:
     """A MJCF robot with legs has no free joint: it is welded to the world.
 
     Without a joint MuJoCo makes the trunk a part of the world. The legs hang in the air, and
@@ -287,7 +287,7 @@ def no_free_joint(robot: Facts) -> Iterator[Defect]:
     if root.source.element is not None and not model.home:
         edit = InsertChild(source=root.source, xml="<freejoint/>", first=True)
         fix = Fix(safety="safe", description=f"Put <freejoint/> into {root.name}.", edits=(edit,))
-    yield Defect(
+    yield Violation(
         subject=root.name,
         source=root.source,
         message=f"body {root.name} has no joint to the world, so it is welded there, but the robot "
@@ -298,8 +298,8 @@ def no_free_joint(robot: Facts) -> Iterator[Defect]:
     )
 
 
-@rule("TRE008", "inner-floating", "error")
-def inner_floating(robot: Facts) -> Iterator[Defect]:
+@rule("TRE008", "inner-floating-joint", "error")
+def inner_floating_joint(robot: Facts) -> Iterator[Violation]:
     """A floating or planar joint lies inside the robot.
 
     What hangs on it is connected to the rest by nothing: it falls off, or drifts away in a plane.
@@ -315,7 +315,7 @@ def inner_floating(robot: Facts) -> Iterator[Defect]:
     tree = robot.tree
     for joint in tree.above.values():
         if joint.kind in ("floating", "planar") and not _stands_for_world(robot, joint.parent):
-            yield Defect(
+            yield Violation(
                 subject=joint.name,
                 source=joint.source,
                 message=f"joint {short(joint.name)} between {short(joint.parent)} and "
@@ -335,7 +335,7 @@ def _is_empty(link: Link) -> bool:
 
 
 @rule("TRE009", "dummy-root", "info")
-def dummy_root(robot: Facts) -> Iterator[Defect]:
+def dummy_root(robot: Facts) -> Iterator[Violation]:
     """The root link is empty, and the trunk hangs on it by a fixed joint.
 
     That is common, for readers that want a root without inertia. But the trunk then has two names:
@@ -362,7 +362,7 @@ def dummy_root(robot: Facts) -> Iterator[Defect]:
     while joint.parent != root.name:
         joint = tree.above[joint.parent]
     bolted = root.name == "world" and robot.model.kind != "mjcf" and bool(robot.legs)
-    yield Defect(
+    yield Violation(
         subject=root.name,
         source=root.source,
         message=f"root link {short(root.name)} has no mass and no collision shape; the trunk is "

@@ -6,7 +6,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.fix import Fix, RemoveAttribute, RemoveElement, SetAttribute
 from terrainkit_robots.description.model import Problem
 from terrainkit_robots.description.xml.document import without_mark
-from terrainkit_robots.lint.rule import Defect, Severity, rule
+from terrainkit_robots.lint.rule import Severity, Violation, rule
 
 
 def _problems(robot: Facts, code: str) -> Iterator[Problem]:
@@ -15,8 +15,8 @@ def _problems(robot: Facts, code: str) -> Iterator[Problem]:
 
 def _defect(
     robot: Facts, problem: Problem, fix: Fix | None = None, severity: Severity | None = None
-) -> Defect:
-    return Defect(
+) -> Violation:
+    return Violation(
         subject=problem.subject or robot.model.name or problem.source.file.name,
         source=problem.source,
         message=problem.message,
@@ -25,8 +25,8 @@ def _defect(
     )
 
 
-@rule("XML001", "malformed", "error")
-def malformed(robot: Facts) -> Iterator[Defect]:
+@rule("XML001", "malformed-xml", "error")
+def malformed_xml(robot: Facts) -> Iterator[Violation]:
     """The file is not well-formed XML.
 
     Readers differ in what they make of a broken file: some stop, some lose every element after the
@@ -43,8 +43,8 @@ def malformed(robot: Facts) -> Iterator[Defect]:
         yield _defect(robot, problem)
 
 
-@rule("XML002", "no-root", "error")
-def no_root(robot: Facts) -> Iterator[Defect]:
+@rule("XML002", "unknown-root", "error")
+def unknown_root(robot: Facts) -> Iterator[Violation]:
     """The root element is neither <robot> nor <mujoco>.
 
     The file is something else (SDF, a launch file, a scene), or its root was lost. Nothing in it is
@@ -61,7 +61,7 @@ def no_root(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("XML003", "unnamed-robot", "warning", fixes="safe")
-def unnamed_robot(robot: Facts) -> Iterator[Defect]:
+def unnamed_robot(robot: Facts) -> Iterator[Violation]:
     """The robot has no name.
 
     URDF requires one: urdfdom and everything built on it refuse a <robot> without a name, other
@@ -82,7 +82,7 @@ def unnamed_robot(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("XML004", "unexpanded-xacro", "error")
-def unexpanded_xacro(robot: Facts) -> Iterator[Defect]:
+def unexpanded_xacro(robot: Facts) -> Iterator[Violation]:
     """Xacro was left in a file that is read as plain URDF.
 
     To a URDF reader a macro is an unknown element that is skipped, and `${length}` is no number:
@@ -99,7 +99,7 @@ def unexpanded_xacro(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("XML005", "xacro-failed", "error")
-def xacro_failed(robot: Facts) -> Iterator[Defect]:
+def xacro_failed(robot: Facts) -> Iterator[Violation]:
     """The xacro file could not be expanded.
 
     An argument has no value, a package is not on this machine, or an expression fails. Without
@@ -115,8 +115,8 @@ def xacro_failed(robot: Facts) -> Iterator[Defect]:
         yield _defect(robot, problem)
 
 
-@rule("XML006", "bad-number", "error", fixes="safe")
-def bad_number(robot: Facts) -> Iterator[Defect]:
+@rule("XML006", "invalid-number", "error", fixes="safe")
+def invalid_number(robot: Facts) -> Iterator[Violation]:
     """A number is not a number, or there are too few or too many of them.
 
     Readers take what they can: "0,5" is 0 to one and an error to another, a missing third
@@ -138,8 +138,8 @@ def bad_number(robot: Facts) -> Iterator[Defect]:
         yield _defect(robot, problem, fix)
 
 
-@rule("XML007", "unknown-word", "warning")
-def unknown_word(robot: Facts) -> Iterator[Defect]:
+@rule("XML007", "unknown-tag", "warning")
+def unknown_tag(robot: Facts) -> Iterator[Violation]:
     """A tag or attribute looks like a misspelt one.
 
     URDF readers skip what they do not know. A <colision> is no collision shape, and a limit with
@@ -158,8 +158,8 @@ def unknown_word(robot: Facts) -> Iterator[Defect]:
         yield _defect(robot, problem, severity="error" if refused else None)
 
 
-@rule("XML008", "repeated-material", "error", fixes="safe")
-def repeated_material(robot: Facts) -> Iterator[Defect]:
+@rule("XML008", "duplicate-material", "error", fixes="safe")
+def duplicate_material(robot: Facts) -> Iterator[Violation]:
     """A visual or collision has two materials.
 
     MuJoCo refuses the whole file: `repeated element: 'material'`. Other readers take the first.
@@ -179,7 +179,7 @@ def repeated_material(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("XML009", "byte-order-mark", "error", fixes="safe")
-def byte_order_mark(robot: Facts) -> Iterator[Defect]:
+def byte_order_mark(robot: Facts) -> Iterator[Violation]:
     """Something invisible stands before the XML.
 
     A byte order mark, or a blank line before <?xml ...?>, comes from an editor. Strict readers
@@ -197,8 +197,8 @@ def byte_order_mark(robot: Facts) -> Iterator[Defect]:
         yield _defect(robot, problem, without_mark(problem))
 
 
-@rule("XML010", "entities", "error")
-def entities(robot: Facts) -> Iterator[Defect]:
+@rule("XML010", "entity-declarations", "error")
+def entity_declarations(robot: Facts) -> Iterator[Violation]:
     """The file declares entities of its own.
 
     An entity can pull in another file, or grow to gigabytes. Most readers of robots do not resolve
@@ -214,8 +214,8 @@ def entities(robot: Facts) -> Iterator[Defect]:
         yield _defect(robot, problem)
 
 
-@rule("XML011", "mjcf-refused", "error")
-def mjcf_refused(robot: Facts) -> Iterator[Defect]:
+@rule("XML011", "mjcf-parse-error", "error")
+def mjcf_parse_error(robot: Facts) -> Iterator[Violation]:
     """MuJoCo's own parser refuses the file.
 
     The message is MuJoCo's. The element was left out, and the rest is checked.
@@ -230,8 +230,8 @@ def mjcf_refused(robot: Facts) -> Iterator[Defect]:
         yield _defect(robot, problem)
 
 
-@rule("XML012", "broken-include", "error")
-def broken_include(robot: Facts) -> Iterator[Defect]:
+@rule("XML012", "invalid-include", "error")
+def invalid_include(robot: Facts) -> Iterator[Violation]:
     """An included file is missing, includes itself, or cannot be read.
 
     MuJoCo refuses the whole model for it. What is not in that file is checked.
@@ -247,7 +247,7 @@ def broken_include(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("XML013", "missing-attribute", "error")
-def missing_attribute(robot: Facts) -> Iterator[Defect]:
+def missing_attribute(robot: Facts) -> Iterator[Violation]:
     """An element lacks what it cannot do without.
 
     A link without a name, a mesh without a file or a box without a size: readers refuse it, or take
@@ -263,8 +263,8 @@ def missing_attribute(robot: Facts) -> Iterator[Defect]:
         yield _defect(robot, problem)
 
 
-@rule("XML014", "quaternion", "error", fixes="unsafe")
-def quaternion(robot: Facts) -> Iterator[Defect]:
+@rule("XML014", "unsupported-quaternion", "error", fixes="unsafe")
+def unsupported_quaternion(robot: Facts) -> Iterator[Violation]:
     """A rotation is written as a quaternion, which simulators skip.
 
     `quat_xyzw` came with URDF 1.1. MuJoCo and yourdfpy take such an origin for one that is not

@@ -19,7 +19,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.effort import effort_of
 from terrainkit_robots.description.model import Joint, Mimic, Source
 from terrainkit_robots.lint.compare.body_masses import body_gap, dropped_mass, is_known, share
-from terrainkit_robots.lint.rule import Defect, Severity, rule
+from terrainkit_robots.lint.rule import Severity, Violation, rule
 from terrainkit_robots.text import names, short
 from terrainkit_robots.transforms import Matrix
 
@@ -103,7 +103,7 @@ def _called(one: Joint, other: Joint) -> str:
 
 
 @rule("XRF001", "joint-set-differs", "error", needs=("against",))
-def joint_set_differs(robot: Facts) -> Iterator[Defect]:
+def joint_set_differs(robot: Facts) -> Iterator[Violation]:
     """One of the two files has a joint that the other lacks.
 
     A policy has as many actions as the robot has joints. What was trained on one file does not fit
@@ -131,7 +131,7 @@ def joint_set_differs(robot: Facts) -> Iterator[Defect]:
     renamed = pairing.joint_names.renamed
     if renamed:
         listed = names([f"{a} is {b}" for a, b in renamed])
-        yield Defect(
+        yield Violation(
             subject=renamed[0][0],
             source=next(j.source for j in robot.joints if j.name == renamed[0][0]),
             severity="info",
@@ -156,10 +156,10 @@ def _held_by(robot: Facts, joint: Joint) -> Source | None:
     return above.source if above is not None and above.kind == "fixed" else None
 
 
-def _lone(joints: Sequence[Joint], what: str, source: Source, robot: Facts) -> Defect:
+def _lone(joints: Sequence[Joint], what: str, source: Source, robot: Facts) -> Violation:
     count, there = (len(robot.joints), len(_other(robot).joints)), _there(robot)
     listed = names(joint.name for joint in joints)
-    return Defect(
+    return Violation(
         subject=joints[0].name,
         source=source,
         message=f"{f'joint {listed} is' if len(joints) == 1 else f'{len(joints)} joints are'} "
@@ -178,7 +178,7 @@ def _count(number: int, noun: str) -> str:
 
 
 @rule("XRF002", "joint-differs", "error", needs=("against",))
-def joint_differs(robot: Facts) -> Iterator[Defect]:
+def joint_differs(robot: Facts) -> Iterator[Violation]:
     """A joint moves another way than in the other file.
 
     It slides in one and turns in the other, turns about another axis or the other way round, or
@@ -196,7 +196,7 @@ def joint_differs(robot: Facts) -> Iterator[Defect]:
     for one, other in _joints(robot):
         what, severity = _unlike(robot, one, other)
         if what:
-            yield Defect(
+            yield Violation(
                 subject=one.name,
                 source=one.source,
                 severity=severity,
@@ -273,7 +273,7 @@ def _alike(robot: Facts, one: Joint, other: Joint) -> bool:
 
 
 @rule("XRF003", "joint-limits-differ", "warning", needs=("against",))
-def limits_differ(robot: Facts) -> Iterator[Defect]:
+def limits_differ(robot: Facts) -> Iterator[Violation]:
     """A joint has other limits than in the other file.
 
     Limits clip targets, end episodes and are what rewards keep away from. A policy from one
@@ -344,11 +344,11 @@ def _grouped(
 
 def _joints_defect(
     group: Sequence[tuple[Joint, Joint]], what: str, severity: Severity | None = None
-) -> Defect:
+) -> Violation:
     one, other = group[0]
     listed = names(_called(a, b) for a, b in group)
     several = f"{len(group)} joints ({listed}) have" if len(group) > 1 else f"joint {listed} has"
-    return Defect(
+    return Violation(
         subject=one.name,
         source=(one.limit or one).source,
         severity=severity,
@@ -358,7 +358,7 @@ def _joints_defect(
 
 
 @rule("XRF004", "joint-order-differs", "warning", needs=("against",))
-def joint_order_differs(robot: Facts) -> Iterator[Defect]:
+def joint_order_differs(robot: Facts) -> Iterator[Violation]:
     """The joints come in another order than in the other file.
 
     Simulators number joints by the order in the file. Actions and observations of a policy that was
@@ -379,7 +379,7 @@ def joint_order_differs(robot: Facts) -> Iterator[Defect]:
         return
     there = _there(robot)
     few = len(common) < max(len(robot.joints), len(_other(robot).joints))
-    yield Defect(
+    yield Violation(
         subject=robot.model.title,
         source=robot.model.source,
         message=f"the joints {f'that both have ({len(common)}) ' if few else ''}come in another "
@@ -399,7 +399,7 @@ def _back(places: Sequence[int]) -> list[int]:
 
 
 @rule("XRF005", "actuator-order-differs", "warning", needs=("against",))
-def actuator_order_differs(robot: Facts) -> Iterator[Defect]:
+def actuator_order_differs(robot: Facts) -> Iterator[Violation]:
     """The actuators of a MJCF file come in another order than the joints.
 
     Controls go by actuator, positions by joint. Who sends actions in the order of the joints, as
@@ -450,13 +450,13 @@ def _against_joints(robot: Facts) -> str:
     )
 
 
-def _actuators(robot: Facts, message: str, severity: Severity | None = None) -> Defect:
+def _actuators(robot: Facts, message: str, severity: Severity | None = None) -> Violation:
     first = next((actuator.source for actuator in robot.model.actuators), robot.model.source)
-    return Defect(subject=robot.model.title, source=first, message=message, severity=severity)
+    return Violation(subject=robot.model.title, source=first, message=message, severity=severity)
 
 
 @rule("XRF006", "effort-differs", "warning", needs=("against",))
-def effort_differs(robot: Facts) -> Iterator[Defect]:
+def effort_differs(robot: Facts) -> Iterator[Violation]:
     """A joint has another largest torque or force than in the other file.
 
     The robot is stronger in one simulator than in the other: what it learns to do in the one, it
@@ -504,7 +504,7 @@ def effort_differs(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("XRF007", "total-mass-differs", "warning", needs=("against",))
-def total_mass_differs(robot: Facts) -> Iterator[Defect]:
+def total_mass_differs(robot: Facts) -> Iterator[Violation]:
     """The robot is heavier in one file than in the other.
 
     A part is missing in one of them, or counted twice. A policy learns how hard to push from the
@@ -526,7 +526,7 @@ def total_mass_differs(robot: Facts) -> Iterator[Defect]:
             raise CannotCheckError(f"masses of {_file(each)} hang on mesh files")
     apart = share(a, b)
     if apart > _MASS:
-        yield Defect(
+        yield Violation(
             subject=robot.model.title,
             source=robot.model.source,
             severity="error" if apart > _MASS_FAR else None,
@@ -548,14 +548,14 @@ def _heaviest_gaps(pairing: "Pairing") -> str:
     return f"; most of it: {', '.join(told)}" if told else ""
 
 
-def _as_it_stands(robot: Facts, other: Facts) -> Iterator[Defect]:
+def _as_it_stands(robot: Facts, other: Facts) -> Iterator[Violation]:
     """Yield what MuJoCo makes of the mass of a URDF whose MJCF floats."""
     for urdf, mjcf in ((robot, other), (other, robot)):
         floats = any(joint.kind == "floating" for joint in mjcf.model.joints)
         dropped = dropped_mass(urdf) if mjcf.model.kind == "mjcf" and floats else 0.0
         if dropped > _MASS * urdf.total_mass:
             root = urdf.bodies[0].top.name
-            yield Defect(
+            yield Violation(
                 subject=root,
                 source=robot.model.source,
                 severity="info",
@@ -569,7 +569,7 @@ def _as_it_stands(robot: Facts, other: Facts) -> Iterator[Defect]:
 
 
 @rule("XRF008", "kinematics-differ", "error", needs=("against",))
-def kinematics_differ(robot: Facts) -> Iterator[Defect]:
+def kinematics_differ(robot: Facts) -> Iterator[Violation]:
     """With its joints at the same positions, a link is elsewhere than in the other file.
 
     A length, an origin or the zero of a joint differs. Feet then touch the ground where the policy
@@ -591,7 +591,7 @@ def kinematics_differ(robot: Facts) -> Iterator[Defect]:
     same_base = gap.base[0] == gap.base[1]
     links = {link.name: link for link in robot.links}
     subject = gap.base[0] if gap.base_only else gap.first
-    yield Defect(
+    yield Violation(
         subject=subject,
         source=links[subject].source,
         severity=_severity(gap, same_base),
@@ -642,7 +642,7 @@ def _gap_message(gap: "KinematicDifference", there: str) -> str:
 
 
 @rule("XRF009", "inertia-differs", "warning", needs=("against",))
-def inertia_differs(robot: Facts) -> Iterator[Defect]:
+def inertia_differs(robot: Facts) -> Iterator[Violation]:
     """A body has another inertia, or its mass elsewhere, than in the other file.
 
     The total mass can agree while the robot is another one: top-heavy, or with feet that are harder
@@ -678,7 +678,7 @@ def inertia_differs(robot: Facts) -> Iterator[Defect]:
             )
         if what:
             link = next(link for link in one.links if link.name == one.name)
-            yield Defect(
+            yield Violation(
                 subject=one.name,
                 source=(link.inertial or link).source,
                 message=f"body {short(one.name)} {what}",

@@ -8,7 +8,7 @@ from terrainkit_robots.analysis.bodies.joint_order import actuator_order, is_mov
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.effort import effort_of
 from terrainkit_robots.description.model import Joint
-from terrainkit_robots.lint.rule import Defect, rule
+from terrainkit_robots.lint.rule import Violation, rule
 from terrainkit_robots.spec.per_joint import match_joints
 from terrainkit_robots.text import closest, names, short
 
@@ -47,10 +47,10 @@ def _found(robot: Facts) -> dict[str, Joint]:
 
 def _at(
     robot: Facts, subject: str, message: str, measured: Mapping[str, float] | None = None
-) -> Defect:
+) -> Violation:
     """Return a defect at the joint or link of that name, or at the robot."""
     place = _found(robot).get(subject) or robot.tree.links.get(subject)
-    return Defect(
+    return Violation(
         subject=short(subject) or robot.model.title,
         source=place.source if place is not None else robot.model.source,
         message=message,
@@ -64,7 +64,7 @@ def _meant(name: str, known: Sequence[str]) -> str:
 
 
 @rule("XRF010", "spec-joints", "error", needs=("spec",))
-def spec_joints(robot: Facts) -> Iterator[Defect]:
+def spec_joints(robot: Facts) -> Iterator[Violation]:
     """The joints of the spec are not those that the robot's motors drive.
 
     Actions and observations have one number for each joint in `joint_order`. A name that is not
@@ -97,7 +97,7 @@ def spec_joints(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("XRF011", "spec-joint-order", "warning", needs=("spec",))
-def spec_joint_order(robot: Facts) -> Iterator[Defect]:
+def spec_joint_order(robot: Facts) -> Iterator[Violation]:
     """The spec has the joints in another order than the file.
 
     A policy that was trained in one order and runs in the other moves the wrong legs. Numbers have
@@ -117,7 +117,7 @@ def spec_joint_order(robot: Facts) -> Iterator[Defect]:
     if places is None or not is_moved(places):
         return
     first = next(k for k, place in enumerate(places) if place != k)
-    yield Defect(
+    yield Violation(
         subject=robot.model.title,
         source=robot.model.source,
         message=(
@@ -130,7 +130,7 @@ def spec_joint_order(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("XRF012", "spec-tables", "error", needs=("spec",))
-def spec_tables(robot: Facts) -> Iterator[Defect]:
+def spec_tables(robot: Facts) -> Iterator[Violation]:
     """A table of the spec does not match each joint exactly once.
 
     A joint without a gain would hang limp, and of two keys that match one joint it is open which
@@ -152,7 +152,7 @@ def spec_tables(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("XRF013", "spec-feet", "error", needs=("spec", "legs"))
-def spec_feet(robot: Facts) -> Iterator[Defect]:
+def spec_feet(robot: Facts) -> Iterator[Violation]:
     """The feet of the spec are not those that the robot stands on.
 
     Rewards for air time and slipping are given for contacts of the feet. With a foot missing, or a
@@ -188,7 +188,7 @@ def spec_feet(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("XRF014", "spec-bodies", "error", needs=("spec",))
-def spec_bodies(robot: Facts) -> Iterator[Defect]:
+def spec_bodies(robot: Facts) -> Iterator[Violation]:
     """The spec names a body that the robot has not, or has bodies of legs in another order.
 
     A contact of a body that is not there is never felt: an episode does not end when the robot
@@ -215,7 +215,7 @@ def spec_bodies(robot: Facts) -> Iterator[Defect]:
 
 def _astray(
     robot: Facts, field: str, bodies: Sequence[str], feet: Sequence[str]
-) -> Iterator[Defect]:
+) -> Iterator[Violation]:
     """Yield bodies of legs that carry another foot than the one at their place."""
     if len(bodies) != len(feet) or any(n not in robot.body_of for n in (*bodies, *feet)):
         return
@@ -238,7 +238,7 @@ def _carries(robot: Facts, name: str, foot: str) -> bool:
 
 
 @rule("XRF015", "spec-pose", "error", needs=("spec",))
-def spec_pose(robot: Facts) -> Iterator[Defect]:
+def spec_pose(robot: Facts) -> Iterator[Violation]:
     """The default pose of the spec is outside of a joint's limits.
 
     The simulator pushes the joint back at the first step, and an action of 0 asks for a position
@@ -268,7 +268,7 @@ def spec_pose(robot: Facts) -> Iterator[Defect]:
 
 
 @rule("XRF016", "spec-motor-limits", "warning", needs=("spec",))
-def spec_motor_limits(robot: Facts) -> Iterator[Defect]:
+def spec_motor_limits(robot: Facts) -> Iterator[Violation]:
     """The spec gives a motor more torque or speed than the file declares.
 
     The policy learns to use what the motor does not have, and fails on the robot.
@@ -292,7 +292,7 @@ def _stronger(
     table: str,
     declared: Callable[[Joint], float | None],
     unit_of: Callable[[Joint], str],
-) -> Iterator[Defect]:
+) -> Iterator[Violation]:
     found = {joint.name: joint for joint in robot.actuated}
     for name, value in match_joints(getattr(_spec(robot), table), _joints(robot)).values.items():
         limit = declared(found[name])
@@ -307,7 +307,7 @@ def _stronger(
 
 
 @rule("XRF017", "spec-mirror", "error", needs=("spec",))
-def spec_mirror(robot: Facts) -> Iterator[Defect]:
+def spec_mirror(robot: Facts) -> Iterator[Violation]:
     """The mirror map of the spec does not fit the joints of the robot.
 
     Mirrored experience teaches a policy to walk alike on both sides. With a wrong twin or sign half

@@ -9,7 +9,7 @@ from lxml import etree
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.urdf.reader import rotation_of
 
 FILE = Path("/robots/robot.urdf")
@@ -17,7 +17,7 @@ FILE = Path("/robots/robot.urdf")
 
 def bodies(inner):
     text = f'<robot name="r">{inner}</robot>'
-    return Facts(read_robot(FILE, contents={FILE: text.encode()})).bodies
+    return Facts(load_robot(FILE, contents={FILE: text.encode()})).bodies
 
 
 def link(name, mass=None, xyz="0 0 0", inertia="1 1 1 0 0 0", rpy="0 0 0", shape=""):
@@ -272,7 +272,7 @@ def compiled(path):
 def test_merged_bodies_are_as_mujoco_merges_them(name, robot_file):
     path = bundled.find(name) if name in bundled.names() else robot_file(name)
     model = compiled(path)
-    merged = Facts(read_robot(path)).bodies
+    merged = Facts(load_robot(path)).bodies
     assert len(merged) == model.nbody - 1
     for body in merged:
         theirs = model.body(body.top.name)

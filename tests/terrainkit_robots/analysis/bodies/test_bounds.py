@@ -4,7 +4,7 @@ import trimesh
 
 from terrainkit_robots.analysis.bodies.bounds import extents_of, half_diagonal
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.mesh.mesh_cache import Meshes
 
 ARM = """<robot name="arm">
@@ -36,7 +36,7 @@ def robot(tmp_path):
         (tmp_path / "arm.urdf").write_text(ARM.format(shapes="".join(shapes)))
         if bar:
             trimesh.creation.box((0.1, 0.1, 2.0)).export(tmp_path / "bar.stl")
-        return Facts(read_robot(tmp_path / "arm.urdf"), Counting())
+        return Facts(load_robot(tmp_path / "arm.urdf"), Counting())
 
     return make
 

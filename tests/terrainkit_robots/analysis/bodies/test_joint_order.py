@@ -10,7 +10,7 @@ from terrainkit_robots.analysis.bodies.joint_order import (
 )
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 
 NAMES = st.permutations([f"j{k}" for k in range(12)])
 
@@ -35,12 +35,12 @@ def test_other_names_have_no_permutation():
 
 def test_the_order_of_the_tree_is_depth_first():
     path = bundled.find("quadruped")
-    robot = Facts(read_robot(path))
+    robot = Facts(load_robot(path))
     legs = ("FL", "FR", "RL", "RR")
     wanted = tuple(f"{leg}_{part}_joint" for leg in legs for part in ("hip", "thigh", "calf"))
     assert tree_order(robot) == wanted
     assert actuator_order(robot) == ()
-    assert actuator_order(Facts(read_robot(path.with_suffix(".xml")))) == wanted
+    assert actuator_order(Facts(load_robot(path.with_suffix(".xml")))) == wanted
 
 
 def test_only_the_first_motor_of_a_joint_counts_and_only_those_of_joints(tmp_path):
@@ -52,4 +52,4 @@ def test_only_the_first_motor_of_a_joint_counts_and_only_those_of_joints(tmp_pat
         '</body></worldbody><actuator><motor joint="two"/><motor site="s"/><motor joint="one"/>'
         '<motor joint="two"/></actuator></mujoco>'
     )
-    assert actuator_order(Facts(read_robot(path))) == ("two", "one")
+    assert actuator_order(Facts(load_robot(path))) == ("two", "one")

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from terrainkit_robots.analysis.bodies.kinematics import ancestors, axis_in_trunk, body_poses
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.transforms import axis_angle_to_matrix
 
 BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]
@@ -33,7 +33,7 @@ MJCFS = [
 
 def facts(text, name="robot.urdf"):
     file = Path("/robots") / name
-    return Facts(read_robot(file, contents={file: text.encode()}))
+    return Facts(load_robot(file, contents={file: text.encode()}))
 
 
 def path_of(name, robot_file):
@@ -195,7 +195,7 @@ def test_many_angles_at_once():
 def test_urdfs_move_as_in_yourdfpy(name, robot_file):
     yourdfpy = pytest.importorskip("yourdfpy")
     path = path_of(name, robot_file)
-    robot = Facts(read_robot(path))
+    robot = Facts(load_robot(path))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         other = yourdfpy.URDF.load(path, load_meshes=False, build_scene_graph=True)
@@ -250,7 +250,7 @@ def without_meshes(path):
 @pytest.mark.parametrize("name", MJCFS)
 def test_mjcfs_move_as_in_mujoco(name, robot_file):
     path = path_of(name, robot_file)
-    robot, model = Facts(read_robot(path)), without_meshes(path)
+    robot, model = Facts(load_robot(path)), without_meshes(path)
     rng = np.random.default_rng(0)
     for _ in range(5):
         assert same_as_mujoco(robot, model, rng) >= 11

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.bodies.mimic_joints import follower_positions, followers
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 
 
 def chain(tmp_path, *mimics):
@@ -20,7 +20,7 @@ def chain(tmp_path, *mimics):
     )
     path = tmp_path / "robot.urdf"
     path.write_text(f'<robot name="r">{links}{joints}</robot>')
-    return Facts(read_robot(path))
+    return Facts(load_robot(path))
 
 
 def follows(joint, multiplier=1.0, offset=0.0):
@@ -70,7 +70,7 @@ def test_a_joint_that_does_not_move_is_not_followed(tmp_path):
     robot = chain(tmp_path, "", follows("jA", 2, 1))
     path = tmp_path / "robot.urdf"
     path.write_text(path.read_text().replace('"prismatic"', '"fixed"', 1))
-    assert follower_positions(Facts(read_robot(path)).joints, {"jA": 1.0}) == {}
+    assert follower_positions(Facts(load_robot(path)).joints, {"jA": 1.0}) == {}
     assert len(robot.joints) == 2
 
 

@@ -8,14 +8,14 @@ import pytest
 
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 
 FILE = Path("/robots/robot.urdf")
 BOX = '<box size="0.2 0.2 0.2"/>'
 
 
 def scene(text, file=FILE):
-    return Facts(read_robot(file, contents={file: text.encode()})).overlaps
+    return Facts(load_robot(file, contents={file: text.encode()})).overlaps
 
 
 def link(name, *shapes):
@@ -267,6 +267,6 @@ def test_a_heap_of_shapes_is_not_compared():
 
 @pytest.mark.parametrize("name", ["a1/urdf/a1.urdf", "go2/urdf/go2.urdf"])
 def test_a_standing_robot_does_not_overlap_itself(name, robot_file):
-    facts = Facts(read_robot(robot_file(name)))
+    facts = Facts(load_robot(robot_file(name)))
     assert facts.stance is not None
     assert [o.depth for o in facts.overlaps.overlaps(facts.positions) if o.depth > 0.001] == []

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from terrainkit_robots.analysis.bodies.tree import build_tree
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import Joint, Link, RobotModel, Source
 
 SOURCE = Source(file=Path("robot.urdf"), line=1)
@@ -215,7 +215,7 @@ def test_the_order_of_joints_does_not_change_the_tree(order):
 
 
 def test_a_real_robot_in_full(robot_file):
-    model = read_robot(robot_file("g1/g1_29dof.urdf"))
+    model = load_robot(robot_file("g1/g1_29dof.urdf"))
     sound = build_tree(model)
     assert sound.roots == ("pelvis",)
     assert set(sound.order) == {link.name for link in model.links}

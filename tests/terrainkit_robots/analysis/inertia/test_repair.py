@@ -7,7 +7,7 @@ import pytest
 import terrainkit_robots
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.inertia.repair import repair
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.fixes.edits import edit_bytes
 from terrainkit_robots.mesh.mesh_cache import Meshes
 
@@ -35,7 +35,7 @@ def repaired(tmp_path):
     def make(text, link):
         path = tmp_path / "robot.xml"
         path.write_text(text)
-        facts = Facts(read_robot(path), Meshes())
+        facts = Facts(load_robot(path), Meshes())
         fix = repair(facts, facts.tree.links[link])
         assert fix is not None
         data = edit_bytes(path.read_bytes(), fix.edits)
@@ -104,5 +104,5 @@ def test_a_full_one_stays_full(repaired):
 def test_what_mujoco_makes_of_shapes_has_no_repair(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(ARM.format(inertia='diaginertia="1 1 1"'))
-    facts = Facts(read_robot(path), Meshes())
+    facts = Facts(load_robot(path), Meshes())
     assert repair(facts, facts.tree.links["base"]) is None

@@ -8,7 +8,7 @@ from lxml import etree
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 
 FILE = Path("/robots/robot.urdf")
 BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]
@@ -55,14 +55,14 @@ def path_of(name, robot_file):
 
 def facts(text, file=FILE):
     return Facts(
-        read_robot(file, contents={file: text if isinstance(text, bytes) else text.encode()})
+        load_robot(file, contents={file: text if isinstance(text, bytes) else text.encode()})
     )
 
 
 @pytest.mark.parametrize("name", KNOWN)
 def test_legs_of_known_robots(name, robot_file):
     feet, roles, length = KNOWN[name]
-    legs = Facts(read_robot(path_of(name, robot_file))).legs
+    legs = Facts(load_robot(path_of(name, robot_file))).legs
     assert [leg.foot for leg in legs] == feet
     assert {leg.roles for leg in legs} == {roles}
     for leg in legs:
@@ -73,7 +73,7 @@ def test_legs_of_known_robots(name, robot_file):
 
 
 def test_joints_by_their_role(robot_file):
-    leg = Facts(read_robot(path_of("h1/urdf/h1.urdf", robot_file))).legs[0]
+    leg = Facts(load_robot(path_of("h1/urdf/h1.urdf", robot_file))).legs[0]
     assert leg.joint("yaw").name == "left_hip_yaw_joint"
     assert leg.joint("hip").name == "left_hip_pitch_joint"
     assert leg.joint("knee").name == "left_knee_joint"
@@ -130,7 +130,7 @@ def original(robot_file):
             root = etree.parse(str(path)).getroot()
             for visual in list(root.iter("visual")):
                 visual.getparent().remove(visual)
-            read[name] = path, root, Facts(read_robot(path, contents={path: etree.tostring(root)}))
+            read[name] = path, root, Facts(load_robot(path, contents={path: etree.tostring(root)}))
         return read[name]
 
     def changed(name, change, *arguments):

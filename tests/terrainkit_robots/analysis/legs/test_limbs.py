@@ -5,7 +5,7 @@ import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.limbs import forks
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 
 FILE = Path("/robots/robot.urdf")
 
@@ -48,7 +48,7 @@ def limb(name, root, lengths=(0.3, 0.3), parent="trunk", kind="revolute"):
 def facts(*parts, trunk=None):
     inner = (link("trunk", mass=10) if trunk is None else trunk) + "".join(parts)
     text = f'<robot name="r">{inner}</robot>'
-    return Facts(read_robot(FILE, contents={FILE: text.encode()}))
+    return Facts(load_robot(FILE, contents={FILE: text.encode()}))
 
 
 def scores(robot):
@@ -93,7 +93,7 @@ def test_one_joint_is_no_limb():
 
 def test_a_trunk_alone_has_no_limbs():
     assert facts().limbs == ()
-    assert Facts(read_robot(FILE, contents={FILE: b'<robot name="r"/>'})).limbs == ()
+    assert Facts(load_robot(FILE, contents={FILE: b'<robot name="r"/>'})).limbs == ()
 
 
 def test_joints_that_follow_others_do_not_count():
@@ -122,7 +122,7 @@ def test_joints_count_that_a_motor_or_a_tendon_drives(actuators, count):
         f"</tendon><actuator>{actuators}</actuator></mujoco>"
     )
     file = Path("/robots/robot.xml")
-    assert len(Facts(read_robot(file, contents={file: text.encode()})).limbs) == count
+    assert len(Facts(load_robot(file, contents={file: text.encode()})).limbs) == count
 
 
 def test_a_wheel_does_not_bend_a_limb():

@@ -14,7 +14,7 @@ from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.stance import GRAVITY, ground_forces, stand
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 
 FILE = Path("/robots/robot.urdf")
 BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]
@@ -38,7 +38,7 @@ def path_of(name, robot_file):
 
 @cache
 def read(path):
-    return Facts(read_robot(path))
+    return Facts(load_robot(path))
 
 
 def afloat(path):
@@ -139,7 +139,7 @@ def test_torques_are_what_holds_the_joints_in_mujoco(name, robot_file):
 def test_a_waist_carries_what_all_legs_below_it_do(tmp_path):
     # The legs of the bundled biped under a waist that leans, with a torso on the other side.
     text = bundled.find("biped").read_text()
-    model = read_robot(bundled.find("biped"))
+    model = load_robot(bundled.find("biped"))
     trunk = Facts(model).bodies[0].top.name
     inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
     text = text.replace(
@@ -152,7 +152,7 @@ def test_a_waist_carries_what_all_legs_below_it_do(tmp_path):
     )
     path = tmp_path / "waist.urdf"
     path.write_text(text)
-    facts = Facts(read_robot(path))
+    facts = Facts(load_robot(path))
     assert [leg.roles[0] for leg in facts.legs] == ["waist", "waist"]
     assert facts.stance.positions["waist"] == 0.05
     assert abs(facts.stance.torques["waist"]) > 1
@@ -216,7 +216,7 @@ def table(leg_mass=0.0, trunk_mass=12.0, foot=0.02):
             joint(f"{side}_knee", f"{side}_thigh", f"{side}_shank", "0 0 -0.3", -2.5, 0),
         ]
     text = f'<robot name="table">{"".join(parts)}</robot>'
-    return Facts(read_robot(FILE, contents={FILE: text.encode()}))
+    return Facts(load_robot(FILE, contents={FILE: text.encode()}))
 
 
 def at(hip, knee):

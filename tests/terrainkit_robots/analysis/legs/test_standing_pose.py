@@ -17,7 +17,7 @@ from terrainkit_robots.analysis.legs.standing_pose import (
     solve_positions,
 )
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import Joint, Limit, Source
 
 FILE = Path("/robots/robot.urdf")
@@ -41,7 +41,7 @@ def load(name, robot_file):
 
 @cache
 def read(path):
-    return Facts(read_robot(path))
+    return Facts(load_robot(path))
 
 
 def joint(lower, upper, kind="revolute"):
@@ -187,7 +187,7 @@ def table(center="0 0 0", **each):
         f'<robot name="r"><link name="trunk"><inertial><origin xyz="{center}"/><mass value="20"/>'
         f'<inertia ixx="1" iyy="1" izz="1"/></inertial></link>{legs}</robot>'
     )
-    return Facts(read_robot(FILE, contents={FILE: text.encode()}))
+    return Facts(load_robot(FILE, contents={FILE: text.encode()}))
 
 
 def feet(robot):
@@ -263,7 +263,7 @@ def test_any_leg_stands_where_it_should(thigh, ratio, lower, upper):
 
 def test_a_keyframe_is_taken_as_it_is():
     path = bundled.find("quadruped").with_suffix(".xml")
-    robot = Facts(read_robot(path))
+    robot = Facts(load_robot(path))
     assert robot.model.home
     assert solve_positions(robot) == {j.name: robot.model.home[j.name] for j in robot.joints}
 
@@ -273,7 +273,7 @@ def test_a_robot_without_legs_is_left_as_it_is():
         '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="revolute">'
         '<parent link="a"/><child link="b"/><limit lower="0.5" upper="1"/></joint></robot>'
     )
-    robot = Facts(read_robot(FILE, contents={FILE: text.encode()}))
+    robot = Facts(load_robot(FILE, contents={FILE: text.encode()}))
     assert robot.stance is None
     assert solve_positions(robot) == {"j": 0.5}
 
@@ -289,5 +289,5 @@ def test_the_centre_of_mass_by_hand():
 
 def test_without_mass_the_centre_is_the_origin():
     text = '<robot name="r"><link name="a"/></robot>'
-    robot = Facts(read_robot(FILE, contents={FILE: text.encode()}))
+    robot = Facts(load_robot(FILE, contents={FILE: text.encode()}))
     assert center_of_mass(robot.bodies, body_poses(robot.bodies, {})).tolist() == [0, 0, 0]

@@ -13,7 +13,7 @@ from terrainkit_robots.analysis.meshes.uses import (
     replaced,
 )
 from terrainkit_robots.description.fix import SetAttribute, WriteFile
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 
 TWO_LINKS = """<robot name="r">
   <link name="a">
@@ -36,7 +36,7 @@ def robot(tmp_path):
         (tmp_path / "m").mkdir()
         (tmp_path / "m/foot.stl").write_bytes(b"x")
         (tmp_path / name).write_text(text)
-        return Facts(read_robot(tmp_path / name))
+        return Facts(load_robot(tmp_path / name))
 
     return make
 
@@ -104,7 +104,7 @@ def test_names_relative_to_a_link_to_the_robot(robot, tmp_path):
     elsewhere.mkdir(parents=True)
     (tmp_path / "linked").symlink_to(elsewhere)
     (elsewhere / "robot.urdf").write_text(TWO_LINKS)
-    facts = Facts(read_robot(tmp_path / "linked/robot.urdf"))
+    facts = Facts(load_robot(tmp_path / "linked/robot.urdf"))
     name = relative_name(facts, tmp_path / "m/foot.stl")
     assert (tmp_path / "linked" / name).samefile(tmp_path / "m/foot.stl")
 

@@ -3,7 +3,7 @@
 import pytest
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 
 INERTIAL = (
     '<inertial><mass value="1"/>'
@@ -33,7 +33,7 @@ def urdf(tmp_path):
         bodies = "".join(f'<link name="{name}">{INERTIAL}{SPHERE}</link>' for name in links)
         path = tmp_path / "robot.urdf"
         path.write_text(f'<robot name="r">{extra}{bodies}{"".join(parts)}</robot>')
-        return Facts(read_robot(path))
+        return Facts(load_robot(path))
 
     return make
 
@@ -45,6 +45,6 @@ def mjcf(tmp_path):
     def make(bodies):
         path = tmp_path / "robot.xml"
         path.write_text(f"<mujoco><worldbody>{bodies}</worldbody></mujoco>")
-        return Facts(read_robot(path))
+        return Facts(load_robot(path))
 
     return make

@@ -5,7 +5,7 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.simulator_conventions.armature import moved_by_joints
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 
 
 def test_a_point_mass_on_a_rod(mjcf):
@@ -42,7 +42,7 @@ def test_against_the_mass_matrix_of_mujoco(name):
     matrix = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, matrix)
     diagonal = {model.joint(i).name: matrix[model.jnt_dofadr[i]] for i in range(model.njnt)}
-    moved = moved_by_joints(Facts(read_robot(path)))
+    moved = moved_by_joints(Facts(load_robot(path)))
     assert moved
     for each in moved:
         at = model.joint(each.joint.name).dofadr[0]

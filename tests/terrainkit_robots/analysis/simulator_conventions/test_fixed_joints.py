@@ -10,7 +10,7 @@ from terrainkit_robots.analysis.simulator_conventions.fixed_joints import (
     merged_joints,
 )
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 
 
 def homes(facts, simulator):
@@ -43,7 +43,7 @@ def test_the_bodies_of_mjcf_are_not_merged(mjcf):
 
 @pytest.mark.parametrize("name", ["quadruped.urdf", "quadruped.xml"])
 def test_feet_are_merged_into_shanks_where_nothing_keeps_them(name):
-    merges = foot_merges(Facts(read_robot(bundled.find("quadruped").with_name(name))))
+    merges = foot_merges(Facts(load_robot(bundled.find("quadruped").with_name(name))))
     if name.endswith("xml"):
         assert merges == ()
         return
@@ -55,12 +55,12 @@ def test_feet_are_merged_into_shanks_where_nothing_keeps_them(name):
 def test_feet_without_the_attribute_are_merged_everywhere(tmp_path):
     text = bundled.find("quadruped").read_text().replace('dont_collapse="true"', "")
     (tmp_path / "robot.urdf").write_text(text)
-    merges = foot_merges(Facts(read_robot(tmp_path / "robot.urdf")))
+    merges = foot_merges(Facts(load_robot(tmp_path / "robot.urdf")))
     assert {simulator for each in merges for simulator in each.into} == set(SIMULATORS)
 
 
 def test_feet_that_are_the_last_body_are_never_merged():
-    assert foot_merges(Facts(read_robot(bundled.find("biped")))) == ()
+    assert foot_merges(Facts(load_robot(bundled.find("biped")))) == ()
 
 
 def test_each_simulator_has_its_own_way_to_keep_a_link():
@@ -69,6 +69,6 @@ def test_each_simulator_has_its_own_way_to_keep_a_link():
 
 def test_no_links(tmp_path):
     (tmp_path / "robot.urdf").write_text('<robot name="r"/>')
-    facts = Facts(read_robot(tmp_path / "robot.urdf"))
+    facts = Facts(load_robot(tmp_path / "robot.urdf"))
     assert merge(facts, set()) is None
     assert foot_merges(facts) == ()

@@ -12,7 +12,7 @@ from terrainkit_robots.analysis.simulator_conventions.joint_order import (
     simulator_orders,
 )
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 
 SHARED = [
@@ -159,7 +159,7 @@ def test_bodies_with_several_joints_are_to_be_verified(mjcf):
     ],
 )
 def test_isaac_orders_are_those_that_were_published(robot_file, name, legs, parts):
-    found = orders(Facts(read_robot(robot_file(name))))
+    found = orders(Facts(load_robot(robot_file(name))))
     assert found["Isaac Gym"].joints == tuple(leg + part for leg in legs for part in parts)
     assert found["Isaac Lab"].joints == tuple(leg + part for part in parts for leg in legs)
     assert not found["Isaac Lab"].certain  # an importer that keeps the file's order gives another
@@ -167,7 +167,7 @@ def test_isaac_orders_are_those_that_were_published(robot_file, name, legs, part
 
 
 def test_isaac_lab_goes_through_g1_as_nvidia_publishes_it(robot_file):
-    order = orders(Facts(read_robot(robot_file("g1/g1_29dof.urdf"))))["Isaac Lab"]
+    order = orders(Facts(load_robot(robot_file("g1/g1_29dof.urdf"))))["Isaac Lab"]
     assert order.certain
     assert order.joints[:9] == (
         "left_hip_pitch_joint",
@@ -213,7 +213,7 @@ def listed(model):
 
 
 def check(path, compiled):
-    order = orders(Facts(read_robot(path)))["MuJoCo"]
+    order = orders(Facts(load_robot(path)))["MuJoCo"]
     assert (order.joints, order.bodies) == compiled
     assert order.certain
 
@@ -264,7 +264,7 @@ def test_nothing_to_order(tmp_path):
     path = Path(tmp_path / "robot.urdf")
     path.write_text('<robot name="r"/>')
     assert all(
-        order.joints == order.bodies == () for order in simulator_orders(Facts(read_robot(path)))
+        order.joints == order.bodies == () for order in simulator_orders(Facts(load_robot(path)))
     )
 
 

@@ -11,7 +11,7 @@ from terrainkit_robots.analysis.simulator_conventions.loading import (
     refused_by_yourdfpy,
 )
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 
 BODY = '<body><freejoint/><geom size="0.1"/></body>'
 
@@ -19,15 +19,15 @@ BODY = '<body><freejoint/><geom size="0.1"/></body>'
 def facts_of(folder, text, name="robot.xml"):
     path = folder / name
     path.write_text(text)
-    return Facts(read_robot(path))
+    return Facts(load_robot(path))
 
 
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
 def test_the_bundled_robots_load(name):
     for suffix in (".urdf", ".xml"):
-        facts = Facts(read_robot(bundled.find(name).with_suffix(suffix)))
+        facts = Facts(load_robot(bundled.find(name).with_suffix(suffix)))
         assert refused_by_mujoco(facts) is None
-    assert refused_by_yourdfpy(Facts(read_robot(bundled.find(name)))) is None
+    assert refused_by_yourdfpy(Facts(load_robot(bundled.find(name)))) is None
 
 
 def test_the_words_of_mujoco_and_the_element(tmp_path):

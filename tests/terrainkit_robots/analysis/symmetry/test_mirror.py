@@ -9,7 +9,7 @@ from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.symmetry.mirror import Mirror, swap_sides
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 
 FILE = Path("/robots/robot.urdf")
 BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]
@@ -31,7 +31,7 @@ every_robot = pytest.mark.parametrize("name", PAIRS)
 def load(name, robot_file):
     stem, suffix = Path(name).stem, Path(name).suffix
     path = bundled.find(stem).with_suffix(suffix) if name in BUNDLED else robot_file(name)
-    return Facts(read_robot(path))
+    return Facts(load_robot(path))
 
 
 def facts(*joints):
@@ -44,7 +44,7 @@ def facts(*joints):
             f'<parent link="{parent}"/><child link="{child}"/><origin xyz="{xyz}"/>'
             f'<axis xyz="{axis}"/></joint>'
         )
-    return Facts(read_robot(FILE, contents={FILE: f'<robot name="r">{text}</robot>'.encode()}))
+    return Facts(load_robot(FILE, contents={FILE: f'<robot name="r">{text}</robot>'.encode()}))
 
 
 def pairs(robot):
@@ -278,14 +278,14 @@ def test_a_robot_that_walks_along_y_is_mirrored_across_x():
 def test_a_robot_beside_its_own_origin_is_mirrored_in_its_middle():
     # The frame of the trunk is that of a sensor at its side.
     path = bundled.find("quadruped")
-    plain = Facts(read_robot(path))
+    plain = Facts(load_robot(path))
     trunk = plain.bodies[0].top.name
     text = path.read_text().replace(
         "</robot>",
         '<link name="sensor"/><joint name="mounted" type="fixed"><parent link="sensor"/>'
         f'<child link="{trunk}"/><origin xyz="0 0.1 0"/></joint></robot>',
     )
-    robot = Facts(read_robot(FILE, contents={FILE: text.encode()}))
+    robot = Facts(load_robot(FILE, contents={FILE: text.encode()}))
     assert robot.bodies[0].top.name == "sensor"
     assert robot.mirror.offset == pytest.approx(0.1)
     assert plain.mirror.offset == 0
@@ -295,7 +295,7 @@ def test_a_robot_beside_its_own_origin_is_mirrored_in_its_middle():
 
 def test_robots_without_bodies_or_joints():
     assert facts().mirror.pairs == ()
-    assert Facts(read_robot(FILE, contents={FILE: b'<robot name="r"/>'})).mirror.pairs == ()
+    assert Facts(load_robot(FILE, contents={FILE: b'<robot name="r"/>'})).mirror.pairs == ()
 
 
 def test_thousands_of_bodies_are_no_trouble():

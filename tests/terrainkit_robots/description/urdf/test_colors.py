@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 
 FILE = Path("/robots/robot.urdf")
 BOX = '<geometry><box size="1 1 1"/></geometry>'
@@ -10,7 +10,7 @@ BOX = '<geometry><box size="1 1 1"/></geometry>'
 
 def visuals(inner):
     text = f'<robot name="r">{inner}</robot>'
-    model = read_robot(FILE, contents={FILE: text.encode()})
+    model = load_robot(FILE, contents={FILE: text.encode()})
     assert model.problems == ()
     return [visual.color for link in model.links for visual in link.visuals]
 
@@ -67,5 +67,5 @@ def test_no_color(material):
 
 def test_collision_shapes_have_none():
     text = f'<robot name="r"><link name="l"><collision>{BOX}{color("1 0 0 1")}</collision></link>'
-    model = read_robot(FILE, contents={FILE: f"{text}</robot>".encode()})
+    model = load_robot(FILE, contents={FILE: f"{text}</robot>".encode()})
     assert model.links[0].collisions[0].color is None

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.urdf.reader import rotation_of
 
 FILE = Path("/robots/robot.urdf")
@@ -22,7 +22,7 @@ URDFS = [
 
 
 def read(text):
-    return read_robot(FILE, contents={FILE: text.encode()})
+    return load_robot(FILE, contents={FILE: text.encode()})
 
 
 def robot(inner):
@@ -460,7 +460,7 @@ def both(request, robot_file):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         other = yourdfpy.URDF.load(path, load_meshes=False, build_scene_graph=False).robot
-    return read_robot(path), other
+    return load_robot(path), other
 
 
 def test_links_are_as_yourdfpy_reads_them(both):

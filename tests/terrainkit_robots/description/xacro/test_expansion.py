@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import Problem, RobotModel
 from terrainkit_robots.description.xacro.expansion import XacroError, expand_xacro
 from terrainkit_robots.description.xacro.process import _check_expression, _RefusedError
@@ -74,7 +74,7 @@ def test_everything_that_robots_use_is_expanded(tmp_path: Path) -> None:
             "values.yaml": "mass: 1.5",
         },
     )
-    robot = read_robot(file, xacro_arguments={"prefix": "front"})
+    robot = load_robot(file, xacro_arguments={"prefix": "front"})
     assert robot.problems == ()
     assert robot.kind == "xacro"
     assert places(robot) == {
@@ -100,7 +100,7 @@ def test_packages_are_found_where_they_are_given(tmp_path: Path) -> None:
     part = tmp_path / "elsewhere" / "part.xacro"
     part.parent.mkdir()
     part.write_text(wrapped('<link name="found"/>'))
-    robot = read_robot(file, packages={"other": part.parent})
+    robot = load_robot(file, packages={"other": part.parent})
     assert [each.name for each in robot.links] == ["found"]
     assert robot.links[0].source.file == part
 
@@ -109,7 +109,7 @@ def test_packages_are_found_by_their_package_xml(tmp_path: Path) -> None:
     file = write(tmp_path, '<xacro:include filename="$(find my_robot)/urdf/part.xacro"/>')
     (tmp_path / "pack" / "package.xml").write_text("<package><name>my_robot</name></package>")
     (file.parent / "part.xacro").write_text(wrapped('<link name="found"/>'))
-    assert [each.name for each in read_robot(file).links] == ["found"]
+    assert [each.name for each in load_robot(file).links] == ["found"]
 
 
 @pytest.mark.parametrize(
@@ -166,7 +166,7 @@ def only(robot: RobotModel) -> Problem:
 
 
 def test_a_robot_that_cannot_be_expanded_has_one_problem(tmp_path: Path) -> None:
-    robot = read_robot(write(tmp_path, '\n<link name="$(arg side)"/>'))
+    robot = load_robot(write(tmp_path, '\n<link name="$(arg side)"/>'))
     assert robot.kind == "xacro"
     assert robot.links == ()
     problem = only(robot)
@@ -247,7 +247,7 @@ def test_secrets_of_the_environment_are_not_for_files(
     monkeypatch.setenv("ROBOT_MODEL", "big")
     monkeypatch.setenv("CI_TOKEN", "hidden")
     file = write(tmp_path, '<link name="$(env ROBOT_MODEL)$(optenv CI_TOKEN none)"/>')
-    assert [each.name for each in read_robot(file).links] == ["bignone"]
+    assert [each.name for each in load_robot(file).links] == ["bignone"]
 
 
 def test_a_fifo_does_not_hold_it_up(tmp_path: Path) -> None:
@@ -263,6 +263,6 @@ def test_a_relative_path_stays_as_it_was_given(
 ) -> None:
     file = write(tmp_path, '<link name="a"/>')
     monkeypatch.chdir(file.parent)
-    robot = read_robot(Path(file.name))
+    robot = load_robot(Path(file.name))
     assert robot.file == Path(file.name)
     assert robot.links[0].source.file == Path(file.name)

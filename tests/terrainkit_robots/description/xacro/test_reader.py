@@ -1,6 +1,6 @@
 import pytest
 
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.xacro.expansion import XacroError, expand_xacro
 
 HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
@@ -38,7 +38,7 @@ def test_macros_keep_the_lines_they_came_from(write):
         '<xacro:leg side="left" y="0.1"/>',
         '<xacro:leg side="right" y="${-0.1}"/>',
     )
-    model = read_robot(path)
+    model = load_robot(path)
     assert model.kind == "xacro"
     assert model.problems == ()
     assert [link.name for link in model.links] == ["base", "left_leg", "right_leg"]
@@ -53,11 +53,11 @@ def test_macros_keep_the_lines_they_came_from(write):
 
 def test_an_argument_is_given_or_named(write):
     path = write("r.xacro", '<link name="a"/>', '<link name="$(arg side)_b"/>')
-    (problem,) = read_robot(path).problems
+    (problem,) = load_robot(path).problems
     assert problem.code == "XML005"
     assert "--xacro-arg side:=VALUE" in problem.message
     assert problem.source.line == 3
-    model = read_robot(path, xacro_arguments={"side": "left"})
+    model = load_robot(path, xacro_arguments={"side": "left"})
     assert [link.name for link in model.links] == ["a", "left_b"]
 
 
@@ -65,13 +65,13 @@ def test_a_package_is_given_found_or_named(write):
     leg = write("legs_description/urdf/leg.xacro", '<link name="leg"/>')
     text = '<xacro:include filename="$(find legs_description)/urdf/leg.xacro"/>'
     path = write("somewhere/else/entirely/r.xacro", text)
-    model = read_robot(path, packages={"legs_description": leg.parents[1]})
+    model = load_robot(path, packages={"legs_description": leg.parents[1]})
     assert [link.name for link in model.links] == ["leg"]
     (leg.parents[1] / "package.xml").write_text("<package><name>legs_description</name></package>")
     beside = write("legs_description/robots/r.xacro", text)
-    assert [link.name for link in read_robot(beside).links] == ["leg"]
+    assert [link.name for link in load_robot(beside).links] == ["leg"]
     lost = write("r.xacro", '<xacro:include filename="$(find no_such_package_at_all)/x.xacro"/>')
-    (problem,) = read_robot(lost).problems
+    (problem,) = load_robot(lost).problems
     assert "--package no_such_package_at_all=FOLDER" in problem.message
 
 
@@ -88,7 +88,7 @@ def test_a_package_is_given_found_or_named(write):
     ],
 )
 def test_an_expression_that_must_not_run_is_a_problem(write, expression):
-    (problem,) = read_robot(write("r.xacro", f'<link name="{expression}"/>')).problems
+    (problem,) = load_robot(write("r.xacro", f'<link name="{expression}"/>')).problems
     assert problem.code == "XML005"
     assert "Traceback" not in problem.message
     assert "\n" not in problem.message
@@ -109,6 +109,6 @@ def test_time_and_memory_are_limited(write):
 def test_a_broken_file_is_told_once(write, tmp_path):
     path = tmp_path / "r.xacro"
     path.write_text(HEAD + '<link name="a">')
-    assert {problem.code for problem in read_robot(path).problems} == {"XML001"}
+    assert {problem.code for problem in load_robot(path).problems} == {"XML001"}
     include = write("s.xacro", '<xacro:include filename="r.xacro"/>')
-    assert [problem.code for problem in read_robot(include).problems] == ["XML005"]
+    assert [problem.code for problem in load_robot(include).problems] == ["XML005"]

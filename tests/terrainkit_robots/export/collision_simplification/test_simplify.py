@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from terrainkit_robots.analysis.bodies.shapes import volume
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import Geometry, Link, MeshFile, RobotModel, Source
 from terrainkit_robots.export.collision_simplification import simplify as module
 from terrainkit_robots.export.collision_simplification.simplify import VolumeError, treat
@@ -218,7 +218,7 @@ def test_the_same_each_time(how):
 
 
 def test_a_robot_of_meshes(robot_file):
-    model = read_robot(robot_file("h1/urdf/h1.urdf"))
+    model = load_robot(robot_file("h1/urdf/h1.urdf"))
     done = treat(model, Meshes(), "hull")
     assert len(done.errors) == 18
     # never smaller than the mesh, but for corners that a hull may not have

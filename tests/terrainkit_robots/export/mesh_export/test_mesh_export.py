@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import Geometry, Link, MeshFile, RobotModel, Source
 from terrainkit_robots.description.xml.document import RobotFileError
 from terrainkit_robots.export.mesh_export.mesh_export import pack
@@ -167,7 +167,7 @@ class TestPrimitives:
 
 @pytest.fixture(scope="module", params=["go2/urdf/go2.urdf", "h1/urdf/h1.urdf"])
 def source(robot_file, request):
-    return read_robot(robot_file(request.param))
+    return load_robot(robot_file(request.param))
 
 
 @pytest.fixture(scope="module")

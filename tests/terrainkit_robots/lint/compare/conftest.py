@@ -6,7 +6,7 @@ import pytest
 
 import terrainkit_robots
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 
 BUNDLED = Path(terrainkit_robots.__file__).parent / "description/bundled"
 
@@ -28,6 +28,6 @@ def robot_of(tmp_path):
         count += 1
         path = tmp_path / f"robot{count}{suffix}"
         path.write_text(text)
-        return Facts(read_robot(path))
+        return Facts(load_robot(path))
 
     return make

@@ -8,7 +8,7 @@ import pytest
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.compare.kinematics import largest_difference, random_positions
 from terrainkit_robots.lint.compare.mjcf_poses import mjcf_poses
 from terrainkit_robots.lint.compare.pairing import pair_robots
@@ -66,12 +66,12 @@ def test_it_agrees_on_turns_that_are_told_by_quaternions(tmp_path):
     text = ARM.replace('rpy="0.2 -0.3 0.4"', 'quat_xyzw="0.1 0.2 0.3 0.9"')
     assert text != ARM
     path.write_text(text)
-    assert worst(Facts(read_robot(path))) < 1e-9
+    assert worst(Facts(load_robot(path))) < 1e-9
 
 
 @pytest.mark.parametrize("name", REAL)
 def test_our_own_kinematics_agrees_on_real_robots(robot_file, name):
-    assert worst(Facts(read_robot(robot_file(name)))) < 1e-9
+    assert worst(Facts(load_robot(robot_file(name)))) < 1e-9
 
 
 @pytest.mark.parametrize("name", BUNDLED)
@@ -83,7 +83,7 @@ def test_our_own_kinematics_agrees_on_bundled_robots(robot_of, name):
 def test_a_joint_that_points_straight_up_is_exact(tmp_path, off):
     path = tmp_path / "arm.xacro"  # whose angles are written anew
     path.write_text(ARM.replace("0.2 -0.3 0.4", f"0.2 {math.pi / 2 - off!r} 0.4"))
-    robot = Facts(read_robot(path))
+    robot = Facts(load_robot(path))
     assert robot.model.kind == "xacro"
     assert worst(robot) < 1e-11
 
@@ -92,7 +92,7 @@ def test_a_joint_that_points_straight_up_is_exact(tmp_path, off):
 def test_a_slide_whose_axis_is_not_of_unit_length_goes_as_far_as_asked(tmp_path, kind):
     path = tmp_path / f"arm.{kind}"
     path.write_text(ARM)
-    robot = Facts(read_robot(path))
+    robot = Facts(load_robot(path))
     assert robot.model.kind == kind
     assert worst(robot) < 1e-12
 
@@ -225,8 +225,8 @@ def test_limits_that_make_no_sense_are_not_believed(robot_of, limit):
 
 
 def test_a_mjcf_whose_meshes_are_not_there(robot_file):
-    one = Facts(read_robot(robot_file("go2/urdf/go2.urdf")))
-    gap = largest_difference(one, Facts(read_robot(robot_file("go2_mjcf/go2.xml"))), poses=100)
+    one = Facts(load_robot(robot_file("go2/urdf/go2.urdf")))
+    gap = largest_difference(one, Facts(load_robot(robot_file("go2_mjcf/go2.xml"))), poses=100)
     assert gap.distance < 1e-4
     assert gap.base == ("base", "base_link")
 

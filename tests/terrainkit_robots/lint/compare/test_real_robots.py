@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.rule import rules
 from terrainkit_robots.lint.runner import lint
 
@@ -16,7 +16,7 @@ GO2 = [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]
 
 
 def compared(one, other):
-    report = lint(Facts(read_robot(one), against=Facts(read_robot(other))), XRF)
+    report = lint(Facts(load_robot(one), against=Facts(load_robot(other))), XRF)
     assert report.skipped == ()
     return report
 
@@ -114,8 +114,8 @@ def test_who_compares_nothing_does_not_import_yourdfpy(robot_of):
     code = (
         "import sys; from pathlib import Path; from terrainkit_robots.analysis.facts import Facts; "
         "from terrainkit_robots.lint.runner import lint; "
-        "from terrainkit_robots.description.load import read_robot; "
-        f"report = lint(Facts(read_robot(Path({str(file)!r}))), simulate=False); "
+        "from terrainkit_robots.description.load import load_robot; "
+        f"report = lint(Facts(load_robot(Path({str(file)!r}))), simulate=False); "
         "assert not any(f.code.startswith('XRF') for f in report.findings); "
         "assert 'yourdfpy' not in sys.modules"
     )

@@ -9,7 +9,7 @@ from terrainkit_robots.description.fix import Fix
 from terrainkit_robots.description.model import RobotModel, Source
 from terrainkit_robots.lint.report.repaired import Repaired
 from terrainkit_robots.lint.runner import Finding, Report, Skipped
-from terrainkit_robots.lint.selection import IdleComment, Ignored
+from terrainkit_robots.lint.selection import Suppressed, UnusedSuppression
 from terrainkit_robots.lint.suppressions import read_comments
 
 NASTY = 'a,b:c%d|e{0}<b>@me`*_\x1b[31m\r\n::error::x\u202e\udc80"'
@@ -61,8 +61,8 @@ def report(model, finding):
         skipped=(
             Skipped(code="SYM001", reason="no legs were found"),
             Skipped(code="SYM002", reason="no legs were found"),
-            Ignored(code="INR002", reason="ignored: so", comment=comment, finding=quiet),
-            IdleComment(code="INR999", reason="comment at robot.urdf:3: no such rule"),
+            Suppressed(code="INR002", reason="ignored: so", comment=comment, finding=quiet),
+            UnusedSuppression(code="INR999", reason="comment at robot.urdf:3: no such rule"),
         ),
     )
 

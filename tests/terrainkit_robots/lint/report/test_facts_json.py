@@ -4,12 +4,12 @@ import math
 import pytest
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
-from terrainkit_robots.lint.report.facts_json import facts_record, number
+from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.report.facts_json import facts_json, number
 
 
 def record(path):
-    made = facts_record(Facts(read_robot(path)))
+    made = facts_json(Facts(load_robot(path)))
     json.dumps(made, allow_nan=False)
     return made
 
@@ -75,9 +75,9 @@ def test_six_digits_are_kept(value, kept):
 
 
 def test_gains_need_a_simulation(robot_file):
-    robot = Facts(read_robot(robot_file("go2/urdf/go2.urdf")))
-    assert facts_record(robot)["suggested_gains"] is None
-    gains = facts_record(robot, simulated=True)["suggested_gains"]
+    robot = Facts(load_robot(robot_file("go2/urdf/go2.urdf")))
+    assert facts_json(robot)["suggested_gains"] is None
+    gains = facts_json(robot, simulated=True)["suggested_gains"]
     assert list(gains) == [joint.name for joint in robot.actuated]
     assert gains["FL_calf_joint"]["stiffness"] == 60
     assert gains["FL_calf_joint"]["reason"]
@@ -86,4 +86,4 @@ def test_gains_need_a_simulation(robot_file):
 def test_a_robot_that_cannot_be_simulated_gets_no_gains(tmp_path):
     path = tmp_path / "robot.urdf"
     path.write_text('<robot name="r"/>')
-    assert facts_record(Facts(read_robot(path)), simulated=True)["suggested_gains"] is None
+    assert facts_json(Facts(load_robot(path)), simulated=True)["suggested_gains"] is None

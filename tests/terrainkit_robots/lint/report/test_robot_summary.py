@@ -2,13 +2,13 @@ import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.report.robot_summary import robot_summary
 from terrainkit_robots.lint.runner import lint
 
 
 def summary(path):
-    return dict(robot_summary(lint(Facts(read_robot(path)), [])))
+    return dict(robot_summary(lint(Facts(load_robot(path)), [])))
 
 
 def test_a_quadruped():
@@ -46,9 +46,9 @@ def test_numbers_out_of_all_proportion_stay_short(tmp_path, words, value):
 
 
 def test_gains_are_suggested_once_a_robot_may_be_simulated():
-    report = lint(Facts(read_robot(bundled.find("quadruped"))), [])
+    report = lint(Facts(load_robot(bundled.find("quadruped"))), [])
     assert report.simulated
     told = dict(robot_summary(report))
     assert "kp 60, kd 2: FL_hip_joint" in told["  roll"]
-    static = lint(Facts(read_robot(bundled.find("quadruped"))), [], simulate=False)
+    static = lint(Facts(load_robot(bundled.find("quadruped"))), [], simulate=False)
     assert "kp" not in dict(robot_summary(static))["  roll"]

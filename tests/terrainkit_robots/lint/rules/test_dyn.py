@@ -5,8 +5,8 @@ import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import read_robot
-from terrainkit_robots.lint.rule import find
+from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.rule import get_rule
 from terrainkit_robots.simulation import standing
 
 TWEEZERS = """
@@ -44,7 +44,7 @@ SLIDER = """
 
 
 def found(code, path):
-    return list(find(code).check(Facts(read_robot(path))))
+    return list(get_rule(code).check(Facts(load_robot(path))))
 
 
 @pytest.fixture

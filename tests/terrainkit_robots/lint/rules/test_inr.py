@@ -6,8 +6,8 @@ import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.inertia.physical import triangle_ratio
-from terrainkit_robots.description.load import read_robot
-from terrainkit_robots.lint.rule import find, rules
+from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.rule import get_rule, rules
 from terrainkit_robots.mesh.mesh_cache import Meshes
 
 HEALTHY = [
@@ -50,7 +50,7 @@ class Counting(Meshes):
 
 def found(path, meshes=None):
     """Return code, severity and subject of what INR finds that is more than information."""
-    facts = Facts(read_robot(path), meshes)
+    facts = Facts(load_robot(path), meshes)
     return [
         (rule.code, defect.severity or rule.severity, defect.subject)
         for rule in rules()
@@ -96,7 +96,7 @@ def test_the_real_defects_of_cassie_are_found(robot_file):
 
 
 def test_of_cassie_it_is_told_that_links_have_no_mass(robot_file):
-    facts = Facts(read_robot(robot_file("cassie/urdf/cassie.urdf")))
+    facts = Facts(load_robot(robot_file("cassie/urdf/cassie.urdf")))
     rule = next(rule for rule in rules() if rule.code == "INR001")
     (told,) = rule.check(facts)
     assert told.severity == "warning"
@@ -175,7 +175,7 @@ def test_the_mass_that_is_added_is_what_mujoco_adds(arm):
       </link>"""
     path = arm(mass=1, more=hood)
     compiled = mujoco.MjModel.from_xml_path(str(path))
-    facts = Facts(read_robot(path))
+    facts = Facts(load_robot(path))
     rule = next(rule for rule in rules() if rule.code == "INR011")
     (defect,) = rule.check(facts)
     assert defect.measured["added"] == pytest.approx(compiled.body_mass.sum() - 1.0)
@@ -193,7 +193,7 @@ def test_the_mass_that_is_added_is_what_mujoco_adds(arm):
 def test_what_an_inertia_lacks_is_named(arm, old, new, words):
     path = arm()
     path.write_text(path.read_text().replace(old, new))
-    (defect,) = find("INR003").check(Facts(read_robot(path)))
+    (defect,) = get_rule("INR003").check(Facts(load_robot(path)))
     assert f"link tip has a mass of 1 kg, but {words}" in defect.message
 
 
@@ -204,6 +204,6 @@ def test_of_mjcf_its_own_attributes_are_named(tmp_path):
         '<body name="b"><joint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>'
         '<body name="c"><joint/><inertial pos="0 0 0" mass="1"/></body></body></worldbody></mujoco>'
     )
-    told = {defect.subject: defect for defect in find("INR003").check(Facts(read_robot(path)))}
+    told = {defect.subject: defect for defect in get_rule("INR003").check(Facts(load_robot(path)))}
     assert "c" in told
     assert "neither diaginertia nor fullinertia" in told["c"].message

@@ -2,8 +2,8 @@ import mujoco
 import pytest
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
-from terrainkit_robots.lint.rule import find, rules
+from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.rule import get_rule, rules
 
 HEALTHY = [
     "a1/urdf/a1.urdf",
@@ -19,7 +19,7 @@ HEALTHY = [
 
 def found(path):
     """Return code, severity and subject of what JNT finds that is more than information."""
-    facts = Facts(read_robot(path))
+    facts = Facts(load_robot(path))
     return [
         (rule.code, defect.severity or rule.severity, defect.subject)
         for rule in rules()
@@ -84,7 +84,7 @@ def told(tmp_path, code, text):
     """Return the messages of one rule."""
     path = tmp_path / "r.urdf"
     path.write_text(text)
-    return [defect.message for defect in find(code).check(Facts(read_robot(path)))]
+    return [defect.message for defect in get_rule(code).check(Facts(load_robot(path)))]
 
 
 @pytest.mark.parametrize(("count", "words"), [(1, "a has a"), (2, "a, b have a")])

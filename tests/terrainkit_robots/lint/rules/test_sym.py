@@ -3,7 +3,7 @@ import re
 import pytest
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.rule import rules
 
 ALL = [
@@ -22,7 +22,7 @@ ALL = [
 def found(path, text=None):
     """Return code and subject of what SYM finds."""
     contents = {} if text is None else {path: text.encode()}
-    facts = Facts(read_robot(path, contents=contents))
+    facts = Facts(load_robot(path, contents=contents))
     return [
         (rule.code, defect.subject)
         for rule in rules()

@@ -1,8 +1,8 @@
 import pytest
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
-from terrainkit_robots.lint.rule import find
+from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.rule import get_rule
 from terrainkit_robots.lint.runner import MOST_FINDINGS, lint
 
 
@@ -11,7 +11,7 @@ def report(tmp_path):
     def check(code, *parts):
         path = tmp_path / "robot.urdf"
         path.write_text(f'<robot name="r">{"".join(parts)}</robot>')
-        return lint(Facts(read_robot(path)), [find(code)])
+        return lint(Facts(load_robot(path)), [get_rule(code)])
 
     return check
 

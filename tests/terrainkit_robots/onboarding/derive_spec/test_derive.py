@@ -4,7 +4,7 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
 from terrainkit_robots.spec.robot_spec import JOINT_TABLES, unit_of
@@ -151,7 +151,7 @@ def test_numbers_without_measure_break_nothing(bundled, gains, tmp_path, old, va
     ],
 )
 def test_robots_of_others(robot_file, gains, file, base, torso):
-    facts = Facts(read_robot(robot_file(file)))
+    facts = Facts(load_robot(robot_file(file)))
     spec = derived(facts, gains)
     assert spec.base == base
     assert spec.termination_contacts == (base, *torso)

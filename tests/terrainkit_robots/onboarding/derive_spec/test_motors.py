@@ -2,7 +2,7 @@ import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.symmetry.mirror_map import mirror_map
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.onboarding.derive_spec.motors import (
     action_scales,
     armatures,
@@ -20,7 +20,7 @@ def without_one(bundled, tmp_path, *, limit):
     text = plain.model.file.read_text(encoding="utf-8").replace(FIRST, limit, 1)
     path = tmp_path / "one.urdf"
     path.write_text(text, encoding="utf-8")
-    return Facts(read_robot(path))
+    return Facts(load_robot(path))
 
 
 def test_what_is_declared_is_taken(bundled, gains):

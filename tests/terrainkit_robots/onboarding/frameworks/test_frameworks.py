@@ -7,7 +7,7 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import read_robot
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.onboarding import frameworks as package
 from terrainkit_robots.onboarding.frameworks import frameworks
@@ -159,7 +159,7 @@ def test_joints_without_a_motor_keep_a_robot_from_frameworks_that_drive_all(robo
 
 
 def test_joints_without_a_motor_are_found(robots, bundled_xml):
-    facts = Facts(read_robot(bundled_xml.with_suffix(".urdf")), Meshes())
+    facts = Facts(load_robot(bundled_xml.with_suffix(".urdf")), Meshes())
     spec = robots.quadruped()
     fewer = replace(spec, joint_order=spec.joint_order[:-1])
     with pytest.raises(ConfigError, match=f"no motor drives {spec.joint_order[-1]} of"):
@@ -168,7 +168,7 @@ def test_joints_without_a_motor_are_found(robots, bundled_xml):
 
 def test_bodies_and_ranges_come_from_the_facts(robots, bundled_xml):
     """The calves range over 1.88 rad, of which the spec leaves 1.5 free."""
-    facts = Facts(read_robot(bundled_xml.with_suffix(".urdf")), Meshes())
+    facts = Facts(load_robot(bundled_xml.with_suffix(".urdf")), Meshes())
     spec = robots.quadruped()
     text = config_of("legged_gym", facts, spec)
     assert "soft_dof_pos_limit = 0.7958" in text
