@@ -18,9 +18,9 @@ from clock import seconds
 import terrainkit
 from terrainkit_robots.rl import registry
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Ground, MapGround, Plane
-from terrainkit_robots.rl.robot import read_robot
 from terrainkit_robots.rl.runner import LeggedRunner
+from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.terrain import MapTerrain, Plane, Terrain
 
 _ENVS = 512
 _STEPS = 60
@@ -30,10 +30,10 @@ _ITERATIONS = 5
 def run() -> Iterator[tuple[str, float]]:
     found = registry.find("quadruped")
     task = replace(found.task, env=replace(found.task.env, num_envs=_ENVS))
-    robot = read_robot(found.folder)
-    grounds: dict[str, tuple[Ground, str]] = {
+    robot = Robot.load(found.folder)
+    grounds: dict[str, tuple[Terrain, str]] = {
         "plane": (Plane(), "at least 0.75"),
-        "default_map": (MapGround(terrainkit.generate(terrainkit.MapConfig())), "at least 0.7"),
+        "default_map": (MapTerrain(terrainkit.generate(terrainkit.MapConfig())), "at least 0.7"),
     }
     for name, (ground, limit) in grounds.items():
         env = LeggedEnv(task, robot, ground)
@@ -45,12 +45,12 @@ def run() -> Iterator[tuple[str, float]]:
 def _part_of_bare(env: LeggedEnv) -> float:
     """Return the speed of the environment over that of MuJoCo alone."""
     draw = torch.Generator().manual_seed(0)
-    batch, count = env.physics.batch, env.cfg.control.decimation
+    batch, count = env.sim.batch, env.cfg.control.decimation
     bare, whole = [], []
     for _ in range(_STEPS):
         actions = 0.3 * torch.randn(env.num_envs, env.num_actions, generator=draw)
         before = batch.state.copy()
-        env.physics.ctrl[:] = env.control.told(actions.numpy(), env.joint_offset)
+        env.sim.ctrl[:] = env.to_ctrl(actions.numpy())
         bare.append(seconds(lambda: batch.step(nstep=count, stage=mujoco.mjtStage.mjSTAGE_VEL)))
         batch.state[:] = before
         whole.append(seconds(partial(env.step, actions)))
@@ -61,7 +61,7 @@ def _shares(env: LeggedEnv) -> Iterator[tuple[str, float]]:
     """Yield which part of training physics, environment and networks take."""
     spent = {"physics": 0.0, "step": 0.0}
     runner = LeggedRunner(env)
-    env.physics.step = _timed(env.physics.step, spent, "physics")  # type: ignore[method-assign]
+    env.sim.step = _timed(env.sim.step, spent, "physics")  # type: ignore[method-assign]
     env.step = _timed(env.step, spent, "step")  # type: ignore[method-assign]
     begin = time.perf_counter()
     runner.learn(_ITERATIONS)

@@ -23,7 +23,7 @@ from terrainkit.terrain_docs import TerrainDoc, terrain_doc
 from terrainkit_cli.main import COMMANDS
 from terrainkit_robots.description import bundled
 from terrainkit_robots.lint.rule import FAMILIES, Rule, rules
-from terrainkit_robots.onboarding.pictures import draw
+from terrainkit_robots.rendering.robot_pictures import render_robot
 
 DOCS = Path(__file__).parent
 PICTURES = DOCS / "pictures"
@@ -155,7 +155,7 @@ def draw_pictures() -> None:
 def draw_robot(name: str) -> None:
     found = bundled.find(name)
     assert found is not None
-    views = draw(found.with_suffix(".xml"), size=(400, 340)).values()
+    views = render_robot(found.with_suffix(".xml"), size=(400, 340)).values()
     pictures = [cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR) for png in views]
     cv2.imwrite(str(PICTURES / f"{name}.png"), np.hstack(pictures))
 

@@ -7,7 +7,7 @@ import typing
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Annotated, Any, Literal, Self, get_args, get_origin
+from typing import Annotated, Any, Literal, Self, TypeVar, get_args, get_origin
 
 import msgspec
 import numpy as np
@@ -90,8 +90,10 @@ class Config:
             if field.name not in values and is_required(field):
                 expected = describe(annotations[field.name])
                 raise ConfigError(f"{path}{field.name}: missing; expected {expected}")
+        if default is not None:
+            return replace(path, default, values)
         try:
-            return cls(**values) if default is None else dataclasses.replace(default, **values)
+            return cls(**values)
         except ConfigError as error:
             raise ConfigError(f"{path}{error}") from error
 
@@ -124,6 +126,9 @@ class Config:
     def to_toml(self) -> str:
         """Return the config as TOML with comments; :meth:`from_toml` restores it."""
         return "\n".join([*_toml_lines("", self), ""])
+
+
+_C = TypeVar("_C", bound=Config)
 
 
 @cache
@@ -178,6 +183,23 @@ def flatten(config: Any, path: str = "") -> Iterator[tuple[str, Any]]:
             yield from flatten(value, f"{path}{name}.")
         else:
             yield path + name, value
+
+
+def replace(path: str, config: _C, values: Mapping[str, Any]) -> _C:
+    """Return a copy of a config with other values.
+
+    Args:
+        path: Prefix of the names in error messages, such as "rewards.".
+        config: The config.
+        values: New values by name.
+
+    Raises:
+        ConfigError: if a value is invalid.
+    """
+    try:
+        return dataclasses.replace(config, **values)
+    except ConfigError as error:
+        raise ConfigError(f"{path}{error}") from error
 
 
 def convert(name: str, value: object, annotation: Any) -> Any:

@@ -15,7 +15,7 @@ from terrainkit_cli.robot_options import NO_NUMBER, Checkpoint, Output, number_g
 if TYPE_CHECKING:
     from terrainkit_robots.policy.evaluate import Asked
     from terrainkit_robots.policy.score import Evaluation, Score
-    from terrainkit_robots.rl.run_folder import Run
+    from terrainkit_robots.rl.run import Run
 
 _NOT_ASKED = (-math.inf, -math.inf, -math.inf)
 """No command; not None, since tyro's errors about a union name its members."""
@@ -69,7 +69,7 @@ class PolicyCommand(Command):
         if not self.policy:
             raise ConfigError("no RUN; wanted the folder of a run, a checkpoint, or a robot's name")
         require_training()
-        from terrainkit_robots.rl.run_folder import open_run
+        from terrainkit_robots.rl.run import open_run
 
         return open_run(self.policy, number_given(self.checkpoint))
 

@@ -107,7 +107,7 @@ class Export(Command):
 
         require_training()
         from terrainkit_robots.policy.export import export_policy
-        from terrainkit_robots.rl.run_folder import is_shipped, open_run
+        from terrainkit_robots.rl.run import is_shipped, open_run
 
         run = open_run(self.subject, number_given(self.checkpoint))
         own = Path(f"{run.folder.name}_policy") if is_shipped(run) else run.folder / "exported"

@@ -76,6 +76,7 @@ def _put_aside(name: str) -> None:
 
 def _run(arguments: list[str]) -> int:
     from terrainkit import __version__
+    from terrainkit.errors import known_names, shorten
 
     name = arguments[0] if arguments else "--help"
     if name in ("-h", "--help"):
@@ -85,10 +86,9 @@ def _run(arguments: list[str]) -> int:
         render.result(f"terrainkit {__version__}")
         return 0
     if name not in COMMANDS:
-        render.error(f"no command {name!r}; there are: {', '.join(COMMANDS)}")
-        return 2
-    wanted = command(name).options(arguments[1:])
-    parsed = parse.parse(wanted, f"terrainkit {name}", arguments[1:])
+        raise parse.UsageError(f"no command {shorten(repr(name))}; {known_names(name, COMMANDS)}")
+    options = command(name).options(arguments[1:])
+    parsed = parse.parse(options, f"terrainkit {name}", arguments[1:])
     return parsed.run()
 
 

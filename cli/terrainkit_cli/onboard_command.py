@@ -138,11 +138,11 @@ def _refusal(done: "BroughtIn") -> str:
     """Return the errors of a robot that was not brought in."""
     from dataclasses import replace
 
-    from terrainkit_robots.lint.report import as_text
+    from terrainkit_robots.lint.report import format_reports
     from terrainkit_robots.onboarding.pipeline import keeps_out
 
     errors = tuple(filter(keeps_out, done.report.findings))
-    return as_text([replace(done.report, findings=errors)], "text")
+    return format_reports([replace(done.report, findings=errors)], "text")
 
 
 def _advice(done: "BroughtIn", command: Onboard) -> str:
@@ -163,7 +163,7 @@ def _viewer(folder: Path) -> str:
 
 def _faults(done: "BroughtIn") -> list[str]:
     """Return why a robot that was written is not yet one to train."""
-    from terrainkit_robots.lint.report.tally import count
+    from terrainkit_robots.lint.report.summary import count
 
     left = [finding for finding in done.report.findings if finding.severity == "error"]
     codes = ", ".join(dict.fromkeys(finding.code for finding in left))

@@ -1,14 +1,16 @@
-"""Arguments: from words to a command, a frozen dataclass whose docstrings are its help."""
+"""Command-line arguments to a command: a frozen dataclass whose docstrings are its help."""
 
 import contextlib
+import dataclasses
 import io
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, TypeVar, get_type_hints
 
-from terrainkit.errors import TerrainkitError
+from terrainkit.errors import TerrainkitError, nearest, shorten
 
 if TYPE_CHECKING:
     from typing import Self
@@ -19,13 +21,18 @@ class Command(ABC):
     """A command of `terrainkit`: its fields are the options."""
 
     @classmethod
-    def options(cls, arguments: Sequence[str]) -> "type[Self]":  # noqa: ARG003
-        """Return the command with all its options, which may depend on what is given."""
+    def options(cls, arguments: Sequence[str]) -> "type[Self]":
+        """Return the command with all its options, which may depend on the arguments.
+
+        Raises:
+            UsageError: if an option is unknown.
+        """
+        check_options(cls, arguments)
         return cls
 
     @abstractmethod
     def run(self) -> int:
-        """Do the work, and return the exit code."""
+        """Run the command, and return the exit code."""
 
 
 class UsageError(TerrainkitError):
@@ -39,24 +46,22 @@ def parse(command: type[_Command], program: str, arguments: list[str]) -> _Comma
     """Return the `command` that `arguments` describe; `--help` prints its help and exits.
 
     Raises:
-        UsageError: if an option is unknown, missing, or holds what it cannot.
+        UsageError: if an option is unknown, missing, or has an invalid value.
     """
     import tyro
 
-    said = io.StringIO()
+    stderr = io.StringIO()
     try:
-        with contextlib.redirect_stderr(said):
-            # Flags without a negative: none of ours is on unless given.
-            markers = (tyro.conf.FlagCreatePairsOff,)
-            return tyro.cli(command, prog=program, args=arguments, config=markers)
+        with contextlib.redirect_stderr(stderr):
+            return tyro.cli(command, prog=program, args=arguments)
     except SystemExit as end:
         if end.code in (0, None):
             raise
-        raise UsageError(f"{_one_line(said.getvalue())}; see {program} --help") from None
+        raise UsageError(f"{_one_line(stderr.getvalue())}; see {program} --help") from None
 
 
 def value_of(word: str) -> str | float | bool | None:
-    """Return the value that `word` writes: a number, true, false, none, or the word itself."""
+    """Return the value of a word: a number, true, false, none, or the word itself."""
     constants = {"true": True, "false": False, "none": None}
     if word.lower() in constants:
         return constants[word.lower()]
@@ -66,11 +71,48 @@ def value_of(word: str) -> str | float | bool | None:
     return word
 
 
+def word_after(option: str, arguments: Sequence[str]) -> str:
+    """Return the word after an option, also in `--option=word`; empty if it is not given."""
+    for word, following in pairwise([*arguments, ""]):
+        name, equals, value = word.partition("=")
+        if name == option:
+            return value if equals else following
+    return ""
+
+
+def option_names(command: type[Any], prefix: str = "", *, flags_only: bool = False) -> list[str]:
+    """Return the options of a dataclass that tyro parses, those of nested dataclasses included."""
+    options = []
+    for name, hint in get_type_hints(command, include_extras=True).items():
+        markers = [each for each in getattr(hint, "__metadata__", ()) if hasattr(each, "aliases")]
+        kind = getattr(hint, "__origin__", hint)
+        named = next((each.name for each in markers if each.name is not None), name)
+        if dataclasses.is_dataclass(kind):
+            inner = f"{prefix}{named}." if named else prefix
+            options += option_names(kind, inner, flags_only=flags_only)  # type: ignore[arg-type]
+        elif kind is bool or not flags_only:
+            options.append(f"--{prefix}{named}")
+            options += [f"--{prefix}no-{named}"] * (kind is bool)
+            options += [alias for each in markers for alias in each.aliases or ()]
+    return [option.replace("_", "-") for option in options]
+
+
+def check_options(command: type[Command], arguments: Sequence[str]) -> None:
+    """Raise UsageError if an option is unknown, on one line; tyro's message fills a page."""
+    known = [*option_names(command), "--help"]
+    for word in arguments:
+        name = word.partition("=")[0]
+        if name.startswith("--") and name.replace("_", "-") not in known:
+            near = nearest(name.replace("_", "-"), known)
+            meant = f"; did you mean {near}?" if near else ""
+            raise UsageError(f"no option {shorten(name)}{meant}; --help lists the options")
+
+
 def _one_line(box: str) -> str:
-    """Return what tyro's box says as one line, without its title and its closing advice."""
+    """Return the text in tyro's box as one line, without its title and its closing advice."""
     # A terminal that is not UTF-8 gets a box of other characters.
     rows = [row.strip("│| ") for row in box.splitlines()[1:]]
     parts = " ".join(row if row.strip("─╰╯+- ") else "\n" for row in rows).split("\n")
-    told = [part.strip() for part in parts]
-    told = [part for part in told if part and not part.startswith(("For full", "Argument help"))]
-    return re.sub(r"^Error parsing (\S+): (?=\1: )", "", ". ".join(told))
+    texts = [part.strip() for part in parts]
+    texts = [text for text in texts if text and not text.startswith(("For full", "Argument help"))]
+    return re.sub(r"^Error parsing (\S+): (?=\1: )", "", ". ".join(texts))

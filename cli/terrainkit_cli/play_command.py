@@ -14,7 +14,7 @@ from terrainkit_cli.training_extra import require_training
 
 if TYPE_CHECKING:
     from terrainkit_robots.policy.score import Evaluation
-    from terrainkit_robots.rl.video import Film
+    from terrainkit_robots.rendering.video import VideoSpec
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,14 +59,14 @@ class Play(PolicyCommand):
         target = Path(self.output or f"{run.folder.resolve().name}.mp4")
         asked = self.asked(self.seconds)
         from terrainkit_robots.policy.play import play, view
-        from terrainkit_robots.rl.video import check_size, check_video
+        from terrainkit_robots.rendering.video import check_video_path, check_video_size
 
         if self.viewer:
             view(run, asked)
             return 0
         if not self.no_video:
-            check_size(self.size)
-            check_video(target, overwrite=self.overwrite)  # before the wait
+            check_video_size(self.size)
+            check_video_path(target, overwrite=self.overwrite)  # before the wait
         with render.steps() as steps:
             played = play(
                 run,
@@ -82,14 +82,14 @@ class Play(PolicyCommand):
             self._write(played.film, target)
         return 0
 
-    def _write(self, film: "Film", target: Path) -> None:
-        from terrainkit_robots.rl.video import film_frames
+    def _write(self, film: "VideoSpec", target: Path) -> None:
+        from terrainkit_robots.rendering.video import write_video
 
-        frames = film_frames(film, target, overwrite=self.overwrite)
-        for _ in render.progress(frames, len(film), of="frames"):
+        frames = write_video(film, target, overwrite=self.overwrite)
+        for _ in render.progress(frames, film.num_frames, of="frames"):
             pass
         size = target.stat().st_size / 1e6
-        render.result(f"wrote {target}: {len(film) / film.fps:.1f} s, {size:.1f} MB")
+        render.result(f"wrote {target}: {film.num_frames / film.fps:.1f} s, {size:.1f} MB")
 
 
 def rows(found: "Evaluation") -> list[tuple[str, ...]]:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from terrainkit_robots.lint.report.text import Span
-    from terrainkit_robots.rl.progress import Progress, Watch
+    from terrainkit_robots.rl.runner import ProgressCallback, TrainingProgress
 
 _T = TypeVar("_T")
 
@@ -174,7 +174,7 @@ and of what robots succeed in and are rewarded for."""
 
 
 @contextmanager
-def training() -> "Iterator[Watch]":
+def training() -> "Iterator[ProgressCallback]":
     """Yield what shows the progress of training on stderr: live, or as a line now and then."""
     if not sys.stderr.isatty():
         yield _training_line
@@ -186,26 +186,26 @@ def training() -> "Iterator[Watch]":
         yield lambda progress: live.update(_training_table(progress), refresh=True)
 
 
-def _training_line(progress: "Progress") -> None:
+def _training_line(progress: "TrainingProgress") -> None:
     done = progress.iteration
-    if done % _LINE_EVERY and done != progress.last:
+    if done % _LINE_EVERY and done != progress.max_iterations:
         return
     facts = ", ".join(f"{name} {value}" for name, value in _training_facts(progress))
-    print(f"iteration {done}/{progress.last}: {facts}", file=sys.stderr, flush=True)
-    if done % _TERMS_EVERY and done != progress.last:
+    print(f"iteration {done}/{progress.max_iterations}: {facts}", file=sys.stderr, flush=True)
+    if done % _TERMS_EVERY and done != progress.max_iterations:
         return
     terms = [f"success {name} {rate:.0%}" for name, rate in progress.success.items()]
     terms += [f"{name} {reward:+.3f} /s" for name, reward in progress.rewards.items()]
     if terms:
         told = ", ".join(terms)
-        print(f"iteration {done}/{progress.last}: {told}", file=sys.stderr, flush=True)
+        print(f"iteration {done}/{progress.max_iterations}: {told}", file=sys.stderr, flush=True)
 
 
-def _training_facts(progress: "Progress") -> list[tuple[str, str]]:
+def _training_facts(progress: "TrainingProgress") -> list[tuple[str, str]]:
     """Return what is said of training in both ways."""
     facts = [
         ("env steps/s", f"{progress.steps_per_second:.0f}"),
-        ("to go", _clock(progress.remaining)),
+        ("to go", _clock(progress.eta)),
         ("noise std", f"{progress.noise_std:.2f}"),
     ]
     if progress.reward is not None and progress.episode_length is not None:
@@ -214,10 +214,10 @@ def _training_facts(progress: "Progress") -> list[tuple[str, str]]:
     return facts + [(f"level {name}", f"{level:.1f}") for name, level in progress.levels.items()]
 
 
-def _training_table(progress: "Progress") -> "Table":
+def _training_table(progress: "TrainingProgress") -> "Table":
     from rich.table import Table
 
-    title = f"iteration {progress.iteration}/{progress.last}"
+    title = f"iteration {progress.iteration}/{progress.max_iterations}"
     where = None if progress.folder is None else str(progress.folder)
     table = Table(title=title, caption=where, show_header=False, title_justify="left")
     table.add_column()
@@ -226,7 +226,7 @@ def _training_table(progress: "Progress") -> "Table":
         rate = progress.success.get(name.removeprefix("level "))
         reached = "" if rate is None or not name.startswith("level ") else f"  {rate:.0%} succeed"
         table.add_row(name, value + reached)
-    table.add_row("time learning", f"{progress.learning:.0%}")
+    table.add_row("time learning", f"{progress.learning_fraction:.0%}")
     table.add_section()
     for name, reward in progress.rewards.items():
         table.add_row(name, f"{reward:+.3f} /s")

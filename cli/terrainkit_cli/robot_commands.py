@@ -139,8 +139,8 @@ class CheckRobot(Command):
         return settings
 
     def _say(self, checks: "Sequence[_Checked]", output: Path | None) -> None:
-        from terrainkit_robots.lint.report import as_text
-        from terrainkit_robots.lint.report.tally import tally
+        from terrainkit_robots.lint.report import format_reports
+        from terrainkit_robots.lint.report.summary import summarize_findings
 
         reports = [check.report for check in checks]
         if self.diff:
@@ -148,18 +148,18 @@ class CheckRobot(Command):
             if checks and not text:
                 render.note("there is nothing to fix")
         elif output is None and self.format == "text" and render.has_colors():
-            from terrainkit_robots.lint.report.text import lines
+            from terrainkit_robots.lint.report.text import format_lines
 
-            render.styled(lines(reports, width=render.width()))
+            render.styled(format_lines(reports, width=render.width()))
             return
         else:
-            text = as_text(reports, self.format)
+            text = format_reports(reports, self.format)
         if output is None:
             render.report(text)
         elif reports:
             _check_output(output, [path for r in reports for path in r.facts.model.sources])
             _write(output, text)
-            render.result(f"wrote {output}: {tally(reports)}")
+            render.result(f"wrote {output}: {summarize_findings(reports)}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -176,7 +176,7 @@ class _Checked:
 def _tried(name: str, command: CheckRobot, options: "Settings") -> _Checked | None:
     """Return what there is to say of a file; None, and one line of error, if that failed."""
     from terrainkit_robots.lint.report.facts_json import facts_json
-    from terrainkit_robots.lint.runner import INTERNAL
+    from terrainkit_robots.lint.runner import INTERNAL_ERROR
 
     try:
         check = _check(name, command, options)
@@ -190,7 +190,7 @@ def _tried(name: str, command: CheckRobot, options: "Settings") -> _Checked | No
     except MemoryError:
         render.error(f"{name}: out of memory")
     except Exception as error:  # a bug of ours is told as one, and costs no other file
-        render.error(f"{name}: {INTERNAL}: {type(error).__name__}: {error}")
+        render.error(f"{name}: {INTERNAL_ERROR}: {type(error).__name__}: {error}")
     return None
 
 
@@ -256,7 +256,7 @@ def _repaired(
 ) -> "tuple[Report, str]":
     """Return the report once the fixes are written; what was found and a diff, if none is to be."""
     from terrainkit_robots.lint.fixes.apply import fix_robot, unified_diff, write_fixes
-    from terrainkit_robots.lint.report.repaired import Repaired
+    from terrainkit_robots.lint.report.fixed_report import FixedReport
 
     result = fix_robot(
         path, lambda contents: look(contents) if contents else found, unsafe=command.unsafe_fixes
@@ -271,7 +271,7 @@ def _repaired(
         if each.finding.fix is not None and each.finding.fix.safety in wanted
     )
     report = result.report
-    return Repaired(
+    return FixedReport(
         facts=report.facts,
         findings=report.findings,
         skipped=report.skipped,

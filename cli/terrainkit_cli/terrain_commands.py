@@ -1,10 +1,10 @@
 """The commands that make, look at and check maps."""
 
-import dataclasses
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
@@ -15,42 +15,58 @@ from terrainkit.parameter import Range, Value
 from terrainkit.sub_terrain import SubTerrain
 from terrainkit.terrain_map import TerrainMap
 from terrainkit_cli import render
-from terrainkit_cli.map_options import MapOptions, given
-from terrainkit_cli.parse import Command, value_of
+from terrainkit_cli.config_options import ConfigCommand
+from terrainkit_cli.parse import Command, check_options, value_of, word_after
+
+if TYPE_CHECKING:
+    from typing import Self
 
 MapFile = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="MAP.npz")]
 Output = Annotated[Path, tyro.conf.arg(aliases=["-o"])]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Generate(Command):
-    """Make a map and write it."""
+class Generate(ConfigCommand):
+    """Generate a map and write it to a file."""
 
     output: Output
-    """Where to write the map; the suffix names the format (.npz holds everything)."""
+    """File to write; its suffix is the format (.npz holds everything)."""
 
     config: Annotated[str, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = ""
-    """TOML file of a map, or a map in .npz to take it from; options given here override it."""
+    """TOML file of a map, or a map in .npz with its config; options override it."""
 
     terrain: Annotated[str, tyro.conf.arg(metavar="NAME", help_behavior_hint="")] = ""
-    """Make the whole map of this terrain; `terrainkit list` shows which there are."""
+    """Terrain of the whole map; `terrainkit list` prints the names."""
 
     set: Annotated[str, tyro.conf.arg(metavar="NAME=VALUE,...", help_behavior_hint="")] = ""
-    """Parameters of --terrain: name=value, or name=easy:hard for a range, with commas between."""
+    """Parameters of --terrain: name=value, or name=easy:hard for a range, separated by commas."""
 
     overwrite: bool = False
     """Replace an existing file."""
 
-    map: tyro.conf.OmitArgPrefixes[MapOptions] = dataclasses.field(default_factory=MapOptions)
+    @classmethod
+    def options(cls, arguments: Sequence[str]) -> "type[Self]":
+        """Return this command with an option for each value of the config."""
+        path = word_after("--config", arguments)
+        config = _load_config(path) if path else MapConfig()
+        command = cls.with_options(config, omit=("terrains",))
+        check_options(command, arguments)
+        return command
+
+    def default_config(self) -> MapConfig:
+        """Return the config of --config, or the default one."""
+        return _load_config(self.config) if self.config else MapConfig()
 
     def run(self) -> int:
-        """Make the map, write it, and say what to do next."""
+        """Generate the map, write it, and print the next commands."""
         from terrainkit import export
         from terrainkit.generation import generate
 
-        config = self._config()
+        config = self.changed_config()
         samples = config.grid.shape[0] * config.grid.shape[1]
-        export.check_export(self.output, samples, overwrite=self.overwrite)  # before the wait
+        export.check_export(
+            self.output, samples, overwrite=self.overwrite
+        )  # fail before generating
         terrain_map = generate(config, progress=render.progress)
         terrain_map.save(self.output, overwrite=self.overwrite)
         render.result(written(terrain_map, self.output))
@@ -62,26 +78,23 @@ class Generate(Command):
             )
         return 0
 
-    def _config(self) -> MapConfig:
-        options = given(self.map)
-        if self.terrain and "preset" in options:
-            raise ConfigError("--terrain and --preset both name the terrains; wanted one of them")
+    def given(self) -> dict[str, Any]:
+        """Return the values on the command line by field name."""
+        given = super().given()
+        if self.terrain and "preset" in given:
+            raise ConfigError("--terrain, --preset: got both; expected one of them")
         if self.set and not self.terrain:
-            raise ConfigError("--set gives parameters to --terrain, which is missing")
+            raise ConfigError("--set: got parameters without a terrain; expected --terrain")
         if self.terrain:
             parameters = _parameters(self.set)
-            options["terrains"] = (SubTerrain(terrain=self.terrain, parameters=parameters),)
-        elif "preset" in options:
-            options["terrains"] = ()
-        config = _config_of(self.config) if self.config else MapConfig()
-        fields = {f.name: getattr(config, f.name) for f in dataclasses.fields(config)}
-        return MapConfig(**fields | options)
+            given["terrains"] = (SubTerrain(terrain=self.terrain, parameters=parameters),)
+        elif "preset" in given:
+            given["terrains"] = ()
+        return given
 
 
-def _config_of(path: str) -> MapConfig:
-    if path.endswith(".npz"):
-        return TerrainMap.load(path).config
-    return MapConfig.load(path)
+def _load_config(path: str) -> MapConfig:
+    return TerrainMap.load(path).config if path.endswith(".npz") else MapConfig.load(path)
 
 
 def _parameters(text: str) -> dict[str, Value | Range]:
@@ -90,9 +103,9 @@ def _parameters(text: str) -> dict[str, Value | Range]:
         name, equals, value = word.partition("=")
         values = tuple(value_of(part) for part in value.split(":"))
         if not equals or len(values) > 2:
-            raise ConfigError(f"--set {word!r}; wanted name=value or name=easy:hard")
+            raise ConfigError(f"--set: got {word!r}; expected name=value or name=easy:hard")
         if name.strip() in parameters:
-            raise ConfigError(f"--set has {name.strip()} twice; wanted it once")
+            raise ConfigError(f"--set: got {name.strip()} twice; expected it once")
         parameters[name.strip()] = values if len(values) == 2 else values[0]
     return parameters
 
@@ -175,7 +188,7 @@ def _print_map(terrain_map: TerrainMap) -> None:
     }
     render.table(list(facts.items()))
     render.result("")
-    rows = [("column", "terrain", "difficulty", "measured_difficulty")]
+    rows = [("column", "terrain", "difficulty", "measured difficulty")]
     for col in range(config.cols):
         patches = [terrain_map.patch(row, col) for row in range(config.rows)]
         hard = [measured_difficulty(t.heights, config.cell, float(t.origin[2])) for t in patches]

@@ -1,6 +1,7 @@
 """The extra `train`: what the commands that train robots need, and the others do not."""
 
 import importlib.util
+import os
 
 from terrainkit.errors import ConfigError
 
@@ -23,6 +24,5 @@ def require_training(*more: str) -> None:
             f"this needs {', '.join(missing)}, which is not installed: "
             "pip install 'terrainkit[train]'"
         )
-    from terrainkit_robots.rl.threads import wait_asleep
-
-    wait_asleep()
+    # Waiting threads of torch slow the physics down; this must be set before torch is imported.
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")

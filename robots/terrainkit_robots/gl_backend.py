@@ -1,45 +1,36 @@
-"""The graphics library that MuJoCo draws with, where there is no window.
+"""The OpenGL backend that MuJoCo renders with when there is no window.
 
-Which one it takes is settled when MuJoCo is imported, by the variable MUJOCO_GL. So pictures are
-drawn in processes of their own, one for each library that is tried; a broken one may crash.
+MuJoCo chooses its backend at import, from the environment variable MUJOCO_GL. Rendering therefore
+runs in a child process, one for each backend that is tried.
 """
 
-import json
 import os
 import sys
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
-
-from terrainkit_robots.text import short
-
-_MOST_WORDS = 160
-"""So many characters of a complaint are passed on."""
 
 
-def libraries() -> tuple[str, ...]:
-    """Return what to try as MUJOCO_GL, in this order; an empty one is MuJoCo's default.
+def backends() -> tuple[str, ...]:
+    """Return the values of MUJOCO_GL to try, in order; an empty string is MuJoCo's default.
 
-    What the user asks for is all that is tried. Otherwise, on Linux, EGL and then OSMesa are.
+    A backend that the user has set is the only one tried. Otherwise Linux tries EGL, then OSMesa.
     """
-    asked = _asked()
-    if asked:
-        return (asked,)
+    if requested := _requested_backend():
+        return (requested,)
     return ("egl", "osmesa") if sys.platform == "linux" else ("",)
 
 
-def environment(library: str) -> dict[str, str]:
-    """Return the environment of a process that draws, which finds modules where this one does.
+def child_environment(backend: str) -> dict[str, str]:
+    """Return the environment variables of a child process that renders.
 
     Args:
-        library: One of `libraries()`.
+        backend: One of `backends()`.
     """
     variables = dict(os.environ)
-    variables.pop("PYOPENGL_PLATFORM", None)  # which MuJoCo sets, here to another library
+    variables.pop("PYOPENGL_PLATFORM", None)  # set by MuJoCo, here possibly to another backend
     variables.pop("MUJOCO_GL", None)
-    if library:
-        variables["MUJOCO_GL"] = library
-    # Nothing is to be left on this machine.
+    if backend:
+        variables["MUJOCO_GL"] = backend
+    # Rendering must not leave files in the user's home folder.
     variables.setdefault("MESA_SHADER_CACHE_DISABLE", "true")
     variables.setdefault("__GL_SHADER_DISK_CACHE", "0")
     variables["PYTHONPATH"] = os.pathsep.join(
@@ -48,41 +39,13 @@ def environment(library: str) -> dict[str, str]:
     return variables
 
 
-def take_answer(file: Path, crash: str) -> dict[str, Any]:
-    """Return what a process that draws has answered, complaints in one line, and take it away.
-
-    Args:
-        file: The JSON that it was to write.
-        crash: What has `failed` if it wrote none.
-    """
-    try:
-        answer: dict[str, Any] = json.loads(file.read_bytes())
-    except (OSError, ValueError):
-        return {"failed": crash}
-    file.unlink()
-    for key, told in answer.items():
-        if isinstance(told, str):
-            answer[key] = short(" ".join(told.split()), _MOST_WORDS)
-    return answer
-
-
-def cannot_draw(complaints: Mapping[str, str]) -> str:
-    """Return that none of the libraries draws, and what a user can do.
-
-    Args:
-        complaints: How each library that was tried failed.
-    """
-    told = "; ".join(f"{name or 'its default'}: {how}" for name, how in complaints.items())
-    return f"MuJoCo cannot draw here ({told}); {advice()}"
-
-
-def advice() -> str:
-    """Return what a user can do when none of the libraries draws."""
-    if _asked():
-        return "MUJOCO_GL says so; unset it to have EGL and OSMesa tried"
+def installation_advice() -> str:
+    """Return what the user can do when no backend works."""
+    if _requested_backend():
+        return "the backend is set by MUJOCO_GL; unset it to try EGL and OSMesa"
     return "install EGL or OSMesa (Debian: libegl1 libgl1-mesa-dri, or libosmesa6)"
 
 
-def _asked() -> str:
-    """Return the library that the environment names; the command line puts that variable aside."""
+def _requested_backend() -> str:
+    # The command line renames MUJOCO_GL so that an invalid value does not break `import mujoco`.
     return (os.environ.get("TERRAINKIT_MUJOCO_GL") or os.environ.get("MUJOCO_GL", "")).strip()

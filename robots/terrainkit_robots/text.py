@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Container, Iterable, Sequence
+from pathlib import Path
 
 _MOST_LETTERS = 100
 """Longer names are cut, and compared with no other: they come from a program, or are no names."""
@@ -74,3 +75,11 @@ def _most_alike(lower: str, others: Sequence[str], near: float) -> str:
         if matcher.ratio() > score:
             best, score = other, matcher.ratio()
     return best
+
+
+def display_path(path: Path | str) -> str:
+    """Return a path as reports show it: relative to the working directory if it is below it."""
+    try:
+        return str(Path(path).absolute().relative_to(Path.cwd()))
+    except (OSError, ValueError):
+        return str(path)

@@ -1,4 +1,4 @@
-"""Convert between rotation representations, and invert and compare poses."""
+"""Convert between rotation representations, rotate vectors, and invert and compare poses."""
 
 import math
 
@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Matrix = NDArray[np.float64]
+FloatArray = NDArray[np.float32]
 
 _GIMBAL_LOCK = 1e-13
 """Cosine of the pitch below which roll and yaw are not unique; roll is then 0."""
@@ -62,6 +63,25 @@ def quat_to_matrix(quat: Matrix) -> Matrix:
     )
 
 
+def rpy_to_matrix(rpy: Matrix) -> Matrix:
+    """Return the rotation matrix of roll, pitch and yaw, as in URDF.
+
+    Args:
+        rpy: Roll, pitch and yaw [rad] about the fixed axes x, y and z, shape (3,).
+
+    Returns:
+        Rotation matrix Rz(yaw) Ry(pitch) Rx(roll), shape (3, 3).
+    """
+    (sr, sp, sy), (cr, cp, cy) = np.sin(rpy), np.cos(rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
 def matrix_to_rpy(rotation: Matrix) -> Matrix:
     """Return the roll, pitch and yaw of a rotation, as in URDF.
 
@@ -98,3 +118,48 @@ def axis_angle_to_matrix(axis: Matrix, angle: Matrix | np.float64) -> Matrix:
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     s, c = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
     return np.asarray(np.eye(3) + s * cross + (1 - c) * (cross @ cross))
+
+
+def quat_rotate_inverse(quat: FloatArray, vector: FloatArray) -> FloatArray:
+    """Rotate vectors from the world frame to body frames.
+
+    With q = (w, u): v' = v - 2 w (u x v) + 2 u x (u x v), the rotation by the conjugate of q.
+
+    Args:
+        quat: Unit quaternions (w, x, y, z) of the bodies, shape (n, 4).
+        vector: Vectors in the world frame, shape (n, 3).
+
+    Returns:
+        Vectors in the body frames, shape (n, 3).
+    """
+
+    def cross(a: FloatArray, b: FloatArray) -> FloatArray:  # np.cross takes three times as long
+        ax, ay, az = a.T
+        bx, by, bz = b.T
+        return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
+
+    w, u = quat[:, :1], quat[:, 1:]
+    twice = 2 * cross(u, vector)
+    return vector - w * twice + cross(u, twice)
+
+
+def projected_gravity(quat: FloatArray) -> FloatArray:
+    """Return the unit vector of gravity in body frames, shape (n, 3).
+
+    Args:
+        quat: Unit quaternions (w, x, y, z) of the bodies, shape (n, 4).
+    """
+    w, x, y, z = quat.T
+    return np.stack([2 * (w * y - x * z), -2 * (w * x + y * z), 2 * (x * x + y * y) - 1], axis=1)
+
+
+def quat_to_yaw(quat: FloatArray) -> FloatArray:
+    """Return the yaw of unit quaternions of shape (n, 4) [rad], shape (n,)."""
+    w, x, y, z = quat.T
+    yaw: FloatArray = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    return yaw
+
+
+def wrap_to_pi(angle: FloatArray) -> FloatArray:
+    """Wrap angles to the range from -pi to pi [rad]."""
+    return (angle + np.float32(np.pi)) % np.float32(2 * np.pi) - np.float32(np.pi)

@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit_cli import evaluate_command, training_extra
-from terrainkit_robots.rl import run_folder
+from terrainkit_robots.rl import run as run_module
 
 
 @pytest.fixture
@@ -60,7 +60,7 @@ def test_it_writes_a_file_once(here, tmp_path, monkeypatch):
     before = (tmp_path / "result.json").read_text()
     assert json.loads(before)["seconds"] == 0.04
     with monkeypatch.context() as patch:
-        patch.setattr(run_folder, "open_run", None)  # it is told before any work
+        patch.setattr(run_module, "open_run", None)  # it is told before any work
         code, _, err = here(*words)
     assert code == 2
     assert "result.json exists" in one_line(err)

@@ -13,11 +13,11 @@ import torch
 from terrainkit_cli import training_extra
 from terrainkit_robots.rl import registry
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
 from terrainkit_robots.rl.registry import SHIPPED
-from terrainkit_robots.rl.run_folder import create_run
+from terrainkit_robots.rl.run import create_run
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.task import Env, Policy, Runner, Task
+from terrainkit_robots.rl.terrain import Plane
 
 FILES = ["policy.json", "policy.onnx", "policy.pt"]
 

@@ -30,9 +30,9 @@ def test_every_command_has_help_for_every_option(terrainkit, name):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("generat",), "no command 'generat'; there are: generate, list,"),
+        (("generat",), "no command 'generat'; did you mean 'generate'? There are: gen"),
         (("generate",), "Missing from terrainkit generate: -o PATH"),
-        (("generate", "-o", "a.npz", "--row", 3), "Unrecognized options: --row, 3. Perhaps you"),
+        (("generate", "-o", "a.npz", "--row", 3), "no option --row; did you mean --rows?"),
         (
             ("generate", "-o", "a.npz", "--rows", "three"),
             "--rows: got 'three'; expected an integer",
@@ -71,10 +71,16 @@ def test_every_command_has_help_for_every_option(terrainkit, name):
             ("generate", "-o", "a.npz", "--terrain", "pit", "--set", "dept=1"),
             "mean 'depth'? It has: ",
         ),
-        (("generate", "-o", "a.npz", "--terrain", "pit", "--set", "depth"), "wanted name=value"),
+        (("generate", "-o", "a.npz", "--terrain", "pit", "--set", "depth"), "expected name=value"),
         (("generate", "-o", "a.npz", "--terrain", "pit", "--set", "depth=x"), "expected a number"),
-        (("generate", "-o", "a.npz", "--set", "depth=1"), "--set gives parameters to --terrain"),
-        (("generate", "-o", "a.npz", "--terrain", "pit", "--preset", "all"), "wanted one of them"),
+        (
+            ("generate", "-o", "a.npz", "--set", "depth=1"),
+            "--set: got parameters without a terrain",
+        ),
+        (
+            ("generate", "-o", "a.npz", "--terrain", "pit", "--preset", "all"),
+            "expected one of them",
+        ),
         (("generate", "-o", "a.npz", "--terrain", "pit", "--set", "side=2,side=3"), "side twice"),
         (("generate", "-o", "a.npz", "--terrain", "slope", "--set", "grade=2"), "would be walls"),
         (("generate", "-o", "a.npz", "--config", "none.toml"), "cannot read none.toml"),

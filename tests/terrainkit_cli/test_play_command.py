@@ -5,9 +5,9 @@ import pytest
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit import MapConfig, SubTerrain, generate
-from terrainkit_robots.onboarding.pictures import PicturesError
 from terrainkit_robots.policy import play
-from terrainkit_robots.rl import video
+from terrainkit_robots.rendering import video
+from terrainkit_robots.rendering.child_process import RenderError
 
 QUICK = ("--seconds", "0.04", "--num-envs", "1")
 SMALL = ("--size", "96", "64")
@@ -88,9 +88,9 @@ def test_no_video_on_a_plane_is_a_line(here):
 
 def test_the_table_is_there_even_if_nothing_can_be_drawn(here, tmp_path, monkeypatch):
     def broken(*_, **__):
-        raise PicturesError("MuJoCo cannot draw here")
+        raise RenderError("MuJoCo cannot draw here")
 
-    monkeypatch.setattr(video, "film_frames", broken)
+    monkeypatch.setattr(video, "write_video", broken)
     code, out, err = here("walk", *QUICK)
     assert code == 2
     assert "1 robots" in out
@@ -112,7 +112,7 @@ def test_an_existing_video_is_told_before_the_wait(here, tmp_path, monkeypatch):
     [
         ((), "no RUN; wanted"),
         (("walk", "-o", "film.avi"), "ends in .mp4"),
-        (("walk", "--size", "99", "64"), "wanted two even numbers"),
+        (("walk", "--size", "99", "64"), "expected two even numbers"),
         (("walk", "--robots", "0"), "robots is 0"),
         (("walk", "--seconds", "0"), "seconds is 0"),
         (("walk", "--viewer", "--no-video"), "--viewer writes no video"),

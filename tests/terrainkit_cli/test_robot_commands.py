@@ -326,7 +326,7 @@ def test_a_terminal_gets_colors_and_no_escapes_of_the_file(folder):
 def test_a_rule_has_a_page(here):
     run = here("rule", "inr002")
     assert run.returncode == 0
-    assert run.stdout.startswith("INR002 negative-mass (error), of masses and inertias\n\n")
+    assert run.stdout.startswith("INR002 negative-mass (error), of mass and inertia\n\n")
     for part in ("\n\nFix: ", "\n\nSource: "):
         assert part in run.stdout
     assert here("rule", "negative-mass").stdout == run.stdout

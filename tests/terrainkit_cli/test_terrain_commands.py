@@ -84,6 +84,14 @@ def test_options_go_before_the_config_file(terrainkit, tmp_path):
     assert terrain_map.terrain_names == ("stairs", "moat")
 
 
+def test_flag_of_the_config_file_can_be_cleared(terrainkit, tmp_path):
+    (tmp_path / "my.toml").write_text(f"centered = true\n{CONFIG}")
+    terrainkit("generate", "-o", "a.npz", "--config=my.toml")
+    terrainkit("generate", "-o", "b.npz", "--config", "my.toml", "--no-centered")
+    centered = [tk.TerrainMap.load(tmp_path / name).config.centered for name in ("a.npz", "b.npz")]
+    assert centered == [True, False]
+
+
 def test_the_config_in_a_map_makes_the_same_bytes_again(terrainkit, tmp_path, small):
     (tmp_path / "again.toml").write_text(str(np.load(tmp_path / small)["config"]))
     terrainkit("generate", "-o", "again.npz", "--config", "again.toml")

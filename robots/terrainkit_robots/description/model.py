@@ -148,7 +148,7 @@ class Geometry:
     conaffinity: int = 1
     """Bits of what it collides with: two shapes do if the bits of one meet the other's."""
 
-    fitted: bool = False
+    fit_to_mesh: bool = False
     """Whether MuJoCo fits the primitive to the mesh, whose shape this is not; MJCF only."""
 
     color: tuple[float, float, float, float] | None = None

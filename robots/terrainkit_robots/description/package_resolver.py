@@ -90,7 +90,7 @@ class Packages:
         """Return the file that is there in other letters, or with slashes for backslashes."""
         if is_absolute(name):
             return None
-        return in_other_letters(self._folder, name)
+        return find_ignore_case(self._folder, name)
 
     def _around(self, name: str) -> Path | None:
         """Return a file with the same end of its path, in the folders around."""
@@ -129,7 +129,7 @@ class Packages:
             if exists(_joined(folder, rest)):
                 return _joined(folder, rest), how
         for folder, _ in candidates:
-            found = in_other_letters(folder, rest)
+            found = find_ignore_case(folder, rest)
             if found is not None:
                 return found, "search"
         found = self._around(rest)
@@ -211,13 +211,13 @@ def resolve_in(folders: Iterable[Path], filename: str) -> tuple[Path, FoundBy]:
             return _joined(folder, filename), "path"
     if not is_absolute(filename):
         for folder in places:
-            found = in_other_letters(folder, filename)
+            found = find_ignore_case(folder, filename)
             if found is not None:
                 return found, "search"
     return _joined(places[0], filename), "nothing"
 
 
-def names_package(filename: str) -> bool:
+def is_package_uri(filename: str) -> bool:
     """Return whether a file is named by its package: `package://`, `model://` or `$(find ...)`."""
     return _PACKAGE.fullmatch(filename) is not None
 
@@ -228,7 +228,7 @@ def is_absolute(filename: str) -> bool:
     return name.startswith(("/", "~", "\\\\")) or _DRIVE.match(name) is not None
 
 
-def in_other_letters(folder: Path, name: str) -> Path | None:
+def find_ignore_case(folder: Path, name: str) -> Path | None:
     """Return the file that `name` means if case does not count, and a backslash is a slash."""
     parts = _parts(name)
     if not parts or len(parts) > _MOST_PARTS:
@@ -245,7 +245,7 @@ def in_other_letters(folder: Path, name: str) -> Path | None:
     return at if exists(at) else None
 
 
-def right_letters(filename: str, path: Path) -> str | None:
+def filename_on_disk(filename: str, path: Path) -> str | None:
     """Return `filename` as it has to be written for `path`, if it has other letters or backslashes.
 
     None if it is right, if only the folder is another one, or if it starts at a root.

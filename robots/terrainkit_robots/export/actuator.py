@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drive:
+class ActuatorConfig:
     """A position controller: torque = stiffness * (target - q) - damping * dq, up to effort.
 
     Without stiffness it is one of speed: torque = damping * (target - dq).
@@ -26,6 +26,6 @@ class Drive:
     """Largest speed that a wheel may be told [rad/s]; None if it is not limited."""
 
     @property
-    def of_speed(self) -> bool:
+    def is_velocity_control(self) -> bool:
         """Return whether it is told a speed, as a wheel is."""
         return self.stiffness == 0 and self.damping > 0

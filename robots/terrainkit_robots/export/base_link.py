@@ -18,7 +18,7 @@ WORLD = "world"
 """What MJCF calls the parent of the first bodies."""
 
 
-def rooted(facts: "Facts", *, floating: bool | None = None) -> "Facts":
+def with_world_base(facts: "Facts", *, floating: bool | None = None) -> "Facts":
     """Return a robot whose base is the world, if that is what its joints hang on.
 
     It is the same robot, unless it is of MJCF and its first joint moves it against the world, or

@@ -28,8 +28,8 @@ from terrainkit_robots.description.model import (
     RobotModel,
 )
 from terrainkit_robots.description.xml.document import RobotFileError
-from terrainkit_robots.export.base_link import WORLD, rooted
-from terrainkit_robots.export.valid_inertia import sound_inertias
+from terrainkit_robots.export.base_link import WORLD, with_world_base
+from terrainkit_robots.export.valid_inertia import with_valid_inertia
 from terrainkit_robots.text import free_name, names
 from terrainkit_robots.transforms import Matrix
 
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class NormalForm:
+class CanonicalRobot:
     """A robot that can be written."""
 
     model: RobotModel
@@ -51,7 +51,7 @@ class NormalForm:
     """What was left out or changed, a sentence each."""
 
 
-def normal_form(facts: "Facts", *, floating: bool | None = None) -> NormalForm:
+def to_canonical(facts: "Facts", *, floating: bool | None = None) -> CanonicalRobot:
     """Return a robot in its normal form.
 
     Args:
@@ -64,10 +64,10 @@ def normal_form(facts: "Facts", *, floating: bool | None = None) -> NormalForm:
     if not facts.bodies:
         raise RobotFileError(f"{facts.model.file}: there is no link; wanted a robot")
     notes: list[str] = []
-    given, facts = facts, rooted(facts, floating=floating)
+    given, facts = facts, with_world_base(facts, floating=floating)
     links = _links(facts, notes)
     joints = _joints(facts, notes)
-    floating = floats(facts) if floating is None else floating
+    floating = has_floating_base(facts) if floating is None else floating
     driven = {joint.name for joint in facts.actuated}
     kept = {link.name for link in links}
     if WORLD in kept:
@@ -102,7 +102,7 @@ def normal_form(facts: "Facts", *, floating: bool | None = None) -> NormalForm:
         excluded=frozenset(pair for pair in facts.model.excluded if pair <= kept),
         sources=facts.model.sources,
     )
-    return NormalForm(model=model, notes=tuple(notes))
+    return CanonicalRobot(model=model, notes=tuple(notes))
 
 
 def _imu(model: RobotModel, kept: Collection[str]) -> tuple[str, Matrix] | None:
@@ -120,7 +120,7 @@ def _moved(joint: Joint, other: str) -> Joint:
     return replace(joint, parent=parent, child=other if joint.child == WORLD else joint.child)
 
 
-def floats(facts: "Facts") -> bool:
+def has_floating_base(facts: "Facts") -> bool:
     """Return whether the base of a robot moves freely.
 
     It does if the file says so or the robot has legs or wheels, and if nothing of it has a limit,
@@ -168,12 +168,12 @@ def _links(facts: "Facts", notes: list[str]) -> list[Link]:
     held = [j.name for j in facts.model.joints if j.moves and j.parent not in facts.body_of]
     if held:
         notes.append(f"left out {names(held)}: a joint between the world and the robot")
-    unknown = [link for link in links if has_unknown(link.inertial)]
+    unknown = [link for link in links if has_unknown_inertia(link.inertial)]
     known = _with_mesh_inertia(facts, links) if unknown else links
-    return sound_inertias(facts.bodies, known, notes)
+    return with_valid_inertia(facts.bodies, known, notes)
 
 
-def has_unknown(inertial: Inertial | None) -> bool:
+def has_unknown_inertia(inertial: Inertial | None) -> bool:
     """Return whether a mass or an inertia has to be taken from a mesh."""
     return inertial is not None and (
         (inertial.mass is not None and np.isnan(inertial.mass))
@@ -192,7 +192,7 @@ def _with_mesh_inertia(facts: "Facts", links: Sequence[Link]) -> list[Link]:
     model = _compiled(facts)
     found = []
     for link in links:
-        if has_unknown(link.inertial):
+        if has_unknown_inertia(link.inertial):
             assert link.inertial is not None
             if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, link.name) < 0:
                 raise RobotFileError(

@@ -1,4 +1,4 @@
-"""Fused links: those that fixed joints hold together as one body, as importers make them.
+"""MergedRobot links: those that fixed joints hold together as one body, as importers make them.
 
 What moves as one is one body in the MJCF and has the name of its top link, as in simulators that
 merge fixed joints, and as in the spec: a contact of the trunk's shell is a contact of the base.
@@ -16,7 +16,7 @@ from terrainkit_robots.transforms import Matrix
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Fused:
+class MergedRobot:
     """A robot without fixed joints but those above its feet."""
 
     model: RobotModel
@@ -25,7 +25,7 @@ class Fused:
     """Body and pose in it, shape (4, 4) [m], of each link: its own, or the one it is part of."""
 
 
-def fused(model: RobotModel, *, keep: Collection[str] = ()) -> Fused:
+def merge_fixed_joints(model: RobotModel, *, keep: Collection[str] = ()) -> MergedRobot:
     """Return a robot whose links are one body where they move as one.
 
     Args:
@@ -50,7 +50,7 @@ def fused(model: RobotModel, *, keep: Collection[str] = ()) -> Fused:
         joints=tuple(_hung(joint, frames) for joint in model.joints if joint.child in members),
         excluded=_apart(model.excluded, frames),
     )
-    return Fused(model=made, frames=frames)
+    return MergedRobot(model=made, frames=frames)
 
 
 def _body(parts: Sequence[tuple[Link, Matrix]]) -> Link:

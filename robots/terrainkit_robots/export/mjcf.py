@@ -12,7 +12,7 @@ import numpy as np
 from lxml import etree
 
 from terrainkit_robots.description.model import Geometry, Inertial, Joint, Link, RobotModel
-from terrainkit_robots.export.actuator import Drive
+from terrainkit_robots.export.actuator import ActuatorConfig
 from terrainkit_robots.text import free_name
 from terrainkit_robots.transforms import Matrix, invert_poses
 
@@ -42,7 +42,7 @@ class Site:
 class Extras:
     """What a MJCF has beyond the robot's body."""
 
-    drives: Mapping[str, Drive] = field(default_factory=dict)
+    actuators: Mapping[str, ActuatorConfig] = field(default_factory=dict)
     """Controller of each actuated joint, in the order of the actuators."""
 
     feet: tuple[Site, ...] = ()
@@ -265,7 +265,7 @@ def _body(
             after = np.eye(4)
             for later in joints[index + 1 :]:
                 after = after @ later.origin
-            _joint(body, joint, invert_poses(after), extras.drives.get(joint.name))
+            _joint(body, joint, invert_poses(after), extras.actuators.get(joint.name))
     for kind, shapes in (("visual", link.visuals), ("collision", link.collisions)):
         for shape in shapes:
             _geom(body, shape, kind, meshes, taken)
@@ -305,7 +305,7 @@ def _inertial(body: Any, inertial: Inertial) -> None:
         element.set("diaginertia", "0 0 0")
 
 
-def _joint(body: Any, joint: Joint, frame: Matrix, drive: Drive | None) -> None:
+def _joint(body: Any, joint: Joint, frame: Matrix, drive: ActuatorConfig | None) -> None:
     element = etree.SubElement(body, "joint", name=joint.name)
     if joint.kind == "prismatic":
         element.set("type", "slide")
@@ -378,19 +378,19 @@ def _equality(root: Any, model: RobotModel) -> None:
 
 
 def _actuators(root: Any, model: RobotModel, extras: Extras) -> None:
-    if not extras.drives:
+    if not extras.actuators:
         return
     joints = {joint.name: joint for joint in model.joints}
     actuator = etree.SubElement(root, "actuator")
-    for name, drive in extras.drives.items():
-        kind = "velocity" if drive.of_speed else "position"
+    for name, drive in extras.actuators.items():
+        kind = "velocity" if drive.is_velocity_control else "position"
         element = etree.SubElement(actuator, kind, name=name, joint=name)
-        if not drive.of_speed:
+        if not drive.is_velocity_control:
             element.set("kp", _text(drive.stiffness))
         element.set("kv", _text(drive.damping))
         limits = (
             drive.velocity and (-drive.velocity, drive.velocity)
-            if drive.of_speed
+            if drive.is_velocity_control
             else joints[name].range
         )
         if limits:
@@ -429,9 +429,9 @@ def _keyframe(root: Any, model: RobotModel, extras: Extras) -> None:
     key = etree.SubElement(etree.SubElement(root, "keyframe"), "key", name="home")
     base = [0.0, 0.0, extras.height, 1.0, 0.0, 0.0, 0.0] if model.floating else []
     key.set("qpos", _text([*base, *(extras.home.get(name, 0.0) for name in order)]))
-    if extras.drives:
+    if extras.actuators:
         targets = (
-            0.0 if drive.of_speed else extras.home.get(name, 0.0)
-            for name, drive in extras.drives.items()
+            0.0 if drive.is_velocity_control else extras.home.get(name, 0.0)
+            for name, drive in extras.actuators.items()
         )
         key.set("ctrl", _text(list(targets)))

@@ -15,7 +15,7 @@ _CONTACT = ("friction", "condim", "priority", "solref", "solimp", "solmix", "mar
 """Attributes of shapes that are not carried over: how they feel to what they touch."""
 
 
-def leftovers(model: RobotModel) -> tuple[str, ...]:
+def unsupported_elements(model: RobotModel) -> tuple[str, ...]:
     """Return a sentence for each kind of thing that onboarding a MJCF leaves out."""
     if model.kind != "mjcf":
         return ()

@@ -35,7 +35,9 @@ def elements_of(shape: Geometry) -> Iterator[Element]:
                 attributes["scale"] = number_text(shape.mesh.scale)
             yield shape.origin, "mesh", attributes
         case _:
-            raise ValueError(f"a {shape.shape} has no place in a URDF; pack() leaves it out")
+            raise ValueError(
+                f"a {shape.shape} has no place in a URDF; export_meshes() leaves it out"
+            )
 
 
 def _ends_of_capsule(shape: Geometry) -> Iterator[Element]:

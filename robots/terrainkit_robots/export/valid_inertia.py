@@ -33,7 +33,9 @@ _THINNEST = 1e-6
 when the plate is turned, and nothing that is felt."""
 
 
-def sound_inertias(bodies: Sequence["Body"], links: Sequence[Link], notes: list[str]) -> list[Link]:
+def with_valid_inertia(
+    bodies: Sequence["Body"], links: Sequence[Link], notes: list[str]
+) -> list[Link]:
     """Return links with inertias that are taken, and note what was changed.
 
     The mass of a link whose inertia no reader takes goes to the heaviest link that it is fixed to,

@@ -1,19 +1,20 @@
-"""Rules: what each one is called, why it is there, and what it finds.
+"""Rules: the checks that run on a robot, each with a code, a name and a documentation page.
 
-A rule is a function from the facts of a robot to its violations. Its docstring is its page in
-docs/rules.md: a title, a paragraph that says why, the sections `Fix:` and `Source:`.
+A rule is a generator function that takes the `Facts` of a robot and yields its violations. The
+docstring of the function is its page in docs/rules.md. It consists of a title, the reason for the
+rule, and the sections `Fix:` and `Source:`.
 
     @rule("INR002", "negative-mass", "error")
     def negative_mass(robot: Facts) -> Iterator[Violation]:
         '''A mass is negative.
 
-        Why this goes wrong, and where.
+        What goes wrong with a negative mass, and in which tools.
 
         Fix:
-            What to do.
+            How to correct it.
 
         Source:
-            Where this is known from.
+            Where the problem and the threshold are documented.
         '''
 """
 
@@ -26,7 +27,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING, Literal
 
-from terrainkit.errors import ConfigError, listing
+from terrainkit.errors import ConfigError, known_names, nearest
 from terrainkit_robots.description.fix import Fix
 from terrainkit_robots.description.model import Source
 
@@ -38,52 +39,52 @@ Certainty = Literal["proven", "likely"]
 Measured = Mapping[str, float | int | str]
 
 Need = Literal["legs", "simulation", "against", "spec"]
-"""What a rule cannot be asked without: legs that were found, leave to simulate, another description
-of the robot, its robot.toml."""
+"""Input that a rule requires: detected legs, permission to simulate, a second description of the
+robot, or its robot.toml."""
 
 FAMILIES = {
-    "XML": "what is written",
+    "XML": "XML syntax and schema",
     "MSH": "mesh files",
-    "TRE": "the tree of links and joints",
+    "TRE": "kinematic tree",
     "JNT": "joints",
-    "INR": "masses and inertias",
-    "COL": "collision shapes",
+    "INR": "mass and inertia",
+    "COL": "collision geometry",
     "LEG": "legs",
-    "SYM": "left and right",
+    "SYM": "left-right symmetry",
     "NAM": "names",
-    "XRF": "the robot against another file of it, or its spec",
-    "SIM": "what simulators make of it",
-    "DYN": "the robot simulated",
+    "XRF": "comparison with another file or with the spec",
+    "SIM": "simulator compatibility",
+    "DYN": "simulation",
 }
 
 
 @dataclass(frozen=True, kw_only=True)
 class Violation:
-    """One thing that a rule found."""
+    """One place where a robot violates a rule."""
 
     subject: str
     """Name of the link, joint, mesh or file."""
 
     source: Source
-    """Where it is written."""
+    """File and line of the element."""
 
     message: str
-    """What was measured, what the threshold is: one sentence, with numbers and units."""
+    """One sentence with the measured value, its unit and the threshold."""
 
     hint: str = ""
-    """What to do about it; empty for what the rule says in general."""
+    """How to correct it. If empty, the `Fix:` section of the rule is used."""
 
     severity: Severity | None = None
-    """If it is another than the rule's."""
+    """Severity, if it differs from that of the rule."""
 
     certainty: Certainty = "proven"
-    """Likely where it rests on a guess, such as which links are legs."""
+    """`likely` if the violation depends on a heuristic, such as leg detection."""
 
     measured: Measured = field(default_factory=dict)
-    """The numbers of the message, by name."""
+    """The numbers in the message, by name."""
 
     fix: Fix | None = None
-    """How to repair it, where that can be done."""
+    """The edits that correct it, if it can be corrected automatically."""
 
 
 Check = Callable[["Facts"], Iterator[Violation]]
@@ -91,24 +92,24 @@ Check = Callable[["Facts"], Iterator[Violation]]
 
 @dataclass(frozen=True, kw_only=True)
 class Rule:
-    """A rule and its page."""
+    """A rule and its documentation page."""
 
     code: str
-    """Family and number; never used again for something else."""
+    """Family and number. Codes are never reused."""
 
     name: str
-    """The same in words."""
+    """Name in lower case with hyphens."""
 
     severity: Severity
-    """How bad a violation is, where it does not say otherwise itself."""
+    """Default severity of a violation."""
 
     check: Check
 
     fixes: Literal["safe", "unsafe", "no"] = "no"
-    """Whether it repairs what it finds, or some of that."""
+    """Whether some violations can be fixed automatically."""
 
     needs: tuple[Need, ...] = ()
-    """What it cannot be asked without."""
+    """Inputs that the rule requires."""
 
     @property
     def family(self) -> str:
@@ -122,34 +123,35 @@ class Rule:
 
     @property
     def why(self) -> str:
-        """Return why the rule is there."""
+        """Return the reason for the rule."""
         return self._page[1]
 
     @property
     def how_to_fix(self) -> str:
-        """Return what to do about a violation."""
+        """Return the `Fix:` section of the page."""
         return self._page[2]
 
     @property
     def reference(self) -> str:
-        """Return where the rule and its threshold come from."""
+        """Return the `Source:` section of the page."""
         return self._page[3]
 
     @property
     def _page(self) -> tuple[str, str, str, str]:
-        text = inspect.getdoc(self.check) or ""
         match = re.fullmatch(
             r"(?P<title>[^\n]+)\n\n(?P<why>.+?)\n\nFix:\n(?P<fix>.+?)\n\nSource:\n(?P<source>.+)",
-            text,
+            inspect.getdoc(self.check) or "",
             re.DOTALL,
         )
         if match is None:
-            raise ConfigError(f"{self.code}: the docstring lacks a title, why, Fix: or Source:")
-        why = "\n\n".join(_flow(paragraph) for paragraph in match["why"].split("\n\n"))
-        return match["title"], why, _flow(match["fix"]), _flow(match["source"])
+            raise ConfigError(
+                f"docstring of rule {self.code}: expected a title, a reason, Fix: and Source:"
+            )
+        why = "\n\n".join(_join_lines(paragraph) for paragraph in match["why"].split("\n\n"))
+        return match["title"], why, _join_lines(match["fix"]), _join_lines(match["source"])
 
 
-def _flow(text: str) -> str:
+def _join_lines(text: str) -> str:
     return " ".join(text.split())
 
 
@@ -164,11 +166,11 @@ def rule(
     fixes: Literal["safe", "unsafe", "no"] = "no",
     needs: tuple[Need, ...] = (),
 ) -> Callable[[Check], Check]:
-    """Return a decorator that makes a function the rule `code`."""
+    """Return a decorator that registers a function as the rule `code`."""
 
     def register(check: Check) -> Check:
         if code in _RULES and _RULES[code].check.__module__ != check.__module__:
-            raise ConfigError(f"two rules are called {code}")
+            raise ConfigError(f"rule code {code}: registered twice; expected a unique code")
         _RULES[code] = Rule(
             code=code, name=name, severity=severity, check=check, fixes=fixes, needs=needs
         )
@@ -179,7 +181,7 @@ def rule(
 
 @cache
 def rules() -> tuple[Rule, ...]:
-    """Return every rule: by family in the order of FAMILIES, then by number."""
+    """Return all rules, sorted by family in the order of FAMILIES, then by number."""
     from terrainkit_robots.lint import rules as package
 
     for module in pkgutil.iter_modules(package.__path__):
@@ -188,13 +190,16 @@ def rules() -> tuple[Rule, ...]:
     return tuple(sorted(_RULES.values(), key=lambda r: (order.index(r.family), r.code)))
 
 
-def get_rule(word: str) -> Rule:
-    """Return the rule whose code or name is `word`.
+def get_rule(code_or_name: str) -> Rule:
+    """Return the rule with this code or name.
 
     Raises:
-        ConfigError: if there is none.
+        ConfigError: if there is no such rule.
     """
-    for each in rules():
-        if word.upper() == each.code or word.lower() == each.name:
-            return each
-    raise ConfigError(f"no rule {word!r}; there are: {listing(r.code for r in rules())}")
+    known = {key: rule for rule in rules() for key in (rule.code.lower(), rule.name)}
+    found = known.get(code_or_name.lower())
+    if found is None:
+        codes = [rule.code for rule in rules()]
+        suggestion = known_names(code_or_name, codes, meant=nearest(code_or_name, known))
+        raise ConfigError(f"no rule {code_or_name!r}; {suggestion}")
+    return found

@@ -1,4 +1,4 @@
-"""Linting: every rule that was selected, on one robot, in one pass."""
+"""Run rules on a robot and collect their findings in a report."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,13 +14,13 @@ from terrainkit_robots.lint.rule import Certainty, Measured, Rule, Severity, Vio
 Verdict = Literal["pass", "warn", "fail"]
 
 
-INTERNAL = "internal error, please report it"
-"""How the reason of a rule begins that raised what it should not."""
+INTERNAL_ERROR = "internal error, please report it"
+"""Start of the reason of a rule that raised an unexpected exception."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """A violation and the rule that found it: what the reports print."""
+    """A violation together with the rule that found it, as shown in reports."""
 
     code: str
     name: str
@@ -37,7 +37,7 @@ class Finding:
 
 @dataclass(frozen=True, kw_only=True)
 class Skipped:
-    """A rule that could not be asked, or was told to be quiet."""
+    """A rule that could not run or was ignored."""
 
     code: str
     reason: str
@@ -45,97 +45,99 @@ class Skipped:
 
 @dataclass(frozen=True, kw_only=True)
 class Report:
-    """Everything that is to be said of one robot."""
+    """The result of linting one robot."""
 
     facts: Facts
     findings: tuple[Finding, ...]
-    """Errors first, then by place in the file."""
+    """Findings sorted by severity, then by file and line."""
 
     skipped: tuple[Skipped, ...] = ()
 
     simulated: bool = False
-    """Whether the robot was simulated where a rule wanted that."""
+    """Whether rules were allowed to simulate the robot."""
 
     @property
     def crashed(self) -> tuple[Skipped, ...]:
-        """The rules that raised what they should not have."""
-        return tuple(each for each in self.skipped if each.reason.startswith(INTERNAL))
+        """The rules that raised an unexpected exception."""
+        return tuple(each for each in self.skipped if each.reason.startswith(INTERNAL_ERROR))
 
     @property
     def verdict(self) -> Verdict:
-        """Fail with an error, warn with a warning, else pass."""
+        """`fail` if there are errors, `warn` if there are warnings, else `pass`."""
         severities = {finding.severity for finding in self.findings}
         return "fail" if "error" in severities else "warn" if "warning" in severities else "pass"
 
 
-MOST_FINDINGS = 50
-"""So many violations of one rule are told: of 10,000 alike nobody reads the last."""
+MAX_FINDINGS = 50
+"""Maximum number of findings of one rule."""
 
 _UNREADABLE = ("XML001", "XML002", "XML005", "XML011")
-"""Problems that can leave nothing of a file."""
+"""Problems after which a file may contain no robot."""
 
-_OF_WHOLE_ROBOTS = ("LEG", "SYM")
-"""Families that compare limbs, and would tell again what a broken tree has lost."""
+_NEEDS_COMPLETE_TREE = ("LEG", "SYM")
+"""Families that compare limbs. On an incomplete tree they would report consequences of the tree's
+own errors."""
 
 
-def lint(facts: Facts, chosen: Sequence[Rule] | None = None, *, simulate: bool = True) -> Report:
-    """Return what the rules find on a robot.
+def lint(facts: Facts, selected: Sequence[Rule] | None = None, *, simulate: bool = True) -> Report:
+    """Return the report of the selected rules on a robot.
+
+    An exception in one rule does not affect the others. It is recorded in `Report.skipped`.
 
     Args:
         facts: The robot.
-        chosen: Rules to ask; unless told all of those for which there is what they need.
-        simulate: Whether the rules that simulate may do so, which takes a second or two.
+        selected: Rules to run. By default, all rules whose inputs are available.
+        simulate: Whether rules may simulate the robot, which takes one or two seconds.
     """
     findings: list[Finding] = []
     skipped: list[Skipped] = []
-    if chosen is None:
-        chosen = [rule for rule in rules() if is_applicable(rule, facts, simulate=simulate)]
+    if selected is None:
+        selected = [rule for rule in rules() if is_applicable(rule, facts, simulate=simulate)]
     if not facts.model.links and any(p.code in _UNREADABLE for p in facts.model.problems):
-        chosen = [rule for rule in chosen if rule.family == "XML"]  # there is no robot to look at
-    for each in chosen:
+        selected = [rule for rule in selected if rule.family == "XML"]  # no robot was read
+    for rule in selected:
         try:
-            if each.family in _OF_WHOLE_ROBOTS and facts.tree.left_out:
-                raise CannotCheckError("links or joints are missing from the tree")
-            missing = _missing(each, facts, simulate=simulate)
+            if rule.family in _NEEDS_COMPLETE_TREE and facts.tree.left_out:
+                raise CannotCheckError("links or joints are missing from the kinematic tree")
+            missing = _missing_need(rule, facts, simulate=simulate)
             if missing:
                 raise CannotCheckError(missing)
-            violations = list(islice(each.check(facts), MOST_FINDINGS + 1))
-            findings += [_finding(each, violation) for violation in violations[:MOST_FINDINGS]]
-            if len(violations) > MOST_FINDINGS:
-                reason = f"it found more than the {MOST_FINDINGS} violations that are shown"
-                skipped.append(Skipped(code=each.code, reason=reason))
-        except CannotCheckError as cannot:
-            skipped.append(Skipped(code=each.code, reason=str(cannot)))
+            violations = list(islice(rule.check(facts), MAX_FINDINGS + 1))
+            findings += [_finding(rule, violation) for violation in violations[:MAX_FINDINGS]]
+            if len(violations) > MAX_FINDINGS:
+                reason = f"more than {MAX_FINDINGS} findings; only the first are reported"
+                skipped.append(Skipped(code=rule.code, reason=reason))
+        except CannotCheckError as error:
+            skipped.append(Skipped(code=rule.code, reason=str(error)))
         except MemoryError:
             raise
         except Exception as error:
-            # One rule that fails on a strange robot must not cost what the others found; that it
-            # failed is told, and the tests take it for the bug that it is.
-            reason = f"{INTERNAL}: {type(error).__name__}: {error}"
-            skipped.append(Skipped(code=each.code, reason=reason))
+            # A bug in one rule must not hide the findings of the others. Tests assert on `crashed`.
+            reason = f"{INTERNAL_ERROR}: {type(error).__name__}: {error}"
+            skipped.append(Skipped(code=rule.code, reason=reason))
     order = {"error": 0, "warning": 1, "info": 2}
     findings.sort(key=lambda f: (order[f.severity], str(f.file), f.line, f.code))
     return Report(facts=facts, findings=tuple(findings), skipped=tuple(skipped), simulated=simulate)
 
 
 def is_applicable(rule: Rule, facts: Facts, *, simulate: bool) -> bool:
-    """Return whether the inputs that a rule needs were given: other file, spec, simulation."""
-    missing = _missing(rule, facts, simulate=simulate)
-    return missing not in (_NO_OTHER, _NO_SPEC, _NO_SIMULATION)
+    """Return whether the user provided the inputs of a rule: other file, spec, simulation."""
+    missing = _missing_need(rule, facts, simulate=simulate)
+    return missing not in (_NO_AGAINST, _NO_SPEC, _NO_SIMULATION)
 
 
-_NO_LEGS = "no legs were found"
-_NO_OTHER = "there is no other file to compare with; --against names one"
-_NO_SPEC = "there is no robot.toml to compare with; --spec names one"
-_NO_SIMULATION = "nothing is simulated here"
+_NO_LEGS = "no legs detected"
+_NO_AGAINST = "no second file to compare with; use --against FILE"
+_NO_SPEC = "no robot.toml to compare with; use --spec FILE"
+_NO_SIMULATION = "simulation is disabled"
 
 
-def _missing(rule: Rule, facts: Facts, *, simulate: bool) -> str:
-    """Return which of its needs a rule lacks, as a reason; empty if it can be asked."""
+def _missing_need(rule: Rule, facts: Facts, *, simulate: bool) -> str:
+    """Return which input a rule lacks, as a reason. Empty if it can run."""
     if "simulation" in rule.needs and not simulate:
         return _NO_SIMULATION
     if "against" in rule.needs and facts.against is None:
-        return _NO_OTHER
+        return _NO_AGAINST
     if "spec" in rule.needs and facts.spec is None:
         return _NO_SPEC
     if "legs" in rule.needs and not facts.legs:

@@ -1,4 +1,4 @@
-"""Selection: which rules are asked, and which of their findings are told to be quiet."""
+"""Select which rules run, and suppress findings by comments in the robot's files."""
 
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
@@ -9,6 +9,7 @@ from terrainkit_robots.lint.rule import Rule, rules
 from terrainkit_robots.lint.runner import Finding, Report, Skipped, is_applicable, lint
 from terrainkit_robots.lint.settings import Settings, matching
 from terrainkit_robots.lint.suppressions import SuppressionComment, read_comments
+from terrainkit_robots.text import display_path
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Suppressed(Skipped):
-    """A finding that a comment in the file quiets."""
+    """A finding that is suppressed by a comment in the file."""
 
     finding: Finding
     comment: SuppressionComment
@@ -24,95 +25,93 @@ class Suppressed(Skipped):
 
 @dataclass(frozen=True, kw_only=True)
 class UnusedSuppression(Skipped):
-    """A comment that quiets nothing; `reason` says where it is, and why."""
+    """A suppression comment without effect. `reason` contains its location."""
 
 
 def select_rules(settings: Settings) -> tuple[tuple[Rule, ...], tuple[Skipped, ...]]:
-    """Return the rules to ask, and those that are left out for a reason.
+    """Return the rules that the settings select, and the ignored ones with their reasons.
 
     Raises:
-        ConfigError: if a word stands for no rule.
+        ConfigError: if the settings name an unknown rule.
     """
-    selected = {rule for word in settings.select for rule in matching(word)}
+    named = {rule for word in settings.select for rule in matching(word)}
     reasons = {
         rule.code: reason for word, reason in settings.ignore.items() for rule in matching(word)
     }
-    wanted = [rule for rule in rules() if rule in selected or not settings.select]
-    chosen = tuple(rule for rule in wanted if rule.code not in reasons)
-    left_out = tuple(
+    candidates = [rule for rule in rules() if rule in named or not settings.select]
+    selected = tuple(rule for rule in candidates if rule.code not in reasons)
+    ignored = tuple(
         Skipped(code=rule.code, reason=f"ignored: {reasons[rule.code]}")
-        for rule in wanted
+        for rule in candidates
         if rule.code in reasons
     )
-    return chosen, left_out
+    return selected, ignored
 
 
 def lint_selected(
     facts: "Facts", settings: Settings, contents: Mapping[Path, bytes] | None = None
 ) -> Report:
-    """Return what the chosen rules find on a robot, without what its comments quiet.
+    """Return the report of the selected rules on a robot, without suppressed findings.
 
     Args:
         facts: The robot.
-        settings: Which rules are asked.
-        contents: What was read instead of the files of these paths.
+        settings: Which rules to run.
+        contents: Bytes that replace the content of files, by path.
 
     Raises:
-        ConfigError: if the settings name a rule that there is not.
+        ConfigError: if the settings name an unknown rule.
     """
-    chosen, left_out = select_rules(settings)
+    selected, ignored = select_rules(settings)
     if not settings.select:
-        chosen = tuple(r for r in chosen if is_applicable(r, facts, simulate=settings.simulate))
-    report = lint(facts, chosen, simulate=settings.simulate)
+        selected = tuple(r for r in selected if is_applicable(r, facts, simulate=settings.simulate))
+    report = lint(facts, selected, simulate=settings.simulate)
     comments = [
         comment
         for file in facts.model.sources
         for comment in read_comments(file, (contents or {}).get(file))
     ]
-    kept, ignored = _quieted(report, comments)
-    unable = {skipped.code for skipped in report.skipped}
-    asked = {rule.code for rule in chosen} - unable
-    idle = _idle(comments, asked, ignored)
+    kept, suppressed = _apply_suppressions(report, comments)
+    completed = {rule.code for rule in selected} - {skipped.code for skipped in report.skipped}
+    unused = _unused_suppressions(comments, completed, suppressed)
     return replace(
-        report, findings=tuple(kept), skipped=(*report.skipped, *left_out, *ignored, *idle)
+        report, findings=tuple(kept), skipped=(*report.skipped, *ignored, *suppressed, *unused)
     )
 
 
-def _quieted(
+def _apply_suppressions(
     report: Report, comments: Sequence[SuppressionComment]
 ) -> tuple[list[Finding], list[Suppressed]]:
-    """Return the findings that are left, and those that comments quiet."""
-    by_code: dict[tuple[Path, str], list[SuppressionComment]] = {}
+    """Split the findings of a report into those that remain and those that are suppressed."""
+    by_rule: dict[tuple[Path, str], list[SuppressionComment]] = {}
     for comment in comments:
-        if comment.mistake is None:
-            by_code.setdefault((comment.file, comment.code), []).append(comment)
+        if comment.error is None:
+            by_rule.setdefault((comment.file, comment.code), []).append(comment)
     kept: list[Finding] = []
-    ignored: list[Suppressed] = []
+    suppressed: list[Suppressed] = []
     for finding in report.findings:
-        near = by_code.get((finding.file, finding.code), ())
-        covering = next((c for c in near if c.covers(finding.line)), None)
-        if covering is None:
+        candidates = by_rule.get((finding.file, finding.code), ())
+        comment = next((c for c in candidates if c.is_covering(finding.line)), None)
+        if comment is None:
             kept.append(finding)
             continue
-        why = f"ignored for {_place(finding)}: {covering.reason}"
-        ignored.append(Suppressed(code=finding.code, reason=why, finding=finding, comment=covering))
-    return kept, ignored
+        location = f"{finding.file.name}:{finding.line}"
+        target = f"{finding.subject} ({location})" if finding.subject else location
+        reason = f"suppressed for {target}: {comment.reason}"
+        suppressed.append(
+            Suppressed(code=finding.code, reason=reason, finding=finding, comment=comment)
+        )
+    return kept, suppressed
 
 
-def _place(finding: Finding) -> str:
-    where = f"{finding.file.name}:{finding.line}"
-    return f"{finding.subject} ({where})" if finding.subject else where
-
-
-def _idle(
-    comments: Sequence[SuppressionComment], asked: Set[str], ignored: Sequence[Suppressed]
+def _unused_suppressions(
+    comments: Sequence[SuppressionComment], completed: Set[str], suppressed: Sequence[Suppressed]
 ) -> Iterator[UnusedSuppression]:
-    """Yield the comments that quiet nothing, although their rule was asked."""
-    used = {id(each.comment) for each in ignored}
+    """Yield the comments that suppress nothing although their rule ran."""
+    used = {id(each.comment) for each in suppressed}
     for comment in comments:
-        why = comment.mistake
-        if why is None and comment.code in asked and id(comment) not in used:
-            why = f"there is no {comment.code} to ignore here"
-        if why is not None:
-            reason = f"comment at {comment.file}:{comment.line}: {why}"
+        error = comment.error
+        if error is None and comment.code in completed and id(comment) not in used:
+            error = f"unused suppression: {comment.code} has no finding here"
+        if error is not None:
+            reason = f"comment at {display_path(comment.file)}:{comment.line}: {error}"
             yield UnusedSuppression(code=comment.code, reason=reason)

@@ -1,11 +1,11 @@
-"""Comments in a robot's file that ignore a rule for one element.
+"""Read comments in a robot's file that suppress a rule for one element.
 
-    <!-- terrainkit: ignore INR004 the dummy weighs nothing -->
+    <!-- terrainkit: ignore INR004 the dummy link has no mass -->
     <link name="dummy">
 
-A comment speaks of the element on its line, or else of the one below: of that and of all that is
-in it. It also speaks of the element that it is in; as the first or the last thing there, of all of
-that element, unless that holds the whole robot.
+A comment applies to the element on its line, or else to the next element, including everything
+inside. A comment at the start or end of an element applies to that whole element, unless the
+element contains the whole robot.
 """
 
 import re
@@ -30,69 +30,70 @@ _COMMENT = re.compile(
     re.DOTALL,
 )
 
-_MARKS = tuple("terrainkit".encode(encoding) for encoding in ("ascii", "utf-16-le", "utf-16-be"))
-"""What a file with comments contains, in the encodings that XML comes in."""
+_MARKERS = tuple("terrainkit".encode(encoding) for encoding in ("ascii", "utf-16-le", "utf-16-be"))
+"""The word that a file with suppression comments contains, in each encoding of XML."""
 
 _CONTAINERS = frozenset(
     {"robot", "mujoco", "mujocoinclude", "worldbody", "default", "asset", "actuator", "sensor"}
     | {"contact", "tendon", "equality", "keyframe", "custom", "extension", "deformable"}
 )
-"""Elements that hold unlike things: a comment in one does not speak of all that is in it."""
+"""Elements with unrelated children. A comment inside one does not apply to all of them."""
 
-_MOST = 1000
-"""So many comments of a file are read."""
+_MAX_COMMENTS = 1000
+"""Maximum number of comments that are read from a file."""
 
-_MOST_CODES = 20
-"""So many codes of a comment are read."""
+_MAX_CODES = 20
+"""Maximum number of codes that are read from a comment."""
 
-_MOST_BETWEEN = 100
-"""So many other comments may stand between a comment and its element."""
+_MAX_BETWEEN = 100
+"""Maximum number of other comments between a comment and its element."""
 
-_LONGEST = 200
-"""So much is kept of a reason, and of a word [characters]."""
+_MAX_LENGTH = 200
+"""Maximum length of a reason, and of a word [characters]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SuppressionComment:
-    """A comment, and the lines on which the elements start that it speaks of."""
+    """A suppression comment for one rule, and the lines to which it applies."""
 
     file: Path
     line: int
     code: str
-    """The rule to ignore; as it is written, if there is no such rule."""
+    """Code of the rule to suppress, or the word in the comment if it is not a rule."""
 
     reason: str
-    first: int
-    """Line of the element that it speaks of."""
+    first_line: int
+    """Line of the element to which the comment applies."""
 
-    last: int
-    """Line of the last element in that."""
+    last_line: int
+    """Line of the last element inside it."""
 
-    without: tuple[tuple[int, int], ...]
-    """First and last lines of what in there is another part of the robot, in order."""
+    excluded: tuple[tuple[int, int], ...]
+    """First and last lines of nested bodies, which are separate parts of the robot, in order."""
 
-    around: tuple[int, ...]
-    """Lines of elements of which it speaks without what is in them; 0 is the whole file."""
+    extra_lines: tuple[int, ...]
+    """Lines of further elements to which the comment applies without their children. 0 is the
+    whole file."""
 
-    mistake: str | None
-    """Why it cannot quiet anything, and what was wanted."""
+    error: str | None
+    """Why the comment is invalid. None if it is valid."""
 
-    def covers(self, line: int) -> bool:
-        """Whether it speaks of what starts on `line`."""
-        if line == self.first or line in self.around:
+    def is_covering(self, line: int) -> bool:
+        """Return whether the comment applies to the element that starts on `line`."""
+        if line == self.first_line or line in self.extra_lines:
             return True
-        if not self.first < line <= self.last:
+        if not self.first_line < line <= self.last_line:
             return False
-        place = bisect_right(self.without, line, key=itemgetter(0))
-        return not place or line > self.without[place - 1][1]
+        index = bisect_right(self.excluded, line, key=itemgetter(0))
+        return not index or line > self.excluded[index - 1][1]
 
 
 def read_comments(file: Path, data: bytes | None = None) -> Iterator[SuppressionComment]:
-    """Yield the comments of a file that are for us, one for each code in them.
+    """Yield the suppression comments of a file, one for each code.
 
     Args:
         file: The file.
-        data: What to read instead of it.
+        data: Bytes to parse instead of the content of the file.
     """
     from lxml import etree
 
@@ -101,80 +102,84 @@ def read_comments(file: Path, data: bytes | None = None) -> Iterator[Suppression
     try:
         data = read_bytes(file) if data is None else data
     except RobotFileError:
-        return  # gone since it was read, or never there: its reader tells of that
-    if not any(mark in data for mark in _MARKS):
+        return  # reported when the robot is read
+    if not any(marker in data for marker in _MARKERS):
         return
     document = parse_xml(file, data)
     root = document.root
     if root is None:
         return
     lines = _Lines({element: source.line for element, source in document.sources.items()})
-    around = (*root.itersiblings(etree.Comment, preceding=True), *root.itersiblings(etree.Comment))
-    said = ((n, _COMMENT.fullmatch(n.text or "")) for n in (*around, *root.iter(etree.Comment)))
-    ours = ((node, match) for node, match in said if match is not None)
-    for node, match in islice(ours, _MOST):
-        about, parent = _scope(node, root)
-        alone = [lines.first(parent)] if parent is not None else []
-        whole = [0] if root in (about, parent) else []
-        for code in re.split(r"\s*,\s*", match["codes"] or "")[:_MOST_CODES]:
-            known, mistake = _checked(match["word"], code[:_LONGEST], match["reason"])
+    outside = (*root.itersiblings(etree.Comment, preceding=True), *root.itersiblings(etree.Comment))
+    matches = ((n, _COMMENT.fullmatch(n.text or "")) for n in (*outside, *root.iter(etree.Comment)))
+    comments = ((node, match) for node, match in matches if match is not None)
+    for node, match in islice(comments, _MAX_COMMENTS):
+        element, parent = _scope(node, root)
+        parent_lines = [lines.first(parent)] if parent is not None else []
+        file_lines = [0] if root in (element, parent) else []
+        for code in re.split(r"\s*,\s*", match["codes"] or "")[:_MAX_CODES]:
+            known, error = _validate(match["word"], code[:_MAX_LENGTH], match["reason"])
             yield SuppressionComment(
                 file=file,
                 line=(node.sourceline or 0) - (node.text or "").count("\n"),
                 code=known,
-                reason=" ".join(match["reason"][:_LONGEST].split()),
-                first=lines.first(about),
-                last=lines.last(about),
-                without=lines.without(about),
-                around=(*alone, *whole),
-                mistake=mistake,
+                reason=" ".join(match["reason"][:_MAX_LENGTH].split()),
+                first_line=lines.first(element),
+                last_line=lines.last(element),
+                excluded=lines.nested_bodies(element),
+                extra_lines=(*parent_lines, *file_lines),
+                error=error,
             )
 
 
-def _checked(word: str, code: str, reason: str) -> tuple[str, str | None]:
+def _validate(word: str, code: str, reason: str) -> tuple[str, str | None]:
     """Return the code of the rule, and what is wrong with the comment."""
     try:
         known = get_rule(code).code
     except ConfigError:
         known = ""
     if word != "ignore":
-        why = f"it says {word[:_LONGEST]!r}"
+        error = f"unknown word {word[:_MAX_LENGTH]!r}"
     elif not known:
-        why = f"there is no rule {code!r}" if code else "it names no rule"
+        error = f"unknown rule {code!r}" if code else "missing rule"
     elif not reason.strip():
-        why = "it gives no reason"
+        error = "missing reason"
     else:
         return known, None
-    return known or code, f"{why}; wanted <!-- terrainkit: ignore {known or 'CODE'} reason -->"
+    return known or code, f"{error}; expected <!-- terrainkit: ignore {known or 'CODE'} reason -->"
 
 
 def _scope(
     comment: "etree._Element", root: "etree._Element"
 ) -> tuple["etree._Element", "etree._Element | None"]:
-    """Return the element that a comment is about, with what is in it, and one without that."""
+    """Return the element to which a comment applies, and a parent to which it applies as well.
+
+    The comment applies to the children of the element, but not to those of the parent.
+    """
     parent = comment.getparent()
     if parent is None:
         return root, None
     before = _first_element(comment.itersiblings(preceding=True))
     after = _first_element(comment.itersiblings())
-    if before is not None and _on_one_line(before, comment):
-        about = before
+    if before is not None and _is_on_same_line(before, comment):
+        element = before
     elif after is None or (before is None and parent.tag not in _CONTAINERS):
         return parent, None
     else:
-        about = after
-    # Of a link, a comment in it may speak as well; of the whole robot, one at its very start.
-    inside = before is None or parent.tag not in _CONTAINERS
-    return about, parent if inside and about.tag != "body" else None
+        element = after
+    # A comment anywhere in a link also applies to the link; one at the start of the robot also
+    # applies to the robot.
+    applies_to_parent = before is None or parent.tag not in _CONTAINERS
+    return element, parent if applies_to_parent and element.tag != "body" else None
 
 
 def _first_element(nodes: "Iterator[etree._Element]") -> "etree._Element | None":
-    return next((n for n in islice(nodes, _MOST_BETWEEN) if isinstance(n.tag, str)), None)
+    return next((n for n in islice(nodes, _MAX_BETWEEN) if isinstance(n.tag, str)), None)
 
 
-def _on_one_line(element: "etree._Element", comment: "etree._Element") -> bool:
-    """Return whether no line ends between an element and a comment after it."""
-    for node in islice(comment.itersiblings(preceding=True), _MOST_BETWEEN):
+def _is_on_same_line(element: "etree._Element", comment: "etree._Element") -> bool:
+    """Return whether there is no line break between an element and a comment after it."""
+    for node in islice(comment.itersiblings(preceding=True), _MAX_BETWEEN):
         if "\n" in (node.tail or ""):
             return False
         if node is element:
@@ -185,27 +190,27 @@ def _on_one_line(element: "etree._Element", comment: "etree._Element") -> bool:
 
 
 class _Lines:
-    """The lines of elements and of what is in them."""
+    """The lines of elements and of their children."""
 
     def __init__(self, starts: "Mapping[etree._Element, int]") -> None:
         self._starts = starts
-        self._without: dict[etree._Element, tuple[tuple[int, int], ...]] = {}
+        self._nested_bodies: dict[etree._Element, tuple[tuple[int, int], ...]] = {}
 
     def first(self, element: "etree._Element") -> int:
         """Return the line on which an element starts."""
         return self._starts.get(element, -1)
 
     def last(self, element: "etree._Element") -> int:
-        """Return the line on which the last element in another starts."""
+        """Return the line on which the last element inside an element starts."""
         if element.tag in _CONTAINERS:
             return self.first(element)
         while (child := _first_element(element.iterchildren(reversed=True))) is not None:
             element = child
         return self.first(element)
 
-    def without(self, element: "etree._Element") -> tuple[tuple[int, int], ...]:
-        """Return the lines of the bodies in a body: each is another part of the robot."""
-        if element not in self._without:
+    def nested_bodies(self, element: "etree._Element") -> tuple[tuple[int, int], ...]:
+        """Return the first and last lines of the bodies inside a body."""
+        if element not in self._nested_bodies:
             bodies = element.iterchildren("body") if element.tag == "body" else ()
-            self._without[element] = tuple((self.first(b), self.last(b)) for b in bodies)
-        return self._without[element]
+            self._nested_bodies[element] = tuple((self.first(b), self.last(b)) for b in bodies)
+        return self._nested_bodies[element]

@@ -28,7 +28,7 @@ from terrainkit_robots.mesh.surface import (
     TooLargeError,
     is_closed,
     is_flat,
-    numbers,
+    parse_float_list,
     signed_volume,
     welded,
 )
@@ -83,13 +83,13 @@ class Meshes:
 
         return self._once(("header", path), read)
 
-    def is_held(self, path: Path) -> bool:
+    def has_contents(self, path: Path) -> bool:
         """Return whether something else is read instead of the file, such as what a fix makes."""
         return self._held(path) is not None
 
     def exists(self, path: Path) -> bool:
         """Return whether there is something under that name, be it a mesh or not; opens nothing."""
-        return self.is_held(path) or exists(path)
+        return self.has_contents(path) or exists(path)
 
     def data(self, path: Path) -> bytes:
         """Return the content of a file.
@@ -99,7 +99,7 @@ class Meshes:
         """
         return self._bytes_of(path, self.header(path).size)
 
-    def beside(self, contents: Mapping[Path, bytes]) -> "Meshes":
+    def with_contents(self, contents: Mapping[Path, bytes]) -> "Meshes":
         """Return the same files and others that are not on disk."""
         return Meshes({**self._contents, **contents})
 
@@ -119,7 +119,7 @@ class Meshes:
         """
         return self._once(("vertices", mesh.path, mesh.scale), lambda: self._scaled(mesh))
 
-    def readable(self, mesh: MeshFile) -> bool:
+    def is_readable(self, mesh: MeshFile) -> bool:
         """Return whether the vertices can be had."""
         try:
             self.vertices(mesh)
@@ -136,7 +136,7 @@ class Meshes:
         key = ("diagonal", mesh.path, mesh.scale)
         return self._once(key, lambda: float(np.linalg.norm(np.ptp(self.vertices(mesh), axis=0))))
 
-    def glance(self, mesh: MeshFile) -> float | None:
+    def partial_diagonal(self, mesh: MeshFile) -> float | None:
         """Return the diagonal of a part of the mesh, scaled [m], from the beginning of its file.
 
         The whole is at least as large, unless the file itself scales it, or begins with points that
@@ -330,13 +330,13 @@ def _first_points(kind: Format, head: bytes) -> Points:
         return np.frombuffer(head, STL_RECORD, faces, STL_HEADER)["corners"].reshape(-1, 3)
     if kind == "obj":
         lines = re.findall(rb"^v[ \t]+(\S+[ \t]+\S+[ \t]+\S+)", head, re.MULTILINE)
-        return numbers(b" ".join(lines[:-1])).reshape(-1, 3)
+        return parse_float_list(b" ".join(lines[:-1])).reshape(-1, 3)
     array = re.search(rb"<float_array[^>]*>([^<]*)", head)
     if array is None:
         return np.zeros((0, 3))
     unit = re.search(rb"<unit[^>]*\bmeter=[\"']([0-9.eE+-]+)[\"']", head)
-    values = numbers(array[1].rpartition(b" ")[0])  # the last number may be cut off
-    factor = float(numbers(unit[1])[0]) if unit else 1.0
+    values = parse_float_list(array[1].rpartition(b" ")[0])  # the last number may be cut off
+    factor = float(parse_float_list(unit[1])[0]) if unit else 1.0
     return values[: values.size // 3 * 3].reshape(-1, 3) * factor
 
 

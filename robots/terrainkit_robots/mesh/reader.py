@@ -13,10 +13,10 @@ from terrainkit_robots.mesh.surface import (
     MeshError,
     Points,
     Surface,
-    fan,
-    numbers,
+    parse_float_list,
+    parse_int_list,
+    triangulate_fan,
     unique_points,
-    whole_numbers,
 )
 
 
@@ -59,7 +59,7 @@ def _binary_stl(data: bytes) -> Surface:
 
 def _ascii_stl(data: bytes) -> Surface:
     lines = re.findall(rb"vertex[ \t]([^\r\n]*)", data, re.IGNORECASE)
-    corners = numbers(b" ".join(lines))
+    corners = parse_float_list(b" ".join(lines))
     if corners.size != 3 * len(lines) or len(lines) % 3:
         raise MeshError("is an ASCII STL whose corners are not three numbers each, three a face")
     return _loose(corners.reshape(-1, 3))
@@ -76,16 +76,16 @@ def _obj(data: bytes) -> Surface:
     # only the first of the three indices is a corner's: 7/1/3 -> 7
     corners = re.sub(rb"/\S*", b"", b"\n".join(faces))
     counts = np.array([len(face.split()) for face in corners.split(b"\n")])
-    indices = whole_numbers(corners)
+    indices = parse_int_list(corners)
     indices = np.where(indices < 0, indices + len(points), indices - 1)
-    return Surface(points=points, faces=fan(indices, counts))
+    return Surface(points=points, faces=triangulate_fan(indices, counts))
 
 
 def obj_points(lines: list[bytes]) -> Points:
     """Return the corners in the `v` lines of an OBJ, which may have a weight or a color as well."""
     if not lines:
         raise MeshError("holds no corners")
-    values = numbers(b" ".join(line[2:] for line in lines))
+    values = parse_float_list(b" ".join(line[2:] for line in lines))
     width, rest = divmod(values.size, len(lines))
     if rest or width < 3:
         raise MeshError("has corners that are not three numbers each")

@@ -34,7 +34,7 @@ class Surface:
     """Indices of the three corners of each triangle, shape (m, 3)."""
 
 
-def numbers(text: bytes) -> NDArray[np.float64]:
+def parse_float_list(text: bytes) -> NDArray[np.float64]:
     """Return the numbers in a text, parted by white space.
 
     Raises:
@@ -48,13 +48,13 @@ def numbers(text: bytes) -> NDArray[np.float64]:
             raise MeshError("has text where numbers should be") from None
 
 
-def whole_numbers(text: bytes) -> NDArray[np.int64]:
+def parse_int_list(text: bytes) -> NDArray[np.int64]:
     """Return the whole numbers in a text, such as indices.
 
     Raises:
         MeshError: if something else is in it.
     """
-    values = numbers(text)
+    values = parse_float_list(text)
     if not (np.abs(values) < _LARGEST_INDEX).all():
         raise MeshError("has an index that is not a number, or beyond every corner")
     return values.astype(np.int64)
@@ -64,7 +64,7 @@ _LARGEST_INDEX = 2.0**40
 """No file has as many corners; float64 holds every whole number up to it."""
 
 
-def fan(indices: Faces, counts: Faces) -> Faces:
+def triangulate_fan(indices: Faces, counts: Faces) -> Faces:
     """Return polygons as triangles, shape (m, 3), each from the first corner of its polygon.
 
     Args:
@@ -153,7 +153,7 @@ def thickness(points: Points) -> float:
     return float(spans.min()) / diagonal if diagonal > 0 else 0.0
 
 
-def clustered(surface: Surface, cells: int) -> Surface:
+def cluster_vertices(surface: Surface, cells: int) -> Surface:
     """Return a coarser surface: the corners in one cell of a grid become one corner.
 
     Args:

@@ -241,10 +241,11 @@ def _repaired(file: Path, wishes: Wishes) -> tuple[Report, tuple["Finding", ...]
 
 def _pictures(folder: Path) -> tuple[dict[str, bytes], str]:
     """Return pictures by the names of their files, and why there are none."""
-    from terrainkit_robots.onboarding.pictures import PicturesError, draw
+    from terrainkit_robots.rendering.child_process import RenderError
+    from terrainkit_robots.rendering.robot_pictures import render_robot
 
     try:
-        drawn = draw(folder / MJCF)
-    except PicturesError as error:
+        drawn = render_robot(folder / MJCF)
+    except RenderError as error:
         return {}, str(error)
     return {f"report/{name}.png": data for name, data in drawn.items()}, ""

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 from terrainkit_robots.analysis.bodies.joint_order import permutation
 from terrainkit_robots.analysis.simulator_conventions.joint_order import simulator_orders
 from terrainkit_robots.analysis.simulator_conventions.order_table import order_table
+from terrainkit_robots.lint.report.escape import escape_control, escape_surrogates
+from terrainkit_robots.lint.report.grouping import group_findings
 from terrainkit_robots.lint.report.markdown import cell, finding_row, titled_list
-from terrainkit_robots.lint.report.plain import encodable, plain
-from terrainkit_robots.lint.report.tally import grouped, tally
+from terrainkit_robots.lint.report.summary import group_skipped, summarize_findings
 from terrainkit_robots.onboarding.joint_rows import joint_rows, shown
 from terrainkit_robots.text import count
 
@@ -41,7 +42,7 @@ def report_page(done: "BroughtIn") -> str:
         _findings(done),
         _next(done, made),
     )
-    return encodable("\n".join(line for section in sections for line in section))
+    return escape_surrogates("\n".join(line for section in sections for line in section))
 
 
 def _table(rows: Sequence[Sequence[str]]) -> Iterator[str]:
@@ -229,12 +230,13 @@ def _orders(made: "Onboarded") -> Iterator[str]:
 def _findings(done: "BroughtIn") -> Iterator[str]:
     report = done.report
     yield "## Findings\n"
-    yield f"**{tally([report])}** in the robot as it was read, repairs made.\n"
+    yield f"**{summarize_findings([report])}** in the robot as it was read, repairs made.\n"
     if report.findings:
         yield "| | rule | where | what | what to do |\n|---|---|---|---|---|"
-        yield from (finding_row(finding) for finding in report.findings)
+        groups = group_findings(report.facts.model, report.findings)
+        yield from (finding_row(group) for group in groups)
         yield ""
-    skipped = [(codes, reason) for _, codes, reason in grouped(report.skipped)]
+    skipped = [(codes, reason) for _, codes, reason in group_skipped(report.skipped)]
     yield from titled_list("Not checked, or ignored", skipped)
 
 
@@ -264,4 +266,4 @@ def _next(done: "BroughtIn", made: "Onboarded") -> Iterator[str]:
 
 
 def _word(name: str) -> str:
-    return shlex.quote(plain(name))
+    return shlex.quote(escape_control(name))

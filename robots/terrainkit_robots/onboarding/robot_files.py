@@ -14,9 +14,9 @@ from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.bodies.shapes import lowest
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.export.actuator import Drive
-from terrainkit_robots.export.canonical import normal_form
-from terrainkit_robots.export.fixed_joint_merge import fused
+from terrainkit_robots.export.actuator import ActuatorConfig
+from terrainkit_robots.export.canonical import to_canonical
+from terrainkit_robots.export.fixed_joint_merge import merge_fixed_joints
 from terrainkit_robots.export.mjcf import Extras, Site, mjcf_text, scene_text
 from terrainkit_robots.export.sites import foot_sites, imu_notes, imu_site
 from terrainkit_robots.mesh.mesh_cache import Meshes
@@ -86,17 +86,19 @@ def onboard(
         TerrainkitError: if there is no robot, a mesh of it cannot be had, the spec that is given is
             of another, or MuJoCo refuses it.
     """
-    from terrainkit_robots.export.collision_simplification.simplify import treat
-    from terrainkit_robots.export.mesh_export.mesh_export import pack
-    from terrainkit_robots.export.unsupported import leftovers
+    from terrainkit_robots.export.collision_simplification.simplify import simplify_collisions
+    from terrainkit_robots.export.mesh_export.mesh_export import export_meshes
+    from terrainkit_robots.export.unsupported import unsupported_elements
     from terrainkit_robots.export.urdf import urdf_text
     from terrainkit_robots.spec.spec_file import to_toml
 
     if floating is None and given is not None:
         floating = given.spec.floating
-    form = normal_form(source, floating=floating)
-    treated = treat(form.model, source.meshes, collision, cache=cache, progress=progress)
-    packed = pack(treated.model, treated.meshes)
+    form = to_canonical(source, floating=floating)
+    treated = simplify_collisions(
+        form.model, source.meshes, collision, cache=cache, progress=progress
+    )
+    packed = export_meshes(treated.model, treated.meshes)
     meshes = Meshes({Path(name): data for name, data in packed.files.items()})
     doubts = _doubts(Facts(packed.model, meshes, spec=given.spec), given) if given else ()
     spec = _spec(Facts(packed.model, meshes), given)
@@ -115,7 +117,7 @@ def onboard(
         notes=(
             *doubts,
             *form.notes,
-            *leftovers(source.model),
+            *unsupported_elements(source.model),
             *treated.notes,
             *packed.notes,
             *said,
@@ -132,7 +134,7 @@ def _spec(facts: Facts, given: Given | None) -> "RobotSpec":
     """
     from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
     from terrainkit_robots.simulation.pd_gains import suggest_gains
-    from terrainkit_robots.spec.given import with_origins
+    from terrainkit_robots.spec.provenance import with_provenance
 
     try:
         gains = suggest_gains(facts)
@@ -143,7 +145,7 @@ def _spec(facts: Facts, given: Given | None) -> "RobotSpec":
     if given is None:
         return derived
     mine = replace(given.spec, floating=floating, urdf=URDF, mjcf=MJCF)
-    return with_origins(mine, derived, given.file)
+    return with_provenance(mine, derived, given.file)
 
 
 def _doubts(facts: Facts, given: Given) -> tuple[str, ...]:
@@ -188,10 +190,10 @@ def _with_motors(model: "RobotModel", spec: "RobotSpec") -> "RobotModel":
 
 def _mjcf(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[str]]) -> str:
     """Return the robot as MJCF, in which pairs of links are not to touch."""
-    single = fused(replace(facts.model, excluded=excluded), keep=spec.feet)
+    single = merge_fixed_joints(replace(facts.model, excluded=excluded), keep=spec.feet)
     columns = {name: spec.per_joint(name) for name in _DRIVEN}
     drives = {
-        joint: Drive(**{name: values[joint] for name, values in columns.items()})
+        joint: ActuatorConfig(**{name: values[joint] for name, values in columns.items()})
         for joint in spec.joint_order
     }
     bodies = {link.name for link in single.model.links}
@@ -204,7 +206,7 @@ def _mjcf(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[str]]) 
     if imu.name in spec.feet:
         imu = replace(imu, name=f"{imu.name}_site")
     extras = Extras(
-        drives=drives,
+        actuators=drives,
         feet=foot_sites(facts, spec.feet),
         imu=imu,
         frames=tuple(frames),

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from terrainkit_robots.lint.report.tally import count, tally
+from terrainkit_robots.lint.report.summary import count, summarize_findings
 from terrainkit_robots.onboarding.equivalence import POSES
 from terrainkit_robots.text import names
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def summary(done: "BroughtIn") -> Iterator[tuple[str, str]]:
     """Yield what was done: a word and a sentence each."""
-    yield "checked", tally([done.report])
+    yield "checked", summarize_findings([done.report])
     if done.repaired:
         codes = dict.fromkeys(finding.code for finding in done.repaired)
         yield "repaired", f"{count(len(done.repaired), 'defect')}: {names(codes)}"

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from terrainkit.errors import ExportError
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.legs.stance import stands_alone
-from terrainkit_robots.export.base_link import rooted
-from terrainkit_robots.export.canonical import has_unknown, normal_form
+from terrainkit_robots.export.base_link import with_world_base
+from terrainkit_robots.export.canonical import has_unknown_inertia, to_canonical
 from terrainkit_robots.onboarding.equivalence import Agreement, agreement, expected
 from terrainkit_robots.onboarding.robot_files import MJCF, SCENE, URDF
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -99,9 +99,9 @@ def _with_masses(source: "Facts", floating: bool) -> "Facts":
     """Return the source with its base and all of its masses, which may come from meshes."""
     from terrainkit_robots.analysis.facts import Facts
 
-    if not any(has_unknown(link.inertial) for link in source.links):
-        return rooted(source, floating=floating)
-    return Facts(normal_form(source, floating=floating).model, source.meshes)
+    if not any(has_unknown_inertia(link.inertial) for link in source.links):
+        return with_world_base(source, floating=floating)
+    return Facts(to_canonical(source, floating=floating).model, source.meshes)
 
 
 def _loaded(path: Path) -> Any:

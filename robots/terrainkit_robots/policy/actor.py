@@ -8,11 +8,10 @@ from rsl_rl.models import MLPModel
 from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError, TerrainkitWarning
-from terrainkit_robots.rl.checkpoint import read_checkpoint
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.policy import GROUPS, actor_config, fitting, refuse_other
-from terrainkit_robots.rl.robot import SPEC_FILE
-from terrainkit_robots.rl.run_folder import Run, changed_robot
+from terrainkit_robots.rl.run import Run, changed_robot_files, read_checkpoint
+from terrainkit_robots.rl.runner import OBS_GROUPS, actor_config, check_checkpoint, network_errors
+from terrainkit_robots.rl.scene import SPEC_FILE
 
 Act = Callable[[TensorDict], torch.Tensor]
 """From observations to actions."""
@@ -41,7 +40,7 @@ def actor_of(run: Run, env: LeggedEnv) -> MLPModel:
     if run.checkpoint is None:
         raise ConfigError(f"{run.folder} has no checkpoint yet; wanted a run that has been trained")
     # Of the spec, the run has its own.
-    if files := [name for name in changed_robot(run) if name != SPEC_FILE]:
+    if files := [name for name in changed_robot_files(run) if name != SPEC_FILE]:
         other = f"{run.robot_name} has another {' and '.join(files)}"
         warnings.warn(
             f"{other} than {run.folder} was trained with",
@@ -49,10 +48,10 @@ def actor_of(run: Run, env: LeggedEnv) -> MLPModel:
             stacklevel=2,
         )
     state = read_checkpoint(run.checkpoint)
-    refuse_other(run.checkpoint, state, env, GROUPS["actor"])
-    with fitting(run.checkpoint):
+    check_checkpoint(run.checkpoint, state, env, OBS_GROUPS["actor"])
+    with network_errors(run.checkpoint):
         actor = MLPModel(
-            env.get_observations(), GROUPS, "actor", env.num_actions, **actor_config(run.task)
+            env.get_observations(), OBS_GROUPS, "actor", env.num_actions, **actor_config(run.task)
         )
         actor.load_state_dict(state["actor_state_dict"])
     return actor.to(env.device).eval()

@@ -12,17 +12,18 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit.toml_text import parse_toml
 from terrainkit_robots.onboarding.folder import new_folder
 from terrainkit_robots.rl import registry
-from terrainkit_robots.rl.checkpoint import only_policy, read_checkpoint, save_checkpoint
-from terrainkit_robots.rl.robot import SPEC_FILE
-from terrainkit_robots.rl.run_folder import (
+from terrainkit_robots.rl.run import (
     MAP_FILE,
     RUN_FILE,
     TASK_FILE,
     Run,
     checkpoint_name,
-    make_parents,
     open_run,
+    policy_state,
+    read_checkpoint,
+    save_checkpoint,
 )
+from terrainkit_robots.rl.scene import SPEC_FILE
 
 
 def ship(run: Run, folder: Path | str) -> Run:
@@ -56,8 +57,8 @@ def ship(run: Run, folder: Path | str) -> Run:
         )
     about = parse_toml((run.folder / RUN_FILE).read_text(encoding="utf-8"))
     about["terrain"] = "plane" if run.terrain == "plane" else MAP_FILE
-    state = only_policy(read_checkpoint(run.checkpoint))
-    make_parents(folder)
+    state = policy_state(read_checkpoint(run.checkpoint))
+    folder.parent.mkdir(parents=True, exist_ok=True)
     with new_folder(folder) as made:
         for name in noted:
             (made / name).write_bytes((run.folder / name).read_bytes())

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.observations import Observation
+from terrainkit_robots.rl.observations import ObservationTerm
 
 ONNX, TORCHSCRIPT = "policy.onnx", "policy.pt"
 """What the files with the policy are called."""
@@ -83,8 +83,8 @@ def _parts(env: LeggedEnv) -> list[dict[str, Any]]:
     """Return each part of an observation: its place, and how it is made of what is measured."""
     parts: list[dict[str, Any]] = []
     start = 0
-    for each in env.groups["policy"]:
-        width = each.read(env.state).shape[1]
+    for each in env.obs_groups["policy"]:
+        width = each.function(env.state).shape[1]
         offset = np.zeros(width)
         if each.name == "dof_pos":
             offset[:] = env.robot.default_pose
@@ -105,10 +105,10 @@ def _parts(env: LeggedEnv) -> list[dict[str, Any]]:
     return parts
 
 
-def _scanned(each: Observation, env: LeggedEnv, height: float) -> float:
+def _scanned(each: ObservationTerm, env: LeggedEnv, height: float) -> float:
     """Return what is observed, before the scale, where the base is so high above the ground [m]."""
     scan = np.full_like(env.state.height_scan, height)
-    return float(each.read(replace(env.state, height_scan=scan))[0, 0])
+    return float(each.function(replace(env.state, height_scan=scan))[0, 0])
 
 
 def _units(name: str, env: LeggedEnv) -> list[str] | str:
@@ -127,7 +127,7 @@ def _position_units(env: LeggedEnv) -> list[str]:
 
 def _joints(env: LeggedEnv) -> dict[str, Any]:
     """Return names, poses and gains by joint; the gains are those of the scene's own motors."""
-    model, control = env.scene.model, env.control
+    model = env.scene.model
     gain = model.actuator_gainprm[:, 0]
     stiffness, damping = -model.actuator_biasprm[:, 1], -model.actuator_biasprm[:, 2]
     held = np.where(stiffness > 0, "position", "velocity")
@@ -137,8 +137,8 @@ def _joints(env: LeggedEnv) -> dict[str, Any]:
         "position_unit": _position_units(env),
         "drive": drives.tolist(),
         "default_position": _numbers(env.robot.default_pose),
-        "action_offset": _numbers(control.middle),
-        "action_scale": _numbers(control.scale),
+        "action_offset": _numbers(env.action_offset),
+        "action_scale": _numbers(env.action_scale),
         "gain": _numbers(gain),
         "stiffness": _numbers(stiffness),
         "damping": _numbers(damping),

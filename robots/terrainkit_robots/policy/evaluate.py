@@ -16,13 +16,12 @@ from terrainkit.errors import ConfigError
 from terrainkit_robots.policy.actor import policy_of
 from terrainkit_robots.policy.score import Evaluation, summed_up
 from terrainkit_robots.policy.trials import Watch, roll_out
-from terrainkit_robots.rl.device import require_device
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Ground, read_ground
-from terrainkit_robots.rl.observations import sees_heights
-from terrainkit_robots.rl.run_folder import Run, same_ground
+from terrainkit_robots.rl.observations import uses_height_scan
+from terrainkit_robots.rl.run import Run, is_same_terrain
+from terrainkit_robots.rl.runner import resolve_device, single_torch_thread
 from terrainkit_robots.rl.task import Commands, Task
-from terrainkit_robots.rl.threads import one_thread
+from terrainkit_robots.rl.terrain import Terrain, load_terrain
 
 FloatArray = NDArray[np.float32]
 
@@ -133,7 +132,7 @@ def forward_command(settings: Commands) -> FloatArray:
     return np.array([_FORWARD * settings.lin_vel_x[1], 0, 0], np.float32)
 
 
-@one_thread()
+@single_torch_thread()
 def evaluate(run: Run, asked: Asked | None = None, watch: Watch = lambda _: None) -> Evaluation:
     """Evaluate the policy of a run; the same seed gives the same result, bit for bit.
 
@@ -149,7 +148,7 @@ def evaluate(run: Run, asked: Asked | None = None, watch: Watch = lambda _: None
     asked = asked or Asked()
     env, commands = prepared(run, asked)
     outcome = roll_out(env, policy_of(run, env), asked.seconds, commands, watch)
-    grid = env.ground.level and asked.command is None
+    grid = env.terrain.is_flat and asked.command is None
     return summed_up(run, asked, env, outcome, commands if grid else None)
 
 
@@ -164,30 +163,30 @@ def prepared(run: Run, asked: Asked, *, each: int = MOST) -> tuple[LeggedEnv, Fl
     Returns:
         The environment, and commands of shape (n, 3); None: the task's random ones.
     """
-    device = require_device(asked.device)
+    device = resolve_device(asked.device)
     own = asked.terrain is None and not is_flat(run, asked)
-    if own and not same_ground(run, run.terrain):
+    if own and not is_same_terrain(run, run.terrain):
         raise ConfigError(
             f"{run.terrain} is not what {run.folder} was trained on any more; "
             "--terrain says what to take"
         )
     source, task = asked.terrain or run.terrain, run.task
     # The policy sees as much as in training, whatever it walks on now.
-    scan = sees_heights(task.terrain, level=is_flat(run, Asked()))
+    scan = uses_height_scan(task, is_flat=is_flat(run, Asked()))
     touch = task.terrain.collision
     if asked.terrain is not None and touch == "plane":
         touch = "auto"
-    ground = read_ground(source, touch)
+    ground = load_terrain(source, touch)
     choice = _choice(task, ground, asked)
     rows, cols = ground.env_origins.shape[:2]
     count = asked.num_envs or _count(choice, rows * cols, each)
     task = evaluation_task(task, count, seconds=asked.seconds, seed=asked.seed)
     task = replace(task, terrain=replace(task.terrain, collision=touch, measure_heights=scan))
     env = LeggedEnv(task, run.robot, ground, device)
-    env.careers.levels[:], env.careers.columns[:] = np.divmod(
+    env.curriculum.levels[:], env.curriculum.columns[:] = np.divmod(
         _spread(rows * cols, count, asked.seed), cols
     )
-    env.begin_all()
+    env.reset()
     return env, None if choice is None else choice[_spread(len(choice), count, asked.seed)]
 
 
@@ -198,13 +197,13 @@ def is_flat(run: Run, asked: Asked) -> bool:
     return run.terrain == "plane" or run.task.terrain.collision == "plane"
 
 
-def _choice(task: Task, ground: Ground, asked: Asked) -> FloatArray | None:
+def _choice(task: Task, ground: Terrain, asked: Asked) -> FloatArray | None:
     """Return the commands that robots share out, shape (k, 3); None for random ones."""
     if asked.random_commands:
         return None
     if asked.command is not None:
         return np.array([asked.command], np.float32)
-    if ground.level:
+    if ground.is_flat:
         return command_grid(task.commands)
     return forward_command(task.commands)[None]
 

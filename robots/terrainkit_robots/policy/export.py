@@ -69,11 +69,10 @@ from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots.policy.actor import actor_of
 from terrainkit_robots.policy.description import ONNX, TORCHSCRIPT, description, width_of
 from terrainkit_robots.policy.rollout import walk
-from terrainkit_robots.rl.checkpoint import read_checkpoint
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import read_ground
-from terrainkit_robots.rl.run_folder import Run
-from terrainkit_robots.rl.threads import one_thread
+from terrainkit_robots.rl.run import Run, read_checkpoint
+from terrainkit_robots.rl.runner import single_torch_thread
+from terrainkit_robots.rl.terrain import load_terrain
 
 FloatArray = NDArray[np.float32]
 Answer = Callable[[FloatArray], FloatArray]
@@ -135,7 +134,7 @@ class DeployedPolicy(torch.nn.Module):
         return torch.clamp(actions, -self.clip_actions, self.clip_actions)
 
 
-@one_thread()
+@single_torch_thread()
 def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> Exported:
     """Write the policy of a run's checkpoint to `folder`, which is made if it is not there.
 
@@ -154,7 +153,7 @@ def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> Exporte
         env=replace(run.task.env, num_envs=_ROBOTS, num_threads=1),
         algorithm=replace(run.task.algorithm, num_mini_batches=1),  # so few may have no more
     )
-    env = LeggedEnv(task, run.robot, read_ground(run.terrain, task.terrain.collision))
+    env = LeggedEnv(task, run.robot, load_terrain(run.terrain, task.terrain.collision))
     actor = actor_of(run, env)
     document = description(env) | {"iteration": _iteration(run)}
     return write_policy(env, actor, document, folder, overwrite=overwrite)

@@ -22,13 +22,13 @@ from terrainkit_robots.policy.recorder import Recorder
 from terrainkit_robots.policy.rollout import timetable, walk
 from terrainkit_robots.policy.score import Evaluation, summed_up
 from terrainkit_robots.policy.trials import roll_out
+from terrainkit_robots.rendering.video import DEFAULT_SIZE, VideoSpec
 from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.runner import single_torch_thread
 from terrainkit_robots.rl.task import Commands
-from terrainkit_robots.rl.threads import one_thread
-from terrainkit_robots.rl.video import SIZE, Film
 
 if TYPE_CHECKING:
-    from terrainkit_robots.rl.run_folder import Run
+    from terrainkit_robots.rl.run import Run
 
 FloatArray = NDArray[np.float32]
 
@@ -49,18 +49,18 @@ class Played:
     evaluation: Evaluation
     """How the robots did."""
 
-    film: Film | None
+    film: VideoSpec | None
     """What is to be drawn; None if no film was wanted."""
 
 
-@one_thread()
+@single_torch_thread()
 def play(
     run: "Run",
     asked: Asked | None = None,
     *,
     filmed: bool = True,
     robots: int = ROBOTS,
-    size: tuple[int, int] = SIZE,
+    size: tuple[int, int] = DEFAULT_SIZE,
     progress: Callable[[float], None] = lambda _: None,
 ) -> Played:
     """Roll the policy of a run.
@@ -117,7 +117,7 @@ def tour_of(settings: Commands) -> FloatArray:
     return np.array([[ahead, 0, 0], [ahead, 0, turn], [0, left, 0], [0, 0, -turn]], np.float32)
 
 
-@one_thread()
+@single_torch_thread()
 def view(run: "Run", asked: Asked | None = None) -> None:
     """Show one robot in MuJoCo's viewer, in real time, until its window is closed.
 
@@ -145,7 +145,7 @@ def view(run: "Run", asked: Asked | None = None) -> None:
             begun = time.monotonic()
             next(walking)
             with window.lock():
-                data.qpos[:], data.qvel[:] = env.physics.qpos[0], env.physics.qvel[0]
+                data.qpos[:], data.qvel[:] = env.sim.qpos[0], env.sim.qvel[0]
                 mujoco.mj_forward(env.scene.model, data)
             window.sync()
             time.sleep(max(0.0, env.cfg.dt - (time.monotonic() - begun)))

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit_robots.rendering.video import Shot, VideoSpec
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.rotation import yaw_of
-from terrainkit_robots.rl.video import Film, Shot
+from terrainkit_robots.transforms import quat_to_yaw
 
 FloatArray = NDArray[np.float32]
 
@@ -31,19 +31,21 @@ class Recorder:
 
     def _start(self) -> FloatArray:
         """Return where and in which direction each robot stands, shape (n, 3)."""
-        qpos = self._env.physics.qpos
-        yaw = yaw_of(qpos[:, 3:7].astype(np.float32))
+        qpos = self._env.sim.qpos
+        yaw = quat_to_yaw(qpos[:, 3:7].astype(np.float32))
         return np.column_stack([qpos[:, :2], yaw]).astype(np.float32)
 
     def record(self) -> None:
         """Take down what is seen now."""
         env = self._env
-        self._fell |= env.steps == 0
-        if self._env.ground.level:
-            self._starts = np.where((env.steps == 0)[:, None], self._start(), self._starts)
+        self._fell |= env.steps_since_reset == 0
+        if self._env.terrain.is_flat:
+            self._starts = np.where(
+                (env.steps_since_reset == 0)[:, None], self._start(), self._starts
+            )
         if self._steps % self._stride == 0:
-            poses = env.physics.qpos.astype(np.float32)
-            if env.ground.level:
+            poses = env.sim.qpos.astype(np.float32)
+            if env.terrain.is_flat:
                 poses = self._marching(poses)
             self._poses.append(poses)
             self._commands.append(env.commands.copy())
@@ -66,18 +68,18 @@ class Recorder:
         turned[:, 3:7] = _turned(yaw, poses[:, 3:7])
         return turned
 
-    def film(self, robots: int, size: tuple[int, int]) -> Film:
+    def film(self, robots: int, size: tuple[int, int]) -> VideoSpec:
         """Return the film, which follows so many robots on a map."""
         env = self._env
         frames = len(self._poses)
-        if env.ground.level:
+        if env.terrain.is_flat:
             middle = env.num_envs // 2
             shots: tuple[Shot, ...] = (self._march(middle, frames),)
         else:
             chosen = visited(env, robots)
             each = max(1, frames // len(chosen))
             shots = tuple(self._visit(robot, each) for robot in chosen)
-        return Film(
+        return VideoSpec(
             model=env.scene.model,
             poses=np.stack(self._poses),
             shots=shots,
@@ -95,9 +97,9 @@ class Recorder:
         env = self._env
         fell = np.flatnonzero(np.stack([each[robot] for each in self._begun[:frames]]))
         stop = max(1, int(fell[0])) if len(fell) else frames
-        level, column = int(env.careers.levels[robot]), int(env.careers.columns[robot])
-        terrain = str(env.ground.terrain_names[level, column])
-        rows = len(env.ground.env_origins)
+        level, column = int(env.curriculum.levels[robot]), int(env.curriculum.columns[robot])
+        terrain = str(env.terrain.terrain_names[level, column])
+        rows = len(env.terrain.env_origins)
         where = f"{terrain}, level {level} of {rows - 1}"
         caption = where if rows > 1 else terrain
         return Shot(robot=robot, start=0, stop=stop, captions=(caption,) * stop)
@@ -105,8 +107,8 @@ class Recorder:
 
 def visited(env: LeggedEnv, robots: int) -> list[int]:
     """Return whom a video follows: robots on different terrains, at the middle level or near it."""
-    levels, every = env.careers.levels, env.ground.terrain_names
-    names = every[levels, env.careers.columns]
+    levels, every = env.curriculum.levels, env.terrain.terrain_names
+    names = every[levels, env.curriculum.columns]
     middle = (len(every) - 1) / 2
     # The nearest to the middle of each terrain; then the second nearest of each, and so on.
     order = np.lexsort((np.arange(len(levels)), np.abs(levels - middle)))

@@ -39,7 +39,7 @@ def walk(env: LeggedEnv, policy: Act, commands: Iterable[FloatArray | None]) -> 
     held: object = ...  # neither commands nor None: nothing was asked for yet
     for asked in commands:
         if asked is not held:
-            env.hold_commands(asked)
+            env.set_commands(asked)
             held = asked
         before, observed = env.state, env.get_observations()
         with torch.inference_mode():

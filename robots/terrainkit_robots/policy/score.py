@@ -14,7 +14,7 @@ from terrainkit_robots.rl.env import LeggedEnv
 
 if TYPE_CHECKING:
     from terrainkit_robots.policy.evaluate import Asked
-    from terrainkit_robots.rl.run_folder import Run
+    from terrainkit_robots.rl.run import Run
 
 FloatArray = NDArray[np.float32]
 
@@ -153,10 +153,10 @@ def summed_up(
     commands: FloatArray | None = None,
 ) -> Evaluation:
     """Return an evaluation; commands as they are to be told apart, shape (n, 3)."""
-    patches = not env.ground.level
-    levels = env.careers.levels.tolist()
-    names = env.ground.terrain_names
-    terrains = names[env.careers.levels, env.careers.columns].tolist()
+    patches = not env.terrain.is_flat
+    levels = env.curriculum.levels.tolist()
+    names = env.terrain.terrain_names
+    terrains = names[env.curriculum.levels, env.curriculum.columns].tolist()
     place = {name: k for k, name in enumerate(dict.fromkeys(names.ravel().tolist()))}
     across = np.lexsort((levels, [place[name] for name in terrains]))
 

@@ -21,15 +21,13 @@ from terrainkit.errors import ConfigError, TerrainkitError
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl import registry
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Ground, Plane
+from terrainkit_robots.rl.events import sample_reset_state
 from terrainkit_robots.rl.rewards import Reward
-from terrainkit_robots.rl.robot import Robot, read_robot
-from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.scene import lowest_point
-from terrainkit_robots.rl.start import draw_start
+from terrainkit_robots.rl.runner import LeggedRunner, single_torch_thread
+from terrainkit_robots.rl.scene import Robot, lowest_point
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.task import Rewards, Task
-from terrainkit_robots.rl.threads import one_thread
+from terrainkit_robots.rl.terrain import Plane, Terrain
 
 if TYPE_CHECKING:
     from terrainkit_robots.lint.settings import Settings
@@ -92,7 +90,7 @@ class Smoke:
         return all(check.passed for check in self.checks)
 
 
-def smoke(robot: Robot, task: Task, ground: Ground) -> Smoke:
+def smoke(robot: Robot, task: Task, ground: Terrain) -> Smoke:
     """Return whether a robot can be trained for a task on a ground.
 
     Args:
@@ -106,7 +104,7 @@ def smoke(robot: Robot, task: Task, ground: Ground) -> Smoke:
         env=replace(task.env, num_envs=ROBOTS, num_threads=1),
         algorithm=replace(task.algorithm, num_mini_batches=parts),
     )
-    with one_thread():
+    with single_torch_thread():
         try:
             env, still = LeggedEnv(small, robot, ground), LeggedEnv(_still(small), robot, ground)
         except TerrainkitError as error:
@@ -133,7 +131,7 @@ def smoke_of(name: str, *, settings: "Settings | None" = None, spec: Path | None
         if spec is not None:
             raise ConfigError(f"a spec for {name}, which has one; wanted it for a robot's file")
         found = registry.find(name)
-        return smoke(read_robot(found.folder), found.task, Plane())
+        return smoke(Robot.load(found.folder), found.task, Plane())
     from terrainkit_robots.onboarding.pipeline import Wishes, bring_in, keeps_out
 
     with tempfile.TemporaryDirectory() as folder:
@@ -147,7 +145,7 @@ def smoke_of(name: str, *, settings: "Settings | None" = None, spec: Path | None
                 robot=done.report.facts.model.title,
                 checks=(_onboarded(f"{len(errors)} errors left: {codes}"),),
             )
-        tried = smoke(read_robot(target), Task(), Plane())
+        tried = smoke(Robot.load(target), Task(), Plane())
     return replace(tried, checks=(_onboarded(""), *tried.checks))
 
 
@@ -240,12 +238,12 @@ def _gaps(env: LeggedEnv) -> dict[str, float]:
     model, data = env.scene.model, mujoco.MjData(env.scene.model)
     gaps: dict[str, float] = {}
     # As it was drawn: an environment lifts robots that begin in the ground.
-    drawn, _ = draw_start(
+    drawn, _ = sample_reset_state(
         np.random.default_rng(0),
-        env.careers.origins,
+        env.curriculum.env_origins,
         env.scene,
         env.robot,
-        env.ground,
+        env.terrain,
         env.cfg.init_state,
     )
     for qpos in drawn:
@@ -255,14 +253,16 @@ def _gaps(env: LeggedEnv) -> dict[str, float]:
         for foot in env.robot.spec.feet:
             first = int(model.body(foot).geomadr[0])
             geoms = range(first, first + int(model.body(foot).geomnum[0]))
-            own = [_gap(env.ground, model, data, geom) for geom in geoms if geom in env.scene.geoms]
+            own = [
+                _gap(env.terrain, model, data, geom) for geom in geoms if geom in env.scene.geoms
+            ]
             if own:
                 gap = min(own)
                 gaps[foot] = max(gaps.get(foot, gap), gap, key=lambda g: abs(g - _HIGH / 2))
     return gaps
 
 
-def _gap(ground: Ground, model: Any, data: Any, geom: int) -> float:
+def _gap(ground: Terrain, model: Any, data: Any, geom: int) -> float:
     """Return how far the lowest point of a geom is above the ground under its middle [m]."""
     x, y = data.geom_xpos[geom][:2, None].astype(np.float32)
     return lowest_point(model, data, geom) - float(ground.height(x, y)[0])
@@ -284,7 +284,7 @@ def observation_shapes(env: LeggedEnv) -> list[Check]:
     }
     checks = []
     for group, observed in env.get_observations().items():
-        own = {each.name: each.read(env.state).shape[1] for each in env.groups[group]}
+        own = {each.name: each.function(env.state).shape[1] for each in env.obs_groups[group]}
         vectors = ("commands", "projected_gravity", "base_ang_vel", "base_lin_vel", "com_shift")
         table = widths | dict.fromkeys((*vectors, "push_vel"), 3)
         wanted = sum(table.get(name, width) for name, width in own.items())
@@ -302,7 +302,7 @@ def observation_shapes(env: LeggedEnv) -> list[Check]:
 
 def stands(env: LeggedEnv) -> Check:
     """Return whether robots stay up for the first second with zero action."""
-    env.hold_commands(np.zeros((env.num_envs, 3), np.float32))
+    env.set_commands(np.zeros((env.num_envs, 3), np.float32))
     target = float(env.robot.spec.base_height_target or 1.0)
     fell, lowest, steps = np.inf, np.inf, round(1 / env.cfg.dt)
     for step in range(1, steps + 1):
@@ -311,7 +311,7 @@ def stands(env: LeggedEnv) -> Check:
             fell = step * env.cfg.dt
             break
         lowest = float(env.state.base_height.min())
-    env.hold_commands(None)
+    env.set_commands(None)
     if np.isfinite(fell):
         measured = f"fell after {fell:.2f} s"
     else:
@@ -365,7 +365,7 @@ def rewards(env: LeggedEnv) -> list[Check]:
     """
     commands = env.commands.copy()
     commands[::4] = 0
-    env.hold_commands(commands)
+    env.set_commands(commands)
     before = dict(env.rewards)
     recorders = {name: _Recorder(name, function) for name, (function, _) in before.items()}
     env.rewards.update({name: (recorders[name], scale) for name, (_, scale) in before.items()})
@@ -373,7 +373,7 @@ def rewards(env: LeggedEnv) -> list[Check]:
         _act_at_random(env, _RANDOM_STEPS)
     finally:
         env.rewards.update(before)
-        env.hold_commands(None)
+        env.set_commands(None)
     possible = possible_states(env.state, env.cfg.runner.seed)
     return [recorder.check(possible, env.robot, env.cfg.rewards) for recorder in recorders.values()]
 

@@ -76,9 +76,9 @@ class Trials:
 
     def __init__(self, env: LeggedEnv) -> None:
         n, dt = env.num_envs, env.cfg.dt
-        self._env, self._start = env, env.start.copy()
+        self._env, self._start = env, env.start_pos.copy()
         self._settling, self._window = round(SETTLING / dt), max(1, round(WINDOW / dt))
-        self._half = np.inf if env.ground.level else env.ground.patch_length / 2
+        self._half = np.inf if env.terrain.is_flat else env.terrain.patch_length / 2
         self.fell, self.crossed = np.zeros(n, bool), np.zeros(n, bool)
         self._distance, self._asked = np.zeros(n), np.zeros(n)
         self._sums, self._counts = np.zeros((4, n)), np.zeros((4, n), np.int64)
@@ -103,13 +103,13 @@ class Trials:
         self._measure(step.commands, error - step.commands, active)
         way = np.linalg.norm(state.base_pos[:, :2] - self._start, axis=1)
         self._distance[active] = way[active]
-        self._asked[active] = np.linalg.norm(self._env.careers.asked[active], axis=1)
+        self._asked[active] = np.linalg.norm(self._env.curriculum.commanded[active], axis=1)
         self.crossed |= active & (way > self._half)
 
     def _measure(self, commands: FloatArray, error: FloatArray, active: NDArray[np.bool_]) -> None:
-        orders = self._env.orders
+        orders = self._env.velocity_command
         # A heading makes a new turning speed of every step; only new directions count then.
-        axes = 2 if orders.headings and orders.held is None else 3
+        axes = 2 if orders.heading_command and orders.fixed is None else 3
         same = (commands[:, :axes] == self._command[:, :axes]).all(axis=1)
         self._same = np.where(same, self._same + 1, 1)
         self._command[:] = commands

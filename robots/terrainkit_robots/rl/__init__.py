@@ -1,7 +1,5 @@
-"""The training loop: MuJoCo steps, rsl-rl learns, terrainkit supplies the ground and the task.
+"""Reinforcement learning: MuJoCo steps the physics, rsl-rl trains the policy.
 
-Read it in this order: `env`, which is the loop; then what it calls: `task` (every number), `scene`
-(the model), `physics` (what steps it), `sensors` and `state` (what is known after a step),
-`observations`, `rewards` and `earnings`, `terminations`, `commands`, `control`, `start`,
-`randomization`, `careers` (the terrain curriculum). `training` and `runner` learn with it.
+Read `train` and `env` first, then what they call: `rewards`, `observations`, `commands`, `events`
+and `curriculum`.
 """

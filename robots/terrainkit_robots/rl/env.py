@@ -1,8 +1,4 @@
-"""The environment: n robots on one ground, as rsl-rl's `VecEnv`.
-
-Each step: act, let the physics run, look, judge, reward, begin anew what has ended, observe. All is
-numpy until the border, where arrays become fresh tensors.
-"""
+"""The vectorized environment: n legged robots that follow velocity commands on one terrain."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,327 +10,354 @@ from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots.rl.careers import Careers
-from terrainkit_robots.rl.commands import Orders, asks_headings
-from terrainkit_robots.rl.control import control_of
-from terrainkit_robots.rl.earnings import Earnings
-from terrainkit_robots.rl.ground import Ground
+from terrainkit_robots.rl.commands import VelocityCommand, uses_heading
+from terrainkit_robots.rl.config import Task
+from terrainkit_robots.rl.curriculum import TerrainCurriculum
+from terrainkit_robots.rl.events import Pushes, apply_params, sample_params, sample_reset_state
 from terrainkit_robots.rl.observations import (
-    observe,
+    compute_observations,
     policy_group,
     privileged_group,
-    sees_heights,
+    uses_height_scan,
 )
-from terrainkit_robots.rl.physics import Physics
-from terrainkit_robots.rl.randomization import Pushes, apply_differences, draw_differences
-from terrainkit_robots.rl.robot import Robot
-from terrainkit_robots.rl.room import require_room
-from terrainkit_robots.rl.rotation import yaw_of
-from terrainkit_robots.rl.scene import build_scene
-from terrainkit_robots.rl.sensors import Sensors
-from terrainkit_robots.rl.start import draw_start
-from terrainkit_robots.rl.state import State
-from terrainkit_robots.rl.task import Task
-from terrainkit_robots.rl.terminations import outside
+from terrainkit_robots.rl.rewards import active_rewards
+from terrainkit_robots.rl.scene import Robot, build_scene
+from terrainkit_robots.rl.simulation import Simulation, check_memory
+from terrainkit_robots.rl.state import Sensors, State
+from terrainkit_robots.rl.terminations import terrain_out_of_bounds
+from terrainkit_robots.rl.terrain import Terrain
+from terrainkit_robots.transforms import quat_to_yaw
 
 FloatArray = NDArray[np.float32]
 Ids = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 
 class LeggedEnv(VecEnv):
-    """Legged robots that follow commands; see :mod:`.task` for what they are paid for."""
+    """Legged robots as rsl-rl's `VecEnv`: numpy inside, fresh tensors at the border."""
 
-    def __init__(self, task: Task, robot: Robot, ground: Ground, device: str = "cpu") -> None:
-        """Build it, and begin the first episodes.
+    def __init__(self, task: Task, robot: Robot, terrain: Terrain, device: str = "cpu") -> None:
+        """Build the simulations and reset every environment.
 
         Raises:
-            ConfigError: if the robot or the task does not fit.
-            MemoryLimitError: if so many environments do not fit in memory.
+            ConfigError: If the robot does not fit the task.
+            MemoryLimitError: If the environments do not fit in memory.
         """
-        self.cfg, self.robot, self.ground = task, robot, ground
+        self.cfg, self.robot, self.terrain, self.device = task, robot, terrain, device
         self.num_envs, self.num_actions = task.env.num_envs, len(robot.default_pose)
         self.max_episode_length = task.max_episode_length
-        self.device = device
-        self.scene = build_scene(robot, ground, task)
-        scan = sees_heights(task.terrain, level=ground.level)
-        require_room(task, robot, scan=scan, geoms=self.scene.model.ngeom)
-        self.physics = Physics(self.scene, self.num_envs, task.env.num_threads)
-        self.control = control_of(robot, task)
+        self.scene = build_scene(robot, terrain, task)
+        scan = uses_height_scan(task, is_flat=terrain.is_flat)
+        check_memory(task, robot, scan=scan, ngeom=self.scene.model.ngeom)
+        self.sim = Simulation(self.scene, self.num_envs, task.env.num_threads)
         self.rng = np.random.default_rng(task.runner.seed)
-        self.sensors = Sensors(self.physics, ground, task, scan=scan)
-        headings = asks_headings(task.commands, ground)
-        self.orders = Orders(task.commands, self.num_envs, task.dt, headings=headings)
+        self.sensors = Sensors(self.sim, terrain, task, scan=scan)
+        self.velocity_command = VelocityCommand(
+            task.commands, self.num_envs, task.dt, heading_command=uses_heading(task, terrain)
+        )
         self.pushes = Pushes(task.domain_rand, self.num_envs, task.dt)
-        self.earnings = Earnings(task.rewards, robot, task.dt, self.num_envs)
         weight = float(self.scene.model.body_subtreemass[self.scene.base] * 9.81)
-        self.groups = {
+        self.obs_groups = {
             "policy": policy_group(robot, task, scan=scan),
             "privileged": privileged_group(robot, task, scan=scan, weight=weight),
         }
-        self.differences = draw_differences(self.rng, self.num_envs, self.physics, task.domain_rand)
-        apply_differences(self.physics, self.differences)
-        self.careers = Careers(ground, self.num_envs, task.terrain.max_init_level, task.runner.seed)
-        self._allocate()
-        self.begin_all()
+        self.params = sample_params(self.rng, self.num_envs, self.sim, task.domain_rand)
+        apply_params(self.sim, self.params)
+        self.curriculum = TerrainCurriculum(
+            terrain, self.num_envs, task.terrain.max_init_level, task.runner.seed
+        )
+        self._init_buffers()
+        self.reset()
 
-    def _allocate(self) -> None:
-        """Make what each robot remembers from step to step."""
-        n, joints = self.num_envs, self.num_actions
-        self.lengths = np.zeros(n, np.int64)  # of episodes, as the runner knows them
-        self.actions = np.zeros((3, n, joints), np.float32)  # of this step, and of two before
+    def _init_buffers(self) -> None:
+        n, joints, task, robot = self.num_envs, self.num_actions, self.cfg, self.robot
+        self.episode_length = np.zeros(n, np.int64)  # rsl-rl may set it to random lengths
+        self.steps_since_reset = np.zeros(n, np.int64)
+        self.start_pos = np.zeros((n, 2))  # base position at the last reset
+        self.actions = np.zeros((3, n, joints), np.float32)  # of the last three steps
         self.joint_offset = np.zeros((n, joints), np.float32)
-        self.steps = np.zeros(n, np.int64)  # of this episode, whatever the runner says
-        self.start = np.zeros((n, 2))
-        # What those who look at an environment ask for most; live.
-        self.commands, self.heading = self.orders.commands, self.orders.heading
-        self.rewards, self.sums = self.earnings.rewards, self.earnings.sums
+        self.rewards = active_rewards(task.rewards)
+        self.episode_sums = {name: np.zeros(n, np.float32) for name in self.rewards}
+        self.commands = self.velocity_command.commands  # live, like the next two
         self.air_time, self.push_vel = self.sensors.air_time, self.pushes.velocity
+
+        # A motor receives offset + scale * action.
+        kind, scale = task.control.control_type, task.control.action_scale
+        stiff = np.array(list(robot.spec.per_joint("stiffness").values())) > 0
+        if task.control.stiffness is not None:
+            stiff &= task.control.stiffness > 0
+        self.is_position_controlled = stiff & (kind == "P")
+        spec_scale = np.array(list(robot.spec.per_joint("action_scale").values()))
+        default = {"P": spec_scale, "V": robot.velocity, "T": robot.effort}[kind]
+        scales = default if scale is None else np.full(joints, scale)
+        self.action_scale = scales.astype(np.float32)
+        self.action_offset = np.where(self.is_position_controlled, robot.default_pose, 0)
+        self.action_offset = self.action_offset.astype(np.float32)
 
     @property
     def episode_length_buf(self) -> torch.Tensor:
-        """Length of each episode so far, in steps; live, and the runner may replace it."""
-        return torch.from_numpy(self.lengths)
+        """Length of each episode so far [steps], shape (n,); live."""
+        return torch.from_numpy(self.episode_length)
 
     @episode_length_buf.setter
     def episode_length_buf(self, lengths: torch.Tensor) -> None:
-        self.lengths[:] = lengths.cpu().numpy()
-
-    def hold_commands(self, commands: FloatArray | None) -> None:
-        """Ask for the same all the time, shape (n, 3); None to draw new commands at once."""
-        let_go = commands is None and self.orders.held is not None
-        self.orders.held = commands
-        if let_go:
-            self.orders.draw(self.rng, np.arange(self.num_envs))
-        if let_go or commands is not None:
-            self.orders.steer(self._yaw())
-            np.copyto(self.state.commands, self.commands)
-            self._observed = self._observe()
-
-    def begin_all(self) -> None:
-        """Begin every episode anew."""
-        everyone = np.arange(self.num_envs)
-        self._begin(everyone)
-        self.orders.steer(self._yaw())
-        self.state = self._look(everyone, fresh=True)
-        self._observed = self._observe()
-
-    def state_dict(self) -> dict[str, Any]:
-        """Return all that changes from step to step, so that a run can go on as if unbroken."""
-        arrays = {name: torch.from_numpy(value.copy()) for name, value in self._arrays().items()}
-        return {
-            "arrays": arrays,
-            "rng": self.rng.bit_generator.state,
-            "lin_vel_x": self.orders.lin_vel_x,
-            "careers": self.careers.state_dict(),
-            "state": {k: torch.from_numpy(v.copy()) for k, v in vars(self.state).items()},
-            "observed": dict(self._observed.clone().items()),
-        }
-
-    def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Go on from a state; with another number of environments only the curriculum does.
-
-        Raises:
-            ConfigError: if the state is of another robot or map.
-        """
-        self.careers.load_state_dict(state["careers"])
-        self.orders.lin_vel_x = tuple(state["lin_vel_x"])
-        mine, theirs = self._arrays(), state["arrays"]
-        if len(theirs["episode_length"]) != self.num_envs:
-            self.begin_all()
-            return
-        kept = {name for name in mine if not name.startswith("rew_")}  # those are the task's
-        if kept - theirs.keys() or vars(self.state).keys() != state["state"].keys():
-            raise ConfigError(
-                "the checkpoint was written by another version of terrainkit; with another "
-                "env.num_envs its networks and its curriculum go on"
-            )
-        for name, value in mine.items():
-            if name not in theirs or tuple(theirs[name].shape) != value.shape:
-                raise ConfigError(f"the checkpoint's {name} is of another robot or task")
-        for name, value in mine.items():
-            value[...] = theirs[name].numpy()
-        apply_differences(self.physics, self.differences)
-        self.rng.bit_generator.state = state["rng"]
-        # To look again would count time and draw noise once more.
-        self.state = State(**{k: v.numpy().copy() for k, v in state["state"].items()})
-        self._observed = TensorDict(state["observed"], batch_size=[self.num_envs]).to(self.device)
-
-    def _arrays(self) -> dict[str, NDArray[Any]]:
-        """Return what each robot remembers, by name; live."""
-        own = {
-            "physics": self.physics.batch.state,
-            "episode_length": self.lengths,
-            "commands": self.commands,
-            "heading": self.heading,
-            "actions": self.actions,
-            "last_dof_vel": self.sensors.last_dof_vel,
-            "joint_offset": self.joint_offset,
-            "push_vel": self.push_vel,
-            "push_in": self.pushes.wait,
-            "air_time": self.air_time,
-            "steps": self.steps,
-            "start": self.start,
-            "followed": self.orders.followed,
-        }
-        sums = {f"rew_{name}": value for name, value in self.sums.items()}
-        return own | sums | vars(self.differences)
+        self.episode_length[:] = lengths.cpu().numpy()
 
     def get_observations(self) -> TensorDict:
-        """Return what is observed now, as tensors that later steps do not change."""
-        return self._observed
+        """Return the current observations; later steps do not change these tensors."""
+        return self._observations
 
     def step(
         self, actions: torch.Tensor
     ) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict[str, Any]]:
-        """Act for one step of the policy.
-
-        Args:
-            actions: Shape (n, j).
+        """Apply actions of shape (n, j) for one control step.
 
         Returns:
-            Observations, rewards (n,), dones (n,), and `time_outs` and `log`.
+            Observations, rewards (n,), dones (n,), and extras with `time_outs` and `log`.
 
         Raises:
-            ConfigError: if an action is not a number.
+            ConfigError: If an action is not finite.
         """
-        self._act(actions)
-        self.pushes.push(self.rng, self.physics.qvel)
-        bad = self.physics.step(self.cfg.control.decimation)
-        self.lengths += 1
-        self.steps += 1
-        self.sensors.last_dof_vel[bad] = 0  # the jump back to rest is no acceleration
-        self.state = state = self._look(np.arange(self.num_envs), bad)
-        rewards = self.earnings.pay(state, bad)
-        time_out = (self.lengths >= self.max_episode_length) & ~state.fallen
+        self._apply_actions(actions)
+        self.pushes.apply(self.rng, self.sim.qvel)
+        unstable = self.sim.step(self.cfg.control.decimation)
+        self.episode_length += 1
+        self.steps_since_reset += 1
+        self.sensors.last_dof_vel[unstable] = 0  # MuJoCo reset the state: no acceleration
+        self.state = state = self._compute_state(np.arange(self.num_envs), unstable)
+        rewards = self._compute_rewards(state, unstable)
+        time_out = (self.episode_length >= self.max_episode_length) & ~state.fallen
         done = state.fallen | time_out
-        self.careers.ask(self.commands, yaw_of(state.base_quat), self.cfg.dt)
+        self.curriculum.accumulate_command(self.commands, quat_to_yaw(state.base_quat), self.cfg.dt)
         extras: dict[str, Any] = {"time_outs": torch.from_numpy(time_out).to(self.device)}
-        ended = np.flatnonzero(done)
-        if len(ended):
-            extras["log"] = self._end(ended, state, bad)
-            self._begin(ended)
-        self.orders.renew(self.rng, self.steps)
-        self.orders.steer(self._yaw())
-        if len(ended):
-            state.put(ended, self._look(ended, fresh=True))
+        env_ids = np.flatnonzero(done)
+        if len(env_ids):
+            extras["log"] = self._end_episodes(env_ids, state, unstable)
+            self._reset_idx(env_ids)
+        self.velocity_command.resample_due(self.rng, self.steps_since_reset)
+        self.velocity_command.update_heading(self._yaw())
+        if len(env_ids):
+            state.update(env_ids, self._compute_state(env_ids, after_reset=True))
         np.copyto(state.commands, self.commands)
-        self._observed = self._observe()
+        self._compute_observations()
         tensor = torch.from_numpy
-        return self._observed, tensor(rewards).to(self.device), tensor(done).to(self.device), extras
+        return (
+            self._observations,
+            tensor(rewards).to(self.device),
+            tensor(done).to(self.device),
+            extras,
+        )
 
-    def _act(self, actions: torch.Tensor) -> None:
-        wanted = actions.detach().to("cpu", torch.float32).numpy()
-        if wanted.shape != (self.num_envs, self.num_actions):
-            raise ConfigError(
-                f"actions have shape {wanted.shape}; wanted {(self.num_envs, self.num_actions)}"
-            )
-        if not np.isfinite(wanted).all():
-            first = int(np.flatnonzero(~np.isfinite(wanted).all(axis=1))[0])
-            raise ConfigError(
-                f"actions of environment {first} are not numbers; the policy has diverged"
-            )
-        most = self.cfg.normalization.clip_actions
+    def reset(self) -> None:
+        """Reset every environment."""
+        env_ids = np.arange(self.num_envs)
+        self._reset_idx(env_ids)
+        self.velocity_command.update_heading(self._yaw())
+        self.state = self._compute_state(env_ids, after_reset=True)
+        self._compute_observations()
+
+    def set_commands(self, commands: FloatArray | None) -> None:
+        """Fix the commands, shape (n, 3); None returns to random commands."""
+        released = commands is None and self.velocity_command.fixed is not None
+        self.velocity_command.fixed = commands
+        if released:
+            self.velocity_command.resample(self.rng, np.arange(self.num_envs))
+        if released or commands is not None:
+            self.velocity_command.update_heading(self._yaw())
+            np.copyto(self.state.commands, self.commands)
+            self._compute_observations()
+
+    def to_ctrl(self, actions: FloatArray) -> FloatArray:
+        """Return the motors' setpoints for actions of shape (n, j)."""
+        target = self.action_offset + self.action_scale * actions
+        return target - self.joint_offset * self.is_position_controlled
+
+    def _apply_actions(self, actions: torch.Tensor) -> None:
+        array = actions.detach().to("cpu", torch.float32).numpy()
+        expected = (self.num_envs, self.num_actions)
+        if array.shape != expected:
+            raise ConfigError(f"shape of the actions: got {array.shape}; expected {expected}")
+        if not np.isfinite(array).all():
+            first = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
+            raise ConfigError(f"actions of environment {first} are not finite: the policy diverged")
+        clip = self.cfg.normalization.clip_actions
         self.actions[1:] = self.actions[:-1]
-        np.clip(wanted, -most, most, out=self.actions[0])
-        self.physics.ctrl[:] = self.control.told(self.actions[0], self.joint_offset)
+        np.clip(array, -clip, clip, out=self.actions[0])
+        self.sim.ctrl[:] = self.to_ctrl(self.actions[0])
 
-    def _look(
-        self, ids: Ids, bad: NDArray[np.bool_] | None = None, *, fresh: bool = False
+    def _compute_state(
+        self, env_ids: Ids, unstable: BoolArray | None = None, *, after_reset: bool = False
     ) -> State:
-        """Return the state of robots `ids`; what has just begun has no contacts yet."""
-        rows: Any = slice(None) if len(ids) == self.num_envs else ids
-        seen = vars(self.sensors.measure(rows, fresh=fresh))
-        if bad is not None:
-            seen["fallen"] |= bad
+        """Return the state of some environments; after a reset there are no contacts yet."""
+        rows: Any = slice(None) if len(env_ids) == self.num_envs else env_ids
+        measured = self.sensors.read(rows, after_reset=after_reset)
+        if unstable is not None:
+            measured["fallen"] |= unstable
         return State(
-            **seen,
+            **measured,
             actions=self.actions[0, rows].copy(),
             last_actions=self.actions[1, rows].copy(),
             last_last_actions=self.actions[2, rows].copy(),
             commands=self.commands[rows].copy(),
             push_vel=self.push_vel[rows].copy(),
-            friction=self.differences.friction[rows].copy(),
-            added_mass=self.differences.added_mass[rows].copy(),
-            com_shift=self.differences.com_shift[rows].copy(),
+            friction=self.params.friction[rows].copy(),
+            added_mass=self.params.added_mass[rows].copy(),
+            com_shift=self.params.com_shift[rows].copy(),
             joint_offset=self.joint_offset[rows].copy(),
         )
 
-    def _yaw(self) -> FloatArray:
-        """Return the heading of each robot now [rad], shape (n,)."""
-        return yaw_of(self.physics.qpos[:, 3:7].astype(np.float32))
+    def _compute_rewards(self, state: State, unstable: BoolArray) -> FloatArray:
+        """Return the rewards of a step, shape (n,), and add them to the episode sums.
 
-    def _end(self, ids: Ids, state: State, bad: NDArray[np.bool_]) -> dict[str, float]:
-        """Close the episodes of robots `ids`, and return what is to be logged of them."""
-        lived = self.steps[ids] * self.cfg.dt
-        earned = self.earnings.per_second(ids, lived)
-        log = {f"Episode/rew_{name}": mean for name, mean in earned.items()}
-        fallen = state.fallen[ids]
-        log["Episode/falls"] = float(fallen.mean())
-        self._widen(ids, lived)
-        if self.cfg.commands.curriculum:
-            log["Curriculum/lin_vel_x"] = self.orders.lin_vel_x[1]
-        # The runner may have cut the first episodes to random lengths, which says nothing.
-        whole = self.lengths[ids] == self.steps[ids]
-        distance = np.linalg.norm(state.base_pos[ids, :2] - self.start[ids], axis=1)
-        # Who left the map has crossed its patch, which may be narrower than it is long.
-        distance[outside(state.base_pos[ids], self.ground)] = self.ground.patch_length
-        distance[bad[ids]] = 0  # MuJoCo has put these at the world's origin
-        self.careers.end(
-            ids[whole], distance[whole], fallen[whole], move=self.cfg.terrain.curriculum
-        )
-        if not self.ground.level:
-            log["Curriculum/level"] = float(self.careers.levels.mean())
-            for name, (level, success) in self.careers.by_terrain().items():
-                if not np.isnan(level):
-                    log[f"Curriculum/level_{name}"] = level
-                if not np.isnan(success):
-                    log[f"Curriculum/success_{name}"] = success
-        return log
+        An unstable simulation was reset by MuJoCo, so its state only counts as a termination.
+        """
+        settings, dt = self.cfg.rewards, np.float32(self.cfg.dt)
+        total = np.zeros(self.num_envs, np.float32)
+        termination = np.zeros_like(total)
+        for name, (function, scale) in self.rewards.items():
+            term = function(state, self.robot, settings) * np.float32(scale) * dt
+            if name == "termination":
+                termination += term
+            else:
+                term[unstable] = 0
+                total += term
+            self.episode_sums[name] += term
+        if settings.only_positive_rewards:
+            np.maximum(total, 0, out=total)
+        return total + termination
 
-    def _widen(self, ids: Ids, lived: NDArray[np.floating[Any]]) -> None:
-        """Ask for more, once what is asked was followed well over as long as an episode of all."""
-        if "tracking_lin_vel" in self.rewards:
-            self.orders.widen(
-                float(self.sums["tracking_lin_vel"][ids].sum()),
-                float(lived.sum()),
-                scale=self.rewards["tracking_lin_vel"][1],
-                enough=self.num_envs * self.cfg.env.episode_length_s,
-            )
-
-    def _begin(self, ids: Ids) -> None:
-        """Begin new episodes."""
-        origins = self.careers.origins[ids]
-        qpos, qvel = draw_start(
-            self.rng, origins, self.scene, self.robot, self.ground, self.cfg.init_state
-        )
-        self.physics.reset(ids, qpos, qvel)
-        self._lift(ids)
-        self.start[ids] = qpos[:, :2]
-        self.careers.begin(ids)
-        self.lengths[ids] = self.steps[ids] = 0
-        self.actions[:, ids] = 0
-        self.pushes.begin(self.rng, ids)
-        self.sensors.forget(ids)
-        most = self.cfg.domain_rand.joint_offset
-        self.joint_offset[ids] = self.rng.uniform(-most, most, (len(ids), self.num_actions))
-        self.earnings.forget(ids)
-        self.orders.draw(self.rng, ids)
-
-    def _lift(self, ids: Ids) -> None:
-        """Lift those with a foot in the ground: legs that are bent at random may be too long."""
-        x, y, z = np.moveaxis(self.physics.block("foot_position", ids), 2, 0)
-        deep = (self.ground.height(x, y) + self.scene.sole_depth - z).max(axis=1)
-        if (deep > 0).any():
-            self.physics.qpos[ids, 2] += np.maximum(deep, 0)
-            self.physics.refresh(ids)
-
-    def _observe(self) -> TensorDict:
+    def _compute_observations(self) -> None:
         clip = self.cfg.normalization.clip_observations
-        noisy = {"policy": self.rng, "privileged": None}
-        return TensorDict(
-            {
-                name: torch.from_numpy(observe(group, self.state, clip, noisy[name]))
-                for name, group in self.groups.items()
-            },
-            batch_size=[self.num_envs],
-        ).to(self.device)
+        rngs = {"policy": self.rng, "privileged": None}  # noise for the policy only
+        groups = {
+            name: torch.from_numpy(compute_observations(group, self.state, clip, rngs[name]))
+            for name, group in self.obs_groups.items()
+        }
+        self._observations = TensorDict(groups, batch_size=[self.num_envs]).to(self.device)
+
+    def _yaw(self) -> FloatArray:
+        return quat_to_yaw(self.sim.qpos[:, 3:7].astype(np.float32))
+
+    def _end_episodes(self, env_ids: Ids, state: State, unstable: BoolArray) -> dict[str, float]:
+        """Update the curricula after some episodes, and return the values to log."""
+        seconds, fallen = self.steps_since_reset[env_ids] * self.cfg.dt, state.fallen[env_ids]
+        log = {
+            f"Episode/rew_{name}": float((total[env_ids] / seconds).mean())
+            for name, total in self.episode_sums.items()
+        }
+        log["Episode/falls"] = float(fallen.mean())
+        if "tracking_lin_vel" in self.rewards:
+            self.velocity_command.expand_range(
+                float(self.episode_sums["tracking_lin_vel"][env_ids].sum()),
+                float(seconds.sum()),
+                scale=self.rewards["tracking_lin_vel"][1],
+                min_seconds=self.num_envs * self.cfg.env.episode_length_s,
+            )
+        if self.cfg.commands.curriculum:
+            log["Curriculum/lin_vel_x"] = self.velocity_command.lin_vel_x[1]
+        # rsl-rl cuts the first episodes to random lengths; those say nothing about the terrain.
+        complete = self.episode_length[env_ids] == self.steps_since_reset[env_ids]
+        base_pos = state.base_pos[env_ids]
+        distance = np.linalg.norm(base_pos[:, :2] - self.start_pos[env_ids], axis=1)
+        # A robot that left the map crossed its patch, even if the patch is wider than long.
+        distance[terrain_out_of_bounds(base_pos, self.terrain)] = self.terrain.patch_length
+        distance[unstable[env_ids]] = 0  # MuJoCo moved these to the world's origin
+        self.curriculum.on_episode_end(
+            env_ids[complete],
+            distance[complete],
+            fallen[complete],
+            update_levels=self.cfg.terrain.curriculum,
+        )
+        return log if self.terrain.is_flat else log | self.curriculum.log()
+
+    def _reset_idx(self, env_ids: Ids) -> None:
+        """Start new episodes."""
+        qpos, qvel = sample_reset_state(
+            self.rng,
+            self.curriculum.env_origins[env_ids],
+            self.scene,
+            self.robot,
+            self.terrain,
+            self.cfg.init_state,
+        )
+        self.sim.reset(env_ids, qpos, qvel)
+        # Random joint positions may put a foot below the ground: raise the base.
+        x, y, z = np.moveaxis(self.sim.sensor("foot_position", env_ids), 2, 0)
+        depth = (self.terrain.height(x, y) + self.scene.sole_depth - z).max(axis=1)
+        if (depth > 0).any():
+            self.sim.qpos[env_ids, 2] += np.maximum(depth, 0)
+            self.sim.forward(env_ids)
+        self.start_pos[env_ids] = qpos[:, :2]
+        self.curriculum.reset(env_ids)
+        self.episode_length[env_ids] = self.steps_since_reset[env_ids] = 0
+        self.actions[:, env_ids] = 0
+        self.pushes.reset(self.rng, env_ids)
+        self.sensors.reset(env_ids)
+        limit = self.cfg.domain_rand.joint_offset
+        self.joint_offset[env_ids] = self.rng.uniform(
+            -limit, limit, (len(env_ids), self.num_actions)
+        )
+        for total in self.episode_sums.values():
+            total[env_ids] = 0
+        self.velocity_command.resample(self.rng, env_ids)
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return everything that changes from step to step, for an exact resume."""
+        return {
+            "arrays": {name: torch.tensor(array) for name, array in self._arrays().items()},
+            "rng": self.rng.bit_generator.state,
+            "lin_vel_x": self.velocity_command.lin_vel_x,
+            "curriculum": self.curriculum.state_dict(),
+            "state": {name: torch.tensor(array) for name, array in vars(self.state).items()},
+            "observations": dict(self._observations.clone().items()),
+        }
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Continue from a state; with another number of environments, keep only the curricula.
+
+        Raises:
+            ConfigError: If the state belongs to another robot or map.
+        """
+        self.curriculum.load_state_dict(state["curriculum"])
+        self.velocity_command.lin_vel_x = tuple(state["lin_vel_x"])
+        arrays, saved = self._arrays(), state["arrays"]
+        if len(saved["episode_length"]) != self.num_envs:
+            self.reset()
+            return
+        required = {name for name in arrays if not name.startswith("rew_")}
+        if required - saved.keys() or vars(self.state).keys() != state["state"].keys():
+            raise ConfigError(
+                "the checkpoint was written by another version of terrainkit; with another "
+                "env.num_envs, training continues with its networks and curricula"
+            )
+        for name, array in arrays.items():
+            if name not in saved or tuple(saved[name].shape) != array.shape:
+                raise ConfigError(f"the checkpoint's {name} belongs to another robot or task")
+        for name, array in arrays.items():
+            array[...] = saved[name].numpy()
+        apply_params(self.sim, self.params)
+        self.rng.bit_generator.state = state["rng"]
+        # Computing the state again would advance the air time and draw noise.
+        self.state = State(**{name: each.numpy().copy() for name, each in state["state"].items()})
+        groups = state["observations"]
+        self._observations = TensorDict(groups, batch_size=[self.num_envs]).to(self.device)
+
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the arrays to save by name; live."""
+        arrays = {
+            "physics": self.sim.batch.state,
+            "episode_length": self.episode_length,
+            "commands": self.commands,
+            "heading": self.velocity_command.heading,
+            "actions": self.actions,
+            "last_dof_vel": self.sensors.last_dof_vel,
+            "joint_offset": self.joint_offset,
+            "push_vel": self.push_vel,
+            "steps_until_push": self.pushes.steps_until_push,
+            "air_time": self.air_time,
+            "steps_since_reset": self.steps_since_reset,
+            "start_pos": self.start_pos,
+            "tracking": self.velocity_command.tracking,
+        }
+        sums = {f"rew_{name}": total for name, total in self.episode_sums.items()}
+        return arrays | sums | vars(self.params)

@@ -1,7 +1,7 @@
-"""The observations: each with its scale, its noise and its mirror image, in one table.
+"""Observations: groups of terms, each with its scale, noise and mirror symmetry.
 
-The policy's group is what a real robot can measure, with noise; the privileged group is the same
-without noise, and what only a simulation knows. The order is that of the exported policies.
+The policy group is what a real robot can measure, with noise. The privileged group has the same
+terms without noise, and terms that only a simulation knows. Exported policies use this order.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,174 +12,158 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit_robots.rl.robot import Robot
-from terrainkit_robots.rl.rotation import to_body
+from terrainkit_robots.rl.config import Task
+from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.state import State
-from terrainkit_robots.rl.task import Task, Terrain
+from terrainkit_robots.transforms import quat_rotate_inverse
 
 FloatArray = NDArray[np.float32]
 
-Image = Literal["number", "vector", "turn", "command", "joints", "feet", "scan"]
-"""What becomes of an observation in a mirror that swaps left and right; see :mod:`.symmetry`."""
-
-_SCAN_OFFSET = 0.5
-"""Height of the base above the ground that is observed as 0 [m]: legged_gym's."""
+HEIGHT_SCAN_OFFSET = 0.5
+"""Base height above the ground that is observed as 0 [m], as in legged_gym."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Observation:
-    """A part of what is observed."""
+class ObservationTerm:
+    """One term of an observation group."""
 
     name: str
-    """What it is called in logs and exports."""
+    """Name in logs and exports."""
 
-    read: Callable[[State], FloatArray]
-    """What it is in a state, shape (n, width)."""
+    function: Callable[[State], FloatArray]
+    """Computes the term, shape (n, width)."""
 
     scale: tuple[float, ...] | float = 1.0
-    """Factor, or one for each number."""
+    """Scale factor, or one per number."""
 
     noise: float = 0.0
-    """Uniform noise, to either side, before the scale."""
+    """Half range of the uniform noise, added before scaling."""
 
-    image: Image = "number"
-    """What a mirror makes of it."""
-
-
-def sees_heights(settings: Terrain, *, level: bool) -> bool:
-    """Return whether the policy has a height scan: unless given, on any ground but a level one."""
-    given = settings.measure_heights
-    return not level if given is None else given
+    symmetry: Literal["scalar", "vector", "axial", "command", "joints", "feet", "scan"] = "scalar"
+    """How the term transforms when left and right are swapped; see :mod:`.symmetry`."""
 
 
-def policy_group(robot: Robot, task: Task, *, scan: bool) -> tuple[Observation, ...]:
-    """Return what the policy observes: 45 numbers for 12 joints, and a scan of 187 heights."""
-    scales, noise = task.normalization.obs_scales, task.noise
+def uses_height_scan(task: Task, *, is_flat: bool) -> bool:
+    """Return whether the policy has a height scan; the default is True except on flat ground."""
+    setting = task.terrain.measure_heights
+    return not is_flat if setting is None else setting
+
+
+def policy_group(robot: Robot, task: Task, *, scan: bool) -> tuple[ObservationTerm, ...]:
+    """Return the policy's terms: 45 numbers for 12 joints, and 187 with the height scan."""
+    term, scales, noise = ObservationTerm, task.normalization.obs_scales, task.noise
     level = noise.noise_level
     group = (
-        Observation(
+        term(
             name="commands",
-            read=lambda state: state.commands,
+            function=lambda state: state.commands,
             scale=(scales.lin_vel, scales.lin_vel, scales.ang_vel),
-            image="command",
+            symmetry="command",
         ),
-        Observation(
+        term(
             name="projected_gravity",
-            read=lambda state: state.projected_gravity,
+            function=lambda state: state.projected_gravity,
             noise=level * noise.gravity,
-            image="vector",
+            symmetry="vector",
         ),
-        Observation(
+        term(
             name="base_ang_vel",
-            read=lambda state: state.base_ang_vel,
+            function=lambda state: state.base_ang_vel,
             scale=scales.ang_vel,
             noise=level * noise.ang_vel,
-            image="turn",
+            symmetry="axial",
         ),
-        Observation(
+        term(
             name="dof_pos",
-            read=lambda state: state.dof_pos + state.joint_offset - robot.default_pose,
-            # How far a wheel has turned since it was built says nothing, and grows without end.
+            function=lambda state: state.dof_pos + state.joint_offset - robot.default_pose,
+            # The angle of a wheel grows without bound and carries no information.
             scale=tuple(np.where(robot.wheels, 0.0, scales.dof_pos).tolist()),
             noise=level * noise.dof_pos,
-            image="joints",
+            symmetry="joints",
         ),
-        Observation(
+        term(
             name="dof_vel",
-            read=lambda state: state.dof_vel,
+            function=lambda state: state.dof_vel,
             scale=scales.dof_vel,
             noise=level * noise.dof_vel,
-            image="joints",
+            symmetry="joints",
         ),
-        Observation(name="actions", read=lambda state: state.actions, image="joints"),
+        term(name="actions", function=lambda state: state.actions, symmetry="joints"),
     )
     if not scan:
         return group
-    heights = Observation(
+    height_scan = term(
         name="height_scan",
-        read=lambda state: np.clip(state.height_scan - np.float32(_SCAN_OFFSET), -1, 1),
+        function=lambda state: np.clip(state.height_scan - np.float32(HEIGHT_SCAN_OFFSET), -1, 1),
         scale=scales.height_measurements,
         noise=level * noise.height_measurements,
-        image="scan",
+        symmetry="scan",
     )
-    return (*group, heights)
+    return (*group, height_scan)
 
 
 def privileged_group(
     robot: Robot, task: Task, *, scan: bool, weight: float
-) -> tuple[Observation, ...]:
-    """Return what the critic observes: the policy's group without noise, and the unknowable.
+) -> tuple[ObservationTerm, ...]:
+    """Return the critic's terms; contact forces are in units of the robot's `weight` [N]."""
 
-    Args:
-        robot: The robot.
-        task: Its task.
-        scan: Whether there is a height scan.
-        weight: Weight of the robot, the unit of forces [N].
-    """
-    known = [replace(each, noise=0.0) for each in policy_group(robot, task, scan=scan)]
+    def push_vel(state: State) -> FloatArray:
+        return quat_rotate_inverse(state.base_quat, state.push_vel)
+
+    def foot_force(state: State) -> FloatArray:
+        n, feet, _ = state.foot_force.shape
+        quat = np.repeat(state.base_quat, feet, axis=0)
+        return quat_rotate_inverse(quat, state.foot_force.reshape(-1, 3)).reshape(n, -1)
+
+    term = ObservationTerm
     return (
-        *known,
-        Observation(
+        *(replace(each, noise=0.0) for each in policy_group(robot, task, scan=scan)),
+        term(
             name="base_lin_vel",
-            read=lambda state: state.base_lin_vel,
+            function=lambda state: state.base_lin_vel,
             scale=task.normalization.obs_scales.lin_vel,
-            image="vector",
+            symmetry="vector",
         ),
-        Observation(name="friction", read=lambda state: state.friction),
-        Observation(name="added_mass", read=lambda state: state.added_mass),
-        Observation(
-            name="com_shift", read=lambda state: state.com_shift, scale=10.0, image="vector"
+        term(name="friction", function=lambda state: state.friction),
+        term(name="added_mass", function=lambda state: state.added_mass),
+        term(
+            name="com_shift",
+            function=lambda state: state.com_shift,
+            scale=10.0,
+            symmetry="vector",
         ),
-        Observation(name="joint_offset", read=lambda state: state.joint_offset, image="joints"),
-        Observation(
-            name="push_vel",
-            read=lambda state: to_body(state.base_quat, state.push_vel),
-            image="vector",
-        ),
-        Observation(name="foot_force", read=_foot_force, scale=1 / weight, image="feet"),
+        term(name="joint_offset", function=lambda state: state.joint_offset, symmetry="joints"),
+        term(name="push_vel", function=push_vel, symmetry="vector"),
+        term(name="foot_force", function=foot_force, scale=1 / weight, symmetry="feet"),
     )
 
 
-def _foot_force(state: State) -> FloatArray:
-    """Return the forces on the feet in the base's frame [N], shape (n, 3 f)."""
-    n, feet, _ = state.foot_force.shape
-    quat = np.repeat(state.base_quat, feet, axis=0)
-    return to_body(quat, state.foot_force.reshape(-1, 3)).reshape(n, -1)
-
-
-def observe(
-    group: Sequence[Observation],
+def compute_observations(
+    group: Sequence[ObservationTerm],
     state: State,
     clip: float,
     rng: np.random.Generator | None = None,
 ) -> FloatArray:
-    """Return what a group observes in a state, shape (n, width of the group).
-
-    Args:
-        group: The observations, in their order.
-        state: The state.
-        clip: Largest number.
-        rng: Where noise is drawn from; None for none.
-    """
-    values = [each.read(state) for each in group]
+    """Return the observations of a group, shape (n, width), with noise from `rng` if given."""
+    values = [term.function(state) for term in group]
     widths = tuple(value.shape[1] for value in values)
-    observed = np.concatenate(values, axis=1, dtype=np.float32)
-    noise = _by_number(tuple(each.noise for each in group), widths)
+    observations = np.concatenate(values, axis=1, dtype=np.float32)
+    noise = _per_number(tuple(term.noise for term in group), widths)
     if rng is not None and noise.any():
         noisy = np.flatnonzero(noise)
-        start, stop = noisy[0], noisy[-1] + 1  # one block, for speed
-        drawn = rng.random((len(observed), stop - start), dtype=np.float32)
-        observed[:, start:stop] += (2 * drawn - 1) * noise[start:stop]
-    observed *= _by_number(tuple(each.scale for each in group), widths)
-    return np.clip(observed, -clip, clip, out=observed)
+        start, stop = noisy[0], noisy[-1] + 1  # one block is faster than single columns
+        sample = rng.random((len(observations), stop - start), dtype=np.float32)
+        observations[:, start:stop] += (2 * sample - 1) * noise[start:stop]
+    observations *= _per_number(tuple(term.scale for term in group), widths)
+    return np.clip(observations, -clip, clip, out=observations)
 
 
-@lru_cache(maxsize=64)  # the same in every step
-def _by_number(
+@lru_cache(maxsize=64)
+def _per_number(
     values: tuple[tuple[float, ...] | float, ...], widths: tuple[int, ...]
 ) -> FloatArray:
-    """Return the value for each number of a group; not to be written to."""
+    """Repeat the value of each term over its width; read-only, because it is cached."""
     parts = [np.broadcast_to(value, width) for value, width in zip(values, widths, strict=True)]
-    found = np.concatenate(parts).astype(np.float32)
-    found.flags.writeable = False
-    return found
+    array = np.concatenate(parts).astype(np.float32)
+    array.flags.writeable = False
+    return array

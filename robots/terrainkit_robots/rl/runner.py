@@ -1,73 +1,181 @@
-"""The runner: rsl-rl's, so that it goes on exactly where a checkpoint ends, and keeps quiet."""
+"""The runner: rsl-rl's `OnPolicyRunner` with exact resume, graceful stopping and progress."""
 
 import os
+import signal
 import statistics
+import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
+from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
-os.environ.setdefault("GIT_PYTHON_REFRESH", "quiet")  # rsl-rl asks for git, which may be missing
+os.environ.setdefault("GIT_PYTHON_REFRESH", "quiet")  # rsl-rl imports git, which may be missing
 
 import numpy as np
 import torch
 from rsl_rl.runners import OnPolicyRunner
+from rsl_rl.utils.logger import Logger
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit_robots.rl.checkpoint import read_checkpoint, save_checkpoint
-from terrainkit_robots.rl.curves import Curves, quiet
+from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.policy import GROUPS, actor_config, fitting, refuse_other, widths
-from terrainkit_robots.rl.progress import Progress, Watch, nobody
-from terrainkit_robots.rl.run_folder import checkpoint_name
-from terrainkit_robots.rl.task import Task
+from terrainkit_robots.rl.run import checkpoint_name, read_checkpoint, save_checkpoint
+
+OBS_GROUPS = {"actor": ["policy"], "critic": ["privileged"]}
+"""Observation groups of each network."""
+
+SIGNAL_INTERVAL = 1.0
+"""Signals within this time of the first count as one [s]: torchrun and schedulers repeat them."""
 
 
-def runner_config(task: Task) -> dict[str, Any]:
-    """Return what rsl-rl's runner wants to know, from a task."""
-    return {
-        "num_steps_per_env": task.runner.num_steps_per_env,
-        "save_interval": task.runner.save_interval,
-        "seed": task.runner.seed,
-        "logger": _logger_config(task),
-        "obs_groups": {name: list(groups) for name, groups in GROUPS.items()},
-        "actor": {"class_name": "MLPModel", **actor_config(task)},
-        "critic": {
-            "class_name": "MLPModel",
-            "hidden_dims": list(task.policy.critic_hidden_dims),
-            "activation": task.policy.activation,
-            "obs_normalization": task.policy.obs_normalization,
-        },
-        "algorithm": _algorithm_config(task),
-    }
+@dataclass(frozen=True, kw_only=True)
+class TrainingProgress:
+    """The progress of training; means are those of the last 100 episodes."""
+
+    folder: Path | None
+    """Folder of the run."""
+
+    iteration: int
+    """Completed iterations."""
+
+    max_iterations: int
+    """Iterations after which training ends."""
+
+    steps_per_second: float
+    """Environment steps per second, learning included [1/s]."""
+
+    learning_fraction: float
+    """Fraction of the time spent on learning, 0 to 1."""
+
+    eta: float
+    """Estimated time until training ends [s]."""
+
+    reward: float | None
+    """Mean sum of rewards of an episode; None before the first has ended."""
+
+    episode_length: float | None
+    """Mean episode length [s]; None before the first has ended."""
+
+    noise_std: float
+    """Mean standard deviation of the actions."""
+
+    rewards: Mapping[str, float]
+    """Mean reward per second of each term."""
+
+    levels: Mapping[str, float]
+    """Mean level on each terrain; empty on a plane."""
+
+    success: Mapping[str, float]
+    """Success rate on each terrain, 0 to 1."""
 
 
-def _algorithm_config(task: Task) -> dict[str, Any]:
-    own = dict(vars(task.algorithm))
-    symmetry, mirror_loss = own.pop("symmetry"), own.pop("mirror_loss_coeff")
-    config = {"class_name": "PPO", **own, "rnd_cfg": None, "symmetry_cfg": None}
-    if symmetry != "none":
-        from terrainkit_robots.rl.symmetry import mirrored
+ProgressCallback = Callable[[TrainingProgress], object]
 
-        config["symmetry_cfg"] = {
-            "data_augmentation_func": mirrored,
-            "use_data_augmentation": symmetry == "augmentation",
-            "use_mirror_loss": symmetry == "loss",
-            "mirror_loss_coeff": mirror_loss,
+
+class MetricsLogger(Logger):
+    """rsl-rl's logger without console output; its buffers are part of a checkpoint."""
+
+    def __init__(self, runner: "LeggedRunner") -> None:
+        super().__init__(
+            log_dir=None,
+            cfg=runner.cfg,
+            env_cfg=runner.env.cfg,
+            num_envs=runner.env.num_envs,
+            is_distributed=runner.is_distributed,
+            gpu_world_size=runner.gpu_world_size,
+            gpu_global_rank=runner.gpu_global_rank,
+            device=runner.device,
+        )
+        self.means: dict[str, float] = {}
+        """Latest mean of each value in the environments' log."""
+
+        self._runner = runner
+
+    def init_logging_writer(self) -> None:
+        """Open the log files.
+
+        Raises:
+            ConfigError: If wandb does not start.
+        """
+        try:
+            with redirect_stdout(None):
+                super().init_logging_writer()
+        except Exception as error:
+            if self.cfg["logger"] == "tensorboard":
+                raise
+            raise ConfigError(f"wandb does not start: {' '.join(str(error).split())}") from error
+        if self.writer is not None and self.cfg["logger"] == "tensorboard":
+            from tensorboard.compat.proto.event_pb2 import Event, SessionLog
+
+            # TensorBoard drops what an interrupted run logged after its last checkpoint.
+            start = Event(session_log=SessionLog(status=SessionLog.START))
+            self.writer.file_writer.add_event(start, self._runner.current_learning_iteration)
+
+    def stop_logging_writer(self) -> None:
+        """Close the log files, if they are open."""
+        if self.writer is not None:
+            self.writer.close()
+            super().stop_logging_writer()
+            self.writer = None
+
+    def process_env_step(self, rewards: torch.Tensor, *args: Any, **kwargs: Any) -> None:
+        """Check and record the rewards of a step."""
+        if not torch.isfinite(rewards).all():
+            sums = self._runner.env.episode_sums.items()
+            names = [name for name, total in sums if not np.isfinite(total).all()]
+            raise ConfigError(f"rewards are not finite: {listing(names) or 'of robots that fell'}")
+        super().process_env_step(rewards, *args, **kwargs)
+
+    def log(self, **values: Any) -> None:  # type: ignore[override]
+        """Log an iteration, and finish it."""
+        self._runner.check_weights()
+        for key in dict.fromkeys(key for log in self.ep_extras for key in log):
+            self.means[key] = statistics.mean(log[key] for log in self.ep_extras if key in log)
+        with redirect_stdout(None):
+            super().log(**values)
+        self._runner.finish_iteration(values["it"], values["collect_time"], values["learn_time"])
+
+    def latest(self, prefix: str) -> dict[str, float]:
+        """Return the latest means of the values whose names start with `prefix`."""
+        means = self.means.items()
+        return {key.removeprefix(prefix): mean for key, mean in means if key.startswith(prefix)}
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return the buffers, for a checkpoint."""
+        return {
+            "rewards": list(self.rewbuffer),
+            "lengths": list(self.lenbuffer),
+            "reward_sums": self.cur_reward_sum,
+            "episode_lengths": self.cur_episode_length,
+            "total_steps": self.tot_timesteps,
+            "total_time": self.tot_time,
         }
-    return config
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Restore the buffers; those per environment only if their number is the same."""
+        self.rewbuffer.extend(state["rewards"])
+        self.lenbuffer.extend(state["lengths"])
+        self.tot_timesteps, self.tot_time = state["total_steps"], state["total_time"]
+        if len(state["reward_sums"]) == self.num_envs:
+            self.cur_reward_sum.copy_(state["reward_sums"])
+            self.cur_episode_length.copy_(state["episode_lengths"])
+
+    def _store_code_state(self) -> list[str]:
+        return []  # a run.toml records the versions; the user's git repository is not touched
 
 
-def _logger_config(task: Task) -> str | dict[str, str]:
-    if task.runner.logger == "wandb":
-        return {"class_name": "WandbLogWriter", "project_name": "terrainkit"}
-    return "tensorboard"
+class _StopTraining(Exception):  # noqa: N818
+    """Leaves rsl-rl's loop after an iteration."""
 
 
 class LeggedRunner(OnPolicyRunner):
-    """Lets the robots of an environment act, and learns from it, again and again."""
+    """Train a policy with PPO. Iteration k is the state after k updates."""
 
     env: LeggedEnv
+    logger: MetricsLogger
 
     def __init__(
         self,
@@ -75,96 +183,85 @@ class LeggedRunner(OnPolicyRunner):
         folder: Path | None = None,
         device: str = "cpu",
         *,
-        watch: Watch = nobody,
-        stop: Callable[[], object] = lambda: False,
+        progress_callback: ProgressCallback | None = None,
+        should_stop: Callable[[], object] = lambda: False,
     ) -> None:
-        """Make the networks.
+        """Create the networks.
 
         Args:
             env: The environment.
-            folder: Where checkpoints and curves go; None for nowhere.
-            device: Where the networks are: `cpu`, `cuda`, `cuda:1`.
-            watch: Told of the progress after each iteration.
-            stop: Asked before each iteration; training ends, with a checkpoint, once it is true.
+            folder: Folder for checkpoints and logs; None writes nothing.
+            device: Device of the networks: `cpu`, `cuda`, `cuda:1`.
+            progress_callback: Called after each iteration.
+            should_stop: Called before each iteration; True stops with a checkpoint.
         """
-        self.folder, self.watch, self.stop = folder, watch, stop
-        with quiet():
+        self.folder = folder
+        self._progress_callback, self._should_stop = progress_callback, should_stop
+        self._saved: Path | None = None
+        with redirect_stdout(None):
             super().__init__(env, runner_config(env.cfg), None, device)
-        self.first = self.gpu_global_rank == 0
-        self.logger = Curves(
-            log_dir=None,
-            cfg=self.cfg,
-            env_cfg=env.cfg,
-            num_envs=env.num_envs,
-            is_distributed=self.is_distributed,
-            gpu_world_size=self.gpu_world_size,
-            gpu_global_rank=self.gpu_global_rank,
-            device=device,
-        )
-        self._obs = env.get_observations().to(device)
+        self.is_main_process = self.gpu_global_rank == 0
+        self.logger = MetricsLogger(self)
 
     def learn(self, num_learning_iterations: int, init_at_random_ep_len: bool = False) -> None:
-        """Learn.
+        """Train for some iterations.
 
         Args:
-            num_learning_iterations: How many times, from here on.
-            init_at_random_ep_len: Cut the first episodes to random lengths, so that not all robots
-                begin anew at the same time.
+            num_learning_iterations: Number of iterations from here on.
+            init_at_random_ep_len: Cut the first episodes to random lengths, so that resets do not
+                all happen at once.
 
         Raises:
-            ConfigError: if the networks diverge.
-            ExportError: if the disk does not take a checkpoint.
+            ConfigError: If training diverges.
+            ExportError: If a checkpoint cannot be written.
         """
-        first, begun = self.current_learning_iteration, time.perf_counter()
-        last, saved = first + num_learning_iterations, -1
-        if init_at_random_ep_len:
-            self.env.episode_length_buf = torch.randint_like(
-                self.env.episode_length_buf, high=self.env.max_episode_length
-            )
-        self.alg.train_mode()
-        if self.is_distributed:
-            self.alg.broadcast_parameters()
-        with self.logger.writing(self.folder):
-            while self.current_learning_iteration < last and not self._asked_to_stop():
-                start = time.perf_counter()
-                self._collect()
-                collected = time.perf_counter()
-                losses = self._update()
-                learned = time.perf_counter()
-                self.current_learning_iteration += 1
-                pace = (learned - begun) / (self.current_learning_iteration - first)
-                self._tell(losses, collected - start, learned - collected, last, pace)
-                if self.current_learning_iteration % self.cfg["save_interval"] == 0:
-                    self.save()
-                    saved = self.current_learning_iteration
-            if saved != self.current_learning_iteration:
-                self.save()
+        self._first, self._start_time = self.current_learning_iteration, time.perf_counter()
+        self._last = self._first + num_learning_iterations
+        self._completed, self._saved = self._first, None
+        self.logger.log_dir = None if self.folder is None else str(self.folder)
+        if self._stop_requested():
+            self.save()
+            return
+        self.current_learning_iteration += 1  # rsl-rl's first iteration has the number 0
+        quiet = redirect_stdout(None) if self.is_distributed else nullcontext()
+        with _quiet_thread_errors(), quiet:
+            try:
+                super().learn(num_learning_iterations, init_at_random_ep_len)
+            except _StopTraining:
+                pass
+            except RuntimeError:  # torch cannot sample from weights that are not finite
+                self.check_weights()
+                raise
+            finally:
+                with suppress(OSError):  # on a full disk, the first error says so
+                    self.logger.stop_logging_writer()
 
-    def _collect(self) -> None:
-        """Let the robots act for a few steps, and note what comes of it."""
-        with torch.inference_mode():
-            for _ in range(self.cfg["num_steps_per_env"]):
-                actions = self.alg.act(self._obs)
-                obs, rewards, dones, extras = self.env.step(actions)
-                self._refuse_pay(rewards)
-                self._obs = obs.to(self.device)
-                rewards, dones = rewards.to(self.device), dones.to(self.device)
-                self.alg.process_env_step(self._obs, rewards, dones, extras)
-                self.logger.process_env_step(rewards, dones, extras)
-            self.alg.compute_returns(self._obs)
+    def finish_iteration(self, iteration: int, collect_time: float, learn_time: float) -> None:
+        """Report the progress, write a checkpoint if one is due, and stop if requested."""
+        self._completed = iteration
+        if self.is_main_process and self._progress_callback is not None:
+            self._progress_callback(self._progress(collect_time, learn_time))
+        stop = iteration < self._last and self._stop_requested()
+        if stop or iteration == self._last or iteration % self.cfg["save_interval"] == 0:
+            self.save()
+        if stop:
+            raise _StopTraining
 
     def save(self, path: str | None = None, infos: dict[str, Any] | None = None) -> None:
-        """Write a checkpoint into the folder, called by its iteration; one process does so.
+        """Write a checkpoint to the folder; every process must call this.
 
         Raises:
-            ExportError: if the disk does not take it; earlier checkpoints stay.
+            ExportError: If the file cannot be written.
         """
-        state = self.state_dict()  # of all processes: each has to ask for it
-        if self.folder is None or not self.first:
-            return
-        where = Path(path or self.folder / checkpoint_name(self.current_learning_iteration))
-        save_checkpoint(where, state | (infos or {}))
-        self.logger.save_model(str(where), self.current_learning_iteration)
+        name = checkpoint_name(self.current_learning_iteration)
+        target = None if self.folder is None else Path(path or self.folder / name)
+        if path is not None and target == self._saved:
+            return  # rsl-rl saves, in one process, what `finish_iteration` has just saved
+        state = self.state_dict()
+        if target is not None and self.is_main_process:
+            save_checkpoint(target, state | (infos or {}))
+            self._saved = target
+            self.logger.save_model(str(target), self.current_learning_iteration)
 
     def load(
         self,
@@ -173,145 +270,114 @@ class LeggedRunner(OnPolicyRunner):
         strict: bool = True,
         map_location: str | None = None,  # noqa: ARG002
     ) -> dict[str, Any]:
-        """Go on from a checkpoint, as if training had not been interrupted.
+        """Load a checkpoint.
 
-        With another number of environments only the networks and the curricula go on. From a policy
-        without the state of training only the networks do.
+        By default training continues exactly; with another number of environments, only the
+        networks and the curricula do. A checkpoint of a policy alone has only networks.
 
         Args:
             path: The checkpoint.
-            load_cfg: What to take over, and nothing else: the networks `actor` and `critic`; as far
-                as it is in the checkpoint, `optimizer`, and `careers`, where robots are in the
-                curriculum. Unless given, all that there is.
-            strict: Whether every weight has to be there.
-            map_location: Of no use: where the networks are, weights go.
+            load_cfg: Parts to load, instead of everything: `actor`, `critic`, `optimizer`, and
+                `curriculum`, the terrain levels.
+            strict: Whether every weight must be present.
+            map_location: Ignored; weights go to the device of the networks.
 
         Raises:
-            ConfigError: if it is no checkpoint, or one of another robot, task or map.
+            ConfigError: If it is no checkpoint, or belongs to another robot, task or map.
         """
         path = Path(path)
         state = read_checkpoint(path)
-        refuse_other(path, state, self.env, list(self.env.groups))
-        with fitting(path):
-            trained = "processes" in state  # and no policy alone
-            everything = {"actor": True, "critic": True, "optimizer": True}
-            parts = everything if load_cfg is None else load_cfg
-            self.alg.load(state, {**parts, "optimizer": trained and parts.get("optimizer")}, strict)
-            if trained and load_cfg is None:
+        check_checkpoint(path, state, self.env, list(self.env.obs_groups))
+        with network_errors(path):
+            is_resumable = "processes" in state
+            parts = load_cfg or {"actor": True, "critic": True, "optimizer": True}
+            optimizer = is_resumable and parts.get("optimizer")
+            self.alg.load(state, {**parts, "optimizer": optimizer}, strict)
+            if is_resumable and load_cfg is None:
                 self.current_learning_iteration = state["iteration"]
-                self._load_state(state)
-            elif trained and parts.get("careers"):
-                self.env.careers.load_state_dict(self._own(state)["env"]["careers"])
-                self.env.begin_all()
-                self._obs = self.env.get_observations().to(self.device)
+                self._load_process(state)
+            elif is_resumable and parts.get("curriculum"):
+                env_state = self._process_state(state)["env"]
+                self.env.curriculum.load_state_dict(env_state["curriculum"])
+                self.env.reset()
         return {}
 
     def state_dict(self) -> dict[str, Any]:
-        """Return all that training needs to go on; of every process, if this is the first."""
-        mine = {
-            "env": self.env.state_dict(),
-            "random": _random_state(self.device),
-        }
+        """Return everything for an exact resume; of all processes, in the main process."""
+        process = {"env": self.env.state_dict(), "random": {"cpu": torch.get_rng_state()}}
+        if self.device != "cpu":
+            process["random"]["cuda"] = torch.cuda.get_rng_state(self.device)
+        processes: list[Any] | None = [process]
+        if self.is_distributed:
+            gathered = [None] * self.gpu_world_size if self.is_main_process else None
+            torch.distributed.gather_object(process, gathered, dst=0)
+            processes = gathered or processes
         return {
             "iteration": self.current_learning_iteration,
             "robot": self.env.robot.spec.name,
             "joints": list(self.env.robot.spec.joint_order),
-            "observed": widths(self.env),
+            "observed": observation_widths(self.env),
             **self.alg.save(),
-            "processes": self._gathered(mine),
-            "curves": self.logger.state_dict(),
+            "processes": processes,
+            "logger": self.logger.state_dict(),
         }
 
-    def _load_state(self, state: Mapping[str, Any]) -> None:
-        mine = self._own(state)
-        self.env.load_state_dict(mine["env"])
-        self._obs = self.env.get_observations().to(self.device)
+    def _load_process(self, state: Mapping[str, Any]) -> None:
+        process = self._process_state(state)
+        self.env.load_state_dict(process["env"])
         if len(state["processes"]) == self.gpu_world_size:
-            _set_random_state(mine["random"], self.device)
-        else:  # or several would go on alike
+            torch.set_rng_state(process["random"]["cpu"])
+            if self.device != "cpu" and "cuda" in process["random"]:
+                torch.cuda.set_rng_state(process["random"]["cuda"], self.device)
+        else:  # several processes may share one saved state: their samples must differ
             self.env.rng = np.random.default_rng([self.env.cfg.runner.seed, state["iteration"]])
-        self.logger.load_state_dict(state["curves"])
+        self.logger.load_state_dict(state["logger"])
 
-    def _own(self, state: Mapping[str, Any]) -> Any:
-        """Return what this process has in a checkpoint, or that of another for one too many."""
+    def _process_state(self, state: Mapping[str, Any]) -> Any:
+        """Return this process's part of a checkpoint; processes in excess share the last one."""
         processes = state["processes"]
         return processes[min(self.gpu_global_rank, len(processes) - 1)]
 
-    def _gathered(self, mine: dict[str, Any]) -> list[Any]:
-        """Return what each process has; only in the first one it is more than its own."""
+    def _stop_requested(self) -> bool:
+        requested = bool(self._should_stop())
         if not self.is_distributed:
-            return [mine]
-        everyone: list[Any] | None = [None] * self.gpu_world_size if self.first else None
-        torch.distributed.gather_object(mine, everyone, dst=0)
-        return everyone or [mine]
-
-    def _asked_to_stop(self) -> bool:
-        asked = bool(self.stop())
-        if not self.is_distributed:
-            return asked
-        # One process may have been asked before the others; they have to stop together.
-        anyone = torch.tensor(float(asked), device=self.device)
+            return requested
+        # A signal may reach one process first; all must stop after the same iteration.
+        anyone = torch.tensor(float(requested), device=self.device)
         torch.distributed.all_reduce(anyone, op=torch.distributed.ReduceOp.MAX)
         return bool(anyone)
 
-    def _update(self) -> dict[str, float]:
-        """Learn from what was noted, and return the losses."""
-        try:
-            losses: dict[str, float] = self.alg.update()
-        except RuntimeError:  # torch draws no actions from what is not a number
-            self._refuse_nonsense()
-            raise
-        self._refuse_nonsense()
-        return losses
-
-    def _refuse_pay(self, rewards: torch.Tensor) -> None:
-        """Raise ConfigError if a reward is not a number: a division by zero, as a rule."""
-        if not torch.isfinite(rewards).all():
-            sums = self.env.sums.items()
-            wrong = [name for name, total in sums if not np.isfinite(total).all()]
-            raise ConfigError(
-                f"rewards are not numbers any more: {listing(wrong) or 'of robots that fell'}"
-            )
-
-    def _refuse_nonsense(self) -> None:
-        """Raise ConfigError if the networks hold what is not a number: it would only spread."""
+    def check_weights(self) -> None:
+        """Raise ConfigError if a weight of the networks is not finite."""
         weights = [*self.alg.actor.parameters(), *self.alg.critic.parameters()]
         if not all(torch.isfinite(each).all() for each in weights):
             raise ConfigError(
-                f"iteration {self.current_learning_iteration + 1}: the networks have diverged, "
-                "their weights are not numbers any more; smaller rewards or a smaller "
-                "algorithm.learning_rate may help"
+                f"iteration {self._completed + 1}: the networks have diverged, their weights are "
+                "not finite; smaller rewards or a smaller algorithm.learning_rate may help"
             )
 
-    def _tell(
-        self, losses: dict[str, float], collecting: float, learning: float, last: int, pace: float
-    ) -> None:
-        """Write the curves, and tell whoever watches."""
-        done, std = self.current_learning_iteration, self.alg.get_policy().output_std.detach()
-        if not self.first:
-            return
-        self.logger.write(done, collecting, learning, losses, self.alg.learning_rate, std)
-        steps = self.cfg["num_steps_per_env"] * self.env.num_envs * self.gpu_world_size
-        known, dt = self.logger, self.env.cfg.dt
-        self.watch(
-            Progress(
-                folder=self.folder,
-                iteration=done,
-                last=last,
-                steps_per_second=steps / (collecting + learning),
-                learning=learning / (collecting + learning),
-                remaining=(last - done) * pace,
-                reward=_mean(known.rewbuffer),
-                episode_length=_mean([dt * length for length in known.lenbuffer]),
-                noise_std=std.mean().item(),
-                rewards=known.latest("Episode/rew_"),
-                levels=known.latest("Curriculum/level_"),
-                success=known.latest("Curriculum/success_"),
-            )
+    def _progress(self, collect_time: float, learn_time: float) -> TrainingProgress:
+        env, logger, seconds = self.env, self.logger, collect_time + learn_time
+        steps = self.cfg["num_steps_per_env"] * env.num_envs * self.gpu_world_size
+        elapsed, done = time.perf_counter() - self._start_time, self._completed - self._first
+        lengths = [env.cfg.dt * length for length in logger.lenbuffer]
+        return TrainingProgress(
+            folder=self.folder,
+            iteration=self._completed,
+            max_iterations=self._last,
+            steps_per_second=steps / seconds,
+            learning_fraction=learn_time / seconds,
+            eta=(self._last - self._completed) * elapsed / done,
+            reward=statistics.mean(logger.rewbuffer) if logger.rewbuffer else None,
+            episode_length=statistics.mean(lengths) if lengths else None,
+            noise_std=self.alg.get_policy().output_std.detach().mean().item(),
+            rewards=logger.latest("Episode/rew_"),
+            levels=logger.latest("Curriculum/level_"),
+            success=logger.latest("Curriculum/success_"),
         )
 
     def _configure_multi_gpu(self) -> None:
-        """Join the other processes of torchrun: on GPUs rsl-rl's way, on CPUs by gloo."""
+        """Join torchrun's other processes; on CPUs with gloo, which rsl-rl does not support."""
         if int(os.environ.get("WORLD_SIZE", "1")) == 1 or self.device != "cpu":
             super()._configure_multi_gpu()
             return
@@ -327,18 +393,161 @@ class LeggedRunner(OnPolicyRunner):
         }
 
 
-def _mean(values: Any) -> float | None:
-    return statistics.mean(values) if values else None
+def runner_config(task: Task) -> dict[str, Any]:
+    """Return the configuration of rsl-rl's runner."""
+    policy, runner, algorithm = task.policy, task.runner, dict(vars(task.algorithm))
+    symmetry, mirror_loss_coeff = algorithm.pop("symmetry"), algorithm.pop("mirror_loss_coeff")
+    symmetry_cfg = None
+    if symmetry != "none":
+        from terrainkit_robots.rl.symmetry import augment
+
+        symmetry_cfg = {
+            "data_augmentation_func": augment,
+            "use_data_augmentation": symmetry == "augmentation",
+            "use_mirror_loss": symmetry == "loss",
+            "mirror_loss_coeff": mirror_loss_coeff,
+        }
+    wandb = {"class_name": "WandbLogWriter", "project_name": "terrainkit"}
+    return {
+        "num_steps_per_env": runner.num_steps_per_env,
+        "save_interval": runner.save_interval,
+        "seed": runner.seed,
+        "logger": wandb if runner.logger == "wandb" else "tensorboard",
+        "check_for_nan": False,  # `MetricsLogger` names the rewards that are not finite
+        "obs_groups": {name: list(groups) for name, groups in OBS_GROUPS.items()},
+        "actor": {"class_name": "MLPModel", **actor_config(task)},
+        "critic": {
+            "class_name": "MLPModel",
+            "hidden_dims": list(policy.critic_hidden_dims),
+            "activation": policy.activation,
+            "obs_normalization": policy.obs_normalization,
+        },
+        "algorithm": {
+            "class_name": "PPO",
+            **algorithm,
+            "rnd_cfg": None,
+            "symmetry_cfg": symmetry_cfg,
+        },
+    }
 
 
-def _random_state(device: str) -> dict[str, torch.Tensor]:
-    state = {"cpu": torch.get_rng_state()}
-    if device != "cpu":
-        state["cuda"] = torch.cuda.get_rng_state(device)
-    return state
+def actor_config(task: Task) -> dict[str, Any]:
+    """Return the configuration of rsl-rl's actor network."""
+    return {
+        "hidden_dims": list(task.policy.actor_hidden_dims),
+        "activation": task.policy.activation,
+        "obs_normalization": task.policy.obs_normalization,
+        "distribution_cfg": {
+            "class_name": "GaussianDistribution",
+            "init_std": task.policy.init_noise_std,
+            "std_type": "scalar",
+        },
+    }
 
 
-def _set_random_state(state: Mapping[str, torch.Tensor], device: str) -> None:
-    torch.set_rng_state(state["cpu"])
-    if device != "cpu" and "cuda" in state:
-        torch.cuda.set_rng_state(state["cuda"], device)
+def observation_widths(env: LeggedEnv) -> dict[str, int]:
+    """Return the width of each observation group."""
+    return {name: values.shape[1] for name, values in env.get_observations().items()}
+
+
+def check_checkpoint(
+    path: Path, state: Mapping[str, Any], env: LeggedEnv, groups: Sequence[str]
+) -> None:
+    """Check that a checkpoint has the environment's joints and observation widths.
+
+    Raises:
+        ConfigError: If it belongs to another robot or task.
+    """
+    joints, widths = list(env.robot.spec.joint_order), observation_widths(env)
+    if state["joints"] != joints:
+        raise ConfigError(
+            f"{path} belongs to another robot, {state['robot']}: got the joints "
+            f"{listing(map(str, state['joints']))}; expected {listing(joints)}"
+        )
+    for name in groups:
+        if state["observed"].get(name) != widths[name]:
+            raise ConfigError(
+                f"{path} belongs to another task: got {state['observed'].get(name)} {name} "
+                f"observations; expected {widths[name]}. To continue on a map after a plane, set "
+                "terrain.measure_heights on both"
+            )
+
+
+@contextmanager
+def network_errors(path: Path) -> Iterator[None]:
+    """Turn torch's errors about weights that do not fit into one ConfigError."""
+    try:
+        yield
+    except ConfigError:
+        raise
+    except (RuntimeError, ValueError, LookupError, TypeError, AttributeError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise ConfigError(f"{path} does not fit the networks of its task: {reason}") from error
+
+
+@contextmanager
+def stop_on_signal() -> Iterator[Callable[[], int]]:
+    """Yield a function that returns the signal that requested to stop, or 0.
+
+    The first SIGINT, SIGTERM or SIGHUP lets the iteration finish, so that a checkpoint can be
+    written. A second one raises KeyboardInterrupt.
+    """
+    received: list[tuple[int, float]] = []
+
+    def handle(number: int, _frame: FrameType | None) -> None:
+        if received and time.monotonic() - received[0][1] >= SIGNAL_INTERVAL:
+            raise KeyboardInterrupt
+        received.append((number, time.monotonic()))
+
+    numbers = [signal.SIGINT, signal.SIGTERM]
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
+        numbers.append(signal.SIGHUP)
+    if threading.current_thread() is not threading.main_thread():
+        numbers = []  # only the main thread may handle signals
+    previous = {number: signal.signal(number, handle) for number in numbers}
+    try:
+        yield lambda: received[0][0] if received else 0
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def _quiet_thread_errors() -> Iterator[None]:
+    """Keep TensorBoard's thread from printing an OSError that the next log call raises again."""
+    previous = threading.excepthook
+    threading.excepthook = lambda args: None if args.exc_type is OSError else previous(args)
+    try:
+        yield
+    finally:
+        threading.excepthook = previous
+
+
+@contextmanager
+def single_torch_thread() -> Iterator[None]:
+    """Limit torch to one thread, which is fastest for networks as small as these."""
+    previous = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(previous)
+
+
+def resolve_device(name: str) -> str:
+    """Return the device `name`: `cpu`, `cuda` or `cuda:1`.
+
+    Raises:
+        ConfigError: If there is no such device.
+    """
+    count = torch.cuda.device_count()
+    try:
+        device = torch.device(name)
+    except RuntimeError:
+        device = None
+    if device is not None and device.type == "cpu":
+        return "cpu"
+    if device is not None and device.type == "cuda" and (device.index or 0) < count:
+        return name
+    devices = ["cpu", *(f"cuda:{k}" for k in range(count))]
+    raise ConfigError(f"device: got {name!r}; expected one of: {listing(devices)}")

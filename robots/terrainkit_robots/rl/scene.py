@@ -1,174 +1,264 @@
-"""The scene: ground and robot as one MuJoCo model, with the sensors and motors of training.
+"""The MuJoCo model of terrain and robot, with the motors and sensors of training.
 
-What the robot's own file says of actuators and sensors does not count: its spec does. So an
-onboarded robot, a bundled one and one written by hand are trained alike.
+Actuators and sensors of the robot's own file are ignored: its spec defines them. So onboarded,
+bundled and hand-written robots are trained alike.
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.rl.ground import Ground, touching
-from terrainkit_robots.rl.robot import Robot
-from terrainkit_robots.rl.task import Task
+from terrainkit_robots.rl.config import Task
+from terrainkit_robots.rl.terrain import Terrain, collides
+from terrainkit_robots.spec.per_joint import match_joints
+from terrainkit_robots.spec.robot_spec import RobotSpec
+from terrainkit_robots.spec.spec_file import read_spec
 
-_CONTACT_FORCE = 2
-"""What a contact sensor tells: its bit in `intprm[0]`, as MuJoCo's `mjtConDataField` counts."""
+FloatArray = NDArray[np.float32]
 
-_MOTOR_DEFAULTS = ("gear", "ctrllimited", "ctrlrange", "actlimited", "actrange")
-"""What a new motor would take over from the defaults in the robot's file."""
+SPEC_FILE = "robot.toml"
+"""File name of the spec in a robot's folder."""
 
-_ANY = 0x7FFFFFFF
-"""Every bit of `conaffinity`: whatever the ground's `contype` is, it is touched."""
+CONTACT_FORCE_BIT, NET_FORCE = 2, 3
+"""`intprm[0]` and `intprm[1]` of a contact sensor: report the force, summed over all contacts."""
 
-_NET_FORCE = 3
-"""How it sums up several contacts, in `intprm[1]`: the net force, in the world's frame."""
+ALL_BITS = 0x7FFFFFFF
+"""A `conaffinity` that matches every `contype`."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Robot:
+    """A robot as arrays, with j joints in the order of its actions."""
+
+    spec: RobotSpec
+    """Its spec."""
+
+    mjcf: Path
+    """Its MuJoCo model."""
+
+    default_pose: FloatArray
+    """Default joint positions [rad], shape (j,)."""
+
+    wheels: NDArray[np.bool_]
+    """Joints with damping but no stiffness, shape (j,)."""
+
+    effort: FloatArray
+    """Torque limits [N m], shape (j,)."""
+
+    velocity: FloatArray
+    """Velocity limits [rad/s], shape (j,)."""
+
+    lower: FloatArray
+    """Lower soft limits [rad], -inf without one, shape (j,)."""
+
+    upper: FloatArray
+    """Upper soft limits [rad], shape (j,)."""
+
+    @classmethod
+    def from_spec(cls, spec: RobotSpec, folder: Path) -> "Robot":
+        """Return the robot that a spec in `folder` describes.
+
+        Raises:
+            ConfigError: If the spec is incomplete.
+        """
+        if not spec.floating:
+            raise ConfigError(f"base of {spec.name}: got a fixed base; expected a floating base")
+        if not spec.feet:
+            raise ConfigError(f"feet of {spec.name}: got none; expected one for each leg")
+        if spec.spawn_height is None or spec.base_height_target is None:
+            raise ConfigError(
+                f"the spec of {spec.name} lacks spawn_height or base_height_target; "
+                "terrainkit onboard measures both"
+            )
+
+        def array(table: str) -> FloatArray:
+            return np.array(list(spec.per_joint(table).values()), np.float32)
+
+        soft = match_joints(spec.soft_limits, spec.joint_order).values
+        limits = [soft.get(name, (-np.inf, np.inf)) for name in spec.joint_order]
+        lower, upper = np.array(limits, np.float32).T
+        return cls(
+            spec=spec,
+            mjcf=folder / spec.mjcf,
+            default_pose=array("default_pose"),
+            wheels=(array("stiffness") == 0) & (array("damping") > 0),
+            effort=array("effort"),
+            velocity=array("velocity"),
+            lower=lower,
+            upper=upper,
+        )
+
+    @classmethod
+    def load(cls, folder: Path) -> "Robot":
+        """Load the robot in an onboarded folder.
+
+        Raises:
+            ConfigError: If there is no robot.toml, or it is incomplete.
+        """
+        if not (folder / SPEC_FILE).exists():
+            raise ConfigError(f"{folder}: got no {SPEC_FILE}; expected an onboarded robot's folder")
+        return cls.from_spec(read_spec(folder / SPEC_FILE), folder)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Scene:
-    """A compiled scene, and where in it things are. f feet, p penalized and t termination bodies.
-
-    qpos is the base's seven numbers, then the joints at `joint_qpos`; qvel alike. Sensor data is
-    the blocks named below, in their order, three numbers for each body.
-    """
+    """A compiled model, and indices into it. In qpos and qvel, the base comes first."""
 
     model: Any
     """The `mujoco.MjModel`."""
 
     joint_qpos: Any
-    """Index in qpos of each joint, in the robot's order, shape (j,)."""
+    """qpos index of each joint, in the robot's order, shape (j,)."""
 
     joint_qvel: Any
-    """Index in qvel of each joint, shape (j,)."""
+    """qvel index of each joint, shape (j,)."""
 
     base: int
-    """Body of the base."""
+    """Body id of the base."""
 
     geoms: Any
-    """Geoms of the robot that touch, shape (g,)."""
+    """Ids of the robot's colliding geoms, shape (g,)."""
 
     home: Any
     """qpos of the default pose with the base at height 0, shape (nq,)."""
 
     sole_depth: Any
-    """How far below its sensor the lowest point of each foot is in the default pose [m], (f,)."""
+    """Distance from each foot's site down to its lowest point in the default pose [m], (f,)."""
 
-    blocks: dict[str, slice]
-    """Sensor data of: `foot_position`, `foot_velocity`, `foot_force`, `penalized_force`,
-    `termination_force`. Forces are those of the robot on what it touches [N]."""
+    sensors: dict[str, slice]
+    """Range in sensordata of `foot_position`, `foot_velocity`, `foot_force`, `penalized_force` and
+    `termination_force`, three numbers per body. Forces act on what the robot touches [N]."""
 
 
-def build_scene(robot: Robot, ground: Ground, task: Task) -> Scene:
-    """Return the scene of a task.
+def build_scene(robot: Robot, terrain: Terrain, task: Task) -> Scene:
+    """Build the scene of a task.
 
     Raises:
-        ConfigError: if MuJoCo does not read the robot, or the spec names what it does not have.
+        ConfigError: If MuJoCo rejects the robot, or the spec does not match it.
     """
     with quiet_mujoco():
-        whole, body = _attached(robot, ground, task)
-        _fits(robot, whole, body)
-        _collisions(robot, body, task)
-        _joints(robot, body, task)
-        _actuators(robot, whole, task)
-        blocks = _sensors(robot, whole)
+        scene, base = _attach(robot, terrain, task)
+        _check_spec(robot, scene, base)
+        _set_collisions(robot, base, task)
+        armature = robot.spec.per_joint("armature")
+        for joint in base.find_all("joint"):
+            if joint.name in armature:
+                joint.armature = armature[joint.name]
+                joint.actfrclimited = False  # the spec's effort is the limit
+                if not task.asset.joint_friction:
+                    joint.frictionloss = 0
+        _add_actuators(robot, scene, task)
+        sensors = _add_sensors(robot, scene)
         try:
-            model = whole.compile()
+            model = scene.compile()
         except ValueError as error:
             raise ConfigError(f"{robot.mjcf}: {' '.join(str(error).split())}") from None
-    return _scene(robot, model, blocks)
+    joint_qpos = np.array([model.joint(name).qposadr[0] for name in robot.spec.joint_order])
+    home = model.qpos0.copy()
+    home[:7] = (0, 0, 0, 1, 0, 0, 0)
+    home[joint_qpos] = robot.default_pose
+    base_id = model.body(robot.spec.base).id
+    of_robot = model.body_rootid[model.geom_bodyid] == model.body_rootid[base_id]
+    return Scene(
+        model=model,
+        joint_qpos=joint_qpos,
+        joint_qvel=np.array([model.joint(name).dofadr[0] for name in robot.spec.joint_order]),
+        base=base_id,
+        geoms=np.flatnonzero(collides(model) & of_robot),
+        home=home,
+        sole_depth=_sole_depth(robot, model, home),
+        sensors=sensors,
+    )
 
 
-def _attached(robot: Robot, ground: Ground, task: Task) -> tuple[Any, Any]:
-    """Return the scene, and the robot's base in it."""
+def _attach(robot: Robot, terrain: Terrain, task: Task) -> tuple[Any, Any]:
+    """Return the spec of robot and terrain, and the robot's base in it."""
     import mujoco
 
     try:
-        own = mujoco.MjSpec.from_file(str(robot.mjcf))
+        spec = mujoco.MjSpec.from_file(str(robot.mjcf))
     except ValueError as error:
         raise ConfigError(
-            f"MuJoCo does not read {robot.mjcf}: {' '.join(str(error).split())}"
+            f"MuJoCo cannot read {robot.mjcf}: {' '.join(str(error).split())}"
         ) from None
-    for element in (*own.actuators, *own.sensors, *own.keys, *own.cameras, *own.lights):
-        own.delete(element)
-    below = ground.spec()
-    for spec in (own, below):
-        _options(spec, task)  # both, or MuJoCo warns of what they disagree on
-    # The ground to the robot, so that it is the robot's names that stay as they are.
-    for element in (*below.actuators, *below.sensors, *below.keys):
-        below.delete(element)  # they would come before the robot's
-    for geom in below.geoms:
+    for element in (*spec.actuators, *spec.sensors, *spec.keys, *spec.cameras, *spec.lights):
+        spec.delete(element)
+    ground = terrain.spec()
+    for each in (spec, ground):  # both, or MuJoCo warns about differences
+        each.option = mujoco.MjSpec().option  # gravity, wind: the same for every robot
+        option = each.option
+        option.timestep = task.sim.dt
+        option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
+        option.iterations = task.sim.iterations
+        option.ls_iterations = task.sim.ls_iterations
+    for element in (*ground.actuators, *ground.sensors, *ground.keys):
+        ground.delete(element)  # they would precede the robot's
+    for geom in ground.geoms:
         if geom.conaffinity:
-            geom.contype |= 1  # a robot that does not touch itself touches what has a contype
-    own.attach(below, frame=own.worldbody.add_frame(), prefix="ground/")
-    base = own.body(robot.spec.base)
+            geom.contype |= 1  # robots without self-collision touch only geoms with a contype
+    # The terrain is attached to the robot, so the robot's names keep their form.
+    spec.attach(ground, frame=spec.worldbody.add_frame(), prefix="ground/")
+    base = spec.body(robot.spec.base)
     if base is None:
         raise ConfigError(f"{robot.mjcf} has no body {robot.spec.base!r}, the base of its spec")
-    return own, base
+    return spec, base
 
 
-def _fits(robot: Robot, whole: Any, base: Any) -> None:
-    """Refuse a spec that speaks of another robot."""
+def _check_spec(robot: Robot, scene: Any, base: Any) -> None:
+    """Check that the spec matches the robot's model."""
     import mujoco
 
-    spec = robot.spec
-    free = [j for j in base.joints if j.type == mujoco.mjtJoint.mjJNT_FREE]
+    spec, free_type = robot.spec, mujoco.mjtJoint.mjJNT_FREE
+    free = [joint for joint in base.joints if joint.type == free_type]
     if len(free) != 1 or len(base.joints) != 1:
-        raise ConfigError(f"{robot.mjcf}: {spec.base} is not free to move; wanted a freejoint")
-    if whole.joints[0].name != free[0].name or whole.joints[0].parent.name != spec.base:
-        raise ConfigError(f"{robot.mjcf}: something moves before {spec.base}; wanted it first")
-    joints = [j.name for j in whole.joints if j.type != mujoco.mjtJoint.mjJNT_FREE]
+        raise ConfigError(f"{robot.mjcf}: {spec.base} has no freejoint of its own; expected one")
+    first = scene.joints[0]
+    if first.name != free[0].name or first.parent.name != spec.base:
+        raise ConfigError(f"{robot.mjcf}: a joint precedes {spec.base}; expected the base first")
+    joints = [joint.name for joint in scene.joints if joint.type != free_type]
     unknown = [name for name in spec.joint_order if name not in joints]
     if unknown:
         raise ConfigError(
             f"the spec of {spec.name} has the joint {unknown[0]!r}; "
             f"{robot.mjcf.name} has: {listing(joints)}"
         )
-    bodies = [b.name for b in base.find_all("body")] + [base.name]
+    bodies = [body.name for body in base.find_all("body")] + [base.name]
     for field in ("feet", "termination_contacts", "penalized_contacts"):
         for name in getattr(spec, field):
             if name not in bodies:
                 raise ConfigError(
-                    f"{field} of {spec.name} has {name!r}; the bodies of "
+                    f"{field} of {spec.name}: got {name!r}; the bodies of "
                     f"{robot.mjcf.name} are: {listing(bodies)}"
                 )
 
 
-def _collisions(robot: Robot, base: Any, task: Task) -> None:
-    """Let the robot touch the ground, with what touches anything, and itself if wanted."""
-    wanted = {*robot.spec.feet, *robot.spec.termination_contacts}
+def _set_collisions(robot: Robot, base: Any, task: Task) -> None:
+    """Enable collisions with the terrain, and with the robot itself if the task says so."""
+    bodies = {*robot.spec.feet, *robot.spec.termination_contacts}
     for geom in base.find_all("geom"):
         if not geom.contype and not geom.conaffinity:
             continue
-        if task.asset.collisions != "all" and geom.parent.name not in wanted:
+        if task.asset.collisions != "all" and geom.parent.name not in bodies:
             geom.contype = geom.conaffinity = 0
             continue
         geom.contype = int(task.asset.self_collisions)
-        geom.conaffinity = _ANY
+        geom.conaffinity = ALL_BITS
         geom.condim = 3
-        # The robot's friction is what is randomized; without priority the larger of two counts.
-        geom.priority = 1
+        geom.priority = 1  # the robot's friction counts, not the larger of two
 
 
-def _joints(robot: Robot, base: Any, task: Task) -> None:
-    armature = robot.spec.per_joint("armature")
-    for joint in base.find_all("joint"):
-        if joint.name in armature:
-            joint.armature = armature[joint.name]
-            joint.actfrclimited = False  # the spec's effort counts
-            if not task.asset.joint_friction:
-                joint.frictionloss = 0
-
-
-def _actuators(robot: Robot, whole: Any, task: Task) -> None:
-    """Add a motor for each joint, with its controller: the physics' own, evaluated every step."""
+def _add_actuators(robot: Robot, scene: Any, task: Task) -> None:
+    """Add a motor for each joint; MuJoCo evaluates its controller in every physics step."""
     import mujoco
 
     spec, control = robot.spec, task.control
-    plain = mujoco.MjSpec().default.actuator
+    default = mujoco.MjSpec().default.actuator
     stiffness, damping = spec.per_joint("stiffness"), spec.per_joint("damping")
     for name, effort in spec.per_joint("effort").items():
         kp, kd = stiffness[name], damping[name]
@@ -176,11 +266,12 @@ def _actuators(robot: Robot, whole: Any, task: Task) -> None:
             kp = control.stiffness
         if control.damping is not None:
             kd = control.damping
-        motor = whole.add_actuator(
+        motor = scene.add_actuator(
             name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, forcelimited=True
         )
-        for what in _MOTOR_DEFAULTS:
-            setattr(motor, what, getattr(plain, what))
+        # A new motor inherits from the defaults in the robot's file.
+        for attribute in ("gear", "ctrllimited", "ctrlrange", "actlimited", "actrange"):
+            setattr(motor, attribute, getattr(default, attribute))
         motor.forcerange = [-effort, effort]
         if control.control_type == "T":
             motor.set_to_motor()
@@ -190,77 +281,41 @@ def _actuators(robot: Robot, whole: Any, task: Task) -> None:
             motor.set_to_position(kp=kp, kv=kd)
 
 
-def _sensors(robot: Robot, whole: Any) -> dict[str, slice]:
-    """Add the sensors, and return where in sensordata the values of each kind are."""
+def _add_sensors(robot: Robot, scene: Any) -> dict[str, slice]:
+    """Add the sensors, and return the range of each kind in sensordata."""
     import mujoco
 
-    kind, body, site = mujoco.mjtSensor, mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_SITE
-    spec = robot.spec
-    soles = [_sole(whole, name) for name in spec.feet]
-    wanted = {
-        "foot_position": (kind.mjSENS_FRAMEPOS, site, soles),
-        "foot_velocity": (kind.mjSENS_FRAMELINVEL, site, soles),
-        "foot_force": (kind.mjSENS_CONTACT, body, spec.feet),
-        "penalized_force": (kind.mjSENS_CONTACT, body, spec.penalized_contacts),
-        "termination_force": (kind.mjSENS_CONTACT, body, spec.termination_contacts),
+    for foot in robot.spec.feet:
+        geoms = [geom for geom in scene.body(foot).geoms if geom.contype or geom.conaffinity]
+        center = np.mean([geom.pos for geom in geoms], axis=0) if geoms else np.zeros(3)
+        scene.body(foot).add_site(name=_sole(foot), pos=center, group=4)
+    sensor, body, site = mujoco.mjtSensor, mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_SITE
+    spec, soles = robot.spec, [_sole(foot) for foot in robot.spec.feet]
+    kinds = {
+        "foot_position": (sensor.mjSENS_FRAMEPOS, site, soles),
+        "foot_velocity": (sensor.mjSENS_FRAMELINVEL, site, soles),
+        "foot_force": (sensor.mjSENS_CONTACT, body, spec.feet),
+        "penalized_force": (sensor.mjSENS_CONTACT, body, spec.penalized_contacts),
+        "termination_force": (sensor.mjSENS_CONTACT, body, spec.termination_contacts),
     }
-    blocks, start = {}, 0
-    for block, (sensed, at, names) in wanted.items():
+    ranges, start = {}, 0
+    for kind, (type_, objtype, names) in kinds.items():
         for name in names:
-            sensor = whole.add_sensor(name=f"{block}_{name}", type=sensed, objtype=at, objname=name)
-            if sensed == kind.mjSENS_CONTACT:
-                sensor.intprm[:3] = [_CONTACT_FORCE, _NET_FORCE, 1]
-        blocks[block] = slice(start, start + 3 * len(names))
+            made = scene.add_sensor(
+                name=f"{kind}_{name}", type=type_, objtype=objtype, objname=name
+            )
+            if type_ == sensor.mjSENS_CONTACT:
+                made.intprm[:3] = [CONTACT_FORCE_BIT, NET_FORCE, 1]
+        ranges[kind] = slice(start, start + 3 * len(names))
         start += 3 * len(names)
-    return blocks
+    return ranges
 
 
-def _sole(whole: Any, foot: str) -> str:
-    """Add a site at the middle of what a foot touches the ground with, and return its name."""
-    shapes = [g for g in whole.body(foot).geoms if g.contype or g.conaffinity]
-    where = np.mean([g.pos for g in shapes], axis=0) if shapes else np.zeros(3)
-    whole.body(foot).add_site(name=_sole_name(foot), pos=where, group=4)
-    return _sole_name(foot)
-
-
-def _sole_name(foot: str) -> str:
+def _sole(foot: str) -> str:
     return f"sole of {foot}"
 
 
-def _options(spec: Any, task: Task) -> None:
-    """Set what was measured to pay, together a factor of two."""
-    import mujoco
-
-    spec.option = mujoco.MjSpec().option  # gravity, impratio, wind: the same for every robot
-    option = spec.option
-    option.timestep = task.sim.dt
-    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
-    option.iterations = task.sim.iterations
-    option.ls_iterations = task.sim.ls_iterations
-
-
-def _scene(robot: Robot, model: Any, blocks: dict[str, slice]) -> Scene:
-    names = robot.spec.joint_order
-    joint_qpos = np.array([model.joint(name).qposadr[0] for name in names])
-    home = model.qpos0.copy()
-    home[:7] = (0, 0, 0, 1, 0, 0, 0)
-    home[joint_qpos] = robot.default_pose
-    base = model.body(robot.spec.base).id
-    own = model.body_rootid[model.geom_bodyid] == model.body_rootid[base]
-    return Scene(
-        model=model,
-        joint_qpos=joint_qpos,
-        joint_qvel=np.array([model.joint(name).dofadr[0] for name in names]),
-        base=base,
-        geoms=np.flatnonzero(touching(model) & own),
-        home=home,
-        sole_depth=_sole_depth(robot, model, home),
-        blocks=blocks,
-    )
-
-
-def _sole_depth(robot: Robot, model: Any, home: Any) -> Any:
+def _sole_depth(robot: Robot, model: Any, home: Any) -> FloatArray:
     import mujoco
 
     data = mujoco.MjData(model)
@@ -268,32 +323,32 @@ def _sole_depth(robot: Robot, model: Any, home: Any) -> Any:
     mujoco.mj_kinematics(model, data)
     depths = []
     for foot in robot.spec.feet:
-        geoms = np.flatnonzero(touching(model) & (model.geom_bodyid == model.body(foot).id))
-        at = data.site(_sole_name(foot)).xpos[2]
-        depths.append(max((at - lowest_point(model, data, int(g)) for g in geoms), default=0.0))
+        geoms = np.flatnonzero(collides(model) & (model.geom_bodyid == model.body(foot).id))
+        height = data.site(_sole(foot)).xpos[2]
+        depths.append(max((height - lowest_point(model, data, int(g)) for g in geoms), default=0.0))
     return np.array(depths, np.float32)
 
 
 def lowest_point(model: Any, data: Any, geom: int) -> float:
-    """Return the height of the lowest point of a geom in the world [m]."""
+    """Return the height of a geom's lowest point in the world [m]."""
     import mujoco
 
-    kind = mujoco.mjtGeom
-    axes = data.geom_xmat[geom].reshape(3, 3)[2]  # how far up each axis of the geom points
-    size, up = model.geom_size[geom], np.abs(axes)
+    types, size = mujoco.mjtGeom, model.geom_size[geom]
+    axes = data.geom_xmat[geom].reshape(3, 3)[2]  # vertical component of each axis
+    up = np.abs(axes)
     match model.geom_type[geom]:
-        case kind.mjGEOM_SPHERE:
-            reach = size[0]
-        case kind.mjGEOM_CAPSULE:
-            reach = size[0] + size[1] * up[2]
-        case kind.mjGEOM_CYLINDER:
-            reach = size[0] * np.hypot(up[0], up[1]) + size[1] * up[2]
-        case kind.mjGEOM_ELLIPSOID:
-            reach = np.linalg.norm(size * up)
-        case kind.mjGEOM_MESH:
+        case types.mjGEOM_SPHERE:
+            extent = size[0]
+        case types.mjGEOM_CAPSULE:
+            extent = size[0] + size[1] * up[2]
+        case types.mjGEOM_CYLINDER:
+            extent = size[0] * np.hypot(up[0], up[1]) + size[1] * up[2]
+        case types.mjGEOM_ELLIPSOID:
+            extent = np.linalg.norm(size * up)
+        case types.mjGEOM_MESH:
             mesh = model.mesh(int(model.geom_dataid[geom]))
             start, count = int(mesh.vertadr[0]), int(mesh.vertnum[0])
-            reach = -(model.mesh_vert[start : start + count] @ axes).min()
+            extent = -(model.mesh_vert[start : start + count] @ axes).min()
         case _:
-            reach = size @ up
-    return float(data.geom_xpos[geom][2] - reach)
+            extent = size @ up
+    return float(data.geom_xpos[geom][2] - extent)

@@ -1,108 +1,193 @@
-"""The state: all that observations and rewards may look at, after a step of the environment."""
+"""The state of the robots after a step, and the sensors that measure it."""
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit_robots.rl.config import Task
+from terrainkit_robots.rl.simulation import Simulation
+from terrainkit_robots.rl.terminations import (
+    bad_orientation,
+    illegal_contact,
+    terrain_out_of_bounds,
+)
+from terrainkit_robots.rl.terrain import Terrain
+from terrainkit_robots.transforms import projected_gravity, quat_rotate_inverse, quat_to_yaw
+
 FloatArray = NDArray[np.float32]
+BoolArray = NDArray[np.bool_]
+
+CONTACT_FORCE = 1.0
+"""Vertical force from which a foot is in contact [N], as in legged_gym."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Measured:
-    """What is measured of n robots: j joints, f feet, p penalized bodies, k points of the scan.
+class State:
+    """The state of n robots: j joints, f feet, p penalized bodies, k points of the height scan.
 
-    The arrays are copies: they stay what they are when the physics goes on.
+    The arrays are copies; later steps do not change them.
     """
 
     base_pos: FloatArray
-    """Position of the base in the world [m], shape (n, 3)."""
+    """Position of the base, world frame [m], shape (n, 3)."""
 
     base_quat: FloatArray
-    """Rotation of the base, shape (n, 4)."""
+    """Orientation of the base (w, x, y, z), shape (n, 4)."""
 
     base_lin_vel: FloatArray
-    """Velocity of the base in its own frame [m/s], shape (n, 3)."""
+    """Linear velocity of the base, base frame [m/s], shape (n, 3)."""
 
     base_ang_vel: FloatArray
-    """Angular velocity of the base in its own frame [rad/s], shape (n, 3)."""
+    """Angular velocity of the base, base frame [rad/s], shape (n, 3)."""
 
     projected_gravity: FloatArray
-    """Direction of gravity in the base's frame, shape (n, 3); upright is (0, 0, -1)."""
+    """Direction of gravity, base frame, shape (n, 3); (0, 0, -1) when upright."""
 
     base_height: FloatArray
     """Height of the base above the ground under it [m], shape (n,)."""
 
     dof_pos: FloatArray
-    """Position of the joints [rad], shape (n, j)."""
+    """Joint positions [rad], shape (n, j)."""
 
     dof_vel: FloatArray
-    """Speed of the joints [rad/s], shape (n, j)."""
+    """Joint velocities [rad/s], shape (n, j)."""
 
     dof_acc: FloatArray
-    """Change of the speed since the last step, per second [rad/s2], shape (n, j)."""
+    """Joint accelerations, from the last two velocities [rad/s2], shape (n, j)."""
 
     torques: FloatArray
-    """Torque of the motors [N m], shape (n, j)."""
+    """Motor torques [N m], shape (n, j)."""
 
     foot_height: FloatArray
     """Height of the feet above the ground under them [m], shape (n, f)."""
 
     foot_vel: FloatArray
-    """Velocity of the feet in the world [m/s], shape (n, f, 3)."""
+    """Velocity of the feet, world frame [m/s], shape (n, f, 3)."""
 
     foot_force: FloatArray
-    """Force of the ground on the feet, in the world's frame [N], shape (n, f, 3)."""
+    """Contact force on the feet, world frame [N], shape (n, f, 3)."""
 
-    first_contact: NDArray[np.bool_]
-    """Feet that have just come down, shape (n, f)."""
+    first_contact: BoolArray
+    """Feet that touched down in this step, shape (n, f)."""
 
     air_time: FloatArray
     """Time since each foot left the ground, up to this step [s], shape (n, f)."""
 
     penalized_force: FloatArray
-    """Force on each penalized body [N], shape (n, p)."""
+    """Magnitude of the force on each penalized body [N], shape (n, p)."""
 
     height_scan: FloatArray
-    """Height of the base above each point of the scan [m], shape (n, k); empty without one."""
+    """Height of the base above each scan point [m], shape (n, k); k = 0 without a scan."""
 
-    fallen: NDArray[np.bool_]
-    """Robots whose episode ends as a fall, shape (n,)."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class State(Measured):
-    """What is measured of n robots, and what is known of them otherwise."""
+    fallen: BoolArray
+    """Robots whose episode ends with a fall, shape (n,)."""
 
     actions: FloatArray
-    """The actions of this step, shape (n, j)."""
+    """Actions of this step, shape (n, j)."""
 
     last_actions: FloatArray
-    """The actions of the step before, shape (n, j)."""
+    """Actions of the previous step, shape (n, j)."""
 
     last_last_actions: FloatArray
-    """The actions of the step before that, shape (n, j)."""
+    """Actions of the step before that, shape (n, j)."""
 
     commands: FloatArray
-    """What is asked for: speed forward, to the left [m/s], turning [rad/s], shape (n, 3)."""
+    """Forward and left velocity [m/s], yaw rate [rad/s], shape (n, 3)."""
 
     push_vel: FloatArray
-    """What a push in this step added to the base's velocity, in the world's frame [m/s], shape
-    (n, 3); of one before there is nothing left but that velocity, so it is 0 again."""
+    """Velocity that a push added in this step, world frame [m/s], shape (n, 3)."""
 
     friction: FloatArray
-    """Friction of the robot's contacts, shape (n, 1)."""
+    """Contact friction, shape (n, 1)."""
 
     added_mass: FloatArray
     """Mass added to the base [kg], shape (n, 1)."""
 
     com_shift: FloatArray
-    """Shift of the base's center of mass, in its frame [m], shape (n, 3)."""
+    """Shift of the base's center of mass, base frame [m], shape (n, 3)."""
 
     joint_offset: FloatArray
-    """Error of the zero of each joint: what is measured less what is [rad], shape (n, j)."""
+    """Measured minus true joint position [rad], shape (n, j)."""
 
-    def put(self, ids: NDArray[np.int64], other: "State") -> None:
-        """Take over the robots `ids` from a state of those alone."""
+    def update(self, env_ids: NDArray[np.int64], other: "State") -> None:
+        """Replace the rows `env_ids` with the state `other` of these robots."""
         for field in fields(self):
-            getattr(self, field.name)[ids] = getattr(other, field.name)
+            getattr(self, field.name)[env_ids] = getattr(other, field.name)
+
+
+class Sensors:
+    """Measure n robots; keep the values that the next measurement is compared with."""
+
+    def __init__(self, sim: Simulation, terrain: Terrain, task: Task, *, scan: bool) -> None:
+        n, feet, joints = len(sim.qpos), len(sim.scene.sole_depth), len(sim.scene.joint_qvel)
+        self.air_time = np.zeros((n, feet), np.float32)
+        """Time since each foot left the ground, 0 in contact [s], shape (n, f)."""
+
+        self.last_dof_vel = np.zeros((n, joints), np.float32)
+        """Joint velocities of the previous step [rad/s], shape (n, j)."""
+
+        self._sim, self._terrain, self._cfg = sim, terrain, task.termination
+        self._dt = np.float32(task.dt)
+        x, y = task.terrain.measured_points_x, task.terrain.measured_points_y
+        points = np.stack([each.ravel() for each in np.meshgrid(x, y, indexing="ij")])
+        self._scan_points = points[:, : None if scan else 0].astype(np.float32)
+
+    def reset(self, env_ids: Any) -> None:
+        """Start new episodes: joints at rest, feet in contact."""
+        self.last_dof_vel[env_ids] = 0
+        self.air_time[env_ids] = 0
+
+    def read(self, rows: Any, *, after_reset: bool) -> dict[str, Any]:
+        """Return the measured fields of `State`; after a reset there are no contacts yet."""
+        sim, scene = self._sim, self._sim.scene
+        qpos, qvel = sim.qpos[rows].astype(np.float32), sim.qvel[rows].astype(np.float32)
+        quat, pos = qpos[:, 3:7], qpos[:, :3]
+        gravity = projected_gravity(quat)
+        dof_vel = qvel[:, scene.joint_qvel]
+        foot_pos = sim.sensor("foot_position", rows)
+        foot_force = -sim.sensor("foot_force", rows)
+        penalized = sim.sensor("penalized_force", rows)
+        terminating = sim.sensor("termination_force", rows)
+        if after_reset:
+            foot_force[:] = penalized[:] = terminating[:] = 0
+        contact = foot_force[..., 2] > CONTACT_FORCE
+        air_time = self.air_time[rows] + (np.float32(0) if after_reset else self._dt)
+        first_contact = contact & (self.air_time[rows] > 0)
+        self.air_time[rows] = np.where(contact, 0, air_time)
+        dof_acc = (dof_vel - self.last_dof_vel[rows]) / self._dt
+        self.last_dof_vel[rows] = dof_vel
+        ground_height = self._terrain.height(foot_pos[..., 0], foot_pos[..., 1])
+        return {
+            "base_pos": pos,
+            "base_quat": quat,
+            "base_lin_vel": quat_rotate_inverse(quat, qvel[:, :3]),
+            "base_ang_vel": qvel[:, 3:6],
+            "projected_gravity": gravity,
+            "base_height": pos[:, 2] - self._terrain.height(pos[:, 0], pos[:, 1]),
+            "dof_pos": qpos[:, scene.joint_qpos],
+            "dof_vel": dof_vel,
+            "dof_acc": dof_acc,
+            "torques": sim.torque[rows].astype(np.float32) * np.float32(not after_reset),
+            "foot_height": foot_pos[..., 2] - ground_height - scene.sole_depth,
+            "foot_vel": sim.sensor("foot_velocity", rows),
+            "foot_force": foot_force,
+            "first_contact": first_contact,
+            "air_time": air_time,
+            "penalized_force": np.sqrt(np.einsum("npi,npi->np", penalized, penalized)),
+            "height_scan": self._height_scan(pos, quat),
+            "fallen": illegal_contact(terminating, self._cfg)
+            | bad_orientation(gravity, self._cfg)
+            | terrain_out_of_bounds(pos, self._terrain),
+        }
+
+    def _height_scan(self, pos: FloatArray, quat: FloatArray) -> FloatArray:
+        """Return the height of the base above the scan points, which turn with the yaw."""
+        x, y = self._scan_points
+        if not len(x):
+            return np.zeros((len(pos), 0), np.float32)
+        yaw = quat_to_yaw(quat)
+        c, s = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
+        height = self._terrain.height(pos[:, :1] + c * x - s * y, pos[:, 1:2] + s * x + c * y)
+        return pos[:, 2:3] - height

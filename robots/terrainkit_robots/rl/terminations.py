@@ -1,30 +1,25 @@
-"""The terminations: what ends an episode as a fall. Running out of time does not."""
+"""Terminations: conditions that end an episode as a fall."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit_robots.rl.ground import Ground
-from terrainkit_robots.rl.task import Termination
+from terrainkit_robots.rl.config import Termination
+from terrainkit_robots.rl.terrain import Terrain
 
 FloatArray = NDArray[np.float32]
 
 
-def touched(force: FloatArray, settings: Termination) -> NDArray[np.bool_]:
-    """Return whose termination bodies touch something, shape (n,).
-
-    Args:
-        force: Force on each termination body [N], shape (n, t, 3).
-        settings: How hard.
-    """
-    return (np.einsum("nti,nti->nt", force, force) > settings.contact_force**2).any(axis=1)
+def illegal_contact(force: FloatArray, cfg: Termination) -> NDArray[np.bool_]:
+    """Return which robots touch something with a termination body; force [N], shape (n, t, 3)."""
+    return (np.einsum("nti,nti->nt", force, force) > cfg.contact_force**2).any(axis=1)
 
 
-def tilted(projected_gravity: FloatArray, settings: Termination) -> NDArray[np.bool_]:
-    """Return who is tilted too far, shape (n,); gravity as in the state, shape (n, 3)."""
-    return -projected_gravity[:, 2] < np.cos(settings.tilt)
+def bad_orientation(projected_gravity: FloatArray, cfg: Termination) -> NDArray[np.bool_]:
+    """Return which robots are tilted beyond the limit; gravity of shape (n, 3)."""
+    return -projected_gravity[:, 2] < np.cos(cfg.tilt)
 
 
-def outside(base_pos: FloatArray, ground: Ground) -> NDArray[np.bool_]:
-    """Return who has left the map, shape (n,); positions in the world [m], shape (n, 3)."""
-    beyond = (base_pos[:, :2] < ground.lower) | (base_pos[:, :2] > ground.upper)
-    return np.asarray(beyond.any(axis=1))
+def terrain_out_of_bounds(base_pos: FloatArray, terrain: Terrain) -> NDArray[np.bool_]:
+    """Return which robots have left the map; positions [m], shape (n, 3)."""
+    outside = (base_pos[:, :2] < terrain.lower) | (base_pos[:, :2] > terrain.upper)
+    return np.asarray(outside.any(axis=1))

@@ -18,8 +18,8 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Geometry, Inertial, Link, RobotModel
 from terrainkit_robots.description.xml.document import RobotFileError
-from terrainkit_robots.export.actuator import Drive
-from terrainkit_robots.export.canonical import normal_form
+from terrainkit_robots.export.actuator import ActuatorConfig
+from terrainkit_robots.export.canonical import to_canonical
 from terrainkit_robots.export.mjcf import Extras, floor_text, mjcf_text
 from terrainkit_robots.mesh.mesh_cache import MeshError
 from terrainkit_robots.mesh.surface import binary_stl
@@ -79,19 +79,19 @@ def plant(facts: Facts) -> Plant:
             f"it has {len(facts.bodies)} bodies, and of more than {_MOST_BODIES} none is simulated"
         )
     try:
-        model, assets = _lean(normal_form(facts).model, facts)
+        model, assets = _lean(to_canonical(facts).model, facts)
     except RobotFileError as error:
         raise CannotCheckError(str(error)) from None
-    drives = {motor.joint: Drive(stiffness=0, damping=0) for motor in model.actuators}
+    drives = {motor.joint: ActuatorConfig(stiffness=0, damping=0) for motor in model.actuators}
     for joint in model.joints:
         if joint.name in drives:
             effort = joint.limit.effort if joint.limit else None
-            drives[joint.name] = Drive(
+            drives[joint.name] = ActuatorConfig(
                 stiffness=0, damping=0, effort=effort, armature=joint.armature
             )
     height = facts.stance.height if facts.stance else 1.0
     extras = Extras(
-        drives=drives,
+        actuators=drives,
         excluded=model.excluded,
         home=facts.positions,
         height=height,
@@ -179,7 +179,7 @@ def _lean(model: RobotModel, facts: Facts) -> tuple[RobotModel, dict[str, bytes]
             try:
                 hull = facts.meshes.hull(path, _HULL_CORNERS)
             except MeshError as error:
-                if facts.meshes.readable(shape.mesh) and facts.meshes.is_flat(shape.mesh):
+                if facts.meshes.is_readable(shape.mesh) and facts.meshes.is_flat(shape.mesh):
                     return None  # nothing can be inside of it, and no simulator takes it
                 raise CannotCheckError(f"its collision mesh {path.name} {error}") from None
             files[path] = f"{len(files)}.stl"

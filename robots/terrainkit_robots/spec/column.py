@@ -47,7 +47,7 @@ class Column:
                 yield f"{name}.{joint}", origin
 
 
-def provenances(columns: Mapping[str, Column]) -> dict[str, Provenance]:
+def collect_provenance(columns: Mapping[str, Column]) -> dict[str, Provenance]:
     """Return where the values of all columns came from, as a spec has it."""
     return {
         key: origin for name, column in columns.items() for key, origin in column.provenance(name)

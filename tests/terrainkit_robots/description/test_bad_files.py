@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.lint.runner import INTERNAL, lint
+from terrainkit_robots.lint.runner import INTERNAL_ERROR, lint
 
 URDF = (bundled.find("quadruped") or Path()).read_text()
 MJCF = (bundled.find("quadruped") or Path()).with_suffix(".xml").read_text()
@@ -32,7 +32,7 @@ NASTY = [
 def check(path: Path) -> set[str]:
     """Return the codes of all findings; fails if a rule failed."""
     report = lint(Facts(load_robot(path)), simulate=False)
-    broken = [skipped for skipped in report.skipped if skipped.reason.startswith(INTERNAL)]
+    broken = [skipped for skipped in report.skipped if skipped.reason.startswith(INTERNAL_ERROR)]
     assert not broken
     return {finding.code for finding in report.findings}
 
@@ -224,7 +224,7 @@ def test_a_bad_file_is_a_finding(folder, name):
     code, out, err = run(folder / f"{name}.urdf")
     assert code in (0, 1)
     assert "Traceback" not in err
-    assert INTERNAL not in out
+    assert INTERNAL_ERROR not in out
     expected = {"binary": "XML001", "large": "XML001"}.get(name) or BY_HAND[name][1]
     assert expected in out
 

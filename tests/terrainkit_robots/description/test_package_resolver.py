@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from terrainkit_robots.description.package_resolver import (
     Packages,
+    filename_on_disk,
     is_absolute,
-    names_package,
+    is_package_uri,
     resolve_in,
-    right_letters,
 )
 
 
@@ -213,7 +213,7 @@ class TestMalice:
         (robot.parent / "loop").symlink_to("loop")
         path, _ = resolve(name, robot, {})
         assert "\0" not in str(path)
-        assert right_letters(name, path) is None
+        assert filename_on_disk(name, path) is None
 
     @settings(max_examples=40, deadline=None)
     @given(st.text(max_size=40))
@@ -221,7 +221,7 @@ class TestMalice:
         for name in (text, f"package://{text}", f"$(find {text})/x", f"C:\\{text}"):
             path, found_by = resolve(name, Path("/nowhere/dog.urdf"), {})
             assert found_by in ("path", "package", "search", "nothing")
-            right_letters(name, path)
+            filename_on_disk(name, path)
 
     def test_a_folder_that_is_a_loop(self, place):
         (robot,) = place("a/dog.urdf")
@@ -273,7 +273,7 @@ def test_folders_in_turn(place):
 )
 def test_right_letters(place, name, right):
     (mesh,) = place("x/meshes/foot.stl")
-    assert right_letters(name, mesh) == right
+    assert filename_on_disk(name, mesh) == right
 
 
 def test_right_letters_where_case_does_not_count(place, monkeypatch):
@@ -285,11 +285,11 @@ def test_right_letters_where_case_does_not_count(place, monkeypatch):
         "terrainkit_robots.description.package_resolver._entries",
         lambda folder: listed.get(str(folder), []),
     )
-    assert right_letters("Meshes/FOOT.stl", asked) == "meshes/foot.stl"
+    assert filename_on_disk("Meshes/FOOT.stl", asked) == "meshes/foot.stl"
 
 
 def test_kinds_of_names():
     assert all(map(is_absolute, ["/a", "file:///a", "C:\\a", "c:/a", "~/a", "\\\\server\\a"]))
     assert not any(map(is_absolute, ["a", "./a", "../a", "package://a/b", "file://a", ""]))
-    assert all(map(names_package, ["package://a/b", "model://a/b", "$(find a)/b", "package:/a/b"]))
-    assert not any(map(names_package, ["a", "/a", "file://a", "https://a/b", "$(arg a)/b"]))
+    assert all(map(is_package_uri, ["package://a/b", "model://a/b", "$(find a)/b", "package:/a/b"]))
+    assert not any(map(is_package_uri, ["a", "/a", "file://a", "https://a/b", "$(arg a)/b"]))

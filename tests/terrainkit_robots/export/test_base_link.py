@@ -2,7 +2,7 @@ import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.export.base_link import rooted
+from terrainkit_robots.export.base_link import with_world_base
 from terrainkit_robots.onboarding.pipeline import Wishes, bring_in
 from terrainkit_robots.spec.spec_file import read_spec
 
@@ -70,4 +70,4 @@ def test_a_robot_with_a_base_is_the_same(tmp_path, joint):
         '<body name="left" pos="-1 0 0">', f'<body name="left" pos="-1 0 0">{joint}'
     )
     robot = facts(tmp_path, text + "</worldbody></mujoco>")
-    assert rooted(robot) is robot
+    assert with_world_base(robot) is robot

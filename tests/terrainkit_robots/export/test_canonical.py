@@ -8,7 +8,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.xml.document import RobotFileError
-from terrainkit_robots.export.canonical import normal_form
+from terrainkit_robots.export.canonical import to_canonical
 
 MASS = '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>'
 
@@ -58,7 +58,7 @@ def test_the_normal_form_of_a_bundled_robot_is_the_same_robot(name, suffix):
 
 
 def check_same(source):
-    form = normal_form(source)
+    form = to_canonical(source)
     made = Facts(form.model)
     assert made.total_mass == pytest.approx(source.total_mass)
     assert [leg.foot for leg in made.legs] == [leg.foot for leg in source.legs]
@@ -70,7 +70,7 @@ def check_same(source):
     for link, pose in here.items():
         np.testing.assert_allclose(pose, there[link], atol=1e-12)
     # Doing it again changes nothing: the form is one.
-    again = normal_form(made)
+    again = to_canonical(made)
     assert again.notes == ()
     assert [j.name for j in again.model.joints] == [j.name for j in form.model.joints]
 
@@ -83,20 +83,20 @@ def test_a_reference_goes_into_the_origin(tmp_path):
             '<joint name="j" axis="0 2 0" pos="0 0 0.1" ref="0.5" range="-1 1"/></body>'
         ),
     )
-    (joint,) = normal_form(robot).model.joints
+    (joint,) = to_canonical(robot).model.joints
     assert joint.reference == 0
     np.testing.assert_allclose(joint.axis, [0, 1, 0])
     # At q = 0.5 the leg is where the file has it; at 0 it is turned back about (0, 0, -0.1).
     c, s = np.cos(-0.5), np.sin(-0.5)
     np.testing.assert_allclose(joint.origin[:3, 3], [-0.1 * s, 0, -0.1 - 0.1 * c], atol=1e-12)
-    (body,) = [b for b in Facts(normal_form(robot).model).bodies if b.joint is not None]
-    at = body_poses(Facts(normal_form(robot).model).bodies, {"j": 0.5})[body.index]
+    (body,) = [b for b in Facts(to_canonical(robot).model).bodies if b.joint is not None]
+    at = body_poses(Facts(to_canonical(robot).model).bodies, {"j": 0.5})[body.index]
     np.testing.assert_allclose(at[:3, 3], [0, 0, -0.2], atol=1e-12)
 
 
 def test_a_joint_without_a_motor_is_fixed_and_told(tmp_path):
     robot = facts(tmp_path, mjcf(f'<body name="ball">{MASS}<joint name="b" type="ball"/></body>'))
-    form = normal_form(robot)
+    form = to_canonical(robot)
     assert [joint.kind for joint in form.model.joints] == ["fixed"]
     assert any("b" in note and "ball" in note for note in form.notes)
 
@@ -109,7 +109,7 @@ def test_the_effort_of_a_mjcf_is_that_of_its_motor(tmp_path):
             '<actuator><motor joint="j" gear="2" ctrlrange="-10 10"/></actuator>',
         ),
     )
-    form = normal_form(robot)
+    form = to_canonical(robot)
     (joint,) = form.model.joints
     assert joint.limit.effort == 20
     assert [motor.joint for motor in form.model.actuators] == ["j"]
@@ -119,7 +119,7 @@ def test_what_is_beside_the_robot_is_left_out_and_told(tmp_path):
     text = mjcf(f'<body name="leg">{MASS}<joint name="j"/></body>').replace(
         "</worldbody>", f'<body name="crate">{MASS}<freejoint/></body></worldbody>'
     )
-    form = normal_form(facts(tmp_path, text))
+    form = to_canonical(facts(tmp_path, text))
     assert [link.name for link in form.model.links] == ["base", "leg"]
     assert any("crate" in note for note in form.notes)
 
@@ -134,7 +134,7 @@ def test_what_is_beside_the_robot_is_left_out_and_told(tmp_path):
 def test_a_mjcf_says_itself_whether_it_floats(tmp_path, joint, floating):
     text = mjcf(f'<body name="arm">{MASS}<joint name="j" range="-1 1"/></body>')
     robot = facts(tmp_path, text.replace('<body name="base">', f'<body name="base">{joint}'))
-    assert normal_form(robot).model.floating is floating
+    assert to_canonical(robot).model.floating is floating
 
 
 def test_an_arm_is_bolted_down_and_a_car_is_not(tmp_path):
@@ -149,9 +149,9 @@ def test_an_arm_is_bolted_down_and_a_car_is_not(tmp_path):
     links = link.format("a") + link.format("b")
     arm = f'<robot name="r">{links}{joint.format("revolute", limit)}</robot>'
     car = f'<robot name="r">{links}{joint.format("continuous", "")}</robot>'
-    assert normal_form(facts(tmp_path, arm)).model.floating is False
-    assert normal_form(facts(tmp_path, car)).model.floating is True
-    assert normal_form(facts(tmp_path, arm), floating=True).model.floating is True
+    assert to_canonical(facts(tmp_path, arm)).model.floating is False
+    assert to_canonical(facts(tmp_path, car)).model.floating is True
+    assert to_canonical(facts(tmp_path, arm), floating=True).model.floating is True
 
 
 CHAIN = """<robot name="r">{}<joint name="a" type="{}"><parent link="base"/><child link="one"/>
@@ -181,7 +181,7 @@ def test_a_wheel_is_on_the_base_or_on_what_steers_it(tmp_path, kind, ends, joint
         for above, name in pairwise(names[1:])
     ]
     robot = facts(tmp_path, CHAIN.format(links, kind, *ends, "".join(more)))
-    assert normal_form(robot).model.floating is floating
+    assert to_canonical(robot).model.floating is floating
 
 
 def test_a_mass_from_a_mesh_is_what_mujoco_makes_of_it(tmp_path):
@@ -193,7 +193,7 @@ def test_a_mass_from_a_mesh_is_what_mujoco_makes_of_it(tmp_path):
     </worldbody></mujoco>"""
     robot = facts(tmp_path, text)
     assert np.isnan(robot.total_mass)
-    (link,) = normal_form(robot).model.links
+    (link,) = to_canonical(robot).model.links
     assert link.inertial.mass == pytest.approx(6.0, rel=1e-5)
     moments = 6.0 / 12 * np.array([0.01 + 0.04, 0.01 + 0.09, 0.04 + 0.09])
     assert sorted(np.linalg.eigvalsh(link.inertial.inertia)) == pytest.approx(moments, rel=1e-4)
@@ -201,21 +201,21 @@ def test_a_mass_from_a_mesh_is_what_mujoco_makes_of_it(tmp_path):
 
 def test_there_has_to_be_a_robot(tmp_path):
     with pytest.raises(RobotFileError, match="wanted a robot"):
-        normal_form(facts(tmp_path, '<robot name="r"/>'))
+        to_canonical(facts(tmp_path, '<robot name="r"/>'))
 
 
 def test_two_joints_of_one_name_get_two(tmp_path):
     text = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
       <joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>
       <joint name="j" type="fixed"><parent link="a"/><child link="c"/></joint></robot>"""
-    form = normal_form(facts(tmp_path, text))
+    form = to_canonical(facts(tmp_path, text))
     assert [joint.name for joint in form.model.joints] == ["j", "c_joint"]
     assert form.notes == ("named the joint above c c_joint: there are two j",)
 
 
 @pytest.mark.parametrize(("name", "wanted"), [("my robot/../x", "my_robot_.._x"), ("..", "robot")])
 def test_the_name_is_one_on_every_disk(tmp_path, name, wanted):
-    form = normal_form(facts(tmp_path, f'<robot name="{name}"><link name="a"/></robot>'))
+    form = to_canonical(facts(tmp_path, f'<robot name="{name}"><link name="a"/></robot>'))
     assert form.model.name == wanted
 
 
@@ -223,7 +223,7 @@ def test_a_link_called_world_gets_another_name(tmp_path):
     text = """<robot name="r"><link name="world"/><link name="world_link"/>
       <joint name="j" type="fixed"><parent link="world"/><child link="world_link"/></joint>
       </robot>"""
-    form = normal_form(facts(tmp_path, text))
+    form = to_canonical(facts(tmp_path, text))
     assert [link.name for link in form.model.links] == ["world_link_2", "world_link"]
     assert form.model.joints[0].parent == "world_link_2"
     assert form.model.floating is False
@@ -236,7 +236,7 @@ DYNAMICS = """<robot name="r"><link name="a"/><link name="b"/><joint name="j" ty
 
 @pytest.mark.parametrize(("written", "wanted"), [("0.3", 0.3), ("-0.3", 0.0), ("nan", 0.0)])
 def test_friction_and_damping_are_kept_where_they_slow(tmp_path, written, wanted):
-    (joint,) = normal_form(facts(tmp_path, DYNAMICS.format(written))).model.joints
+    (joint,) = to_canonical(facts(tmp_path, DYNAMICS.format(written))).model.joints
     assert (joint.friction, joint.damping) == (wanted, wanted)
 
 
@@ -253,7 +253,7 @@ def test_a_joint_that_follows_itself_or_nobody_is_free_and_told(tmp_path, leads,
       <mimic joint="{}"/></joint>"""
     joints = joint.format("j", "b", leads[0]) + joint.format("k", "c", leads[1])
     text = f'<robot name="r"><link name="a"/><link name="b"/><link name="c"/>{joints}</robot>'
-    form = normal_form(facts(tmp_path, text))
+    form = to_canonical(facts(tmp_path, text))
     free = [joint.name for joint in form.model.joints if joint.mimic is None]
     assert free == list(notes)
     why = {"nobody": "there is no 'nobody'"}.get(leads[0], "it would follow itself in the end")
@@ -270,7 +270,7 @@ def test_a_texture_without_end_costs_nothing(tmp_path):
       <material name="p" texture="t"/></asset>
       <worldbody><body name="base"><geom type="mesh" mesh="m" material="p"/></body></worldbody>
     </mujoco>"""
-    (link,) = normal_form(facts(tmp_path, text)).model.links
+    (link,) = to_canonical(facts(tmp_path, text)).model.links
     assert link.inertial.mass == pytest.approx(1000 / 6)
 
 
@@ -278,11 +278,11 @@ def test_a_body_without_a_name_is_told(tmp_path):
     text = f"""<mujoco><asset>{MESH}</asset><worldbody><body>
       <geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
     with pytest.raises(RobotFileError, match="a body without a name has its mass from a mesh"):
-        normal_form(facts(tmp_path, text))
+        to_canonical(facts(tmp_path, text))
 
 
 def test_a_mesh_that_mujoco_does_not_find_is_told(tmp_path):
     text = """<mujoco><asset><mesh name="m" file="no.stl"/></asset><worldbody><body name="base">
       <geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
     with pytest.raises(RobotFileError, match="masses are to come from meshes, and MuJoCo does not"):
-        normal_form(facts(tmp_path, text))
+        to_canonical(facts(tmp_path, text))

@@ -5,19 +5,19 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.export.canonical import normal_form
-from terrainkit_robots.export.fixed_joint_merge import fused
+from terrainkit_robots.export.canonical import to_canonical
+from terrainkit_robots.export.fixed_joint_merge import merge_fixed_joints
 from terrainkit_robots.export.mjcf import Extras, mjcf_text
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 
 
 @pytest.fixture
 def facts():
-    return Facts(normal_form(Facts(load_robot(bundled.find("quadruped")))).model)
+    return Facts(to_canonical(Facts(load_robot(bundled.find("quadruped")))).model)
 
 
 def test_what_moves_as_one_is_one_body(facts):
-    single = fused(facts.model, keep=["FL_foot"])
+    single = merge_fixed_joints(facts.model, keep=["FL_foot"])
     names = [link.name for link in single.model.links]
     assert "FL_foot" in names
     assert "FR_foot" not in names
@@ -31,7 +31,9 @@ def test_what_moves_as_one_is_one_body(facts):
 
 
 def test_it_moves_as_before(facts):
-    whole, single = (compiled(model) for model in (facts.model, fused(facts.model).model))
+    whole, single = (
+        compiled(model) for model in (facts.model, merge_fixed_joints(facts.model).model)
+    )
     assert single.nbody < whole.nbody
     for qpos in np.random.default_rng(0).uniform(-1, 1, (5, whole.nq)):
         qpos[3:7] /= np.linalg.norm(qpos[3:7])
@@ -58,5 +60,5 @@ def test_pairs_of_links_become_pairs_of_bodies(facts):
     from dataclasses import replace
 
     pairs = frozenset({frozenset(("FL_foot", "FR_foot")), frozenset(("FL_foot", "FL_calf"))})
-    single = fused(replace(facts.model, excluded=pairs))
+    single = merge_fixed_joints(replace(facts.model, excluded=pairs))
     assert single.model.excluded == {frozenset(("FL_calf", "FR_calf"))}

@@ -7,8 +7,8 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.export.actuator import Drive
-from terrainkit_robots.export.canonical import normal_form
+from terrainkit_robots.export.actuator import ActuatorConfig
+from terrainkit_robots.export.canonical import to_canonical
 from terrainkit_robots.export.mjcf import Extras, mjcf_text, quaternion, scene_text
 from terrainkit_robots.export.sites import foot_sites, imu_site
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -24,7 +24,7 @@ def written(model, **extras):
 @pytest.fixture
 def quadruped():
     facts = Facts(load_robot(bundled.find("quadruped")))
-    return Facts(normal_form(facts).model)
+    return Facts(to_canonical(facts).model)
 
 
 def test_masses_and_inertias_are_those_declared(quadruped):
@@ -58,7 +58,7 @@ def test_several_joints_of_one_body_move_it_as_they_did(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(text)
     source = mujoco.MjModel.from_xml_path(str(path))
-    model = written(normal_form(Facts(load_robot(path)), floating=False).model)
+    model = written(to_canonical(Facts(load_robot(path)), floating=False).model)
     assert [model.joint(k).name for k in range(model.njnt)] == ["a", "b", "c", "d"]
     rng = np.random.default_rng(0)
     for qpos in rng.uniform(-1, 1, (20, 4)):
@@ -77,10 +77,10 @@ def pose_of(model, qpos, name):
 def test_the_motors_come_in_the_order_of_the_drives(quadruped):
     names = [joint.name for joint in quadruped.actuated][::-1]
     drives = {
-        name: Drive(stiffness=20 + k, damping=0.5, effort=5.0 + k, armature=0.01)
+        name: ActuatorConfig(stiffness=20 + k, damping=0.5, effort=5.0 + k, armature=0.01)
         for k, name in enumerate(names)
     }
-    model = written(quadruped.model, drives=drives, home=quadruped.positions, height=0.3)
+    model = written(quadruped.model, actuators=drives, home=quadruped.positions, height=0.3)
     assert [model.actuator(k).name for k in range(model.nu)] == names
     for k, name in enumerate(names):
         motor, joint = model.actuator(k), model.joint(name)
@@ -96,18 +96,20 @@ def test_the_motors_come_in_the_order_of_the_drives(quadruped):
 
 
 def test_a_drive_without_effort_is_not_limited(quadruped):
-    model = written(quadruped.model, drives={"FL_hip_joint": Drive(stiffness=1, damping=0)})
+    model = written(
+        quadruped.model, actuators={"FL_hip_joint": ActuatorConfig(stiffness=1, damping=0)}
+    )
     assert not model.actuator(0).forcelimited
 
 
 def test_it_stands_on_its_feet_which_feel_it(quadruped):
     weight = quadruped.total_mass * 9.81
     drives = {
-        joint.name: Drive(stiffness=100, damping=2, effort=50.0, armature=0.01)
+        joint.name: ActuatorConfig(stiffness=100, damping=2, effort=50.0, armature=0.01)
         for joint in quadruped.actuated
     }
     extras = Extras(
-        drives=drives,
+        actuators=drives,
         feet=foot_sites(quadruped),
         imu=imu_site(quadruped),
         home=quadruped.positions,
@@ -141,7 +143,7 @@ def test_a_joint_that_mimics_another_follows_it(tmp_path):
       {joint.format("k", "c", '<mimic joint="j" multiplier="-2" offset="0.1"/>')}</robot>"""
     path = tmp_path / "robot.urdf"
     path.write_text(text)
-    facts = Facts(normal_form(Facts(load_robot(path))).model)
+    facts = Facts(to_canonical(Facts(load_robot(path))).model)
     assert [joint.name for joint in facts.actuated] == ["j"]
     model = written(facts.model)
     assert model.neq == 1
@@ -169,7 +171,7 @@ def test_an_arm_stands_still(tmp_path):
       <joint name="j" range="-1 1"/></body></body></worldbody></mujoco>"""
     path = tmp_path / "robot.xml"
     path.write_text(text)
-    model = written(normal_form(Facts(load_robot(path))).model)
+    model = written(to_canonical(Facts(load_robot(path))).model)
     assert (model.nq, model.nkey) == (1, 1)
 
 

@@ -4,7 +4,7 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.export.canonical import normal_form
+from terrainkit_robots.export.canonical import to_canonical
 from terrainkit_robots.export.sites import foot_sites, imu_notes, imu_site
 
 
@@ -52,7 +52,7 @@ def test_a_robot_without_an_imu_has_it_at_its_base(tmp_path):
         "the IMU is at the origin of trunk: no sensor, site or link says where it is",
     )
     # An arm that is bolted down has none, and nobody misses it.
-    arm = Facts(normal_form(facts, floating=False).model)
+    arm = Facts(to_canonical(facts, floating=False).model)
     assert imu_notes(arm) == ()
 
 
@@ -65,7 +65,7 @@ IMU = """<mujoco><worldbody><body name="trunk"><freejoint/><geom size="0.1"/>
 def test_the_imu_that_the_file_names_goes_before_a_link_of_that_name(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(IMU)
-    facts = Facts(normal_form(Facts(load_robot(path))).model)
+    facts = Facts(to_canonical(Facts(load_robot(path))).model)
     site = imu_site(facts)
     assert site.body == "trunk"  # of which the head is a part
     np.testing.assert_allclose(site.pose[:3, 3], [0.1, 0.2, 1.3])
@@ -78,13 +78,13 @@ def test_an_imu_beside_the_robot_is_not_its_own(tmp_path):
     text = IMU.replace("</worldbody>", f"{crate}</worldbody>")
     text = text.replace('<site name="sensed" pos="0.1 0.2 0.3"/>', "", 1)
     path.write_text(text.replace('name="imu_link"', 'name="cover"'))
-    model = normal_form(Facts(load_robot(path))).model
+    model = to_canonical(Facts(load_robot(path))).model
     assert model.imu is None
     assert imu_notes(Facts(model))[0].startswith("the IMU is at the origin of trunk")
 
 
 def test_the_imu_of_go2_is_where_its_site_is(robot_file):
-    facts = Facts(normal_form(Facts(load_robot(robot_file("go2_mjcf/go2.xml")))).model)
+    facts = Facts(to_canonical(Facts(load_robot(robot_file("go2_mjcf/go2.xml")))).model)
     site = imu_site(facts)
     assert site.body == "base_link"
     np.testing.assert_allclose(site.pose[:3, 3], [-0.02557, 0, 0.04232], atol=1e-12)

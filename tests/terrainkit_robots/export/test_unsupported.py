@@ -1,6 +1,6 @@
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.export.unsupported import leftovers
+from terrainkit_robots.export.unsupported import unsupported_elements
 
 MJCF = """<mujoco><worldbody><body name="a"><geom size="0.1"/>
   <body name="b"><joint name="j" stiffness="5" frictionloss="0.5"/><geom size="0.1"/></body></body>
@@ -12,7 +12,7 @@ MJCF = """<mujoco><worldbody><body name="a"><geom size="0.1"/>
 def test_what_is_left_out_of_a_mjcf_is_told(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(MJCF)
-    assert leftovers(load_robot(path)) == (
+    assert unsupported_elements(load_robot(path)) == (
         "left out the element of <tendon>",
         "left out the element of <equality>",
         "left out stiffness of joints, which 1 element sets",
@@ -27,14 +27,14 @@ def test_motors_of_tendons_are_told_and_followers_are_none(tmp_path):
     path.write_text(text.replace('joint1="j"', 'joint1="j" joint2="k"'))
     model = load_robot(path)
     assert not model.problems
-    assert leftovers(model) == (
+    assert unsupported_elements(model) == (
         "left out the element of <tendon>",
         "left out a motor, which drives no joint: pull",
     )
 
 
 def test_nothing_is_left_out_of_a_urdf():
-    assert leftovers(load_robot(bundled.find("quadruped"))) == ()
+    assert unsupported_elements(load_robot(bundled.find("quadruped"))) == ()
 
 
 def test_how_shapes_feel_is_left_out_and_told(tmp_path):
@@ -44,6 +44,6 @@ def test_how_shapes_feel_is_left_out_and_told(tmp_path):
         <geom size="0.1" friction="0.4 0.02 0.01" priority="1"/><geom size="0.1"/>
         </body></worldbody></mujoco>"""
     )
-    assert leftovers(load_robot(path)) == (
+    assert unsupported_elements(load_robot(path)) == (
         "left out friction and contact parameters of shapes, which 2 elements set",
     )

@@ -24,8 +24,8 @@ from terrainkit_robots.description.model import (
     RobotModel,
     Source,
 )
-from terrainkit_robots.export.canonical import normal_form
-from terrainkit_robots.export.mesh_export.mesh_export import pack
+from terrainkit_robots.export.canonical import to_canonical
+from terrainkit_robots.export.mesh_export.mesh_export import export_meshes
 from terrainkit_robots.export.urdf import NO_EFFORT, NO_RANGE, NO_VELOCITY, urdf_text
 from terrainkit_robots.lint.rule import rules
 from terrainkit_robots.lint.runner import lint
@@ -376,7 +376,7 @@ def test_an_axis_beside_the_origin_of_its_child():
 
 
 def test_the_same_text_each_time():
-    model = normal_form(Facts(load_robot(bundled.find("biped")))).model
+    model = to_canonical(Facts(load_robot(bundled.find("biped")))).model
     assert urdf_text(model) == urdf_text(model)
 
 
@@ -389,7 +389,7 @@ class Written:
 
     def __init__(self, file, folder):
         self.source = Facts(load_robot(file))
-        packed = pack(normal_form(self.source).model, self.source.meshes)
+        packed = export_meshes(to_canonical(self.source).model, self.source.meshes)
         for name, data in packed.files.items():
             (folder / name).parent.mkdir(exist_ok=True)
             (folder / name).write_bytes(data)

@@ -4,7 +4,7 @@ import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.export.canonical import normal_form
+from terrainkit_robots.export.canonical import to_canonical
 from terrainkit_robots.export.mjcf import Extras, mjcf_text
 from terrainkit_robots.export.urdf import urdf_text
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -42,7 +42,7 @@ def compiled(form):
 
 def test_a_sensor_without_an_inertia_is_a_part_of_the_trunk(tmp_path):
     robot = facts(tmp_path, {"trunk": TRUNK, "imu": NOTHING.format(0.5)}, fixed("trunk", "imu"))
-    form = normal_form(robot, floating=True)
+    form = to_canonical(robot, floating=True)
     _, imu = form.model.links
     assert imu.inertial is None
     assert form.notes == (
@@ -58,7 +58,7 @@ def test_a_sensor_without_an_inertia_is_a_part_of_the_trunk(tmp_path):
 
 def test_the_heaviest_link_takes_what_the_base_cannot_hold(tmp_path):
     robot = facts(tmp_path, {"base": NOTHING.format(1e-6), "trunk": TRUNK}, fixed("base", "trunk"))
-    form = normal_form(robot, floating=True)
+    form = to_canonical(robot, floating=True)
     base, trunk = form.model.links
     assert base.inertial is None
     assert trunk.inertial.mass == pytest.approx(60 + 1e-6)
@@ -71,7 +71,7 @@ def test_a_plate_may_be_turned_and_rounded(tmp_path):
         '<inertia ixx="0.010004" iyy="0.02" izz="0.03001" ixy="0" ixz="0" iyz="0"/>'
     )
     robot = facts(tmp_path, {"plate": plate})
-    form = normal_form(robot, floating=True)
+    form = to_canonical(robot, floating=True)
     assert not form.notes
     before, after = robot.bodies[0].principal, Facts(form.model).bodies[0].principal
     assert after == pytest.approx(before, rel=1e-3)
@@ -81,7 +81,7 @@ def test_a_plate_may_be_turned_and_rounded(tmp_path):
 def test_what_no_body_can_have_is_left_as_it_is(tmp_path):
     wrong = '<mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="1" ixy="0" ixz="0" iyz="0"/>'
     robot = facts(tmp_path, {"a": wrong, "b": NOTHING.format(1)}, fixed("a", "b"))
-    form = normal_form(robot, floating=True)
+    form = to_canonical(robot, floating=True)
     assert not form.notes
     assert [link.inertial.mass for link in form.model.links] == [2, 1]
     assert form.model.links[0].inertial.inertia[2, 2] == 1
@@ -92,7 +92,7 @@ NONE = '<mass value="{}"/>'
 
 def test_an_inertia_that_is_not_written_is_one_of_zero(tmp_path):
     forms = [
-        normal_form(facts(tmp_path, {"trunk": TRUNK, "imu": imu}, fixed("trunk", "imu")))
+        to_canonical(facts(tmp_path, {"trunk": TRUNK, "imu": imu}, fixed("trunk", "imu")))
         for imu in (NONE.format(0.5), NOTHING.format(0.5))
     ]
     for form in forms:
@@ -109,7 +109,7 @@ def test_a_mass_alone_has_no_inertia_in_either_file(tmp_path):
     joint = """<joint name="j" type="continuous"><parent link="base"/><child link="arm"/>
       <axis xyz="0 1 0"/></joint>"""
     robot = facts(tmp_path, {"base": NONE.format(5), "arm": TRUNK}, joint)
-    form = normal_form(robot, floating=False)
+    form = to_canonical(robot, floating=False)
     assert form.notes == ()
     np.testing.assert_array_equal(form.model.links[0].inertial.inertia, np.zeros((3, 3)))
     assert 'mass value="5"/>\n      <inertia ixx="0" ixy="0"' in urdf_text(form.model)

@@ -1,4 +1,4 @@
-"""Every rule on its cases: robots in cases/<CODE>.toml, on which it finds something or nothing."""
+"""Run every rule on its cases: robots in cases/<CODE>.toml that violate it or not."""
 
 import re
 import struct
@@ -24,7 +24,7 @@ BUNDLED = Path(terrainkit_robots.__file__).parent / "description/bundled"
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A robot, and what one rule is to say of it."""
+    """A robot, and the expected result of one rule."""
 
     code: str
     fails: bool
@@ -44,7 +44,7 @@ class Case:
     spec: str | None = None
 
     def __post_init__(self):
-        assert (self.robot is None) != (self.of is None), f"{self}: wanted either robot or of"
+        assert (self.robot is None) != (self.of is None), f"{self}: expected either robot or of"
         assert None in (self.against, self.against_of), f"{self}: two robots to compare with"
         assert not self.replace or self.of, f"{self}: replace is for of"
         assert not self.against_replace or self.against_of, f"{self}: against_of is missing"
@@ -54,12 +54,12 @@ class Case:
 
     @property
     def text(self):
-        """Return the robot's file."""
+        """Return the content of the robot's file."""
         return self._edited(self.of, self.replace) if self.robot is None else self.robot
 
     @property
     def other_text(self):
-        """Return the file that the robot is compared with; None if there is none."""
+        """Return the content of the file to compare with, or None."""
         if self.against_of is None:
             return self.against
         return self._edited(self.against_of, self.against_replace)
@@ -72,7 +72,7 @@ class Case:
         return text
 
     def write(self, folder):
-        """Return the path of the robot, with all of its files in `folder`."""
+        """Write the robot and its files to `folder` and return its path."""
         text = self.text
         path = folder / (self.name or f"robot{suffix_of(text)}")
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -88,7 +88,7 @@ class Case:
         return path
 
     def facts(self, path, contents=None):
-        """Return the facts of the robot that was written to `path`, with all that it goes with."""
+        """Return the facts of the robot at `path`, including the other file and the spec."""
         other = spec = None
         if self.other_text is not None:
             file = path.parent / f"other{suffix_of(self.other_text)}"
@@ -103,7 +103,7 @@ class Case:
 
 
 def suffix_of(text):
-    """Return what the name of a file with this text ends with."""
+    """Return the suffix of a file with this text."""
     return ".urdf" if "<robot" in text or "<mujoco" not in text else ".xml"
 
 
@@ -116,7 +116,7 @@ def bundled(name):
 
 
 def bytes_of(*, radius=1.0, **content):
-    """Return what a file is described to hold."""
+    """Return the bytes that a case describes."""
     ((kind, value),) = content.items()
     match kind:
         case "text":
@@ -131,7 +131,7 @@ def bytes_of(*, radius=1.0, **content):
             return ascii_stl(box(*value))
         case "sphere_faces":
             return sphere(value, radius)
-    raise AssertionError(f"no such content of a file: {kind}")
+    raise AssertionError(f"unknown kind of file content: {kind}")
 
 
 def box(x, y, z):
@@ -161,16 +161,16 @@ def ascii_stl(triangles):
 
 @cache
 def sphere(faces, radius):
-    """Return a binary STL of a sphere with at least so many faces."""
+    """Return a binary STL of a sphere with at least `faces` faces."""
     import trimesh
 
-    fourfold = 0
-    while 20 * 4**fourfold < faces:
-        fourfold += 1
-    return stl(trimesh.creation.icosphere(subdivisions=fourfold, radius=radius).triangles)
+    subdivisions = 0
+    while 20 * 4**subdivisions < faces:
+        subdivisions += 1
+    return stl(trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius).triangles)
 
 
-def test_the_box_is_closed_and_as_large_as_asked():
+def test_box_is_closed_and_sized():
     import trimesh
 
     mesh = trimesh.Trimesh(**trimesh.triangles.to_kwargs(box(1.0, 2.0, 3.0)))
@@ -184,7 +184,7 @@ def test_the_box_is_closed_and_as_large_as_asked():
 
 
 def cases_of(code):
-    """Return the cases of a rule; none if it has no file."""
+    """Return the cases of a rule, or an empty list if it has no file."""
     path = CASES / f"{code}.toml"
     if not path.exists():
         return []
@@ -203,57 +203,57 @@ def pairs_of(case):
     return {name: tuple((old, new) for old, new in case.get(name, [])) for name in names}
 
 
-def sound_cases_of(code):
-    """Return the cases of a rule; none if its file is broken, which has a test of its own."""
+def valid_cases_of(code):
+    """Return the cases of a rule, or an empty list if its file is invalid."""
     try:
         return cases_of(code)
     except (AssertionError, TypeError, ValueError):
         return []
 
 
-ALL_CASES = [case for rule in rules() for case in sound_cases_of(rule.code)]
+ALL_CASES = [case for rule in rules() for case in valid_cases_of(rule.code)]
 every_rule = pytest.mark.parametrize("code", [rule.code for rule in rules()])
 
 
-def every_case(chosen):
-    return pytest.mark.parametrize("case", [pytest.param(c, id=str(c)) for c in chosen])
+def every_case(selected):
+    return pytest.mark.parametrize("case", [pytest.param(c, id=str(c)) for c in selected])
 
 
-def look_at(case, path, contents=None, chosen=None):
-    """Return the report on the robot of a case, which was written to `path`.
+def lint_case(case, path, contents=None, selected=None):
+    """Return the report on the robot of a case at `path`.
 
-    Only a rule that is asked by itself may simulate.
+    Simulation is enabled only if rules are selected.
     """
-    return lint(case.facts(path, contents), chosen, simulate=chosen is not None)
+    return lint(case.facts(path, contents), selected, simulate=selected is not None)
 
 
-def what(report):
+def messages(report):
     return [f"{f.code} {f.subject}: {f.message}" for f in report.findings]
 
 
 @every_case([case for case in ALL_CASES if case.fails])
-def test_what_is_wrong_is_found(case, tmp_path):
+def test_failing_case_is_found(case, tmp_path):
     path = case.write(tmp_path)
-    report = look_at(case, path, chosen=None if case.only else [get_rule(case.code)])
+    report = lint_case(case, path, selected=None if case.only else [get_rule(case.code)])
     found = [f for f in report.findings if f.code == case.code]
-    assert found, f"nothing was found; skipped: {report.skipped}"
+    assert found, f"no finding; skipped: {report.skipped}"
     for finding in found:
         check_text(case, finding)
         assert finding.file.is_relative_to(tmp_path)
         assert finding.fix is None or get_rule(case.code).fixes != "no", "the rule claims no fix"
     for name in ("subject", "line", "severity"):
-        wanted = getattr(case, name)
-        if wanted is not None:
-            have = [getattr(f, name) for f in found]
-            assert wanted in have, f"{name}: wanted {wanted!r}, have {have}"
-            found = [f for f in found if getattr(f, name) == wanted]
+        expected = getattr(case, name)
+        if expected is not None:
+            values = [getattr(f, name) for f in found]
+            assert expected in values, f"{name}: expected {expected!r}, got {values}"
+            found = [f for f in found if getattr(f, name) == expected]
     if case.only:
         others = [f for f in report.findings if f.code != case.code and f.severity != "info"]
-        assert not others, what(report)
+        assert not others, messages(report)
 
 
 def check_text(case, finding):
-    """Fail if a finding cannot be read by itself, on one line of any terminal."""
+    """Check that a finding has a subject, a hint and a one-line message."""
     assert finding.subject
     assert finding.hint
     assert finding.message == " ".join(finding.message.split())
@@ -261,9 +261,9 @@ def check_text(case, finding):
 
 
 @every_case([case for case in ALL_CASES if not case.fails])
-def test_what_is_right_is_left_in_peace(case, tmp_path):
-    report = look_at(case, case.write(tmp_path), chosen=[get_rule(case.code)])
-    assert not report.findings, what(report)
+def test_passing_case_has_no_findings(case, tmp_path):
+    report = lint_case(case, case.write(tmp_path), selected=[get_rule(case.code)])
+    assert not report.findings, messages(report)
 
 
 @every_rule
@@ -277,16 +277,16 @@ def test_every_rule_has_cases(code):
 
 
 @every_rule
-def test_every_rule_is_asked_on_a_case_that_passes(code, tmp_path):
+def test_every_rule_runs_on_a_passing_case(code, tmp_path):
     reasons = []
     for number, case in enumerate(case for case in cases_of(code) if not case.fails):
         (tmp_path / str(number)).mkdir()
         path = case.write(tmp_path / str(number))
-        skipped = look_at(case, path, chosen=[get_rule(code)]).skipped
+        skipped = lint_case(case, path, selected=[get_rule(code)]).skipped
         if not skipped:
             return
         reasons += [each.reason for each in skipped]
-    # One that only informs may have something to say whenever it is asked.
+    # An info rule may report on every robot.
     assert not reasons or get_rule(code).severity == "info", f"skipped on all of them: {reasons}"
 
 
@@ -320,13 +320,13 @@ def test_names_are_unique():
 
 
 @every_case([case for case in ALL_CASES if case.fails and get_rule(case.code).fixes != "no"])
-def test_a_fix_removes_the_finding_and_brings_no_other(case, tmp_path):
+def test_fix_removes_the_finding(case, tmp_path):
     path = case.write(tmp_path)
     unsafe = get_rule(case.code).fixes == "unsafe"
     reports = []
 
     def look(contents):
-        reports.append(look_at(case, path, contents))
+        reports.append(lint_case(case, path, contents))
         return reports[-1]
 
     result = fix_robot(path, look, unsafe=unsafe)
@@ -336,26 +336,26 @@ def test_a_fix_removes_the_finding_and_brings_no_other(case, tmp_path):
         return
     assert case.code in {f.code for f in result.fixed}, result.unfixed
     assert len([f for f in result.report.findings if f.code == case.code]) < len(own)
-    assert places(result.report) <= places(reports[0])
+    assert problems(result.report) <= problems(reports[0])
     write_fixes(result)
     again = fix_robot(path, look, unsafe=unsafe)
     assert again.after == again.new == {}
-    assert places(again.report) == places(result.report)
+    assert problems(again.report) == problems(result.report)
 
 
-def places(report):
-    """Return what is wrong, and with what.
+def problems(report):
+    """Return codes and subjects of errors and warnings.
 
-    What only informs may well be said for the first time once a robot is repaired.
+    Notes may appear only after a robot is fixed.
     """
     return {(f.code, f.subject) for f in report.findings if f.severity != "info"}
 
 
 @pytest.mark.parametrize("code", [rule.code for rule in rules() if rule.fixes != "no"])
-def test_every_rule_with_fixes_has_a_case_with_one(code, tmp_path):
+def test_every_fixing_rule_has_a_fixable_case(code, tmp_path):
     safeties = set()
     for number, case in enumerate(case for case in cases_of(code) if case.fails):
         (tmp_path / str(number)).mkdir()
-        report = look_at(case, case.write(tmp_path / str(number)), chosen=[get_rule(code)])
+        report = lint_case(case, case.write(tmp_path / str(number)), selected=[get_rule(code)])
         safeties |= {finding.fix.safety for finding in report.findings if finding.fix}
     assert get_rule(code).fixes in safeties

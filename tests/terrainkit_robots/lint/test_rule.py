@@ -24,7 +24,7 @@ PAGE = """A mass is negative.
 
 @pytest.fixture
 def empty(monkeypatch):
-    """Return the registry, empty."""
+    """Return an empty registry."""
     registry = {}
     monkeypatch.setattr(module, "_RULES", registry)
     return registry
@@ -38,7 +38,7 @@ def check(text=PAGE):
     return negative
 
 
-def test_a_rule_has_a_page(empty):
+def test_rule_page_is_parsed(empty):
     rule("INR099", "negative-mass", "error", fixes="safe", needs=("legs",))(check())
     made = empty["INR099"]
     assert (made.code, made.name, made.severity) == ("INR099", "negative-mass", "error")
@@ -49,12 +49,12 @@ def test_a_rule_has_a_page(empty):
     assert made.reference == "A book, chapter 3."
 
 
-def test_a_rule_fixes_nothing_and_needs_nothing_unless_told(empty):
+def test_rule_defaults(empty):
     rule("INR099", "n", "error")(check())
     assert (empty["INR099"].fixes, empty["INR099"].needs) == ("no", ())
 
 
-def test_the_function_stays_as_it_is(empty):
+def test_decorator_returns_function(empty):
     function = check()
     assert rule("INR099", "n", "error")(function) is function
     assert empty
@@ -73,17 +73,17 @@ def test_the_function_stays_as_it_is(empty):
         "A title\nover lines.\n\nWhy.\n\nFix:\n    This.\n\nSource:\n    That.",
     ],
 )
-def test_a_page_that_lacks_something_is_told(empty, text):
+def test_incomplete_page_is_rejected(empty, text):
     rule("INR099", "n", "error")(check(text))
-    with pytest.raises(ConfigError, match="INR099: the docstring lacks"):
+    with pytest.raises(ConfigError, match="docstring of rule INR099: expected a title"):
         _ = empty["INR099"].why
 
 
-def test_two_rules_of_one_code_are_told(empty):
+def test_duplicate_code_is_rejected(empty):
     rule("INR099", "one", "error")(check())
     other = check()
     other.__module__ = "elsewhere"
-    with pytest.raises(ConfigError, match="two rules are called INR099"):
+    with pytest.raises(ConfigError, match="rule code INR099: registered twice"):
         rule("INR099", "two", "error")(other)
     assert empty["INR099"].name == "one"
 
@@ -91,14 +91,14 @@ def test_two_rules_of_one_code_are_told(empty):
 # All of them
 
 
-def test_rules_are_ordered_by_family_and_number():
+def test_rules_are_sorted_by_family_and_number():
     families = list(FAMILIES)
     order = [(families.index(each.family), each.code) for each in rules()]
     assert order == sorted(order)
     assert {each.family for each in rules()} == set(FAMILIES)
 
 
-def test_codes_and_names_are_used_once():
+def test_codes_and_names_are_unique():
     assert len({each.code for each in rules()}) == len(rules())
     assert len({each.name for each in rules()}) == len(rules())
 
@@ -115,17 +115,17 @@ def test_every_rule_is_well_formed(each):
 
 
 @pytest.mark.parametrize("word", ["INR001", "inr001", "Inr001"])
-def test_a_rule_is_found_by_code(word):
+def test_get_rule_by_code(word):
     assert get_rule(word).code == "INR001"
 
 
 @pytest.mark.parametrize("each", rules()[:10], ids=lambda each: each.code)
-def test_a_rule_is_found_by_name(each):
+def test_get_rule_by_name(each):
     assert get_rule(each.name) is each
     assert get_rule(each.name.upper()) is each
 
 
 @pytest.mark.parametrize("word", ["", "INR", "INR999", "no-such-rule"])
-def test_a_rule_that_is_not_there_is_told_with_those_that_are(word):
-    with pytest.raises(ConfigError, match=r"no rule .*; there are: .*XML001"):
+def test_get_rule_unknown_lists_rules(word):
+    with pytest.raises(ConfigError, match=r"no rule .*[Tt]here are: .*XML001"):
         get_rule(word)

@@ -9,7 +9,7 @@ from terrainkit_robots.description.fix import Fix
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import Source
 from terrainkit_robots.lint.rule import Rule, Violation, rules
-from terrainkit_robots.lint.runner import INTERNAL, MOST_FINDINGS, lint
+from terrainkit_robots.lint.runner import INTERNAL_ERROR, MAX_FINDINGS, lint
 
 FILE = Path("/robots/robot.urdf")
 
@@ -23,7 +23,7 @@ def violation(subject="a", line=1, **more):
 
 
 def rule(check, code="INR099", severity="error", *, needs=()):
-    """Return a rule that finds what `check` yields; a list is found on every robot."""
+    """Return a rule that yields from `check`, a function or a list of violations."""
 
     def found(robot):
         """Something is wrong.
@@ -41,11 +41,11 @@ def rule(check, code="INR099", severity="error", *, needs=()):
     return Rule(code=code, name="a-rule", severity=severity, check=found, needs=needs)
 
 
-def report(*chosen, robot=None):
-    return lint(facts() if robot is None else robot, chosen)
+def report(*selected, robot=None):
+    return lint(facts() if robot is None else robot, selected)
 
 
-def test_a_finding_says_what_the_rule_and_the_defect_say():
+def test_finding_combines_rule_and_violation():
     fix = Fix(safety="safe", description="d", edits=())
     source = Source(file=Path("/robots/part.urdf"), line=7)
     whole = Violation(
@@ -65,17 +65,17 @@ def test_a_finding_says_what_the_rule_and_the_defect_say():
     assert found.fix is fix
 
 
-def test_the_hint_is_the_rules_unless_the_defect_has_its_own():
+def test_violation_hint_overrides_rule():
     found = report(rule([violation(), violation(line=2, hint="Do that.")])).findings
     assert [each.hint for each in found] == ["Do this.", "Do that."]
 
 
-def test_a_defect_may_be_less_severe_than_its_rule():
+def test_violation_severity_overrides_rule():
     found = report(rule([violation(severity="info")])).findings
     assert [each.severity for each in found] == ["info"]
 
 
-def test_errors_come_first_then_the_place_in_the_file():
+def test_findings_are_sorted():
     found = report(
         rule([violation("a", 9), violation("b", 3)], "INR099", "warning"),
         rule([violation("c", 9), violation("d", 3)], "INR098", "error"),
@@ -94,43 +94,43 @@ def test_errors_come_first_then_the_place_in_the_file():
         (["info", "error", "warning"], "fail"),
     ],
 )
-def test_the_verdict_is_that_of_the_worst(severities, verdict):
+def test_verdict_is_the_worst_severity(severities, verdict):
     found = [violation(severity=severity) for severity in severities]
     assert report(rule(found)).verdict == verdict
 
 
-def test_what_cannot_be_checked_is_told():
+def test_cannot_check_is_skipped_with_reason():
     def check(_):
         yield violation()
-        raise CannotCheckError("there is nothing to go by")
+        raise CannotCheckError("no data")
 
     made = report(rule(check))
     assert made.findings == ()
-    assert [(s.code, s.reason) for s in made.skipped] == [("INR099", "there is nothing to go by")]
+    assert [(s.code, s.reason) for s in made.skipped] == [("INR099", "no data")]
     assert made.crashed == ()
 
 
-def test_a_rule_for_legs_is_not_asked_of_a_robot_without():
+def test_leg_rules_need_legs():
     made = report(rule([violation()], needs=("legs",)))
     assert made.findings == ()
-    assert made.skipped[0].reason == "no legs were found"
+    assert made.skipped[0].reason == "no legs detected"
     robot = Facts(load_robot(bundled.find("biped")))
     assert len(report(rule([violation()], needs=("legs",)), robot=robot).findings) == 1
 
 
 @pytest.mark.parametrize("family", ["LEG", "SYM"])
-def test_limbs_are_not_compared_where_some_are_lost(family):
+def test_limb_rules_need_complete_tree(family):
     text = (
         '<robot name="r"><link name="a"/><joint name="j" type="fixed"><parent link="a"/>'
         '<child link="lost"/></joint></robot>'
     )
     made = report(rule([violation()], f"{family}099"), robot=facts(text))
     assert made.findings == ()
-    assert "missing from the tree" in made.skipped[0].reason
+    assert "missing from the kinematic tree" in made.skipped[0].reason
     assert len(report(rule([violation()], "INR099"), robot=facts(text)).findings) == 1
 
 
-def test_a_rule_that_fails_costs_no_other():
+def test_crash_of_a_rule_is_recorded():
     def broken(_):
         raise ZeroDivisionError("oh")
         yield
@@ -138,10 +138,10 @@ def test_a_rule_that_fails_costs_no_other():
     made = report(rule(broken, "INR098"), rule([violation()]))
     assert [each.code for each in made.findings] == ["INR099"]
     assert [each.code for each in made.crashed] == ["INR098"]
-    assert made.crashed[0].reason == f"{INTERNAL}: ZeroDivisionError: oh"
+    assert made.crashed[0].reason == f"{INTERNAL_ERROR}: ZeroDivisionError: oh"
 
 
-def test_a_rule_without_memory_ends_the_run():
+def test_memory_error_is_raised():
     def greedy(_):
         raise MemoryError
         yield
@@ -150,7 +150,7 @@ def test_a_rule_without_memory_ends_the_run():
         report(rule(greedy))
 
 
-def test_of_endless_defects_the_first_are_told():
+def test_findings_of_a_rule_are_limited():
     def endless(_):
         line = 0
         while True:
@@ -158,21 +158,21 @@ def test_of_endless_defects_the_first_are_told():
             yield violation(line=line)
 
     made = report(rule(endless))
-    assert [each.line for each in made.findings] == list(range(1, MOST_FINDINGS + 1))
-    assert str(MOST_FINDINGS) in made.skipped[0].reason
-    exactly = report(rule([violation(line=k) for k in range(MOST_FINDINGS)]))
+    assert [each.line for each in made.findings] == list(range(1, MAX_FINDINGS + 1))
+    assert str(MAX_FINDINGS) in made.skipped[0].reason
+    exactly = report(rule([violation(line=k) for k in range(MAX_FINDINGS)]))
     assert exactly.skipped == ()
 
 
-def test_all_rules_are_asked_unless_told():
-    asked = {each.code for each in rules()}
+def test_all_rules_run_by_default():
+    codes = {each.code for each in rules()}
     made = lint(facts("<robot/>"))
-    assert {each.code for each in (*made.findings, *made.skipped)} <= asked
+    assert {each.code for each in (*made.findings, *made.skipped)} <= codes
     assert any(each.code == "XML003" for each in made.findings)
     assert lint(facts("<robot/>"), []).findings == ()
 
 
-def test_the_same_robot_has_the_same_findings():
+def test_lint_is_deterministic():
     robot = bundled.find("quadruped")
     first, second = (lint(Facts(load_robot(robot))) for _ in range(2))
     assert first.findings == second.findings
@@ -181,7 +181,7 @@ def test_the_same_robot_has_the_same_findings():
 
 @pytest.mark.parametrize("name", bundled.names())
 @pytest.mark.parametrize("suffix", [".urdf", ".xml"])
-def test_no_rule_fails_on_a_bundled_robot(name, suffix):
+def test_bundled_robots_pass_all_rules(name, suffix):
     made = lint(Facts(load_robot(bundled.find(name).with_suffix(suffix))))
     assert made.crashed == ()
     assert made.verdict == "pass"

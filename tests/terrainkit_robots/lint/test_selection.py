@@ -20,7 +20,7 @@ def codes(found):
 
 
 def check(path, text, **settings):
-    """Return the report of what INR002, negative-mass, finds in `text`."""
+    """Return the report of INR002, negative-mass, on `text`."""
     path.write_text(text)
     wanted = Settings(**{"select": ("INR002",)} | settings)
     return lint_selected(Facts(load_robot(path)), wanted)
@@ -31,25 +31,25 @@ def file(tmp_path):
     return tmp_path / "robot.urdf"
 
 
-def test_without_a_word_every_rule_is_asked():
+def test_all_rules_are_selected_by_default():
     chosen, left_out = select_rules(Settings())
     assert chosen == rules()
     assert left_out == ()
 
 
-def test_what_is_ignored_is_left_out_of_what_is_selected_with_its_reason():
+def test_ignored_rules_are_listed_with_reason():
     settings = Settings(select=("INR",), ignore={"INR002": "a balloon", "JNT": "no joints"})
     chosen, left_out = select_rules(settings)
     assert codes(chosen) == codes(matching("INR")) - {"INR002"}
     assert [(s.code, s.reason) for s in left_out] == [("INR002", "ignored: a balloon")]
 
 
-def test_an_ignored_word_that_is_no_rule_is_an_error():
+def test_unknown_ignored_rule_is_rejected():
     with pytest.raises(ConfigError, match="no rule 'NOPE1'"):
         select_rules(Settings(ignore={"NOPE1": "why"}))
 
 
-def test_only_the_selected_rules_are_asked(file):
+def test_only_selected_rules_run(file):
     text = f"<robot>{LINK.format(name='a')}</robot>"
     assert codes(check(file, text).findings) == {"INR002"}
     assert codes(check(file, text, select=("XML003",)).findings) == {"XML003"}
@@ -97,7 +97,7 @@ A, B = LINK.format(name="a"), LINK.format(name="b")
         (f"{A}\n<!-- terrainkit says: ignore INR002 x -->\n{B}", ["a", "b"]),
     ],
 )
-def test_a_comment_quiets_a_rule_for_what_it_is_on_in_or_above(file, text, left):
+def test_comment_suppresses_its_element(file, text, left):
     report = check(file, f'<robot name="r">\n{text}\n</robot>\n')
     assert [finding.subject for finding in report.findings] == left
     ignored = [skipped for skipped in report.skipped if isinstance(skipped, Suppressed)]
@@ -105,20 +105,20 @@ def test_a_comment_quiets_a_rule_for_what_it_is_on_in_or_above(file, text, left)
     assert {each.comment.reason for each in ignored} <= {"a balloon"}
 
 
-def test_a_comment_quiets_no_other_rule(file):
+def test_comment_suppresses_only_its_rule(file):
     text = f"<robot>\n{NOTE.replace('INR002', 'XML003')}\n{A}\n</robot>"
     assert codes(check(file, text).findings) == {"INR002"}
 
 
-def test_what_is_said_of_an_ignored_finding(file):
+def test_suppressed_finding_has_reason(file):
     report = check(file, f'<robot name="r">\n<link name="x"/>\n{NOTE}\n{A}\n</robot>')
     (ignored,) = report.skipped
-    assert ignored.reason == "ignored for a (robot.urdf:4): a balloon"
+    assert ignored.reason == "suppressed for a (robot.urdf:4): a balloon"
     assert ignored.finding.subject == "a"
     assert report.verdict == "pass"
 
 
-def test_above_the_root_it_speaks_of_the_robot_and_not_of_all_that_is_in_it(file):
+def test_comment_above_root_applies_to_robot_only(file):
     comment = "<!-- terrainkit: ignore XML003, INR002 a test -->"
     for text in (
         f"{comment}\n<robot>\n<link name='x'/>\n{A}",
@@ -129,7 +129,7 @@ def test_above_the_root_it_speaks_of_the_robot_and_not_of_all_that_is_in_it(file
         assert codes(s for s in report.skipped if isinstance(s, Suppressed)) == {"XML003"}
 
 
-def test_in_mjcf_a_body_in_a_body_is_another_part(tmp_path):
+def test_comment_excludes_nested_mjcf_bodies(tmp_path):
     inertial = '<inertial mass="-1" pos="0 0 0" diaginertia="1 1 1"/>'
     text = f"""<mujoco>
       <worldbody>
@@ -146,19 +146,19 @@ def test_in_mjcf_a_body_in_a_body_is_another_part(tmp_path):
     assert [finding.subject for finding in report.findings] == ["arm"]
 
 
-def test_a_file_with_syntax_errors_has_comments_too(file):
+def test_comment_in_malformed_file_is_read(file):
     report = check(file, f'<robot name="r">\n{NOTE}\n{A}\n{B}\n<oops>\n</robot>')
     assert [finding.subject for finding in report.findings] == ["b"]
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-8-sig"])
-def test_a_file_in_another_encoding_has_comments_too(file, encoding):
+def test_comment_in_other_encoding_is_read(file, encoding):
     file.write_bytes(f'<robot name="r">\n{NOTE}\n{A}\n{B}\n</robot>'.encode(encoding))
     report = lint_selected(Facts(load_robot(file)), Settings(select=("INR002",)))
     assert [finding.subject for finding in report.findings] == ["b"]
 
 
-def test_what_is_read_instead_of_a_file_has_its_own_comments(file):
+def test_replaced_contents_have_own_comments(file):
     text = f'<robot name="r">\n{A}\n</robot>'
     file.write_text(text)
     contents = {file: text.replace("\n<link", f"\n{NOTE} <link").encode()}
@@ -170,14 +170,14 @@ def test_what_is_read_instead_of_a_file_has_its_own_comments(file):
 @pytest.mark.parametrize(
     ("comment", "said"),
     [
-        ("ignore INR002", "it gives no reason; wanted <!-- terrainkit: ignore INR002 reason -->"),
-        ("ignore INR999 it is light", "there is no rule 'INR999'; wanted"),
-        ("ignore", "it names no rule; wanted <!-- terrainkit: ignore CODE reason -->"),
-        ("disable INR002 it is light", "it says 'disable'; wanted"),
-        ("", "it says ''; wanted"),
+        ("ignore INR002", "missing reason; expected <!-- terrainkit: ignore INR002 reason -->"),
+        ("ignore INR999 it is light", "unknown rule 'INR999'; expected"),
+        ("ignore", "missing rule; expected <!-- terrainkit: ignore CODE reason -->"),
+        ("disable INR002 it is light", "unknown word 'disable'; expected"),
+        ("", "unknown word ''; expected"),
     ],
 )
-def test_a_comment_that_can_quiet_nothing_is_told(file, comment, said):
+def test_invalid_comment_is_reported(file, comment, said):
     report = check(file, f'<robot name="r">\n<!-- terrainkit: {comment} -->\n{A}\n</robot>')
     assert codes(report.findings) == {"INR002"}
     (idle,) = report.skipped
@@ -186,20 +186,20 @@ def test_a_comment_that_can_quiet_nothing_is_told(file, comment, said):
     assert said in idle.reason
 
 
-def test_a_comment_with_nothing_to_quiet_is_told(file):
+def test_unused_comment_is_reported(file):
     text = f'<robot name="r">\n{NOTE}\n<link name="a"/>\n</robot>'
     (idle,) = check(file, text).skipped
-    assert idle.reason == f"comment at {file}:2: there is no INR002 to ignore here"
+    assert idle.reason == f"comment at {file}:2: unused suppression: INR002 has no finding here"
 
 
-def test_a_comment_on_a_rule_that_is_not_asked_is_not_told(file):
+def test_comment_of_unselected_rule_is_not_reported(file):
     text = f'<robot name="r">\n{NOTE}\n<link name="a"/>\n</robot>'
     assert check(file, text, select=("XML003",)).skipped == ()
     ignoring = check(file, text, ignore={"INR002": "here"})
     assert [type(s).__name__ for s in ignoring.skipped] == ["Skipped"]
 
 
-def test_a_file_without_comments_is_not_parsed_again(file, monkeypatch):
+def test_file_without_comments_is_not_parsed_again(file, monkeypatch):
     import terrainkit_robots.description.xml.document as xml_document
 
     file.write_text(f'<robot name="r">{A}</robot>')
@@ -216,7 +216,7 @@ def test_long_words_are_cut(file):
     assert len(report.skipped[0].reason) < 1000
 
 
-def test_in_xacro_a_comment_stands_where_the_finding_is(tmp_path):
+def test_comment_in_xacro_macro_applies_to_each_use(tmp_path):
     text = f"""<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r">
       <xacro:macro name="part" params="n">
         <link name="${{n}}"> {NOTE}

@@ -10,10 +10,10 @@ BODY = b"<body>\n%s\n<geom/>\n<body>\n<geom/>\n</body>\n<geom/>\n</body>"
 
 
 def covered(data):
-    """Return the lines with elements of which the one comment in `data` speaks; 0 is the file."""
+    """Return the lines of the elements that the comment in `data` covers; 0 is the file."""
     (comment,) = read_comments(Path("robot.urdf"), data)
     starts = [i for i, line in enumerate(data.split(b"\n"), 1) if re.search(rb"<[a-z]", line)]
-    return [line for line in (0, *starts) if comment.covers(line)]
+    return [line for line in (0, *starts) if comment.is_covering(line)]
 
 
 @pytest.mark.parametrize(
@@ -28,16 +28,16 @@ def covered(data):
             [4, 5, 6, 7],
         ),
         (b"<robot>\n<link>\n<a/>\n" + NOTE + b"\n<b>\n<c/></b>\n</link></robot>", [2, 5, 6]),
-        # The inner body, on lines 5 and 6, is another part.
+        # The inner body, on lines 5 and 6, is a separate part.
         (b"<mujoco>\n" + BODY % NOTE + b"</mujoco>", [2, 4, 8]),
         (b"<mujoco><worldbody>\n<geom/>\n" + NOTE + b"\n<body/>\n</worldbody></mujoco>", [4]),
     ],
 )
-def test_what_a_comment_speaks_of(data, lines):
+def test_comment_covers_lines(data, lines):
     assert covered(data) == lines
 
 
-def test_the_line_of_a_comment_is_where_it_starts():
+def test_comment_line_is_its_first():
     (comment,) = read_comments(
         Path("robot.urdf"), b"<robot>\n\n<!-- terrainkit:\n ignore INR002\n x -->\n</robot>"
     )
@@ -60,7 +60,7 @@ def test_the_line_of_a_comment_is_where_it_starts():
     ],
     ids=lambda data: repr(data[:24]),
 )
-def test_no_data_is_too_broken(data):
+def test_malformed_data_is_accepted(data):
     list(read_comments(Path("robot.urdf"), data))
 
 
@@ -76,9 +76,9 @@ def test_no_data_is_too_broken(data):
     ],
     ids=["comments", "between", "nested", "bodies", "codes", "blanks"],
 )
-def test_no_data_takes_long(data):
+def test_large_data_is_bounded(data):
     assert len(list(read_comments(Path("robot.urdf"), data))) <= 1000
 
 
-def test_a_file_that_is_not_there_has_none(tmp_path):
+def test_missing_file_has_no_comments(tmp_path):
     assert list(read_comments(tmp_path / "none.urdf")) == []

@@ -49,15 +49,15 @@ class TestVertices:
     @pytest.mark.parametrize("factor", [float("nan"), float("inf"), 1e308, 1e7])
     def test_larger_than_anything(self, mesh, factor):
         use = mesh(scale=(factor, 1, 1))
-        assert not Meshes().readable(use)
+        assert not Meshes().is_readable(use)
         with pytest.raises(MeshError, match="reaches farther than 1,000,000 m"):
             Meshes().vertices(use)
-        Meshes().glance(use)  # nor does it warn
+        Meshes().partial_diagonal(use)  # nor does it warn
 
     def test_what_is_not_there(self, tmp_path):
         use = use_of(tmp_path / "a.stl")
         meshes = Meshes()
-        assert not meshes.readable(use)
+        assert not meshes.is_readable(use)
         assert not meshes.exists(use.path)
         for ask in (meshes.vertices, meshes.volume, meshes.hull_volume, meshes.is_flat):
             with pytest.raises(MeshError, match="does not exist"):
@@ -105,7 +105,7 @@ class TestOncePerRun:
     def test_a_broken_one_too(self, mesh):
         meshes, use = Meshes(), mesh(b"v 0 0 x\n", "a.obj")
         for _ in range(3):
-            assert not meshes.readable(use)
+            assert not meshes.is_readable(use)
             with pytest.raises(MeshError, match="text"):
                 meshes.volume(use)
         assert meshes.opened == {use.path: 2}
@@ -136,14 +136,14 @@ class TestGlance:
 
     def test_a_part_of_a_long_file(self, mesh):
         meshes, use = Meshes(), mesh(self.OBJ, "a.obj", (0.1, 1, 1))
-        about = meshes.glance(use)
+        about = meshes.partial_diagonal(use)
         assert about is not None
         assert 100 < about < 999.9
         assert meshes.diagonal(use) == pytest.approx(999.9)
-        assert meshes.glance(use) is None  # the whole is known by now
+        assert meshes.partial_diagonal(use) is None  # the whole is known by now
 
     def test_a_few_corners_tell_nothing(self, mesh):
-        assert Meshes().glance(mesh(self.OBJ[:100] + b"\nf 1 2 3\n", "a.obj")) is None
+        assert Meshes().partial_diagonal(mesh(self.OBJ[:100] + b"\nf 1 2 3\n", "a.obj")) is None
 
     def test_in_metres(self, mesh):
         numbers = b" ".join(b"%d 0 0" % x for x in range(1000))
@@ -152,14 +152,14 @@ class TestGlance:
             + numbers
             + b"</float_array></COLLADA>"
         )
-        assert Meshes().glance(mesh(data, "a.dae")) == pytest.approx(0.998)
+        assert Meshes().partial_diagonal(mesh(data, "a.dae")) == pytest.approx(0.998)
 
     def test_of_an_stl(self, mesh):
-        assert Meshes().glance(mesh()) == pytest.approx(14**0.5)
+        assert Meshes().partial_diagonal(mesh()) == pytest.approx(14**0.5)
 
     def test_of_a_broken_file(self, mesh):
-        assert Meshes().glance(mesh(b"\0" * 100)) is None
-        assert Meshes().glance(mesh(b"v a b c\n" * 50, "b.obj")) is None
+        assert Meshes().partial_diagonal(mesh(b"\0" * 100)) is None
+        assert Meshes().partial_diagonal(mesh(b"v a b c\n" * 50, "b.obj")) is None
 
 
 class TestLimits:
@@ -241,8 +241,8 @@ class TestRobots:
 def test_files_that_are_not_on_disk_can_be_added(tmp_path):
     (tmp_path / "here.stl").write_bytes(b"here")
     held = Meshes({tmp_path / "held.stl": b"held"})
-    more = held.beside({tmp_path / "more.stl": b"more"})
+    more = held.with_contents({tmp_path / "more.stl": b"more"})
     for name in ("here", "held", "more"):
         assert more.data(tmp_path / f"{name}.stl") == name.encode()
-    assert more.is_held(tmp_path / "more.stl")
-    assert not held.is_held(tmp_path / "more.stl")
+    assert more.has_contents(tmp_path / "more.stl")
+    assert not held.has_contents(tmp_path / "more.stl")

@@ -41,10 +41,12 @@ SAMPLES = {
     "ply": exported("ply"),
     "glb": exported("glb"),
     "msh": msh(BOX.vertices, BOX.faces),
-    "dae": b"""<COLLADA><library_geometries><geometry id="g"><mesh><source id="p">
+    "dae": b"""<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema">
+      <library_geometries><geometry id="g"><mesh><source id="p">
       <float_array>0 0 0 1 0 0 0 1 0</float_array><technique_common><accessor stride="3"/>
-      </technique_common></source><vertices><input semantic="POSITION" source="#p"/></vertices>
-      <polylist><input semantic="VERTEX" offset="0"/><vcount>3</vcount><p>0 1 2</p></polylist>
+      </technique_common></source>
+      <vertices id="v"><input semantic="POSITION" source="#p"/></vertices><polylist>
+      <input semantic="VERTEX" source="#v" offset="0"/><vcount>3</vcount><p>0 1 2</p></polylist>
       </mesh></geometry></library_geometries><library_visual_scenes><visual_scene><node>
       <scale>1 2 3</scale><instance_geometry url="#g"/></node></visual_scene>
       </library_visual_scenes></COLLADA>""",

@@ -9,16 +9,16 @@ from terrainkit_robots.mesh.surface import (
     MeshError,
     Surface,
     binary_stl,
-    clustered,
-    fan,
+    cluster_vertices,
     is_closed,
     is_flat,
-    numbers,
+    parse_float_list,
+    parse_int_list,
     signed_volume,
     thickness,
+    triangulate_fan,
     unique_points,
     welded,
-    whole_numbers,
 )
 
 
@@ -38,25 +38,25 @@ SPHERE = surface_of(trimesh.creation.icosphere(subdivisions=3, radius=0.1))
 
 class TestNumbers:
     def test_white_space_of_all_kinds(self):
-        assert list(numbers(b" 1\t2\n3.5\r\n-1e3 ")) == [1, 2, 3.5, -1000]
-        assert numbers(b"").size == 0
+        assert list(parse_float_list(b" 1\t2\n3.5\r\n-1e3 ")) == [1, 2, 3.5, -1000]
+        assert parse_float_list(b"").size == 0
 
     @pytest.mark.parametrize("text", [b"1 two 3", b"1,2", b"0x10", b"1 2 -"])
     def test_text(self, text):
         with pytest.raises(MeshError, match="text where numbers"):
-            numbers(text)
+            parse_float_list(text)
 
     @pytest.mark.parametrize("text", [b"nan", b"1e300", b"-inf"])
     def test_indices_that_are_none(self, text):
         with pytest.raises(MeshError, match="index"):
-            whole_numbers(text)
+            parse_int_list(text)
 
 
 def test_polygons_as_triangles():
-    triangles = fan(np.array([0, 1, 2, 3, 9, 8, 7, 5, 4]), np.array([4, 3, 2]))
+    triangles = triangulate_fan(np.array([0, 1, 2, 3, 9, 8, 7, 5, 4]), np.array([4, 3, 2]))
     assert triangles.tolist() == [[0, 1, 2], [0, 2, 3], [9, 8, 7]]
-    assert fan(np.array([1, 2, 3]), np.array([3])).tolist() == [[1, 2, 3]]
-    assert fan(np.zeros(0, int), np.zeros(0, int)).shape == (0, 3)
+    assert triangulate_fan(np.array([1, 2, 3]), np.array([3])).tolist() == [[1, 2, 3]]
+    assert triangulate_fan(np.zeros(0, int), np.zeros(0, int)).shape == (0, 3)
 
 
 @settings(max_examples=50, deadline=None)
@@ -129,19 +129,21 @@ class TestFlat:
 
 class TestClustered:
     def test_a_sphere_keeps_its_shape(self):
-        coarse = clustered(SPHERE, 8)
+        coarse = cluster_vertices(SPHERE, 8)
         assert len(coarse.faces) < len(SPHERE.faces)
         assert np.linalg.norm(coarse.points, axis=1).max() < 0.1001
         assert np.ptp(coarse.points, axis=0) == pytest.approx(0.2, rel=0.1)
         assert signed_volume(coarse) == pytest.approx(signed_volume(SPHERE), rel=0.15)
 
     def test_no_triangle_comes_twice_or_is_a_line(self):
-        faces = clustered(SPHERE, 6).faces
+        faces = cluster_vertices(SPHERE, 6).faces
         assert len(np.unique(np.sort(faces, axis=1), axis=0)) == len(faces)
         assert (faces != np.roll(faces, 1, axis=1)).all()
 
     def test_all_in_one_place(self):
-        assert not len(clustered(Surface(points=np.ones((3, 3)), faces=BOX.faces[:0]), 4).faces)
+        assert not len(
+            cluster_vertices(Surface(points=np.ones((3, 3)), faces=BOX.faces[:0]), 4).faces
+        )
 
 
 class TestBinaryStl:

@@ -5,8 +5,8 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.export.canonical import normal_form
-from terrainkit_robots.export.fixed_joint_merge import fused
+from terrainkit_robots.export.canonical import to_canonical
+from terrainkit_robots.export.fixed_joint_merge import merge_fixed_joints
 from terrainkit_robots.export.mjcf import Extras, Site, mjcf_text
 from terrainkit_robots.onboarding.equivalence import agreement, expected
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -19,7 +19,7 @@ def source():
 
 @pytest.fixture
 def written(source):
-    return Facts(normal_form(source).model)
+    return Facts(to_canonical(source).model)
 
 
 def compiled(text):
@@ -85,7 +85,7 @@ def test_a_mass_that_is_elsewhere_is_seen(source, written):
 
 
 def test_fused_links_are_found_as_frames(source, written):
-    single = fused(written.model, keep=["FL_foot"])
+    single = merge_fixed_joints(written.model, keep=["FL_foot"])
     sites = tuple(
         Site(name=link, body=body, pose=pose)
         for link, (body, pose) in single.frames.items()

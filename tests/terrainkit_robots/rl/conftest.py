@@ -17,13 +17,7 @@ pytest.importorskip("torch", reason="the extra `train` is not installed")
 import torch
 
 from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
-from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Ground, MapGround, Plane
-from terrainkit_robots.rl.registry import find
-from terrainkit_robots.rl.robot import Robot, read_robot, robot_of
-from terrainkit_robots.rl.run_folder import Run, create_run
-from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.task import (
+from terrainkit_robots.rl.config import (
     DomainRand,
     Env,
     InitState,
@@ -33,6 +27,12 @@ from terrainkit_robots.rl.task import (
     Runner,
     Task,
 )
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.run import Run, create_run
+from terrainkit_robots.rl.runner import LeggedRunner
+from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.tasks import get_task
+from terrainkit_robots.rl.terrain import MapTerrain, Plane, Terrain
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
 # The contract is a class that several test files share; there are no packages here to find it in.
@@ -88,12 +88,12 @@ CART = """
 
 @pytest.fixture(scope="session")
 def quadruped() -> Robot:
-    return read_robot(find("quadruped").folder)
+    return Robot.load(get_task("quadruped").folder)
 
 
 @pytest.fixture(scope="session")
 def biped() -> Robot:
-    return read_robot(find("biped").folder)
+    return Robot.load(get_task("biped").folder)
 
 
 @pytest.fixture(scope="session")
@@ -129,7 +129,7 @@ def cart_spec() -> RobotSpec:
 def cart(cart_spec: RobotSpec, tmp_path_factory: pytest.TempPathFactory) -> Robot:
     folder = tmp_path_factory.mktemp("cart")
     (folder / "cart.xml").write_text(CART)
-    return robot_of(cart_spec, folder)
+    return Robot.from_spec(cart_spec, folder)
 
 
 @pytest.fixture(scope="session")
@@ -151,8 +151,8 @@ def mixed_map() -> TerrainMap:
 
 
 @pytest.fixture(scope="session")
-def map_ground(mixed_map: TerrainMap) -> Ground:
-    return MapGround(mixed_map)
+def map_ground(mixed_map: TerrainMap) -> Terrain:
+    return MapTerrain(mixed_map)
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from terrainkit.errors import ConfigError, ExportError
-from terrainkit_robots.rl.checkpoint import only_policy, read_checkpoint, save_checkpoint
+from terrainkit_robots.rl.run import policy_state, read_checkpoint, save_checkpoint
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ def test_only_what_can_be_read_without_a_risk_is_saved(tmp_path, state):
 
 
 def test_a_policy_alone_is_a_checkpoint_too(tmp_path, state):
-    save_checkpoint(tmp_path / "model.pt", only_policy(state))
+    save_checkpoint(tmp_path / "model.pt", policy_state(state))
     assert "processes" not in read_checkpoint(tmp_path / "model.pt")
 
 
@@ -133,7 +133,7 @@ def test_a_packed_file_is_not_unpacked(tmp_path, state):
 )
 def test_a_foreign_file_of_torch_is_told(tmp_path, state, change, said):
     whole = {"format": "terrainkit checkpoint", "version": 1}
-    torch.save(only_policy(state) | whole | change, tmp_path / "model.pt")
+    torch.save(policy_state(state) | whole | change, tmp_path / "model.pt")
     with pytest.raises(ConfigError, match=said):
         read_checkpoint(tmp_path / "model.pt")
 

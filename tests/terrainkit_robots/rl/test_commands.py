@@ -11,13 +11,13 @@ import torch
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.description import bundled
-from terrainkit_robots.rl.commands import asks_headings, draw_commands, turning_to, widened
+from terrainkit_robots.rl.commands import VelocityCommand, sample_commands, uses_heading
+from terrainkit_robots.rl.config import Commands, Control, DomainRand, Env, InitState, Rewards, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
 from terrainkit_robots.rl.rewards import REWARDS
-from terrainkit_robots.rl.robot import read_robot
-from terrainkit_robots.rl.rotation import yaw_of
-from terrainkit_robots.rl.task import Commands, Control, DomainRand, Env, InitState, Rewards, Task
+from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.transforms import quat_to_yaw
 
 torch.set_num_threads(1)
 
@@ -26,7 +26,7 @@ _ALL = Commands(min_norm=0.0, standing=0.0)
 
 
 def draw(settings: Commands, count: int = _MANY, seed: int = 0) -> tuple[Any, Any]:
-    return draw_commands(np.random.default_rng(seed), count, settings, settings.lin_vel_x)
+    return sample_commands(np.random.default_rng(seed), count, settings, settings.lin_vel_x)
 
 
 class TestDraw:
@@ -53,7 +53,7 @@ class TestDraw:
 
     def test_range_of_the_time_is_what_counts(self) -> None:
         rng = np.random.default_rng(0)
-        commands, _ = draw_commands(rng, _MANY, replace(_ALL, lin_vel_x=(-1, 1)), (2.0, 3.0))
+        commands, _ = sample_commands(rng, _MANY, replace(_ALL, lin_vel_x=(-1, 1)), (2.0, 3.0))
         assert commands[:, 0].min() >= 2
         assert commands[:, 0].max() <= 3
 
@@ -90,11 +90,10 @@ class TestDraw:
 
 class TestHeading:
     def turn(self, heading: float, yaw: float, **settings: Any) -> float:
-        speed = turning_to(
-            np.array([heading], np.float32), np.array([yaw], np.float32), Commands(**settings)
-        )
-        assert speed.shape == (1,)
-        return float(speed[0])
+        command = VelocityCommand(Commands(**settings), 1, 0.02, heading_command=True)
+        command.heading[:] = heading
+        command.update_heading(np.array([yaw], np.float32))
+        return float(command.commands[0, 2])
 
     def test_by_hand(self) -> None:
         assert self.turn(1.0, 0.2) == pytest.approx(0.4)
@@ -117,8 +116,11 @@ class TestHeading:
     def test_gets_there(self) -> None:
         yaw = np.array([-3.0, 0.1, 2.5], np.float32)
         heading = np.array([3.0, -1.0, 0.0], np.float32)
+        command = VelocityCommand(Commands(), 3, 0.02, heading_command=True)
+        command.heading[:] = heading
         for _ in range(1000):
-            yaw += np.float32(0.02) * turning_to(heading, yaw, Commands())
+            command.update_heading(yaw)
+            yaw += np.float32(0.02) * command.commands[:, 2]
         off = np.angle(np.exp(1j * (heading - yaw)))
         np.testing.assert_allclose(off, 0, atol=1e-3)
 
@@ -132,31 +134,43 @@ class TestHeadingUnlessGiven:
         self, given: bool | None, *, level: bool, asked: bool
     ) -> None:
         ground = Plane()
-        ground.level = level
+        ground.is_flat = level
         settings = Commands(heading_command=given, standing=0.0)
-        assert asks_headings(settings, ground) == asked
+        assert uses_heading(Task(commands=settings), ground) == asked
         env = make_env(ground=ground, commands=settings)
-        turning = turning_to(env.heading, yaw_of(env.state.base_quat), settings)
-        assert np.allclose(env.commands[:, 2], turning, atol=1e-5) == asked
+        assert env.velocity_command.heading_command == asked
+        before = env.commands[:, 2].copy()
+        env.velocity_command.update_heading(quat_to_yaw(env.state.base_quat) + np.float32(0.5))
+        assert (env.commands[:, 2] != before).any() == asked
 
 
-class TestWidening:
+def expanded(
+    lin_vel_x: tuple[float, float], tracking: float, settings: Commands
+) -> tuple[float, float]:
+    """Return the range of the forward speed after 10 s of tracking, of 10 s that are averaged."""
+    command = VelocityCommand(settings, 4, 0.02, heading_command=False)
+    command.lin_vel_x = lin_vel_x
+    command.expand_range(1.5 * tracking * 10, 10, scale=1.5, min_seconds=10)
+    return command.lin_vel_x
+
+
+class TestExpandRange:
     def test_by_hand(self) -> None:
         settings = Commands(curriculum=True, max_curriculum=2.0)
-        assert widened((-1.0, 1.0), 0.79, settings) == (-1.0, 1.0)
-        assert widened((-1.0, 1.0), 0.81, settings) == pytest.approx((-1.1, 1.1))
+        assert expanded((-1.0, 1.0), 0.79, settings) == (-1.0, 1.0)
+        assert expanded((-1.0, 1.0), 0.81, settings) == pytest.approx((-1.1, 1.1))
 
     def test_stops_at_the_widest(self) -> None:
         settings, span = Commands(curriculum=True, max_curriculum=1.25), (-0.5, 0.75)
         for _ in range(20):
-            before, span = span, widened(span, 0.9, settings)
+            before, span = span, expanded(span, 0.9, settings)
             assert span[0] <= before[0]
             assert span[1] >= before[1]
         assert span == (-1.25, 1.25)
 
     def test_never_narrows(self) -> None:
         settings = Commands(curriculum=True, max_curriculum=1.5)
-        assert widened((-2.0, 3.0), 0.9, settings) == (-2.0, 3.0)
+        assert expanded((-2.0, 3.0), 0.9, settings) == (-2.0, 3.0)
 
     def test_needs_room(self) -> None:
         with pytest.raises(ConfigError, match="max_curriculum is 1, and lin_vel_x from -1 to 1"):
@@ -167,7 +181,7 @@ class TestWidening:
         Commands(curriculum=True, lin_vel_x=(0.0, 1.5))
 
     def test_only_where_asked_for(self) -> None:
-        assert widened((-1.0, 1.0), 1.0, Commands(max_curriculum=5.0)) == (-1.0, 1.0)
+        assert expanded((-1.0, 1.0), 1.0, Commands(max_curriculum=5.0)) == (-1.0, 1.0)
 
 
 def make_env(num_envs: int = 4, **changes: Any) -> LeggedEnv:
@@ -178,7 +192,7 @@ def make_env(num_envs: int = 4, **changes: Any) -> LeggedEnv:
         domain_rand=DomainRand(push_interval_s=0, joint_offset=0),
         control=Control(decimation=changes.pop("decimation", 4)),
     )
-    robot = read_robot(Path(str(bundled.find("quadruped"))).parent)
+    robot = Robot.load(Path(str(bundled.find("quadruped"))).parent)
     ground = changes.pop("ground", Plane())
     return LeggedEnv(replace(task, **changes), robot, ground)
 
@@ -198,7 +212,7 @@ class TestEnvironment:
         first = env.state.commands.copy()
         assert env.cfg.dt == pytest.approx(0.02)
         seen = run(env, 3)
-        env.steps[:] = 497  # of the episode, as after 9.94 s
+        env.steps_since_reset[:] = 497  # of the episode, as after 9.94 s
         seen += run(env, 4)
         assert not env.state.fallen.any()
         for commands in seen[:5]:  # what is observed after step k is for step k + 1
@@ -215,7 +229,7 @@ class TestEnvironment:
     def test_new_ones_with_a_new_episode(self) -> None:
         env = make_env(commands=Commands(standing=0, min_norm=0))
         first = env.state.commands.copy()
-        env.physics.qpos[1, 3:7] = (0, 1, 0, 0)
+        env.sim.qpos[1, 3:7] = (0, 1, 0, 0)
         [after] = run(env, 1)
         assert (after != first).any(axis=1).tolist() == [False, True, False, False]
 
@@ -241,40 +255,40 @@ class TestEnvironment:
         run(env, 2)
         quat = env.state.base_quat
         yaw = 2 * np.arctan2(quat[:, 3], quat[:, 0])
-        off = np.angle(np.exp(1j * (env.heading - yaw)))
+        off = np.angle(np.exp(1j * (env.velocity_command.heading - yaw)))
         np.testing.assert_allclose(env.commands[:, 2], np.clip(0.5 * off, -1, 1), atol=2e-3)
 
     def test_heading_is_heeded_from_the_start(self) -> None:
         env = make_env(commands=Commands(heading_command=True, standing=0))
         quat = env.state.base_quat
         yaw = 2 * np.arctan2(quat[:, 3], quat[:, 0])
-        off = np.angle(np.exp(1j * (env.heading - yaw)))
+        off = np.angle(np.exp(1j * (env.velocity_command.heading - yaw)))
         np.testing.assert_allclose(env.commands[:, 2], np.clip(0.5 * off, -1, 1), atol=2e-3)
 
     def test_held_ones_stay(self) -> None:
         env = make_env(commands=Commands(resampling_time=0.06, heading_command=True))
         held = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]], np.float32)
-        env.hold_commands(held)
+        env.set_commands(held)
         scaled = held * np.array([2, 2, 0.25], np.float32)
         np.testing.assert_array_equal(env.get_observations()["policy"][:, :3], scaled)
-        env.physics.qpos[1, 3:7] = (0, 1, 0, 0)  # a new episode changes nothing
+        env.sim.qpos[1, 3:7] = (0, 1, 0, 0)  # a new episode changes nothing
         for commands in run(env, 8):
             np.testing.assert_array_equal(commands, held)
 
     def test_held_ones_stay_when_all_begins_anew(self) -> None:
         env = make_env(commands=Commands(standing=0))
         held = np.tile(np.array([0.5, 0, 0], np.float32), (4, 1))
-        env.hold_commands(held)
-        env.begin_all()
+        env.set_commands(held)
+        env.reset()
         np.testing.assert_array_equal(env.state.commands, held)
         np.testing.assert_array_equal(env.get_observations()["policy"][:, 0], [1.0] * 4)
 
     def test_held_ones_can_be_let_go(self) -> None:
         env = make_env(commands=Commands(standing=0, resampling_time=0.04))
         held = np.tile(np.array([5, 5, 5], np.float32), (4, 1))
-        env.hold_commands(held)
+        env.set_commands(held)
         run(env, 1)
-        env.hold_commands(None)
+        env.set_commands(None)
         assert np.abs(env.state.commands).max() <= 1
         assert np.abs(run(env, 3)[-1]).max() <= 1
 
@@ -286,13 +300,13 @@ class TestEnvironment:
             commands=Commands(curriculum=True, max_curriculum=1.15),
             rewards=Rewards(tracking_sigma=1e9),
         )
-        env.physics.qpos[0, 3:7] = (0, 1, 0, 0)
+        env.sim.qpos[0, 3:7] = (0, 1, 0, 0)
         run(env, 1)
-        assert env.orders.lin_vel_x == (-1.0, 1.0)
+        assert env.velocity_command.lin_vel_x == (-1.0, 1.0)
         spans = []
         for _ in range(5):
             run(env, 10)
-            spans.append(env.orders.lin_vel_x[1])
+            spans.append(env.velocity_command.lin_vel_x[1])
         assert max(spans) == 1.15
         assert spans == sorted(spans)
         assert spans[0] <= 1.1 + 1e-6
@@ -304,4 +318,4 @@ class TestEnvironment:
             rewards=Rewards(tracking_sigma=0.01),
         )
         run(env, 30)
-        assert env.orders.lin_vel_x == (-1.0, 1.0)
+        assert env.velocity_command.lin_vel_x == (-1.0, 1.0)

@@ -1,11 +1,9 @@
 import numpy as np
 import pytest
 
-from terrainkit_robots.rl.control import control_of
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.physics import Physics
-from terrainkit_robots.rl.scene import build_scene
-from terrainkit_robots.rl.task import Control
+from terrainkit_robots.rl.config import Control
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.terrain import Plane
 
 # Joints of the cart: wheel_axle, rear_hinge, front_hinge.
 Q = np.array([0.4, -0.3, 0.5])
@@ -17,17 +15,17 @@ def torques(cart, calm):
     """Return the torques of an action in one physics step, from `Q` and `DQ` high in the air."""
 
     def act(action, offset=(0.0, 0.0, 0.0), **settings):
-        task = calm(1, control=Control(**settings))
-        scene = build_scene(cart, Plane(), task)
-        physics = Physics(scene, 1, 1)
-        physics.qpos[0] = scene.home
-        physics.qpos[0, 2] = 5.0
-        physics.qpos[0, scene.joint_qpos] = Q
-        physics.qvel[0, scene.joint_qvel] = DQ
-        told = control_of(cart, task).told(np.float32([action]), np.float32([offset]))
-        physics.ctrl[:] = told
-        physics.step(1)
-        return physics.torque[0].copy()
+        env = LeggedEnv(calm(1, control=Control(**settings)), cart, Plane())
+        sim, scene = env.sim, env.scene
+        sim.qpos[0] = scene.home
+        sim.qpos[0, 2] = 5.0
+        sim.qpos[0, scene.joint_qpos] = Q
+        sim.qvel[0] = 0
+        sim.qvel[0, scene.joint_qvel] = DQ
+        env.joint_offset[:] = offset
+        sim.ctrl[:] = env.to_ctrl(np.float32([action]))
+        sim.step(1)
+        return sim.torque[0].copy()
 
     return act
 
@@ -98,7 +96,7 @@ class TestTorque:
         np.testing.assert_allclose(torques((-9, 9, 9), control_type="T"), [-3, 5, 6])
 
 
-def test_an_action_of_zero_is_the_default_pose(quadruped, calm):
-    control = control_of(quadruped, calm())
-    told = control.told(np.zeros((2, 12), np.float32), np.zeros((2, 12), np.float32))
-    np.testing.assert_allclose(told, np.tile(quadruped.default_pose, (2, 1)))
+def test_zero_action_is_the_default_pose(quadruped, calm):
+    env = LeggedEnv(calm(2), quadruped, Plane())
+    ctrl = env.to_ctrl(np.zeros((2, 12), np.float32))
+    np.testing.assert_allclose(ctrl, np.tile(quadruped.default_pose, (2, 1)))

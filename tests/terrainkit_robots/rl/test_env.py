@@ -4,10 +4,7 @@ import torch
 from vec_env_contract import VecEnvContract
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots.rl.checkpoint import save_checkpoint
-from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import MapGround, Plane
-from terrainkit_robots.rl.task import (
+from terrainkit_robots.rl.config import (
     Commands,
     Control,
     DomainRand,
@@ -17,6 +14,9 @@ from terrainkit_robots.rl.task import (
     Termination,
     Terrain,
 )
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.run import save_checkpoint
+from terrainkit_robots.rl.terrain import MapTerrain, Plane
 
 SHORT = Env(num_envs=5, num_threads=1, episode_length_s=0.4)
 
@@ -97,8 +97,8 @@ class TestObservations:
     ):
         # The ground has a mass too: thousands of tons.
         env = LeggedEnv(calm(), quadruped, map_ground if on_map else Plane())
-        env.careers.levels[:] = 0
-        env.begin_all()
+        env.curriculum.levels[:] = 0
+        env.reset()
         for _ in range(50):
             observed, *_ = still(env)
         up = observed["privileged"][:, -12:].reshape(4, 4, 3)[..., 2]
@@ -135,12 +135,12 @@ class TestEndings:
 
     @pytest.mark.parametrize("how", ["back", "side", "outside", "velocity", "position"])
     def test_falls_end_an_episode_and_only_their_own(self, quadruped, calm, mixed_map, how):
-        env = LeggedEnv(calm(4), quadruped, MapGround(mixed_map))
-        twin = LeggedEnv(calm(4), quadruped, MapGround(mixed_map))
+        env = LeggedEnv(calm(4), quadruped, MapTerrain(mixed_map))
+        twin = LeggedEnv(calm(4), quadruped, MapTerrain(mixed_map))
         for each in (env, twin):
             for _ in range(5):
                 still(each)
-        qpos, qvel = env.physics.qpos[2], env.physics.qvel[2]
+        qpos, qvel = env.sim.qpos[2], env.sim.qvel[2]
         if how == "back":
             qpos[3:7] = (0, 1, 0, 0)
             qpos[2] += 1
@@ -165,19 +165,19 @@ class TestEndings:
             assert torch.isfinite(observed[name]).all()
             assert torch.equal(observed[name][others], expected[name][others])
         assert torch.equal(rewards[others], expected_rewards[others])
-        np.testing.assert_array_equal(env.physics.qpos[others], twin.physics.qpos[others])
+        np.testing.assert_array_equal(env.sim.qpos[others], twin.physics.qpos[others])
 
     def test_tilt_counts_from_its_limit(self, quadruped, calm):
         env = LeggedEnv(calm(3, termination=Termination(tilt=0.5)), quadruped, Plane())
         for k, tilt in enumerate((0.0, 0.45, 0.55)):
-            env.physics.qpos[k, 2] = 2.0
-            env.physics.qpos[k, 3:7] = (np.cos(tilt / 2), 0, np.sin(tilt / 2), 0)
+            env.sim.qpos[k, 2] = 2.0
+            env.sim.qpos[k, 3:7] = (np.cos(tilt / 2), 0, np.sin(tilt / 2), 0)
         _, _, dones, _ = still(env)
         assert dones.tolist() == [False, False, True]
 
     def test_the_base_on_the_ground_is_a_fall(self, quadruped, calm):
         env = LeggedEnv(calm(2, termination=Termination(tilt=3.1)), quadruped, Plane())
-        env.physics.qpos[1, 2:7] = (0.06, 0, 1, 0, 0)
+        env.sim.qpos[1, 2:7] = (0.06, 0, 1, 0, 0)
         fell = []
         for _ in range(10):
             _, _, dones, extras = still(env)
@@ -190,7 +190,7 @@ class TestEndings:
     def test_bad_states_are_falls_every_time(self, quadruped, calm):
         env = LeggedEnv(calm(3), quadruped, Plane())
         for value in (np.nan, 1e12, np.nan, 1e9, np.inf):
-            env.physics.qvel[1, 7] = value
+            env.sim.qvel[1, 7] = value
             _, rewards, dones, _ = still(env)
             assert dones.tolist() == [False, True, False], value
             assert torch.isfinite(rewards).all()
@@ -198,7 +198,7 @@ class TestEndings:
     def test_a_bad_state_is_paid_for_the_fall_alone(self, quadruped, calm):
         # What is seen of it is the pose of MuJoCo's reset, in which nothing is asked too much.
         env = LeggedEnv(calm(3, rewards=Rewards(termination=-3.0)), quadruped, Plane())
-        env.physics.qvel[1, 7] = np.nan
+        env.sim.qvel[1, 7] = np.nan
         _, rewards, dones, extras = still(env)
         assert dones.tolist() == [False, True, False]
         assert rewards[1] == pytest.approx(-3 * 0.02)
@@ -210,18 +210,18 @@ class TestEndings:
     def test_a_bad_state_is_no_progress_in_the_curriculum(self, quadruped, calm, map_ground):
         # MuJoCo puts it at the world's origin, far from where the robot was.
         env = LeggedEnv(calm(4), quadruped, map_ground)
-        env.careers.levels[:] = 1
-        env.begin_all()
-        env.physics.qvel[2, 7] = np.nan
+        env.curriculum.levels[:] = 1
+        env.reset()
+        env.sim.qvel[2, 7] = np.nan
         _, _, dones, _ = still(env)
         assert dones.tolist() == [False, False, True, False]
-        assert env.careers.levels[2] <= 1
-        assert np.nansum(env.careers.success) == 0
+        assert env.curriculum.levels[2] <= 1
+        assert np.nansum(env.curriculum.success) == 0
 
     def test_a_fall_costs_what_the_task_says(self, quadruped, calm):
         task = calm(2, rewards=Rewards(termination=-100.0, only_positive_rewards=True))
         env = LeggedEnv(task, quadruped, Plane())
-        env.physics.qpos[1, 2:7] = (1.0, 0, 1, 0, 0)
+        env.sim.qpos[1, 2:7] = (1.0, 0, 1, 0, 0)
         _, rewards, dones, _ = still(env)
         assert dones.tolist() == [False, True]
         assert rewards[0] >= 0
@@ -230,7 +230,7 @@ class TestEndings:
     def test_who_falls_in_the_last_step_has_fallen(self, quadruped, calm):
         env = LeggedEnv(calm(2), quadruped, Plane())
         env.episode_length_buf = torch.tensor([999, 999])
-        env.physics.qpos[1, 2:7] = (1.0, 0, 1, 0, 0)
+        env.sim.qpos[1, 2:7] = (1.0, 0, 1, 0, 0)
         _, _, dones, extras = still(env)
         assert dones.all()
         assert extras["time_outs"].tolist() == [True, False]
@@ -351,8 +351,8 @@ class TestGoingOn:
         self, quadruped, lively, map_ground
     ):
         env = LeggedEnv(lively(4), quadruped, map_ground)
-        env.careers.levels[:] = 2
-        env.orders.lin_vel_x = (-1.3, 1.3)
+        env.curriculum.levels[:] = 2
+        env.velocity_command.lin_vel_x = (-1.3, 1.3)
         other = LeggedEnv(lively(7), quadruped, map_ground)
         other.load_state_dict(env.state_dict())
         assert (other.careers.levels == 2).all()
@@ -388,7 +388,7 @@ class TestHeldCommands:
     def test_are_asked_for_all_the_time(self, quadruped, lively):
         task = lively(commands=Commands(resampling_time=0.04))
         env = LeggedEnv(task, quadruped, Plane())
-        env.hold_commands(self.HELD)
+        env.set_commands(self.HELD)
         for _ in range(10):
             observed = env.get_observations()["policy"][:, :3] / torch.tensor([2, 2, 0.25])
             np.testing.assert_allclose(observed, self.HELD, atol=1e-6)
@@ -397,21 +397,21 @@ class TestHeldCommands:
 
     def test_also_of_episodes_that_begin(self, quadruped, lively):
         env = LeggedEnv(lively(), quadruped, Plane())
-        env.hold_commands(self.HELD)
-        env.begin_all()
+        env.set_commands(self.HELD)
+        env.reset()
         np.testing.assert_allclose(env.commands, self.HELD)
         np.testing.assert_allclose(env.state.commands, self.HELD)
 
     def test_until_they_are_let_go(self, quadruped, lively):
         env = LeggedEnv(lively(commands=Commands(standing=0.0)), quadruped, Plane())
-        env.hold_commands(self.HELD)
-        env.hold_commands(None)
+        env.set_commands(self.HELD)
+        env.set_commands(None)
         assert (env.commands[:, :2] != self.HELD[:, :2]).any(axis=1).all()
         np.testing.assert_array_equal(env.state.commands, env.commands)
         observed = env.get_observations()["policy"][:, :3] / torch.tensor([2, 2, 0.25])
         np.testing.assert_allclose(observed, env.commands, atol=1e-6)
         drawn = env.commands.copy()
-        env.hold_commands(None)  # there is nothing to let go
+        env.set_commands(None)  # there is nothing to let go
         still(env)
         np.testing.assert_array_equal(env.commands, drawn)
 
@@ -419,20 +419,20 @@ class TestHeldCommands:
 class TestBeginning:
     def test_everyone_begins_where_they_are_put(self, quadruped, calm, map_ground):
         env = LeggedEnv(calm(6), quadruped, map_ground)
-        env.careers.levels[:] = [0, 1, 2, 0, 1, 2]
-        env.careers.columns[:] = [0, 0, 0, 1, 1, 1]
+        env.curriculum.levels[:] = [0, 1, 2, 0, 1, 2]
+        env.curriculum.columns[:] = [0, 0, 0, 1, 1, 1]
         for _ in range(3):
             still(env)
-        env.begin_all()
+        env.reset()
         assert (env.episode_length_buf == 0).all()
-        expected = map_ground.env_origins[env.careers.levels, env.careers.columns]
+        expected = map_ground.env_origins[env.curriculum.levels, env.curriculum.columns]
         np.testing.assert_allclose(env.state.base_pos[:, :2], expected[:, :2], atol=1e-5)
         np.testing.assert_allclose(env.state.base_pos[:, 2] - expected[:, 2], 0.346, atol=0.07)
 
     def test_robots_start_no_higher_than_they_may(self, quadruped, calm, map_ground):
         env = LeggedEnv(calm(50), quadruped, map_ground)
-        assert env.careers.levels.max() <= 2
+        assert env.curriculum.levels.max() <= 2
 
     def test_the_first_level_is_the_tasks(self, quadruped, calm, map_ground):
         env = LeggedEnv(calm(50, terrain=Terrain(max_init_level=0)), quadruped, map_ground)
-        assert (env.careers.levels == 0).all()
+        assert (env.curriculum.levels == 0).all()

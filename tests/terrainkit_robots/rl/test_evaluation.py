@@ -14,8 +14,8 @@ from terrainkit_robots.policy.evaluate import (
     forward_command,
     prepared,
 )
-from terrainkit_robots.rl.run_folder import open_run
-from terrainkit_robots.rl.task import Algorithm, Commands, DomainRand, Runner, Task, Terrain
+from terrainkit_robots.rl.config import Algorithm, Commands, DomainRand, Runner, Task, Terrain
+from terrainkit_robots.rl.run import open_run
 
 
 def test_nothing_of_a_robot_is_random_in_an_evaluation():
@@ -46,10 +46,10 @@ def test_a_task_of_ones_own_stays_one():
 
 def test_robots_are_as_their_model(run_of):
     env, _ = prepared(run_of(domain_rand=DomainRand(joint_offset=0.1)), Asked(num_envs=3))
-    assert not env.differences.added_mass.any()
-    assert not env.differences.com_shift.any()
+    assert not env.params.added_mass.any()
+    assert not env.params.com_shift.any()
     assert not env.joint_offset.any()
-    assert (env.differences.strength == 1).all()
+    assert (env.params.strength == 1).all()
     np.testing.assert_allclose(
         env.state.dof_pos, np.tile(env.robot.default_pose, (3, 1)), atol=1e-6
     )
@@ -87,15 +87,19 @@ def test_on_a_plane_each_command_has_a_robot(run_of):
 
 def test_on_a_map_each_patch_has_equally_many_robots(run_of, map_file):
     env, commands = prepared(run_of(map_file), Asked(num_envs=12))
-    patches = list(zip(env.careers.levels.tolist(), env.careers.columns.tolist(), strict=True))
+    patches = list(
+        zip(env.curriculum.levels.tolist(), env.curriculum.columns.tolist(), strict=True)
+    )
     assert sorted(patches) == sorted([(row, col) for row in range(3) for col in range(2)] * 2)
-    near = env.ground.env_origins[env.careers.levels, env.careers.columns]
+    near = env.terrain.env_origins[env.curriculum.levels, env.curriculum.columns]
     assert np.abs(env.state.base_pos - near)[:, :2].max() <= env.cfg.init_state.position + 1e-5
     assert (commands == forward_command(env.cfg.commands)).all()
     env, _ = prepared(run_of(map_file), Asked(), each=3)
     assert env.num_envs == 18
     env, _ = prepared(run_of(map_file), Asked(num_envs=4))
-    patches = list(zip(env.careers.levels.tolist(), env.careers.columns.tolist(), strict=True))
+    patches = list(
+        zip(env.curriculum.levels.tolist(), env.curriculum.columns.tolist(), strict=True)
+    )
     assert len(set(patches)) == 4
 
 
@@ -111,7 +115,7 @@ def test_the_policy_sees_as_much_as_in_training(run_of, map_file):
         asked = Asked(num_envs=1, terrain=None if terrain is None else str(terrain))
         env, _ = prepared(run, asked)
         assert env.get_observations()["policy"].shape == (1, width)
-        assert env.ground.level == (terrain in ("plane", None))
+        assert env.terrain.is_flat == (terrain in ("plane", None))
 
 
 @pytest.mark.parametrize(
@@ -151,7 +155,7 @@ def test_a_map_that_is_left_flat_may_be_another_or_gone(run_of, map_file):
     (run.folder / "map.toml").unlink()
     map_file.write_text("gone")
     env, _ = prepared(run, Asked(num_envs=1))
-    assert env.ground.level
+    assert env.terrain.is_flat
 
 
 def test_a_run_without_a_checkpoint_is_an_error(run_of):

@@ -5,9 +5,9 @@ import pytest
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError, TerrainkitError
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.rl.config import InitState
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import HeightGrid, MapGround, Plane, ScannedGround, read_ground
-from terrainkit_robots.rl.task import InitState
+from terrainkit_robots.rl.terrain import HeightGrid, MapTerrain, ModelTerrain, Plane, load_terrain
 
 EXACT = 1e-3
 
@@ -48,7 +48,7 @@ def scanned(tmp_path_factory):
           </worldbody>
         </mujoco>
     """)
-    return ScannedGround(path, cell=0.02, reach=1.5)
+    return ModelTerrain(path, cell=0.02, reach=1.5)
 
 
 class TestHeightGrid:
@@ -90,7 +90,7 @@ class TestMapGround:
     @pytest.mark.parametrize("collision", ["hfield", "boxes", "auto"])
     def test_is_as_high_as_what_mujoco_collides_with(self, terrain_map, collision):
         # Two of its patches are stairs and obstacles, one is rough: boxes beside a heightfield.
-        ground = MapGround(terrain_map, collision)
+        ground = MapTerrain(terrain_map, collision)
         xy = anywhere(ground, 4000)
         found = ground.height(xy[:, 0], xy[:, 1])
         off = np.abs(found - rays(compiled(ground), xy))
@@ -99,7 +99,7 @@ class TestMapGround:
 
     @pytest.mark.parametrize("collision", ["hfield", "boxes", "auto"])
     def test_and_so_where_all_ground_is_level(self, level_map, collision):
-        ground = MapGround(level_map, collision)
+        ground = MapTerrain(level_map, collision)
         xy = anywhere(ground, 2000, seed=1)
         found = ground.height(xy[:, 0], xy[:, 1])
         off = np.abs(found - rays(compiled(ground), xy))
@@ -107,7 +107,7 @@ class TestMapGround:
 
     def test_boxes_are_level_up_to_their_walls(self, level_map):
         # All ground is level, so each point is as high as the sample that it is nearest to.
-        ground = MapGround(level_map, "boxes")
+        ground = MapTerrain(level_map, "boxes")
         xy = anywhere(ground, 2000, seed=2)
         cell, (x, y) = level_map.grid.cell, level_map.first_sample
         nearest = np.rint((xy - (x, y)) / cell).astype(int)
@@ -123,13 +123,13 @@ class TestMapGround:
         )
 
     def test_tells_its_rows_columns_and_size(self, mixed_map):
-        ground = MapGround(mixed_map)
+        ground = MapTerrain(mixed_map)
         assert ground.env_origins.shape == (3, 2, 3)
         assert ground.terrain_names.tolist() == [["stairs", "rough_slope"]] * 3
         assert ground.patch_length == 6.0
         np.testing.assert_allclose(ground.lower, (-1.2, -1.2))
         np.testing.assert_allclose(ground.upper, (3 * 6 + 1.2, 2 * 4 + 1.2))
-        assert not ground.level
+        assert not ground.is_flat
 
     def test_knows_the_terrain_of_each_patch_of_a_randomized_map(self):
         choices = tuple(SubTerrain(terrain=name) for name in ("flat", "stairs"))
@@ -137,7 +137,7 @@ class TestMapGround:
             mode="randomized", rows=4, cols=3, patch_size=(4, 4), border=0.5, terrains=choices
         )
         terrain_map = generate(config)
-        ground = MapGround(terrain_map)
+        ground = MapTerrain(terrain_map)
         assert ground.terrain_names.shape == (4, 3)
         assert len({tuple(row) for row in ground.terrain_names}) > 1  # or nothing is told apart
         for row in range(4):
@@ -189,7 +189,7 @@ class TestScannedGround:
         path.write_text(
             '<mujoco><worldbody><geom type="box" size=".5 .5 .1"/></worldbody></mujoco>'
         )
-        ground = ScannedGround(path, cell=0.1, reach=1.0)
+        ground = ModelTerrain(path, cell=0.1, reach=1.0)
         found = ground.height(np.float32([0, 0.9]), np.float32([0, 0]))
         np.testing.assert_allclose(found, [0.1, 0.1 - 10], atol=1e-6)
 
@@ -202,7 +202,7 @@ class TestScannedGround:
             f'<geom type="plane" size="0 0 1" euler="{turn}" pos="{x} 0 0"/>'
             "</worldbody></mujoco>"
         )
-        ground = ScannedGround(path, cell=1.0, reach=12.0)
+        ground = ModelTerrain(path, cell=1.0, reach=12.0)
         corners = np.float32([[-12, -12], [-12, 12], [12, -12], [12, 12]])
         found = ground.height(corners[:, 0], corners[:, 1])
         np.testing.assert_allclose(found, rays(compiled(ground), corners), atol=1e-4)
@@ -230,7 +230,7 @@ class TestScannedGround:
         path = tmp_path / "ground.xml"
         path.write_text(text)
         with pytest.raises(ConfigError, match=message) as caught:
-            ScannedGround(path, cell=0.1, reach=0.5)
+            ModelTerrain(path, cell=0.1, reach=0.5)
         assert "\n" not in str(caught.value)
         assert not (tmp_path / "MUJOCO_LOG.TXT").exists()
 
@@ -242,7 +242,7 @@ class TestScannedGround:
             '<geom type="plane" size="5 5 0.1" pos="0 0 -1"/>'
             '<geom type="box" size="0.5 0.5 3"/></worldbody></mujoco>'
         )
-        ground = ScannedGround(path, cell=0.1, reach=0.5)
+        ground = ModelTerrain(path, cell=0.1, reach=0.5)
         np.testing.assert_allclose(ground.env_origins[0, 0], [0, 0, 3], atol=1e-6)
 
     def test_what_is_only_seen_is_no_ground(self, tmp_path):
@@ -252,7 +252,7 @@ class TestScannedGround:
             '<geom type="box" size="3 3 0.1" pos="0 0 0.5" contype="0" conaffinity="0"/>'
             "</worldbody></mujoco>"
         )
-        ground = ScannedGround(path, cell=0.1, reach=0.5)
+        ground = ModelTerrain(path, cell=0.1, reach=0.5)
         np.testing.assert_allclose(ground.env_origins[0, 0], [0, 0, 0], atol=1e-6)
 
     def test_what_is_only_touched_is_ground(self, tmp_path):
@@ -262,7 +262,7 @@ class TestScannedGround:
             '<mujoco><worldbody><geom type="plane" size="5 5 0.1" pos="0 0 -1"/>'
             '<geom type="box" size="3 3 0.1" rgba="1 1 1 0"/></worldbody></mujoco>'
         )
-        ground = ScannedGround(path, cell=0.1, reach=0.5)
+        ground = ModelTerrain(path, cell=0.1, reach=0.5)
         np.testing.assert_allclose(ground.env_origins[0, 0], [0, 0, 0.1], atol=1e-6)
 
 
@@ -272,10 +272,10 @@ class TestReadGround:
         (tmp_path / "slab.xml").write_text(
             '<mujoco><worldbody><geom type="plane" size="1 1 1"/></worldbody></mujoco>'
         )
-        assert isinstance(read_ground("plane"), Plane)
-        assert isinstance(read_ground(tmp_path / "map.npz"), MapGround)
-        assert isinstance(read_ground(str(tmp_path / "map.npz")), MapGround)
-        assert isinstance(read_ground(tmp_path / "map.npz", "plane"), Plane)
+        assert isinstance(load_terrain("plane"), Plane)
+        assert isinstance(load_terrain(tmp_path / "map.npz"), MapTerrain)
+        assert isinstance(load_terrain(str(tmp_path / "map.npz")), MapTerrain)
+        assert isinstance(load_terrain(tmp_path / "map.npz", "plane"), Plane)
 
     def test_the_config_of_a_map_gives_the_same_ground(self, tmp_path):
         config = tmp_path / "map.toml"
@@ -283,7 +283,7 @@ class TestReadGround:
             "rows = 1\ncols = 1\npatch_size = [4.0, 3.0]\nborder = 0.5\nseed = 3\n"
             '[[terrains]]\nterrain = "rough"\n'
         )
-        first, second = read_ground(config), read_ground(config)
+        first, second = load_terrain(config), load_terrain(config)
         xy = anywhere(first, 100)
         np.testing.assert_array_equal(
             first.height(xy[:, 0], xy[:, 1]), second.height(xy[:, 0], xy[:, 1])
@@ -306,7 +306,7 @@ class TestReadGround:
         (tmp_path / "folder.xml").mkdir()
         source = tmp_path / name if "." in name else name
         with pytest.raises(TerrainkitError, match=message) as caught:
-            read_ground(source)
+            load_terrain(source)
         assert "\n" not in str(caught.value)
 
 
@@ -317,37 +317,37 @@ class TestHeightScan:
         points = env.cfg.terrain
         x, y = np.meshgrid(points.measured_points_x, points.measured_points_y, indexing="ij")
         x, y = x.ravel(), y.ravel()
-        base = env.physics.qpos[0]
+        base = env.sim.qpos[0]
         # To the left of where it heads is a quarter of a turn further.
         at = base[:2] + np.column_stack(
             [x * np.cos(yaw) - y * np.sin(yaw), x * np.sin(yaw) + y * np.cos(yaw)]
         )
         only_ground = np.array([1, 0, 0, 0, 0, 0], np.uint8)
-        return base[2] - rays(compiled(env.ground), at, only_ground)
+        return base[2] - rays(compiled(env.terrain), at, only_ground)
 
     @pytest.mark.parametrize("yaw", [0.0, 0.7, 2.5, -1.6])
     @pytest.mark.parametrize("tilt", [0.0, 0.2])
     def test_is_what_rays_see_and_turns_with_the_robot(self, quadruped, calm, mixed_map, yaw, tilt):
-        env = LeggedEnv(calm(1, init_state=InitState(position=0)), quadruped, MapGround(mixed_map))
+        env = LeggedEnv(calm(1, init_state=InitState(position=0)), quadruped, MapTerrain(mixed_map))
         quat = np.zeros(4)
         turn = np.array([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)])
         pitch = np.array([np.cos(tilt / 2), 0, np.sin(tilt / 2), 0])
         mujoco.mju_mulQuat(quat, turn, pitch)
-        env.physics.qpos[0, :2] += (0.83, 0.41)
-        env.physics.qpos[0, 3:7] = quat
+        env.sim.qpos[0, :2] += (0.83, 0.41)
+        env.sim.qpos[0, 3:7] = quat
         state = env._look(np.arange(1))
         assert state.height_scan.shape == (1, 187)
         np.testing.assert_allclose(state.height_scan[0], self.cast(env, yaw), atol=EXACT)
         assert np.ptp(state.height_scan) > 0.05
 
     def test_base_height_is_that_above_the_ground_below(self, quadruped, calm, mixed_map):
-        env = LeggedEnv(calm(6), quadruped, MapGround(mixed_map))
-        env.physics.qpos[:, :2] += np.random.default_rng(0).uniform(-1, 1, (6, 2))
+        env = LeggedEnv(calm(6), quadruped, MapTerrain(mixed_map))
+        env.sim.qpos[:, :2] += np.random.default_rng(0).uniform(-1, 1, (6, 2))
         state = env._look(np.arange(6))
         under = rays(
-            compiled(env.ground), env.physics.qpos[:, :2], np.array([1, 0, 0, 0, 0, 0], np.uint8)
+            compiled(env.terrain), env.sim.qpos[:, :2], np.array([1, 0, 0, 0, 0, 0], np.uint8)
         )
-        np.testing.assert_allclose(state.base_height, env.physics.qpos[:, 2] - under, atol=EXACT)
+        np.testing.assert_allclose(state.base_height, env.sim.qpos[:, 2] - under, atol=EXACT)
 
     def test_is_left_out_on_a_plane_unless_asked_for(self, quadruped, calm):
         env = LeggedEnv(calm(1), quadruped, Plane())

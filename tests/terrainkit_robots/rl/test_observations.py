@@ -10,12 +10,17 @@ import torch
 from made_states import made_state, shapes
 
 from terrainkit_robots.description import bundled
+from terrainkit_robots.rl.config import Env, Noise, Normalization, ObsScales, Task, Terrain
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.observations import Observation, observe, policy_group, privileged_group
-from terrainkit_robots.rl.robot import Robot, read_robot
+from terrainkit_robots.rl.observations import (
+    ObservationTerm,
+    compute_observations,
+    policy_group,
+    privileged_group,
+)
+from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.state import State
-from terrainkit_robots.rl.task import Env, Noise, Normalization, ObsScales, Task, Terrain
+from terrainkit_robots.rl.terrain import Plane
 
 torch.set_num_threads(1)
 
@@ -50,28 +55,28 @@ def state(n: int = 1, **arrays: Any) -> State:
 
 @pytest.fixture(scope="module")
 def robot() -> Robot:
-    return read_robot(Path(str(bundled.find("quadruped"))).parent)
+    return Robot.load(Path(str(bundled.find("quadruped"))).parent)
 
 
-def group_of(robot: Robot, task: Task | None = None) -> tuple[Observation, ...]:
+def group_of(robot: Robot, task: Task | None = None) -> tuple[ObservationTerm, ...]:
     return policy_group(robot, task or Task(), scan=True)
 
 
-def privileged_of(robot: Robot, task: Task | None = None) -> tuple[Observation, ...]:
+def privileged_of(robot: Robot, task: Task | None = None) -> tuple[ObservationTerm, ...]:
     return privileged_group(robot, task or Task(), scan=True, weight=100.0)
 
 
-def observed(group: tuple[Observation, ...], name: str, given: State) -> list[float]:
+def observed(group: tuple[ObservationTerm, ...], name: str, given: State) -> list[float]:
     """Return what one observation adds to its group, without noise."""
     [only] = [each for each in group if each.name == name]
-    values: list[float] = observe([only], given, 100.0)[0].tolist()
+    values: list[float] = compute_observations([only], given, 100.0)[0].tolist()
     return values
 
 
-def slices(group: tuple[Observation, ...], given: State) -> dict[str, slice]:
+def slices(group: tuple[ObservationTerm, ...], given: State) -> dict[str, slice]:
     found, start = {}, 0
     for each in group:
-        stop = start + each.read(given).shape[1]
+        stop = start + each.function(given).shape[1]
         found[each.name], start = slice(start, stop), stop
     return found
 
@@ -162,14 +167,16 @@ class TestByHand:
 class TestGroups:
     def test_policy_is_what_the_task_table_says(self, robot: Robot) -> None:
         group = group_of(robot)
-        found = [(each.name, each.read(state()).shape[1]) for each in group]
+        found = [(each.name, each.function(state()).shape[1]) for each in group]
         assert found == _TASK_TABLE
-        assert observe(group, state(2), 100.0).shape == (2, 232)
-        assert observe(policy_group(robot, Task(), scan=False), state(2), 100.0).shape == (2, 45)
+        assert compute_observations(group, state(2), 100.0).shape == (2, 232)
+        assert compute_observations(
+            policy_group(robot, Task(), scan=False), state(2), 100.0
+        ).shape == (2, 45)
 
     def test_privileged_is_the_policys_and_more(self, robot: Robot) -> None:
         group = privileged_of(robot)
-        found = [(each.name, each.read(state()).shape[1]) for each in group]
+        found = [(each.name, each.function(state()).shape[1]) for each in group]
         assert found == _TASK_TABLE + _SECRETS
 
     def test_scales_of_the_task(self, robot: Robot) -> None:
@@ -179,7 +186,7 @@ class TestGroups:
             commands=1, base_lin_vel=1, base_ang_vel=1, dof_vel=1, dof_pos=robot.default_pose + 1
         )
         given.height_scan[:] = 1.5
-        seen = observe(privileged_of(robot, task), given, 100.0)[0]
+        seen = compute_observations(privileged_of(robot, task), given, 100.0)[0]
         here = slices(privileged_of(robot), given)
         assert seen[here["commands"]].tolist() == [3, 3, 5]
         assert seen[here["base_ang_vel"]].tolist() == [5] * 3
@@ -190,13 +197,13 @@ class TestGroups:
 
     def test_clip(self, robot: Robot) -> None:
         given = state(dof_vel=[[1e6, -1e6, 30, *[0] * 9]])
-        seen = observe(group_of(robot), given, 1.25)
+        seen = compute_observations(group_of(robot), given, 1.25)
         assert seen[0, 21:24].tolist() == [1.25, -1.25, 1.25]
         assert np.abs(seen).max() == 1.25
 
     def test_state_is_left_as_it_is(self, robot: Robot) -> None:
         given, twin = state(3, commands=2, height_scan=2), state(3, commands=2, height_scan=2)
-        seen = observe(privileged_of(robot), given, 100.0)
+        seen = compute_observations(privileged_of(robot), given, 100.0)
         seen += 1
         for each in fields(State):
             np.testing.assert_array_equal(getattr(given, each.name), getattr(twin, each.name))
@@ -218,7 +225,9 @@ class TestNoise:
         group = group_of(robot, Task(noise=Noise(noise_level=level)))
         given = state(4000, projected_gravity=[0, 0, -1], dof_pos=robot.default_pose)
         given.height_scan[:] = 0.5
-        off = observe(group, given, 100.0, np.random.default_rng(0)) - observe(group, given, 100.0)
+        off = compute_observations(
+            group, given, 100.0, np.random.default_rng(0)
+        ) - compute_observations(group, given, 100.0)
         for name, here in slices(group, given).items():
             drawn = off[:, here]
             most = level * _NOISE.get(name, 0.0)
@@ -250,8 +259,8 @@ class TestNoise:
     def test_level_of_zero_is_none(self, robot: Robot) -> None:
         group = group_of(robot, Task(noise=Noise(noise_level=0)))
         rng = np.random.default_rng(0)
-        seen = observe(group, state(5), 100.0, rng)
-        np.testing.assert_array_equal(seen, observe(group, state(5), 100.0))
+        seen = compute_observations(group, state(5), 100.0, rng)
+        np.testing.assert_array_equal(seen, compute_observations(group, state(5), 100.0))
         # And nothing was drawn in vain.
         assert rng.bit_generator.state == np.random.default_rng(0).bit_generator.state
 
@@ -260,13 +269,13 @@ class TestNoise:
 
     def test_comes_before_the_clip(self, robot: Robot) -> None:
         group = group_of(robot, Task(noise=Noise(dof_vel=1e6)))
-        seen = observe(group, state(50), 2.0, np.random.default_rng(0))
+        seen = compute_observations(group, state(50), 2.0, np.random.default_rng(0))
         assert np.abs(seen).max() == 2.0
 
 
 class TestEnvironment:
     def make(self, **changes: Any) -> LeggedEnv:
-        robot = read_robot(Path(str(bundled.find("quadruped"))).parent)
+        robot = Robot.load(Path(str(bundled.find("quadruped"))).parent)
         task = replace(Task(env=Env(num_envs=3, num_threads=1)), **changes)
         return LeggedEnv(task, robot, Plane())
 
@@ -306,12 +315,12 @@ class TestEnvironment:
     def test_known_state_by_hand(self) -> None:
         """Standing upright at the default pose and told 1, 0, 0.5 it sees just this."""
         env = self.make(noise=Noise(noise_level=0.0))
-        env.hold_commands(np.tile(np.array([1, 0, 0.5], np.float32), (3, 1)))
+        env.set_commands(np.tile(np.array([1, 0, 0.5], np.float32), (3, 1)))
         env.joint_offset[:] = 0
-        env.physics.qpos[:] = env.scene.home
-        env.physics.qpos[:, 2] = 0.4
-        env.physics.qvel[:] = 0
-        env.physics.qvel[:, 6 + 2] = 2.0
+        env.sim.qpos[:] = env.scene.home
+        env.sim.qpos[:, 2] = 0.4
+        env.sim.qvel[:] = 0
+        env.sim.qvel[:, 6 + 2] = 2.0
         env.actions[0] = 0.25
         env.state = env._look(np.arange(3), fresh=True)
         seen = env._observe()["policy"][0]

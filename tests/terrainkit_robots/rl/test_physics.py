@@ -6,121 +6,121 @@ import pytest
 import torch
 
 from terrainkit.errors import ConfigError
+from terrainkit_robots.rl.config import DomainRand
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import MapGround, Plane
-from terrainkit_robots.rl.physics import Physics
-from terrainkit_robots.rl.randomization import Differences
+from terrainkit_robots.rl.events import RandomizedParams
 from terrainkit_robots.rl.scene import build_scene
-from terrainkit_robots.rl.task import DomainRand
+from terrainkit_robots.rl.simulation import Simulation
+from terrainkit_robots.rl.terrain import MapTerrain, Plane
 
 
 @pytest.fixture
-def physics(cart, calm):
+def sim(cart, calm):
     scene = build_scene(cart, Plane(), calm())
-    physics = Physics(scene, 3, 1)
+    sim = Simulation(scene, 3, 1)
     start = np.tile(scene.home, (3, 1))
     start[:, 2] = [0.3, 0.5, 0.7]
-    physics.reset(np.arange(3), start, np.zeros((3, scene.model.nv)))
-    return physics
+    sim.reset(np.arange(3), start, np.zeros((3, scene.model.nv)))
+    return sim
 
 
 class TestStepping:
-    def test_is_mujocos_own(self, physics):
-        model = physics.scene.model
+    def test_is_mujocos_own(self, sim):
+        model = sim.scene.model
         data = mujoco.MjData(model)
-        data.qpos[:] = physics.qpos[1]
+        data.qpos[:] = sim.qpos[1]
         for _ in range(5):
-            physics.ctrl[:] = 0.1
-            physics.step(4)
+            sim.ctrl[:] = 0.1
+            sim.step(4)
             data.ctrl[:] = 0.1
             for _ in range(4):
                 mujoco.mj_step(model, data)
-        np.testing.assert_array_equal(physics.qpos[1], data.qpos)
-        np.testing.assert_array_equal(physics.qvel[1], data.qvel)
+        np.testing.assert_array_equal(sim.qpos[1], data.qpos)
+        np.testing.assert_array_equal(sim.qvel[1], data.qvel)
 
-    def test_sensors_are_those_of_the_state_now(self, physics):
-        physics.step(4)
-        data = mujoco.MjData(physics.scene.model)
-        data.qpos[:], data.qvel[:] = physics.qpos[2], physics.qvel[2]
-        mujoco.mj_forward(physics.scene.model, data)
+    def test_sensors_are_those_of_the_state_now(self, sim):
+        sim.step(4)
+        data = mujoco.MjData(sim.scene.model)
+        data.qpos[:], data.qvel[:] = sim.qpos[2], sim.qvel[2]
+        mujoco.mj_forward(sim.scene.model, data)
         for name in ("foot_position", "foot_velocity"):
-            where = physics.scene.blocks[name]
-            found = physics.block(name)[2].ravel()
+            where = sim.scene.sensors[name]
+            found = sim.sensor(name)[2].ravel()
             np.testing.assert_allclose(found, data.sensordata[where], atol=1e-5)
 
-    def test_simulations_know_nothing_of_each_other(self, physics):
-        physics.step(10)
-        heights = physics.qpos[:, 2].copy()
+    def test_simulations_know_nothing_of_each_other(self, sim):
+        sim.step(10)
+        heights = sim.qpos[:, 2].copy()
         assert heights[0] < heights[1] < heights[2]
 
-    def test_blocks_are_copies(self, physics):
-        before = physics.block("foot_position")
+    def test_blocks_are_copies(self, sim):
+        before = sim.sensor("foot_position")
         kept = before.copy()
-        physics.step(10)
+        sim.step(10)
         np.testing.assert_array_equal(before, kept)
-        assert not np.allclose(physics.block("foot_position"), kept)
+        assert not np.allclose(sim.sensor("foot_position"), kept)
 
-    def test_some_can_begin_anew(self, physics):
-        physics.step(10)
-        untouched = physics.qpos[[0, 2]].copy()
-        start = physics.scene.home.copy()
+    def test_some_can_begin_anew(self, sim):
+        sim.step(10)
+        untouched = sim.qpos[[0, 2]].copy()
+        start = sim.scene.home.copy()
         start[:3] = (1, 2, 3)
-        physics.ctrl[:] = 0.3
-        physics.reset(np.array([1]), start[None], np.full((1, physics.scene.model.nv), 0.1))
-        np.testing.assert_array_equal(physics.qpos[1], start)
-        np.testing.assert_array_equal(physics.qvel[1], 0.1)
-        np.testing.assert_array_equal(physics.ctrl[1], 0)
-        np.testing.assert_array_equal(physics.qpos[[0, 2]], untouched)
+        sim.ctrl[:] = 0.3
+        sim.reset(np.array([1]), start[None], np.full((1, sim.scene.model.nv), 0.1))
+        np.testing.assert_array_equal(sim.qpos[1], start)
+        np.testing.assert_array_equal(sim.qvel[1], 0.1)
+        np.testing.assert_array_equal(sim.ctrl[1], 0)
+        np.testing.assert_array_equal(sim.qpos[[0, 2]], untouched)
 
 
 class TestBadStates:
     @pytest.mark.parametrize("value", [np.nan, np.inf, 1e12, -1e12])
     @pytest.mark.parametrize("field", ["qvel", "qpos"])
-    def test_are_told(self, physics, field, value):
-        getattr(physics, field)[1, 7] = value
-        assert physics.step(4).tolist() == [False, True, False]
-        assert np.isfinite(physics.qpos).all()
+    def test_are_told(self, sim, field, value):
+        getattr(sim, field)[1, 7] = value
+        assert sim.step(4).tolist() == [False, True, False]
+        assert np.isfinite(sim.qpos).all()
 
-    def test_controls_that_are_no_numbers_are_told(self, physics):
-        physics.ctrl[2, 0] = np.nan
-        assert physics.step(4).tolist() == [False, False, True]
+    def test_controls_that_are_no_numbers_are_told(self, sim):
+        sim.ctrl[2, 0] = np.nan
+        assert sim.step(4).tolist() == [False, False, True]
 
-    def test_are_told_every_time(self, physics):
+    def test_are_told_every_time(self, sim):
         for _ in range(3):
-            physics.qvel[1, 7] = np.nan
-            assert physics.step(4).tolist() == [False, True, False]
-            assert not physics.step(4).any()
+            sim.qvel[1, 7] = np.nan
+            assert sim.step(4).tolist() == [False, True, False]
+            assert not sim.step(4).any()
 
-    def test_are_told_of_what_has_just_begun_anew(self, physics):
+    def test_are_told_of_what_has_just_begun_anew(self, sim):
         # A reset sets the counts of warnings back too.
         for _ in range(3):
-            physics.qvel[1, 7] = np.nan
-            assert physics.step(4).tolist() == [False, True, False]
+            sim.qvel[1, 7] = np.nan
+            assert sim.step(4).tolist() == [False, True, False]
             ids = np.array([1])
-            physics.reset(ids, physics.scene.home[None], np.zeros((1, physics.scene.model.nv)))
+            sim.reset(ids, sim.scene.home[None], np.zeros((1, sim.scene.model.nv)))
 
     def test_leave_the_others_as_they_are(self, cart, calm):
         def run(bad):
             scene = build_scene(cart, Plane(), calm())
-            physics = Physics(scene, 3, 1)
-            physics.qpos[:] = scene.home + 0.3
+            sim = Simulation(scene, 3, 1)
+            sim.qpos[:] = scene.home + 0.3
             if bad:
-                physics.qvel[1, 7] = np.nan
-            physics.step(8)
-            return physics.qpos[[0, 2]].copy()
+                sim.qvel[1, 7] = np.nan
+            sim.step(8)
+            return sim.qpos[[0, 2]].copy()
 
         np.testing.assert_array_equal(run(bad=True), run(bad=False))
 
-    def test_leave_no_log_behind(self, physics, tmp_path, monkeypatch):
+    def test_leave_no_log_behind(self, sim, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
-        physics.qvel[1, 7] = np.nan
-        physics.step(4)
+        sim.qvel[1, 7] = np.nan
+        sim.step(4)
         assert list(tmp_path.iterdir()) == []
 
 
 def test_threads_do_not_matter(quadruped, lively, mixed_map):
     def run(threads):
-        env = LeggedEnv(lively(9, num_threads=threads), quadruped, MapGround(mixed_map))
+        env = LeggedEnv(lively(9, num_threads=threads), quadruped, MapTerrain(mixed_map))
         made = torch.Generator().manual_seed(0)
         return [
             (observed["privileged"].numpy().tobytes(), rewards.numpy().tobytes())
@@ -170,7 +170,7 @@ class TestRandomization:
         scene, found = varied.scene, varied.differences
         nominal, base, hinge, wheel = scene.model, scene.base, 1, 0
         for k in range(5):
-            model = varied.physics.batch.get_model(k)
+            model = varied.sim.batch.get_model(k)
             mass = nominal.body_mass[base] + found.added_mass[k, 0]
             assert model.body_mass[base] == pytest.approx(mass)
             np.testing.assert_allclose(
@@ -193,13 +193,13 @@ class TestRandomization:
         base = varied.scene.base
         nominal = varied.scene.model.body_subtreemass[base]
         for k, (added,) in enumerate(varied.differences.added_mass):
-            model = varied.physics.batch.get_model(k)
+            model = varied.sim.batch.get_model(k)
             assert model.body_subtreemass[base] == pytest.approx(nominal + added)
 
     def test_leaves_everything_else(self, varied):
         nominal, base = varied.scene.model, varied.scene.base
         others = np.arange(nominal.nbody) != base
-        model = varied.physics.batch.get_model(3)
+        model = varied.sim.batch.get_model(3)
         np.testing.assert_array_equal(model.body_mass[others], nominal.body_mass[others])
         ground = ~np.isin(np.arange(nominal.ngeom), varied.scene.geoms)
         np.testing.assert_array_equal(model.geom_friction[ground], nominal.geom_friction[ground])
@@ -207,7 +207,7 @@ class TestRandomization:
 
     def test_none_leaves_the_robot_as_it_is(self, cart, calm):
         env = LeggedEnv(calm(2), cart, Plane())
-        model = env.physics.batch.get_model(1)
+        model = env.sim.batch.get_model(1)
         for name in (
             "body_mass",
             "body_inertia",
@@ -239,10 +239,10 @@ class TestRandomization:
         for _ in range(60):
             env.step(torch.zeros(3, 12))
         robot = env.scene.model.body_subtreemass[env.scene.base]
-        weight = (robot + env.differences.added_mass[:, 0]) * 9.81
+        weight = (robot + env.params.added_mass[:, 0]) * 9.81
         np.testing.assert_allclose(env.state.foot_force.sum(axis=1)[:, 2], weight, rtol=0.02)
         assert np.ptp(weight) > 1
 
     def test_every_difference_has_a_row_for_each_robot(self, varied):
-        for field in fields(Differences):
+        for field in fields(RandomizedParams):
             assert len(getattr(varied.differences, field.name)) == 5

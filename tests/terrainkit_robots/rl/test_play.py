@@ -9,7 +9,7 @@ from terrainkit.errors import ConfigError
 from terrainkit_robots.policy import play as playing
 from terrainkit_robots.policy.evaluate import Asked
 from terrainkit_robots.policy.play import play, tour_of, view
-from terrainkit_robots.rl.task import Commands, Env, Terrain
+from terrainkit_robots.rl.config import Commands, Env, Terrain
 
 
 @pytest.fixture(autouse=True)

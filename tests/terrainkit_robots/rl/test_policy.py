@@ -6,12 +6,12 @@ import torch
 
 from terrainkit.errors import ConfigError, TerrainkitWarning
 from terrainkit_robots.policy.actor import actor_of, policy_of
+from terrainkit_robots.rl.config import Env, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.registry import find
-from terrainkit_robots.rl.run_folder import create_run, open_run
+from terrainkit_robots.rl.run import create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.task import Env, Task
+from terrainkit_robots.rl.tasks import get_task
+from terrainkit_robots.rl.terrain import Plane
 
 
 @pytest.fixture
@@ -57,7 +57,7 @@ def test_a_run_without_a_checkpoint_has_no_policy(env, tmp_path):
 @pytest.mark.parametrize(("name", "told"), [("quadruped.xml", True), ("robot.toml", False)])
 def test_a_robot_that_moves_otherwise_than_in_training_is_told(trained, env, tmp_path, name, told):
     mine = tmp_path / "mine"
-    shutil.copytree(find("quadruped").folder, mine)
+    shutil.copytree(get_task("quadruped").folder, mine)
     folder = create_run(tmp_path / "run", Task(policy=env.cfg.policy), mine, "plane").folder
     shutil.copy(trained / "model_2.pt", folder)
     (mine / name).write_text((mine / name).read_text() + "\n")

@@ -8,16 +8,16 @@ import torch
 
 from terrainkit_robots.policy.description import description
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.rl.config import Control, Env, Noise, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.task import Control, Env, Noise, Task
+from terrainkit_robots.rl.terrain import Plane
 
 SMALL = Task(env=Env(num_envs=4, num_threads=1))
 
 
 def raw(env, told):
     """Return what is measured, from the state of the physics alone; one robot a row."""
-    qpos, qvel = np.array(env.physics.qpos), np.array(env.physics.qvel)
+    qpos, qvel = np.array(env.sim.qpos), np.array(env.sim.qvel)
     turns = np.zeros((len(qpos), 9))
     for turn, pose in zip(turns, qpos, strict=True):
         mujoco.mju_quat2Mat(turn, pose[3:7])
@@ -35,7 +35,7 @@ def raw(env, told):
         x, y = np.array(told["height_scan"]["points"]).T
         at_x = qpos[:, :1] + np.cos(yaw) * x - np.sin(yaw) * y
         at_y = qpos[:, 1:2] + np.sin(yaw) * x + np.cos(yaw) * y
-        ground = env.ground.height(at_x.astype(np.float32), at_y.astype(np.float32))
+        ground = env.terrain.height(at_x.astype(np.float32), at_y.astype(np.float32))
         found["height_scan"] = qpos[:, 2:3] - ground
     return found
 

@@ -16,11 +16,11 @@ from terrainkit_robots.policy import export as policy_export
 from terrainkit_robots.policy.actor import policy_of
 from terrainkit_robots.policy.export import METADATA, export_policy
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.rl.config import Env, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.registry import find
-from terrainkit_robots.rl.run_folder import create_run, open_run
-from terrainkit_robots.rl.task import Env, Task
+from terrainkit_robots.rl.run import create_run, open_run
+from terrainkit_robots.rl.tasks import get_task
+from terrainkit_robots.rl.terrain import Plane
 
 
 @pytest.fixture(scope="module")
@@ -137,7 +137,7 @@ def test_the_example_runs_a_policy_in_plain_mujoco(exported, quadruped, tmp_path
 
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
 def test_the_example_walks_with_the_policy_that_is_shipped(name, tmp_path, monkeypatch):
-    if not find(name).shipped.is_dir():
+    if not get_task(name).shipped.is_dir():
         pytest.skip(f"no policy of {name} is shipped")
     run = open_run(name)
     export_policy(run, tmp_path / "exported")

@@ -9,18 +9,12 @@ import pytest
 import torch
 
 from terrainkit_robots.description import bundled
+from terrainkit_robots.rl.config import Control, DomainRand, Env, InitState, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.physics import Physics
-from terrainkit_robots.rl.randomization import (
-    Differences,
-    Pushes,
-    apply_differences,
-    draw_differences,
-)
-from terrainkit_robots.rl.robot import Robot, read_robot
-from terrainkit_robots.rl.scene import build_scene
-from terrainkit_robots.rl.task import Control, DomainRand, Env, InitState, Task
+from terrainkit_robots.rl.events import Pushes, RandomizedParams, apply_params, sample_params
+from terrainkit_robots.rl.scene import Robot, build_scene
+from terrainkit_robots.rl.simulation import Simulation
+from terrainkit_robots.rl.terrain import Plane
 
 torch.set_num_threads(1)
 
@@ -36,16 +30,16 @@ _NONE = DomainRand(
 
 
 def robot_named(name: str) -> Robot:
-    return read_robot(Path(str(bundled.find(name))).parent)
+    return Robot.load(Path(str(bundled.find(name))).parent)
 
 
-def physics_of(kind: Literal["P", "V", "T"] = "P", n: int = 5) -> Physics:
+def physics_of(kind: Literal["P", "V", "T"] = "P", n: int = 5) -> Simulation:
     task = Task(control=Control(control_type=kind))
-    return Physics(build_scene(robot_named("quadruped"), Plane(), task), n, 1)
+    return Simulation(build_scene(robot_named("quadruped"), Plane(), task), n, 1)
 
 
-def draw(physics: Physics, settings: DomainRand, n: int = 5, seed: int = 0) -> Differences:
-    return draw_differences(np.random.default_rng(seed), n, physics, settings)
+def draw(sim: Simulation, settings: DomainRand, n: int = 5, seed: int = 0) -> RandomizedParams:
+    return sample_params(np.random.default_rng(seed), n, sim, settings)
 
 
 class TestDraw:
@@ -88,9 +82,9 @@ class TestDraw:
             assert (factor == 1).all()
 
     def test_seed_decides(self) -> None:
-        physics = physics_of()
-        one, other, third = (draw(physics, DomainRand(), seed=seed) for seed in (1, 1, 2))
-        for each in fields(Differences):
+        sim = physics_of()
+        one, other, third = (draw(sim, DomainRand(), seed=seed) for seed in (1, 1, 2))
+        for each in fields(RandomizedParams):
             np.testing.assert_array_equal(getattr(one, each.name), getattr(other, each.name))
             assert (getattr(one, each.name) != getattr(third, each.name)).any()
 
@@ -108,51 +102,51 @@ _CHANGED = (
 class TestApply:
     @pytest.mark.parametrize("kind", ["P", "V", "T"])
     def test_none_leaves_the_model_as_it_is(self, kind: Literal["P", "V", "T"]) -> None:
-        physics = physics_of(kind)
-        apply_differences(physics, draw(physics, _NONE))
+        sim = physics_of(kind)
+        apply_params(sim, draw(sim, _NONE))
         for field in _CHANGED:
-            found = physics.batch.expand(field)
-            expected = np.broadcast_to(getattr(physics.scene.model, field), found.shape)
+            found = sim.batch.expand(field)
+            expected = np.broadcast_to(getattr(sim.scene.model, field), found.shape)
             np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9, err_msg=field)
 
     def test_mass_and_its_inertia(self) -> None:
-        physics = physics_of()
-        base, model = physics.scene.base, physics.scene.model
-        drawn = draw(physics, replace(_NONE, added_mass=(1.5, 1.5)))
-        apply_differences(physics, drawn)
-        mass = physics.batch.expand("body_mass")
+        sim = physics_of()
+        base, model = sim.scene.base, sim.scene.model
+        drawn = draw(sim, replace(_NONE, added_mass=(1.5, 1.5)))
+        apply_params(sim, drawn)
+        mass = sim.batch.expand("body_mass")
         np.testing.assert_allclose(mass[:, base], model.body_mass[base] + 1.5)
         others = np.delete(mass, base, axis=1)
         np.testing.assert_array_equal(others[0], np.delete(model.body_mass, base))
         heavier = 1 + 1.5 / model.body_mass[base]
-        inertia = physics.batch.expand("body_inertia")[:, base]
+        inertia = sim.batch.expand("body_inertia")[:, base]
         np.testing.assert_allclose(inertia, np.tile(heavier * model.body_inertia[base], (5, 1)))
 
     def test_center_of_mass(self) -> None:
-        physics = physics_of()
-        base, model = physics.scene.base, physics.scene.model
-        drawn = draw(physics, replace(_NONE, com_shift=0.1))
-        apply_differences(physics, drawn)
-        shift = physics.batch.expand("body_ipos")[:, base] - model.body_ipos[base]
+        sim = physics_of()
+        base, model = sim.scene.base, sim.scene.model
+        drawn = draw(sim, replace(_NONE, com_shift=0.1))
+        apply_params(sim, drawn)
+        shift = sim.batch.expand("body_ipos")[:, base] - model.body_ipos[base]
         np.testing.assert_allclose(shift, drawn.com_shift, atol=1e-7)
         assert np.abs(shift).max() > 0.05
 
     def test_friction_of_all_that_touches(self) -> None:
-        physics = physics_of()
-        apply_differences(physics, draw(physics, replace(_NONE, friction=(0.3, 0.3))))
-        friction, own = physics.batch.expand("geom_friction"), physics.scene.geoms
+        sim = physics_of()
+        apply_params(sim, draw(sim, replace(_NONE, friction=(0.3, 0.3))))
+        friction, own = sim.batch.expand("geom_friction"), sim.scene.geoms
         np.testing.assert_allclose(friction[:, own, 0], 0.3, rtol=1e-6)
-        model = physics.scene.model
+        model = sim.scene.model
         expected = np.delete(model.geom_friction[:, 0], own)
         np.testing.assert_array_equal(np.delete(friction[0, :, 0], own), expected)
         np.testing.assert_array_equal(friction[0, :, 1:], model.geom_friction[:, 1:])
 
     def test_gains_of_position_control(self) -> None:
-        physics, model = physics_of("P"), physics_of("P").scene.model
-        drawn = draw(physics, DomainRand())
-        apply_differences(physics, drawn)
-        gain = physics.batch.expand("actuator_gainprm")
-        bias = physics.batch.expand("actuator_biasprm")
+        sim, model = physics_of("P"), physics_of("P").scene.model
+        drawn = draw(sim, DomainRand())
+        apply_params(sim, drawn)
+        gain = sim.batch.expand("actuator_gainprm")
+        bias = sim.batch.expand("actuator_biasprm")
         kp = model.actuator_gainprm[:, 0] * drawn.stiffness * drawn.strength
         kd = -model.actuator_biasprm[:, 2] * drawn.damping * drawn.strength
         assert (kp > 0).all()
@@ -162,41 +156,41 @@ class TestApply:
         np.testing.assert_allclose(bias[:, :, 2], -kd, rtol=1e-6)
 
     def test_gains_of_velocity_control(self) -> None:
-        physics, model = physics_of("V"), physics_of("V").scene.model
-        drawn = draw(physics, DomainRand())
-        apply_differences(physics, drawn)
+        sim, model = physics_of("V"), physics_of("V").scene.model
+        drawn = draw(sim, DomainRand())
+        apply_params(sim, drawn)
         kv = model.actuator_gainprm[:, 0] * drawn.damping * drawn.strength
         assert (kv > 0).all()
-        np.testing.assert_allclose(physics.batch.expand("actuator_gainprm")[:, :, 0], kv, rtol=1e-6)
-        bias = physics.batch.expand("actuator_biasprm")
+        np.testing.assert_allclose(sim.batch.expand("actuator_gainprm")[:, :, 0], kv, rtol=1e-6)
+        bias = sim.batch.expand("actuator_biasprm")
         np.testing.assert_allclose(bias[:, :, 2], -kv, rtol=1e-6)
         assert (bias[:, :, :2] == 0).all()
 
     def test_torque_control_has_no_gains(self) -> None:
         """Only the strength of the motors counts."""
-        physics = physics_of("T")
-        apply_differences(physics, draw(physics, replace(DomainRand(), motor_strength=None)))
-        model = physics.scene.model
+        sim = physics_of("T")
+        apply_params(sim, draw(sim, replace(DomainRand(), motor_strength=None)))
+        model = sim.scene.model
         for field in ("actuator_gainprm", "actuator_biasprm"):
-            found = physics.batch.expand(field)
+            found = sim.batch.expand(field)
             expected = np.broadcast_to(getattr(model, field), found.shape)
             np.testing.assert_array_equal(found, expected)
-        drawn = draw(physics, DomainRand())
-        apply_differences(physics, drawn)
-        gain = physics.batch.expand("actuator_gainprm")[:, :, 0]
+        drawn = draw(sim, DomainRand())
+        apply_params(sim, drawn)
+        gain = sim.batch.expand("actuator_gainprm")[:, :, 0]
         np.testing.assert_allclose(gain, np.tile(drawn.strength, 12), rtol=1e-6)
-        assert (physics.batch.expand("actuator_biasprm") == 0).all()
+        assert (sim.batch.expand("actuator_biasprm") == 0).all()
 
     def test_twice_is_once(self) -> None:
         """A checkpoint's differences are applied over those of the start."""
-        physics = physics_of()
-        first, second = draw(physics, DomainRand(), seed=1), draw(physics, DomainRand(), seed=2)
-        apply_differences(physics, second)
-        once = {field: physics.batch.expand(field).copy() for field in _CHANGED}
-        apply_differences(physics, first)
-        apply_differences(physics, second)
+        sim = physics_of()
+        first, second = draw(sim, DomainRand(), seed=1), draw(sim, DomainRand(), seed=2)
+        apply_params(sim, second)
+        once = {field: sim.batch.expand(field).copy() for field in _CHANGED}
+        apply_params(sim, first)
+        apply_params(sim, second)
         for field in _CHANGED:
-            np.testing.assert_array_equal(physics.batch.expand(field), once[field], err_msg=field)
+            np.testing.assert_array_equal(sim.batch.expand(field), once[field], err_msg=field)
 
 
 def make_env(settings: DomainRand, n: int = 6, **changes: Any) -> LeggedEnv:
@@ -214,7 +208,7 @@ class TestEnvironment:
         env = make_env(_NONE)
         for _ in range(5):
             env.step(torch.full((6, 12), 0.1))
-        assert np.ptp(env.physics.qpos, axis=0).max() == 0
+        assert np.ptp(env.sim.qpos, axis=0).max() == 0
 
     @pytest.mark.parametrize(
         "change",
@@ -231,7 +225,7 @@ class TestEnvironment:
         env = make_env(replace(_NONE, **change))
         for _ in range(5):
             env.step(torch.full((6, 12), 0.1))
-        assert np.ptp(env.physics.qpos, axis=0).max() > 1e-5
+        assert np.ptp(env.sim.qpos, axis=0).max() > 1e-5
 
     def test_friction_holds_or_slips(self) -> None:
         speeds = []
@@ -239,7 +233,7 @@ class TestEnvironment:
             env = make_env(replace(_NONE, friction=(friction, friction)), n=1)
             for _ in range(15):
                 env.step(torch.zeros(1, 12))
-            env.physics.qvel[:, 0] = 1.0
+            env.sim.qvel[:, 0] = 1.0
             for _ in range(10):
                 env.step(torch.zeros(1, 12))
             feet = env.state.foot_vel[0, :, 0]
@@ -257,19 +251,19 @@ class TestEnvironment:
         env = make_env(DomainRand())
         seen = env.get_observations()["privileged"].numpy()
         here, start = {}, 0
-        for each in env.groups["privileged"]:
-            stop = start + each.read(env.state).shape[1]
+        for each in env.obs_groups["privileged"]:
+            stop = start + each.function(env.state).shape[1]
             here[each.name], start = seen[:, start:stop], stop
-        np.testing.assert_array_equal(here["friction"], env.differences.friction)
-        np.testing.assert_array_equal(here["added_mass"], env.differences.added_mass)
-        np.testing.assert_allclose(here["com_shift"], 10 * env.differences.com_shift)
+        np.testing.assert_array_equal(here["friction"], env.params.friction)
+        np.testing.assert_array_equal(here["added_mass"], env.params.added_mass)
+        np.testing.assert_allclose(here["com_shift"], 10 * env.params.com_shift)
         np.testing.assert_array_equal(here["joint_offset"], env.joint_offset)
 
     def test_joint_offsets_are_new_at_each_reset(self) -> None:
         env = make_env(replace(_NONE, joint_offset=0.05))
         before = env.joint_offset.copy()
         assert 0.04 < np.abs(before).max() <= 0.05
-        env.physics.qpos[1, 3:7] = (0, 1, 0, 0)
+        env.sim.qpos[1, 3:7] = (0, 1, 0, 0)
         env.step(torch.zeros(6, 12))
         changed = (env.joint_offset != before).any(axis=1)
         assert changed.tolist() == [False, True, False, False, False, False]
@@ -279,8 +273,8 @@ class TestEnvironment:
         env = make_env(replace(_NONE, joint_offset=0.05))
         env.scene.model.opt.gravity[:] = 0
         for _ in range(40):
-            env.physics.qpos[:, :7] = (0, 0, 1, 1, 0, 0, 0)
-            env.physics.qvel[:, :6] = 0
+            env.sim.qpos[:, :7] = (0, 0, 1, 1, 0, 0, 0)
+            env.sim.qvel[:, :6] = 0
             env.step(torch.zeros(6, 12))
         off = env.state.dof_pos - env.robot.default_pose
         np.testing.assert_allclose(off, -env.state.joint_offset, atol=1e-3)
@@ -305,7 +299,7 @@ class TestEnvironment:
     def test_pushes_may_come_at_any_time_of_an_episode(self) -> None:
         pushes = Pushes(DomainRand(push_interval_s=0.1), 2000, 0.02)
         pushes.begin(np.random.default_rng(0), np.arange(2000))
-        times, counts = np.unique(pushes.wait, return_counts=True)
+        times, counts = np.unique(pushes.steps_until_push, return_counts=True)
         assert times.tolist() == [1, 2, 3, 4, 5]
         np.testing.assert_allclose(counts, 400, rtol=0.15)
 
@@ -313,10 +307,10 @@ class TestEnvironment:
         pushes = Pushes(DomainRand(push_interval_s=15), 6, 0.02)
         rng = np.random.default_rng(0)
         pushes.begin(rng, np.arange(6))
-        before = pushes.wait.copy()
+        before = pushes.steps_until_push.copy()
         pushes.velocity[:] = 1
         pushes.begin(rng, np.array([1, 4]))
-        assert np.flatnonzero(pushes.wait != before).tolist() == [1, 4]
+        assert np.flatnonzero(pushes.steps_until_push != before).tolist() == [1, 4]
         assert pushes.velocity[:, 0].tolist() == [1, 0, 1, 1, 0, 1]
 
     def test_no_pushes(self) -> None:

@@ -4,12 +4,12 @@ import torch
 
 from terrainkit_robots.onboarding.pipeline import Wishes, bring_in
 from terrainkit_robots.policy.export import export_policy
+from terrainkit_robots.rl.config import Env, Runner, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.robot import read_robot
-from terrainkit_robots.rl.run_folder import create_run, open_run
+from terrainkit_robots.rl.run import create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.task import Env, Runner, Task
+from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.terrain import Plane
 
 TASK = Task(
     env=Env(num_envs=16, num_threads=1), runner=Runner(num_steps_per_env=12, save_interval=100)
@@ -24,7 +24,7 @@ def test_a_real_robot_is_onboarded_and_trains(robot_file, tmp_path, name, joints
     folder = tmp_path / "robot"
     done = bring_in(robot_file(name), Wishes(target=folder, pictures=False))
     assert done.folder == folder
-    robot = read_robot(folder)
+    robot = Robot.load(folder)
     assert len(robot.spec.joint_order) == joints
     run = create_run(tmp_path / "run", TASK, folder, "plane")
     torch.manual_seed(1)
@@ -39,7 +39,7 @@ def test_a_real_robot_is_onboarded_and_trains(robot_file, tmp_path, name, joints
     assert all(np.isfinite(list(each.values())).all() for each in losses)
     after = list(runner.alg.actor.mlp.parameters())
     assert all(not torch.equal(a, b) for a, b in zip(before, after, strict=True))
-    assert np.isfinite(env.physics.qpos).all()
+    assert np.isfinite(env.sim.qpos).all()
     exported = export_policy(open_run(run.folder), tmp_path / "policy")
     assert exported.observations == observed
     assert exported.error <= 1e-5

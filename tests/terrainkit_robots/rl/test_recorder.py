@@ -5,10 +5,10 @@ import pytest
 import torch
 
 from terrainkit_robots.policy.recorder import Recorder, visited
+from terrainkit_robots.rl.config import InitState
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.rotation import yaw_of
-from terrainkit_robots.rl.task import InitState
+from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.transforms import quat_to_yaw
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def test_robots_on_a_plane_start_in_formation_looking_ahead(marching):
     recorder.record()
     (poses,) = recorder._poses
     assert np.ptp(marching.physics.qpos[:, 3]) > 0.01  # they really look all over
-    np.testing.assert_allclose(yaw_of(poses[:, 3:7]), 0, atol=1e-5)
+    np.testing.assert_allclose(quat_to_yaw(poses[:, 3:7]), 0, atol=1e-5)
     x, y = poses[:, 0].reshape(2, 2), poses[:, 1].reshape(2, 2)
     assert np.ptp(x, axis=1).max() < 1e-5
     assert np.ptp(y, axis=0).max() < 1e-5
@@ -35,7 +35,7 @@ def test_a_way_ahead_is_seen_as_one_along_x(marching):
     recorder = Recorder(marching)
     recorder.record()
     before = recorder._poses[0]
-    yaw = yaw_of(marching.physics.qpos[:, 3:7].astype(np.float32))
+    yaw = quat_to_yaw(marching.physics.qpos[:, 3:7].astype(np.float32))
     marching.physics.qpos[:, 0] += np.cos(yaw)
     marching.physics.qpos[:, 1] += np.sin(yaw)
     marching.steps[:] = 1
@@ -48,11 +48,11 @@ def test_a_way_ahead_is_seen_as_one_along_x(marching):
 def test_who_falls_on_a_plane_goes_back_to_his_place(marching):
     recorder = Recorder(marching)
     recorder.record()
-    marching.begin_all()
+    marching.reset()
     recorder._steps = recorder._stride
     recorder.record()
     np.testing.assert_allclose(recorder._poses[1][:, :2], recorder._poses[0][:, :2], atol=1e-5)
-    np.testing.assert_allclose(yaw_of(recorder._poses[1][:, 3:7]), 0, atol=1e-5)
+    np.testing.assert_allclose(quat_to_yaw(recorder._poses[1][:, 3:7]), 0, atol=1e-5)
 
 
 def test_a_shot_ends_when_its_robot_falls(quadruped, calm, map_ground):
@@ -61,7 +61,7 @@ def test_a_shot_ends_when_its_robot_falls(quadruped, calm, map_ground):
     for step in range(20):
         env.step(torch.zeros(4, 12))
         if step == 11:
-            env.steps[1] = 0  # as after a new start
+            env.steps_since_reset[1] = 0  # as after a new start
         recorder.record()
     film = recorder.film(4, (128, 72))
     assert {shot.robot: shot.stop for shot in film.shots} == {0: 2, 1: 2, 2: 2, 3: 2}
@@ -71,10 +71,10 @@ def test_a_shot_ends_when_its_robot_falls(quadruped, calm, map_ground):
 
 def test_visits_are_of_all_terrains_before_a_second_of_any(quadruped, calm, map_ground):
     env = LeggedEnv(calm(12), quadruped, map_ground)
-    env.careers.levels[:], env.careers.columns[:] = np.divmod(np.arange(12) % 6, 2)
+    env.curriculum.levels[:], env.curriculum.columns[:] = np.divmod(np.arange(12) % 6, 2)
     chosen = visited(env, 3)
-    assert env.careers.columns[chosen].tolist() == [0, 1, 0]
-    assert env.careers.levels[chosen].tolist() == [1, 1, 1]
+    assert env.curriculum.columns[chosen].tolist() == [0, 1, 0]
+    assert env.curriculum.levels[chosen].tolist() == [1, 1, 1]
     assert visited(env, 1) == chosen[:1]
     assert len(set(visited(env, 100))) == 12
 
@@ -83,7 +83,7 @@ def test_on_a_map_of_mixed_columns_the_terrain_below_is_told(quadruped, calm, ma
     ground = copy.copy(map_ground)
     ground.terrain_names = np.array([["a", "b"], ["b", "c"], ["c", "a"]])
     env = LeggedEnv(calm(6), quadruped, ground)
-    env.careers.levels[:], env.careers.columns[:] = np.divmod(np.arange(6), 2)
+    env.curriculum.levels[:], env.curriculum.columns[:] = np.divmod(np.arange(6), 2)
     recorder = Recorder(env)
     recorder.record()
     film = recorder.film(3, (128, 72))

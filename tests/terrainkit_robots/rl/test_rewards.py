@@ -13,12 +13,12 @@ from made_states import FLAGS, made_state, shapes
 
 from terrainkit_robots.description import bundled
 from terrainkit_robots.rl import rewards as module
+from terrainkit_robots.rl.config import Env, Rewards, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.rewards import REWARDS, chosen, reward
-from terrainkit_robots.rl.robot import Robot, read_robot
+from terrainkit_robots.rl.rewards import REWARDS, active_rewards, reward
+from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.state import State
-from terrainkit_robots.rl.task import Env, Rewards, Task
+from terrainkit_robots.rl.terrain import Plane
 
 torch.set_num_threads(1)
 
@@ -49,7 +49,7 @@ def random_state(n: int, seed: int) -> State:
 @pytest.fixture(scope="module")
 def robot() -> Robot:
     """Two joints: soft limits +-1 and none; 10 and 20 N m; 5 and 10 rad/s; bent 0.5 and -0.5."""
-    real = read_robot(Path(str(bundled.find("quadruped"))).parent)
+    real = Robot.load(Path(str(bundled.find("quadruped"))).parent)
     return replace(
         real,
         spec=replace(real.spec, base_height_target=0.3),
@@ -320,8 +320,8 @@ def test_every_scale_has_a_reward() -> None:
 
 def test_only_scales_that_are_not_zero_are_chosen() -> None:
     nothing = dict.fromkeys(REWARDS, 0.0)
-    assert chosen(Rewards(**nothing)) == {}
-    only = chosen(Rewards(**(nothing | {"torques": -0.5})))
+    assert active_rewards(Rewards(**nothing)) == {}
+    only = active_rewards(Rewards(**(nothing | {"torques": -0.5})))
     assert only == {"torques": (REWARDS["torques"], -0.5)}
 
 
@@ -330,7 +330,7 @@ def test_only_scales_that_are_not_zero_are_chosen() -> None:
 
 def make_env(settings: Rewards, num_envs: int = 4, **other: Any) -> LeggedEnv:
     task = Task(env=Env(num_envs=num_envs, num_threads=1, **other), rewards=settings)
-    return LeggedEnv(task, read_robot(Path(str(bundled.find("quadruped"))).parent), Plane())
+    return LeggedEnv(task, Robot.load(Path(str(bundled.find("quadruped"))).parent), Plane())
 
 
 _NONE = dict.fromkeys(REWARDS, 0.0)
@@ -355,18 +355,18 @@ def test_zero_scale_is_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(REWARDS, "torques", never)
     env = make_env(Rewards(torques=0.0))
     env.step(_REST)
-    assert "torques" not in env.sums
+    assert "torques" not in env.episode_sums
 
 
 def test_only_positive_rewards_but_for_falls() -> None:
     bad = {"orientation": -1e6, "termination": -2.0, "only_positive_rewards": True}
     env = make_env(Rewards(**(_NONE | bad)))
-    env.physics.qpos[0, 3:7] = (0, 1, 0, 0)  # on its back
+    env.sim.qpos[0, 3:7] = (0, 1, 0, 0)  # on its back
     _, rewards, dones, _ = env.step(_REST)
     assert dones.tolist() == [True, False, False, False]
     assert rewards.tolist() == pytest.approx([-2 * 0.02, 0, 0, 0])
     env = make_env(Rewards(**(_NONE | bad | {"only_positive_rewards": False})))
-    env.physics.qpos[0, 3:7] = (0, 1, 0, 0)
+    env.sim.qpos[0, 3:7] = (0, 1, 0, 0)
     _, rewards, *_ = env.step(_REST)
     assert (rewards < 0).all()
 
@@ -382,19 +382,19 @@ def test_sums_are_logged_per_second() -> None:
         assert rewards.tolist() == pytest.approx([0.04] * 4)
     # 1 at each step, times 2: 2 a second, whatever the length of the episode.
     assert extras["log"]["Episode/rew_tracking_ang_vel"] == pytest.approx(2)
-    assert set(env.sums) == {"tracking_ang_vel"}
-    assert env.sums["tracking_ang_vel"].tolist() == [0] * 4
+    assert set(env.episode_sums) == {"tracking_ang_vel"}
+    assert env.episode_sums["tracking_ang_vel"].tolist() == [0] * 4
 
 
 def test_sums_are_those_of_an_episode_that_was_short() -> None:
     env = make_env(Rewards(**(_NONE | {"tracking_ang_vel": 2.0, "tracking_sigma": 1e12})))
     env.step(_REST)
     env.step(_REST)
-    env.physics.qpos[0, 3:7] = (0, 1, 0, 0)
+    env.sim.qpos[0, 3:7] = (0, 1, 0, 0)
     *_, extras = env.step(_REST)
     assert extras["log"]["Episode/rew_tracking_ang_vel"] == pytest.approx(2)
     assert extras["log"]["Episode/falls"] == 1
-    assert env.sums["tracking_ang_vel"].tolist() == pytest.approx([0, 0.12, 0.12, 0.12])
+    assert env.episode_sums["tracking_ang_vel"].tolist() == pytest.approx([0, 0.12, 0.12, 0.12])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -423,7 +423,7 @@ class TestOwnReward:
         _, rewards, *_ = env.step(_REST)
         np.testing.assert_allclose(rewards, 10 * 0.02 * env.state.base_pos[:, 0], rtol=1e-5)
         assert np.ptp(rewards.numpy()) > 0
-        assert list(env.sums) == ["headway"]
+        assert list(env.episode_sums) == ["headway"]
 
     def test_is_logged(self) -> None:
         env = make_env(MyRewards(headway=1.0), episode_length_s=0.02)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots.rl.robot import read_robot, robot_of
+from terrainkit_robots.rl.scene import Robot
 
 
 class TestArrays:
@@ -25,7 +25,7 @@ class TestArrays:
         self, cart_spec, tmp_path, stiffness, damping, wheel
     ):
         spec = replace(cart_spec, stiffness={".*": stiffness}, damping={".*": damping})
-        assert robot_of(spec, tmp_path).wheels.tolist() == [wheel] * len(spec.joint_order)
+        assert Robot.from_spec(spec, tmp_path).wheels.tolist() == [wheel] * len(spec.joint_order)
 
     def test_the_mjcf_lies_beside_the_spec(self, cart):
         assert cart.mjcf.name == "cart.xml"
@@ -54,13 +54,13 @@ class TestRefused:
     )
     def test_what_training_needs_is_asked_for(self, cart_spec, tmp_path, changes, message):
         with pytest.raises(ConfigError, match=message) as caught:
-            robot_of(replace(cart_spec, **changes), tmp_path)
+            Robot.from_spec(replace(cart_spec, **changes), tmp_path)
         assert "\n" not in str(caught.value)
 
     def test_a_folder_without_a_spec(self, tmp_path):
         with pytest.raises(ConfigError, match=r"has no robot\.toml; wanted a folder that terrain"):
-            read_robot(tmp_path)
+            Robot.load(tmp_path)
 
     def test_a_folder_that_is_not_there(self, tmp_path):
         with pytest.raises(ConfigError, match=r"has no robot\.toml"):
-            read_robot(tmp_path / "nowhere")
+            Robot.load(tmp_path / "nowhere")

@@ -4,24 +4,24 @@ import sys
 import pytest
 
 from terrainkit.errors import MemoryLimitError
-from terrainkit_robots.rl.room import bytes_each, require_room
-from terrainkit_robots.rl.task import Env, Runner, Task
+from terrainkit_robots.rl.config import Env, Runner, Task
+from terrainkit_robots.rl.simulation import bytes_per_env, check_memory
 
 MEASURED = """
 import re, sys
 from pathlib import Path
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.registry import find
-from terrainkit_robots.rl.robot import read_robot
+from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.rl.tasks import get_task
+from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.task import Algorithm, Env, Runner, Task, Terrain
+from terrainkit_robots.rl.config import Algorithm, Env, Runner, Task, Terrain
 
 def peak():
     status = Path("/proc/self/status").read_text()  # ru_maxrss counts who started it, too
     return 1024 * int(re.search(r"VmHWM:\\s*(\\d+) kB", status)[1])
 
-robot, few, many = read_robot(find("quadruped").folder), 64, 1024
+robot, few, many = Robot.load(get_task("quadruped").folder), 64, 1024
 terrain = Terrain(measure_heights=sys.argv[1] == "True")
 peaks = []
 for count in (few, many):
@@ -49,15 +49,14 @@ def test_the_estimate_is_near_what_is_taken(quadruped, scan):
         check=True,
     )
     measured, task = float(run.stdout), Task(runner=Runner(num_steps_per_env=12))
-    assert 0.7 < bytes_each(task, quadruped, scan=scan, geoms=50) / measured < 2.0
+    assert 0.7 < bytes_per_env(task, quadruped, scan=scan, ngeom=50) / measured < 2.0
 
 
 def test_what_would_fit_is_said(quadruped, monkeypatch):
     monkeypatch.setattr("terrainkit.memory._free_memory", lambda: 1 << 30)
     task = Task(env=Env(num_envs=40_000))
     with pytest.raises(
-        MemoryLimitError,
-        match=r"with 40000 environments needs .*; env\.num_envs 5000 would fit",
+        MemoryLimitError, match=r"with 40000 environments needs .*; env\.num_envs 5000 would fit"
     ):
-        require_room(task, quadruped, scan=False, geoms=50)
-    require_room(Task(env=Env(num_envs=5000)), quadruped, scan=False, geoms=50)
+        check_memory(task, quadruped, scan=False, ngeom=50)
+    check_memory(Task(env=Env(num_envs=5000)), quadruped, scan=False, ngeom=50)

@@ -9,23 +9,23 @@ import pytest
 
 from terrainkit import TerrainMap
 from terrainkit.errors import ConfigError, ExportError, MapFileError
-from terrainkit_robots.rl import registry
-from terrainkit_robots.rl.ground import read_ground
-from terrainkit_robots.rl.robot import read_robot
-from terrainkit_robots.rl.run_folder import (
+from terrainkit_robots.rl import tasks
+from terrainkit_robots.rl.config import Rewards, Task
+from terrainkit_robots.rl.run import (
     MAP_FILE,
     RUN_FILE,
     TASK_FILE,
-    changed_robot,
+    changed_robot_files,
     checkpoint_name,
     checkpoints,
     create_run,
     default_folder,
+    is_same_terrain,
     open_run,
     rewrite_task,
-    same_ground,
 )
-from terrainkit_robots.rl.task import Rewards, Task
+from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.terrain import load_terrain
 
 
 @pytest.fixture
@@ -56,11 +56,11 @@ def test_a_run_says_what_it_was_made_with(run):
 
 def test_the_spec_is_the_one_that_was_trained(tmp_path, task, quadruped):
     mine = tmp_path / "mine"
-    shutil.copytree(registry.find("quadruped").folder, mine)
+    shutil.copytree(tasks.get_task("quadruped").folder, mine)
     folder = create_run(tmp_path / "run", task, mine, "plane").folder
     spec = mine / "robot.toml"
     spec.write_text(re.sub("spawn_height = [0-9.]+", "spawn_height = 7.5", spec.read_text()))
-    assert read_robot(mine).spec.spawn_height == 7.5
+    assert Robot.load(mine).spec.spawn_height == 7.5
     opened = open_run(folder)
     assert opened.robot_name == str(mine)
     assert opened.robot.spec == quadruped.spec
@@ -68,7 +68,7 @@ def test_the_spec_is_the_one_that_was_trained(tmp_path, task, quadruped):
 
 def test_a_robot_that_is_gone_is_told(tmp_path, task):
     mine = tmp_path / "mine"
-    shutil.copytree(registry.find("quadruped").folder, mine)
+    shutil.copytree(tasks.get_task("quadruped").folder, mine)
     folder = create_run(tmp_path / "run", task, mine, "plane").folder
     (mine / "quadruped.xml").unlink()
     with pytest.raises(ConfigError, match=r"is gone: there is no file .*quadruped\.xml"):
@@ -77,18 +77,18 @@ def test_a_robot_that_is_gone_is_told(tmp_path, task):
 
 def test_what_changed_of_a_robot_is_told(tmp_path, task):
     mine = tmp_path / "mine"
-    shutil.copytree(registry.find("quadruped").folder, mine)
+    shutil.copytree(tasks.get_task("quadruped").folder, mine)
     run = open_run(create_run(tmp_path / "run", task, mine, "plane").folder)
-    assert changed_robot(run) == ()
+    assert changed_robot_files(run) == ()
     for name in ("quadruped.xml", "robot.toml"):
         before = (mine / name).read_bytes()
         (mine / name).write_bytes(before + b"\n")
-        assert changed_robot(run) == (name,)
+        assert changed_robot_files(run) == (name,)
         (mine / name).write_bytes(before)
     about = (run.folder / RUN_FILE).read_text().partition("[robot_sha256]")[0]
     (run.folder / RUN_FILE).write_text(about)
     (mine / "robot.toml").write_bytes(before + b"\n")
-    assert changed_robot(run) == ()  # an earlier version did not note it
+    assert changed_robot_files(run) == ()  # an earlier version did not note it
 
 
 def test_a_map_that_is_gone_is_made_again(tmp_path, task, mixed_map):
@@ -98,7 +98,7 @@ def test_a_map_that_is_gone_is_made_again(tmp_path, task, mixed_map):
     path.unlink()
     opened = open_run(folder)
     assert opened.terrain == str(folder / MAP_FILE)
-    again = read_ground(opened.terrain)
+    again = load_terrain(opened.terrain)
     np.testing.assert_array_equal(again.env_origins, mixed_map.env_origins)
 
 
@@ -106,10 +106,10 @@ def test_a_mujoco_model_that_has_changed_is_another_ground(tmp_path, task):
     path = tmp_path / "ground.xml"
     path.write_text("<mujoco><worldbody><geom type='plane' size='9 9 1'/></worldbody></mujoco>")
     run = create_run(tmp_path / "run", task, "quadruped", path)
-    assert same_ground(run, path)
-    assert not same_ground(run, "plane")
+    assert is_same_terrain(run, path)
+    assert not is_same_terrain(run, "plane")
     path.write_text(path.read_text().replace("9 9 1", "8 8 1"))
-    assert not same_ground(run, path)
+    assert not is_same_terrain(run, path)
 
 
 def test_a_map_of_another_version_is_told_before_anything_is_written(tmp_path, task, mixed_map):
@@ -172,10 +172,10 @@ def test_a_task_is_rewritten_whole(run, task):
 
 
 def test_a_shipped_policy_is_found_by_the_name_of_its_robot(tmp_path, task, monkeypatch):
-    monkeypatch.setattr(registry, "_registered", dict(registry._registered))
+    monkeypatch.setattr(tasks, "_registered", dict(tasks._registered))
     mine = tmp_path / "mine"
-    shutil.copytree(registry.find("quadruped").folder, mine)
-    shipped = registry.register("rover_of_this_test", mine).shipped
+    shutil.copytree(tasks.get_task("quadruped").folder, mine)
+    shipped = tasks.register_task("rover_of_this_test", mine).shipped
     with pytest.raises(ConfigError, match="no policy is shipped with rover_of_this_test"):
         open_run("rover_of_this_test")
     create_run(shipped, task, "rover_of_this_test", "plane")
@@ -189,7 +189,7 @@ def test_a_run_goes_before_a_robot_of_its_name_and_any_other_folder_does_not(
 ):
     monkeypatch.chdir(tmp_path)
     Path("quadruped").mkdir()
-    assert open_run("quadruped").folder == registry.find("quadruped").shipped
+    assert open_run("quadruped").folder == tasks.get_task("quadruped").shipped
     create_run(Path("quadruped"), task, "biped", "plane")
     assert open_run("quadruped").robot_name == "biped"
 
@@ -208,7 +208,7 @@ def test_what_is_no_run_is_told(tmp_path):
     [
         ("format_version = 1", "format_version = 2", "format_version is 2; wanted 1"),
         ('robot = "quadruped"', "robot = 3", "robot is 3; wanted a text"),
-        ('robot = "quadruped"', 'robot = "gone"', "no robot 'gone'"),
+        ('robot = "quadruped"', 'robot = "gone"', "folder 'gone'"),
         ('terrain = "plane"', "", "terrain is 'missing'; wanted a text"),
         ("seed", "seed =", "not a TOML file"),
     ],

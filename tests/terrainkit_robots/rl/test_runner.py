@@ -11,13 +11,12 @@ import pytest
 import torch
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots.rl.checkpoint import only_policy, read_checkpoint, save_checkpoint
+from terrainkit_robots.rl.config import Algorithm, Env, Policy, Rewards, Runner, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Ground, Plane
-from terrainkit_robots.rl.robot import Robot
-from terrainkit_robots.rl.run_folder import open_run
+from terrainkit_robots.rl.run import open_run, policy_state, read_checkpoint, save_checkpoint
 from terrainkit_robots.rl.runner import LeggedRunner, runner_config
-from terrainkit_robots.rl.task import Algorithm, Env, Policy, Rewards, Runner, Task
+from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.terrain import Plane, Terrain
 
 Make = Callable[..., LeggedRunner]
 
@@ -39,7 +38,7 @@ def make(quadruped: Robot, task: Task, tmp_path: Path) -> Make:
 
     def made(
         task: Task = task,
-        ground: Ground | None = None,
+        ground: Terrain | None = None,
         folder: Path | None = tmp_path,
         robot: Robot = quadruped,
         **options: Any,
@@ -102,15 +101,15 @@ def test_another_number_of_environments_keeps_weights_and_curriculum(
     make, task, tmp_path, map_ground
 ):
     before = make(task, map_ground)
-    before.env.careers.levels[:] = 2
-    before.env.careers.success[1, 0] = 0.75
-    before.env.orders.lin_vel_x = (-2.0, 2.0)
+    before.env.curriculum.levels[:] = 2
+    before.env.curriculum.success[1, 0] = 0.75
+    before.env.velocity_command.lin_vel_x = (-2.0, 2.0)
     before.save()
     more = make(replace(task, env=replace(task.env, num_envs=9)), map_ground)
     more.load(tmp_path / "model_0.pt")
-    assert (more.env.careers.levels == 2).all()
-    assert more.env.careers.success[1, 0] == 0.75
-    assert more.env.orders.lin_vel_x == (-2.0, 2.0)
+    assert (more.env.curriculum.levels == 2).all()
+    assert more.env.curriculum.success[1, 0] == 0.75
+    assert more.env.velocity_command.lin_vel_x == (-2.0, 2.0)
     assert differences(before.alg.save(), more.alg.save()) == []
     more.learn(1)
 
@@ -119,7 +118,7 @@ def test_a_policy_alone_lends_its_networks(make, tmp_path):
     before = make()
     before.learn(1)
     path = tmp_path / "model_1.pt"
-    save_checkpoint(path, only_policy(read_checkpoint(path)))
+    save_checkpoint(path, policy_state(read_checkpoint(path)))
     after = make()
     after.load(path)
     assert after.current_learning_iteration == 0
@@ -256,9 +255,9 @@ import os, sys
 from dataclasses import replace
 from pathlib import Path
 import terrainkit_robots.rl.runner as runner
-from terrainkit_robots.rl.run_folder import open_run
-from terrainkit_robots.rl.task import Env, Runner, Task
-from terrainkit_robots.rl.training import train
+from terrainkit_robots.rl.run import open_run
+from terrainkit_robots.rl.config import Env, Runner, Task
+from terrainkit_robots.rl.train import train
 
 kept = {}
 class Kept(runner.LeggedRunner):
@@ -277,7 +276,7 @@ torch.save(
     {
         "actor": mine.alg.get_policy().state_dict(),
         "envs": mine.env.num_envs,
-        "qpos": torch.tensor(mine.env.physics.qpos[:2].copy()),
+        "qpos": torch.tensor(mine.env.sim.qpos[:2].copy()),
         "folder": str(trained.folder),
     },
     out / f"rank{os.environ['RANK']}.pt",

@@ -6,12 +6,11 @@ import pytest
 import torch
 
 from terrainkit.errors import ConfigError
+from terrainkit_robots.rl.config import Asset, Control, Rewards, Sim
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import MapGround, Plane, ScannedGround
-from terrainkit_robots.rl.physics import Physics
-from terrainkit_robots.rl.robot import robot_of
-from terrainkit_robots.rl.scene import build_scene
-from terrainkit_robots.rl.task import Asset, Control, Rewards, Sim
+from terrainkit_robots.rl.scene import Robot, build_scene
+from terrainkit_robots.rl.simulation import Simulation
+from terrainkit_robots.rl.terrain import MapTerrain, ModelTerrain, Plane
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +95,7 @@ class TestPlaces:
 
     def test_blocks_cover_all_sensors(self, scene):
         last = 0
-        for block in scene.blocks.values():
+        for block in scene.sensors.values():
             assert block.start == last
             last = block.stop
         assert last == scene.model.nsensordata
@@ -107,10 +106,10 @@ class TestPlaces:
             '<mujoco><worldbody><geom type="plane" size="5 5 0.1"/></worldbody>'
             "<sensor><clock/></sensor></mujoco>"
         )
-        ground = ScannedGround(path, cell=0.1, reach=1.0)
+        ground = ModelTerrain(path, cell=0.1, reach=1.0)
         scene = build_scene(cart, ground, calm())
         foot = scene.model.sensor("foot_position_sole of wheel")
-        assert foot.adr[0] == scene.blocks["foot_position"].start
+        assert foot.adr[0] == scene.sensors["foot_position"].start
 
     def test_physics_are_those_of_the_task(self, cart, calm):
         task = calm(sim=Sim(dt=0.002, iterations=7, ls_iterations=9))
@@ -168,7 +167,7 @@ class TestCollisions:
             '<mujoco><worldbody><geom name="floor" type="plane" size="5 5 0.1" '
             f'contype="{affinity[0]}" conaffinity="{affinity[1]}"/></worldbody></mujoco>'
         )
-        scene = build_scene(cart, ScannedGround(path, cell=0.1, reach=1.0), calm())
+        scene = build_scene(cart, ModelTerrain(path, cell=0.1, reach=1.0), calm())
         qpos = scene.home.copy()
         qpos[2] = 0.15
         assert any("ground/floor" in pair for pair in contacts(scene.model, qpos))
@@ -190,9 +189,9 @@ class TestForces:
     @pytest.mark.parametrize("collision", ["hfield", "boxes"])
     def test_and_so_on_a_map(self, quadruped, calm, mixed_map, collision):
         # Which of two geoms is the first differs with their kind; the force must not.
-        env = LeggedEnv(calm(6), quadruped, MapGround(mixed_map, collision))
-        env.careers.levels[:] = 0
-        env.begin_all()
+        env = LeggedEnv(calm(6), quadruped, MapTerrain(mixed_map, collision))
+        env.curriculum.levels[:] = 0
+        env.reset()
         for _ in range(60):
             env.step(torch.zeros(6, 12))
         np.testing.assert_allclose(
@@ -201,14 +200,14 @@ class TestForces:
 
     def test_a_robot_on_its_back_is_borne_by_its_trunk(self, cart, calm):
         scene = build_scene(cart, Plane(), calm(1))
-        physics = Physics(scene, 1, 1)
-        physics.qpos[0] = scene.home
-        physics.qpos[0, 2:7] = (0.06, 0, 1, 0, 0)
+        sim = Simulation(scene, 1, 1)
+        sim.qpos[0] = scene.home
+        sim.qpos[0, 2:7] = (0.06, 0, 1, 0, 0)
         for _ in range(100):
-            physics.step(4)
-        up = -physics.block("termination_force")[0, 0]
+            sim.step(4)
+        up = -sim.sensor("termination_force")[0, 0]
         np.testing.assert_allclose(up, [0, 0, weight_of(scene)], atol=0.5)
-        assert (physics.block("foot_force") == 0).all()
+        assert (sim.sensor("foot_force") == 0).all()
 
 
 class TestRefused:
@@ -224,7 +223,7 @@ class TestRefused:
         ],
     )
     def test_a_spec_of_another_robot(self, cart, calm, changes, message):
-        other = robot_of(replace(cart.spec, **changes), cart.mjcf.parent)
+        other = Robot.from_spec(replace(cart.spec, **changes), cart.mjcf.parent)
         with pytest.raises(ConfigError, match=message) as caught:
             build_scene(other, Plane(), calm())
         assert "\n" not in str(caught.value)
@@ -240,7 +239,7 @@ class TestRefused:
         tables["soft_limits"] = {".*": (-1.0, 1.0)}
         spec = replace(cart.spec, joint_order=("wheel_axle", "fore_hinge"), **tables)
         with pytest.raises(ConfigError, match=r"joint 'fore_hinge'; cart\.xml has: "):
-            build_scene(robot_of(spec, cart.mjcf.parent), Plane(), calm())
+            build_scene(Robot.from_spec(spec, cart.mjcf.parent), Plane(), calm())
 
     def test_something_else_that_moves_before_the_robot(self, cart, calm, tmp_path):
         # Positions begin with those of the base.
@@ -250,11 +249,11 @@ class TestRefused:
         )
         (tmp_path / "cart.xml").write_text(text.partition("<keyframe>")[0] + "</mujoco>")
         with pytest.raises(ConfigError, match="trunk") as caught:
-            build_scene(robot_of(cart.spec, tmp_path), Plane(), calm())
+            build_scene(Robot.from_spec(cart.spec, tmp_path), Plane(), calm())
         assert "\n" not in str(caught.value)
 
     def test_a_file_that_is_no_robot(self, cart, calm, tmp_path):
         (tmp_path / "cart.xml").write_text("<mujoco><worldbody>")
         with pytest.raises(ConfigError, match="MuJoCo does not read"):
-            build_scene(robot_of(cart.spec, tmp_path), Plane(), calm())
+            build_scene(Robot.from_spec(cart.spec, tmp_path), Plane(), calm())
         assert not (tmp_path / "MUJOCO_LOG.TXT").exists()

@@ -11,7 +11,7 @@ from terrainkit_robots.policy import trials
 from terrainkit_robots.policy.evaluate import Asked, prepared
 from terrainkit_robots.policy.score import score_of, summed_up, write_evaluation
 from terrainkit_robots.policy.trials import Outcome, roll_out
-from terrainkit_robots.rl.task import Commands
+from terrainkit_robots.rl.config import Commands
 
 
 def still(env):
@@ -91,7 +91,7 @@ def test_on_a_randomized_map_each_robot_counts_for_the_terrain_below_it(run_of, 
     run, asked = run_of(path), Asked(seconds=0.04)
     env, commands = prepared(run, replace(asked, num_envs=9))
     found = summed_up(run, asked, env, roll_out(env, still(env), 0.04, commands))
-    names = env.ground.terrain_names
+    names = env.terrain.terrain_names
     assert len({tuple(row) for row in names}) > 1
     for part in found.by_terrain:
         assert part.score.robots == (names == part.terrain).sum()

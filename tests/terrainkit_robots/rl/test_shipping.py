@@ -6,15 +6,14 @@ import torch
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots.policy.actor import policy_of
 from terrainkit_robots.policy.bundle import ship
-from terrainkit_robots.rl.checkpoint import read_checkpoint
+from terrainkit_robots.rl.config import Env, Policy, Runner, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane, read_ground
-from terrainkit_robots.rl.registry import find, names
-from terrainkit_robots.rl.run_folder import create_run, open_run
+from terrainkit_robots.rl.run import create_run, open_run, read_checkpoint
 from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.task import Env, Policy, Runner, Task
+from terrainkit_robots.rl.tasks import get_task, task_names
+from terrainkit_robots.rl.terrain import Plane, load_terrain
 
-SHIPPING = [name for name in names() if find(name).shipped.is_dir()]
+SHIPPING = [name for name in task_names() if get_task(name).shipped.is_dir()]
 TASK = Task(
     env=Env(num_envs=2, num_threads=1),
     policy=Policy(actor_hidden_dims=(8,), critic_hidden_dims=(8,)),
@@ -60,7 +59,7 @@ def test_a_checkpoint_may_be_asked_for(trained, tmp_path):
 
 def test_a_map_is_made_again_and_no_folder_of_this_machine_is_named(map_file, tmp_path):
     run = create_run(tmp_path / "run", TASK, "quadruped", map_file)
-    ground = read_ground(run.terrain)
+    ground = load_terrain(run.terrain)
     LeggedRunner(LeggedEnv(TASK, run.robot, ground), run.folder).learn(1)
     shipped = ship(open_run(run.folder), tmp_path / "elsewhere")
     map_file.unlink()
@@ -71,7 +70,7 @@ def test_a_map_is_made_again_and_no_folder_of_this_machine_is_named(map_file, tm
     moved = shipped.folder.rename(tmp_path / "moved")
     again = open_run(moved)
     assert again.terrain == str(moved / "map.toml")
-    assert (read_ground(again.terrain).env_origins == ground.env_origins).all()
+    assert (load_terrain(again.terrain).env_origins == ground.env_origins).all()
 
 
 def test_what_is_found_on_this_machine_alone_is_refused(quadruped, trained, tmp_path):
@@ -111,7 +110,7 @@ def test_a_quadruped_that_walks_comes_with_the_package():
 
 @pytest.mark.parametrize("name", SHIPPING)
 def test_a_policy_of_the_package_is_small_and_holds_nothing_that_could_run(name):
-    folder = find(name).shipped
+    folder = get_task(name).shipped
     assert sum(path.stat().st_size for path in folder.iterdir()) < 2e6
     assert len(list(folder.glob("*.pt"))) == 1
     torch.load(open_run(name).checkpoint, weights_only=True)
@@ -122,5 +121,5 @@ def test_a_policy_of_the_package_is_small_and_holds_nothing_that_could_run(name)
 
 @pytest.mark.parametrize("name", SHIPPING)
 def test_a_policy_of_the_package_was_trained_with_the_robot_of_the_package(name):
-    found = find(name)
+    found = get_task(name)
     assert (found.shipped / "robot.toml").read_bytes() == (found.folder / "robot.toml").read_bytes()

@@ -22,13 +22,12 @@ from terrainkit_robots.policy.smoke_test import (
     stands,
     training,
 )
+from terrainkit_robots.rl.config import Control, Env, Rewards, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.registry import find
 from terrainkit_robots.rl.rewards import REWARDS
-from terrainkit_robots.rl.robot import robot_of
-from terrainkit_robots.rl.scene import lowest_point
-from terrainkit_robots.rl.task import Control, Env, Rewards, Task
+from terrainkit_robots.rl.scene import Robot, lowest_point
+from terrainkit_robots.rl.tasks import get_task
+from terrainkit_robots.rl.terrain import Plane
 
 
 def failed(found):
@@ -46,7 +45,7 @@ def env(quadruped, small):
 
 
 def changed(robot, **values):
-    return robot_of(replace(robot.spec, **values), robot.mjcf.parent)
+    return Robot.from_spec(replace(robot.spec, **values), robot.mjcf.parent)
 
 
 def test_a_bundled_robot_can_be_trained(biped):
@@ -171,10 +170,10 @@ def test_the_lowest_point_of_every_shape_is_that_of_mujoco():
 @pytest.mark.parametrize("group", ["policy", "privileged"])
 def test_observations_of_another_width_are_told(env, group):
     assert all(check.passed for check in observation_shapes(env))
-    commands, gravity, *others = env.groups[group]
+    commands, gravity, *others = env.obs_groups[group]
     wide = replace(gravity, read=lambda state: np.tile(gravity.read(state), 2))
-    env.groups[group] = (commands, wide, *others)
-    env.begin_all()
+    env.obs_groups[group] = (commands, wide, *others)
+    env.reset()
     bad = {check.name: check for check in observation_shapes(env) if not check.passed}
     assert set(bad) == {f"observation {group}"}
     more = {"policy": "48 numbers", "privileged": "83 numbers"}[group]
@@ -217,7 +216,7 @@ def test_each_reward_in_use_is_looked_at_and_left_as_it_was(env):
     assert [check.name for check in found] == [f"reward {name}" for name in before]
     assert all(check.passed for check in found)
     assert env.rewards == before
-    assert env.orders.held is None
+    assert env.velocity_command.held is None
 
 
 def constant(value):
@@ -347,7 +346,7 @@ def test_a_file_with_errors_is_not_trained(tmp_path):
 @pytest.mark.usefixtures("quick")
 def test_a_folder_whose_spec_was_edited_badly_fails(tmp_path):
     folder = tmp_path / "mine"
-    shutil.copytree(find("quadruped").folder, folder)
+    shutil.copytree(get_task("quadruped").folder, folder)
     spec = folder / "robot.toml"
     text = spec.read_text()
     assert "spawn_height = 0.34626" in text

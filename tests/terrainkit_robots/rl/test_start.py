@@ -4,18 +4,18 @@ import pytest
 import torch
 
 from terrainkit import MapConfig, generate
+from terrainkit_robots.rl.config import InitState
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import MapGround, Plane
-from terrainkit_robots.rl.rotation import yaw_of
+from terrainkit_robots.rl.events import sample_reset_state
 from terrainkit_robots.rl.scene import build_scene
-from terrainkit_robots.rl.start import draw_start
-from terrainkit_robots.rl.task import InitState
+from terrainkit_robots.rl.terrain import MapTerrain, Plane
+from terrainkit_robots.transforms import quat_to_yaw
 
 
 @pytest.fixture(scope="module")
 def default_ground():
     """Return a map of every default terrain at its easiest, a middling and its hardest."""
-    return MapGround(generate(MapConfig(rows=3, seed=5)))
+    return MapTerrain(generate(MapConfig(rows=3, seed=5)))
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,7 @@ def plane_scene(quadruped, calm):
 
 def drawn(robot, scene, ground, settings, origins, seed=0):
     rng = np.random.default_rng(seed)
-    return draw_start(rng, origins, scene, robot, ground, settings)
+    return sample_reset_state(rng, origins, scene, robot, ground, settings)
 
 
 def deepest(env, qpos, down=0.0):
@@ -39,10 +39,10 @@ def deepest(env, qpos, down=0.0):
 
 def everywhere(env):
     """Start on every patch of the map, each its own robot."""
-    rows, cols = env.ground.env_origins.shape[:2]
-    env.careers.levels[:] = np.repeat(np.arange(rows), cols)
-    env.careers.columns[:] = np.tile(np.arange(cols), rows)
-    env.begin_all()
+    rows, cols = env.terrain.env_origins.shape[:2]
+    env.curriculum.levels[:] = np.repeat(np.arange(rows), cols)
+    env.curriculum.columns[:] = np.tile(np.arange(cols), rows)
+    env.reset()
 
 
 class TestDrawn:
@@ -63,7 +63,7 @@ class TestDrawn:
         offset = qpos[:, :2] - [3, -2]
         for values, most in (
             (offset, 0.4),
-            (yaw_of(qpos[:, 3:7].astype(np.float32)), 1.0),
+            (quat_to_yaw(qpos[:, 3:7].astype(np.float32)), 1.0),
             (qvel[:, :3], 0.3),
             (qvel[:, 3:6], 0.6),
         ):
@@ -109,9 +109,11 @@ class TestOnTheGround:
         rows, cols = default_ground.env_origins.shape[:2]
         env = LeggedEnv(calm(rows * cols), request.getfixturevalue(name), default_ground)
         everywhere(env)
-        np.testing.assert_allclose(env.physics.qpos[:, :2], env.careers.origins[:, :2], atol=1e-6)
+        np.testing.assert_allclose(
+            env.sim.qpos[:, :2], env.curriculum.env_origins[:, :2], atol=1e-6
+        )
         for down, touching in ((0.0, False), (0.02, True)):
-            found = [deepest(env, qpos, down) < 0 for qpos in env.physics.qpos]
+            found = [deepest(env, qpos, down) < 0 for qpos in env.sim.qpos]
             assert found == [touching] * len(found)
 
     @pytest.mark.parametrize("name", ["quadruped", "biped"])
@@ -120,7 +122,7 @@ class TestOnTheGround:
         env = LeggedEnv(lively(rows * cols), request.getfixturevalue(name), default_ground)
         for _ in range(3):
             everywhere(env)
-            depths = np.array([deepest(env, qpos) for qpos in env.physics.qpos])
+            depths = np.array([deepest(env, qpos) for qpos in env.sim.qpos])
             assert depths.min() > -0.02, f"{np.mean(depths < -0.02):.0%} are deeper"
 
     def test_robots_start_beside_the_origin_where_the_ground_allows(
@@ -129,7 +131,7 @@ class TestOnTheGround:
         rows, cols = default_ground.env_origins.shape[:2]
         env = LeggedEnv(lively(rows * cols), quadruped, default_ground)
         everywhere(env)
-        offset = np.abs(env.physics.qpos[:, :2] - env.careers.origins[:, :2])
+        offset = np.abs(env.sim.qpos[:, :2] - env.curriculum.env_origins[:, :2])
         assert (offset <= 0.5 + 1e-6).all()
         assert (offset.max(axis=1) > 0.1).mean() > 0.3
 

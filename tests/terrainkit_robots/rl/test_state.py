@@ -6,10 +6,10 @@ import pytest
 import torch
 
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.rl.config import DomainRand, InitState
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
 from terrainkit_robots.rl.state import State
-from terrainkit_robots.rl.task import DomainRand, InitState
+from terrainkit_robots.rl.terrain import Plane
 
 
 @pytest.fixture
@@ -17,8 +17,8 @@ def moving(cart, calm):
     """Return carts that tumble through the air."""
     env = LeggedEnv(calm(5), cart, Plane())
     rng = np.random.default_rng(2)
-    env.physics.qpos[:, 2] = 2.0
-    env.physics.qvel[:] = rng.normal(size=env.physics.qvel.shape)
+    env.sim.qpos[:, 2] = 2.0
+    env.sim.qvel[:] = rng.normal(size=env.sim.qvel.shape)
     env.step(torch.from_numpy(rng.normal(size=(5, 3)).astype(np.float32)))
     return env
 
@@ -111,14 +111,14 @@ class TestByHand:
 
     def test_torques_are_in_the_order_of_the_spec(self, cart, calm):
         env = LeggedEnv(calm(1), cart, Plane())
-        env.physics.qpos[:, 2] = 2.0
+        env.sim.qpos[:, 2] = 2.0
         env.step(torch.tensor([[50.0, 0.0, 0.0]]))  # the wheel only
         assert env.state.torques[0, 0] == pytest.approx(3.0)
         assert np.abs(env.state.torques[0, 1:]).max() < 1.0
 
     def test_air_time_counts_from_the_start_and_from_each_lift(self, quadruped, calm):
         env = LeggedEnv(calm(1), quadruped, Plane())
-        env.physics.qpos[:, 2] = 0.6
+        env.sim.qpos[:, 2] = 0.6
         flown = 0
         while not env.state.first_contact.any():
             env.step(torch.zeros(1, 12))
@@ -145,12 +145,12 @@ class TestByHand:
             ),
         )  # fmt: skip
         env = LeggedEnv(task, cart, Plane())
-        env.physics.qpos[:, 2] = 3.0
+        env.sim.qpos[:, 2] = 3.0
         seen = []
         for _ in range(4):
-            before = env.physics.qvel[:, :2].copy()
+            before = env.sim.qvel[:, :2].copy()
             env.step(torch.zeros(64, 3))
-            added = env.physics.qvel[:, :2] - before
+            added = env.sim.qvel[:, :2] - before
             np.testing.assert_allclose(added, env.state.push_vel[:, :2], atol=0.05)
             assert (env.state.push_vel[:, 2] == 0).all()
             assert 0.7 < np.abs(env.state.push_vel).max() <= 0.8
@@ -190,7 +190,7 @@ class TestCopies:
         # A reward that writes into the state must not change the robots.
         env = LeggedEnv(lively(3), quadruped, Plane())
         env.step(torch.zeros(3, 12))
-        own = [env.physics.batch.state, *vars(env.differences).values(), env.commands]
+        own = [env.sim.batch.state, *vars(env.params).values(), env.commands]
         own += [env.joint_offset, env.push_vel, env.air_time, env.actions]
         for field in fields(State):
             value = getattr(env.state, field.name)
@@ -215,7 +215,7 @@ class TestCopies:
         env = LeggedEnv(calm(3), quadruped, Plane())
         for _ in range(30):
             env.step(torch.full((3, 12), 0.5))
-        env.physics.qpos[1, 3:7] = (0, 1, 0, 0)  # on its back: a fall
+        env.sim.qpos[1, 3:7] = (0, 1, 0, 0)  # on its back: a fall
         _, _, dones, _ = env.step(torch.zeros(3, 12))
         assert dones.tolist() == [False, True, False]
         new = LeggedEnv(calm(3), quadruped, Plane()).state
@@ -225,7 +225,7 @@ class TestCopies:
             found, fresh = getattr(env.state, field.name)[1], getattr(new, field.name)[1]
             np.testing.assert_allclose(found, fresh, atol=1e-6, err_msg=field.name)
         where = np.array([1])
-        env.physics.batch.forward(where, stage=mujoco.mjtStage.mjSTAGE_VEL)
-        feet = env.physics.block("foot_position", where)[0]
+        env.sim.batch.forward(where, stage=mujoco.mjtStage.mjSTAGE_VEL)
+        feet = env.sim.sensor("foot_position", where)[0]
         expected = feet[:, 2] - quadruped.spec.foot_radius
         np.testing.assert_allclose(env.state.foot_height[1], expected, atol=1e-5)

@@ -11,11 +11,12 @@ from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.description import bundled
+from terrainkit_robots.rl import config as sections
+from terrainkit_robots.rl.config import DomainRand, Env, Noise, Sim, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Ground, Plane
-from terrainkit_robots.rl.robot import Robot, read_robot
-from terrainkit_robots.rl.symmetry import Mirror, mirror_of, mirrored
-from terrainkit_robots.rl.task import DomainRand, Env, Noise, Sim, Task, Terrain
+from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.symmetry import MirrorMaps, augment, mirror_maps
+from terrainkit_robots.rl.terrain import Plane, Terrain
 from terrainkit_robots.spec.robot_spec import Twin
 
 torch.set_num_threads(1)
@@ -27,13 +28,13 @@ _PAIRS = 4
 class Valley(Plane):
     """A plane that looks like a valley along x, the same to both sides of y = 0."""
 
-    level = False
+    is_flat = False
 
     def height(self, x: Any, y: Any) -> Any:
         return (0.3 * np.abs(y) + 0.1 * np.sin(3 * x)).astype(np.float32)
 
 
-def make_env(name: str, ground: Ground | None = None, robot: Robot | None = None) -> LeggedEnv:
+def make_env(name: str, ground: Terrain | None = None, robot: Robot | None = None) -> LeggedEnv:
     task = Task(
         env=Env(num_envs=2 * _PAIRS, num_threads=1),
         noise=Noise(noise_level=0.0),
@@ -44,12 +45,12 @@ def make_env(name: str, ground: Ground | None = None, robot: Robot | None = None
 
 
 def robot_named(name: str) -> Robot:
-    return read_robot(Path(str(bundled.find(name))).parent)
+    return Robot.load(Path(str(bundled.find(name))).parent)
 
 
-def mirror_physics(env: LeggedEnv, mirror: Mirror, *, turn: bool = True) -> None:
+def mirror_physics(env: LeggedEnv, mirror: MirrorMaps, *, turn: bool = True) -> None:
     """Put a random state into half of the environments, and its image into the others."""
-    rng, p, scene = np.random.default_rng(3), env.physics, env.scene
+    rng, p, scene = np.random.default_rng(3), env.sim, env.scene
     a, b = slice(0, _PAIRS), slice(_PAIRS, 2 * _PAIRS)
     height = float(env.robot.spec.spawn_height or 0.0)
     p.qpos[a, :2] = rng.uniform(-1, 1, (_PAIRS, 2))
@@ -69,44 +70,44 @@ def mirror_physics(env: LeggedEnv, mirror: Mirror, *, turn: bool = True) -> None
     p.qvel[b, 1] *= -1
     p.qvel[b, 3] *= -1
     p.qvel[b, 5] *= -1
-    p.qpos[b, scene.joint_qpos] = mirror.actions.of(p.qpos[a, scene.joint_qpos])
-    p.qvel[b, scene.joint_qvel] = mirror.actions.of(p.qvel[a, scene.joint_qvel])
+    p.qpos[b, scene.joint_qpos] = mirror.actions(p.qpos[a, scene.joint_qpos])
+    p.qvel[b, scene.joint_qvel] = mirror.actions(p.qvel[a, scene.joint_qvel])
 
 
-def mirror_memory(env: LeggedEnv, mirror: Mirror) -> None:
+def mirror_memory(env: LeggedEnv, mirror: MirrorMaps) -> None:
     """Make commands, actions and differences of one half the images of the other's."""
-    from terrainkit_robots.rl.randomization import apply_differences
+    from terrainkit_robots.rl.events import apply_params
 
     rng = np.random.default_rng(4)
     a, b = slice(0, _PAIRS), slice(_PAIRS, 2 * _PAIRS)
-    env.hold_commands(rng.uniform(-1, 1, (2 * _PAIRS, 3)).astype(np.float32))
-    assert env.orders.held is not None
-    env.orders.held[b] = env.orders.held[a] * np.array([1, -1, -1])
+    env.set_commands(rng.uniform(-1, 1, (2 * _PAIRS, 3)).astype(np.float32))
+    assert env.velocity_command.fixed is not None
+    env.velocity_command.fixed[b] = env.velocity_command.fixed[a] * np.array([1, -1, -1])
     env.actions[:, a] = rng.uniform(-0.2, 0.2, env.actions[:, a].shape)
-    env.actions[:, b] = [mirror.actions.of(each) for each in env.actions[:, a]]
+    env.actions[:, b] = [mirror.actions(each) for each in env.actions[:, a]]
     env.push_vel[a] = rng.uniform(-1, 1, (_PAIRS, 3)) * [1, 1, 0]
     env.push_vel[b] = env.push_vel[a] * np.array([1, -1, 1])
-    env.joint_offset[b] = mirror.actions.of(env.joint_offset[a])
+    env.joint_offset[b] = mirror.actions(env.joint_offset[a])
     env.air_time[:] = 0
-    d = env.differences
+    d = env.params
     for same in (d.friction, d.geom_friction, d.added_mass, d.strength):
         same[b] = same[a]
     d.com_shift[b] = d.com_shift[a] * np.array([1, -1, 1])
     for each in (d.stiffness, d.damping):
         each[b] = each[a][:, mirror.actions.index]  # a factor has no direction
-    apply_differences(env.physics, env.differences)
+    apply_params(env.sim, env.params)
 
 
-def assert_images(env: LeggedEnv, mirror: Mirror, tolerance: float) -> None:
+def assert_images(env: LeggedEnv, mirror: MirrorMaps, tolerance: float) -> None:
     for name, image in mirror.groups.items():
         values = env.get_observations()[name].numpy()
         one, other = values[:_PAIRS], values[_PAIRS:]
         width = 0
-        for each in env.groups[name]:
-            here = slice(width, width + each.read(env.state).shape[1])
+        for each in env.obs_groups[name]:
+            here = slice(width, width + each.function(env.state).shape[1])
             width = here.stop
             np.testing.assert_allclose(
-                image.of(one)[:, here], other[:, here], atol=tolerance, err_msg=each.name
+                image(one)[:, here], other[:, here], atol=tolerance, err_msg=each.name
             )
         assert width == values.shape[1]
 
@@ -115,27 +116,27 @@ def assert_images(env: LeggedEnv, mirror: Mirror, tolerance: float) -> None:
 class TestRobot:
     def test_image_of_image(self, name: str) -> None:
         env = make_env(name, Valley())
-        mirror = mirror_of(env)
+        mirror = mirror_maps(env)
         for image in (*mirror.groups.values(), mirror.actions):
             values = np.random.default_rng(1).normal(size=(3, len(image.index))).astype(np.float32)
-            np.testing.assert_array_equal(image.of(image.of(values)), values)
-            assert not np.array_equal(image.of(values), values)
+            np.testing.assert_array_equal(image(image(values)), values)
+            assert not np.array_equal(image(values), values)
             assert sorted(image.index) == list(range(len(image.index)))
             assert set(image.sign) == {-1, 1}
 
     def test_mirrored_states_give_mirrored_observations(self, name: str) -> None:
         env = make_env(name, Valley())
-        mirror = mirror_of(env)
+        mirror = mirror_maps(env)
         mirror_physics(env, mirror)
         mirror_memory(env, mirror)
         _look_again(env)
         # The feet have no contacts yet; any forces will do, of feet that are images by their place.
-        feet = env.physics.block("foot_position")
+        feet = env.sim.sensor("foot_position")
         force = np.random.default_rng(5).uniform(-50, 50, feet.shape).astype(np.float32)
         twins = _nearest_images(feet)
         force[_PAIRS:] = force[:_PAIRS, twins] * np.array([1, -1, 1], np.float32)
         env.state.foot_force[:] = force
-        env._observed = env._observe()
+        env._compute_observations()
         assert_images(env, mirror, 3e-5)
         scan = env.state.height_scan
         assert np.ptp(scan[0]) > 0.1
@@ -143,29 +144,29 @@ class TestRobot:
 
     def test_mirrored_actions_lead_to_mirrored_states(self, name: str) -> None:
         env = make_env(name)
-        mirror = mirror_of(env)
+        mirror = mirror_maps(env)
         mirror_physics(env, mirror)
         mirror_memory(env, mirror)
         rng = np.random.default_rng(6)
         touched = False
         for _ in range(6):
             one = rng.uniform(-0.5, 0.5, (_PAIRS, env.num_actions)).astype(np.float32)
-            actions = np.concatenate([one, mirror.actions.of(one)])
+            actions = np.concatenate([one, mirror.actions(one)])
             env.step(torch.from_numpy(actions))
             touched |= bool((env.state.foot_force[..., 2] > 5).any())
             assert not env.state.fallen.any()
         assert touched
         assert_images(env, mirror, 2e-3)
-        image = env.physics.qpos[:_PAIRS].copy()
+        image = env.sim.qpos[:_PAIRS].copy()
         image[:, [1, 4, 6]] *= -1
-        np.testing.assert_allclose(image[:, :7], env.physics.qpos[_PAIRS:, :7], atol=1e-4)
-        rewards = env.earnings.pay(env.state, np.zeros(env.num_envs, bool))
+        np.testing.assert_allclose(image[:, :7], env.sim.qpos[_PAIRS:, :7], atol=1e-4)
+        rewards = env._compute_rewards(env.state, np.zeros(env.num_envs, bool))
         np.testing.assert_allclose(rewards[:_PAIRS], rewards[_PAIRS:], atol=1e-4)
 
     def test_wrong_sign_is_seen(self, name: str) -> None:
         """Proves that the tests above can fail."""
         env = make_env(name)
-        mirror = mirror_of(env)
+        mirror = mirror_maps(env)
         mirror_physics(env, mirror)
         mirror_memory(env, mirror)
         _look_again(env)
@@ -177,26 +178,26 @@ class TestRobot:
 class TestMirrored:
     def test_originals_then_images(self) -> None:
         env = make_env("quadruped")
-        mirror, obs = mirror_of(env), env.get_observations()
+        mirror, obs = mirror_maps(env), env.get_observations()
         actions = torch.randn(8, 12)
-        both, acted = mirrored(env, obs, actions)
+        both, acted = augment(env, obs, actions)
         assert both is not None
         assert acted is not None
         assert both.batch_size == torch.Size([16])
         assert set(both.keys()) == {"policy", "privileged"}
         for name, image in mirror.groups.items():
             np.testing.assert_array_equal(both[name][:8], obs[name])
-            np.testing.assert_array_equal(both[name][8:], image.of(obs[name].numpy()))
+            np.testing.assert_array_equal(both[name][8:], image(obs[name].numpy()))
         np.testing.assert_array_equal(acted[:8], actions)
-        np.testing.assert_array_equal(acted[8:], mirror.actions.of(actions.numpy()))
+        np.testing.assert_array_equal(acted[8:], mirror.actions(actions.numpy()))
 
     def test_either_may_be_none(self) -> None:
         env = make_env("quadruped")
-        both, acted = mirrored(env, None, torch.zeros(2, 12))
+        both, acted = augment(env, None, torch.zeros(2, 12))
         assert both is None
         assert acted is not None
         assert acted.shape == (4, 12)
-        both, acted = mirrored(env, env.get_observations()[:3], None)
+        both, acted = augment(env, env.get_observations()[:3], None)
         assert acted is None
         assert both is not None
         assert both["policy"].shape == (6, 45)
@@ -204,7 +205,7 @@ class TestMirrored:
     def test_gradients_pass(self) -> None:
         env = make_env("quadruped")
         actions = torch.zeros(1, 12, requires_grad=True)
-        _, acted = mirrored(env, None, actions)
+        _, acted = augment(env, None, actions)
         assert acted is not None
         acted.sum().backward()
         assert actions.grad is not None
@@ -216,7 +217,7 @@ class TestMirrored:
         from rsl_rl.storage import RolloutStorage
 
         env = make_env("quadruped")
-        symmetry = Symmetry(env, mirrored, use_data_augmentation=True)
+        symmetry = Symmetry(env, augment, use_data_augmentation=True)
         batch = RolloutStorage.Batch()
         batch.observations, batch.actions = env.get_observations(), torch.zeros(8, 12)
         batch.old_actions_log_prob = batch.values = torch.arange(8.0)[:, None]
@@ -228,8 +229,10 @@ class TestMirrored:
 
     def test_group_unknown_here(self) -> None:
         env = make_env("quadruped")
-        with pytest.raises(ConfigError, match="group 'camera'; there are: policy, privileged"):
-            mirrored(env, TensorDict({"camera": torch.zeros(8, 3)}, batch_size=[8]), None)
+        with pytest.raises(
+            ConfigError, match="group: got 'camera'; expected one of: policy, privileged"
+        ):
+            augment(env, TensorDict({"camera": torch.zeros(8, 3)}, batch_size=[8]), None)
 
 
 class TestNames:
@@ -237,21 +240,21 @@ class TestNames:
 
     def test_joints(self) -> None:
         env = make_env("quadruped")
-        names, image = env.robot.spec.joint_order, mirror_of(env).actions
+        names, image = env.robot.spec.joint_order, mirror_maps(env).actions
         for k, (index, sign) in enumerate(zip(image.index, image.sign, strict=True)):
             swapped = {"L": "R", "R": "L"}[names[k][1]]
             assert names[index] == names[k][0] + swapped + names[k][2:]
             assert sign == (-1 if "hip" in names[k] else 1)
 
     def test_commands_vectors_turns(self) -> None:
-        image = mirror_of(make_env("quadruped")).groups["policy"]
+        image = mirror_maps(make_env("quadruped")).groups["policy"]
         np.testing.assert_array_equal(image.index[:9], range(9))
         np.testing.assert_array_equal(image.sign[:9], [1, -1, -1, 1, -1, 1, -1, 1, -1])
 
     def test_feet(self) -> None:
         env = make_env("quadruped")
         feet = list(env.robot.spec.feet)
-        image = mirror_of(env).groups["privileged"]
+        image = mirror_maps(env).groups["privileged"]
         width = len(image.index)
         own = image.index[-12:] - (width - 12)
         for k, foot in enumerate(feet):
@@ -261,7 +264,7 @@ class TestNames:
 
     def test_scan(self) -> None:
         env = make_env("quadruped", Valley())
-        image = mirror_of(env).groups["policy"]
+        image = mirror_maps(env).groups["policy"]
         rows = (image.index[-187:] - 45).reshape(17, 11)
         np.testing.assert_array_equal(rows, np.arange(187).reshape(17, 11)[:, ::-1])
         assert (image.sign[-187:] == 1).all()
@@ -272,22 +275,22 @@ class TestErrors:
         robot = robot_named("quadruped")
         mirror = {k: v for k, v in robot.spec.mirror.items() if k != "FL_hip_joint"}
         env = make_env("", robot=replace(robot, spec=replace(robot.spec, mirror=mirror)))
-        with pytest.raises(ConfigError, match=r"wants a twin for each joint.*FL_hip_joint"):
-            mirror_of(env)
+        with pytest.raises(ConfigError, match=r"needs a pair for each joint.*FL_hip_joint"):
+            mirror_maps(env)
 
     def test_twin_that_is_not_one(self) -> None:
         robot = robot_named("quadruped")
         mirror = dict(robot.spec.mirror) | {"FL_hip_joint": Twin(joint="RR_hip_joint", sign=-1)}
         env = make_env("", robot=replace(robot, spec=replace(robot.spec, mirror=mirror)))
-        with pytest.raises(ConfigError, match="FL_hip_joint has the twin 'RR_hip_joint'"):
-            mirror_of(env)
+        with pytest.raises(ConfigError, match="FL_hip_joint is paired with 'RR_hip_joint'"):
+            mirror_maps(env)
 
     def test_default_pose_differs(self) -> None:
         robot = robot_named("quadruped")
         pose = robot.default_pose.copy()
         pose[1] += 0.1
-        with pytest.raises(ConfigError, match="same default_pose to the left and to the right"):
-            mirror_of(make_env("", robot=replace(robot, default_pose=pose)))
+        with pytest.raises(ConfigError, match="default_pose differs between left and right"):
+            mirror_maps(make_env("", robot=replace(robot, default_pose=pose)))
 
     @pytest.mark.parametrize("table", ["stiffness", "damping", "effort"])
     def test_control_differs(self, table: str) -> None:
@@ -295,22 +298,22 @@ class TestErrors:
         values = robot.spec.per_joint(table)
         other = {**values, "RR_hip_joint": 1.1 * values["RR_hip_joint"]}
         robot = replace(robot, spec=replace(robot.spec, **{table: other}))
-        with pytest.raises(ConfigError, match=f"same {table} to the left and to the right; RL_hip"):
-            mirror_of(make_env("", robot=robot))
+        with pytest.raises(ConfigError, match=f"{table} differs between left and right: RL_hip"):
+            mirror_maps(make_env("", robot=robot))
 
     def test_scan_that_leans(self) -> None:
         env = make_env("quadruped", Valley())
-        terrain = Terrain(measured_points_y=(-0.5, 0.0, 0.4))
+        terrain = sections.Terrain(measured_points_y=(-0.5, 0.0, 0.4))
         leaning = LeggedEnv(replace(env.cfg, terrain=terrain), env.robot, Valley())
-        with pytest.raises(ConfigError, match=r"measured_points_y .* has -0\.5 without 0\.5"):
-            mirror_of(leaning)
+        with pytest.raises(ConfigError, match=r"measured_points_y: got -0\.5 without 0\.5"):
+            mirror_maps(leaning)
 
     def test_observation_of_another_width(self) -> None:
         env = make_env("quadruped")
-        first, *others = env.groups["policy"]
-        env.groups["policy"] = (replace(first, image="joints"), *others)
-        with pytest.raises(ConfigError, match="commands has 3 numbers; its image, 'joints'"):
-            mirror_of(env)
+        first, *others = env.obs_groups["policy"]
+        env.obs_groups["policy"] = (replace(first, symmetry="joints"), *others)
+        with pytest.raises(ConfigError, match="commands: got 3 numbers; the symmetry 'joints'"):
+            mirror_maps(env)
 
 
 def _look_again(env: LeggedEnv) -> None:
@@ -318,11 +321,11 @@ def _look_again(env: LeggedEnv) -> None:
     import mujoco
 
     everyone = np.arange(env.num_envs)
-    env.physics.batch.forward(everyone, mujoco.mjtStage.mjSTAGE_VEL)
-    assert env.orders.held is not None
-    env.commands[:] = env.orders.held
-    env.state = env._look(everyone, fresh=True)
-    env._observed = env._observe()
+    env.sim.batch.forward(everyone, mujoco.mjtStage.mjSTAGE_VEL)
+    assert env.velocity_command.fixed is not None
+    env.commands[:] = env.velocity_command.fixed
+    env.state = env._compute_state(everyone, after_reset=True)
+    env._compute_observations()
 
 
 def _nearest_images(feet: Any) -> list[int]:

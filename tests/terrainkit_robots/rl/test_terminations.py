@@ -8,12 +8,16 @@ import pytest
 import torch
 
 from terrainkit_robots.description import bundled
+from terrainkit_robots.rl.config import DomainRand, Env, InitState, Task, Termination
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.robot import read_robot
-from terrainkit_robots.rl.rotation import gravity_in_body
-from terrainkit_robots.rl.task import DomainRand, Env, InitState, Task, Termination
-from terrainkit_robots.rl.terminations import outside, tilted, touched
+from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.terminations import (
+    bad_orientation,
+    illegal_contact,
+    terrain_out_of_bounds,
+)
+from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.transforms import projected_gravity
 
 torch.set_num_threads(1)
 
@@ -31,12 +35,14 @@ class TestTouched:
         force[2, 1] = (0, -0.7, 0.75)  # just over
         force[3, 0], force[3, 1] = (0.9, 0, 0), (0, 0.9, 0)  # each for itself
         force[4, 1] = (0, 0, -300)
-        assert touched(force, Termination()).tolist() == [False, False, True, False, True]
-        harder = touched(force, Termination(contact_force=300.5))
+        assert illegal_contact(force, Termination()).tolist() == [False, False, True, False, True]
+        harder = illegal_contact(force, Termination(contact_force=300.5))
         assert harder.tolist() == [False] * 5
 
     def test_without_termination_bodies(self) -> None:
-        assert touched(np.zeros((3, 0, 3), np.float32), Termination()).tolist() == [False] * 3
+        assert (
+            illegal_contact(np.zeros((3, 0, 3), np.float32), Termination()).tolist() == [False] * 3
+        )
 
 
 class TestTilted:
@@ -46,26 +52,26 @@ class TestTilted:
         angles = np.array([0, 0.5, 1.29, 1.31, 2, np.pi, -1.29, -1.31], np.float32)
         quat = np.zeros((len(angles), 4), np.float32)
         quat[:, 0], quat[:, around] = np.cos(angles / 2), np.sin(angles / 2)
-        found = tilted(gravity_in_body(quat), Termination())
+        found = bad_orientation(projected_gravity(quat), Termination())
         assert found.tolist() == [False, False, False, True, True, True, False, True]
-        less = tilted(gravity_in_body(quat), Termination(tilt=0.4))
+        less = bad_orientation(projected_gravity(quat), Termination(tilt=0.4))
         assert less.tolist() == [False] + [True] * 7
 
     def test_turning_is_no_tilt(self) -> None:
         yaw = np.linspace(-3, 3, 9, dtype=np.float32)
         quat = np.zeros((9, 4), np.float32)
         quat[:, 0], quat[:, 3] = np.cos(yaw / 2), np.sin(yaw / 2)
-        assert not tilted(gravity_in_body(quat), Termination(tilt=0.01)).any()
+        assert not bad_orientation(projected_gravity(quat), Termination(tilt=0.01)).any()
 
 
 class TestOutside:
     def test_by_hand(self) -> None:
         places = [[0, 0, 9], [4.9, 2.9, 0], [5.1, 0, 0], [-5.1, 0, 0], [0, 3.1, 0], [0, -1.1, 0]]
-        found = outside(np.array(places, np.float32), Field())
+        found = terrain_out_of_bounds(np.array(places, np.float32), Field())
         assert found.tolist() == [False, False, True, True, True, True]
 
     def test_plane_has_no_end(self) -> None:
-        assert not outside(np.array([[1e6, -1e6, 0]], np.float32), Plane()).any()
+        assert not terrain_out_of_bounds(np.array([[1e6, -1e6, 0]], np.float32), Plane()).any()
 
 
 def make_env(ground: Plane | None = None, **changes: Any) -> LeggedEnv:
@@ -75,7 +81,7 @@ def make_env(ground: Plane | None = None, **changes: Any) -> LeggedEnv:
         domain_rand=DomainRand(push_interval_s=0),
         **changes,
     )
-    robot = read_robot(Path(str(bundled.find("quadruped"))).parent)
+    robot = Robot.load(Path(str(bundled.find("quadruped"))).parent)
     return LeggedEnv(task, robot, ground or Plane())
 
 
@@ -94,32 +100,32 @@ class TestEnvironment:
 
     def test_on_its_back(self) -> None:
         env = make_env()
-        env.physics.qpos[2, 3:7] = (0, 1, 0, 0)
+        env.sim.qpos[2, 3:7] = (0, 1, 0, 0)
         assert step(env) == ([False, False, True, False], [False] * 4)
 
     def test_trunk_on_the_ground(self) -> None:
         env = make_env()
-        env.physics.qpos[1, 2] = 0.05
-        env.physics.qpos[1, env.scene.joint_qpos] = [0, 1.5, -2.5] * 4
+        env.sim.qpos[1, 2] = 0.05
+        env.sim.qpos[1, env.scene.joint_qpos] = [0, 1.5, -2.5] * 4
         dones, time_outs = step(env)
         assert dones == [False, True, False, False]
         assert time_outs == [False] * 4
 
     def test_trunk_may_touch_where_nothing_says_it_ends(self) -> None:
         env = make_env(termination=Termination(contact_force=1e9))
-        env.physics.qpos[1, 2] = 0.05
-        env.physics.qpos[1, env.scene.joint_qpos] = [0, 1.5, -2.5] * 4
+        env.sim.qpos[1, 2] = 0.05
+        env.sim.qpos[1, env.scene.joint_qpos] = [0, 1.5, -2.5] * 4
         assert step(env)[0] == [False] * 4
 
     def test_out_of_the_map(self) -> None:
         env = make_env(Field())
-        env.physics.qpos[3, 1] = -1.2
+        env.sim.qpos[3, 1] = -1.2
         assert step(env) == ([False, False, False, True], [False] * 4)
         assert env.state.base_pos[3, 1] > -1  # begun anew
 
     def test_physics_that_blow_up(self) -> None:
         env = make_env()
-        env.physics.qvel[0, 6] = 1e12
+        env.sim.qvel[0, 6] = 1e12
         dones, time_outs = step(env)
         assert dones == [True, False, False, False]
         assert time_outs == [False] * 4
@@ -131,5 +137,5 @@ class TestEnvironment:
         env = make_env()
         for _ in range(9):
             step(env)
-        env.physics.qpos[0, 3:7] = (0, 1, 0, 0)
+        env.sim.qpos[0, 3:7] = (0, 1, 0, 0)
         assert step(env) == ([True] * 4, [False, True, True, True])

@@ -14,12 +14,17 @@ import torch
 
 import terrainkit
 from terrainkit.errors import ConfigError, ExportError, MemoryLimitError
-from terrainkit_robots.rl import registry, training
-from terrainkit_robots.rl.checkpoint import only_policy, read_checkpoint, save_checkpoint
-from terrainkit_robots.rl.progress import Progress
-from terrainkit_robots.rl.run_folder import checkpoints, open_run
-from terrainkit_robots.rl.task import Algorithm, Env, Policy, Runner, Task, Terrain
-from terrainkit_robots.rl.training import train
+from terrainkit_robots.rl import runner, tasks
+from terrainkit_robots.rl.config import Algorithm, Env, Policy, Runner, Task, Terrain
+from terrainkit_robots.rl.run import (
+    checkpoints,
+    open_run,
+    policy_state,
+    read_checkpoint,
+    save_checkpoint,
+)
+from terrainkit_robots.rl.runner import TrainingProgress
+from terrainkit_robots.rl.train import train
 
 
 @pytest.fixture
@@ -83,13 +88,15 @@ def test_a_run_goes_on_exactly_in_its_own_folder(task, tmp_path):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_goes_on_as_if_it_had_not_been(task, tmp_path, number):
-    def interrupt(progress: Progress) -> None:
+    def interrupt(progress: TrainingProgress) -> None:
         if progress.iteration == 2:
             signal.raise_signal(number)
 
     before = [signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)]
     train("quadruped", "plane", task, folder=tmp_path / "whole")
-    stopped = train("quadruped", "plane", task, folder=tmp_path / "run", watch=interrupt)
+    stopped = train(
+        "quadruped", "plane", task, folder=tmp_path / "run", progress_callback=interrupt
+    )
     assert (stopped.iteration, stopped.signal) == (2, number)
     assert [signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)] == before
     train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
@@ -97,33 +104,35 @@ def test_an_interrupted_run_goes_on_as_if_it_had_not_been(task, tmp_path, number
 
 
 def test_a_signal_in_the_last_iteration_ends_nothing_early(task, tmp_path):
-    def interrupt(progress: Progress) -> None:
+    def interrupt(progress: TrainingProgress) -> None:
         if progress.iteration == 4:
             signal.raise_signal(signal.SIGTERM)
 
-    done = train("quadruped", "plane", task, folder=tmp_path / "run", watch=interrupt)
+    done = train("quadruped", "plane", task, folder=tmp_path / "run", progress_callback=interrupt)
     assert (done.iteration, done.signal) == (4, 0)
 
 
 def test_a_second_interrupt_ends_it_at_once(task, tmp_path, monkeypatch):
-    monkeypatch.setattr(training, "_TOGETHER", 0.0)
+    monkeypatch.setattr(runner, "SIGNAL_INTERVAL", 0.0)
 
-    def interrupt(_progress: Progress) -> None:
+    def interrupt(_progress: TrainingProgress) -> None:
         signal.raise_signal(signal.SIGINT)
         signal.raise_signal(signal.SIGINT)
 
     with pytest.raises(KeyboardInterrupt):
-        train("quadruped", "plane", task, folder=tmp_path / "run", watch=interrupt)
+        train("quadruped", "plane", task, folder=tmp_path / "run", progress_callback=interrupt)
     assert checkpoints(tmp_path / "run") == {}
 
 
 def test_torchrun_tells_its_processes_again_what_the_terminal_told_them(task, tmp_path):
-    def interrupt(progress: Progress) -> None:
+    def interrupt(progress: TrainingProgress) -> None:
         if progress.iteration == 2:
             signal.raise_signal(signal.SIGINT)
             signal.raise_signal(signal.SIGTERM)
 
-    stopped = train("quadruped", "plane", task, folder=tmp_path / "run", watch=interrupt)
+    stopped = train(
+        "quadruped", "plane", task, folder=tmp_path / "run", progress_callback=interrupt
+    )
     assert (stopped.iteration, stopped.signal) == (2, signal.SIGINT)
     assert list(checkpoints(tmp_path / "run")) == [2]
 
@@ -177,7 +186,7 @@ def test_from_an_earlier_checkpoint_nothing_is_overwritten(task, tmp_path):
 @pytest.mark.parametrize("name", ["quadruped.xml", "robot.toml"])
 def test_a_robot_that_has_changed_begins_a_new_run_elsewhere(task, tmp_path, name):
     mine, run = tmp_path / "mine", tmp_path / "run"
-    shutil.copytree(registry.find("quadruped").folder, mine)
+    shutil.copytree(tasks.get_task("quadruped").folder, mine)
     train(mine, "plane", lasting(task, 1), folder=run)
     (mine / name).write_text((mine / name).read_text() + "\n")
     with pytest.raises(ConfigError, match=rf"mine has another {name} than .*run was trained with"):
@@ -200,7 +209,7 @@ def test_another_task_begins_a_new_run_with_the_networks(task, tmp_path, mixed_m
         other,
         resume=open_run(run),
         folder=tmp_path / "other",
-        watch=lambda progress: seen.append(progress.iteration),
+        progress_callback=lambda progress: seen.append(progress.iteration),
     )
     assert (done.folder, seen) == (tmp_path / "other", [1])
     blind = replace(task.terrain, measure_heights=False)
@@ -285,7 +294,7 @@ def test_a_policy_alone_is_gone_on_with_in_a_new_run(task, tmp_path):
     run = tmp_path / "run"
     train("quadruped", "plane", lasting(task, 1), folder=run)
     path = run / "model_1.pt"
-    save_checkpoint(path, only_policy(read_checkpoint(path)))
+    save_checkpoint(path, policy_state(read_checkpoint(path)))
     done = train("quadruped", "plane", task, resume=open_run(run), folder=tmp_path / "more")
     assert (done.folder, done.iteration) == (tmp_path / "more", 4)
     assert list(checkpoints(run)) == [1]
@@ -316,7 +325,7 @@ def test_a_disk_that_fills_up_leaves_the_checkpoint_before(task, tmp_path, capfd
     task = replace(task, runner=replace(task.runner, save_interval=2))
     disk = full_disk(20_000)
 
-    def fill(progress: Progress) -> None:
+    def fill(progress: TrainingProgress) -> None:
         if progress.iteration == 3:
             disk.__enter__()
 
@@ -325,7 +334,7 @@ def test_a_disk_that_fills_up_leaves_the_checkpoint_before(task, tmp_path, capfd
         with pytest.raises(
             ExportError, match=r"cannot write .*model_4\.pt: File too large; .* is .*model_2\.pt"
         ):
-            train("quadruped", "plane", task, folder=run, watch=fill)
+            train("quadruped", "plane", task, folder=run, progress_callback=fill)
     finally:
         disk.__exit__(None, None, None)
     assert open_run(run).checkpoint == run / "model_2.pt"
@@ -337,7 +346,7 @@ def test_a_disk_that_fills_up_leaves_the_checkpoint_before(task, tmp_path, capfd
 def test_a_disk_that_is_too_full_for_the_curves_is_one_error(task, tmp_path, capfd):
     disk = full_disk(200)
 
-    def fill(progress: Progress) -> None:
+    def fill(progress: TrainingProgress) -> None:
         if progress.iteration == 1:
             disk.__enter__()
 
@@ -345,7 +354,7 @@ def test_a_disk_that_is_too_full_for_the_curves_is_one_error(task, tmp_path, cap
         with pytest.raises(
             ExportError, match=r"cannot write .*: File too large; there is no check"
         ):
-            train("quadruped", "plane", task, folder=tmp_path / "run", watch=fill)
+            train("quadruped", "plane", task, folder=tmp_path / "run", progress_callback=fill)
     finally:
         disk.__exit__(None, None, None)
     assert capfd.readouterr() == ("", "")
@@ -366,7 +375,7 @@ def test_too_many_environments_are_refused_before_anything_is_made(task, tmp_pat
 
 
 def test_wandb_has_to_be_installed(task, tmp_path, monkeypatch):
-    monkeypatch.setattr("terrainkit_robots.rl.training.find_spec", lambda _: None)
+    monkeypatch.setattr("terrainkit_robots.rl.train.find_spec", lambda _: None)
     task = replace(task, runner=replace(task.runner, logger="wandb"))
     with pytest.raises(ConfigError, match="wandb, which is not installed: pip install wandb"):
         train("quadruped", "plane", task, folder=tmp_path / "run")
@@ -391,7 +400,7 @@ def test_processes_share_the_environments(task, tmp_path, monkeypatch):
 def test_a_spec_that_does_not_fit_its_robot_is_told(task, tmp_path):
     mine = tmp_path / "mine"
     mine.mkdir()
-    for path in registry.find("quadruped").folder.iterdir():
+    for path in tasks.get_task("quadruped").folder.iterdir():
         if path.is_file():
             (mine / path.name).write_bytes(path.read_bytes())
     model = mine / "quadruped.xml"

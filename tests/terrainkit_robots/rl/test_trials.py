@@ -5,9 +5,9 @@ import torch
 from terrainkit_robots.policy.evaluate import Asked, evaluation_task, prepared
 from terrainkit_robots.policy.score import score_of
 from terrainkit_robots.policy.trials import SETTLING, roll_out
+from terrainkit_robots.rl.config import Commands, Control, Sim
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
-from terrainkit_robots.rl.task import Commands, Control, Sim
+from terrainkit_robots.rl.terrain import Plane
 
 
 def still(env):
@@ -77,7 +77,7 @@ def test_swaying_cancels_out_over_a_second(sliding):
     before = env.step
 
     def swaying(actions):
-        env.moves = np.array([[1, 0.4 * (-1) ** env.steps[0], 0]], np.float32)
+        env.moves = np.array([[1, 0.4 * (-1) ** env.steps_since_reset[0], 0]], np.float32)
         return before(actions)
 
     env.step = swaying

@@ -6,7 +6,7 @@ import torch
 
 from terrainkit_robots.policy.rollout import timetable, walk
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.ground import Plane
+from terrainkit_robots.rl.terrain import Plane
 
 
 @pytest.fixture
@@ -25,22 +25,22 @@ def test_what_is_asked_for_is_followed_in_the_step_that_it_is_asked_for(env):
     assert [step.commands[0].tolist() for step in steps] == [[0.5, 0, 0], [0.5, 0, 0], [0, 0.25, 0]]
     told = [step.observed["policy"][0, :3].tolist() for step in steps]
     assert told == [[1.0, 0, 0], [1.0, 0, 0], [0, 0.5, 0]]  # scaled by 2
-    assert env.steps.tolist() == [3, 3]
+    assert env.steps_since_reset.tolist() == [3, 3]
 
 
 def test_it_makes_no_step_that_nobody_asks_for(env):
     walking = walk(env, still, repeat(None))
-    assert env.steps.tolist() == [0, 0]
+    assert env.steps_since_reset.tolist() == [0, 0]
     next(walking)
-    assert env.steps.tolist() == [1, 1]
+    assert env.steps_since_reset.tolist() == [1, 1]
 
 
 def test_commands_are_random_again_once_none_are_held(env):
     held = np.full((2, 3), 0.1, np.float32)
     list(walk(env, still, [held]))
-    assert env.orders.held is held
+    assert env.velocity_command.held is held
     list(walk(env, still, [None]))
-    assert env.orders.held is None
+    assert env.velocity_command.held is None
 
 
 def test_who_falls_is_told_but_not_who_runs_out_of_time(quadruped, calm):
@@ -53,10 +53,10 @@ def test_who_falls_is_told_but_not_who_runs_out_of_time(quadruped, calm):
 
     fallen = [step.fallen for step in walk(env, limp, repeat(None, 50))]
     assert np.any(fallen, axis=0).tolist() == [True, False]
-    env.begin_all()
+    env.reset()
     env.episode_length_buf[:] = env.max_episode_length - 1
     (step,) = walk(env, still, [None])
-    assert env.steps.tolist() == [0, 0]
+    assert env.steps_since_reset.tolist() == [0, 0]
     assert step.fallen.tolist() == [False, False]
 
 

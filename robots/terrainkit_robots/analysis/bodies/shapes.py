@@ -44,7 +44,7 @@ def reach(geometry: Geometry, direction: Matrix, meshes: "Meshes") -> float:
 def has_extent(geometry: Geometry, meshes: "Meshes") -> bool:
     """Return whether `reach` has an answer: a primitive with sizes, or a mesh that can be read."""
     if geometry.shape == "mesh":
-        return geometry.mesh is not None and meshes.readable(geometry.mesh)
+        return geometry.mesh is not None and meshes.is_readable(geometry.mesh)
     wanted = {"box": 3, "sphere": 1, "cylinder": 2, "capsule": 2, "ellipsoid": 3}
     return (
         len(geometry.size) == wanted.get(geometry.shape, -1)

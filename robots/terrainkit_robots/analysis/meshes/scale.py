@@ -74,7 +74,7 @@ class Scales:
         near, far = self._offsets(use.link)
         meshes = self._robot.meshes
         try:
-            about = meshes.glance(use.mesh)
+            about = meshes.partial_diagonal(use.mesh)
             if about is not None and _MOST_TINY < about < _LEAST_LARGE:
                 return None  # the rest of it is not worth the reading
             diagonal = meshes.diagonal(use.mesh)

@@ -9,7 +9,11 @@ from pathlib import Path
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.fix import Edit, SetAttribute, WriteFile
 from terrainkit_robots.description.model import Geometry, Link, MeshFile, Source
-from terrainkit_robots.description.package_resolver import is_absolute, names_package, right_letters
+from terrainkit_robots.description.package_resolver import (
+    filename_on_disk,
+    is_absolute,
+    is_package_uri,
+)
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.mesh.sniff import Header
 from terrainkit_robots.text import names
@@ -78,7 +82,7 @@ def mesh_uses(robot: Facts) -> Iterator[MeshUse]:
         for shapes, may_collide in ((link.collisions, True), (link.visuals, False)):
             for geometry in shapes:
                 if geometry.shape == "mesh" and geometry.mesh is not None:
-                    collides = may_collide and geometry.contacts and not geometry.fitted
+                    collides = may_collide and geometry.contacts and not geometry.fit_to_mesh
                     yield MeshUse(
                         link=link, geometry=geometry, mesh=geometry.mesh, collides=collides
                     )
@@ -119,9 +123,9 @@ def is_elsewhere(mesh: MeshFile) -> bool:
     """Return whether a search found it in another folder than the one that is written."""
     return (
         mesh.found_by == "search"
-        and not names_package(mesh.filename)
+        and not is_package_uri(mesh.filename)
         and not is_absolute(mesh.filename)
-        and right_letters(mesh.filename, mesh.path) is None
+        and filename_on_disk(mesh.filename, mesh.path) is None
     )
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from terrainkit_robots.description.mjcf.document import MOST_ELEMENTS, harmless
+from terrainkit_robots.description.mjcf.document import MAX_ELEMENTS, harmless
 from terrainkit_robots.description.xml.document import RobotFileError, parse_xml, read_bytes
 from terrainkit_robots.mesh.sniff import open_regular
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -95,8 +95,8 @@ def refused_by_yourdfpy(facts: "Facts") -> Refusal | None:
     model = facts.model
     if model.kind != "urdf":
         raise NotTriedError("the text that xacro expands to has no file for yourdfpy to read")
-    if len(model.links) + len(model.joints) > MOST_ELEMENTS:
-        raise NotTriedError(f"yourdfpy is not asked about more than {MOST_ELEMENTS} elements")
+    if len(model.links) + len(model.joints) > MAX_ELEMENTS:
+        raise NotTriedError(f"yourdfpy is not asked about more than {MAX_ELEMENTS} elements")
     if facts.tree.cycles:
         raise NotTriedError("yourdfpy is not asked about a circle of links")
     document = parse_xml(model.file, _data(model.file))
@@ -153,8 +153,8 @@ def _check_cost(sources: tuple[Path, ...]) -> None:
             if not isinstance(element.tag, str):
                 continue
             elements += 1
-            if elements > MOST_ELEMENTS:
-                raise NotTriedError(f"MuJoCo is not asked about more than {MOST_ELEMENTS} elements")
+            if elements > MAX_ELEMENTS:
+                raise NotTriedError(f"MuJoCo is not asked about more than {MAX_ELEMENTS} elements")
             _check_element(element)
             folders |= {Path(v) for k, v in element.attrib.items() if k in _FOLDERS}
             names |= {v for k, v in element.attrib.items() if k.startswith("file") and v}

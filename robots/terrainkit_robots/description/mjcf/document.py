@@ -15,14 +15,14 @@ from lxml import etree
 from terrainkit_robots.description.model import Problem, Source
 from terrainkit_robots.description.package_resolver import exists
 from terrainkit_robots.description.xml.document import (
-    MOST_BYTES,
+    MAX_BYTES,
     RobotFileError,
     XmlDocument,
     parse_xml,
     read_bytes,
 )
 
-MOST_ELEMENTS = 8_000
+MAX_ELEMENTS = 8_000
 """MuJoCo's parser takes time with the square of the elements: seconds for these."""
 
 _MOST_DEPTH = 400
@@ -195,7 +195,7 @@ class _Reader:
         included: dict[Path, tuple[Path, ...]] = {_same(main.file): ()}
         top = Node(tag="", source=main.source(main.root), folder=folder)
         stack: list[tuple[etree._Element, XmlDocument, Node, int]] = [(main.root, main, top, 0)]
-        while stack and self._count <= MOST_ELEMENTS:
+        while stack and self._count <= MAX_ELEMENTS:
             element, document, parent, depth = stack.pop()
             source = document.source(element)
             if element.tag == "include":
@@ -280,7 +280,7 @@ class _Reader:
         return path in self._contents or exists(path)
 
     def _read(self, path: Path, source: Source, name: str) -> XmlDocument | None:
-        if len(self.files) >= _MOST_FILES or self._bytes > MOST_BYTES:
+        if len(self.files) >= _MOST_FILES or self._bytes > MAX_BYTES:
             self._tell(source, f"{name} is not read: too many or too large files", name)
             return None
         try:
@@ -358,13 +358,13 @@ def _same(path: Path) -> Path:
 
 def bound(document: MjcfDocument) -> None:
     """See to it that the model stays small: replicas are not made, or nothing is read at all."""
-    if sum(1 for _ in document.nodes()) <= MOST_ELEMENTS:
-        if _cost(document) <= MOST_ELEMENTS:
+    if sum(1 for _ in document.nodes()) <= MAX_ELEMENTS:
+        if _cost(document) <= MAX_ELEMENTS:
             return
         replicas = [node for node in document.nodes() if node.tag == "replicate"]
         for node in replicas:
             node.attributes["count"] = "1"
-        if replicas and _cost(document) <= MOST_ELEMENTS:
+        if replicas and _cost(document) <= MAX_ELEMENTS:
             _tell_size(document, replicas[0], "no replicas are made")
             document.whole = False
             return
@@ -376,7 +376,7 @@ def bound(document: MjcfDocument) -> None:
 
 def _tell_size(document: MjcfDocument, node: Node, what: str) -> None:
     message = (
-        f"{what}: it has more than {MOST_ELEMENTS} elements, long attributes counted as several, "
+        f"{what}: it has more than {MAX_ELEMENTS} elements, long attributes counted as several, "
         "and MuJoCo's parser takes the square of that in time"
     )
     document.problems.append(

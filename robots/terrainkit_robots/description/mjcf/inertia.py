@@ -76,7 +76,7 @@ def _capsule(r: float, half: float) -> tuple[float, Matrix]:
     return volume, np.array([across, across, along]) / volume
 
 
-def sum_of_solids(solids: Sequence[Solid], source: Source) -> Inertial | None:
+def sum_solids(solids: Sequence[Solid], source: Source) -> Inertial | None:
     """Return the inertia of a body that consists of solids; None if there are none.
 
     It has NaN for what is not known.

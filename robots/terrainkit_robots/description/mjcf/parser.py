@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from terrainkit_robots.description.mjcf.document import MjcfDocument, Node, bound, harmless
 from terrainkit_robots.description.model import Problem
-from terrainkit_robots.description.xml.numbers import parse_numbers, without_commas
+from terrainkit_robots.description.xml.numbers import parse_numbers, replace_commas
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.text import closest, short
 
@@ -131,7 +131,7 @@ def _check_numbers(document: MjcfDocument, node: Node) -> None:
         )
         if not words or parse_numbers(" ".join(words), count) is not None:
             continue
-        repaired = next((r for n in counts if (r := without_commas(text, n))), "")
+        repaired = next((r for n in counts if (r := replace_commas(text, n))), "")
         wanted = "a number" if counts[0] == 1 else f"{counts[0]} numbers"
         tell(
             document,

@@ -19,7 +19,7 @@ import numpy as np
 from terrainkit_robots.description.mjcf.actuators import Drive, actuators, force_limit, mimics
 from terrainkit_robots.description.mjcf.document import MjcfDocument, Node, read_document
 from terrainkit_robots.description.mjcf.imu import PlacedSite, find_imu
-from terrainkit_robots.description.mjcf.inertia import Solid, solid, sum_of_solids
+from terrainkit_robots.description.mjcf.inertia import Solid, solid, sum_solids
 from terrainkit_robots.description.mjcf.parser import parse_mjcf, tell
 from terrainkit_robots.description.mjcf.references import dangling_references
 from terrainkit_robots.description.mjcf.shapes import (
@@ -213,12 +213,10 @@ class _Reader:
         how = body.compiler.inertiafromgeom
         derived = mujoco.mjtInertiaFromGeom
         if how == derived.mjINERTIAFROMGEOM_TRUE:
-            return sum_of_solids(solids, node.source)
+            return sum_solids(solids, node.source)
         if not body.explicitinertial:
             return (
-                None
-                if how == derived.mjINERTIAFROMGEOM_FALSE
-                else sum_of_solids(solids, node.source)
+                None if how == derived.mjINERTIAFROMGEOM_FALSE else sum_solids(solids, node.source)
             )
         written = next((n for n in _inside(node) if n.tag == "inertial"), node)
         origin = np.eye(4)
@@ -304,7 +302,7 @@ class _Reader:
             color=color_of(geom, self._materials),
         )
         if shape == "mesh" or fitted:
-            geometry = replace(self._meshed(geometry, geom, scale), fitted=fitted)
+            geometry = replace(self._meshed(geometry, geom, scale), fit_to_mesh=fitted)
         return geometry, None if weight is None else scaled(weight, scale)
 
     def _bits(self, geom: Any) -> tuple[int, int]:

@@ -28,9 +28,9 @@ from terrainkit_robots.description.urdf.colors import Color, color_of, named_col
 from terrainkit_robots.description.urdf.tags import has_variable, misspelt, unexpanded
 from terrainkit_robots.description.xml.document import XmlDocument
 from terrainkit_robots.description.xml.number_text import place_text
-from terrainkit_robots.description.xml.numbers import parse_numbers, without_commas
+from terrainkit_robots.description.xml.numbers import parse_numbers, replace_commas
 from terrainkit_robots.text import short
-from terrainkit_robots.transforms import Matrix, matrix_to_rpy, quat_to_matrix
+from terrainkit_robots.transforms import Matrix, matrix_to_rpy, quat_to_matrix, rpy_to_matrix
 
 
 def read_urdf(document: XmlDocument, *, packages: Mapping[str, Path]) -> RobotModel:
@@ -106,7 +106,7 @@ class _Reader:
         values = parse_numbers(text, count)
         if values is not None:
             return values
-        repaired = without_commas(text, count)
+        repaired = replace_commas(text, count)
         wanted = "a number" if count == 1 else f"{count} numbers"
         if has_variable(text):
             return None  # told as unexpanded xacro
@@ -143,7 +143,7 @@ class _Reader:
         if xyz is not None:
             origin[:3, 3] = xyz
         if rpy is not None:
-            origin[:3, :3] = rotation_of(rpy)
+            origin[:3, :3] = rpy_to_matrix(rpy)
         elif turn is not None:
             origin[:3, :3] = turn
         return origin
@@ -326,21 +326,6 @@ _SIZES = {
     "cylinder": {"radius", "length"},
     "capsule": {"radius", "length"},
 }
-
-
-def rotation_of(rpy: Matrix) -> Matrix:
-    """Return the rotation of URDF's roll, pitch and yaw [rad], shape (3, 3).
-
-    About the fixed axes x, then y, then z: Rz(yaw) Ry(pitch) Rx(roll).
-    """
-    (sr, sp, sy), (cr, cp, cy) = np.sin(rpy), np.cos(rpy)
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
 
 
 def _symmetric(six: list[float | None]) -> Matrix | None:

@@ -43,7 +43,7 @@ class Expansion:
     """An expanded file."""
 
     data: bytes
-    """The URDF; each element has its origin, for `take_origin`."""
+    """The URDF; each element has its origin, for `pop_origin`."""
 
     files: tuple[Path, ...]
     """The file and all that it includes."""
@@ -128,7 +128,7 @@ def _kill(process: "subprocess.Popen[bytes]") -> None:
         process.kill()
 
 
-def take_origin(element: Any, files: tuple[Path, ...]) -> tuple[Path, int] | None:
+def pop_origin(element: Any, files: tuple[Path, ...]) -> tuple[Path, int] | None:
     """Take the origin off an element of an expanded document: file and line, if it has one."""
     words = element.attrib.pop(ORIGIN, "").split(":")
     if len(words) != 2 or not all(word.isdecimal() for word in words):

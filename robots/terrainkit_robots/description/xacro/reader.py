@@ -8,7 +8,7 @@ from lxml import etree
 
 from terrainkit_robots.description.model import Problem, RobotModel, Source
 from terrainkit_robots.description.urdf.reader import read_urdf
-from terrainkit_robots.description.xacro.expansion import XacroError, expand_xacro, take_origin
+from terrainkit_robots.description.xacro.expansion import XacroError, expand_xacro, pop_origin
 from terrainkit_robots.description.xml.document import XmlDocument, parse_xml
 
 
@@ -39,7 +39,7 @@ def read_xacro(
     sources = {}
     at = whole
     for element in expanded.root.iter(etree.Element):
-        origin = take_origin(element, expansion.files)
+        origin = pop_origin(element, expansion.files)
         if origin is not None:  # else it is where the one before it is
             at = Source(file=_as_given(origin[0], document.file), line=origin[1])
         sources[element] = at

@@ -18,10 +18,10 @@ from terrainkit.errors import TerrainkitError
 from terrainkit_robots.description.fix import Fix, ReplaceBytes
 from terrainkit_robots.description.model import Problem, Source
 
-MOST_BYTES = 32 * 2**20
+MAX_BYTES = 32 * 2**20
 """Of a file larger than this nothing is read; no robot is described in 32 MiB of text."""
 
-MOST_ELEMENTS = 50_000
+MAX_ELEMENTS = 50_000
 """A document with more elements is not looked at; the largest humanoids have a few thousand."""
 
 _MOST_ATTRIBUTES = 1000
@@ -36,7 +36,7 @@ class RobotFileError(TerrainkitError):
 
 
 def read_bytes(path: Path) -> bytes:
-    """Return the content of a plain file, of which one byte more than MOST_BYTES is read at most.
+    """Return the content of a plain file, of which one byte more than MAX_BYTES is read at most.
 
     Raises:
         RobotFileError: if there is none, it is a folder or a device, or not readable.
@@ -48,7 +48,7 @@ def read_bytes(path: Path) -> bytes:
         if not stat.S_ISREG(status.st_mode):
             raise RobotFileError(f"{path} is not a plain file; wanted a URDF, xacro or MJCF file")
         with path.open("rb") as file:
-            return file.read(MOST_BYTES + 1)
+            return file.read(MAX_BYTES + 1)
     except FileNotFoundError:
         raise RobotFileError(f"there is no file {path}") from None
     except (OSError, ValueError) as error:  # ValueError: a NUL character in the name
@@ -82,8 +82,8 @@ def parse_xml(file: Path, data: bytes) -> XmlDocument:
     """
     whole = Source(file=file, line=0)
     problems: list[Problem] = []
-    if len(data) > MOST_BYTES:
-        message = f"the file has more than {MOST_BYTES // 2**20} MiB; no robot description has"
+    if len(data) > MAX_BYTES:
+        message = f"the file has more than {MAX_BYTES // 2**20} MiB; no robot description has"
         return _unreadable(file, data, Problem(code="XML001", message=message, source=whole))
     text = _without_mark(file, data, problems)
     if not text.strip():
@@ -113,9 +113,9 @@ def parse_xml(file: Path, data: bytes) -> XmlDocument:
             message = "this is not XML; wanted a <robot> or <mujoco> element"
             problems.append(Problem(code="XML001", message=message, source=whole))
         return _unreadable(file, data, *problems)
-    elements = list(itertools.islice(root.iter(etree.Element), MOST_ELEMENTS + 1))
-    if len(elements) > MOST_ELEMENTS:
-        message = f"the file has more than {MOST_ELEMENTS} elements; no robot description has"
+    elements = list(itertools.islice(root.iter(etree.Element), MAX_ELEMENTS + 1))
+    if len(elements) > MAX_ELEMENTS:
+        message = f"the file has more than {MAX_ELEMENTS} elements; no robot description has"
         return _unreadable(file, data, Problem(code="XML001", message=message, source=whole))
     if any(len(element.attrib) > _MOST_ATTRIBUTES for element in elements):
         message = f"an element has more than {_MOST_ATTRIBUTES} attributes; none of a robot has"

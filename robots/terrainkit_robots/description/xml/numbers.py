@@ -24,7 +24,7 @@ def parse_numbers(text: str, count: int) -> Matrix | None:
     return np.array(values) if all(abs(value) < _LARGEST for value in values) else None
 
 
-def without_commas(text: str, count: int) -> str:
+def replace_commas(text: str, count: int) -> str:
     """Return the text as it was meant, where commas are all that is wrong; else nothing."""
     between = re.search(r",\s|\s,", text) is not None
     for other in (" ", ".") if between else (".", " "):

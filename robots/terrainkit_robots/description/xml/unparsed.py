@@ -3,7 +3,7 @@
 from terrainkit_robots.description.model import RobotModel, Source
 
 
-class Unread:
+class UnparsedNumbers:
     """The numbers of a robot that are missing because they are no numbers."""
 
     def __init__(self, model: RobotModel) -> None:

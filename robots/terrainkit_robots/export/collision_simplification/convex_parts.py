@@ -17,11 +17,11 @@ import numpy as np
 
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots.export.collision_simplification.decomposition_cache import (
-    PartCache,
+    DecompositionCache,
     packed,
     unpacked,
 )
-from terrainkit_robots.export.mesh_export.decimate import coarser
+from terrainkit_robots.export.mesh_export.decimate import decimate
 from terrainkit_robots.mesh.surface import MeshError, Surface
 
 PARAMETERS: Mapping[str, float | int | bool] = {
@@ -59,11 +59,11 @@ def convex_parts(surface: Surface, cache: Path | None) -> tuple[Surface, ...]:
         MeshError: if CoACD fails at it.
         TerrainkitError: if CoACD is not installed.
     """
-    kept = PartCache(cache)
+    kept = DecompositionCache(cache)
     key = _key(surface)
     parts = kept.get(key)
     if parts is None:
-        parts = _decomposed(coarser(surface, _MOST_FACES))
+        parts = _decomposed(decimate(surface, _MOST_FACES))
         kept.put(key, parts)
     return parts
 

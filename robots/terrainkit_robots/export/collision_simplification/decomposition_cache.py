@@ -1,8 +1,6 @@
 """Convex parts that were found before, kept on disk by what they were made from."""
 
 import io
-import os
-import sys
 import zipfile
 import zlib
 from collections.abc import Sequence
@@ -31,20 +29,13 @@ _DAMAGED = (
 
 
 def cache_folder() -> Path:
-    """Return the folder in which this system keeps what can be made again."""
-    home = Path.home()
-    if sys.platform == "win32":
-        kept = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        kept = home / "Library" / "Caches"
-    else:
-        named = os.environ.get("XDG_CACHE_HOME", "")
-        # one that is not absolute is to be ignored: XDG Base Directory Specification
-        kept = Path(named) if named.startswith("/") else home / ".cache"
-    return kept / "terrainkit" / "coacd"
+    """Return the folder of the cache, in the user's cache folder of this system."""
+    import platformdirs
+
+    return platformdirs.user_cache_path("terrainkit", appauthor=False) / "coacd"
 
 
-class PartCache:
+class DecompositionCache:
     """Parts by key; a file that is damaged counts as none."""
 
     def __init__(self, folder: Path | None) -> None:

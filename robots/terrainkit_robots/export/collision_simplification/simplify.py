@@ -14,8 +14,8 @@ import numpy as np
 
 from terrainkit_robots.description.model import Geometry, Link, MeshFile, RobotModel
 from terrainkit_robots.export.collision_simplification.convex_parts import convex_parts
-from terrainkit_robots.export.collision_simplification.fitted_primitive import fitted_primitive
-from terrainkit_robots.export.mesh_export.decimate import coarser
+from terrainkit_robots.export.collision_simplification.fit_primitive import fit_primitive
+from terrainkit_robots.export.mesh_export.decimate import decimate
 from terrainkit_robots.export.mesh_export.file_names import FileNames
 from terrainkit_robots.export.mesh_export.mesh_bytes import has_no_volume, scaled
 from terrainkit_robots.mesh.hull import convex_hull
@@ -26,7 +26,6 @@ from terrainkit_robots.mesh.surface import (
     signed_volume,
     welded,
 )
-from terrainkit_robots.transforms import Matrix
 
 How = Literal["keep", "hull", "coacd", "primitives"]
 
@@ -41,9 +40,6 @@ _FAR_FROM_CONVEX = 2.0
 
 _MOST_WELDED = 500_000
 """Of more faces the corners are not compared; the mesh is made coarser first."""
-
-_MOST_NORMALS = 40
-"""Sides of a hull, the largest first, along which a box is tried."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +65,7 @@ class VolumeError:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Treated:
+class SimplifiedRobot:
     """A robot with other collision shapes."""
 
     model: RobotModel
@@ -88,14 +84,14 @@ class Treated:
     """What became of each collision mesh, a sentence each."""
 
 
-def treat(
+def simplify_collisions(
     model: RobotModel,
     meshes: Meshes,
     how: How = "keep",
     *,
     cache: Path | None = None,
     progress: Progress = lambda items, _: items,
-) -> Treated:
+) -> SimplifiedRobot:
     """Return a robot with its collision meshes made fit to collide with.
 
     A mesh that cannot be read or is flat stays as it is: it is told when it is packed.
@@ -109,7 +105,7 @@ def treat(
         progress: Draws a bar while it passes on the meshes.
     """
     if how == "keep":
-        return Treated(model=model, meshes=meshes)
+        return SimplifiedRobot(model=model, meshes=meshes)
     work = _Work(meshes, how, cache)
     uses = {
         (shape.mesh.path, shape.mesh.scale): shape.mesh
@@ -118,13 +114,13 @@ def treat(
         if shape.shape == "mesh" and shape.mesh is not None
     }
     for mesh in progress(uses.values(), len(uses)):
-        work.treat(mesh)
+        work.simplify(mesh)
     links = tuple(work.link(link) for link in model.links)
     contents = {Path(name): data for name, data in work.names.files.items()}
-    return Treated(
+    return SimplifiedRobot(
         model=replace(model, links=links),
         contents=contents,
-        meshes=meshes.beside(contents),
+        meshes=meshes.with_contents(contents),
         errors=tuple(work.errors),
         notes=tuple(work.notes),
     )
@@ -143,7 +139,7 @@ class _Work:
         self.errors: list[VolumeError] = []
         self.notes: list[str] = []
 
-    def treat(self, mesh: MeshFile) -> None:
+    def simplify(self, mesh: MeshFile) -> None:
         """Find what is to be in the place of a mesh."""
         try:
             if has_no_volume(self._meshes, mesh):
@@ -186,7 +182,7 @@ class _Work:
 
     def _primitive(self, mesh: MeshFile) -> tuple[tuple[Geometry, ...], str, float]:
         hull = self._hull(mesh, None)
-        fitted = fitted_primitive(hull.points.astype(np.float64), _largest_sides(hull))
+        fitted = fit_primitive(hull.points.astype(np.float64))
         shape = Geometry(
             source=mesh.source, shape=fitted.shape, size=fitted.size, origin=fitted.pose
         )
@@ -217,7 +213,7 @@ class _Work:
     def _welded(self, path: Path) -> Surface:
         surface = self._meshes.surface(path)
         if len(surface.faces) > _MOST_WELDED:
-            return welded(coarser(surface, _MOST_WELDED))
+            return welded(decimate(surface, _MOST_WELDED))
         return self._meshes.welded(path)
 
     def _is_far_from_convex(self, mesh: MeshFile) -> bool:
@@ -239,7 +235,7 @@ def _instead(shape: Geometry, other: Geometry) -> Geometry:
         size=other.size,
         mesh=other.mesh,
         origin=shape.origin @ other.origin,
-        fitted=False,
+        fit_to_mesh=False,
     )
 
 
@@ -251,20 +247,3 @@ def _named_once(shapes: Iterable[Geometry]) -> Iterable[Geometry]:
         yield (
             shape if count == 1 or not shape.name else replace(shape, name=f"{shape.name}_{count}")
         )
-
-
-def _largest_sides(hull: Surface) -> Matrix:
-    """Return the normals of the largest sides of a hull, shape (n, 3); each direction once."""
-    corners = hull.points[hull.faces].astype(np.float64)
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = np.linalg.norm(normals, axis=1)
-    whole = areas > 1e-12 * areas.max()
-    directions = normals[whole] / areas[whole, None]
-    # a side and the one across from it are one direction
-    first = np.abs(directions).argmax(axis=1)
-    directions *= np.sign(np.take_along_axis(directions, first[:, None], axis=1))
-    cells, which = np.unique(np.round(directions, 2), axis=0, return_inverse=True)
-    sizes = np.bincount(which.ravel(), areas[whole], minlength=len(cells))
-    largest = np.argsort(-sizes, kind="stable")[:_MOST_NORMALS]
-    chosen = cells[largest]
-    return np.asarray(chosen / np.linalg.norm(chosen, axis=1, keepdims=True))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from terrainkit_robots.description.model import MeshFile
-from terrainkit_robots.export.mesh_export.decimate import coarser
+from terrainkit_robots.export.mesh_export.decimate import decimate
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.mesh.surface import MeshError, Surface, binary_stl, is_flat
 
@@ -50,7 +50,7 @@ def mesh_bytes(meshes: Meshes, mesh: MeshFile) -> MeshBytes:
     note = ""
     if len(surface.faces) > MOST_FACES:
         before = len(surface.faces)
-        surface = coarser(surface, MOST_FACES)
+        surface = decimate(surface, MOST_FACES)
         note = f"was simplified from {before:,} to {len(surface.faces):,} faces"
     elif header.format == "stl" and not mirrored:
         data = meshes.data(mesh.path)

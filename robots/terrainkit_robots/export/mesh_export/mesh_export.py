@@ -28,7 +28,7 @@ and enough for simulators that step by 5 ms to keep a foot on it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Packed:
+class RobotWithMeshes:
     """A robot with its mesh files."""
 
     model: RobotModel
@@ -42,7 +42,7 @@ class Packed:
     """What was left out or changed, a sentence each."""
 
 
-def pack(model: RobotModel, meshes: Meshes, *, folder: str = "meshes") -> Packed:
+def export_meshes(model: RobotModel, meshes: Meshes, *, folder: str = "meshes") -> RobotWithMeshes:
     """Return a robot with copies of its mesh files.
 
     Args:
@@ -55,7 +55,7 @@ def pack(model: RobotModel, meshes: Meshes, *, folder: str = "meshes") -> Packed
     """
     packing = _Packing(model, meshes, folder)
     links = tuple(packing.link(link) for link in model.links)
-    return Packed(
+    return RobotWithMeshes(
         model=replace(model, links=links),
         files=packing.names.files,
         notes=tuple(packing.notes),
@@ -130,13 +130,13 @@ class _Packing:
             return None
         if content.note:
             self._tell(f"the mesh {file} {content.note}")
-        if shape.fitted:
+        if shape.fit_to_mesh:
             self._tell(
                 f"{link.name} collides with the mesh {file}, to which MuJoCo fitted a primitive"
             )
         name = self.names.add(mesh.path.stem, ".stl", content.data)
         own = replace(mesh, filename=name, path=Path(name), found_by="path", scale=content.scale)
-        return replace(shape, mesh=own, fitted=False)
+        return replace(shape, mesh=own, fit_to_mesh=False)
 
     def _content(self, mesh: MeshFile) -> MeshBytes:
         key = mesh.path, mesh.scale
@@ -151,7 +151,7 @@ class _Packing:
         return done
 
     def _is_flat(self, mesh: MeshFile) -> bool:
-        return self._meshes.readable(mesh) and has_no_volume(self._meshes, mesh)
+        return self._meshes.is_readable(mesh) and has_no_volume(self._meshes, mesh)
 
     def _sheet(self, link: Link, shape: Geometry, mesh: MeshFile, file: str) -> Geometry | None:
         """Return a thin box in the place of a flat mesh; none in that of a line or a point."""
@@ -170,5 +170,5 @@ class _Packing:
 def _box(shape: Geometry, pose: Matrix, size: Matrix) -> Geometry:
     x, y, z = map(float, size)
     return replace(
-        shape, shape="box", size=(x, y, z), mesh=None, fitted=False, origin=shape.origin @ pose
+        shape, shape="box", size=(x, y, z), mesh=None, fit_to_mesh=False, origin=shape.origin @ pose
     )

@@ -17,7 +17,7 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.description.xml.document import RobotFileError, parse_xml, read_bytes
-from terrainkit_robots.description.xml.numbers import parse_numbers, without_commas
+from terrainkit_robots.description.xml.numbers import parse_numbers, replace_commas
 from terrainkit_robots.transforms import Matrix, matrix_to_rpy
 
 if TYPE_CHECKING:
@@ -136,7 +136,7 @@ def _origin(joint: Joint, written: "etree._Element | None") -> Iterator[tuple[st
     for name in ("xyz", "rpy"):
         text = "" if origin is None else origin.get(name, "")
         if parse_numbers(text, 3) is None:
-            text = without_commas(text, 3)
+            text = replace_commas(text, 3)
         if text:
             yield name, text
         elif name == "rpy" and origin is not None and origin.get("quat_xyzw") is not None:

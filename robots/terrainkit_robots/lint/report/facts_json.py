@@ -1,4 +1,4 @@
-"""The facts of a robot as plain data, which every report carries."""
+"""Convert the facts of a robot to a dictionary, which every report contains."""
 
 import math
 from collections.abc import Mapping
@@ -13,19 +13,21 @@ if TYPE_CHECKING:
     from terrainkit_robots.analysis.legs.legs import Leg
 
 _DIGITS = 6
-"""Significant digits of each number: more than any robot is built to."""
+"""Significant digits of each number."""
 
 
 def facts_json(facts: "Facts", *, simulated: bool = False) -> dict[str, Any]:
-    """Return the facts as JSON has them: SI units and radians, and None for what is not known.
+    """Return the facts as a JSON-compatible dictionary, in SI units and radians.
 
-    The keys are the same for every robot: one without legs has no feet and no standing pose.
-    `observation_size` counts what legged_gym's policies see without the terrain: velocities,
-    gravity and command (12 numbers), and position, speed and last action of each actuated joint.
-    `joint_orders` has the joints in the order of the file under `file`, those outside the main tree
-    included, and under each simulator its `joints` and `bodies`, whether that is `certain`, and the
-    `reason`.
-    `suggested_gains` take a model in MuJoCo, and are None unless the robot was simulated.
+    All robots have the same keys. Unknown values are None. `observation_size` is that of a
+    legged_gym policy without height scan: 12 values for velocities, gravity and command, and
+    position, velocity and last action of each actuated joint. `joint_orders` contains the joints
+    in the order of the file as `file`, and for each simulator `joints`, `bodies`, whether the
+    order is `certain`, and the `reason`.
+
+    Args:
+        facts: The robot.
+        simulated: Whether to compute `suggested_gains`, which requires a MuJoCo model.
     """
     legs, actuated = facts.legs, len(facts.actuated)
     return {
@@ -39,12 +41,12 @@ def facts_json(facts: "Facts", *, simulated: bool = False) -> dict[str, Any]:
         "legs": [_leg(leg) for leg in legs],
         "feet": [leg.foot for leg in legs],
         "leg_length": number(sum(leg.length for leg in legs) / len(legs)) if legs else None,
-        "joint_orders": _orders(facts),
+        "joint_orders": _joint_orders(facts),
         "mirror_plane": {
             "normal": [number(float(x)) for x in facts.mirror.normal],
             "offset": number(facts.mirror.offset),
         },
-        "mirrored_joints": _mirrored(facts),
+        "mirrored_joints": _mirrored_joints(facts),
         **_standing(facts),
         "suggested_gains": _gains(facts) if simulated else None,
         "action_size": actuated,
@@ -53,12 +55,12 @@ def facts_json(facts: "Facts", *, simulated: bool = False) -> dict[str, Any]:
 
 
 def number(value: float) -> float | None:
-    """Return `value` rounded to the digits that mean something; None if it is not finite."""
+    """Return `value` rounded to 6 significant digits, or None if it is not finite."""
     return float(f"{value:.{_DIGITS}g}") if math.isfinite(value) else None
 
 
 def _gains(facts: "Facts") -> dict[str, Any] | None:
-    """Return what a position controller of each actuated joint may have; None where none can be."""
+    """Return the suggested PD gains of each actuated joint, or None if they cannot be computed."""
     from terrainkit_robots.analysis.cannot_check import CannotCheckError
     from terrainkit_robots.simulation.pd_gains import suggest_gains
 
@@ -77,7 +79,7 @@ def _gains(facts: "Facts") -> dict[str, Any] | None:
     }
 
 
-def _orders(facts: "Facts") -> dict[str, Any]:
+def _joint_orders(facts: "Facts") -> dict[str, Any]:
     orders: dict[str, Any] = {"file": [joint.name for joint in facts.model.joints if joint.moves]}
     for order in simulator_orders(facts):
         orders[order.key] = {
@@ -98,13 +100,13 @@ def _leg(leg: "Leg") -> dict[str, Any]:
     }
 
 
-def _mirrored(facts: "Facts") -> list[dict[str, Any]]:
-    records = []
+def _mirrored_joints(facts: "Facts") -> list[dict[str, Any]]:
+    pairs = []
     for pair in facts.mirror.pairs:
         left, right = facts.bodies[pair.left].joint, facts.bodies[pair.right].joint
         if left is not None and right is not None and left.moves and right.moves:
-            records.append({"left": left.name, "right": right.name, "sign": pair.sign})
-    return records
+            pairs.append({"left": left.name, "right": right.name, "sign": pair.sign})
+    return pairs
 
 
 def _standing(facts: "Facts") -> dict[str, Any]:
@@ -112,7 +114,7 @@ def _standing(facts: "Facts") -> dict[str, Any]:
     if stance is None:
         keys = ("standing_pose", "standing_height", "spawn_height", "standing_width")
         return dict.fromkeys((*keys, "support_polygon", "support_margin", "holding_torques"))
-    with np.errstate(all="ignore"):  # lengths of 1e308 are told by a rule, not by numpy
+    with np.errstate(all="ignore"):  # a rule reports lengths of 1e308
         width = float(np.ptp(stance.contacts @ facts.mirror.normal))
     return {
         "standing_pose": _numbers(stance.positions),

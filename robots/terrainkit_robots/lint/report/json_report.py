@@ -1,47 +1,53 @@
-"""JSON: one document for each robot, on a line of its own where there are several."""
+"""JSON: one document per robot; several robots are JSON lines."""
 
 import json
 import math
 from collections.abc import Sequence
 from typing import Any
 
+from terrainkit_robots.lint.report.escape import escape_surrogates
 from terrainkit_robots.lint.report.facts_json import facts_json
-from terrainkit_robots.lint.report.plain import encodable
-from terrainkit_robots.lint.report.repaired import fixed, unfixed
+from terrainkit_robots.lint.report.fixed_report import fixed_findings, unfixed_findings
 from terrainkit_robots.lint.runner import Finding, Report
+from terrainkit_robots.text import display_path
 
 SCHEMA_VERSION = 1
-"""Raised when a key changes its meaning or goes; new keys may come without."""
+"""Incremented when a key changes its meaning or is removed. New keys do not increment it."""
 
 
-def write(reports: Sequence[Report]) -> str:
-    """Return one document, indented; several are JSON lines."""
+def format_reports(reports: Sequence[Report]) -> str:
+    """Return one indented document, or one document per line for several robots.
+
+    Findings that repeat are not merged: each has its own subject, line and numbers.
+    """
     indent = 2 if len(reports) == 1 else None
-    documents = (json.dumps(sound(record(r)), indent=indent, allow_nan=False) for r in reports)
+    documents = (
+        json.dumps(to_json(report_json(r)), indent=indent, allow_nan=False) for r in reports
+    )
     return "".join(f"{document}\n" for document in documents)
 
 
-def record(report: Report) -> dict[str, Any]:
-    """Return a report as plain data."""
+def report_json(report: Report) -> dict[str, Any]:
+    """Return a report as a dictionary."""
     from terrainkit import __version__
 
     model = report.facts.model
     return {
         "schema_version": SCHEMA_VERSION,
         "tool": {"name": "terrainkit", "version": __version__},
-        "file": str(model.file),
+        "file": display_path(model.file),
         "kind": model.kind,
         "verdict": report.verdict,
         "facts": facts_json(report.facts, simulated=report.simulated),
-        "findings": [finding_record(finding) for finding in report.findings],
-        "fixed": [finding_record(finding) for finding in fixed(report)],
-        "unfixed": [{**finding_record(f), "reason": reason} for f, reason in unfixed(report)],
+        "findings": [finding_json(finding) for finding in report.findings],
+        "fixed": [finding_json(finding) for finding in fixed_findings(report)],
+        "unfixed": [{**finding_json(f), "reason": why} for f, why in unfixed_findings(report)],
         "skipped": [{"code": s.code, "reason": s.reason} for s in report.skipped],
     }
 
 
-def finding_record(finding: Finding) -> dict[str, Any]:
-    """Return a finding as plain data."""
+def finding_json(finding: Finding) -> dict[str, Any]:
+    """Return a finding as a dictionary."""
     return {
         "code": finding.code,
         "name": finding.name,
@@ -50,21 +56,21 @@ def finding_record(finding: Finding) -> dict[str, Any]:
         "subject": finding.subject,
         "message": finding.message,
         "hint": finding.hint,
-        "file": str(finding.file),
+        "file": display_path(finding.file),
         "line": finding.line,
         "measured": dict(finding.measured),
         "fix": finding.fix.safety if finding.fix is not None else None,
     }
 
 
-def sound(value: Any) -> Any:
-    """Return `value` with only what JSON can hold: no infinite numbers, no halves of characters."""
+def to_json(value: Any) -> Any:
+    """Return `value` with NumPy scalars converted, infinities as None and surrogates escaped."""
     if isinstance(value, dict):
-        return {encodable(str(key)): sound(item) for key, item in value.items()}
+        return {escape_surrogates(str(key)): to_json(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [sound(item) for item in value]
+        return [to_json(item) for item in value]
     if isinstance(value, str):
-        return encodable(value)
+        return escape_surrogates(value)
     if hasattr(value, "item"):
-        value = value.item()  # numpy's
+        value = value.item()
     return None if isinstance(value, float) and not math.isfinite(value) else value

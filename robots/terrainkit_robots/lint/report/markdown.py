@@ -1,63 +1,77 @@
-"""Markdown: a section for each robot with its facts and findings, for issues and pull requests."""
+"""Markdown: one section per robot, for issues and pull requests."""
 
 import re
 from collections.abc import Iterator, Sequence
 
-from terrainkit_robots.lint.report.plain import plain
-from terrainkit_robots.lint.report.repaired import fixed, unfixed
+from terrainkit_robots.lint.report.escape import escape_control
+from terrainkit_robots.lint.report.fixed_report import fixed_findings, unfixed_findings
+from terrainkit_robots.lint.report.grouping import FindingGroup, group_findings
 from terrainkit_robots.lint.report.robot_summary import robot_summary
-from terrainkit_robots.lint.report.tally import WORDS, fixable, grouped, place, tally
-from terrainkit_robots.lint.runner import Finding, Report
+from terrainkit_robots.lint.report.summary import (
+    SEVERITY_LABELS,
+    format_location,
+    group_skipped,
+    summarize_findings,
+    summarize_fixes,
+)
+from terrainkit_robots.lint.runner import Report
+from terrainkit_robots.text import display_path
 
 
-def write(reports: Sequence[Report]) -> str:
-    """Return a section for each robot."""
+def format_reports(reports: Sequence[Report]) -> str:
+    """Return one section per robot. Findings that repeat over joints or links are one row."""
     return "\n".join(line for report in reports for line in _section(report))
 
 
 def _section(report: Report) -> Iterator[str]:
-    yield f"## {cell(str(report.facts.model.file))}\n"
-    repairs = fixable(report.findings)
-    yield f"**{tally([report])}**{f' ({repairs})' if repairs else ''}\n"
+    model = report.facts.model
+    yield f"## {cell(display_path(model.file))}\n"
+    fixes = summarize_fixes([report])
+    yield f"**{summarize_findings([report])}**{f' ({fixes})' if fixes else ''}\n"
     yield "| | |\n|---|---|"
     for label, text in robot_summary(report):
         yield f"| {label.strip()} | {cell(text)} |"
     yield ""
-    yield from titled_list("Fixed", [(f.code, f"{f.name}: {f.message}") for f in fixed(report)])
-    left = [(f.code, f"{f.subject or f.name}: {reason}") for f, reason in unfixed(report)]
-    yield from titled_list("Could not be fixed", left)
+    fixed = group_findings(model, fixed_findings(report))
+    yield from titled_list("Fixed", [(g.first.code, f"{g.first.name}: {_text(g)}") for g in fixed])
+    unfixed = [(f.code, f"{f.subject or f.name}: {why}") for f, why in unfixed_findings(report)]
+    yield from titled_list("Not fixed", unfixed)
     if report.findings:
-        yield "| | rule | where | what | what to do |\n|---|---|---|---|---|"
-        yield from (finding_row(finding) for finding in report.findings)
+        yield "| | rule | location | finding | how to fix |\n|---|---|---|---|---|"
+        yield from (finding_row(group) for group in group_findings(model, report.findings))
         yield ""
-    skipped = [(codes, reason) for _, codes, reason in grouped(report.skipped)]
-    yield from titled_list("Not checked, or ignored", skipped)
+    skipped = [(codes, reason) for _, codes, reason in group_skipped(report.skipped)]
+    yield from titled_list("Not checked or ignored", skipped)
 
 
 def titled_list(title: str, items: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """Yield a list under a title; nothing without items."""
+    """Yield the lines of a list with a title, or nothing if there are no items."""
     if items:
         yield f"{title}:\n"
         yield from (f"- {cell(head)}: {cell(text)}" for head, text in items)
         yield ""
 
 
-def finding_row(finding: Finding) -> str:
-    """Return the row of a finding in the table of findings."""
-    likely = " (likely)" if finding.certainty == "likely" else ""
+def finding_row(group: FindingGroup) -> str:
+    """Return a row of the table of findings."""
+    finding = group.first
     cells = (
-        WORDS[finding.severity],
+        SEVERITY_LABELS[finding.severity],
         f"{finding.code} {finding.name}",
-        place(finding),
-        finding.message + likely,
+        format_location(finding),
+        _text(group) + (" (likely)" if finding.certainty == "likely" else ""),
         finding.hint,
     )
     return f"| {' | '.join(map(cell, cells))} |"
 
 
+def _text(group: FindingGroup) -> str:
+    return "; ".join(filter(None, (group.text, group.also)))
+
+
 def cell(text: str) -> str:
-    """Return `text` so that it shows as it is: no markup, no mention of people, one line."""
-    escaped = re.sub(r"([\\`*_{}\[\]|~#$])", r"\\\1", plain(text))
+    """Return `text` on one line, without markup, HTML or mentions of users."""
+    escaped = re.sub(r"([\\`*_{}\[\]|~#$])", r"\\\1", escape_control(text))
     return (
         escaped.replace("&", "&amp;")
         .replace("<", "&lt;")

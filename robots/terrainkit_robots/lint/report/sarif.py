@@ -1,4 +1,4 @@
-"""SARIF 2.1.0: one document for all robots, which code hosts and editors read."""
+"""SARIF 2.1.0: one document for all robots, for code hosts and editors."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -7,10 +7,11 @@ from typing import Any
 from urllib.parse import quote_from_bytes
 
 from terrainkit_robots.lint.report.facts_json import facts_json
-from terrainkit_robots.lint.report.json_report import sound
+from terrainkit_robots.lint.report.json_report import to_json
 from terrainkit_robots.lint.rule import FAMILIES, Rule, Severity, rules
 from terrainkit_robots.lint.runner import Finding, Report, Skipped
 from terrainkit_robots.lint.selection import Suppressed, UnusedSuppression
+from terrainkit_robots.text import display_path
 
 SCHEMA = (
     "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
@@ -19,10 +20,13 @@ SCHEMA = (
 _LEVELS: dict[Severity, str] = {"error": "error", "warning": "warning", "info": "note"}
 
 
-def write(reports: Sequence[Report]) -> str:
-    """Return one document with the findings of all robots, those that comments quiet included."""
+def format_reports(reports: Sequence[Report]) -> str:
+    """Return one document with the findings of all robots, including suppressed ones.
+
+    Findings that repeat are not merged: code hosts show each result at its own line.
+    """
     document = {"$schema": SCHEMA, "version": "2.1.0", "runs": [_run(reports)]}
-    return json.dumps(sound(document), indent=2, allow_nan=False) + "\n"
+    return json.dumps(to_json(document), indent=2, allow_nan=False) + "\n"
 
 
 def _run(reports: Sequence[Report]) -> dict[str, Any]:
@@ -35,7 +39,7 @@ def _run(reports: Sequence[Report]) -> dict[str, Any]:
         results += [_result(finding, index) for finding in report.findings]
         for skipped in report.skipped:
             if isinstance(skipped, Suppressed):
-                results.append(_suppressed(skipped, index))
+                results.append(_suppressed_result(skipped, index))
             else:
                 notifications.append(_notification(skipped, report.facts.model.file))
     driver = {"name": "terrainkit", "version": __version__, "rules": [_rule(r) for r in rules()]}
@@ -46,14 +50,15 @@ def _run(reports: Sequence[Report]) -> dict[str, Any]:
         "results": results,
         "properties": {
             "facts": {
-                str(r.facts.model.file): facts_json(r.facts, simulated=r.simulated) for r in reports
+                display_path(r.facts.model.file): facts_json(r.facts, simulated=r.simulated)
+                for r in reports
             }
         },
     }
 
 
 def _rule(rule: Rule) -> dict[str, Any]:
-    paragraphs = (rule.why, f"To fix it: {rule.how_to_fix}", f"Source: {rule.reference}")
+    paragraphs = (rule.why, f"How to fix: {rule.how_to_fix}", f"Source: {rule.reference}")
     return {
         "id": rule.code,
         "name": rule.name,
@@ -80,23 +85,23 @@ def _properties(finding: Finding) -> Iterator[tuple[str, Any]]:
     yield "certainty", finding.certainty
     yield "measured", dict(finding.measured)
     if finding.fix is not None:
-        # Not as SARIF's own `fix`: that is bytes of a file, which a report does not read.
+        # SARIF's own `fix` contains bytes of the file, which a report does not read.
         yield "fix", {"safety": finding.fix.safety, "description": finding.fix.description}
 
 
-def _suppressed(ignored: Suppressed, index: dict[str, int]) -> dict[str, Any]:
-    suppression = {"kind": "inSource", "justification": ignored.comment.reason}
-    return {**_result(ignored.finding, index), "suppressions": [suppression]}
+def _suppressed_result(suppressed: Suppressed, index: dict[str, int]) -> dict[str, Any]:
+    suppression = {"kind": "inSource", "justification": suppressed.comment.reason}
+    return {**_result(suppressed.finding, index), "suppressions": [suppression]}
 
 
 def _notification(skipped: Skipped, file: Path) -> dict[str, Any]:
-    idle = isinstance(skipped, UnusedSuppression)
+    unused = isinstance(skipped, UnusedSuppression)
     notification: dict[str, Any] = {
-        "level": "warning" if idle else "note",
+        "level": "warning" if unused else "note",
         "message": _message(f"{skipped.code}: {skipped.reason}"),
         "locations": [_location(file)],
     }
-    if not idle:  # a comment may name a rule that there is not
+    if not unused:  # the comment may name an unknown rule
         notification["associatedRule"] = {"id": skipped.code}
     return notification
 
@@ -112,10 +117,11 @@ def _location(file: Path, line: int = 0, subject: str = "") -> dict[str, Any]:
 
 
 def uri(file: Path) -> str:
-    """Return a file as a URI: relative to where the reader is, unless it is absolute."""
-    return file.as_uri() if file.is_absolute() else quote_from_bytes(bytes(file), safe="/")
+    """Return the URI of a file, relative to the working directory if the file is below it."""
+    path = Path(display_path(file))
+    return path.as_uri() if path.is_absolute() else quote_from_bytes(bytes(path), safe="/")
 
 
 def _message(text: str) -> dict[str, str]:
-    # Single braces would be places for arguments.
+    # Single braces would be placeholders for arguments.
     return {"text": text.replace("{", "{{").replace("}", "}}")}

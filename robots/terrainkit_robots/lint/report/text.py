@@ -1,152 +1,166 @@
-"""Text for people: the robot's facts, its findings by rule, and one line that sums up."""
+"""Text for people: a summary of the robot, its findings by rule, and a line with the counts."""
 
 import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from terrainkit_robots.lint.report.plain import plain
-from terrainkit_robots.lint.report.repaired import fixed, unfixed
+from terrainkit_robots.lint.report.escape import escape_control
+from terrainkit_robots.lint.report.fixed_report import fixed_findings, unfixed_findings
+from terrainkit_robots.lint.report.grouping import FindingGroup, group_findings
 from terrainkit_robots.lint.report.robot_summary import robot_summary
-from terrainkit_robots.lint.report.tally import WORDS, fixable, grouped, place, tally
+from terrainkit_robots.lint.report.summary import (
+    SEVERITY_LABELS,
+    format_location,
+    group_skipped,
+    summarize_findings,
+    summarize_fixes,
+)
 from terrainkit_robots.lint.rule import Severity
 from terrainkit_robots.lint.runner import Finding, Report
-from terrainkit_robots.text import count
+from terrainkit_robots.text import count, display_path
 
-WIDTH = 100
-"""Width of a line [characters]; only what cannot be broken is longer."""
+DEFAULT_WIDTH = 100
+"""Width of a line [characters]. Only lines with longer words are wider."""
 
-_MOST = 10
-"""Most findings of one rule that are printed."""
+_MAX_ENTRIES = 10
+"""Maximum number of entries of one rule."""
 
-_LONGEST = 2000
-"""So much of one message is printed [characters]; names in a file can be of any length."""
+_MAX_LENGTH = 2000
+"""Maximum length of a message [characters]; names in a file can have any length."""
 
 _STYLES: dict[Severity, str] = {"error": "bold red", "warning": "bold yellow", "info": "bold blue"}
 
 
 @dataclass(frozen=True)
 class Span:
-    """Some words of a line."""
+    """A part of a line with one style."""
 
     text: str
     style: str = ""
-    """As rich calls it; empty for none."""
+    """Name of a rich style, or empty."""
 
 
 Line = tuple[Span, ...]
 
 
-def write(reports: Sequence[Report]) -> str:
+def format_reports(reports: Sequence[Report]) -> str:
     """Return the reports without colors."""
-    return "".join("".join(span.text for span in line) + "\n" for line in lines(reports))
+    return "".join("".join(span.text for span in line) + "\n" for line in format_lines(reports))
 
 
-def lines(reports: Sequence[Report], width: int = WIDTH) -> Iterator[Line]:
-    """Yield the reports line by line, at most `width` characters wide where that can be."""
+def format_lines(reports: Sequence[Report], width: int = DEFAULT_WIDTH) -> Iterator[Line]:
+    """Yield the lines of the reports, wrapped at `width` characters.
+
+    A finding that repeats over joints or links is one entry with a list.
+    """
     for index, report in enumerate(reports):
         if index:
             yield ()
         yield from _robot(report, width)
     if len(reports) > 1:
         yield ()
-        findings = [finding for report in reports for finding in report.findings]
-        yield _sum(f"{count(len(reports), 'file')}: ", reports, findings)
+        yield _counts(f"{count(len(reports), 'file')}: ", reports)
 
 
 def _robot(report: Report, width: int) -> Iterator[Line]:
-    file = plain(str(report.facts.model.file))
+    model = report.facts.model
+    file = escape_control(display_path(model.file))
     yield (Span(file, "bold"),)
-    model = report.facts.model  # of a file that is no robot there is nothing to sum up
+    # There is nothing to summarize if the file contains no robot.
     for label, text in robot_summary(report) if model.links or not model.problems else ():
         first = f"  {label:<9} "
-        yield from _wrapped(Span(first, "dim"), plain(text), width, indent=len(first))
+        yield from _wrap(Span(first, "dim"), escape_control(text), width, indent=len(first))
     yield ()
-    if fixed(report):
+    fixed = group_findings(model, fixed_findings(report), _fix_description)
+    if fixed:
         yield (Span("fixed", "bold green"),)
-        for finding in fixed(report):
-            yield from _item(finding, f"{finding.code}, {_repair(finding)}", width)
+        for group in fixed:
+            yield from _entry(group, f"{group.first.code}, {group.text}", width)
         yield ()
-    for (severity, code, name), found in _by_rule(report.findings):
-        yield Span(WORDS[severity], _STYLES[severity]), Span(f" {code} {name}")
-        yield from _rule(found, width)
+    for (severity, code, name), groups in _by_rule(group_findings(model, report.findings)):
+        yield Span(SEVERITY_LABELS[severity], _STYLES[severity]), Span(f" {code} {name}")
+        yield from _rule(groups, width)
         yield ()
-    told = [*_about_notes(report.findings), *_left_out(report, width)]
-    yield from told
-    if told:
+    footer = [*_note_help(report.findings), *_skipped(report, width)]
+    yield from footer
+    if footer:
         yield ()
-    yield _sum(f"{file}: ", [report], report.findings)
+    yield _counts(f"{file}: ", [report])
 
 
 def _by_rule(
-    findings: Sequence[Finding],
-) -> Iterator[tuple[tuple[Severity, str, str], list[Finding]]]:
-    """Yield severity, code and name of each rule with its findings, the errors first."""
-    order = list(WORDS)
-    ranked = sorted(findings, key=lambda f: (order.index(f.severity), f.code))  # stable
-    for key, group in groupby(ranked, key=lambda f: (f.severity, f.code, f.name)):
-        yield key, list(group)
+    groups: Sequence[FindingGroup],
+) -> Iterator[tuple[tuple[Severity, str, str], list[FindingGroup]]]:
+    """Yield severity, code and name of each rule with its entries, errors first."""
+    order = list(SEVERITY_LABELS)
+    ranked = sorted(groups, key=lambda g: (order.index(g.first.severity), g.first.code))  # stable
+    for key, members in groupby(ranked, lambda g: (g.first.severity, g.first.code, g.first.name)):
+        yield key, list(members)
 
 
-def _rule(findings: Sequence[Finding], width: int) -> Iterator[Line]:
-    shown = findings[:_MOST]
-    hints = [plain(finding.hint) for finding in shown]
-    for i, finding in enumerate(shown):
-        likely = " (likely)" if finding.certainty == "likely" else ""
-        yield from _item(finding, plain(finding.message) + likely, width)
-        told = finding.severity != "info"  # `terrainkit rule` helps with notes
-        if told and hints[i] and hints[i + 1 : i + 2] != [hints[i]]:
-            yield from _wrapped(Span("      help: ", "green"), hints[i], width, indent=12)
-    if len(findings) > _MOST:
-        more = count(len(findings) - _MOST, "more finding")
-        yield (Span(f"  and {more}; check-robot --format json has all of them", "dim"),)
+def _rule(groups: Sequence[FindingGroup], width: int) -> Iterator[Line]:
+    shown = groups[:_MAX_ENTRIES]
+    hints = [escape_control(group.first.hint) for group in shown]
+    for i, group in enumerate(shown):
+        likely = " (likely)" if group.first.certainty == "likely" else ""
+        yield from _entry(group, group.text + likely, width)
+        # The help of notes is left to `terrainkit rule`.
+        is_note = group.first.severity == "info"
+        if not is_note and hints[i] and hints[i + 1 : i + 2] != [hints[i]]:
+            yield from _wrap(Span("      help: ", "green"), hints[i], width, indent=12)
+    if len(groups) > _MAX_ENTRIES:
+        more = count(len(groups) - _MAX_ENTRIES, "more finding")
+        yield (Span(f"  and {more}; use --format json for all", "dim"),)
 
 
-def _item(finding: Finding, text: str, width: int) -> Iterator[Line]:
-    where = Span(f"  {plain(place(finding))}: ", "cyan")
-    if len(plain(str(finding.file))) > width // 3:  # by the file, so that all its rows are alike
-        yield (Span(where.text.rstrip(), where.style),)
-        where = Span(" " * 6)
-    yield from _wrapped(where, text, width, indent=6)
+def _entry(group: FindingGroup, text: str, width: int) -> Iterator[Line]:
+    location = Span(f"  {escape_control(format_location(group.first))}: ", "cyan")
+    # The length of the file's path decides, so that all entries of a file look the same.
+    if len(escape_control(display_path(group.first.file))) > width // 3:
+        yield (Span(location.text.rstrip(), location.style),)
+        location = Span(" " * 6)
+    yield from _wrap(location, escape_control(text), width, indent=6)
+    if group.also:
+        label, _, others = escape_control(group.also).partition(": ")
+        yield from _wrap(Span(f"      {label}: ", "dim"), others, width, indent=12)
 
 
-def _repair(finding: Finding) -> str:
+def _fix_description(finding: Finding) -> str:
     description = finding.fix.description if finding.fix is not None else finding.message
-    subject = f"{plain(finding.subject)}: " if finding.subject else ""
-    return f"{subject}{plain(description)}"
+    return f"{finding.subject}: {description}" if finding.subject else description
 
 
-def _about_notes(findings: Sequence[Finding]) -> Iterator[Line]:
-    """Yield where to read on about notes: a healthy robot has several, and nothing to be done."""
+def _note_help(findings: Sequence[Finding]) -> Iterator[Line]:
+    """Yield how to get help on notes, which are listed without help."""
     codes = sorted(finding.code for finding in findings if finding.severity == "info")
     if codes:
-        how = f"terrainkit rule CODE, for example terrainkit rule {codes[0]}"
-        yield Span("about a note: ", "dim"), Span(how)
+        yield Span("about a note: ", "dim"), Span(f"terrainkit rule CODE, such as {codes[0]}")
 
 
-def _left_out(report: Report, width: int) -> Iterator[Line]:
-    """Yield what was not fixed, not checked or ignored, and why."""
-    for finding, reason in unfixed(report):
-        text = f"{finding.code} {finding.subject}: {reason}"
-        yield from _wrapped(Span("not fixed: ", _STYLES["warning"]), plain(text), width, indent=11)
-    for amiss, codes, reason in grouped(report.skipped):
-        label = Span("warning: ", _STYLES["warning"]) if amiss else Span("skipped: ", "dim")
-        text = f"{codes}: {reason}" if codes else reason
-        yield from _wrapped(label, plain(text), width, indent=len(label.text))
+def _skipped(report: Report, width: int) -> Iterator[Line]:
+    """Yield what was not fixed, not checked or ignored, with the reasons."""
+    for finding, reason in unfixed_findings(report):
+        text = escape_control(f"{finding.code} {finding.subject}: {reason}")
+        yield from _wrap(Span("not fixed: ", _STYLES["warning"]), text, width, indent=11)
+    for is_warning, codes, reason in group_skipped(report.skipped):
+        label = Span("warning: ", _STYLES["warning"]) if is_warning else Span("skipped: ", "dim")
+        text = escape_control(f"{codes}: {reason}" if codes else reason)
+        yield from _wrap(label, text, width, indent=len(label.text))
 
 
-def _sum(what: str, reports: Sequence[Report], findings: Sequence[Finding]) -> Line:
+def _counts(label: str, reports: Sequence[Report]) -> Line:
     verdicts = {report.verdict for report in reports}
     style = "bold red" if "fail" in verdicts else "bold yellow" if "warn" in verdicts else ""
-    repairs = fixable(findings)
-    more = Span(f" ({repairs})" if repairs else "")
-    return Span(what, "bold"), Span(tally(reports), style or "bold green"), more
+    fixes = summarize_fixes(reports)
+    counts = Span(summarize_findings(reports), style or "bold green")
+    return Span(label, "bold"), counts, Span(f" ({fixes})" if fixes else "")
 
 
-def _wrapped(first: Span, text: str, width: int, indent: int) -> Iterator[Line]:
-    """Yield `first` and `text`, broken between words, with `indent` on the lines that follow."""
+def _wrap(first: Span, text: str, width: int, indent: int) -> Iterator[Line]:
+    """Yield `first` and `text`, wrapped between words, with `indent` on the following lines."""
     rows = textwrap.wrap(
-        text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ...",
+        text if len(text) <= _MAX_LENGTH else f"{text[:_MAX_LENGTH]} ...",
         width=max(width, indent + 20),
         initial_indent=" " * len(first.text),
         subsequent_indent=" " * indent,

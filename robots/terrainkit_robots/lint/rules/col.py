@@ -1,4 +1,4 @@
-"""Collision shapes: whether the robot can touch what it should, and only that."""
+"""Rules on collision shapes (COL)."""
 
 import math
 from collections import Counter
@@ -14,40 +14,41 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.analysis.legs.standing_pose import range_of
 from terrainkit_robots.lint.rule import Severity, Violation, rule
-from terrainkit_robots.transforms import Matrix
+from terrainkit_robots.text import count
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.bodies.overlap import Overlap
 
-_SLIGHT = 0.001
-"""Overlap from which simulators push bodies apart: MuJoCo's solver starts at contact [m]."""
+_MAX_OVERLAP = 0.001
+"""Overlap above which simulators push two bodies apart [m]."""
 
-_DEEP = 0.01
-"""Overlap from which the push throws a robot of ordinary size off its feet [m]."""
+_MAX_OVERLAP_ERROR = 0.01
+"""Overlap above which the contact force throws a robot of common size off its feet [m]."""
 
-_SHORT = 0.005
-"""How much lower a shape without contacts may be than those with, such as a rubber's skin [m]."""
+_MIN_FOOT_DEPTH = 0.005
+"""How much lower a shape without contacts may be than those with contacts [m], such as a rubber
+skin."""
 
-_SAMPLES = 64
-"""Positions of all joints that are tried for overlaps."""
+_NUM_SAMPLES = 64
+"""Number of joint configurations that are tested for overlaps."""
 
 _PRIMES = [n for n in range(2, 542) if all(n % k for k in range(2, math.isqrt(n) + 1))]
-"""The first hundred, one for each joint."""
+"""The first hundred primes, one for each joint."""
 
-_LARGE_SHARE = 0.5
-"""Share of the joint range from which an overlap is told: the arms of a humanoid meet its trunk in
-40 % of theirs."""
+_MAX_OVERLAP_SHARE = 0.5
+"""Share of the joint range above which overlaps are reported. The arms of a humanoid collide with
+its trunk in 40 % of theirs."""
 
-_WIDE = 1.5
-"""A joint without limits is sampled within +- this [rad]."""
+_DEFAULT_RANGE = 1.5
+"""A joint without limits is sampled in +- this range [rad]."""
 
 
 def _has_contacts(body: Body) -> bool:
     return any(placed.geometry.contacts for placed in body.collisions)
 
 
-def _silent(body: Body) -> list[Placed]:
-    """Return shapes that could collide, but have their contacts switched off; MJCF only."""
+def _disabled_shapes(body: Body) -> list[Placed]:
+    """Return the primitive shapes of a body whose contacts are disabled (MJCF only)."""
     return [
         placed
         for placed in (*body.collisions, *body.visuals)
@@ -57,69 +58,62 @@ def _silent(body: Body) -> list[Placed]:
 
 @rule("COL001", "no-foot-collision", "error", needs=("legs",))
 def no_foot_collision(robot: Facts) -> Iterator[Violation]:
-    """A leg has nothing to stand on: no collision shape on its foot.
+    """A foot has no collision shape.
 
-    What has no collision shape falls through the ground. A robot whose feet are only drawn sinks in
-    to its shanks or its trunk, and no reward will teach it to walk.
+    A link without a collision shape passes through the ground. A robot whose feet have only visual
+    shapes sinks until its shanks or its trunk touch the ground.
 
     Fix:
-        Give the foot, or the shank it is fixed to, a <collision>; a sphere or a box is best.
+        Give the foot, or the shank that it is fixed to, a <collision>; a sphere or a box is best.
 
     Source:
-        Every simulator takes contacts from collision shapes alone.
+        All simulators compute contacts from collision shapes only.
     """
     if not any(_has_contacts(body) for body in robot.bodies):
-        return  # COL003
+        return  # reported by COL003
     for leg in robot.legs:
         body = robot.bodies[leg.limb.chain[-1]]
-        link = robot.tree.links[leg.foot]
+        shapes = ""
         if not _has_contacts(body):
-            if not _silent(body):  # else COL007
-                yield Violation(
-                    subject=leg.foot,
-                    source=link.source,
-                    message=(
-                        f"{leg.foot}, the foot of a leg, has 0 collision shapes; wanted 1 or more"
-                    ),
-                    certainty="likely",
-                )
-        elif _bare(leg, body, robot):
+            # COL007 reports shapes with disabled contacts.
+            shapes = "" if _disabled_shapes(body) else "0"
+        elif _is_visual_only(leg, body, robot):
+            shapes = f"0, and those of {body.top.name} end above it"
+        if shapes:
             yield Violation(
                 subject=leg.foot,
-                source=link.source,
-                message=(
-                    f"{leg.foot}, the foot of a leg, is drawn, but has 0 collision shapes, and "
-                    f"those of {body.top.name} end above it; wanted 1 or more"
-                ),
+                source=robot.tree.links[leg.foot].source,
+                message=f"collision shapes of foot {leg.foot}: got {shapes}; expected 1 or more",
                 certainty="likely",
             )
 
 
-def _bare(leg: Leg, body: Body, robot: Facts) -> bool:
-    """Return whether the foot is a link of its own that is drawn where nothing collides."""
+def _is_visual_only(leg: Leg, body: Body, robot: Facts) -> bool:
+    """Return whether the foot link has only visual shapes, below all collision shapes."""
     link = robot.tree.links[leg.foot]
     if link is body.top or not link.visuals or link.collisions:
         return False
     pose = robot.at_zero[body.index]
-    place = (pose @ body.poses[body.links.index(link)])[:3, 3]
+    position = (pose @ body.poses[body.links.index(link)])[:3, 3]
     floor = min(lowest(placed, pose, robot.meshes) for placed in body.collisions)
-    return floor > float(place[2])
+    return floor > float(position[2])
 
 
 @rule("COL002", "no-trunk-collision", "warning", needs=("legs",))
 def no_trunk_collision(robot: Facts) -> Iterator[Violation]:
     """The trunk has no collision shape.
 
-    The usual termination, a contact of the trunk, never happens then: a robot that fell lies with
-    its trunk in the ground and goes on collecting rewards.
+    Episodes usually terminate on contact of the trunk. Without a collision shape this contact never
+    occurs: a fallen robot lies with its trunk in the ground and keeps collecting rewards.
 
     Fix:
-        Give the trunk a <collision>; one box will do.
+        Give the trunk a <collision>; one box is sufficient.
 
     Source:
-        legged_gym's terminate_after_contacts_on and Isaac Lab's illegal_contact both name the base.
+        legged_gym's terminate_after_contacts_on and Isaac Lab's illegal_contact refer to the base.
     """
-    # A body that several legs hang from is no leg, and a planar walker's trunk hangs from slides.
+    # A body that several legs share is no part of a leg. The trunk of a planar model is the last
+    # body of a chain of slides.
     used = Counter(index for leg in robot.legs for index in leg.limb.chain)
     rest = [body for body in robot.bodies if used[body.index] != 1]
     if any(_has_contacts(body) for body in rest) or robot.bodies[0].virtual:
@@ -129,41 +123,42 @@ def no_trunk_collision(robot: Facts) -> Iterator[Violation]:
         yield Violation(
             subject=trunk.name,
             source=robot.tree.links[trunk.name].source,
-            message=f"{trunk.name}, the trunk, has 0 collision shapes, and so has all that is no "
-            "leg; wanted 1 or more",
+            message=f"collision shapes of trunk {trunk.name} and all other bodies outside of the "
+            "legs: got 0; expected 1 or more",
             certainty="likely",
         )
 
 
 @rule("COL003", "no-collision", "error")
 def no_collision(robot: Facts) -> Iterator[Violation]:
-    """The robot has no collision shape at all.
+    """The robot has no collision shapes.
 
-    It falls through every ground, and touches nothing.
+    It falls through the ground and has no contacts.
 
     Fix:
-        Give the links <collision> elements; primitives are faster and steadier than meshes.
+        Give the links <collision> elements; primitives are faster and more stable than meshes.
 
     Source:
-        Every simulator takes contacts from collision shapes alone.
+        All simulators compute contacts from collision shapes only.
     """
     if robot.bodies and not any(_has_contacts(body) for body in robot.bodies):
         yield Violation(
             subject=robot.model.title,
             source=robot.model.source,
-            message=f"none of the {len(robot.links)} links has a collision shape; wanted 1 or more",
+            message=f"collision shapes of {count(len(robot.links), 'link')}: got 0; expected 1 or "
+            "more",
         )
 
 
-@rule("COL004", "bad-size", "error")
-def bad_size(robot: Facts) -> Iterator[Violation]:
-    """A shape has a size that is zero or negative.
+@rule("COL004", "invalid-size", "error")
+def invalid_size(robot: Facts) -> Iterator[Violation]:
+    """The size of a shape is zero or negative.
 
-    MuJoCo refuses it, PhysX makes it a point or drops it, and what was meant to touch the ground
-    does not.
+    MuJoCo rejects the shape; PhysX treats it as a point or drops it, so that the part has no
+    contacts.
 
     Fix:
-        Give the half of a centimetre or more that the part has; take the shape away if it has none.
+        Give the shape the size of the part, or remove it.
 
     Source:
         MuJoCo: `size 0 must be positive in geom`.
@@ -171,32 +166,30 @@ def bad_size(robot: Facts) -> Iterator[Violation]:
     for link in robot.links:
         for kind, shapes in (("collision", link.collisions), ("visual", link.visuals)):
             for shape in shapes:
-                wrong = [size for size in shape.size if size <= 0]
-                if wrong and shape.shape not in ("mesh", "plane"):
+                invalid = [size for size in shape.size if size <= 0]
+                if invalid and shape.shape not in ("mesh", "plane"):
                     yield Violation(
                         subject=link.name,
                         source=shape.size_source or shape.source,
-                        message=(
-                            f"a {kind} {shape.shape} of {link.name} has a size of "
-                            f"{wrong[0]:g} m; wanted more than 0"
-                        ),
+                        message=f"size of a {kind} {shape.shape} of link {link.name}: got "
+                        f"{invalid[0]:g} m; expected more than 0 m",
                         severity="error" if kind == "collision" else "warning",
-                        measured={"size": wrong[0]},
+                        measured={"size": invalid[0]},
                     )
 
 
 @rule("COL005", "overlap", "warning")
 def overlap(robot: Facts) -> Iterator[Violation]:
-    """Two bodies that are not neighbours are inside each other where the robot starts.
+    """Two bodies that are not neighbors overlap at the default pose.
 
-    Simulators filter contacts between a body and its parent, and no others. Every other overlap is
-    pushed apart from the first step on: the robot jumps, jitters, or explodes. Primitives are
-    compared as they are, meshes by their convex hull, as most simulators do. Over 1 mm is a
-    warning, over 10 mm an error on a robot with legs. Where a hull takes part it is one step less,
-    since other simulators may use the mesh itself, or pieces of it.
+    Simulators ignore contacts between a body and its parent only. All other overlaps are pushed
+    apart from the first step on: the robot jumps, jitters, or becomes unstable. Primitives are
+    compared as they are, meshes by their convex hulls, as in most simulators. An overlap above 1 mm
+    is a warning, and above 10 mm an error on a robot with legs. The severity is one level lower if
+    a convex hull is involved, since other simulators may use the mesh itself or its convex parts.
 
     Fix:
-        Shrink or move one of the shapes, or switch the contact of this pair off (<exclude> in MJCF,
+        Shrink or move one of the shapes, or disable contacts of this pair (<exclude> in MJCF,
         self_collisions = 1 in legged_gym).
 
     Source:
@@ -204,47 +197,45 @@ def overlap(robot: Facts) -> Iterator[Violation]:
     """
     if not robot.bodies:
         raise CannotCheckError("there is no tree of links")
-    for pair, worst in _worst(robot, robot.overlaps.overlaps(robot.positions)).items():
-        if worst.depth <= _SLIGHT:
+    for pair, deepest in _deepest(robot, robot.overlaps.overlaps(robot.positions)).items():
+        if deepest.depth <= _MAX_OVERLAP:
             continue
-        # An arm is bolted down, and its drivers keep pairs that always touch out of the check.
-        steps: tuple[Severity, ...] = ("info", "warning", "error" if robot.legs else "warning")
-        what = "the convex hulls of " if worst.hulls else ""
-        first, second = worst.first.link, worst.second.link
+        # Fixed-base arms often disable contacts of pairs that always touch, so no error for them.
+        levels: tuple[Severity, ...] = ("info", "warning", "error" if robot.legs else "warning")
         yield Violation(
             subject=" and ".join(pair),
-            source=worst.second.geometry.source,
-            message=(
-                f"{what}{first} and {second} are {1000 * worst.depth:.1f} mm inside each other at "
-                f"the default pose; wanted at most {1000 * _SLIGHT:.0f} mm"
-            ),
-            severity=steps[1 + (worst.depth > _DEEP) - worst.hulls],
-            certainty="likely" if worst.hulls else "proven",
-            measured={"depth": round(worst.depth, 5)},
+            source=deepest.second.geometry.source,
+            message=f"overlap of {'the convex hulls of ' if deepest.hulls else ''}"
+            f"{deepest.first.link} and {deepest.second.link} at the default pose: got "
+            f"{1000 * deepest.depth:.1f} mm; expected at most {1000 * _MAX_OVERLAP:.0f} mm",
+            severity=levels[1 + (deepest.depth > _MAX_OVERLAP_ERROR) - deepest.hulls],
+            certainty="likely" if deepest.hulls else "proven",
+            measured={"depth": round(deepest.depth, 5)},
         )
 
 
-def _worst(robot: Facts, overlaps: "list[Overlap]") -> "dict[tuple[str, str], Overlap]":
+def _deepest(robot: Facts, overlaps: "list[Overlap]") -> "dict[tuple[str, str], Overlap]":
     """Return the deepest overlap of each pair of bodies."""
-    worst: dict[tuple[str, str], Overlap] = {}
-    for found in overlaps:
-        names = robot.body_of[found.first.link].name, robot.body_of[found.second.link].name
-        worst.setdefault(names, found)
-    return worst
+    deepest: dict[tuple[str, str], Overlap] = {}
+    for each in overlaps:  # sorted by depth, deepest first
+        pair = robot.body_of[each.first.link].name, robot.body_of[each.second.link].name
+        deepest.setdefault(pair, each)
+    return deepest
 
 
 @rule("COL006", "overlap-in-range", "info")
 def overlap_in_range(robot: Facts) -> Iterator[Violation]:
-    """Two bodies overlap over a large part of the joint range.
+    """Two bodies overlap in a large part of the joint range.
 
-    Exploration reaches every part of the range. Where bodies overlap in much of it, the range is
-    wider than the robot's, or a collision shape larger.
+    Exploration reaches every part of the range. If two bodies overlap in most of it, the joint
+    range or a collision shape is larger than that of the real robot.
 
     Fix:
-        Compare the joint limits with the robot's, and the shapes with its parts.
+        Compare the joint limits and the collision shapes with the real robot.
 
     Source:
-        Counted over positions spread evenly within the limits, a Kronecker sequence.
+        Counted over joint positions that are evenly distributed within the limits (Kronecker
+        sequence).
     """
     if not robot.joints:
         raise CannotCheckError("there are no moving joints")
@@ -252,72 +243,62 @@ def overlap_in_range(robot: Facts) -> Iterator[Violation]:
     for index, joint in enumerate(robot.joints):
         lower, upper = range_of(joint)
         if upper - lower > 4 * np.pi:
-            lower, upper = -_WIDE, _WIDE
-        positions[joint.name] = lower + (upper - lower) * _spread(index)
+            lower, upper = -_DEFAULT_RANGE, _DEFAULT_RANGE
+        # Multiples of the square roots of different primes are evenly distributed modulo 1.
+        samples = np.arange(1, _NUM_SAMPLES + 1) * math.sqrt(_PRIMES[index % len(_PRIMES)]) % 1
+        positions[joint.name] = lower + (upper - lower) * samples
     counts: Counter[tuple[str, str]] = Counter()
-    for found in robot.overlaps.sweep(positions, _SAMPLES):
-        counts.update(pair for pair, w in _worst(robot, found).items() if w.depth > _SLIGHT)
-    for pair, count in counts.items():
-        share = count / _SAMPLES
-        if share > _LARGE_SHARE:
+    for overlaps in robot.overlaps.sweep(positions, _NUM_SAMPLES):
+        deepest = _deepest(robot, overlaps)
+        counts.update(pair for pair, each in deepest.items() if each.depth > _MAX_OVERLAP)
+    for pair, number in counts.items():
+        share = number / _NUM_SAMPLES
+        if share > _MAX_OVERLAP_SHARE:
             yield Violation(
                 subject=" and ".join(pair),
                 source=robot.tree.links[pair[0]].source,
-                message=(
-                    f"{pair[0]} and {pair[1]} overlap in {share:.0%} of the joint range; wanted "
-                    f"at most {_LARGE_SHARE:.0%}"
-                ),
+                message=f"part of the joint range in which {pair[0]} and {pair[1]} overlap: got "
+                f"{share:.0%}; expected at most {_MAX_OVERLAP_SHARE:.0%}",
                 certainty="likely",
                 measured={"share": share},
             )
 
 
-def _spread(dimension: int) -> Matrix:
-    """Return numbers from 0 to 1, evenly spread with those of other dimensions, shape (_SAMPLES,).
+@rule("COL007", "foot-contacts-disabled", "error", needs=("legs",))
+def foot_contacts_disabled(robot: Facts) -> Iterator[Violation]:
+    """The contacts of a foot are disabled.
 
-    Multiples of the square root of a prime, of which no two have a common factor.
-    """
-    prime = _PRIMES[dimension % len(_PRIMES)]
-    return np.asarray(np.arange(1, _SAMPLES + 1) * math.sqrt(prime) % 1)
-
-
-@rule("COL007", "foot-contacts-off", "error", needs=("legs",))
-def foot_contacts_off(robot: Facts) -> Iterator[Violation]:
-    """The shape of a foot is there, but its contacts are switched off.
-
-    With contype and conaffinity 0 a geom is only drawn. The robot sinks in until something else
+    A geom with contype 0 and conaffinity 0 is only visual. The robot sinks until another geom
     touches the ground.
 
     Fix:
-        Give the foot's geom contype="1" or conaffinity="1", or the class it takes them from.
+        Give the geom of the foot, or its default class, contype="1" or conaffinity="1".
 
     Source:
         MuJoCo's XML reference, geom: contype, conaffinity.
     """
     for leg in robot.legs:
         body = robot.bodies[leg.limb.chain[-1]]
-        pose = robot.at_zero[body.index]
-        off = [(lowest(p, pose, robot.meshes), p) for p in _silent(body) if _known(p, robot)]
-        on = [
-            lowest(p, pose, robot.meshes)
-            for p in body.collisions
-            if p.geometry.contacts and _known(p, robot)
+        pose, meshes = robot.at_zero[body.index], robot.meshes
+        disabled = [
+            (lowest(placed, pose, meshes), placed)
+            for placed in _disabled_shapes(body)
+            if has_extent(placed.geometry, meshes)
         ]
-        if not off:
+        enabled = [
+            lowest(placed, pose, meshes)
+            for placed in body.collisions
+            if placed.geometry.contacts and has_extent(placed.geometry, meshes)
+        ]
+        if not disabled:
             continue
-        depth, placed = min(off, key=lambda pair: pair[0])
-        if on and depth > min(on) - _SHORT:
+        height, placed = min(disabled, key=lambda pair: pair[0])
+        if enabled and height > min(enabled) - _MIN_FOOT_DEPTH:
             continue
         yield Violation(
             subject=placed.geometry.name or placed.link,
             source=placed.geometry.source,
-            message=(
-                f"the {placed.geometry.shape} of {placed.link}, the lowest shape of a leg, has "
-                "contype 0 and conaffinity 0; wanted contacts on a foot"
-            ),
+            message=f"contacts of the {placed.geometry.shape} of {placed.link}, the lowest shape "
+            "of a leg: got contype 0 and conaffinity 0; expected one of them above 0",
             certainty="likely",
         )
-
-
-def _known(placed: Placed, robot: Facts) -> bool:
-    return has_extent(placed.geometry, robot.meshes)

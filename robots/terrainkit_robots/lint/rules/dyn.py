@@ -1,177 +1,162 @@
-"""The robot simulated: dropped, standing, swept through its joints, under explicit control.
+"""Rules that simulate the robot in MuJoCo (DYN)."""
 
-MuJoCo is imported when a rule asks for it, so that what does not simulate does not wait for it.
-"""
-
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from dataclasses import replace
 
 from terrainkit_robots.analysis.bodies.kinematics import ancestors
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.stance import stands_alone
-from terrainkit_robots.lint.rule import Measured, Severity, Violation, rule
+from terrainkit_robots.lint.rule import Severity, Violation, rule
+from terrainkit_robots.simulation.assessment import judge
+from terrainkit_robots.simulation.drop import Drop, let_fall
+from terrainkit_robots.simulation.joint_sweep import Reach, sweep
+from terrainkit_robots.simulation.pd_gains import suggest_gains
+from terrainkit_robots.simulation.sim_model import TIME_STEP, plant
+from terrainkit_robots.simulation.standing import Standing, footholds, stand_still
+from terrainkit_robots.simulation.time_step import joint_inertias, longest_step, stable_stiffness
+from terrainkit_robots.simulation.units import SLIDING, units_of
 from terrainkit_robots.text import count
 
-if TYPE_CHECKING:
-    from terrainkit_robots.simulation.drop import Drop
-    from terrainkit_robots.simulation.joint_sweep import Reach
-    from terrainkit_robots.simulation.pd_gains import Gain
-    from terrainkit_robots.simulation.sim_model import Plant
-    from terrainkit_robots.simulation.standing import Standing
-
-_WILD, _BROKEN = 100.0, 500.0
-"""Speed of a joint of a robot that drops [rad/s] or [m/s]: a healthy one stays under 75; a motor of
-a legged robot turns its joint at 30."""
+_MAX_SPEED, _MAX_SPEED_ERROR = 100.0, 500.0
+"""Joint velocity in the drop test [rad/s] or [m/s]: limits of the warning and the error. Robots
+without defects stay below 75; motors of legged robots reach 30."""
 
 _DROP_HEIGHT = 0.1
-"""Height from which it drops [m]."""
+"""Height of the drop test [m]."""
 
-_SINGLE = 6
-"""More legs than this are most often half as many, of two branches that a loop closes; URDF has no
-loops, so that it may stand all the same."""
+_MAX_SINGLE_LEGS = 6
+"""With more legs, two branches usually form one leg through a closed loop. URDF has no loops, so
+the real robot may stand."""
 
-_STUCK = 0.1
-"""A joint that can use less of its range than this is blocked where it stands."""
+_MIN_RANGE_SHARE = 0.1
+"""Usable share of the joint range below which a joint is blocked at its default position."""
 
-_SHORT_REACH = 0.99
-"""From this share on a joint reaches its limits."""
+_FULL_RANGE_SHARE = 0.99
+"""Usable share of the joint range from which a joint reaches its limits."""
 
 _SEVERITIES: tuple[Severity, ...] = ("info", "warning", "error")
 
-_SOLE = 0.005
-"""How far inside its support the centre of mass of a biped has to be, to stand with locked joints:
-one with points for feet does not stand still at all [m]."""
+_MIN_MARGIN = 0.005
+"""Distance of the center of mass from the edge of the support that a biped needs to stand with
+locked joints [m]; with point feet it does not stand at all."""
 
-_OVERLAPS = "Its own shapes push each other apart: look at what overlaps (COL005)."
+_OVERLAP_HINT = "Shapes of the robot push each other apart: check for overlaps (COL005)."
 
-_FEATHER = 0.003
-"""What a joint bears at the time step over the stiffness it needs: an ankle of a humanoid, without
-the inertia of its motor, has 0.04."""
+_MIN_STIFFNESS_SHARE = 0.003
+"""Stable stiffness divided by the required stiffness below which the inertia is probably wrong. The
+ankle of a humanoid has 0.04 without the inertia of its rotor."""
 
 
-@rule("DYN001", "wild-drop", "error", needs=("simulation",))
-def wild_drop(robot: Facts) -> Iterator[Violation]:
-    """Dropped without torque, the robot is thrown about.
+@rule("DYN001", "unstable-drop", "error", needs=("simulation",))
+def unstable_drop(robot: Facts) -> Iterator[Violation]:
+    """The robot becomes unstable when it is dropped without torques.
 
-    A robot that falls from 10 cm with limp joints comes to rest. If a joint reaches 100 rad/s,
-    shapes push each other apart, or something is so light that any contact flings it; if numbers
-    stop being numbers, no policy will be trained on it. It is simulated for 1.5 s; one that is
-    bolted down only swings. If it is quiet without self-collision, the message says so; it is then
-    one step less severe where meshes collide, since other simulators may not take their hulls.
+    A robot that falls from 10 cm with limp joints comes to rest within the 1.5 s of the simulation;
+    a robot with a fixed base swings. A joint velocity above 100 rad/s means that overlapping shapes
+    push each other apart, or that a body is too light for its contacts; above 500 rad/s, or if the
+    state becomes NaN, it is an error. If the robot is stable without self-collision, the message
+    says so, and the severity is one level lower if meshes collide, since other simulators may not
+    use their convex hulls.
 
     Fix:
-        Look at what overlaps (COL005) and at what is too light for its size (INR006 to INR011).
+        Check for overlaps (COL005) and for inertias that are too small (INR006 to INR011).
 
     Source:
         MuJoCo at a time step of 5 ms, that of legged_gym; its warnings BADQPOS, BADQVEL, BADQACC.
     """
-    from terrainkit_robots.simulation.drop import let_fall
-    from terrainkit_robots.simulation.sim_model import plant
-
-    scene = plant(robot)
-    drop = let_fall(scene, height=_DROP_HEIGHT)
-    if not _is_wild(drop):
+    model = plant(robot)
+    drop = let_fall(model, height=_DROP_HEIGHT)
+    if not _is_unstable(drop):
         return
-    alone = let_fall(scene, height=_DROP_HEIGHT, self_collision=False)
-    calm = not _is_wild(alone)
-    hulls = calm and _has_hulls(robot)
-    severe = 2 if drop.blew_up or drop.top_speed > _BROKEN else 1
+    without = let_fall(model, height=_DROP_HEIGHT, self_collision=False)
+    stable = not _is_unstable(without)
+    with_hulls = stable and _has_mesh_collision(robot)
+    level = 2 if drop.blew_up or drop.top_speed > _MAX_SPEED_ERROR else 1
+    unit, unit_without = (units_of(model, each.fastest).speed for each in (drop, without))
+    got = f"{drop.top_speed:.0f} {unit} at {drop.fastest}"
+    if drop.blew_up:
+        got = f"an unstable state after {drop.seconds:.2f} s"
+    start = f"dropped from {_DROP_HEIGHT:g} m" if model.floating else "released"
+    calm = f"; without self-collision {without.top_speed:.0f} {unit_without}" if stable else ""
     measured: dict[str, float | int | str] = {
         "speed": round(drop.top_speed, 1),
         "blew_up": int(drop.blew_up),
         "seconds": round(drop.seconds, 3),
     }
-    if calm:
-        measured["speed_without_self_collision"] = round(alone.top_speed, 1)
+    if stable:
+        measured["speed_without_self_collision"] = round(without.top_speed, 1)
     yield Violation(
         subject=robot.model.title,
         source=robot.model.source,
-        severity=_SEVERITIES[severe - hulls],
-        certainty="likely" if hulls else "proven",
-        message=_thrown(scene, drop, alone),
-        hint=_OVERLAPS if calm else "",
+        severity=_SEVERITIES[level - with_hulls],
+        certainty="likely" if with_hulls else "proven",
+        message=f"largest velocity when {start} without torques: got {got}; expected at most "
+        f"{_MAX_SPEED:.0f} {unit}{calm}",
+        hint=_OVERLAP_HINT if stable else "",
         measured=measured,
     )
 
 
-def _is_wild(drop: "Drop") -> bool:
-    return drop.blew_up or drop.top_speed > _WILD
+def _is_unstable(drop: Drop) -> bool:
+    return drop.blew_up or drop.top_speed > _MAX_SPEED
 
 
-def _thrown(scene: "Plant", drop: "Drop", alone: "Drop") -> str:
-    """Return what a robot did that was dropped, and whether it did without self-collision."""
-    from terrainkit_robots.simulation.units import units_of
-
-    unit, unit_alone = (units_of(scene, each.fastest).speed for each in (drop, alone))
-    how = f"dropped from {_DROP_HEIGHT:g} m" if scene.floating else "let go"
-    what = (
-        f"its state blew up after {drop.seconds:.2f} s"
-        if drop.blew_up
-        else f"{drop.fastest} reached {drop.top_speed:.0f} {unit}"
-    )
-    blame = f"; without self-collision {alone.top_speed:.0f} {unit_alone}"
-    return (
-        f"{how} without torque, {what}; wanted at most {_WILD:.0f} {unit}"
-        f"{'' if _is_wild(alone) else blame}"
-    )
-
-
-def _has_hulls(robot: Facts) -> bool:
-    """Return whether meshes collide, by their hull here, and maybe by something else elsewhere."""
+def _has_mesh_collision(robot: Facts) -> bool:
+    """Return whether meshes collide; other simulators may not use their convex hulls."""
     shapes = (placed.geometry for body in robot.bodies for placed in body.collisions)
     return any(shape.mesh is not None and shape.contacts for shape in shapes)
 
 
 @rule("DYN002", "does-not-stand", "error", needs=("simulation", "legs"))
 def does_not_stand(robot: Facts) -> Iterator[Violation]:
-    """At its standing pose, held by its motors, the robot does not stand.
+    """The robot does not stand at its standing pose under PD control.
 
-    An episode starts like this: actions of zero, position control with the suggested gains. A robot
-    that falls by itself in the first two seconds is reset before it has learned anything; one that
-    stands askew, on its shanks, with a foot in the air or a motor that gives all it has, learns to
-    do that. Leaning by 3 to 9 degrees is a note. One or two legs are not asked to balance: their
-    joints are locked, so that only feet and pose count.
+    An episode starts with zero actions, that is, PD control with the suggested gains at the
+    standing pose. A robot that falls within two seconds is reset before it learns anything. A robot
+    that leans, stands on its shanks, lifts a foot or saturates a motor learns to do so. A tilt of 3
+    to 9 degrees is only reported as information. Robots with one or two legs need not balance:
+    their joints are locked, so that only the feet and the pose count.
 
     Fix:
-        The message says what is to blame. Otherwise look at the pose, the feet and the efforts.
+        The message names the cause. Otherwise check the pose, the feet and the effort limits.
 
     Source:
-        MuJoCo for 2 s at a time step of 5 ms; gains as `terrainkit onboard` suggests them.
+        MuJoCo for 2 s at a time step of 5 ms; gains as suggested by `terrainkit onboard`.
     """
-    from terrainkit_robots.simulation.assessment import judge
-
     locked = not stands_alone(robot)
-    _ask_whether_it_can(robot, locked=locked)
+    _check_can_stand(robot, locked=locked)
     standing = _stand(robot, locked=locked)
-    verdict = judge(standing)
-    if verdict.stands:
+    assessment = judge(standing)
+    if assessment.stands:
         return
-    blame = not locked and judge(_stand(robot, locked=locked, self_collision=False)).stands
-    severe = verdict.degree
-    if locked or len(robot.legs) > _SINGLE:
-        severe = min(severe, 1)
-    elif blame and _has_hulls(robot):
-        severe = max(severe - 1, 0)
-    held = "with its joints locked" if locked else "held by its motors"
+    stands_without = not locked and judge(_stand(robot, locked=locked, self_collision=False)).stands
+    level = assessment.degree
+    if locked or len(robot.legs) > _MAX_SINGLE_LEGS:
+        level = min(level, 1)
+    elif stands_without and _has_mesh_collision(robot):
+        level = max(level - 1, 0)
+    control = "with locked joints" if locked else "under PD control"
     yield Violation(
         subject=robot.model.title,
         source=robot.model.source,
-        severity=_SEVERITIES[severe],
+        severity=_SEVERITIES[level],
         certainty="likely",
-        message=f"{held} at its standing pose, {', '.join(verdict.faults)}"
-        + ("; without self-collision it stands" if blame else ""),
-        hint=_OVERLAPS if blame else "",
-        measured=_numbers(standing),
+        message=f"standing pose {control}: {', '.join(assessment.faults)}"
+        + ("; without self-collision the robot stands" if stands_without else ""),
+        hint=_OVERLAP_HINT if stands_without else "",
+        measured={
+            "tilt": round(standing.tilt, 4),
+            "sink": round(standing.sink, 4),
+            "drift": round(standing.drift, 4),
+            "saturation": round(standing.saturation, 3),
+            "touching": len(standing.touching),
+            "lifted": len(standing.lifted),
+        },
     )
 
 
-def _stand(robot: Facts, *, locked: bool, self_collision: bool = True) -> "Standing":
-    from terrainkit_robots.simulation.pd_gains import suggest_gains
-    from terrainkit_robots.simulation.sim_model import plant
-    from terrainkit_robots.simulation.standing import footholds, stand_still
-
+def _stand(robot: Facts, *, locked: bool, self_collision: bool = True) -> Standing:
     return stand_still(
         plant(robot),
         suggest_gains(robot),
@@ -182,219 +167,158 @@ def _stand(robot: Facts, *, locked: bool, self_collision: bool = True) -> "Stand
     )
 
 
-def _numbers(standing: "Standing") -> Measured:
-    return {
-        "tilt": round(standing.tilt, 4),
-        "sink": round(standing.sink, 4),
-        "drift": round(standing.drift, 4),
-        "saturation": round(standing.saturation, 3),
-        "touching": len(standing.touching),
-        "lifted": len(standing.lifted),
-    }
-
-
-def _ask_whether_it_can(robot: Facts, *, locked: bool) -> None:
-    """Raise an error if it could not stand, for a reason that other rules tell."""
+def _check_can_stand(robot: Facts, *, locked: bool) -> None:
+    """Raise CannotCheckError if the robot cannot stand for a reason that other rules report."""
     if not any(placed.geometry.contacts for body in robot.bodies for placed in body.collisions):
-        raise CannotCheckError("nothing of it collides, so that it falls through the floor")
-    if locked and robot.stance is not None and not robot.stance.margin > _SOLE:
-        raise CannotCheckError("its centre of mass is not above its feet, and two need balance")
-    driven = {joint.name for joint in robot.actuated}
+        raise CannotCheckError("the robot has no collision shapes and falls through the floor")
+    if locked and robot.stance is not None and not robot.stance.margin > _MIN_MARGIN:
+        raise CannotCheckError("the center of mass of the biped is not above its feet")
+    actuated = {joint.name for joint in robot.actuated}
     for index in sorted(robot.leg_bodies):
         joint = robot.bodies[index].joint
-        if joint is not None and joint.moves and joint.mimic is None and joint.name not in driven:
-            raise CannotCheckError(f"no motor drives {joint.name} of a leg, so it cannot be held")
+        if joint is not None and joint.moves and joint.mimic is None and joint.name not in actuated:
+            raise CannotCheckError(f"leg joint {joint.name} has no actuator")
 
 
-@rule("DYN003", "short-reach", "info", needs=("simulation",))
-def short_reach(robot: Facts) -> Iterator[Violation]:
-    """A joint does not get to its limits, with the others at the standing pose.
+@rule("DYN003", "unreachable-limits", "info", needs=("simulation",))
+def unreachable_limits(robot: Facts) -> Iterator[Violation]:
+    """A joint does not reach its limits while the others stay at the standing pose.
 
-    Bodies in its way stop it, by their collision shapes as MuJoCo takes them, or its motor cannot
-    lift the limb. That a leg meets another before its limit is usual, and told once. A joint that
-    its own limb blocks within a tenth of its range is a warning, and so is one of a robot with legs
-    that is too weak to hold what hangs from it in the very pose that the robot starts from; arms
-    may have springs for that.
+    Either a collision with another body stops the joint, or its motor cannot lift the limb.
+    Collisions between legs before a limit are common and reported once as information. It is a
+    warning if the own limb of a joint blocks it within 10 % of its range, or if a motor of a legged
+    robot cannot hold its limb at the standing pose; arms may have springs for that.
 
     Fix:
-        Compare the limits, the collision shapes and the effort with those of the robot.
+        Compare the limits, the collision shapes and the effort limits with the real robot.
 
     Source:
-        MuJoCo: 40 places over the range of each joint, base in the air, contacts deeper than 1 mm.
+        MuJoCo: 40 positions in the range of each joint, base fixed in the air, contacts deeper than
+        1 mm.
     """
-    from terrainkit_robots.simulation.joint_sweep import sweep
-    from terrainkit_robots.simulation.sim_model import plant
-
     reaches = sweep(plant(robot))
     if not reaches:
-        raise CannotCheckError("no joint with a motor has limits")
+        raise CannotCheckError("no joint with an actuator has limits")
     sources = {joint.name: joint.source for joint in robot.joints}
     for reach in reaches:
-        wrong = _stuck(robot, reach) or (_weak(reach) if robot.legs else "")
-        if wrong:
+        message = ""
+        if _is_blocked_by_limb(robot, reach):
+            message = (
+                f"usable range of {_describe(reach)}; expected at least {_MIN_RANGE_SHARE:.0%} of "
+                "its range"
+            )
+        elif robot.legs and reach.load > reach.effort:
+            message = (
+                f"torque of joint {reach.joint} that holds its limb at the default pose: got "
+                f"{reach.load:.3g} {reach.units.push}; expected at most its effort limit of "
+                f"{reach.effort:.3g} {reach.units.push}"
+            )
+        if message:
             yield Violation(
                 subject=reach.joint,
                 source=sources.get(reach.joint, robot.model.source),
                 severity="warning",
                 certainty="likely",
-                message=wrong,
+                message=message,
                 measured={"share": round(reach.share, 3), "load": round(reach.load, 4)},
             )
-    short = [reach for reach in reaches if reach.share < _SHORT_REACH]
+    blocked = [reach for reach in reaches if reach.share < _FULL_RANGE_SHARE]
     weak = [reach for reach in reaches if reach.largest_load > reach.effort]
-    total = count(len(reaches), "joint")
-    told = [*_first_of(short, total), *_weakest_of(weak, total)]
-    if told:
+    total, parts = count(len(reaches), "joint"), []
+    if blocked:
+        worst = min(blocked, key=lambda reach: reach.share)
+        parts.append(
+            "blocked by a collision before their limits, moved one at a time from the default "
+            f"pose: {len(blocked)} of {total}; worst {_describe(worst)}"
+        )
+    if weak:
+        worst = max(weak, key=lambda reach: reach.largest_load / reach.effort)
+        parts.append(
+            f"too weak to lift the limb over the whole range: {len(weak)} of {total}; worst "
+            f"{worst.joint}: got {worst.largest_load:.3g} {worst.units.push}; expected at most its "
+            f"effort limit of {worst.effort:.3g} {worst.units.push}"
+        )
+    if parts:
         yield Violation(
             subject=robot.model.title,
             source=robot.model.source,
             certainty="likely",
-            message="; ".join(told),
-            measured={"short": len(short), "weak": len(weak)},
+            message="; ".join(parts),
+            measured={"short": len(blocked), "weak": len(weak)},
         )
 
 
-def _first_of(short: "list[Reach]", total: str) -> Iterator[str]:
-    if short:
-        meet = "meets another body before its limits"
-        if len(short) > 1:
-            meet = "meet another body before their limits"
-        worst = _way(min(short, key=lambda reach: reach.share))
-        yield (
-            f"{len(short)} of {total} {meet}, moved one at a time from the default pose; "
-            f"worst {worst}"
-        )
-
-
-def _weakest_of(weak: "list[Reach]", total: str) -> Iterator[str]:
-    if weak:
-        worst = max(weak, key=lambda reach: reach.largest_load / reach.effort)
-        them = "it" if len(weak) == 1 else "them"
-        yield (
-            f"{len(weak)} of {total} cannot lift what hangs from {them} all the way; worst "
-            f"{worst.joint}, which needs {worst.largest_load:.3g} of {worst.effort:.3g} "
-            f"{worst.units.push}"
-        )
-
-
-def _way(reach: "Reach") -> str:
-    pair = next(pair for pair in reach.blocked if pair is not None)
+def _describe(reach: Reach) -> str:
+    first, second = next(pair for pair in reach.blocked if pair is not None)
     return (
-        f"{reach.joint}, which gets from {reach.reached[0]:.2f} to {reach.reached[1]:.2f} of "
-        f"{reach.limits[0]:.2f} to {reach.limits[1]:.2f} {reach.units.place}: {pair[0]} meets "
-        f"{pair[1]}"
+        f"{reach.joint}: got {reach.reached[0]:.2f} to {reach.reached[1]:.2f} of "
+        f"{reach.limits[0]:.2f} to {reach.limits[1]:.2f} {reach.units.place}, where {first} "
+        f"collides with {second}"
     )
 
 
-def _stuck(robot: Facts, reach: "Reach") -> str:
-    """Return what is wrong with a joint that its own limb blocks on both sides."""
-    if reach.share >= _STUCK or not all(
-        pair is not None and _on_one_chain(robot, *pair) for pair in reach.blocked
-    ):
-        return ""
-    return f"{_way(reach)}; wanted at least {_STUCK:.0%} of its range"
+def _is_blocked_by_limb(robot: Facts, reach: Reach) -> bool:
+    """Return whether both directions are blocked by two bodies of which one carries the other."""
+    if reach.share >= _MIN_RANGE_SHARE:
+        return False
+    for pair in reach.blocked:
+        if pair is None:
+            return False
+        low, high = sorted(robot.body_of[name].index for name in pair)
+        if low != 0 and low not in ancestors(robot.bodies, high):
+            return False
+    return True
 
 
-def _on_one_chain(robot: Facts, first: str, second: str) -> bool:
-    """Return whether one of two links carries the other."""
-    low, high = sorted(robot.body_of[name].index for name in (first, second))
-    return low == 0 or low in ancestors(robot.bodies, high)
+@rule("DYN004", "low-joint-inertia", "info", needs=("simulation",))
+def low_joint_inertia(robot: Facts) -> Iterator[Violation]:
+    """The inertia of a joint is too low for its gains at the training time step.
 
-
-def _weak(reach: "Reach") -> str:
-    if reach.load <= reach.effort:
-        return ""
-    return (
-        f"{reach.joint} needs {reach.load:.3g} {reach.units.push} to hold what hangs from it at "
-        f"the default pose; its effort is {reach.effort:.3g}"
-    )
-
-
-@rule("DYN004", "light-joint", "info", needs=("simulation",))
-def light_joint(robot: Facts) -> Iterator[Violation]:
-    """A joint is too light for its gains at the time step of training.
-
-    legged_gym and Isaac Lab's explicit actuators compute the torque once per time step of 5 ms. A
-    joint of little inertia has answered before the next torque comes, and shakes, however the gains
-    are tuned. Real joints have the inertia of their motor's rotor times the square of the gear
-    ratio, which URDF cannot hold: a simulator calls it armature. A joint that is lighter by
-    hundreds than that is told as a warning, since its inertia is probably wrong.
+    The explicit actuators of legged_gym and Isaac Lab compute the torque once per time step of 5
+    ms. A joint with little inertia oscillates at this rate for any useful gain. Real joints also
+    have the reflected inertia of the rotor, which URDF cannot express: simulators call it armature.
+    An inertia that is lower by a factor of several hundred is a warning, since it is probably
+    wrong.
 
     Fix:
-        Set the suggested armature where the simulator takes it, or halve the time step.
+        Set the suggested armature in the simulator, or halve the time step.
 
     Source:
-        Longest stable step of explicit PD, by Jury's criterion on the robot's mass matrix; armature
-        of 0.01 kg m2 is what Unitree's MJCF has.
+        Largest stable time step of explicit PD, by Jury's criterion on the mass matrix; Unitree's
+        MJCF has an armature of 0.01 kg m2.
     """
-    from terrainkit_robots.simulation.pd_gains import suggest_gains
-    from terrainkit_robots.simulation.sim_model import plant
-    from terrainkit_robots.simulation.time_step import longest_step
-
-    scene, gains = plant(robot), suggest_gains(robot)
-    declared = {name: float(scene.model.joint(name).armature[0]) for name in gains}
-    light = _light(scene, gains, declared)
-    if not light:
-        return
-    lightest = min(light, key=lambda name: light[name].share)
-    bare = {name: replace(gain, armature=declared[name]) for name, gain in gains.items()}
-    step = longest_step(scene, bare).seconds
-    legged = {joint.name for leg in robot.legs for joint in leg.joints}
-    feather = lightest in legged and light[lightest].share < _FEATHER
-    yield Violation(
-        subject=lightest,
-        source=next((j.source for j in robot.joints if j.name == lightest), robot.model.source),
-        severity="warning" if feather else "info",
-        certainty="likely",
-        message=_answers_too_fast(scene, gains[lightest], light[lightest], step, len(light) - 1),
-        measured={
-            "inertia": light[lightest].inertia,
-            "stable_step": step,
-            "armature": gains[lightest].armature,
-            "joints": len(light),
-        },
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Light:
-    """A joint that is suggested more armature than it has."""
-
-    joint: str
-    inertia: float
-    share: float
-    """Of the stiffness it needs, what it bears without."""
-
-
-def _light(
-    scene: "Plant", gains: "Mapping[str, Gain]", declared: Mapping[str, float]
-) -> dict[str, _Light]:
-    """Return the joints that are too light, by name."""
-    from terrainkit_robots.simulation.time_step import joint_inertias, stable_stiffness
-
-    inertias = joint_inertias(scene)
-    return {
-        name: _Light(
-            joint=name,
-            inertia=inertias[name].free,
-            share=stable_stiffness(inertias[name].free) / gain.stiffness,
-        )
+    model, gains = plant(robot), suggest_gains(robot)
+    declared = {name: float(model.model.joint(name).armature[0]) for name in gains}
+    inertias = joint_inertias(model)
+    shares = {
+        name: stable_stiffness(inertias[name].free) / gain.stiffness
         for name, gain in gains.items()
         if gain.armature > declared[name] and gain.stiffness > 0
     }
-
-
-def _answers_too_fast(scene: "Plant", gain: "Gain", light: _Light, step: float, others: int) -> str:
-    """Return what is wrong with a light joint, what it needs, and how many others do."""
-    from terrainkit_robots.simulation.sim_model import TIME_STEP
-    from terrainkit_robots.simulation.units import SLIDING, units_of
-
-    units = units_of(scene, light.joint)
-    moves = "moves" if units == SLIDING else "turns"
-    return (
-        f"{light.joint} {moves} {light.inertia:.2g} {units.inertia}, so that explicit PD of kp "
-        f"{gain.stiffness:g} and kd {gain.damping:g} is stable up to {1000 * step:.2g} ms; wanted "
-        f"twice training's {1000 * TIME_STEP:g} ms: an armature of {gain.armature:g} "
-        f"{units.inertia} is suggested"
-        + (f", and one for {count(others, 'other joint')}" if others else "")
+    if not shares:
+        return
+    lightest = min(shares, key=lambda name: shares[name])
+    gain, units = gains[lightest], units_of(model, lightest)
+    inertia = inertias[lightest].free
+    without = {name: replace(each, armature=declared[name]) for name, each in gains.items()}
+    step = longest_step(model, without).seconds
+    legged = {joint.name for leg in robot.legs for joint in leg.joints}
+    is_wrong = lightest in legged and shares[lightest] < _MIN_STIFFNESS_SHARE
+    others = count(len(shares) - 1, "other joint")
+    yield Violation(
+        subject=lightest,
+        source=next((j.source for j in robot.joints if j.name == lightest), robot.model.source),
+        severity="warning" if is_wrong else "info",
+        certainty="likely",
+        message=f"largest stable time step of explicit PD on joint {lightest} (kp "
+        f"{gain.stiffness:g}, kd {gain.damping:g}, {'mass' if units == SLIDING else 'inertia'} "
+        f"{inertia:.2g} {units.inertia}): got {1000 * step:.2g} ms; expected at least twice the "
+        f"training time step of {1000 * TIME_STEP:g} ms, as with an armature of {gain.armature:g} "
+        f"{units.inertia}" + (f"; the same applies to {others}" if len(shares) > 1 else ""),
+        measured={
+            "inertia": inertia,
+            "stable_step": step,
+            "armature": gain.armature,
+            "joints": len(shares),
+        },
     )

@@ -1,4 +1,4 @@
-"""INR: masses and inertias."""
+"""Rules on masses and inertias (INR)."""
 
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import replace
@@ -27,163 +27,162 @@ from terrainkit_robots.analysis.inertia.physical import (
 )
 from terrainkit_robots.analysis.inertia.placeholder import is_identity, placeholders
 from terrainkit_robots.analysis.inertia.repair import repair
-from terrainkit_robots.description.model import Inertial, Link
-from terrainkit_robots.description.xml.unparsed import Unread
+from terrainkit_robots.description.model import Link
+from terrainkit_robots.description.xml.unparsed import UnparsedNumbers
 from terrainkit_robots.lint.rule import Severity, Violation, rule
 from terrainkit_robots.text import names
 from terrainkit_robots.transforms import Matrix
 
-_IMPOSSIBLE = 0.99
-"""Ratio (e0 + e1) / e2 below which no rounding explains that a body cannot exist."""
+_MIN_TRIANGLE_RATIO = 0.99
+"""Ratio (I1 + I2) / I3 of the principal moments below which rounding is no explanation."""
 
-_ROUNDED = 0.999
-"""Ratio (e0 + e1) / e2 that a flat part can get from numbers rounded to four digits: at worst
-1/2000 off in e2, and as much in e0 + e1."""
+_MIN_ROUNDED_RATIO = 0.999
+"""The same ratio for a flat part whose moments are rounded to four digits: each number is off by
+at most 1/2000."""
 
-_EXACT = 1 - 1e-12
-"""Ratio (e0 + e1) / e2 below which it is not this program's own rounding."""
+_MIN_EXACT_RATIO = 1 - 1e-12
+"""The same ratio below which the deviation is not a floating-point error of this program."""
 
-_SPREAD, _SPREAD_FAR = 1.05, 3.0
-"""Radius of gyration over the half diagonal of a body. Nothing inside a box can exceed 1; the rest
-is for shapes that leave out a little of the body."""
+_MAX_GYRATION, _MAX_GYRATION_ERROR = 1.05, 3.0
+"""Radius of gyration divided by half the diagonal of the body: limits of the warning and the error.
+Mass inside a box cannot exceed 1; the margin is for shapes that omit a small part of the body."""
 
-_CONCENTRATED = 0.05
-"""The same ratio below which a body would be a point: solid parts have 0.3 to 0.6, and a heavy
-motor in a light shell that is five times as long has 0.1."""
+_MIN_GYRATION = 0.05
+"""The same ratio for a body that is nearly a point mass. Solid parts have 0.3 to 0.6; a heavy motor
+in a light shell five times as long has 0.1."""
 
-_ASIDE, _SLACK, _ASIDE_FAR = 0.10, 0.005, 3.0
-"""How far a centre of mass may be outside the box around a body: a share of the box's diagonal
-plus some metres; and how many times that is an error."""
+_COM_SHARE, _COM_MARGIN, _COM_ERROR = 0.10, 0.005, 3.0
+"""Allowed distance of a center of mass from the bounding box of its body: a share of the diagonal
+plus a margin [m]; and the multiple of that distance that is an error."""
 
-_RATIO = 1000.0
-"""Mass ratio of neighbours from which solvers at usual time steps get stiff: 10 kg on 10 g."""
+_MAX_MASS_RATIO = 1000.0
+"""Mass ratio of neighboring bodies above which solvers become stiff at common time steps, such as
+10 kg on 10 g."""
 
-_DRIFT, _DRIFT_FAR = 0.01, 0.05
-"""Share of the declared mass that a simulator may add before it matters."""
+_MAX_INFERRED, _MAX_INFERRED_ERROR = 0.01, 0.05
+"""Inferred mass divided by the declared mass: limits of the warning and the error."""
 
-_DENSITY = 1000.0
-"""Density that MuJoCo gives to collision shapes of links without an <inertial> [kg/m3]."""
+_DEFAULT_DENSITY = 1000.0
+"""Density that MuJoCo assigns to the collision shapes of links without <inertial> [kg/m3]."""
+
+_INERTIA_ATTRIBUTES = (
+    "ixx",
+    "ixy",
+    "ixz",
+    "iyy",
+    "iyz",
+    "izz",
+    "diaginertia",
+    "fullinertia",
+)
+"""Attributes of URDF and MJCF that hold an inertia."""
 
 
 @rule("INR001", "massless-body", "error")
 def massless_body(robot: Facts) -> Iterator[Violation]:
-    """A body that a joint moves has no mass.
+    """A moving body has no mass.
 
-    A force on nothing has no finite answer. MuJoCo refuses the file, PhysX puts a mass of its own
-    in, others divide by zero. Links that are fixed to a body with mass are part of it and need
-    none, which is only told as information; and a fixed base may go without, as it never moves.
+    The acceleration of a body without mass is undefined. MuJoCo rejects the file, PhysX assigns a
+    default mass, and other simulators divide by zero. A massless link that is fixed to a body with
+    mass is part of that body and is only reported as information. A fixed base never moves and
+    needs no mass.
 
     Fix:
-        Give the body its mass and inertia, or make the joint above it fixed, or take a link away
-        that only stands between two joints. An <inertial> needs both <mass> and <inertia>.
+        Give the body a mass and an inertia, make the joint above it fixed, or remove a link that
+        only separates two joints. An <inertial> needs both <mass> and <inertia>.
 
     Source:
         MuJoCo 4.0: "mass and inertia of moving bodies must be larger than mjMINVAL", and
         "missing element: 'mass'".
     """
-    unread = Unread(robot.model)
+    unparsed = UnparsedNumbers(robot.model)
     for link in robot.model.links:
-        if (
-            link.inertial
-            and link.inertial.mass is None
-            and not unread.has(link.name, "value", "mass")
-        ):
+        inertial = link.inertial
+        if inertial and inertial.mass is None and not unparsed.has(link.name, "value", "mass"):
             yield Violation(
                 subject=link.name,
-                source=link.inertial.source,
-                message=f"link {link.name} has an <inertial> without a mass; wanted both or none",
+                source=inertial.source,
+                message=f"<inertial> of link {link.name}: got no <mass>; expected <mass> and "
+                "<inertia>",
             )
+    trunk = {link.name for body in robot.bodies[:1] for link in body.links}
+    floating = any(j.kind == "floating" and j.child in trunk for j in robot.model.joints)
     for body in robot.bodies:
-        if body.virtual or _mass_unknown(body) or body.mass > NOTHING:
+        if body.virtual or not _has_valid_mass(body) or body.mass > NOTHING:
             continue
-        if body.parent is not None or robot.legs or _floats(robot):
-            yield _massless(body)
-    yield from _empty_links(robot)
+        if body.parent is not None or robot.legs or floating:
+            declared = [link for link in body.links if link.inertial is not None]
+            mass = f"{body.mass:.3g} kg" if declared else "no <inertial> on any of its links"
+            parent = f"joint {body.joint.name} moves it" if body.joint else "it is the trunk"
+            yield Violation(
+                subject=body.name,
+                source=mass_source(declared[0]) if declared else body.top.source,
+                message=f"mass of body {body.name} ({parent}): got {mass}; expected more than 0 kg",
+                measured={"mass": body.mass},
+            )
+    yield from _massless_links(robot)
 
 
-def _empty_links(robot: Facts) -> Iterator[Violation]:
-    """Yield what is to be said of links without mass that are parts of bodies with mass."""
-    empty = [
-        link
+def _massless_links(robot: Facts) -> Iterator[Violation]:
+    """Yield violations of massless links that are fixed to a body with mass."""
+    massless = [
+        (link, _max_inertia(link))
         for body in robot.bodies
         if body.mass > NOTHING
         for link in body.links
         if link.inertial is not None and link.inertial.mass == 0
     ]
-    yield from (_mass_missing(link) for link in empty if _inertia_of(link) > NOTHING)
-    empty = [link for link in empty if _inertia_of(link) <= NOTHING]
-    # A frame weighs nothing; of a part that is drawn it was forgotten.
-    parts = [link for link in empty if link.visuals or link.collisions]
-    frames = [link for link in empty if link not in parts]
-    told: tuple[tuple[list[Link], Severity], ...] = ((parts, "warning"), (frames, "info"))
-    for links, severity in told:
-        if links:
+    for link, inertia in massless:
+        if inertia > NOTHING:
             yield Violation(
-                subject=links[0].name,
-                source=mass_source(links[0]),
+                subject=link.name,
+                source=mass_source(link),
+                severity="warning",
+                message=f"mass of link {link.name}: got 0 kg with an inertia of up to "
+                f"{inertia:.3g} kg m2; expected a mass above 0 kg, or no inertia",
+                measured={"mass": 0.0, "inertia": inertia},
+            )
+    links = [link for link, inertia in massless if inertia <= NOTHING]
+    # A frame has no mass on purpose; the mass of a link with shapes was probably forgotten.
+    parts = [link for link in links if link.visuals or link.collisions]
+    frames = [link for link in links if link not in parts]
+    groups: tuple[tuple[list[Link], Severity], ...] = ((parts, "warning"), (frames, "info"))
+    for group, severity in groups:
+        if group:
+            yield Violation(
+                subject=group[0].name,
+                source=mass_source(group[0]),
                 severity=severity,
-                message=f"the mass of {names(link.name for link in links)} is 0 kg; that is fine "
-                "where fixed joints are merged, and refused or replaced by simulators that keep "
-                "such links as bodies",
-                measured={"links": len(links)},
+                message=f"mass of {names(link.name for link in group)}: got 0 kg; simulators that "
+                "do not merge fixed joints reject or replace it",
+                measured={"links": len(group)},
             )
 
 
-def _inertia_of(link: Link) -> float:
-    """Return the largest number of an inertia [kg m2]; 0 without one."""
+def _max_inertia(link: Link) -> float:
+    """Return the largest absolute element of an inertia [kg m2]; 0 if there is none."""
     inertia = link.inertial.inertia if link.inertial else None
     return 0.0 if inertia is None else float(np.abs(inertia).max())
 
 
-def _mass_missing(link: Link) -> Violation:
-    return Violation(
-        subject=link.name,
-        source=mass_source(link),
-        severity="warning",
-        message=f"link {link.name} has a mass of 0 kg, but an inertia of up to "
-        f"{_inertia_of(link):.3g} kg m2; wanted a mass, too, or no inertia",
-        measured={"mass": 0.0, "inertia": _inertia_of(link)},
-    )
-
-
-def _massless(body: Body) -> Violation:
-    declared = [link for link in body.links if link.inertial is not None]
-    what = f"body {body.name} has a mass of {body.mass:.3g} kg"
-    if not declared:
-        what = f"body {body.name} has no mass: no link of it has an <inertial>"
-    mover = f"joint {body.joint.name} moves it" if body.joint else "it is the trunk"
-    return Violation(
-        subject=body.name,
-        source=mass_source(declared[0]) if declared else body.top.source,
-        message=f"{what}, and {mover}; wanted a mass above 0",
-        measured={"mass": body.mass},
-    )
-
-
-def _mass_unknown(body: Body) -> bool:
-    """Return whether a mass of the body is missing, negative or beyond reckoning."""
+def _has_valid_mass(body: Body) -> bool:
+    """Return whether every mass of the body is given, not negative, and below the upper limit."""
     masses = [link.inertial.mass for link in body.links if link.inertial is not None]
-    return any(mass is None or not 0 <= mass < LARGEST for mass in masses)
-
-
-def _floats(robot: Facts) -> bool:
-    """Return whether a joint of the file sets the trunk free."""
-    trunk = {link.name for link in robot.bodies[0].links}
-    return any(j.kind == "floating" and j.child in trunk for j in robot.model.joints)
+    return all(mass is not None and 0 <= mass < LARGEST for mass in masses)
 
 
 @rule("INR002", "negative-mass", "error")
 def negative_mass(robot: Facts) -> Iterator[Violation]:
     """A mass is negative.
 
-    It falls up, and takes from the mass of what it is fixed to. MuJoCo skips it without a word
-    where the link is merged into another, and refuses the file where it is not.
+    A negative mass reduces the mass of the body that the link is fixed to. MuJoCo ignores it
+    without a message if the link is merged into another one, and rejects the file otherwise.
 
     Fix:
-        Write the mass that the part has.
+        Enter the mass of the part.
 
     Source:
-        MuJoCo 4.0, tried; see also INR001.
+        Tested with MuJoCo 4.0; see also INR001.
     """
     for link in robot.model.links:
         mass = link.inertial.mass if link.inertial else None
@@ -191,273 +190,264 @@ def negative_mass(robot: Facts) -> Iterator[Violation]:
             yield Violation(
                 subject=link.name,
                 source=mass_source(link),
-                message=f"the mass of link {link.name} is {mass:.6g} kg; wanted 0 or more",
+                message=f"mass of link {link.name}: got {mass:.6g} kg; expected 0 kg or more",
                 measured={"mass": mass},
             )
 
 
 @rule("INR003", "not-positive-definite", "error", fixes="unsafe")
 def not_positive_definite(robot: Facts) -> Iterator[Violation]:
-    """An inertia is missing or zero, or negative about some axis.
+    """An inertia is missing, zero, or not positive definite.
 
-    Turning a body about any axis takes work, so all principal moments are above zero. With one that
-    is not, the body spins up by itself and the simulation ends in NaN; MuJoCo refuses the file.
-    Large products ixy, ixz, iyz beside small ixx, iyy, izz do that, too. A zero inertia is fine
-    on a small link that fixed joints make part of a body with an inertia.
+    All principal moments of a rigid body are positive. If one of them is not, the rotation of the
+    body is unstable and the simulation ends in NaN; MuJoCo rejects the file. Products ixy, ixz, iyz
+    that are large compared with ixx, iyy, izz have the same effect. A zero inertia is allowed on a
+    small link that is fixed to a body with an inertia.
 
     Fix:
-        Take the six numbers from CAD, about the centre of mass, in kg m2. The unsafe fix puts the
-        nearest inertia that a body can have, or that of a solid box of the body's size.
+        Take the six numbers from CAD, about the center of mass, in kg m2. The unsafe fix writes the
+        nearest physically valid inertia, or that of a solid box of the size of the body.
 
     Source:
         MuJoCo 4.0: "inertia must have positive eigenvalues", "missing element: 'inertia'".
     """
-    unread = Unread(robot.model)
+    unparsed = UnparsedNumbers(robot.model)
     main = {id(main_link(body)) for body in robot.bodies}
     for link in robot.model.links:
-        if not _mass_in_reach(link) or unread.has(link.name, *_SIX):
+        if not _has_finite_mass(link) or unparsed.has(link.name, *_INERTIA_ATTRIBUTES):
             continue
         assert link.inertial is not None
         inertia = link.inertial.inertia
         if inertia is None:
-            if robot.model.kind != "mjcf" or _spins_freely(robot, link, main):
-                yield _incomplete(robot, link, link.inertial)
-        elif is_zero(inertia):
-            if _spins_freely(robot, link, main):
-                yield _indefinite(robot, link, "is zero")
-        elif in_reach(inertia) and principal_moments(inertia)[0] <= NOTHING:
-            yield _indefinite(robot, link, "is not positive definite")
+            if robot.model.kind != "mjcf" or _needs_inertia(robot, link, main):
+                yield _missing_inertia(robot, link)
+            continue
+        zero = is_zero(inertia)
+        if not in_reach(inertia) or (zero and not _needs_inertia(robot, link, main)):
+            continue
+        moments = principal_moments(inertia)
+        if zero or moments[0] <= NOTHING:
+            yield Violation(
+                subject=link.name,
+                source=inertia_source(link),
+                message=f"principal moments of link {link.name}: got {_format(moments)} kg m2 "
+                f"({'zero' if zero else 'not positive definite'}); expected all above 0 kg m2",
+                measured=_measured(moments),
+                fix=repair(robot, link),
+            )
 
 
-_SIX = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz", "diaginertia", "fullinertia")
-"""Attributes that hold an inertia, in URDF and MJCF."""
-
-
-def _incomplete(robot: Facts, link: Link, inertial: Inertial) -> Violation:
-    lacks, wanted = "no <inertia>", "an <inertia>"
-    if robot.model.kind == "mjcf":
-        lacks, wanted = "neither diaginertia nor fullinertia", "one of them"
-    elif inertial.inertia_source is not None:
-        lacks = f"an <inertia> without {', '.join(inertial.missing) or 'numbers'}"
-        wanted = "all of ixx, iyy and izz"
-    return Violation(
-        subject=link.name,
-        source=inertia_source(link),
-        message=f"link {link.name} has a mass of {inertial.mass:.4g} kg, but {lacks}; wanted "
-        f"{wanted}",
-    )
-
-
-def _indefinite(robot: Facts, link: Link, what: str) -> Violation:
+def _missing_inertia(robot: Facts, link: Link) -> Violation:
     assert link.inertial is not None
-    assert link.inertial.inertia is not None
-    moments = principal_moments(link.inertial.inertia)
+    got, expected = "no <inertia>", "<inertia>"
+    if robot.model.kind == "mjcf":
+        got, expected = "neither diaginertia nor fullinertia", "one of them"
+    elif link.inertial.inertia_source is not None:
+        got = f"<inertia> without {', '.join(link.inertial.missing) or 'numbers'}"
+        expected = "ixx, iyy and izz"
     return Violation(
         subject=link.name,
         source=inertia_source(link),
-        message=f"the inertia of link {link.name} {what}: principal moments "
-        f"{_listed(moments)} kg m2; wanted all above 0",
-        measured=_named(moments),
-        fix=repair(robot, link),
+        message=f"inertia of link {link.name} (mass {link.inertial.mass:.4g} kg): got {got}; "
+        f"expected {expected}",
     )
 
 
-def _spins_freely(robot: Facts, link: Link, main: Container[int]) -> bool:
-    """Return whether the link is the main one of a body that is moved.
+def _needs_inertia(robot: Facts, link: Link, main: Container[int]) -> bool:
+    """Return whether a link is the main link of a moving body.
 
-    In URDF, small parts that are fixed to it would hide that its inertia was forgotten, but not
-    make it up; in MJCF a body is a part of another on purpose.
+    In URDF, small parts fixed to the link do not replace an inertia that was forgotten. In MJCF a
+    body is part of another one on purpose.
     """
     body = robot.body_of.get(link.name) if id(link) in main else None
     if body is None or body.virtual or body.mass <= NOTHING:
         return False
-    moved = body.parent is not None or bool(robot.legs)
-    return moved and (robot.model.kind != "mjcf" or float(body.principal[0]) <= NOTHING)
+    moving = body.parent is not None or bool(robot.legs)
+    return moving and (robot.model.kind != "mjcf" or float(body.principal[0]) <= NOTHING)
 
 
 @rule("INR004", "triangle-inequality", "error", fixes="unsafe")
 def triangle_inequality(robot: Facts) -> Iterator[Violation]:
-    """Principal moments break the triangle inequality: no body has such an inertia.
+    """The principal moments violate the triangle inequality.
 
-    The two smaller principal moments sum to the largest for a flat plate, and to more for anything
-    else. Less means that numbers were mistyped, taken about the wrong point or given in the wrong
-    frame. MuJoCo refuses the file; other simulators integrate it and gain energy.
+    The sum of the two smaller principal moments equals the largest one for a flat plate and exceeds
+    it for every other body. A smaller sum means that a number was mistyped, or that the inertia was
+    taken about the wrong point or in the wrong frame. MuJoCo rejects the file; other simulators
+    integrate it and gain energy.
 
     Fix:
-        Take the inertia from CAD about the centre of mass. The unsafe fix puts the nearest inertia
-        that a body can have; MuJoCo's balanceinertia makes a ball of it instead.
+        Take the inertia from CAD about the center of mass. The unsafe fix writes the nearest
+        physically valid inertia; MuJoCo's balanceinertia uses that of a sphere instead.
 
     Source:
-        MuJoCo 4.0: "inertia must satisfy A + B >= C", without any tolerance. Numbers of four digits
-        may round a flat part to 0.999, which is only told as information.
+        MuJoCo 4.0: "inertia must satisfy A + B >= C", without a tolerance. Numbers with four digits
+        can round a flat part to a ratio of 0.999, which is only reported as information.
     """
     for link in robot.model.links:
         inertia = link.inertial.inertia if link.inertial else None
-        if inertia is None or not _mass_in_reach(link) or not in_reach(inertia):
+        if inertia is None or not _has_finite_mass(link) or not in_reach(inertia):
             continue
         moments = principal_moments(inertia)
-        if moments[0] <= NOTHING or triangle_ratio(moments) >= _EXACT:
+        if moments[0] <= NOTHING or triangle_ratio(moments) >= _MIN_EXACT_RATIO:
             continue
         ratio = triangle_ratio(moments)
-        assert link.inertial is not None
+        severity: Severity = "warning" if ratio < _MIN_ROUNDED_RATIO else "info"
+        text = f"1 - {1 - ratio:.1g}" if ratio > 0.9999 else f"{ratio:.4g}"
         yield Violation(
             subject=link.name,
-            source=link.inertial.inertia_source or link.inertial.source,
-            severity="error" if ratio < _IMPOSSIBLE else "warning" if ratio < _ROUNDED else "info",
-            message=f"the principal moments of link {link.name} are {_listed(moments)} kg m2: the "
-            f"two smaller ones are {_near_one(ratio)} times the largest; wanted 1 or more",
-            measured={"ratio": ratio, **_named(moments)},
+            source=inertia_source(link),
+            severity="error" if ratio < _MIN_TRIANGLE_RATIO else severity,
+            message=f"principal moments of link {link.name}: got {_format(moments)} kg m2, where "
+            f"the two smaller ones sum to {text} times the largest; expected 1 or more",
+            measured={"ratio": ratio, **_measured(moments)},
             fix=repair(robot, link),
         )
 
 
 @rule("INR005", "placeholder-inertia", "warning")
 def placeholder_inertia(robot: Facts) -> Iterator[Violation]:
-    """An inertia is a placeholder: the identity, or one and the same for half of the links.
+    """An inertia is the identity matrix, or the same for half of the links.
 
-    A kilogram whose inertia is 1 kg m2 reaches out a metre to all sides. Motors that move such a
-    link feel a flywheel, and gains that were tuned on it fail on the robot. Parts that are the same
-    part, such as four wheels, may have the same inertia; a thigh and its shank do not.
+    A mass of 1 kg with an inertia of 1 kg m2 has a radius of gyration of 1 m. A motor that moves
+    such a link drives a flywheel, and gains tuned on it fail on the real robot. Identical parts,
+    such as four wheels, may share an inertia; a thigh and a shank do not.
 
     Fix:
-        Take the inertia from CAD, or from the mesh at an even density.
+        Take the inertia from CAD, or compute it from the mesh at a uniform density.
 
     Source:
-        Exporters and tutorials that fill in the identity or 0.001.
+        Exporters and tutorials use the identity matrix or 0.001 as defaults.
     """
+    massive = sum(body.mass > NOTHING for body in robot.bodies)
     for links in placeholders(robot):
         first = links[0]
         assert first.inertial is not None
         assert first.inertial.inertia is not None
-        if is_identity(first):
-            value, wanted = "the identity matrix", "that of the part"
-        else:
-            value = f"{_listed(np.diag(first.inertial.inertia))} kg m2"
-            wanted = "each its own, as they are not the same part"
+        got, expected = "the identity matrix", "the inertia of the part"
+        if not is_identity(first):
+            got = f"the same diagonal {_format(np.diag(first.inertial.inertia))} kg m2"
+            expected = "an inertia for each of these different parts"
         listed = names(link.name for link in links)
-        whose = f"{len(links)} of {_count_massive(robot)} bodies ({listed})"
-        if len(links) == 1:
-            whose = f"body {listed}"
+        bodies = f"{len(links)} of {massive} bodies ({listed})"
         yield Violation(
             subject=first.name,
-            source=first.inertial.inertia_source or first.inertial.source,
-            message=f"the inertia of {whose} is {value}; wanted {wanted}",
+            source=inertia_source(first),
+            message=f"inertia of {bodies if len(links) > 1 else f'body {listed}'}: got {got}; "
+            f"expected {expected}",
             measured={"links": len(links)},
         )
 
 
-@rule("INR006", "too-spread-inertia", "warning")
-def too_spread_inertia(robot: Facts) -> Iterator[Violation]:
+@rule("INR006", "inertia-too-large", "warning")
+def inertia_too_large(robot: Facts) -> Iterator[Violation]:
     """An inertia is larger than the size of the body allows.
 
-    Mass inside a body is at most half of the body's diagonal away from its middle, so the radius of
-    gyration sqrt(I / m) is less than that. A larger one is a matter of units (g mm2, or taken about
-    the origin of the robot) far more often than of shape; the joint then moves a flywheel.
+    Mass inside a body is at most half the body's diagonal away from its center, which limits the
+    radius of gyration sqrt(I / m). A larger value is usually a wrong unit (g mm2) or a wrong
+    reference point (the origin of the robot); the joint then moves a flywheel.
 
     Fix:
-        Give the inertia in kg m2 about the centre of mass, and the mass in kg.
+        Give the inertia in kg m2 about the center of mass, and the mass in kg.
 
     Source:
-        I <= m r2 for all mass within r of the centre of mass. Over 3 are the wrists of a published
-        UR5 and the fingers of a Baxter: numbers of other parts, or in other units.
+        I <= m r^2 for mass within r of the center of mass. The ratio is above 3 for the wrists of a
+        published UR5 and the fingers of a Baxter, which have the numbers of other parts or units.
     """
     for link in robot.model.links:
-        largest = _inertia_of(link)
-        if largest >= LARGEST:
+        inertia = _max_inertia(link)
+        if inertia >= LARGEST:
             yield Violation(
                 subject=link.name,
                 source=inertia_source(link),
                 severity="error",
-                message=f"the inertia of link {link.name} is {largest:.3g} kg m2; wanted less than "
-                f"{LARGEST:.0e}, which no robot has",
-                measured={"inertia": largest},
+                message=f"inertia of link {link.name}: got {inertia:.3g} kg m2; expected less than "
+                f"{LARGEST:.0e} kg m2",
+                measured={"inertia": inertia},
             )
-    extents, odd = extents_of(robot), []
-    for body, radius in _radii(robot):
+    extents, candidates = extents_of(robot), []
+    for body, radius in _gyration_radii(robot):
 
-        def wrong(box: Matrix, radius: float = radius) -> bool:
-            return radius > _SPREAD * half_diagonal(box)
+        def is_too_large(box: Matrix, radius: float = radius) -> bool:
+            return radius > _MAX_GYRATION * half_diagonal(box)
 
-        box = extents.still(body, wrong)
+        box = extents.still(body, is_too_large)
         if box is not None:
-            odd.append((body, radius, box))
-    blamed = _blamed(robot) if odd else set()
-    for body, radius, box in odd:
-        if body.name not in blamed:
-            far = radius > _SPREAD_FAR * half_diagonal(box)
-            severity: Severity = "error" if far else "warning"
-            yield _odd_radius(body, radius, box, severity, f"wanted {_SPREAD:g} of that at most")
+            candidates.append((body, radius, box))
+    reported = _reported_bodies(robot) if candidates else set()
+    for body, radius, box in candidates:
+        if body.name not in reported:
+            is_error = radius > _MAX_GYRATION_ERROR * half_diagonal(box)
+            limit = f"at most {_MAX_GYRATION:g}"
+            yield _gyration_violation(body, radius, box, limit, "error" if is_error else "warning")
 
 
-@rule("INR007", "too-concentrated-inertia", "warning")
-def too_concentrated_inertia(robot: Facts) -> Iterator[Violation]:
-    """An inertia is far smaller than the size of the body suggests.
+@rule("INR007", "inertia-too-small", "warning")
+def inertia_too_small(robot: Facts) -> Iterator[Violation]:
+    """An inertia is much smaller than the size of the body suggests.
 
-    All the mass would sit within a twentieth of the way to the body's ends. Such a body turns at
-    the slightest torque: the simulation gets stiff or explodes, and torques that were learned on
-    it do not move the robot. Mostly the numbers are in other units, or a placeholder.
+    The radius of gyration is below 5 % of half the body's diagonal, as if the body were a point
+    mass. Small torques then cause large accelerations: the simulation becomes stiff or unstable,
+    and learned torques do not move the real robot. The usual causes are wrong units and
+    placeholders.
 
     Fix:
-        Give the inertia in kg m2 about the centre of mass, and the mass in kg.
+        Give the inertia in kg m2 about the center of mass, and the mass in kg.
 
     Source:
-        A rod has a ratio of 0.58, a cube 0.47, a ball 0.36.
+        The ratio is 0.58 for a rod, 0.47 for a cube, and 0.36 for a sphere.
     """
-    extents, odd = extents_of(robot), []
-    for whole, _ in _radii(robot):
-        for body in (whole, _main_part(whole)):
+    extents, candidates = extents_of(robot), []
+    for whole, _ in _gyration_radii(robot):
+        index = next(k for k, link in enumerate(whole.links) if link.name == whole.name)
+        part = slice(index, index + 1)
+        main = replace(whole, links=whole.links[part], poses=whole.poses[part])
+        for body in (whole, main):
             radius = gyration_radius(body.principal, body.mass)
 
-            def doubtful(length: float, radius: float = radius) -> bool:
-                return radius < _CONCENTRATED * length
+            def is_doubtful(length: float, radius: float = radius) -> bool:
+                return radius < _MIN_GYRATION * length
 
-            box = extents.own(body, doubtful) if radius > 0 else None
-            if box is not None and radius < _CONCENTRATED * half_diagonal(box):
-                odd.append((body, radius, box))
+            box = extents.own(body, is_doubtful) if radius > 0 else None
+            if box is not None and radius < _MIN_GYRATION * half_diagonal(box):
+                candidates.append((body, radius, box))
                 break
-    blamed = _blamed(robot) if odd else set()
-    wanted = f"wanted {_CONCENTRATED:g} of that at least"
-    for body, radius, box in odd:
-        if body.name not in blamed:
-            yield _odd_radius(body, radius, box, "warning", wanted)
+    reported = _reported_bodies(robot) if candidates else set()
+    for body, radius, box in candidates:
+        if body.name not in reported:
+            limit = f"at least {_MIN_GYRATION:g}"
+            yield _gyration_violation(body, radius, box, limit, "warning")
 
 
-def _main_part(body: Body) -> Body:
-    """Return the link that stands for a body, as a body of its own."""
-    place = next(k for k, link in enumerate(body.links) if link.name == body.name)
-    return replace(body, links=body.links[place : place + 1], poses=body.poses[place : place + 1])
-
-
-def _odd_radius(
-    body: Body, radius: float, box: Matrix, severity: Severity, wanted: str
+def _gyration_violation(
+    body: Body, radius: float, box: Matrix, limit: str, severity: Severity
 ) -> Violation:
     half = half_diagonal(box)
     return Violation(
         subject=body.name,
         source=inertia_source(main_link(body)),
         severity=severity,
-        message=f"the radius of gyration of body {body.name} is {radius:.3g} m (mass "
-        f"{body.mass:.4g} kg, largest principal moment {body.principal[2]:.3g} kg m2), and half "
-        f"the body's diagonal {half:.3g} m; {wanted}",
+        message=f"radius of gyration of body {body.name}: got {radius:.3g} m (mass "
+        f"{body.mass:.4g} kg, largest principal moment {body.principal[2]:.3g} kg m2); expected "
+        f"{limit} times half the diagonal of the body, which is {half:.3g} m",
         measured={"radius": radius, "half_diagonal": half},
     )
 
 
 @per_robot
-def _blamed(robot: Facts) -> set[str]:
-    """Return the bodies whose mass or inertia other rules find fault with."""
-    blamed = {link.name for links in placeholders(robot) for link in links}
+def _reported_bodies(robot: Facts) -> set[str]:
+    """Return the bodies whose mass or inertia is reported by another rule."""
+    reported = {link.name for links in placeholders(robot) for link in links}
     for check in (not_positive_definite, triangle_inequality):
-        blamed |= {defect.subject for defect in check(robot) if defect.severity in (None, "error")}
-    for check in (implausible_density, center_of_mass_outside):
-        blamed |= {defect.subject for defect in check(robot)}
-    return blamed
+        reported |= {v.subject for v in check(robot) if v.severity in (None, "error")}
+    for check in (implausible_density, com_outside_body):
+        reported |= {violation.subject for violation in check(robot)}
+    return reported
 
 
-def _radii(robot: Facts) -> Iterator[tuple[Body, float]]:
-    """Yield bodies and their radius of gyration [m]."""
+def _gyration_radii(robot: Facts) -> Iterator[tuple[Body, float]]:
+    """Yield each body with a valid inertia, and its radius of gyration [m]."""
     for body in robot.bodies:
-        if body.virtual or _mass_unknown(body) or body.mass <= NOTHING:
+        if body.virtual or not _has_valid_mass(body) or body.mass <= NOTHING:
             continue
         main = main_link(body).inertial
         if main is None or main.inertia is None or not in_reach(main.inertia):
@@ -466,83 +456,87 @@ def _radii(robot: Facts) -> Iterator[tuple[Body, float]]:
             yield body, gyration_radius(body.principal, body.mass)
 
 
-@rule("INR008", "center-of-mass-outside", "warning")
-def center_of_mass_outside(robot: Facts) -> Iterator[Violation]:
-    """A centre of mass lies outside of its body.
+@rule("INR008", "com-outside-body", "warning")
+def com_outside_body(robot: Facts) -> Iterator[Violation]:
+    """A center of mass lies outside of its body.
 
-    The origin of an <inertial> is in the frame of its link. Given in the frame of the robot or of
-    the CAD file, in millimetres, or with a sign lost in mirroring, it ends up in the air, and the
-    robot tips over or holds torques that the real one does not feel.
+    The origin of an <inertial> is given in the frame of its link. If it was given in the frame of
+    the robot or the CAD file, in millimeters, or without the sign of a mirrored part, the robot
+    tips over or needs torques that the real one does not need.
 
     Fix:
-        Give the centre of mass in the frame of the link, in metres.
+        Give the center of mass in the frame of the link, in meters.
 
     Source:
-        A convex body has its centre of mass inside; the margin is for shapes that leave parts out.
+        The center of mass of a convex body lies inside it. The margin of 10 % of the diagonal is
+        for shapes that omit parts of the body.
     """
     extents = extents_of(robot)
     for body in robot.bodies:
-        if body.virtual or _mass_unknown(body) or body.mass <= NOTHING:
+        if body.virtual or not _has_valid_mass(body) or body.mass <= NOTHING:
             continue
 
-        def wrong(box: Matrix, center: Matrix = body.center) -> bool:
-            return _outside(center, box) > _allowed(box)
+        def is_outside(box: Matrix, center: Matrix = body.center) -> bool:
+            return _distance(center, box) > _max_distance(box)
 
-        box = extents.still(body, wrong)
+        box = extents.still(body, is_outside)
         if box is None:
             continue
-        aside, allowed = _outside(body.center, box), _allowed(box)
-        around = f"the box around it, whose diagonal is {2 * half_diagonal(box):.3g} m"
-        link = main_link(body)
+        distance, limit = _distance(body.center, box), _max_distance(box)
         yield Violation(
             subject=body.name,
-            source=mass_source(link),
-            severity="error" if aside > _ASIDE_FAR * allowed else "warning",
-            message=f"the centre of mass of body {body.name} is {aside:.3g} m outside "
-            f"{around}; wanted {allowed:.3g} m at most",
-            measured={"outside": aside, "allowed": allowed},
+            source=mass_source(main_link(body)),
+            severity="error" if distance > _COM_ERROR * limit else "warning",
+            message=f"center of mass of body {body.name}: got {distance:.3g} m outside of the "
+            f"bounding box, whose diagonal is {2 * half_diagonal(box):.3g} m; expected at most "
+            f"{limit:.3g} m",
+            measured={"outside": distance, "allowed": limit},
         )
 
 
-def _outside(point: Matrix, box: Matrix) -> float:
+def _distance(point: Matrix, box: Matrix) -> float:
+    """Return the distance of a point from a box [m]; 0 inside."""
     return float(np.linalg.norm(np.maximum(0, np.maximum(box[0] - point, point - box[1]))))
 
 
-def _allowed(box: Matrix) -> float:
-    return _ASIDE * 2 * half_diagonal(box) + _SLACK
+def _max_distance(box: Matrix) -> float:
+    return _COM_SHARE * 2 * half_diagonal(box) + _COM_MARGIN
 
 
 @rule("INR009", "mass-ratio", "warning")
 def mass_ratio(robot: Facts) -> Iterator[Violation]:
-    """Neighbouring bodies differ in mass by more than a factor of 1000.
+    """The masses of neighboring bodies differ by more than a factor of 1000.
 
-    The joint between them is then stiff to the solver: it needs far smaller time steps, or the
-    light one is thrown about. PhysX in particular lets such joints drift apart.
+    The joint between them is numerically stiff: it needs a much smaller time step, or the light
+    body becomes unstable. In PhysX the two sides of such a joint drift apart.
 
     Fix:
-        Merge the light body into its neighbour, or give it its real mass and some armature.
+        Merge the light body into its neighbor, or give it its real mass and an armature.
 
     Source:
-        PhysX's and Bullet's guides advise ratios below 10 to 100; 1000 is past doubt.
+        The guides of PhysX and Bullet recommend ratios below 10 to 100.
     """
-    apart = []
+    candidates = []
     for body in robot.bodies:
         parent = robot.carrier_of(body)
-        if body.virtual or parent is None or _mass_unknown(body) or _mass_unknown(parent):
+        if body.virtual or parent is None:
+            continue
+        if not (_has_valid_mass(body) and _has_valid_mass(parent)):
             continue
         light, heavy = sorted((body, parent), key=lambda b: b.mass)
-        if light.mass > NOTHING and heavy.mass > _RATIO * light.mass:
-            apart.append((light, heavy))
-    blamed = {odd.subject for odd in implausible_density(robot)} if apart else set()
-    for light, heavy in apart:
-        if blamed & {light.name, heavy.name}:
+        if light.mass > NOTHING and heavy.mass > _MAX_MASS_RATIO * light.mass:
+            candidates.append((light, heavy))
+    reported = {v.subject for v in implausible_density(robot)} if candidates else set()
+    for light, heavy in candidates:
+        if reported & {light.name, heavy.name}:
             continue
         ratio = heavy.mass / light.mass
         yield Violation(
             subject=light.name,
             source=mass_source(main_link(light)),
-            message=f"body {light.name} has {light.mass:.3g} kg and its neighbour {heavy.name} "
-            f"{heavy.mass:.4g} kg: a ratio of {ratio:.0f}; wanted {_RATIO:.0f} at most",
+            message=f"mass ratio of {heavy.name} ({heavy.mass:.4g} kg) and its neighbor "
+            f"{light.name} ({light.mass:.3g} kg): got {ratio:.0f}; expected at most "
+            f"{_MAX_MASS_RATIO:.0f}",
             measured={"ratio": ratio, "mass": light.mass, "neighbor": heavy.mass},
         )
 
@@ -551,15 +545,15 @@ def mass_ratio(robot: Facts) -> Iterator[Violation]:
 def implausible_density(robot: Facts) -> Iterator[Violation]:
     """A mass does not fit the size of the body.
 
-    Nothing on a robot is lighter than packing foam or denser than gold. A mass in grams or pounds,
-    a slipped decimal point or a mesh in millimetres is.
+    No part of a robot is lighter than packing foam or denser than gold. Common causes are a mass in
+    grams or pounds, a shifted decimal point, or a mesh in millimeters.
 
     Fix:
         Give the mass in kg, and check the scale of the shapes.
 
     Source:
-        Densities: foam 10 to 30 kg/m3, aluminium 2700, steel 7850, gold 19,300. Too dense is judged
-        by the box around all that the body has, too light by its largest single shape.
+        Densities: foam 10 to 30 kg/m3, aluminum 2700, steel 7850, gold 19,300. The upper limit is
+        applied to the bounding box of all shapes, the lower limit to the largest shape.
     """
     for link in robot.model.links:
         mass = link.inertial.mass if link.inertial else None
@@ -568,85 +562,76 @@ def implausible_density(robot: Facts) -> Iterator[Violation]:
                 subject=link.name,
                 source=mass_source(link),
                 severity="error",
-                message=f"the mass of link {link.name} is {mass:.3g} kg; wanted less than "
-                f"{LARGEST:.0e}, which no robot has",
+                message=f"mass of link {link.name}: got {mass:.3g} kg; expected less than "
+                f"{LARGEST:.0e} kg",
                 measured={"mass": mass},
             )
     extents = extents_of(robot)
     for body in robot.bodies:
-        if body.virtual or _mass_unknown(body) or body.mass <= NOTHING or is_derived(body):
+        if body.virtual or not _has_valid_mass(body) or body.mass <= NOTHING or is_derived(body):
             continue
-        found = too_dense(extents, body) or too_light(robot, extents, body)
-        if found:
-            space, limit = found
-            density = body.mass / space
-            least = density > limit
+        result = too_dense(extents, body) or too_light(robot, extents, body)
+        if result:
+            volume, limit = result
+            density = body.mass / volume
+            got, expected = ("at least", "at most") if density > limit else ("at most", "at least")
             yield Violation(
                 subject=body.name,
                 source=mass_source(main_link(body)),
-                message=f"body {body.name} has {body.mass:.3g} kg in {space:.3g} m3: "
-                f"{'at least' if least else 'at most'} {density:.3g} kg/m3; wanted "
-                f"{limit:,.0f} {'or less' if least else 'or more'}",
-                measured={"mass": body.mass, "volume": space, "density": density},
+                message=f"density of body {body.name}: got {got} {density:.3g} kg/m3 "
+                f"({body.mass:.3g} kg in {volume:.3g} m3); expected {expected} {limit:,.0f} kg/m3",
+                measured={"mass": body.mass, "volume": volume, "density": density},
             )
 
 
-@rule("INR011", "mass-drift", "warning")
-def mass_drift(robot: Facts) -> Iterator[Violation]:
-    """The robot that a simulator makes of the file is heavier than the file says.
+@rule("INR011", "inferred-mass", "warning")
+def inferred_mass(robot: Facts) -> Iterator[Violation]:
+    """A simulator adds mass for links without an <inertial>.
 
-    A link that has collision shapes but no <inertial> gets a mass from MuJoCo, at the density of
-    water, and so does each shape where two overlap; other simulators take the link as massless, or
-    do the same. The robot then weighs something else in each of them.
+    MuJoCo infers the mass of a link with collision shapes but without <inertial> from the volume of
+    the shapes and the density of water; overlapping shapes count twice. Other simulators do the
+    same or treat the link as massless, so that the robot has a different weight in each of them.
 
     Fix:
-        Give each such link an <inertial> with its mass, or move its collision shapes to the link
-        that it is fixed to.
+        Give each of these links an <inertial> with its mass, or move its collision shapes to the
+        link that it is fixed to.
 
     Source:
-        MuJoCo 4.0, tried on a fixed link with a box of 1 m3: it adds 1000 kg.
+        Tested with MuJoCo 4.0: a fixed link with a box of 1 m3 adds 1000 kg.
     """
     if robot.model.kind == "mjcf" or robot.total_mass <= NOTHING:
         return
-    added = {
-        link: _DENSITY * sum(volume_of(robot, shape) for shape in link.collisions)
+    inferred = {
+        link: _DEFAULT_DENSITY * sum(volume_of(robot, shape) for shape in link.collisions)
         for body in robot.bodies
         if body.mass > NOTHING
         for link in body.links
         if link.inertial is None
     }
-    total = sum(added.values())
+    total = sum(inferred.values())
     share = total / robot.total_mass
-    if share <= _DRIFT:
+    if share <= _MAX_INFERRED:
         return
-    added_to = sorted((link for link in added if added[link] > 0), key=lambda link: -added[link])
+    links = sorted((link for link in inferred if inferred[link] > 0), key=lambda x: -inferred[x])
     yield Violation(
-        subject=added_to[0].name,
-        source=added_to[0].source,
-        severity="error" if share > _DRIFT_FAR else "warning",
-        message=f"MuJoCo adds {total:.3g} kg for the collision shapes of links without <inertial> "
-        f"({names(link.name for link in added_to)}): {share:.1%} of the declared "
-        f"{robot.total_mass:.4g} kg; wanted {_DRIFT:.0%} at most",
+        subject=links[0].name,
+        source=links[0].source,
+        severity="error" if share > _MAX_INFERRED_ERROR else "warning",
+        message=f"mass that MuJoCo infers for links without <inertial> "
+        f"({names(link.name for link in links)}): got {total:.3g} kg, {share:.1%} of the declared "
+        f"{robot.total_mass:.4g} kg; expected at most {_MAX_INFERRED:.0%}",
         measured={"added": total, "declared": robot.total_mass, "share": share},
     )
 
 
-def _mass_in_reach(link: Link) -> bool:
+def _has_finite_mass(link: Link) -> bool:
     mass = link.inertial.mass if link.inertial else None
     return mass is not None and 0 <= mass < LARGEST
 
 
-def _near_one(ratio: float) -> str:
-    return f"1 - {1 - ratio:.1g}" if ratio > 0.9999 else f"{ratio:.4g}"
-
-
-def _listed(moments: Matrix) -> str:
+def _format(moments: Matrix) -> str:
     return ", ".join(f"{moment:.4g}" for moment in moments)
 
 
-def _named(moments: Matrix) -> Mapping[str, float]:
+def _measured(moments: Matrix) -> Mapping[str, float]:
     return {f"e{k}": float(moment) for k, moment in enumerate(moments)}
-
-
-def _count_massive(robot: Facts) -> int:
-    return sum(body.mass > NOTHING for body in robot.bodies)

@@ -1,4 +1,4 @@
-"""JNT: joints."""
+"""Rules on joints (JNT)."""
 
 import math
 from collections.abc import Iterator
@@ -18,75 +18,48 @@ from terrainkit_robots.analysis.legs.joint_roles import (
 from terrainkit_robots.analysis.legs.stance import GRAVITY
 from terrainkit_robots.description.fix import Fix, SetAttribute
 from terrainkit_robots.description.model import JOINT_TYPES, Joint, Limit
-from terrainkit_robots.description.xml.unparsed import Unread
+from terrainkit_robots.description.xml.unparsed import UnparsedNumbers
 from terrainkit_robots.lint.rule import Violation, rule
 from terrainkit_robots.lint.rules.inr import (
-    center_of_mass_outside,
+    com_outside_body,
     implausible_density,
     negative_mass,
 )
-from terrainkit_robots.text import closest, names, short
+from terrainkit_robots.text import closest, count, names, short
 from terrainkit_robots.transforms import Matrix
 
-_TINY = 1e-6
-"""Length below which an axis points nowhere: MuJoCo refuses those."""
+_MIN_AXIS_LENGTH = 1e-6
+"""Axis length below which MuJoCo rejects the axis."""
 
-_UNIT = 1e-3
-"""How far the length of an axis may be from 1: three digits, as in 0.707 0.707 0, are close enough
-for a direction and for a simulator that takes the length for a gear."""
+_MAX_AXIS_ERROR = 1e-3
+"""Allowed deviation of the axis length from 1, for axes with three digits such as 0.707 0.707 0."""
 
-_WIDEST = 4 * math.pi * 1.001
-"""Range of a hinge beyond which it is no angle in radians: +- one turn, with 6.2832 for 2 pi."""
+_MAX_RANGE = 4 * math.pi * 1.001
+"""Largest plausible range of a hinge [rad]: one turn in both directions, with 6.2832 for 2 pi."""
 
-_NO_EFFORT = 1000.0
+_MAX_EFFORT = 1000.0
 """Torque [N m] or force [N] from which a limit may be a placeholder."""
 
-_PUSH = 10.0
-"""A sliding joint may push so many times the robot's weight: 3000 N in a robot of 30 kg."""
+_MAX_WEIGHTS = 10.0
+"""Plausible force of a sliding joint in multiples of the robot's weight: 3000 N for 30 kg."""
 
-_NO_SPEED = 100.0
-"""Speed of a joint [rad/s] or [m/s] beyond which it is a placeholder; geared motors reach 60."""
+_MAX_VELOCITY = 100.0
+"""Largest plausible velocity [rad/s] or [m/s]; geared motors reach 60."""
 
-_NO_SPIN = 1500.0
-"""The same for joints that turn without end: the propellers of small drones reach 1000."""
+_MAX_SPIN_VELOCITY = 1500.0
+"""The same for continuous joints [rad/s]; the propellers of small drones reach 1000."""
 
-_ZERO = 1e-3
-"""How far zero may be outside the limits [rad] or [m]; less is rounding."""
+_ZERO_TOLERANCE = 1e-3
+"""Distance of zero from the limits that is attributed to rounding [rad] or [m]."""
 
-_ALIKE = 0.6
-"""Share of common letters from which on a type is taken for a misspelt one."""
+_MIN_SIMILARITY = 0.6
+"""Share of common letters above which an unknown type is taken for a misspelled one."""
 
-_WEAK, _TOO_WEAK = 0.5, 0.9
-"""Share of the effort that standing still may take: walking needs two to three times as much."""
+_MAX_LOAD, _MAX_LOAD_ERROR = 0.5, 0.9
+"""Share of the effort that standing may need: limits of the warning and the error. Walking needs
+two to three times as much as standing."""
 
-
-@rule("JNT001", "unknown-joint-type", "error")
-def unknown_type(robot: Facts) -> Iterator[Violation]:
-    """A joint is of a type that does not exist.
-
-    MuJoCo and urdfdom refuse the file. Others take the joint as fixed and say nothing.
-
-    Fix:
-        Write one of the types of the format. Letters are small.
-
-    Source:
-        MuJoCo 4.0: "invalid joint type in URDF joint definition"; http://wiki.ros.org/urdf/XML/joint
-        for the types.
-    """
-    known = JOINT_TYPES if robot.model.kind == "mjcf" else JOINT_TYPES - {"ball"}
-    for joint in robot.model.joints:
-        if joint.kind and joint.kind not in known:
-            alike = _meant(joint.kind, known)
-            yield Violation(
-                subject=joint.name,
-                source=joint.source,
-                message=f"joint {joint.name} is of type {short(joint.kind, 40)!r}"
-                f"{f', which may stand for {alike}' if alike else ''}; wanted one of "
-                f"{', '.join(sorted(known))}",
-            )
-
-
-_OTHER_NAMES = {
+_TYPE_SYNONYMS = {
     "hinge": "revolute",
     "rotary": "revolute",
     "rotational": "revolute",
@@ -101,24 +74,46 @@ _OTHER_NAMES = {
 }
 
 
-def _meant(kind: str, known: frozenset[str]) -> str:
-    word = kind.strip().lower()
-    return _OTHER_NAMES.get(word) or closest(word, known, _ALIKE)
+@rule("JNT001", "unknown-joint-type", "error")
+def unknown_joint_type(robot: Facts) -> Iterator[Violation]:
+    """The type of a joint does not exist.
 
-
-@rule("JNT002", "prismatic-leg", "warning", needs=("legs",))
-def prismatic_leg(robot: Facts) -> Iterator[Violation]:
-    """A leg has a joint that slides.
-
-    Few legs do, and what trains legged robots expects hinges: gains, action scales and limits are
-    in radians. Mostly it is a type that was mixed up.
+    MuJoCo and urdfdom reject the file. Other simulators treat the joint as fixed without a message.
 
     Fix:
-        Make it revolute; or ignore this rule if the leg does telescope, and mind the units.
+        Use one of the joint types of the format. Types are lowercase.
 
     Source:
-        Of the published robots that were tried, none with legs has a sliding joint in them, but for
-        the joints that carry the trunk in models of the plane.
+        MuJoCo 4.0: "invalid joint type in URDF joint definition"; the types are listed in
+        http://wiki.ros.org/urdf/XML/joint.
+    """
+    known = JOINT_TYPES if robot.model.kind == "mjcf" else JOINT_TYPES - {"ball"}
+    for joint in robot.model.joints:
+        if joint.kind and joint.kind not in known:
+            word = joint.kind.strip().lower()
+            near = _TYPE_SYNONYMS.get(word) or closest(word, known, _MIN_SIMILARITY)
+            yield Violation(
+                subject=joint.name,
+                source=joint.source,
+                message=f"type of joint {joint.name}: got {short(joint.kind, 40)!r}"
+                f"{f' (did you mean {near}?)' if near else ''}; expected one of "
+                f"{', '.join(sorted(known))}",
+            )
+
+
+@rule("JNT002", "prismatic-leg-joint", "warning", needs=("legs",))
+def prismatic_leg_joint(robot: Facts) -> Iterator[Violation]:
+    """A joint of a leg is prismatic.
+
+    Few legs have prismatic joints, and training frameworks expect hinges: gains, action scales and
+    limits are in radians. The usual cause is a wrong joint type.
+
+    Fix:
+        Make the joint revolute. If the leg is telescopic, ignore this rule and check the units.
+
+    Source:
+        Of the published legged robots that were tested, none has a prismatic leg joint, except for
+        the joints that carry the trunk of planar models.
     """
     for joint in leg_joints(robot):
         if joint.kind == "prismatic":
@@ -126,26 +121,26 @@ def prismatic_leg(robot: Facts) -> Iterator[Violation]:
                 subject=joint.name,
                 source=joint.source,
                 certainty="likely",
-                message=f"joint {joint.name} of a leg is prismatic; wanted revolute",
+                message=f"type of leg joint {joint.name}: got prismatic; expected revolute",
             )
 
 
-@rule("JNT003", "continuous-leg", "warning", needs=("legs",))
-def continuous_leg(robot: Facts) -> Iterator[Violation]:
-    """A leg has a joint without end stops.
+@rule("JNT003", "continuous-leg-joint", "warning", needs=("legs",))
+def continuous_leg_joint(robot: Facts) -> Iterator[Violation]:
+    """A joint of a leg has no limits.
 
-    A knee that is continuous turns through the thigh. Limits are what keeps a policy out of poses
-    that break the robot, and what the standing pose and the reset range are taken from. Wheels at
-    the end of a leg are left alone.
+    A continuous knee can rotate through the thigh. Limits keep a policy away from poses that damage
+    the robot, and the standing pose and the reset range are computed from them. Wheels at the end
+    of a leg are not reported.
 
     Fix:
-        Make it revolute, with the limits of the real joint.
+        Make the joint revolute, with the limits of the real joint.
 
     Source:
-        legged_gym and Isaac Lab take soft limits from the URDF; a continuous joint has none.
+        legged_gym and Isaac Lab compute soft limits from the URDF; a continuous joint has none.
     """
     if robot.model.kind == "mjcf":
-        return  # there it is JNT017
+        return  # reported by JNT017
     bodies = bodies_by_joint(robot)
     for joint in leg_joints(robot):
         if joint.kind == "continuous" and not is_wheel(robot, bodies[joint.name]):
@@ -153,16 +148,18 @@ def continuous_leg(robot: Facts) -> Iterator[Violation]:
                 subject=joint.name,
                 source=joint.source,
                 certainty="likely",
-                message=f"joint {joint.name} of a leg is continuous; wanted revolute with limits",
+                message=f"type of leg joint {joint.name}: got continuous; expected revolute with "
+                "limits",
             )
 
 
 @rule("JNT004", "zero-axis", "error")
 def zero_axis(robot: Facts) -> Iterator[Violation]:
-    """The axis of a joint is zero, or there without numbers.
+    """The axis of a joint is zero or has no numbers.
 
-    Such an axis points nowhere. MuJoCo refuses the file; others divide by its length and fill the
-    robot with NaN, or keep the joint from moving. A joint without any <axis> is fine: it means x.
+    A zero vector has no direction. MuJoCo rejects the file; other simulators divide by its length
+    and produce NaN, or do not move the joint. A joint without an <axis> element is valid: its axis
+    is x.
 
     Fix:
         Write the axis as three numbers in the frame of the joint, such as 0 1 0.
@@ -170,145 +167,146 @@ def zero_axis(robot: Facts) -> Iterator[Violation]:
     Source:
         MuJoCo 4.0: "axis too small"; http://wiki.ros.org/urdf/XML/joint for the default.
     """
-    unread = Unread(robot.model)
+    unparsed = UnparsedNumbers(robot.model)
     for joint in robot.model.joints:
-        if joint.moves and _axis_length(joint) < _TINY and not unread.at(joint.axis_source):
+        short_axis = joint.moves and _axis_length(joint) < _MIN_AXIS_LENGTH
+        if short_axis and not unparsed.at(joint.axis_source):
             assert joint.axis is not None
             yield Violation(
                 subject=joint.name,
                 source=joint.axis_source or joint.source,
-                message=f"the axis of joint {joint.name} is {_written(joint.axis)} or has no "
-                "numbers; wanted a direction such as 0 1 0",
+                message=f"axis of joint {joint.name}: got {_format(joint.axis)} or no numbers; "
+                "expected a direction such as 0 1 0",
             )
 
 
 def _axis_length(joint: Joint) -> float:
-    """Return the length of an axis; 1 for one that is missing or not finite."""
+    """Return the length of an axis; 1 if the axis is missing or not finite."""
     if joint.axis is None or not (np.abs(joint.axis) < 1e100).all():
         return 1.0
     return float(np.linalg.norm(joint.axis))
 
 
-def _written(axis: Matrix) -> str:
-    return " ".join(f"{x + 0.0:.9g}" for x in axis)  # + 0.0: no minus before a zero
+def _format(axis: Matrix) -> str:
+    return " ".join(f"{x + 0.0:.9g}" for x in axis)  # adding 0.0 turns -0 into 0
 
 
 @rule("JNT005", "unnormalized-axis", "warning", fixes="safe")
 def unnormalized_axis(robot: Facts) -> Iterator[Violation]:
-    """The axis of a joint does not have length 1.
+    """The axis of a joint is not a unit vector.
 
-    Most simulators scale it to 1. Some take it as it stands, so that the joint moves further than
-    its position says, and its limits and torque are off by the same factor.
+    Most simulators normalize the axis. In the others the joint moves further than its position
+    says, and its limits and torque are scaled by the same factor.
 
     Fix:
-        Divide the axis by its length; that is what the safe fix does.
+        Divide the axis by its length, as the safe fix does.
 
     Source:
-        http://wiki.ros.org/urdf/XML/joint: "the vector should be normalized". MJCF does not ask.
+        http://wiki.ros.org/urdf/XML/joint: "the vector should be normalized". MJCF does not require
+        it.
     """
     if robot.model.kind == "mjcf":
         return
     for joint in robot.model.joints:
         length = _axis_length(joint)
-        if not joint.moves or length < _TINY or abs(length - 1) <= _UNIT:
+        if not joint.moves or length < _MIN_AXIS_LENGTH or abs(length - 1) <= _MAX_AXIS_ERROR:
             continue
         assert joint.axis is not None
         source = joint.axis_source or joint.source
-        edit = SetAttribute(source=source, name="xyz", value=_written(joint.direction))
+        edit = SetAttribute(source=source, name="xyz", value=_format(joint.direction))
+        fix = Fix(
+            safety="safe",
+            description=f"Scale the axis of joint {joint.name} to length 1.",
+            edits=(edit,),
+        )
         yield Violation(
             subject=joint.name,
             source=source,
-            message=f"the axis of joint {joint.name} is {_written(joint.axis)}, of length "
-            f"{length:.6g}; wanted 1, give or take {_UNIT:g}",
+            message=f"axis length of joint {joint.name}: got {length:.6g} ({_format(joint.axis)}); "
+            f"expected 1 +- {_MAX_AXIS_ERROR:g}",
             measured={"length": length},
-            fix=None
-            if source.element is None
-            else Fix(
-                safety="safe",
-                description=f"Scale the axis of joint {joint.name} to length 1.",
-                edits=(edit,),
-            ),
+            fix=None if source.element is None else fix,
         )
 
 
 @rule("JNT006", "missing-limit", "error")
 def missing_limit(robot: Facts) -> Iterator[Violation]:
-    """A revolute or prismatic joint has no limits, only one, or the same one twice.
+    """A revolute or prismatic joint has no range.
 
-    What is not written counts as 0, and a range of nothing as no range at all: MuJoCo and
-    legged_gym let the joint turn without end, urdfdom refuses the file, others lock the joint. A
-    limit with one end only is an error, too: URDF takes 0 for the other end, but MuJoCo takes no
-    limit at all, whichever end is there, and says nothing.
+    Its limits are missing, incomplete, or equal. In URDF a missing number counts as 0. With equal
+    limits or without limits, MuJoCo and legged_gym let the joint turn without end, urdfdom rejects
+    the file, and other simulators lock the joint. A limit with one end only is an error as well:
+    MuJoCo then applies no limit at all, without a message.
 
     Fix:
-        Give <limit> the lower and upper end of the real joint, in radians or metres. A joint that
-        is meant to turn without end is of type continuous; one that does not move is fixed.
+        Give <limit> the lower and upper end of the real joint, in radians or meters. A joint that
+        turns without end is of type continuous; one that does not move is of type fixed.
 
     Source:
-        http://wiki.ros.org/urdf/XML/joint: limit is required. MuJoCo 4.0, tried: lower = upper, or
-        one of them missing, gives an unlimited joint; its own format refuses that.
+        http://wiki.ros.org/urdf/XML/joint: limit is required. Tested with MuJoCo 4.0: a URDF joint
+        with equal limits or with one limit is unlimited; MJCF rejects such a range.
     """
-    unread = Unread(robot.model)
+    unparsed = UnparsedNumbers(robot.model)
     for joint in robot.model.joints:
-        what = _lacking(joint, robot.model.kind == "mjcf")
-        if what and not unread.has(joint.name, "lower", "upper", "range"):
+        problem = _limit_problem(joint, robot.model.kind == "mjcf")
+        if problem and not unparsed.has(joint.name, "lower", "upper", "range"):
             yield Violation(
                 subject=joint.name,
                 source=joint.limit.source if joint.limit else joint.source,
-                message=f"the {joint.kind} joint {joint.name} {what}; wanted lower and upper, one "
-                "below the other",
+                message=f"limits of {joint.kind} joint {joint.name}: got {problem}; expected lower "
+                "< upper",
             )
 
 
-def _lacking(joint: Joint, mjcf: bool) -> str:
-    """Return what is wrong with a joint that has no range; nothing if it has one or needs none."""
+def _limit_problem(joint: Joint, mjcf: bool) -> str:
+    """Return why a joint has no range; empty if it has one, or needs none."""
     if joint.kind not in ("revolute", "prismatic"):
         return ""
     limit = joint.limit
     if limit is None:
-        return "" if mjcf else "has no <limit>"
+        return "" if mjcf else "no <limit>"
     missing = [name for name in ("lower", "upper") if getattr(limit, name) is None]
-    lower, upper = _ends(limit)
+    lower, upper = _limits(limit)
     if len(missing) == 2:
-        return "" if mjcf else "has neither lower nor upper"
+        return "" if mjcf else "neither lower nor upper"
     if lower == upper:
-        return f"has lower = upper = {lower:g} {joint.unit}"
+        return f"lower = upper = {lower:g} {joint.unit}"
     if not missing or lower > upper:
-        return ""  # JNT007
-    there = "upper" if missing == ["lower"] else "lower"
-    end = f"{getattr(limit, there):g} {joint.unit}"
-    return f"has {there} = {end} but no {missing[0]}, and so no limit in MuJoCo"
+        return ""  # reported by JNT007
+    given = "upper" if missing == ["lower"] else "lower"
+    value = f"{getattr(limit, given):g} {joint.unit}"
+    return f"{given} = {value} without {missing[0]}, which MuJoCo treats as no limit"
 
 
-def _ends(limit: Limit) -> tuple[float, float]:
-    """Return lower and upper; what is missing is 0, as in URDF."""
+def _limits(limit: Limit) -> tuple[float, float]:
+    """Return lower and upper; a missing number is 0, as in URDF."""
     return limit.lower or 0.0, limit.upper or 0.0
 
 
-@rule("JNT007", "inverted-limit", "error")
-def inverted_limit(robot: Facts) -> Iterator[Violation]:
-    """The lower limit of a joint is above its upper one.
+@rule("JNT007", "inverted-limits", "error")
+def inverted_limits(robot: Facts) -> Iterator[Violation]:
+    """The lower limit of a joint is above the upper limit.
 
-    MuJoCo drops such limits from a URDF without a word, and refuses them in its own format; other
-    simulators push the joint to and fro between two ends that exclude each other.
+    MuJoCo ignores such limits in a URDF without a message, and rejects them in MJCF. In other
+    simulators the joint oscillates between two limits that exclude each other.
 
     Fix:
-        Exchange the two, or the sign that was lost. An end that is not written counts as 0.
+        Swap the two numbers, or restore a lost sign. A missing number counts as 0.
 
     Source:
-        MuJoCo 4.0, tried: jnt_limited is false.
+        Tested with MuJoCo 4.0: jnt_limited is false.
     """
-    unread = Unread(robot.model)
+    unparsed = UnparsedNumbers(robot.model)
     for joint in robot.model.joints:
         if joint.kind not in ("revolute", "prismatic") or joint.limit is None:
             continue
-        lower, upper = _ends(joint.limit)
-        if lower > upper and not unread.has(joint.name, "lower", "upper", "range"):
+        lower, upper = _limits(joint.limit)
+        if lower > upper and not unparsed.has(joint.name, "lower", "upper", "range"):
             yield Violation(
                 subject=joint.name,
                 source=joint.limit.source,
-                message=f"the limits of joint {joint.name} are {lower:g} to {upper:g} "
-                f"{joint.unit}; wanted lower below upper",
+                message=f"limits of joint {joint.name}: got {lower:g} to {upper:g} {joint.unit}; "
+                "expected lower < upper",
                 measured={"lower": lower, "upper": upper},
             )
 
@@ -317,147 +315,139 @@ def inverted_limit(robot: Facts) -> Iterator[Violation]:
 def wide_range(robot: Facts) -> Iterator[Violation]:
     """The range of a hinge is more than two turns.
 
-    Limits in degrees look like that, and placeholders such as +-1e16. Policies whose actions are
-    scaled by the range then move the joint by turns at each step.
+    Typical causes are limits in degrees and placeholders such as +-1e16. Actions that are scaled by
+    the range then move the joint by whole turns in each step.
 
     Fix:
         Give the limits in radians. A joint that turns without end is of type continuous.
 
     Source:
-        Cables allow a real joint two turns at most. A published ANYmal has +-9.42 rad, and the
-        robots of the Open Dynamic Robot Initiative +-10: more than they can do.
+        Cables limit a real joint to two turns. A published ANYmal has +-9.42 rad, and the robots of
+        the Open Dynamic Robot Initiative have +-10 rad: more than the real joints can do.
     """
     for joint in robot.model.joints:
         if joint.kind != "revolute" or joint.limit is None:
             continue
-        lower, upper = _ends(joint.limit)
-        if upper - lower > _WIDEST:
+        lower, upper = _limits(joint.limit)
+        if upper - lower > _MAX_RANGE:
             yield Violation(
                 subject=joint.name,
                 source=joint.limit.source,
-                message=f"the range of joint {joint.name} is {lower:g} to {upper:g} rad, "
-                f"{(upper - lower) / (2 * math.pi):.3g} turns; wanted 2 turns at most",
+                message=f"range of joint {joint.name}: got {(upper - lower) / (2 * math.pi):.3g} "
+                f"turns ({lower:g} to {upper:g} rad); expected at most 2 turns",
                 measured={"lower": lower, "upper": upper},
             )
 
 
-@rule("JNT009", "no-effort", "error")
-def no_effort(robot: Facts) -> Iterator[Violation]:
-    """A joint has no torque to move with, or does not say how much.
+@rule("JNT009", "missing-effort", "error")
+def missing_effort(robot: Facts) -> Iterator[Violation]:
+    """The effort limit of a joint is zero or missing.
 
-    Isaac Gym, Isaac Lab and Genesis clip torques to the effort of the URDF: with 0 the joint hangs
-    loose, whatever the policy asks for, while MuJoCo takes 0 for no limit. Without the number
-    simulators take none, or one of their own, and a policy learns with torques that the motor does
-    not have.
+    Isaac Gym, Isaac Lab and Genesis clip torques to the effort of the URDF. With an effort of 0 the
+    joint stays limp, whereas MuJoCo treats 0 as no limit. If the number is missing, simulators
+    apply no limit or a default, and the policy learns with torques that the motor does not have.
 
     Fix:
-        Give the peak torque of the motor behind its gear [N m], or the force [N].
+        Give the peak torque of the motor after the gear [N m], or the force [N].
 
     Source:
         http://wiki.ros.org/urdf/XML/joint: effort is required.
     """
-    unread = Unread(robot.model)
-    for joint in _with_limit(robot):
+    unparsed = UnparsedNumbers(robot.model)
+    for joint in _joints_with_limit(robot):
         assert joint.limit is not None
         effort = joint.limit.effort
-        if effort is not None and effort <= 0:
+        if effort is None and unparsed.has(joint.name, "effort"):
+            continue
+        if effort is None or effort <= 0:
+            unit = joint.effort_unit
             yield Violation(
                 subject=joint.name,
                 source=joint.limit.source,
-                message=f"the effort of joint {joint.name} is {effort:g} {joint.effort_unit}; "
-                "wanted what its motor can give",
-                measured={"effort": effort},
-            )
-        elif effort is None and not unread.has(joint.name, "effort"):
-            yield Violation(
-                subject=joint.name,
-                source=joint.limit.source,
-                severity="warning",
-                message=f"the limit of joint {joint.name} has no effort; wanted what its motor "
-                f"can give [{joint.effort_unit}]",
+                severity="warning" if effort is None else None,
+                message=f"effort limit of joint {joint.name}: got "
+                f"{'no number' if effort is None else f'{effort:g} {unit}'}; expected the peak "
+                f"{'force' if unit == 'N' else 'torque'} of the motor [{unit}]",
+                measured={} if effort is None else {"effort": effort},
             )
 
 
-def _with_limit(robot: Facts) -> Iterator[Joint]:
-    """Yield the joints of a URDF whose <limit> says anything."""
+def _joints_with_limit(robot: Facts) -> Iterator[Joint]:
+    """Yield the moving joints of a URDF whose <limit> has a number other than zero."""
     if robot.model.kind == "mjcf":
-        return  # effort is the actuators' there, and velocity is nobody's
+        return  # MJCF has effort limits on actuators, and no velocity limits
     for joint in robot.model.joints:
-        if joint.moves and joint.limit is not None and not _is_blank(joint):
+        limit = joint.limit
+        if not joint.moves or limit is None:
+            continue
+        numbers = (limit.lower, limit.upper, limit.effort, limit.velocity)
+        if joint.kind == "continuous" or any(numbers):  # JNT006 reports the others
             yield joint
 
 
-def _is_blank(joint: Joint) -> bool:
-    """Return whether all numbers of a limit are zero or missing; JNT006 says all about that."""
-    limit = joint.limit
-    assert limit is not None
-    numbers = (limit.lower, limit.upper, limit.effort, limit.velocity)
-    return joint.kind != "continuous" and not any(numbers)
+@rule("JNT010", "missing-velocity", "warning")
+def missing_velocity(robot: Facts) -> Iterator[Violation]:
+    """The velocity limit of a joint is zero or missing.
 
-
-@rule("JNT010", "no-velocity", "warning")
-def no_velocity(robot: Facts) -> Iterator[Violation]:
-    """A joint has no speed, or does not say how much.
-
-    PhysX clips the speed of a joint to this number: with 0 it stands still. Without the number a
-    policy learns speeds that the motor does not reach, or legged_gym's soft limit on it is none.
+    PhysX clips the velocity of a joint to this number; with 0 the joint does not move. If the
+    number is missing, a policy learns velocities that the motor does not reach, and legged_gym's
+    soft velocity limit is not defined.
 
     Fix:
-        Give the no-load speed of the motor behind its gear [rad/s], or [m/s].
+        Give the no-load speed of the motor after the gear [rad/s], or the speed [m/s].
 
     Source:
         http://wiki.ros.org/urdf/XML/joint: velocity is required.
     """
-    unread = Unread(robot.model)
-    for joint in _with_limit(robot):
+    unparsed = UnparsedNumbers(robot.model)
+    for joint in _joints_with_limit(robot):
         assert joint.limit is not None
-        speed = joint.limit.velocity
-        if speed is not None and speed > 0:
+        velocity, unit = joint.limit.velocity, joint.speed_unit
+        if velocity is None and unparsed.has(joint.name, "velocity"):
             continue
-        if speed is None and unread.has(joint.name, "velocity"):
-            continue
-        what = "not given" if speed is None else f"{speed:g} {joint.speed_unit}"
-        yield Violation(
-            subject=joint.name,
-            source=joint.limit.source,
-            message=f"the velocity of joint {joint.name} is {what}; wanted what its motor reaches "
-            f"[{joint.speed_unit}]",
-        )
+        if velocity is None or velocity <= 0:
+            yield Violation(
+                subject=joint.name,
+                source=joint.limit.source,
+                message=f"velocity limit of joint {joint.name}: got "
+                f"{'no number' if velocity is None else f'{velocity:g} {unit}'}; expected the "
+                f"no-load speed of the motor [{unit}]",
+            )
 
 
 @rule("JNT011", "placeholder-limit", "warning")
 def placeholder_limit(robot: Facts) -> Iterator[Violation]:
-    """An effort or a velocity is a placeholder.
+    """An effort or velocity limit is a placeholder.
 
-    With 1000 N m on a dog of 15 kg the torque limit limits nothing: a policy learns jumps that
-    melt the motor. A torque that could hold the whole robot out at arm's length is not taken for
-    a placeholder, nor a force of ten times its weight.
+    An effort of 1000 N m on a quadruped of 15 kg limits nothing: the policy learns jumps that
+    overload the motor. An effort that can hold the whole robot at arm's length is not reported, nor
+    a force of up to ten times the robot's weight.
 
     Fix:
-        Give the peak torque and the no-load speed of the motor behind its gear.
+        Give the peak torque and the no-load speed of the motor after the gear.
 
     Source:
-        The motors of legged robots give 20 to 400 N m and 10 to 60 rad/s, those of Atlas 900 N m.
+        Motors of legged robots have 20 to 400 N m and 10 to 60 rad/s; those of Atlas have 900 N m.
     """
     weight = max(robot.total_mass, 0.0) * GRAVITY
-    most = {
-        "N": max(_NO_EFFORT, _PUSH * weight),
-        "N m": max(_NO_EFFORT, weight * extents_of(robot).robot_size),
+    max_effort = {
+        "N": max(_MAX_EFFORT, _MAX_WEIGHTS * weight),
+        "N m": max(_MAX_EFFORT, weight * extents_of(robot).robot_size),
     }
-    for joint in _with_limit(robot):
+    for joint in _joints_with_limit(robot):
         assert joint.limit is not None
-        fastest = _NO_SPIN if joint.kind == "continuous" else _NO_SPEED
-        for name, number, limit, unit in (
-            ("effort", joint.limit.effort, most[joint.effort_unit], joint.effort_unit),
-            ("velocity", joint.limit.velocity, fastest, joint.speed_unit),
+        max_velocity = _MAX_SPIN_VELOCITY if joint.kind == "continuous" else _MAX_VELOCITY
+        for name, value, limit, unit in (
+            ("effort", joint.limit.effort, max_effort[joint.effort_unit], joint.effort_unit),
+            ("velocity", joint.limit.velocity, max_velocity, joint.speed_unit),
         ):
-            if number is not None and (number > limit or (name == "effort" and number == limit)):
+            if value is not None and (value > limit or (name == "effort" and value == limit)):
                 yield Violation(
                     subject=joint.name,
                     source=joint.limit.source,
-                    message=f"the {name} of joint {joint.name} is {number:g} {unit}; wanted less "
-                    f"than {limit:.4g} {unit} for a robot of {robot.total_mass:.4g} kg",
-                    measured={name: number, "most": limit},
+                    message=f"{name} limit of joint {joint.name}: got {value:g} {unit}; expected "
+                    f"less than {limit:.4g} {unit} for a robot of {robot.total_mass:.4g} kg",
+                    measured={name: value, "most": limit},
                 )
 
 
@@ -465,40 +455,40 @@ def placeholder_limit(robot: Facts) -> Iterator[Violation]:
 def zero_outside_limits(robot: Facts) -> Iterator[Violation]:
     """Position zero is outside the limits of a joint.
 
-    Whatever starts a robot at zero starts it in a pose it cannot take, and the limits throw it out
-    of that. With a standing pose or a keyframe to start from, nothing is wrong.
+    A simulator that starts all joints at zero starts in an invalid pose, and the limit constraints
+    push the joint out of it. If the robot has a standing pose or a keyframe to start from, this is
+    only information.
 
     Fix:
-        Start from a pose within the limits: give the default joint positions to the simulator.
+        Start from a pose within the limits: set the default joint positions in the simulator.
 
     Source:
-        Isaac Lab refuses default positions outside the limits; MuJoCo starts at zero.
+        Isaac Lab rejects default positions outside the limits; MuJoCo starts at zero.
     """
     outside = [joint for joint in robot.joints if joint.mimic is None and _excludes_zero(joint)]
-    started = [joint for joint in outside if joint.name in robot.model.home or robot.legs]
-    if started:
-        first = started[0]
+    with_pose = [joint for joint in outside if joint.name in robot.model.home or robot.legs]
+    if with_pose:
+        first = with_pose[0]
         assert first.limit is not None
-        lower, upper = _ends(first.limit)
+        lower, upper = _limits(first.limit)
         yield Violation(
             subject=first.name,
             source=first.limit.source,
-            message=f"zero is outside the limits of {names(joint.name for joint in started)}, "
-            f"which for {first.name} are {lower:.5g} to {upper:.5g} {first.unit}; there "
-            "is a pose to start from",
-            measured={"joints": len(started), "lower": lower, "upper": upper},
+            message=f"limits of {names(joint.name for joint in with_pose)}: got a range without 0 "
+            f"({first.name}: {lower:.5g} to {upper:.5g} {first.unit}); the robot has a pose to "
+            "start from",
+            measured={"joints": len(with_pose), "lower": lower, "upper": upper},
         )
     for joint in outside:
-        if joint not in started:
+        if joint not in with_pose:
             assert joint.limit is not None
-            lower, upper = _ends(joint.limit)
+            lower, upper = _limits(joint.limit)
             yield Violation(
                 subject=joint.name,
                 source=joint.limit.source,
                 severity="warning",
-                message=f"the limits of joint {joint.name} are {lower:.5g} to {upper:.5g} "
-                f"{joint.unit}; wanted {joint.reference:g} between them, or a pose to "
-                "start from",
+                message=f"limits of joint {joint.name}: got {lower:.5g} to {upper:.5g} "
+                f"{joint.unit}; expected a range with {joint.reference:g}, or a pose to start from",
                 measured={"lower": lower, "upper": upper},
             )
 
@@ -506,143 +496,152 @@ def zero_outside_limits(robot: Facts) -> Iterator[Violation]:
 def _excludes_zero(joint: Joint) -> bool:
     if joint.kind == "continuous" or joint.limit is None:
         return False
-    lower, upper = _ends(joint.limit)
-    return lower < upper and not lower - _ZERO <= joint.reference <= upper + _ZERO
+    lower, upper = _limits(joint.limit)
+    return lower < upper and not (
+        lower - _ZERO_TOLERANCE <= joint.reference <= upper + _ZERO_TOLERANCE
+    )
 
 
-@rule("JNT013", "broken-mimic", "error")
-def broken_mimic(robot: Facts) -> Iterator[Violation]:
-    """A joint mimics one that is not there, that does not move, or in the end itself.
+@rule("JNT013", "invalid-mimic", "error")
+def invalid_mimic(robot: Facts) -> Iterator[Violation]:
+    """A joint mimics a joint that is missing or fixed, or mimics itself.
 
-    MuJoCo drops the <mimic> and the joint hangs loose; it refuses one that mimics itself. In a
-    circle none of the joints has a position that follows from anything.
+    MuJoCo ignores the <mimic>, so that the joint stays limp, and rejects a joint that mimics
+    itself. The positions of joints that mimic each other in a cycle are not defined.
 
     Fix:
         Name the joint that is driven.
 
     Source:
-        MuJoCo 4.0, tried: "<mimic> on joint ignored".
+        Tested with MuJoCo 4.0: "<mimic> on joint ignored".
     """
     joints = {joint.name: joint for joint in reversed(robot.model.joints)}
-    told: set[str] = set()
+    reported: set[str] = set()
     for joint in robot.model.joints:
-        if joint.mimic is None or not joint.moves or joint.name in told:
+        if joint.mimic is None or not joint.moves or joint.name in reported:
             continue
         target = joints.get(joint.mimic.joint)
-        circle = _circle(joint, joints)
-        told.update(circle)
+        cycle = _mimic_cycle(joint, joints)
+        reported.update(cycle)
         if target is None:
-            what = f"{joint.mimic.joint!r}, and there is no such joint"
+            got = f"{joint.mimic.joint!r}, which does not exist"
         elif not target.moves:
-            what = f"{target.name}, which is {target.kind or 'without a type'}"
-        elif circle == [joint.name]:
-            what = "itself"
-        elif circle:
-            what = f"{target.name}, and that in the end itself: {' -> '.join(circle[:10])}"
+            got = f"{target.name}, which is {target.kind or 'without a type'}"
+        elif cycle == [joint.name]:
+            got = "the joint itself"
+        elif cycle:
+            got = f"{target.name}, in the cycle {' -> '.join(cycle[:10])}"
         else:
             continue
         yield Violation(
             subject=joint.name,
             source=joint.mimic.source,
-            message=f"joint {joint.name} mimics {what}; wanted a joint that is driven",
+            message=f"mimic target of joint {joint.name}: got {got}; expected a joint that is "
+            "driven",
         )
 
 
-def _circle(joint: Joint, joints: dict[str, Joint]) -> list[str]:
-    """Return the joints that mimic each other in a circle with `joint`; none if there is none."""
+def _mimic_cycle(joint: Joint, joints: dict[str, Joint]) -> list[str]:
+    """Return the joints that mimic each other in a cycle with `joint`; empty without a cycle."""
     path: dict[str, None] = {}
-    at: Joint | None = joint
-    while at is not None and at.mimic is not None and at.name not in path:
-        path[at.name] = None
-        at = joints.get(at.mimic.joint)
-    return list(path) if at is not None and at.name == joint.name else []
+    current: Joint | None = joint
+    while current is not None and current.mimic is not None and current.name not in path:
+        path[current.name] = None
+        current = joints.get(current.mimic.joint)
+    return list(path) if current is not None and current.name == joint.name else []
 
 
 @rule("JNT014", "safety-controller", "info")
 def safety_controller(robot: Facts) -> Iterator[Violation]:
-    """A safety_controller is taken for something else.
+    """A joint has a safety_controller, which Genesis treats as a position controller.
 
-    The k_position of a <safety_controller> was made for controllers that ROS 1 had. Genesis makes
-    it the stiffness of the joint, so that a robot without any gains of its own is held in place.
+    The k_position of a <safety_controller> was meant for the controllers of ROS 1. Genesis uses it
+    as the stiffness of the joint, so that a robot without gains is held in place.
 
     Fix:
-        Take the <safety_controller> away, or set the gains after loading.
+        Remove the <safety_controller>, or set the gains after loading.
 
     Source:
-        Genesis' URDF parser; its value is used for dofs_kp.
+        Genesis' URDF parser, which uses the value for dofs_kp.
     """
     joints = [j for j in robot.model.joints if j.safety_controller is not None and j.moves]
     if joints:
         assert joints[0].safety_controller is not None
-        have = "has" if len(joints) == 1 else "have"
         yield Violation(
             subject=joints[0].name,
             source=joints[0].safety_controller,
-            message=f"{names(joint.name for joint in joints)} {have} a safety_controller with "
-            "k_position; Genesis takes that for the gain of a position controller",
+            message=f"safety_controller of {names(joint.name for joint in joints)}: Genesis uses "
+            "k_position as the stiffness of a position controller",
             measured={"joints": len(joints)},
         )
 
 
-@rule("JNT015", "too-weak", "warning", needs=("legs",))
-def too_weak(robot: Facts) -> Iterator[Violation]:
-    """A joint needs most of its effort for standing still.
+@rule("JNT015", "insufficient-torque", "warning", needs=("legs",))
+def insufficient_torque(robot: Facts) -> Iterator[Violation]:
+    """A joint needs more than half of its effort limit to stand.
 
-    The torque that holds the robot in its standing pose, over what the joint can give. From half of
-    it on there is too little left to walk with, and close to all of it the robot sags.
+    The measured value is the static torque at the standing pose divided by the effort limit. Above
+    50 % little torque is left for walking; close to 100 % the robot sags.
 
     Fix:
-        Check the effort, and the masses that it has to carry; or stand with straighter legs.
+        Check the effort limit and the masses that the joint carries, or use a standing pose with
+        straighter legs.
 
     Source:
-        Statics, level ground, all feet down. Of 25 published robots with legs, 22 need 0.4 or less
-        for it; walking takes two to three times what standing does.
+        Statics on level ground with all feet in contact. Of 25 published legged robots, 22 need at
+        most 40 %; walking takes two to three times the torque of standing.
     """
     stance = robot.stance
     if stance is None or stance.margin < 0:
-        raise CannotCheckError("no pose was found in which it stands")
-    weak = []
+        raise CannotCheckError("no statically stable standing pose was found")
+    overloaded = []
     for joint in leg_joints(robot):
         effort, torque = effort_of(robot, joint), abs(stance.torques.get(joint.name, 0.0))
-        if effort is not None and effort > 0 and math.isfinite(torque) and torque > _WEAK * effort:
-            weak.append((joint, torque, effort))
-    if not weak:
+        if effort is None or effort <= 0 or not math.isfinite(torque):
+            continue
+        if torque > _MAX_LOAD * effort:
+            overloaded.append((joint, torque, effort))
+    if not overloaded:
         return
-    for check in (negative_mass, implausible_density, center_of_mass_outside):
-        for defect in check(robot):
-            raise CannotCheckError(f"the mass of {defect.subject} is in doubt")
-    for check in (unknown_type, prismatic_leg, zero_axis):
-        for defect in check(robot):
-            raise CannotCheckError(f"how {defect.subject} moves is in doubt")
-    sure = any(leg.limb.words for leg in robot.legs)
-    for joint, torque, effort in weak:
+    for check in (
+        negative_mass,
+        implausible_density,
+        com_outside_body,
+        unknown_joint_type,
+        prismatic_leg_joint,
+        zero_axis,
+    ):
+        for violation in check(robot):
+            raise CannotCheckError(f"the mass or joint of {violation.subject} is probably wrong")
+    named = any(leg.limb.words for leg in robot.legs)
+    for joint, torque, effort in overloaded:
         share, unit = torque / effort, joint.effort_unit
         yield Violation(
             subject=joint.name,
             source=joint.limit.source if joint.limit else joint.source,
-            severity="error" if share > _TOO_WEAK and sure else "warning",
+            severity="error" if share > _MAX_LOAD_ERROR and named else "warning",
             certainty="likely",
-            message=f"joint {joint.name} holds {torque:.3g} {unit} in the standing pose, "
-            f"{share:.0%} of its effort of {effort:.4g} {unit}; wanted {_WEAK:.0%} at most",
+            message=f"static load of joint {joint.name} at the standing pose: got {torque:.3g} "
+            f"{unit}, {share:.0%} of its effort limit of {effort:.4g} {unit}; expected at most "
+            f"{_MAX_LOAD:.0%}",
             measured={"torque": torque, "effort": effort, "share": share},
         )
 
 
-@rule("JNT016", "no-actuator", "warning")
-def no_actuator(robot: Facts) -> Iterator[Violation]:
-    """A joint of a MJCF file has no actuator.
+@rule("JNT016", "missing-actuator", "warning")
+def missing_actuator(robot: Facts) -> Iterator[Violation]:
+    """A joint of an MJCF file has no actuator.
 
-    Nothing drives it: it swings on its damping, and the actions of an environment that is made
-    from the file are one short. Joints that others pull along, and those that carry the trunk in
-    a model of the plane, are left alone; so is a file with tendons or other drives of its own. On
-    a robot without legs, which may be passive by design, it is only told as information, and so
-    is a file without any actuator, since mjlab and Genesis add their own.
+    The joint is passive, and an environment made from the file has one action less. Joints that
+    mimic others, joints that carry the trunk of a planar model, and files with tendons or other
+    transmissions are not reported. A robot without legs may be passive by design, and mjlab and
+    Genesis add actuators to a file without any: both are only reported as information.
 
     Fix:
-        Add a <motor> or <position> for the joint.
+        Add a <motor> or <position> actuator for the joint.
 
     Source:
-        MuJoCo: nu counts the actuators, not the joints.
+        MuJoCo: nu is the number of actuators, not of joints.
     """
     if robot.model.kind != "mjcf":
         return
@@ -652,33 +651,32 @@ def no_actuator(robot: Facts) -> Iterator[Violation]:
                 subject=robot.model.title,
                 source=robot.model.source,
                 severity="info",
-                message=f"the file has no actuator for any of its {len(robot.joints)} joints; "
-                "wanted one for each, unless the framework adds them",
+                message=f"actuators of the file: got 0 for {count(len(robot.joints), 'joint')}; "
+                "expected one for each joint, unless the framework adds them",
                 measured={"joints": len(robot.joints)},
             )
         return
-    driven = {motor.joint for motor in robot.model.actuators}
-    if "" in driven:
+    actuated = {actuator.joint for actuator in robot.model.actuators}
+    if "" in actuated:
         return
     for joint in own_joints(robot):
-        if joint.name not in driven and joint.mimic is None:
+        if joint.name not in actuated and joint.mimic is None:
             yield Violation(
                 subject=joint.name,
                 source=joint.source,
                 severity="warning" if robot.legs else "info",
-                message=f"no actuator drives joint {joint.name}; {len(driven)} other joints have "
-                "one",
+                message=f"actuators of joint {joint.name}: got 0; expected 1",
             )
 
 
 @rule("JNT017", "unlimited-joint", "warning")
 def unlimited_joint(robot: Facts) -> Iterator[Violation]:
-    """A hinge of a MJCF file has no range.
+    """A hinge of an MJCF file has no range.
 
-    It turns without end, and a leg through the trunk. MuJoCo needs a range, and either
-    limited="true" or autolimits, which is on unless the file switches it off. Wheels and propellers
-    are left alone; on a robot without legs it is only told as information, since the joints of arms
-    may turn without end.
+    The joint turns without end, so that a leg can rotate through the trunk. MuJoCo needs a range,
+    and either limited="true" or autolimits, which is the default. Wheels and propellers are not
+    reported. On a robot without legs this is only information, since joints of arms may turn
+    without end.
 
     Fix:
         Give the joint a range, in the unit of <compiler angle>, which is degrees by default.
@@ -695,5 +693,6 @@ def unlimited_joint(robot: Facts) -> Iterator[Violation]:
                 subject=joint.name,
                 source=joint.source,
                 severity="warning" if robot.legs else "info",
-                message=f"hinge {joint.name} has no range; wanted one, unless it turns without end",
+                message=f"range of hinge {joint.name}: got none; expected one, unless the hinge "
+                "turns without end",
             )

@@ -1,10 +1,9 @@
-"""Legs: whether those that were found can carry a robot and be trained."""
+"""Rules on legs and the standing pose (LEG)."""
 
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -15,138 +14,133 @@ from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.analysis.legs.limbs import Limb
 from terrainkit_robots.analysis.legs.stance import Stance
 from terrainkit_robots.description.fix import Fix, SetAttribute
-from terrainkit_robots.lint.rule import Violation, rule
+from terrainkit_robots.lint.rule import Severity, Violation, rule
 from terrainkit_robots.spec.per_joint import match_joints
 from terrainkit_robots.spec.robot_spec import RobotSpec
 from terrainkit_robots.text import names
 
-_USUAL = (2, 4, 6, 8)
+_LEG_COUNTS = (2, 4, 6, 8)
 
-_UPWARD = 0.3
-"""A limb points up if it ends this share of its own reach above where it starts."""
+_MAX_RISE = 0.3
+"""A leg points up if its end is higher than its start by this share of the distance."""
 
-_EDGE = 0.01
-"""A centre of mass this close to the edge of the support is over it after a small push [m]."""
+_MIN_MARGIN = 0.01
+"""Required distance of the center of mass from the edge of the support polygon [m]."""
 
-_EDGE_SHARE = 0.25
-"""The same as a share of what the support allows at best, for feet narrower than that."""
+_MIN_MARGIN_SHARE = 0.25
+"""The same as a share of the largest possible distance, for small feet."""
 
-_INSIDE = 0.001
-"""A robot let go this far inside of the ground is not thrown up [m]."""
+_MAX_PENETRATION = 0.001
+"""Depth of the feet in the ground that a simulator tolerates at the start [m]."""
 
-_DROP = 0.06
-"""A robot let go this far above the ground lands at 1.1 m/s, which is no start [m]."""
+_MAX_DROP = 0.06
+"""Largest height of the feet above the ground at the start [m]; the robot lands at 1.1 m/s."""
 
-_OFF = 0.1
-"""Share by which a target height may differ from how high the robot stands."""
+_MAX_HEIGHT_ERROR = 0.1
+"""Allowed difference of the target height from the standing height, as a share."""
 
-_LOW = 0.3
-"""A base lower than this share of the leg's length has its origin at its feet."""
+_MIN_HEIGHT_SHARE = 0.3
+"""A base lower than this share of the leg length has its origin at its feet."""
 
-_SLACK = 1e-3
-"""A position this far outside of a limit was rounded [rad] or [m]."""
+_LIMIT_TOLERANCE = 1e-3
+"""Distance of a position from a limit that is attributed to rounding [rad] or [m]."""
 
 _FRONT = {"front", "fore", "fl", "fr", "lf", "rf"}
 _HIND = {"rear", "hind", "back", "rl", "hl", "hr", "bl", "br", "lh", "rh", "lb", "rb"}
 _LEFT = {"left", "fl", "rl", "hl", "bl", "lf", "lh", "lb", "lm", "ml"}
 _RIGHT = {"right", "fr", "hr", "br", "rf", "rh", "rb", "rm", "mr"}
-"""Words of names that tell where a leg is. RR is either rear right, or nothing."""
+"""Words of names that give the position of a leg. RR is omitted: it also occurs in other names."""
 
 
-def _upward(robot: Facts) -> list[Limb]:
-    """Return limbs that look like legs in all but where they end."""
+def _inverted_legs(robot: Facts) -> list[Limb]:
+    """Return the limbs that have the joints of a leg, but end above their start."""
     legs = [leg.limb for leg in robot.legs]
-    kinds = {_kinds(limb) for limb in legs}
-    found = []
+    leg_types = {_joint_types(limb) for limb in legs}
+    inverted = []
     for limb in robot.limbs:
         start = limb.points[0]
         rise = float(limb.tip[2] - start[2])
-        if limb in legs or rise < _UPWARD * float(np.linalg.norm(limb.tip - start)):
+        if limb in legs or rise < _MAX_RISE * float(np.linalg.norm(limb.tip - start)):
             continue
-        beside = any(abs(float(leg.points[0][2] - start[2])) < rise / 2 for leg in legs)
-        if limb.words and _kinds(limb) in kinds and beside:
-            found.append(limb)
-    return found
+        at_leg_height = any(abs(float(leg.points[0][2] - start[2])) < rise / 2 for leg in legs)
+        if limb.words and _joint_types(limb) in leg_types and at_leg_height:
+            inverted.append(limb)
+    return inverted
 
 
-def _kinds(limb: Limb) -> tuple[str, ...]:
+def _joint_types(limb: Limb) -> tuple[str, ...]:
     return tuple(joint.kind for joint in limb.joints)
 
 
-@rule("LEG001", "legs", "info", needs=("legs",))
-def legs(robot: Facts) -> Iterator[Violation]:
-    """These are the legs that were found, and what their joints do.
+@rule("LEG001", "detected-legs", "info", needs=("legs",))
+def detected_legs(robot: Facts) -> Iterator[Violation]:
+    """Lists the legs that were detected and the roles of their joints.
 
-    Everything that is said of legs, feet and the standing pose rests on this. If it is wrong here,
-    do not believe those findings.
+    All findings on legs, feet and the standing pose depend on this detection. If it is wrong,
+    ignore those findings.
 
     Fix:
-        Nothing to do if it is right. If a leg is missing, look at its joints and at where it ends.
+        No action if the legs are correct. If a leg is missing, check its joints and its last link.
 
     Source:
-        Leaves of the tree that end near the ground, are mirrored, and are named like legs.
+        Leaves of the tree that end near the ground, have a mirror image, and have names of legs.
     """
-    found = robot.legs
-    words = {leg.foot: " ".join(leg.roles) for leg in found}
-    same = set(words.values())
-    listed = (
-        f"feet {', '.join(words)}; joints of each: {next(iter(same))}"
-        if len(same) == 1
-        else "; ".join(f"{foot}: {roles}" for foot, roles in words.items())
-    )
+    roles = {leg.foot: " ".join(leg.roles) for leg in robot.legs}
+    if len(set(roles.values())) == 1:
+        listed = f"feet {', '.join(roles)}; joints of each leg: {roles[robot.legs[0].foot]}"
+    else:
+        listed = "; ".join(f"{foot}: {each}" for foot, each in roles.items())
     yield Violation(
         subject=robot.model.title,
         source=robot.model.source,
-        message=f"{len(found)} legs of {_mean_length(found):.3f} m; {listed}",
+        message=f"{len(robot.legs)} legs with a length of {_mean_length(robot.legs):.3f} m; "
+        f"{listed}",
         certainty="likely",
-        measured={"legs": len(found)},
+        measured={"legs": len(robot.legs)},
     )
 
 
-def _mean_length(found: tuple[Leg, ...]) -> float:
-    return float(np.mean([leg.length for leg in found]))
+def _mean_length(legs: tuple[Leg, ...]) -> float:
+    return float(np.mean([leg.length for leg in legs]))
 
 
 @rule("LEG002", "leg-count", "warning", needs=("legs",))
 def leg_count(robot: Facts) -> Iterator[Violation]:
     """The number of legs is not 2, 4, 6 or 8.
 
-    A leg that is missing usually hangs on a joint that was named wrongly or turned fixed, or ends
-    somewhere else than its siblings.
+    A leg that is not detected usually has a joint that is misnamed or fixed, or ends at another
+    height than the other legs.
 
     Fix:
-        Compare the missing leg with its siblings, from the trunk down to the foot.
+        Compare the missing leg with the others, from the trunk to the foot.
 
     Source:
         All legged robots in simulation suites have an even number of legs.
     """
     count = len(robot.legs)
-    if count + len(_upward(robot)) in _USUAL:
-        return
-    yield Violation(
-        subject=robot.model.title,
-        source=robot.model.source,
-        message=(
-            f"{count} legs were found ({', '.join(leg.foot for leg in robot.legs)}); "
-            "wanted 2, 4, 6 or 8"
-        ),
-        certainty="likely",
-        measured={"legs": count},
-    )
+    if count + len(_inverted_legs(robot)) not in _LEG_COUNTS:
+        yield Violation(
+            subject=robot.model.title,
+            source=robot.model.source,
+            message=f"number of legs: got {count} ({', '.join(leg.foot for leg in robot.legs)}); "
+            "expected 2, 4, 6 or 8",
+            certainty="likely",
+            measured={"legs": count},
+        )
 
 
-@rule("LEG003", "uneven-legs", "warning", needs=("legs",))
-def uneven_legs(robot: Facts) -> Iterator[Violation]:
+@rule("LEG003", "missing-leg-joint", "warning", needs=("legs",))
+def missing_leg_joint(robot: Facts) -> Iterator[Violation]:
     """A leg has fewer joints than the others.
 
-    A joint that was turned fixed, or was left out, makes the leg stiff there. The policy then
-    learns to limp, and the motor that has no joint is driven by nobody.
+    A joint that is fixed or missing makes the leg stiff. The policy learns to limp, and one motor
+    of the real robot has no joint.
 
     Fix:
-        Give the leg the joints of its siblings; look for one of type fixed.
+        Give the leg the joints of the other legs; look for a joint of type fixed.
 
     Source:
-        Comparison with the leg that mirrors it, or with what most legs have.
+        Comparison with the number of joints that most legs have.
     """
     counts = Counter(len(leg.joints) for leg in robot.legs)
     usual, _ = max(counts.items(), key=lambda item: (item[1], item[0]))
@@ -155,147 +149,135 @@ def uneven_legs(robot: Facts) -> Iterator[Violation]:
             yield Violation(
                 subject=leg.foot,
                 source=robot.tree.links[leg.foot].source,
-                message=(
-                    f"the leg of {leg.foot} has {len(leg.joints)} moving joints, where the others "
-                    f"have {usual}"
-                ),
+                message=f"moving joints of the leg with foot {leg.foot}: got {len(leg.joints)}; "
+                f"expected {usual}, as in the other legs",
                 certainty="likely",
                 measured={"joints": len(leg.joints), "usual": usual},
             )
 
 
-@rule("LEG004", "foot-merged-away", "warning", fixes="safe", needs=("legs",))
-def foot_merged_away(robot: Facts) -> Iterator[Violation]:
-    """A foot hangs on a fixed joint, and nothing tells Isaac Gym to keep it.
+@rule("LEG004", "foot-collapsed", "warning", fixes="safe", needs=("legs",))
+def foot_collapsed(robot: Facts) -> Iterator[Violation]:
+    """Isaac Gym merges a foot into its shank.
 
-    Isaac Gym merges links across fixed joints by default. The foot is then no body of its own:
-    looking for feet by name finds none, and its contact forces are those of the shank.
+    Isaac Gym collapses fixed joints by default. The foot is then not a rigid body: a search for
+    feet by name finds nothing, and their contact forces belong to the shank.
 
     Fix:
         Add dont_collapse="true" to the fixed joint above the foot.
 
     Source:
-        Isaac Gym's asset option collapse_fixed_joints, and the attribute as Unitree's and
-        ANYbotics' descriptions for legged_gym have it.
+        Isaac Gym's asset option collapse_fixed_joints; the descriptions of Unitree and ANYbotics
+        for legged_gym use the attribute.
     """
     if robot.model.kind == "mjcf":
-        raise CannotCheckError("MJCF is not read by Isaac Gym's URDF importer")
+        raise CannotCheckError("Isaac Gym's URDF importer does not read MJCF")
     for leg in robot.legs:
         joint = robot.tree.above.get(leg.foot)
-        own = bool(robot.tree.links[leg.foot].collisions)
-        if joint is None or joint.kind != "fixed" or joint.dont_collapse or not own:
+        has_shapes = bool(robot.tree.links[leg.foot].collisions)
+        if joint is None or joint.kind != "fixed" or joint.dont_collapse or not has_shapes:
             continue
-        fix = None
-        if joint.source.element is not None:
-            edit = SetAttribute(source=joint.source, name="dont_collapse", value="true")
-            fix = Fix(
-                safety="safe",
-                description=f'Add dont_collapse="true" to joint {joint.name}.',
-                edits=(edit,),
-            )
+        edit = SetAttribute(source=joint.source, name="dont_collapse", value="true")
+        fix = Fix(
+            safety="safe",
+            description=f'Add dont_collapse="true" to joint {joint.name}.',
+            edits=(edit,),
+        )
         yield Violation(
             subject=leg.foot,
             source=joint.source,
-            message=(
-                f"{leg.foot} hangs on the fixed joint {joint.name} without "
-                'dont_collapse="true": Isaac Gym merges the foot away'
-            ),
+            message=f"fixed joint {joint.name} above foot {leg.foot}: got no dont_collapse; "
+            'expected dont_collapse="true", or Isaac Gym merges the foot into its parent',
             certainty="likely",
-            fix=fix,
+            fix=None if joint.source.element is None else fix,
         )
 
 
-@rule("LEG005", "forward", "warning", needs=("legs",))
-def forward(robot: Facts) -> Iterator[Violation]:
-    """The robot does not look along +x.
+@rule("LEG005", "forward-axis", "warning", needs=("legs",))
+def forward_axis(robot: Facts) -> Iterator[Violation]:
+    """The robot does not face +x.
 
-    Commands, rewards and height scans take +x for forward and +y for left. A robot that looks
-    elsewhere learns to walk sideways or backwards, and the policy looks right in every number.
+    Commands, rewards and height scans assume that +x is forward and +y is left. A robot with
+    another orientation learns to walk sideways or backward, and no metric shows it.
 
     Fix:
-        Turn the root: add a fixed joint with the rotation between a new root link and the trunk, or
-        turn the origins of everything on it.
+        Rotate the root: add a new root link and a fixed joint with the rotation above the trunk, or
+        rotate the origins of all elements of the trunk.
 
     Source:
         REP 103 (x forward, y left, z up), which all training frameworks follow.
     """
-    for axis, ahead, behind, where in (
-        (0, _FRONT, _HIND, ("front", "hind", "x")),
-        (1, _LEFT, _RIGHT, ("left", "right", "y")),
+    trunk = robot.bodies[0]
+    message = ""
+    for axis, letter, ahead, behind, words in (
+        (0, "x", "front", "hind", (_FRONT, _HIND)),
+        (1, "y", "left", "right", (_LEFT, _RIGHT)),
     ):
-        places = [_places(robot, words, axis) for words in (ahead, behind)]
-        if all(places) and max(places[0]) < min(places[1]):
-            one, other, letter = where
-            yield _turned(
-                robot,
-                f"the {one} legs are at {letter} = {np.mean(places[0]):.3f} m, the {other} legs "
-                f"at {letter} = {np.mean(places[1]):.3f} m; wanted the {one} ones at larger "
-                f"{letter}",
+        positions = [_leg_positions(robot, each, axis) for each in words]
+        if all(positions) and max(positions[0]) < min(positions[1]):
+            means = [float(np.mean(each)) for each in positions]
+            message = (
+                f"position of the {ahead} legs along {letter}: got {means[0]:.3f} m; expected more "
+                f"than that of the {behind} legs, which is {means[1]:.3f} m"
             )
-            return
-    if robot.mirror.normal[0] == 1:
-        about_x = sum(abs(leg.pitch[0]) > abs(leg.pitch[1]) for leg in robot.legs)
-        yield _turned(
-            robot,
-            f"{about_x} of {len(robot.legs)} legs bend about x; wanted y for half of them or more, "
-            "so that they stride along x",
+            break
+    if not message and robot.mirror.normal[0] == 1:
+        count = sum(abs(leg.pitch[0]) > abs(leg.pitch[1]) for leg in robot.legs)
+        message = (
+            f"legs whose pitch axis is x: got {count} of {len(robot.legs)}; expected y for at "
+            "least half of the legs, so that they step along x"
+        )
+    if message:
+        yield Violation(
+            subject=trunk.name,
+            source=robot.tree.links[trunk.name].source,
+            message=message,
+            certainty="likely",
         )
 
 
-def _places(robot: Facts, words: set[str], axis: int) -> list[float]:
-    """Return where along an axis the legs start whose names have one of the words [m]."""
-    found = []
+def _leg_positions(robot: Facts, words: set[str], axis: int) -> list[float]:
+    """Return where legs with one of the words in their names start along an axis [m]."""
+    positions = []
     for leg in robot.legs:
-        names = [robot.bodies[leg.limb.chain[-1]].name, leg.foot, leg.joints[-1].name]
-        tokens = {t.lower() for n in names for t in re.findall(r"[A-Z]?[a-z]+|[A-Z]+", n)}
+        leg_names = [robot.bodies[leg.limb.chain[-1]].name, leg.foot, leg.joints[-1].name]
+        tokens = {t.lower() for name in leg_names for t in re.findall(r"[A-Z]?[a-z]+|[A-Z]+", name)}
         if tokens & words:
-            found.append(float(leg.limb.points[0][axis]))
-    return found
+            positions.append(float(leg.limb.points[0][axis]))
+    return positions
 
 
-def _turned(robot: Facts, message: str) -> Violation:
-    trunk = robot.bodies[0]
-    return Violation(
-        subject=trunk.name,
-        source=robot.tree.links[trunk.name].source,
-        message=message,
-        certainty="likely",
-    )
+@rule("LEG006", "com-outside-support", "error", needs=("legs",))
+def com_outside_support(robot: Facts) -> Iterator[Violation]:
+    """The center of mass is outside of the support polygon of the standing pose.
 
-
-@rule("LEG006", "falls-over", "error", needs=("legs",))
-def falls_over(robot: Facts) -> Iterator[Violation]:
-    """The centre of mass is not above the feet.
-
-    In the standing pose, with the legs bent so as to bring the feet below the mass, it still lies
-    outside the support polygon. The robot falls before the policy has done anything.
+    The search for a standing pose moves the feet below the center of mass as far as the joints
+    allow. If the center of mass is still outside, the robot falls before the policy acts.
 
     Fix:
-        Look at the centre of mass of the heaviest links, and at the limits of the hips.
+        Check the center of mass of the heaviest links and the limits of the hips.
 
     Source:
-        Static balance: the weight has to act inside the convex hull of the contacts.
+        Static balance: the weight must act inside the convex hull of the contacts.
     """
     stance = robot.stance
     assert stance is not None
     if math.isnan(stance.margin):
-        raise CannotCheckError("a mass is made from a mesh, by MuJoCo")
+        raise CannotCheckError("MuJoCo computes a mass from a mesh")
     if len(stance.support) < 3:
-        raise CannotCheckError("the feet touch the ground in points or on a line, without an area")
-    best = margin(stance.support.mean(axis=0), stance.support)
-    wanted = min(_EDGE, _EDGE_SHARE * best)
-    if stance.margin >= wanted:
+        raise CannotCheckError("the contacts of the feet are points or a line without area")
+    max_margin = margin(stance.support.mean(axis=0), stance.support)
+    limit = min(_MIN_MARGIN, _MIN_MARGIN_SHARE * max_margin)
+    if stance.margin >= limit:
         return
     trunk = robot.bodies[0]
     outside = stance.margin < 0
     yield Violation(
         subject=trunk.name,
         source=robot.tree.links[trunk.name].source,
-        message=(
-            f"the centre of mass is {1000 * abs(stance.margin):.0f} mm "
-            f"{'outside' if outside else 'inside'} the support polygon of the standing pose; "
-            f"wanted at least {1000 * wanted:.0f} mm inside"
-        ),
+        message="distance of the center of mass from the edge of the support polygon at the "
+        f"standing pose: got {1000 * abs(stance.margin):.0f} mm "
+        f"{'outside' if outside else 'inside'}; expected at least {1000 * limit:.0f} mm inside",
         severity="error" if outside else "warning",
         certainty="likely",
         measured={"margin": round(stance.margin, 5)},
@@ -304,56 +286,60 @@ def falls_over(robot: Facts) -> Iterator[Violation]:
 
 @rule("LEG007", "leg-points-up", "error", needs=("legs",))
 def leg_points_up(robot: Facts) -> Iterator[Violation]:
-    """A leg points up where its siblings point down.
+    """A leg points up, unlike the others.
 
-    Its mounting is turned over: a sign or a rotation in the joint's origin is wrong. The robot
-    stands on the legs that are left.
+    A sign or a rotation in the origin of one of its joints is wrong, and the robot stands on the
+    other legs.
 
     Fix:
-        Compare the origin of the leg's first joints with those of its siblings.
+        Compare the origins of the first joints of the leg with those of the others.
 
     Source:
-        Comparison of where limbs of the same make end, all joints at zero.
+        Comparison of the ends of limbs with the same joint types, all joints at zero.
     """
-    for limb in _upward(robot):
-        start = limb.points[0]
+    for limb in _inverted_legs(robot):
+        start, first = limb.points[0], limb.joints[0]
         leaf = robot.bodies[limb.chain[-1]]
-        first = limb.joints[0]
         rise = float(limb.tip[2] - start[2])
         reach = float(np.linalg.norm(limb.tip - start))
         yield Violation(
             subject=leaf.name,
             source=first.source,
-            message=(
-                f"the leg of {leaf.name} ends {rise:.3f} m above its joint {first.name} with all "
-                f"joints at zero, {rise / reach:.0%} of the {reach:.3f} m between them; wanted "
-                f"less than {_UPWARD:.0%}, and below as the others"
-            ),
+            message=f"height of the end of leg {leaf.name} above joint {first.name}, all joints at "
+            f"zero: got {rise:.3f} m, {rise / reach:.0%} of their distance of {reach:.3f} m; "
+            f"expected less than {_MAX_RISE:.0%}, and below 0 as for the other legs",
             certainty="likely",
             measured={"rise": round(rise, 4), "reach": round(reach, 4)},
         )
 
 
-def _standing(robot: Facts) -> tuple[RobotSpec, Stance]:
-    """Return the spec of a robot with legs, and how it stands at the spec's default pose."""
+def _spec_and_stance(robot: Facts) -> tuple[RobotSpec, Stance]:
+    """Return the spec and the stance at its default pose.
+
+    Raises:
+        CannotCheckError: If the default pose does not cover all leg joints.
+    """
     spec, stance = robot.spec, robot.stance
     assert spec is not None
     assert stance is not None
-    actuated = {joint.name for joint in robot.actuated}
-    joints = [j.name for leg in robot.legs for j in leg.joints if j.name in actuated]
-    told = match_joints(spec.default_pose, [joint.name for joint in robot.actuated]).values
-    missing = [name for name in joints if name not in told]
+    actuated = [joint.name for joint in robot.actuated]
+    joints = [j.name for leg in robot.legs for j in leg.joints if j.name in set(actuated)]
+    pose = match_joints(spec.default_pose, actuated).values
+    missing = [name for name in joints if name not in pose]
     if missing:
-        raise CannotCheckError(f"default_pose of the spec says nothing clear of {names(missing)}")
+        raise CannotCheckError(f"default_pose of the spec has no unique value for {names(missing)}")
     return spec, stance
 
 
-def _of_trunk(robot: Facts, message: str, measured: dict[str, float]) -> Violation:
+def _height_violation(
+    robot: Facts, message: str, measured: Mapping[str, float], severity: Severity | None = None
+) -> Violation:
     trunk = robot.bodies[0].top
     return Violation(
         subject=trunk.name,
         source=trunk.source,
         message=message,
+        severity=severity,
         certainty="likely",
         measured={name: round(value, 5) for name, value in measured.items()},
     )
@@ -361,103 +347,99 @@ def _of_trunk(robot: Facts, message: str, measured: dict[str, float]) -> Violati
 
 @rule("LEG008", "spec-spawn-height", "error", needs=("spec", "legs"))
 def spec_spawn_height(robot: Facts) -> Iterator[Violation]:
-    """The spec lets the robot go inside of the ground, or high above it.
+    """The spawn height of the spec is inside the ground or far above it.
 
-    Inside the ground contacts throw it up at the first step. From high above it falls, and an
-    episode begins with a crash.
+    If the feet start inside the ground, contact forces throw the robot up at the first step. If
+    they start far above it, each episode begins with a fall.
 
     Fix:
-        Set spawn_height to the height at which the feet touch at the default pose, plus 1 cm.
+        Set spawn_height to the height at which the feet touch the ground at the default pose, plus
+        1 cm.
 
     Source:
-        Lowest point of the collision shapes at the spec's default pose, with the trunk level.
+        Lowest point of the collision shapes at the spec's default pose, with a level trunk.
     """
-    spec, stance = _standing(robot)
+    spec, stance = _spec_and_stance(robot)
     if spec.spawn_height is None:
         raise CannotCheckError("the spec has no spawn_height")
-    air = spec.spawn_height - stance.height
+    gap = spec.spawn_height - stance.height
+    if -_MAX_PENETRATION <= gap <= _MAX_DROP:
+        return
+    side = f"{1000 * -gap:.0f} mm inside the ground" if gap < 0 else f"{gap:.3f} m above the ground"
+    message = (
+        f"spawn_height: got {spec.spawn_height:.4f} m, with the feet {side}; expected "
+        f"{stance.height:.4f} m, where the feet touch the ground at the default pose, or at most "
+        f"{_MAX_DROP:g} m more"
+    )
     measured = {"spawn_height": spec.spawn_height, "contact_height": stance.height}
-    touch = f"at its default pose the robot touches the ground at {stance.height:.4f} m"
-    if air < -_INSIDE:
-        message = (
-            f"spawn_height is {spec.spawn_height:.4f} m, but {touch}: it starts "
-            f"{1000 * -air:.0f} mm inside"
-        )
-        yield _of_trunk(robot, message, measured)
-    elif air > _DROP:
-        message = (
-            f"spawn_height is {spec.spawn_height:.4f} m, and {touch}: it falls {air:.3f} m; wanted "
-            f"at most {_DROP:g} m"
-        )
-        yield replace(_of_trunk(robot, message, measured), severity="warning")
+    yield _height_violation(robot, message, measured, None if gap < 0 else "warning")
 
 
 @rule("LEG009", "spec-target-height", "warning", needs=("spec", "legs"))
 def spec_target_height(robot: Facts) -> Iterator[Violation]:
-    """The height that rewards ask for is not the one at which the robot stands.
+    """The target height of the spec differs from the standing height.
 
-    The reward for the height and the default pose, to which all actions are added, then pull
-    against each other: the robot learns to crouch or to stretch all the time.
+    The reward for the base height and the default pose, to which all actions are added, then
+    contradict each other: the robot learns to crouch or stretch all the time.
 
     Fix:
-        Set base_height_target to the height of the standing robot, or bend the default pose.
+        Set base_height_target to the standing height, or change the default pose.
 
     Source:
         legged_gym, reward for base height; lowest collision shape at the spec's default pose.
     """
-    spec, stance = _standing(robot)
+    spec, stance = _spec_and_stance(robot)
     target = spec.base_height_target
     if target is None:
         raise CannotCheckError("the spec has no base_height_target")
-    off = target - stance.height
-    # Of a base whose origin is at the ground the height says nothing; the length of the legs does.
-    size = max(abs(stance.height), _LOW * _mean_length(robot.legs))
-    if abs(off) <= _OFF * size:
-        return
-    message = (
-        f"base_height_target is {target:.4f} m, but the robot stands at {stance.height:.4f} m at "
-        f"its default pose, {abs(off):.3f} m {'lower' if off > 0 else 'higher'};"
-        f" wanted at most {_OFF * size:.3f} m"
-    )
-    yield _of_trunk(robot, message, {"target": target, "standing": stance.height})
+    # The height of a base with its origin at the feet says nothing, so the leg length is used.
+    size = max(abs(stance.height), _MIN_HEIGHT_SHARE * _mean_length(robot.legs))
+    error, limit = abs(target - stance.height), _MAX_HEIGHT_ERROR * size
+    if error > limit:
+        message = (
+            f"base_height_target: got {target:.4f} m, {error:.3f} m from the standing height of "
+            f"{stance.height:.4f} m at the default pose; expected at most {limit:.3f} m"
+        )
+        yield _height_violation(robot, message, {"target": target, "standing": stance.height})
 
 
 @rule("LEG010", "spec-reset-range", "warning", needs=("spec", "legs"))
 def spec_reset_range(robot: Facts) -> Iterator[Violation]:
-    """Joints start an episode outside of their limits.
+    """The reset range of the spec exceeds the joint limits.
 
-    The default pose times a factor of the reset range is where a joint starts. Beyond a limit the
-    simulator throws it back, and the robot jumps at its first step.
+    At reset, the default pose is multiplied by a random factor from the reset range. If a position
+    is outside of its limits, the simulator pushes the joint back and the robot jumps at the first
+    step.
 
     Fix:
-        Narrow reset_range, or move the default pose away from the limit.
+        Reduce reset_range, or move the default pose away from the limits.
 
     Source:
-        legged_gym, reset of joints: the default pose times a random factor, 0.5 to 1.5.
+        legged_gym, reset of joints: the default pose times a random factor of 0.5 to 1.5.
     """
     spec = robot.spec
     assert spec is not None
-    found = {joint.name: joint for joint in robot.actuated}
-    outside: dict[str, float] = {}
-    for name, position in match_joints(spec.default_pose, list(found)).values.items():
-        limits = found[name].range
-        if limits is None or not limits[0] - _SLACK <= position <= limits[1] + _SLACK:
-            continue  # a pose that is outside itself is told by another rule
+    joints = {joint.name: joint for joint in robot.actuated}
+    excess: dict[str, float] = {}
+    for name, position in match_joints(spec.default_pose, list(joints)).values.items():
+        limits = joints[name].range
+        if limits is None:
+            continue
+        if not limits[0] - _LIMIT_TOLERANCE <= position <= limits[1] + _LIMIT_TOLERANCE:
+            continue  # reported by XRF015
         ends = [factor * position for factor in spec.reset_range]
-        over = max(limits[0] - min(ends), max(ends) - limits[1])
-        if over > _SLACK:
-            outside[name] = over
-    if not outside:
+        distance = max(limits[0] - min(ends), max(ends) - limits[1])
+        if distance > _LIMIT_TOLERANCE:
+            excess[name] = distance
+    if not excess:
         return
-    worst = max(outside, key=lambda name: outside[name])
-    listed = names(f"{name} by {over:.3g} {found[name].unit}" for name, over in outside.items())
+    largest = max(excess, key=lambda name: excess[name])
+    listed = names(f"{name} by {value:.3g} {joints[name].unit}" for name, value in excess.items())
     lower, upper = spec.reset_range
     yield Violation(
-        subject=worst,
-        source=found[worst].source,
-        message=(
-            f"{lower:g} to {upper:g} times the default pose leaves the limits of {len(outside)} "
-            f"joints: {listed}"
-        ),
-        measured={"joints": len(outside), "farthest": round(outside[worst], 5)},
+        subject=largest,
+        source=joints[largest].source,
+        message=f"reset_range: got {lower:g} to {upper:g} times the default pose, which exceeds "
+        f"the limits of {len(excess)} joints ({listed}); expected positions within the limits",
+        measured={"joints": len(excess), "farthest": round(excess[largest], 5)},
     )

@@ -1,4 +1,4 @@
-"""MSH: mesh files."""
+"""MSH: rules on mesh files."""
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -21,130 +21,134 @@ from terrainkit_robots.analysis.meshes.uses import (
     replaced,
 )
 from terrainkit_robots.description.fix import Edit, Fix
-from terrainkit_robots.description.package_resolver import is_absolute, names_package, right_letters
+from terrainkit_robots.description.package_resolver import (
+    filename_on_disk,
+    is_absolute,
+    is_package_uri,
+)
 from terrainkit_robots.description.xml.document import read_bytes
 from terrainkit_robots.lint.rule import Severity, Violation, rule
 from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes, TooLargeError
 from terrainkit_robots.mesh.sniff import MUJOCO_SUFFIXES
-from terrainkit_robots.mesh.surface import FLAT, binary_stl, clustered, thickness
-from terrainkit_robots.text import names
+from terrainkit_robots.mesh.surface import FLAT, binary_stl, cluster_vertices, thickness
+from terrainkit_robots.text import display_path, names
 
-_MOST_FACES = 200_000
-"""MuJoCo's reader of STL refuses more."""
+_MAX_STL_FACES = 200_000
+"""Maximum number of faces that MuJoCo's STL reader accepts."""
 
-_MANY_FACES = 20_000
-"""A collision mesh with more is a copy of what is drawn: most are below 5,000, and a hull of 1,000
-lies within a hundredth of its size."""
+_MAX_COLLISION_FACES = 20_000
+"""A collision mesh with more faces is usually a copy of the visual mesh. Most collision meshes have
+fewer than 5,000, and a hull of 1,000 faces deviates by less than 1% of its size."""
 
-_SIMPLIFIED = 100_000
-"""Faces that a simplified mesh may have: half of what MuJoCo takes."""
+_SIMPLIFIED_FACES = 100_000
+"""Maximum number of faces of a simplified mesh: half of MuJoCo's limit."""
 
-_GRID = 512
-"""Cells along the longest side of a mesh that is simplified, to begin with."""
+_INITIAL_CELLS = 512
+"""Number of cells along the longest side of a mesh in the first step of simplification."""
 
-_HULL_CORNERS = 500
-"""Corners of a hull that is written: it lies within a hundredth of its size."""
+_HULL_VERTICES = 500
+"""Maximum number of vertices of a convex hull that replaces a mesh. Its deviation is below 1% of
+its size."""
 
-_BLOATED = 2.0
-"""Volume of the hull over that of the solid from which it is told. Limbs and brackets have 1.1 to
-1.8; beyond 2 most of what collides is air."""
+_MAX_HULL_RATIO = 2.0
+"""Maximum ratio of the volumes of hull and mesh. Limbs and brackets have 1.1 to 1.8."""
 
-_FAR_UP = 3
-"""Folders up that a relative path may lead: from urdf/ to another package of the same workspace."""
+_MAX_PARENT_FOLDERS = 3
+"""Maximum number of `..` in a relative path, enough for another package of the same workspace."""
 
 
 @rule("MSH001", "missing-mesh", "error", fixes="unsafe")
 def missing_mesh(robot: Facts) -> Iterator[Violation]:
-    """A mesh file is not where the robot says.
+    """A mesh file does not exist.
 
-    MuJoCo stops at the first collision mesh that it cannot open. Isaac Sim, Genesis and PyBullet go
-    on in part, with a link that touches nothing or is not to be seen. A visual mesh that is missing
-    is a warning, since it takes no part in the training; of a MJCF file MuJoCo wants that, too.
+    MuJoCo stops at the first collision mesh that it cannot open. Isaac Sim, Genesis and PyBullet
+    may continue with a link that has no collision shape or is invisible. A missing visual mesh is
+    a warning, because it does not affect training. MuJoCo requires the visual meshes of an MJCF
+    file as well.
 
     Fix:
-        Put the file there, correct its name, or say where a package lies with --package NAME=DIR.
-        Where a file of that name lies in a folder around, --unsafe-fixes refers to it.
+        Add the file, correct its path, or set the folder of a package with --package NAME=DIR. If a
+        file of that name exists nearby, --unsafe-fixes refers to it.
 
     Source:
-        MuJoCo: "Error opening file"; URDF names files relative to its own folder.
+        MuJoCo: "Error opening file"; paths in a URDF are relative to its folder.
     """
     for used in meshes_by_name(robot):
         if is_lost(used) and not _is_written_absolute(robot, used):
-            there = is_elsewhere(used.mesh)
-            refused = robot.model.kind == "mjcf" and not used.collisions
+            is_required = robot.model.kind == "mjcf" and not used.collisions
             yield Violation(
                 subject=used.name,
                 source=used.source,
-                message=f"{_words(used)} does not exist: {_looked_for(robot, used)}"
-                + ("; MuJoCo does not load the robot without it" if refused else ""),
+                message=f"{_describe(used)}: does not exist; {_search_result(robot, used)}"
+                + ("; MuJoCo cannot load the robot without it" if is_required else ""),
                 severity="error" if used.collisions else "warning",
-                fix=_relative_fix(robot, used, "unsafe") if there else None,
+                fix=_relative_fix(robot, used, "unsafe") if is_elsewhere(used.mesh) else None,
             )
 
 
-def _looked_for(robot: Facts, used: UsedMesh) -> str:
-    """Return where a missing mesh was looked for, as the second half of a sentence."""
+def _search_result(robot: Facts, used: UsedMesh) -> str:
+    """Return where a missing mesh was searched."""
     mesh = used.mesh
     if is_elsewhere(mesh):
-        folder = robot.model.file.parent
-        return f"it is not in {folder}, but there is {mesh.path}"
+        folder = display_path(robot.model.file.parent)
+        return f"not found in {folder}, but {display_path(mesh.path)} exists"
     if re.match(r"(?i)[a-z]{2,}://", mesh.filename) and mesh.found_by == "nothing":
         package = re.match(r"(?i)(?:package|model)://([^/]+)", mesh.filename)
         if package is None:
-            return "nothing is fetched from a network"
+            return "network paths are not supported"
         return (
-            f"package {package[1]} was not given, and there is no package.xml or folder of that "
-            "name above or around the robot, nor in ROS_PACKAGE_PATH or AMENT_PREFIX_PATH"
+            f"package {package[1]} not found in --package, the folders above and around the robot, "
+            "ROS_PACKAGE_PATH or AMENT_PREFIX_PATH"
         )
-    return f"it is not at {mesh.path}"
+    return f"searched at {display_path(mesh.path)}"
 
 
 @rule("MSH002", "absolute-path", "error", fixes="unsafe")
 def absolute_path(robot: Facts) -> Iterator[Violation]:
-    """A mesh is named by a path from the root of somebody's disk.
+    """A mesh has an absolute path.
 
-    The robot loads on one machine and no other: not in a container, not on the cluster, not at
-    whoever downloads it.
+    The robot loads on one machine only: not in a container, on a cluster, or for other users.
 
     Fix:
-        Name it relative to the robot's file. --unsafe-fixes does so where the file, or one with the
-        same end of its path, lies near the robot.
+        Use a path relative to the robot's file. --unsafe-fixes does this if the file, or one with
+        the same end of the path, is near the robot.
 
     Source:
-        Every reader takes such a path as it is written.
+        All readers use absolute paths unchanged.
     """
     for used in meshes_by_name(robot):
         if not _is_written_absolute(robot, used):
             continue
-        missing = not robot.meshes.exists(used.mesh.path)
-        if missing:
-            where = "which does not exist here"
+        is_missing = not robot.meshes.exists(used.mesh.path)
+        if is_missing:
+            status = "which does not exist"
         elif used.mesh.found_by == "search":
-            where = f"which does not exist here; there is {used.mesh.path}"
+            status = f"which does not exist; found {display_path(used.mesh.path)} instead"
         else:
-            where = "which exists on this machine only"
+            status = "which exists on this machine only"
         yield Violation(
             subject=used.name,
             source=used.source,
-            message=f"the {used.role} has an absolute path, {used.name}, {where}",
-            fix=None if missing else _relative_fix(robot, used, "unsafe"),
+            message=f"path of the {used.role}: got the absolute path {used.name}, {status}; "
+            "expected a relative path",
+            fix=None if is_missing else _relative_fix(robot, used, "unsafe"),
         )
 
 
 def _is_written_absolute(robot: Facts, used: UsedMesh) -> bool:
-    """Return whether the file itself has an absolute path, rather than xacro's $(find) made it."""
+    """Return whether the file contains an absolute path that is not the result of $(find)."""
     if not is_absolute(used.name):
         return False
     if robot.model.kind != "xacro":
         return True
     folders = re.sub(r"(?i)^file:(//)?", "", used.name).split("/")[:-1]
-    # a macro may put the path together: what is left of it after two folders is telling enough
-    starts = ["/".join(folders[:k]).encode() for k in range(3, len(folders) + 1)]
-    texts = [_text(source) for source in robot.model.sources]
-    return any(start in text for start in starts for text in texts)
+    # A macro may assemble the path, so a prefix with two folders is sufficient.
+    prefixes = ["/".join(folders[:k]).encode() for k in range(3, len(folders) + 1)]
+    texts = [_read_or_empty(source) for source in robot.model.sources]
+    return any(prefix in text for prefix in prefixes for text in texts)
 
 
-def _text(path: Path) -> bytes:
+def _read_or_empty(path: Path) -> bytes:
     try:
         return read_bytes(path)
     except TerrainkitError:
@@ -153,41 +157,39 @@ def _text(path: Path) -> bytes:
 
 @rule("MSH003", "package-uri", "warning", fixes="safe")
 def package_uri(robot: Facts) -> Iterator[Violation]:
-    """A mesh is named by its ROS package.
+    """A mesh path refers to a ROS package.
 
-    `package://`, `model://` and `$(find ...)` mean something only where ROS or Gazebo is installed
-    and the package is on its path. MuJoCo looks for a folder that is called `package:`; others
-    guess. A relative path after `file://` is no better: what comes first is taken for a host.
+    `package://`, `model://` and `$(find ...)` work only where ROS or Gazebo is installed and the
+    package is on its path. MuJoCo looks for a folder called `package:`, and other readers guess.
+    A relative path after `file://` does not work either: its first part is read as a host name.
 
     Fix:
-        Name it relative to the robot's file; --fix does so for every mesh that was found.
+        Use a path relative to the robot's file. --fix does this for every mesh that was found.
 
     Source:
-        MuJoCo 4.0: "Error opening file 'package:/...'"; seen.
+        Observed in MuJoCo 4.0: "Error opening file 'package:/...'".
     """
     groups: dict[tuple[str, str], list[tuple[UsedMesh, Fix | None]]] = {}
     for used in meshes_by_name(robot):
-        host = used.name.lower().startswith("file:") and not is_absolute(used.name)
-        if not (host or names_package(used.name)) or is_lost(used):
+        has_host = used.name.lower().startswith("file:") and not is_absolute(used.name)
+        if not (has_host or is_package_uri(used.name)) or is_lost(used):
             continue
-        # a file of that name in another folder need not be the one that ROS would find
-        fix = _relative_fix(robot, used, "safe" if _ends_alike(used) else "unsafe")
-        place = "a host" if host else f"the package {_package_of(used.name)}"
-        key = place, fix.safety if fix else ""
-        groups.setdefault(key, []).append((used, fix))
-    for (place, _), alike in groups.items():
-        first, fix = alike[0]
-        edits = [edit for _, each in alike if each is not None for edit in each.edits]
-        text = (
-            fix.description if fix and len(alike) == 1 else "Refer to them relative to this file."
-        )
+        # A file of the same name in another folder may not be the one that ROS would find.
+        fix = _relative_fix(robot, used, "safe" if _is_same_path(used) else "unsafe")
+        scheme = "a host" if has_host else f"the package {_package_of(used.name)}"
+        groups.setdefault((scheme, fix.safety if fix else ""), []).append((used, fix))
+    for (scheme, _), members in groups.items():
+        first, fix = members[0]
+        edits = [edit for _, each in members if each is not None for edit in each.edits]
+        description = fix.description if fix and len(members) == 1 else "Use relative paths."
         yield Violation(
             subject=first.name,
             source=first.source,
-            message=f"{names((each.name for each, _ in alike), 2)}: named by {place}, which MuJoCo "
-            "cannot load",
-            measured={"meshes": len(alike)},
-            fix=None if fix is None else _fix(fix.safety, text, edits),
+            message=f"path of {len(members)} mesh{'es' * (len(members) > 1)} "
+            f"({names((each.name for each, _ in members), 2)}): refers to {scheme}; expected a "
+            "relative path, which MuJoCo can load",
+            measured={"meshes": len(members)},
+            fix=None if fix is None else _fix(fix.safety, description, edits),
         )
 
 
@@ -196,8 +198,8 @@ def _package_of(name: str) -> str:
     return match.group(1) if match else name
 
 
-def _ends_alike(used: UsedMesh) -> bool:
-    """Return whether the path in the package is the end of the path on disk, but for letters."""
+def _is_same_path(used: UsedMesh) -> bool:
+    """Return whether the path in the package is the end of the path on disk, ignoring case."""
     rest = re.sub(r"^(?:file:/*|\w+:/+[^/\\]+|\$\([^)]*\))[/\\]*", "", used.name)
     parts = [part.lower() for part in re.split(r"[/\\]+", rest) if part not in ("", ".", "..")]
     return [part.lower() for part in used.mesh.path.parts[-len(parts) :]] == parts
@@ -205,30 +207,28 @@ def _ends_alike(used: UsedMesh) -> bool:
 
 @rule("MSH004", "filename-case", "error", fixes="safe")
 def filename_case(robot: Facts) -> Iterator[Violation]:
-    """The name of a mesh differs from its file's in upper and lower case, or has backslashes.
+    """A mesh path differs from the file name in case, or contains backslashes.
 
-    It is found on Windows, and on most Macs, and nowhere where robots are trained: on Linux
-    `Foot.STL` and `foot.stl` are two files, and a backslash is a letter like any other.
+    The file is found on Windows and on most Macs, but not on Linux, where `Foot.STL` and `foot.stl`
+    are different files and a backslash is not a separator.
 
     Fix:
-        Write the name as the file has it, with slashes; --fix does.
+        Use the case of the file name, and forward slashes. --fix does this.
 
     Source:
-        POSIX file names are compared byte by byte.
+        POSIX compares file names byte by byte.
     """
     for used in meshes_by_name(robot):
-        right = None if is_lost(used) else right_letters(used.name, used.mesh.path)
-        if right is None:
+        expected = None if is_lost(used) else filename_on_disk(used.name, used.mesh.path)
+        if expected is None:
             continue
-        slashes = right == used.name.replace("\\", "/")
-        how = "has backslashes" if slashes else "has other letters than the file"
-        # a package path is made relative, with the right letters, by MSH003
-        edits = None if names_package(used.name) else renamed(robot, used.uses, right)
+        # MSH003 makes a package path relative, with the correct case.
+        edits = None if is_package_uri(used.name) else renamed(robot, used.uses, expected)
         yield Violation(
             subject=used.name,
             source=used.source,
-            message=f"the name {used.name} of the {used.role} {how}; wanted {right}",
-            fix=_fix("safe", f"Refer to it as {right}.", edits),
+            message=f"path of the {used.role}: got {used.name}; expected {expected}",
+            fix=_fix("safe", f"Change the path to {expected}.", edits),
         )
 
 
@@ -236,15 +236,17 @@ def filename_case(robot: Facts) -> Iterator[Violation]:
 def unsupported_format(robot: Facts) -> Iterator[Violation]:
     """A collision mesh is in a format that MuJoCo cannot read.
 
-    MuJoCo reads STL, OBJ and its own MSH, by the end of the name. COLLADA (.dae), which ROS is full
-    of, stops it at once. Visual meshes of a URDF are left alone: MuJoCo drops them.
+    MuJoCo reads STL, OBJ and its own MSH, depending on the suffix. It cannot load a robot with
+    COLLADA (.dae) meshes, which are common in ROS. Visual meshes of a URDF are not checked, because
+    MuJoCo discards them.
 
     Fix:
-        Convert it; --unsafe-fixes writes an STL beside it: its hull, if it has over 20,000 faces.
-        The up axis of COLLADA is left out of account, as RViz and MoveIt do; look at the result.
+        Convert the mesh. --unsafe-fixes writes an STL file beside it, or its convex hull if it has
+        more than 20,000 faces. As in RViz and MoveIt, the up axis of COLLADA is ignored; inspect
+        the result.
 
     Source:
-        MuJoCo 4.0: "no decoder found for mesh file"; seen.
+        Observed in MuJoCo 4.0: "no decoder found for mesh file".
     """
     for used in meshes_by_file(robot):
         suffix = used.mesh.path.suffix.lower()
@@ -253,27 +255,27 @@ def unsupported_format(robot: Facts) -> Iterator[Violation]:
         uses = used.uses if robot.model.kind == "mjcf" else used.collisions
         edits = None
         if _is_solid(robot.meshes, uses):
-            edits = replaced(robot, uses, ".stl", _converted(robot.meshes, used))
+            edits = replaced(robot, uses, ".stl", _convert(robot.meshes, used))
         yield Violation(
             subject=used.name,
             source=used.source,
-            message=f"{_words(used)} is a {suffix or 'nameless'} file; MuJoCo reads "
-            f"{', '.join(MUJOCO_SUFFIXES)}",
-            fix=_fix("unsafe", "Convert it to an STL beside it.", edits),
+            message=f"format of {_describe(used)}: got {suffix or 'no suffix'}; expected "
+            f"{', '.join(MUJOCO_SUFFIXES)} for MuJoCo",
+            fix=_fix("unsafe", "Convert it to STL.", edits),
         )
 
 
 def _is_solid(meshes: Meshes, uses: Sequence[MeshUse]) -> bool:
-    """Return whether a mesh can be read, and has a hull as every use scales it."""
+    """Return whether a mesh is readable and has a convex hull at the scale of every use."""
     try:
         return not any(meshes.is_flat(use.mesh) for use in uses)
     except MeshError:
         return False
 
 
-def _converted(meshes: Meshes, used: UsedMesh) -> Callable[[], bytes]:
+def _convert(meshes: Meshes, used: UsedMesh) -> Callable[[], bytes]:
     def convert() -> bytes:
-        if meshes.faces(used.mesh.path) > _MANY_FACES:
+        if meshes.faces(used.mesh.path) > _MAX_COLLISION_FACES:
             return _hull(meshes, used)()
         return binary_stl(meshes.surface(used.mesh.path))
 
@@ -281,48 +283,49 @@ def _converted(meshes: Meshes, used: UsedMesh) -> Callable[[], bytes]:
 
 
 def _hull(meshes: Meshes, used: UsedMesh) -> Callable[[], bytes]:
-    return lambda: binary_stl(meshes.hull(used.mesh.path, _HULL_CORNERS))
+    return lambda: binary_stl(meshes.hull(used.mesh.path, _HULL_VERTICES))
 
 
 @rule("MSH006", "malformed-mesh", "error")
 def malformed_mesh(robot: Facts) -> Iterator[Violation]:
-    """A mesh file is empty, cut off or something else than its name says.
+    """A mesh file is empty, truncated or in another format than its suffix.
 
-    A binary STL has 84 bytes and 50 for each face; one that has not was cut off while it was copied
-    or downloaded. Readers refuse it, or make triangles of what lies behind it in memory.
+    A binary STL has 84 bytes plus 50 per face. Any other size means that the file was truncated in
+    a copy or download. Readers reject it, or read triangles from invalid memory.
 
     Fix:
-        Get the file anew, or export it again.
+        Copy or download the file again, or export it again.
 
     Source:
-        MuJoCo 4.0: "STL file has wrong size", "is empty", "vertex coordinate is not finite"; seen.
+        Observed in MuJoCo 4.0: "STL file has wrong size", "is empty", "vertex coordinate is not
+        finite".
     """
     for used in meshes_by_file(robot):
-        problem, severity = _problem(robot.meshes, used)
+        problem, severity = _file_problem(robot.meshes, used)
         if problem:
             yield Violation(
                 subject=used.name,
                 source=used.source,
-                message=f"{_words(used)} {problem}",
+                message=f"{_describe(used)} {problem}",
                 severity=severity,
                 measured={"bytes": used.header.size},
             )
 
 
-def _problem(meshes: Meshes, used: UsedMesh) -> tuple[str, Severity]:
-    """Return what is wrong with a file, as far as no other rule says it, and how bad that is."""
+def _file_problem(meshes: Meshes, used: UsedMesh) -> tuple[str, Severity]:
+    """Return what is wrong with a file and the severity, unless another rule reports it."""
     if used.header.state in ("lfs", "missing"):
         return "", "info"
     if used.header.problem:
-        # every reader but MuJoCo's takes the faces and leaves the rest
-        harmless = not used.strict and used.header.faces is not None
-        return used.header.problem, "warning" if harmless else "error"
+        # All readers except MuJoCo read the faces and ignore the rest.
+        is_harmless = not used.strict and used.header.faces is not None
+        return used.header.problem, "warning" if is_harmless else "error"
     if used.header.format != "other":
         for use in used.collisions:
             try:
                 meshes.vertices(use.mesh)
             except TooLargeError as error:
-                return f"was not looked into: it {error}", "info"
+                return f"was not checked: it {error}", "info"
             except MeshError as error:
                 return str(error), "error"
     return "", "info"
@@ -330,16 +333,16 @@ def _problem(meshes: Meshes, used: UsedMesh) -> tuple[str, Severity]:
 
 @rule("MSH007", "ascii-stl", "error", fixes="safe")
 def ascii_stl(robot: Facts) -> Iterator[Violation]:
-    """A mesh is an STL of text.
+    """A mesh is an ASCII STL file.
 
-    MuJoCo reads binary STL only, and takes the text for a number of faces. Other readers take both;
-    so a mesh that is only drawn, in a URDF, is not worth more than a note.
+    MuJoCo reads binary STL only, and interprets the text as the number of faces. Other readers
+    support both formats, so a visual mesh of a URDF is only a note.
 
     Fix:
-        Save it as a binary STL; --fix writes one beside it.
+        Save it as binary STL. --fix writes one beside it.
 
     Source:
-        MuJoCo 4.0: "perhaps this is an ASCII file?"; seen.
+        Observed in MuJoCo 4.0: "perhaps this is an ASCII file?".
     """
     for used in meshes_by_file(robot):
         if used.header.format == "ascii-stl" and used.header.state == "fine":
@@ -348,10 +351,10 @@ def ascii_stl(robot: Facts) -> Iterator[Violation]:
             yield Violation(
                 subject=used.name,
                 source=used.source,
-                message=f"{_words(used)} is an ASCII STL of {used.header.size:,} bytes; MuJoCo "
-                "reads binary STL only",
+                message=f"format of {_describe(used)}: got ASCII STL of {used.header.size:,} "
+                "bytes; expected binary STL for MuJoCo",
                 severity="error" if used.strict else "info",
-                fix=_fix("safe", "Write a binary STL beside it.", edits),
+                fix=_fix("safe", "Convert it to binary STL.", edits),
             )
 
 
@@ -363,34 +366,34 @@ def _binary(meshes: Meshes, used: UsedMesh) -> Callable[[], bytes]:
 def too_many_faces(robot: Facts) -> Iterator[Violation]:
     """A mesh has over 200,000 faces.
 
-    MuJoCo refuses such an STL. Where it is only drawn, or in another format, it is read, and costs
-    memory and time for each of thousands of robots.
+    MuJoCo rejects such an STL file. A visual mesh, or a mesh in another format, can be loaded, but
+    it costs memory and time. Then it is a warning.
 
     Fix:
-        Reduce it, in Blender or MeshLab for the best result. --unsafe-fixes writes a coarser copy
-        beside it, of a collision mesh its hull.
+        Simplify the mesh, for example in Blender or MeshLab. --unsafe-fixes writes a simplified
+        copy beside it, or the convex hull of a collision mesh.
 
     Source:
-        MuJoCo 4.0: "number of faces should be between 1 and 200000"; seen.
+        Observed in MuJoCo 4.0: "number of faces should be between 1 and 200000".
     """
     for used in meshes_by_file(robot):
         faces = _faces(robot.meshes, used)
-        if faces is None or faces <= _MOST_FACES:
+        if faces is None or faces <= _MAX_STL_FACES:
             continue
-        refused = used.strict and used.header.format in ("stl", "ascii-stl")
+        is_rejected = used.strict and used.header.format in ("stl", "ascii-stl")
         yield Violation(
             subject=used.name,
             source=used.source,
-            message=f"{_words(used)} has {faces:,} faces; wanted {_MOST_FACES:,} or fewer, as "
-            "MuJoCo takes of an STL",
-            severity="error" if refused else "warning",
+            message=f"number of faces of {_describe(used)}: got {faces:,}; expected at most "
+            f"{_MAX_STL_FACES:,}, MuJoCo's limit for STL",
+            severity="error" if is_rejected else "warning",
             measured={"faces": faces},
-            fix=_fix("unsafe", "Write a coarser mesh beside it.", _coarser(robot, used)),
+            fix=_fix("unsafe", "Simplify the mesh.", _simplify_edits(robot, used)),
         )
 
 
 def _faces(meshes: Meshes, used: UsedMesh) -> int | None:
-    """Return the number of triangles, where that is known or worth the reading."""
+    """Return the number of faces, or None if it is unknown. Only collision meshes are read."""
     if used.header.state != "fine":
         return None
     if used.header.faces is not None or not used.collisions:
@@ -401,18 +404,18 @@ def _faces(meshes: Meshes, used: UsedMesh) -> int | None:
         return None
 
 
-def _coarser(robot: Facts, used: UsedMesh) -> Sequence[Edit] | None:
-    """Return edits for a mesh with too many faces: the hull of what collides, less of the rest."""
+def _simplify_edits(robot: Facts, used: UsedMesh) -> Sequence[Edit] | None:
+    """Return the edits that replace collision meshes by hulls and simplify visual meshes."""
     if used.header.format == "ascii-stl":
-        return None  # MSH007 comes first
-    drawn = [use for use in used.uses if not use.collides]
-    simplify = _simplified(robot.meshes, used)
-    if robot.model.kind == "mjcf":  # one element for all of them
+        return None  # MSH007 converts it first
+    visuals = [use for use in used.uses if not use.collides]
+    simplify = _simplify(robot.meshes, used)
+    if robot.model.kind == "mjcf":  # all uses share one element
         return replaced(robot, used.uses, "_simplified.stl", simplify)
     edits: list[Edit] = []
     for uses, ending, content in (
         (used.collisions, "_hull.stl", _hull(robot.meshes, used)),
-        (drawn, "_simplified.stl", simplify),
+        (visuals, "_simplified.stl", simplify),
     ):
         made = replaced(robot, uses, ending, content) if uses else ()
         if made is None or (content is not simplify and not _is_solid(robot.meshes, uses)):
@@ -421,18 +424,18 @@ def _coarser(robot: Facts, used: UsedMesh) -> Sequence[Edit] | None:
     return edits
 
 
-def _simplified(meshes: Meshes, used: UsedMesh) -> Callable[[], bytes]:
+def _simplify(meshes: Meshes, used: UsedMesh) -> Callable[[], bytes]:
     def simplify() -> bytes:
         surface = meshes.surface(used.mesh.path)
-        cells = _GRID
+        cells = _INITIAL_CELLS
         while True:
-            coarse = clustered(surface, cells)
+            coarse = cluster_vertices(surface, cells)
             if not len(coarse.faces):
-                raise MeshError("has nothing left once its corners are merged")
-            share = _SIMPLIFIED / len(coarse.faces)
+                raise MeshError("has no faces left after its vertices are merged")
+            share = _SIMPLIFIED_FACES / len(coarse.faces)
             if share >= 1:
                 return binary_stl(coarse)
-            # faces grow about as the square of the cells
+            # The number of faces grows with the square of the number of cells.
             cells = max(1, int(cells * min(0.9, share**0.5)))
 
     return simplify
@@ -442,108 +445,111 @@ def _simplified(meshes: Meshes, used: UsedMesh) -> Callable[[], bytes]:
 def dense_collision_mesh(robot: Facts) -> Iterator[Violation]:
     """A collision mesh has over 20,000 faces.
 
-    It is the mesh that is drawn. MuJoCo and PhysX make a hull or pieces of it each time the robot
-    is loaded, PyBullet and Gazebo may collide with every face, and none of it makes contacts better
-    than a hull, or a few primitives, would.
+    It is usually the visual mesh. MuJoCo and PhysX compute its hull or a decomposition each time
+    the robot is loaded, and PyBullet and Gazebo may collide with every face. The contacts are no
+    better than those of a convex hull or a few primitives.
 
     Fix:
-        Use primitives, a hull, or a few convex pieces (CoACD). --unsafe-fixes writes the hull of at
-        most 500 corners beside it.
+        Use primitives, a convex hull, or a convex decomposition (CoACD). --unsafe-fixes writes a
+        hull with at most 500 vertices beside it.
 
     Source:
         MuJoCo's documentation, "Collision detection": meshes collide by their hulls.
     """
     for used in meshes_by_file(robot):
         faces = _faces(robot.meshes, used) if used.collisions else None
-        if faces is None or not _MANY_FACES < faces <= _MOST_FACES:
+        if faces is None or not _MAX_COLLISION_FACES < faces <= _MAX_STL_FACES:
             continue
         if robot.model.kind == "urdf" and used.mesh.path.suffix.lower() not in MUJOCO_SUFFIXES:
-            continue  # what MSH005 converts gets a hull
+            continue  # MSH005 converts it to a hull
         yield Violation(
             subject=used.name,
             source=used.collisions[0].mesh.source,
-            message=f"{_words(used)} has {faces:,} faces; wanted {_MANY_FACES:,} or fewer",
+            message=f"number of faces of {_describe(used)}: got {faces:,}; expected at most "
+            f"{_MAX_COLLISION_FACES:,}",
             measured={"faces": faces},
-            fix=_fix("unsafe", "Collide with its hull.", _hull_edits(robot, used)),
+            fix=_fix("unsafe", "Use its convex hull for collision.", _hull_edits(robot, used)),
         )
 
 
 def _hull_edits(robot: Facts, used: UsedMesh) -> Sequence[Edit] | None:
-    drawn = {use.mesh.source for use in used.uses if not use.collides}
-    shared = any(use.mesh.source in drawn for use in used.collisions)
-    if shared or used.header.format == "ascii-stl" or not _is_solid(robot.meshes, used.collisions):
+    visuals = {use.mesh.source for use in used.uses if not use.collides}
+    is_shared = any(use.mesh.source in visuals for use in used.collisions)
+    if (
+        is_shared
+        or used.header.format == "ascii-stl"
+        or not _is_solid(robot.meshes, used.collisions)
+    ):
         return None
     return replaced(robot, used.collisions, "_hull.stl", _hull(robot.meshes, used))
 
 
 @rule("MSH010", "flat-mesh", "error")
 def flat_mesh(robot: Facts) -> Iterator[Violation]:
-    """A collision mesh lies in a plane, and so has no hull.
+    """A collision mesh is flat and has no convex hull.
 
-    Simulators collide with hulls. Of a flat mesh there is none: MuJoCo and PhysX refuse it. It is
-    flat if it is thinner than 1/10,000 of its diagonal; a scale of 0 makes it so, too.
+    Simulators collide with convex hulls. A flat mesh has none, and MuJoCo and PhysX reject it. A
+    mesh is flat if its thickness is below 1/10,000 of its diagonal, which includes a scale of 0.
 
     Fix:
-        Use a thin box in its place.
+        Use a thin box instead.
 
     Source:
-        MuJoCo 4.0: "has coplanar vertices", "at least 4 vertices required"; seen.
+        Observed in MuJoCo 4.0: "has coplanar vertices", "at least 4 vertices required".
     """
     for used in meshes_by_file(robot):
         for use in used.collisions:
-            if not robot.meshes.readable(use.mesh) or not robot.meshes.is_flat(use.mesh):
+            if not robot.meshes.is_readable(use.mesh) or not robot.meshes.is_flat(use.mesh):
                 continue
-            corners = robot.meshes.vertices(use.mesh)
-            flat = thickness(corners)
+            vertices = robot.meshes.vertices(use.mesh)
+            relative = thickness(vertices)
             yield Violation(
                 subject=used.name,
                 source=use.mesh.source,
-                message=f"{_words(used)} is flat: where its {len(corners):,} corners are "
-                f"closest together they span {flat:.2g} of its diagonal; wanted {FLAT:g} or more, "
-                "or there is no hull",
-                measured={"corners": len(corners), "thickness": flat},
+                message=f"thickness of {_describe(used)} over its diagonal: got {relative:.2g}; "
+                f"expected at least {FLAT:g}",
+                measured={"corners": len(vertices), "thickness": relative},
             )
             break
 
 
 @rule("MSH011", "wrong-scale", "error")
 def wrong_scale(robot: Facts) -> Iterator[Violation]:
-    """A mesh is many times too large or too small for the joints around it.
+    """A mesh is far too large or too small compared with the joint distances.
 
-    Millimetres were taken for metres, or a scale was left out or given twice. A collision mesh a
-    thousand times too large holds the whole robot; one too small touches nothing.
+    The mesh is in millimeters instead of meters, or its scale is missing or applied twice. A
+    collision mesh that is 1000 times too large contains the whole robot. One that is too small
+    touches nothing.
 
-    It is measured by the diagonal of its box against the distance to the next joints: over 50 times
-    is an error, over 15 times a warning, and so is under 1/50 an error, where the part is a dot of
-    less than 5 mm. Only what nothing but a wrong unit explains is told: details, sensors, and
-    scenery on a base without mass may be of any size.
+    The diagonal of the bounding box is compared with the distance to the adjacent joints. A ratio
+    above 50 is an error, above 15 a warning. A ratio below 1/50 is an error if the mesh is smaller
+    than 5 mm. Sensors, details, and scenery on a base without mass are not reported.
 
     Fix:
-        Correct the scale: 0.001 0.001 0.001 for a file in millimetres, 0.0254 for inches.
+        Correct the scale: 0.001 0.001 0.001 for millimeters, 0.0254 0.0254 0.0254 for inches.
 
     Source:
-        STL has no unit; URDF and MJCF measure in metres.
+        STL has no unit; URDF and MJCF use meters.
     """
     scales = Scales(robot)
     files = meshes_by_file(robot)
     if files and scales.span <= 0:
-        raise CannotCheckError(
-            "no joint is away from another, so that nothing says how large it is"
-        )
+        raise CannotCheckError("all joints have the same position, so the size is unknown")
     for used in files:
         for use in used.uses:
             misfit = scales.misfit(use)
             if misfit is None:
                 continue
-            large = misfit.ratio > 1
+            is_large = misfit.ratio > 1
             yield Violation(
                 subject=used.name,
                 source=use.mesh.scale_source or use.mesh.source,
-                message=f"{used.name} measures {misfit.diagonal:.3g} m on link {use.link.name}, "
-                f"{misfit.ratio:.3g} times the {misfit.reference:.3g} m {misfit.against}; wanted "
-                + (f"{LARGE:g} times or less" if large else f"{TINY:g} times or more"),
-                hint=_hint(misfit),
-                severity="warning" if large and misfit.ratio <= HUGE else "error",
+                message=f"size of mesh {used.name} on link {use.link.name}: got "
+                f"{misfit.diagonal:.3g} m, {misfit.ratio:.3g} times the {misfit.reference:.3g} m "
+                f"{misfit.against}; expected "
+                + (f"at most {LARGE:g} times" if is_large else f"at least {TINY:g} times"),
+                hint=_scale_hint(misfit),
+                severity="warning" if is_large and misfit.ratio <= HUGE else "error",
                 certainty="likely",
                 measured={
                     "diagonal": misfit.diagonal,
@@ -554,24 +560,22 @@ def wrong_scale(robot: Facts) -> Iterator[Violation]:
             break
 
 
-def _hint(misfit: Misfit) -> str:
+def _scale_hint(misfit: Misfit) -> str:
     if misfit.ratio > 1:
-        return (
-            'If the file is in millimetres, scale it by "0.001 0.001 0.001"; in inches, by 0.0254.'
-        )
-    return "If it was scaled from millimetres twice, or is in metres, take the scale away."
+        return 'Set scale="0.001 0.001 0.001" if the file is in millimeters, 0.0254 if in inches.'
+    return "Remove the scale if the file is in meters or was already scaled."
 
 
 @rule("MSH012", "negative-scale", "warning")
 def negative_scale(robot: Facts) -> Iterator[Violation]:
     """A mesh is mirrored by a negative scale.
 
-    PhysX takes no negative scale for a convex mesh, Webots none at all, and where the corners are
-    multiplied and the faces stay as they are the mesh is inside out. A mesh that is only drawn, and
-    one in MJCF, where this is allowed, is a note.
+    PhysX does not support a negative scale for convex meshes, and Webots does not support it at
+    all. In readers that only scale the vertices, the mesh is inside out. It is a note for visual
+    meshes and for MJCF, which allows it.
 
     Fix:
-        Save a mirrored copy of the file, and scale that by positive numbers.
+        Save a mirrored copy of the file and use a positive scale.
 
     Source:
         PhysX: PxConvexMeshGeometry; Webots: Transform; MuJoCo: mesh/scale allows it.
@@ -581,13 +585,13 @@ def negative_scale(robot: Facts) -> Iterator[Violation]:
         if not mirrored:
             continue
         first = next((use for use in mirrored if use.collides), mirrored[0])
-        harmful = first.collides and robot.model.kind != "mjcf"
+        is_harmful = first.collides and robot.model.kind != "mjcf"
         scale = " ".join(f"{factor:g}" for factor in first.mesh.scale)
         yield Violation(
             subject=used.name,
             source=first.mesh.scale_source or first.mesh.source,
-            message=f"{_words(used)} is scaled by {scale}; wanted numbers over 0",
-            severity="warning" if harmful else "info",
+            message=f"scale of {_describe(used)}: got {scale}; expected values > 0",
+            severity="warning" if is_harmful else "info",
         )
 
 
@@ -595,8 +599,8 @@ def negative_scale(robot: Facts) -> Iterator[Violation]:
 def lfs_pointer(robot: Facts) -> Iterator[Violation]:
     """A mesh file is a Git LFS pointer.
 
-    The repository was cloned without Git LFS, or downloaded as an archive: in the place of each
-    large file there are three lines of text that say where it is kept. No simulator reads them.
+    The repository was cloned without Git LFS, or downloaded as an archive. Each large file is
+    replaced by three lines of text with its hash, which no simulator can read.
 
     Fix:
         Run `git lfs install` and `git lfs pull` in the repository.
@@ -609,29 +613,29 @@ def lfs_pointer(robot: Facts) -> Iterator[Violation]:
             yield Violation(
                 subject=used.name,
                 source=used.source,
-                message=f"{_words(used)} {used.header.problem}",
+                message=f"{_describe(used)} {used.header.problem}",
                 measured={"bytes": used.header.size},
             )
 
 
 @rule("MSH014", "nonconvex-collision", "info")
 def nonconvex_collision(robot: Facts) -> Iterator[Violation]:
-    """The hull of a collision mesh is far larger than the mesh.
+    """The convex hull of a collision mesh is far larger than the mesh.
 
-    MuJoCo, and PhysX unless it is told otherwise, collide with the hull: holes, notches and the
-    inside of a shell are filled. That is right for a limb, and wrong for what should fit into
-    something else, such as a gripper or a bracket around a joint. It is told if the hull has more
-    than twice the volume of the closed mesh.
+    MuJoCo, and PhysX by default, collide with the convex hull, which fills holes and concave parts.
+    This is acceptable for a limb, but not for parts that enclose others, such as a gripper or a
+    bracket around a joint. The rule reports closed meshes whose hull has more than twice their
+    volume.
 
     Fix:
-        If its notches matter, use several convex pieces (CoACD) or primitives.
+        Use a convex decomposition (CoACD) or primitives if the concave parts matter.
 
     Source:
         MuJoCo's documentation, "Collision detection": meshes collide by their hulls.
     """
     for used in meshes_by_file(robot):
         faces = _faces(robot.meshes, used) if used.collisions else None
-        if faces is None or faces > _MOST_FACES:
+        if faces is None or faces > _MAX_STL_FACES:
             continue
         first = used.collisions[0]
         try:
@@ -641,34 +645,35 @@ def nonconvex_collision(robot: Facts) -> Iterator[Violation]:
             hull = robot.meshes.hull_volume(first.mesh)
         except MeshError:
             continue
-        if hull > _BLOATED * solid:
+        if hull > _MAX_HULL_RATIO * solid:
             yield Violation(
                 subject=used.name,
                 source=first.mesh.source,
-                message=f"{_words(used)} encloses {solid:.3g} m3, and its hull {hull:.3g} m3: "
-                f"{hull / solid:.3g} times as much; wanted {_BLOATED:g} times or less",
+                message=f"volume of the convex hull of {_describe(used)}: got {hull:.3g} m3, "
+                f"{hull / solid:.3g} times that of the mesh; expected at most {_MAX_HULL_RATIO:g} "
+                "times",
                 measured={"solid": solid, "hull": hull},
             )
 
 
-def _words(used: UsedMesh) -> str:
-    return f"{used.name}, {used.role},"
+def _describe(used: UsedMesh) -> str:
+    return f"mesh {used.name} ({used.role})"
 
 
 def _relative_fix(robot: Facts, used: UsedMesh, safety: Literal["safe", "unsafe"]) -> Fix | None:
-    """Return a fix that names the file relative to the robot's, if it lies near."""
+    """Return a fix that uses a relative path, or None if the file is too far away."""
     if robot.model.kind != "urdf":
-        return None  # a name in MJCF starts at meshdir
+        return None  # MJCF paths are relative to meshdir
     name = relative_name(robot, used.mesh.path)
-    if is_absolute(name) or name.split("/").count("..") > _FAR_UP:
+    if is_absolute(name) or name.split("/").count("..") > _MAX_PARENT_FOLDERS:
         return None
-    return _fix(safety, f"Refer to it as {name}.", renamed(robot, used.uses, name))
+    return _fix(safety, f"Change the path to {name}.", renamed(robot, used.uses, name))
 
 
 def _fix(
     safety: Literal["safe", "unsafe"], description: str, edits: Iterable[Edit] | None
 ) -> Fix | None:
-    """Return a fix; None where the file cannot be edited."""
+    """Return a fix, or None if the file cannot be edited."""
     if edits is None:
         return None
     return Fix(safety=safety, description=description, edits=tuple(edits))

@@ -1,4 +1,4 @@
-"""Names: whether configurations, simulators and people will take them for what they are."""
+"""NAM: rules on the names of links and joints."""
 
 import re
 from collections import Counter
@@ -12,46 +12,46 @@ from terrainkit_robots.description.model import Joint, Link
 from terrainkit_robots.lint.rule import Violation, rule
 from terrainkit_robots.text import names, short
 
-_FEWEST_TWINS = 4
-"""Of fewer mirrored names nobody could tell a pattern."""
+_MIN_PAIRS = 4
+"""Minimum number of mirrored pairs from which a naming pattern is derived."""
 
-_SEEN = 3
-"""A difference between mirrored names seen so often is the side; a slip is in a joint's name, and
-perhaps again in its link's."""
+_MIN_COUNT = 3
+"""A difference between mirrored names that occurs this often marks the side. A misspelling occurs
+in one joint, and possibly again in its link."""
 
-_REGULAR = 0.75
-"""Where this share of mirrored names differ by the side only, the others break a pattern."""
+_MIN_REGULAR = 0.75
+"""Minimum share of mirrored pairs that follow the pattern. With fewer, there is no pattern."""
 
-_ALIKE = 0.75
-"""Share of common letters from which on two names are the same with a slip, rather than two names.
-Left and right hands may well hold two tools."""
+_MIN_SIMILARITY = 0.75
+"""Minimum share of common letters for a name to be a misspelling. Below, the names are different on
+purpose, such as two tools in the left and the right hand."""
 
-_MOST_LETTERS = 100
-"""Longer names are not looked into."""
+_MAX_LENGTH = 100
+"""Maximum length of a name that is analyzed."""
 
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^A-Za-z\d]+")
 
 
-# Siblings.
+# NAM001: names of mirrored links and joints.
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Twins:
-    """The names of two links or two joints that are mirror images of each other."""
+class _MirrorPair:
+    """Two links or two joints that are mirror images of each other."""
 
     left: Link | Joint
     right: Link | Joint
 
-    sure: bool
-    """Whether they belong together even if their names are nothing alike: joints of legs."""
+    in_legs: bool
+    """Whether they are part of legs. Then they correspond even if their names are not similar."""
 
     @property
-    def what(self) -> str:
+    def kind(self) -> str:
         return "joint" if isinstance(self.left, Joint) else "link"
 
     @cached_property
-    def differences(self) -> frozenset[tuple[str, str]]:
-        """Words of the left one, and what the right one has in their place."""
+    def word_pairs(self) -> frozenset[tuple[str, str]]:
+        """The words of the left name that differ, each with the word in the right name."""
         left, right = _words(self.left.name), _words(self.right.name)
         if len(left) == len(right):
             pairs = [(a, b) for a, b in zip(left, right, strict=True) if a != b]
@@ -69,8 +69,8 @@ def _words(name: str) -> list[str]:
     return _WORD.findall(name)
 
 
-def _trimmed(left: str, right: str) -> tuple[str, str]:
-    """Return two words without what they begin and end with in common; numbers as they are."""
+def _strip_common(left: str, right: str) -> tuple[str, str]:
+    """Return two words without their common prefix and suffix. Numbers are not changed."""
     if left.isdigit() or right.isdigit():
         return left, right
     while left and right and left[0] == right[0]:
@@ -82,173 +82,178 @@ def _trimmed(left: str, right: str) -> tuple[str, str]:
 
 @rule("NAM001", "inconsistent-name", "warning")
 def inconsistent_name(robot: Facts) -> Iterator[Violation]:
-    """A name breaks the pattern that its siblings follow.
+    """A name does not follow the pattern of the other names.
 
-    Configurations address joints and links by patterns such as .*_thigh_joint. The one that is
-    spelt otherwise is left out without a word: its stiffness, its default position or its penalty
-    are those of no joint.
+    Configurations address joints and links by patterns such as `.*_thigh_joint`. A joint with
+    another spelling is silently left out and gets no stiffness, default position or penalty.
 
     Fix:
-        Rename it, wherever it is used, or check that every pattern in your configuration matches
-        it, too.
+        Rename it and update all references, or check that every pattern in your configuration
+        matches it.
 
     Source:
-        legged_gym looks for names as substrings, Isaac Lab by regular expressions.
+        legged_gym matches names by substring, Isaac Lab by regular expression.
     """
-    twins = [t for t in _twins(robot) if len(t.left.name + t.right.name) <= 2 * _MOST_LETTERS]
-    sides = _Sides(twins)
-    known = _Names(robot, sides)
-    for what in ("joint", "link"):
-        kind = [each for each in twins if each.what == what]
-        odd = [each for each in kind if not sides.explain(each)]
-        if len(kind) < _FEWEST_TWINS or len(odd) > (1 - _REGULAR) * len(kind):
+    pairs = [p for p in _mirror_pairs(robot) if len(p.left.name + p.right.name) <= 2 * _MAX_LENGTH]
+    sides = _Sides(pairs)
+    model_names = _ModelNames(robot, sides)
+    for kind in ("joint", "link"):
+        of_kind = [pair for pair in pairs if pair.kind == kind]
+        irregular = [pair for pair in of_kind if not sides.is_explaining(pair)]
+        if len(of_kind) < _MIN_PAIRS or len(irregular) > (1 - _MIN_REGULAR) * len(of_kind):
             continue
-        if what == "link":
-            odd += _carried(robot, sides)
-        for each in odd:
-            yield from known.odd(each)
+        if kind == "link":
+            irregular += _unmatched_links(robot, sides)
+        for pair in irregular:
+            yield from model_names.misspelled(pair)
 
 
-def _twins(robot: Facts) -> Iterator[_Twins]:
-    """Yield the joints and links whose bodies are mirrored."""
+def _mirror_pairs(robot: Facts) -> Iterator[_MirrorPair]:
+    """Yield the joints and top links of mirrored bodies."""
     legs = robot.leg_bodies
     for pair in robot.mirror.pairs:
         left, right = robot.bodies[pair.left], robot.bodies[pair.right]
-        sure = pair.left in legs and pair.right in legs
+        in_legs = pair.left in legs and pair.right in legs
         if left.joint is not None and right.joint is not None:
-            yield _Twins(left=left.joint, right=right.joint, sure=sure)
+            yield _MirrorPair(left=left.joint, right=right.joint, in_legs=in_legs)
         if not (left.top.virtual or right.top.virtual):
-            yield _Twins(left=left.top, right=right.top, sure=sure)
+            yield _MirrorPair(left=left.top, right=right.top, in_legs=in_legs)
 
 
 class _Sides:
-    """What left and right are called in the names of a robot: what they differ by again and again.
+    """The words that mark left and right in the names of a robot.
 
-    No list of words says so: legs may be numbered, or be called port and starboard.
+    They are derived from frequent differences between mirrored names, not from a list of words,
+    because legs may be numbered or called port and starboard.
     """
 
-    def __init__(self, twins: Sequence[_Twins]) -> None:
-        differences = [pair for each in twins for pair in each.differences]
-        self._words = _often(differences)
-        self._letters = _often([_trimmed(*pair) for pair in differences])
-        self._known = {word for pair in self._words for word in pair}
-        seen = Counter(
-            pair
-            for each in twins
-            if self.explain(each) and len(_words(each.left.name)) == len(_words(each.right.name))
-            for pair in each.differences
+    def __init__(self, pairs: Sequence[_MirrorPair]) -> None:
+        word_pairs = [words for pair in pairs for words in pair.word_pairs]
+        self._words = _frequent(word_pairs)
+        self._letters = _frequent([_strip_common(*words) for words in word_pairs])
+        self._known = {word for words in self._words for word in words}
+        counts = Counter(
+            words
+            for pair in pairs
+            if self.is_explaining(pair)
+            and len(_words(pair.left.name)) == len(_words(pair.right.name))
+            for words in pair.word_pairs
         )
-        often = [pair for pair, _ in reversed(seen.most_common())]  # the most common one wins
-        self._right = dict(often)
-        self._left = {right: left for left, right in often}
+        ordered = [words for words, _ in reversed(counts.most_common())]  # the most common wins
+        self._to_right = dict(ordered)
+        self._to_left = {right: left for left, right in ordered}
 
-    def explain(self, twins: _Twins) -> bool:
-        """Return whether two names differ by the side only."""
+    def is_explaining(self, pair: _MirrorPair) -> bool:
+        """Return whether two names differ only by the side."""
         return all(
-            pair in self._words
-            or (_trimmed(*pair) in self._letters and self._known.isdisjoint(pair))
-            for pair in twins.differences
+            words in self._words
+            or (_strip_common(*words) in self._letters and self._known.isdisjoint(words))
+            for words in pair.word_pairs
         )
 
-    def right(self, name: str) -> str | None:
-        """Return what the mirror image of a left one is called; None for a name without a side."""
-        return _translated(name, self._right)
+    def to_right(self, name: str) -> str | None:
+        """Return the right counterpart of a left name, or None if the name has no side."""
+        return _translate(name, self._to_right)
 
-    def left(self, name: str) -> str | None:
-        """Return what the mirror image of a right one is called; None for one without a side."""
-        return _translated(name, self._left)
+    def to_left(self, name: str) -> str | None:
+        """Return the left counterpart of a right name, or None if the name has no side."""
+        return _translate(name, self._to_left)
 
-    def form(self, name: str) -> str:
-        """Return a name without its sides."""
-        sides = self._right.keys() | self._left.keys()
+    def pattern(self, name: str) -> str:
+        """Return a name with its sides replaced by `*`."""
+        sides = self._to_right.keys() | self._to_left.keys()
         return "".join("*" if word in sides else word for word in _words(name))
 
 
-def _often(items: Iterable[tuple[str, str]]) -> set[tuple[str, str]]:
-    return {item for item, count in Counter(items).items() if count >= _SEEN}
+def _frequent(items: Iterable[tuple[str, str]]) -> set[tuple[str, str]]:
+    return {item for item, count in Counter(items).items() if count >= _MIN_COUNT}
 
 
-class _Names:
-    """The names of a robot, and how usual each one is."""
+class _ModelNames:
+    """The names of a robot, with counts of their patterns and words."""
 
     def __init__(self, robot: Facts, sides: _Sides) -> None:
         self._sides = sides
-        self._taken = {
+        self._existing = {
             "link": {link.name for link in robot.model.links},
             "joint": {joint.name for joint in robot.model.joints},
         }
-        every = set.union(*self._taken.values())
-        brief = [name for name in every if len(name) <= _MOST_LETTERS]
-        self._forms = Counter(sides.form(name) for name in brief)
-        self._words = Counter(word for name in brief for word in set(_words(name)))
+        all_names = set.union(*self._existing.values())
+        analyzed = [name for name in all_names if len(name) <= _MAX_LENGTH]
+        self._patterns = Counter(sides.pattern(name) for name in analyzed)
+        self._words = Counter(word for name in analyzed for word in set(_words(name)))
 
-    def odd(self, twins: _Twins) -> Iterator[Violation]:
-        """Yield the one of two twins whose name has a slip, if one has."""
-        right, left = self._sides.right(twins.left.name), self._sides.left(twins.right.name)
-        taken = self._taken[twins.what]
-        if (right is None and left is None) or right in taken or left in taken:
-            return  # names without sides, or two pairs that are named crosswise
-        if not (twins.sure or _is_slip(right, twins.right.name) or _is_slip(left, twins.left.name)):
+    def misspelled(self, pair: _MirrorPair) -> Iterator[Violation]:
+        """Yield a violation for the name of a pair that is misspelled, if there is one."""
+        right, left = self._sides.to_right(pair.left.name), self._sides.to_left(pair.right.name)
+        existing = self._existing[pair.kind]
+        if (right is None and left is None) or right in existing or left in existing:
+            return  # names without sides, or two pairs with swapped names
+        if not (
+            pair.in_legs
+            or _is_misspelling(right, pair.right.name)
+            or _is_misspelling(left, pair.left.name)
+        ):
             return
-        counts = self._uses(twins.left.name), self._uses(twins.right.name)
-        odd, twin, wanted = twins.right, twins.left, right
-        if counts[0] < counts[1]:
-            odd, twin, wanted = twins.left, twins.right, left
+        left_counts, right_counts = self._counts(pair.left.name), self._counts(pair.right.name)
+        item, mirror, expected = pair.right, pair.left, right
+        if left_counts < right_counts:
+            item, mirror, expected = pair.left, pair.right, left
+        is_clear = expected and left_counts != right_counts
         yield Violation(
-            subject=odd.name,
-            source=odd.source,
-            message=f"{twins.what} {odd.name} is the mirror image of {twin.name}, but the names "
-            "differ by more than the side, unlike those of the others"
-            + (f"; wanted {wanted}" if wanted and counts[0] != counts[1] else ""),
+            subject=item.name,
+            source=item.source,
+            message=f"name of the mirror image of {pair.kind} {mirror.name}: got {item.name}; "
+            f"expected {expected if is_clear else 'a name that differs only by the side'}",
             certainty="likely",
         )
 
-    def _uses(self, name: str) -> tuple[int, int]:
-        """Return how many names have the form of this one, and how many its rarest word."""
+    def _counts(self, name: str) -> tuple[int, int]:
+        """Return how many names have the same pattern, and how many contain its rarest word."""
         words = [self._words[word] for word in _words(name)]
-        return self._forms[self._sides.form(name)], min(words, default=0)
+        return self._patterns[self._sides.pattern(name)], min(words, default=0)
 
 
-def _carried(robot: Facts, sides: _Sides) -> Iterator[_Twins]:
-    """Yield links that mirrored bodies carry, if one on either side has no counterpart."""
+def _unmatched_links(robot: Facts, sides: _Sides) -> Iterator[_MirrorPair]:
+    """Yield the merged links of mirrored bodies where one link on each side has no counterpart."""
     for pair in robot.mirror.pairs:
         left, right = robot.bodies[pair.left].links[1:], robot.bodies[pair.right].links[1:]
-        expected = {sides.right(link.name) or link.name: link for link in left}
+        expected = {sides.to_right(link.name) or link.name: link for link in left}
         present = {link.name: link for link in right}
-        alone = [link for name, link in expected.items() if name not in present]
-        others = [link for name, link in present.items() if name not in expected]
-        if len(alone) == len(others) == 1:
-            yield _Twins(left=alone[0], right=others[0], sure=False)
+        only_left = [link for name, link in expected.items() if name not in present]
+        only_right = [link for name, link in present.items() if name not in expected]
+        if len(only_left) == len(only_right) == 1:
+            yield _MirrorPair(left=only_left[0], right=only_right[0], in_legs=False)
 
 
-def _translated(name: str, translation: Mapping[str, str]) -> str | None:
-    """Return a name with other sides; None if it has none."""
+def _translate(name: str, translation: Mapping[str, str]) -> str | None:
+    """Return a name with its words replaced, or None if no word is in `translation`."""
     other = "".join(translation.get(word, word) for word in _words(name))
     return None if other == name else other
 
 
-def _is_slip(expected: str | None, name: str) -> bool:
-    """Return whether a name is the expected one but for a slip; numbers are no slip."""
+def _is_misspelling(expected: str | None, name: str) -> bool:
+    """Return whether a name is similar to the expected one. Different numbers do not count."""
     if expected is None or re.sub(r"\d+", "", expected) == re.sub(r"\d+", "", name):
         return False
-    return SequenceMatcher(None, expected, name, autojunk=False).ratio() >= _ALIKE
+    return SequenceMatcher(None, expected, name, autojunk=False).ratio() >= _MIN_SIMILARITY
 
 
-# Identifiers.
+# NAM002: valid identifiers.
 
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 @rule("NAM002", "invalid-name", "warning")
 def invalid_name(robot: Facts) -> Iterator[Violation]:
-    """Names have characters that not every simulator takes.
+    """A name contains characters that some simulators do not support.
 
-    USD, and with it Isaac Sim and Isaac Lab, knows letters, digits and underscores. It puts an
-    underscore in the place of everything else, after which the patterns of a configuration that was
-    written for the URDF match nothing, and two names may have become one.
+    USD, which Isaac Sim and Isaac Lab use, supports letters, digits and underscores. It replaces
+    all other characters by underscores. Patterns in a configuration that was written for the URDF
+    then match nothing, and two names may become the same, which is an error.
 
     Fix:
-        Use letters, digits and underscores, and begin with a letter.
+        Use letters, digits and underscores, and start with a letter.
 
     Source:
         OpenUSD, TfMakeValidIdentifier.
@@ -258,100 +263,101 @@ def invalid_name(robot: Facts) -> Iterator[Violation]:
     if robot.model.kind != "mjcf":
         joints = [joint for joint in robot.model.joints if joint.name]
     renamed: dict[str, Link | Joint] = {}
-    every: tuple[tuple[str, Sequence[Link | Joint]], ...] = (("links", links), ("joints", joints))
-    for what, items in every:
-        clashing = _clashing(items)
-        for valid, same in clashing.items():
-            yield _clash(what, valid, same)
-        told = {item.name for same in clashing.values() for item in same}
+    kinds: tuple[tuple[str, Sequence[Link | Joint]], ...] = (("links", links), ("joints", joints))
+    for kind, items in kinds:
+        conflicts = _conflicts(items)
+        for valid, same in conflicts.items():
+            yield _conflict_violation(kind, valid, same)
+        reported = {item.name for same in conflicts.values() for item in same}
         for item in items:
-            if item.name not in told and not _IDENTIFIER.fullmatch(item.name):
+            if item.name not in reported and not _IDENTIFIER.fullmatch(item.name):
                 renamed.setdefault(item.name, item)
     if renamed:
         first = next(iter(renamed.values()))
-        count = f"{len(renamed)} names have" if len(renamed) > 1 else "a name has"
+        count = f"{len(renamed)} names" if len(renamed) > 1 else "1 name"
         yield Violation(
             subject=first.name,
             source=first.source,
-            message=f"{count} other characters than letters, digits and underscores: "
-            f"{names(renamed)}; USD would call the first {short(_valid(first.name))}",
+            message=f"{count} with other characters than letters, digits and underscores: "
+            f"{names(renamed)}; USD renames {short(first.name)} to {short(_valid(first.name))}",
             measured={"names": len(renamed)},
         )
 
 
 def _valid(name: str) -> str:
-    """Return what USD calls it."""
+    """Return the name that USD uses instead."""
     return re.sub(r"[^A-Za-z_]", "_", name[:1]) + re.sub(r"[^A-Za-z0-9_]", "_", name[1:])
 
 
-def _clashing(items: Sequence[Link | Joint]) -> dict[str, list[Link | Joint]]:
-    """Return those whose names are different, and become the same."""
+def _conflicts(items: Sequence[Link | Joint]) -> dict[str, list[Link | Joint]]:
+    """Return the items with different names that USD renames to the same name."""
     groups: dict[str, dict[str, Link | Joint]] = {}
     for item in items:
         groups.setdefault(_valid(item.name), {}).setdefault(item.name, item)
     return {valid: list(same.values()) for valid, same in groups.items() if len(same) > 1}
 
 
-def _clash(what: str, valid: str, same: Sequence[Link | Joint]) -> Violation:
+def _conflict_violation(kind: str, valid: str, same: Sequence[Link | Joint]) -> Violation:
     return Violation(
         subject=same[1].name,
         source=same[1].source,
-        message=f"{what} {names(item.name for item in same)} would all be {short(valid)} in USD, "
-        "which takes letters, digits and underscores; wanted names that stay different",
+        message=f"names of {kind} {names(item.name for item in same)}: USD renames all of them to "
+        f"{short(valid)}; expected names that stay different",
         severity="error",
         measured={"names": len(same)},
     )
 
 
-# Substrings.
+# NAM003: substrings that configurations match.
 
 _LEG_WORDS = ("thigh", "calf", "shank", "knee", "hip")
-"""What configurations penalize contacts of."""
+"""Words by which configurations select the links whose contacts they penalize."""
 
 
 @rule("NAM003", "ambiguous-substring", "info", needs=("legs",))
 def ambiguous_substring(robot: Facts) -> Iterator[Violation]:
-    """Words that configurations look for match other links than one would think.
+    """A substring that configurations use matches unexpected links.
 
-    legged_gym takes every link whose name contains `foot` for a foot, ends the episode when one
-    with `base` touches the ground, and penalizes those with `thigh` or `calf`. With none that
-    matches, a reward is never given; with too many, the robot is punished for its sensors.
+    legged_gym treats every link whose name contains `foot` as a foot, ends the episode when a link
+    with `base` touches the ground, and penalizes contacts of links with `thigh` or `calf`. If no
+    link matches, the reward is always zero. If too many links match, the robot is penalized for
+    contacts of its sensors.
 
     Fix:
-        Look at what each word of your configuration matches, and use the one that is given here.
+        Check what each substring in your configuration matches, and use the suggested one.
 
     Source:
-        legged_gym, `find` of asset.foot_name, penalize_contacts_on and terminate_after_contacts_on
-        in the names of all bodies; case counts.
+        legged_gym: asset.foot_name, penalize_contacts_on and terminate_after_contacts_on are
+        case-sensitive substrings of body names.
     """
-    said = [*_said_of_feet(robot), *_said_of_others(robot)]
-    if said:
+    parts = [*_foot_matches(robot), *_other_matches(robot)]
+    if parts:
         yield Violation(
             subject=robot.model.title,
             source=robot.model.source,
-            message="; ".join(said),
+            message="; ".join(parts),
             certainty="likely",
         )
 
 
-def _said_of_feet(robot: Facts) -> Iterator[str]:
+def _foot_matches(robot: Facts) -> Iterator[str]:
     feet = [leg.foot for leg in robot.legs]
     others = [link.name for link in robot.links if link.name not in feet]
     missed = [name for name in feet if "foot" not in name]
     extra = [name for name in others if "foot" in name]
-    word = _exact_word(feet, others)
-    instead = f" ({word} matches the feet and nothing else)" if word else ""
+    word = _unique_substring(feet, others)
+    suggestion = f" ('{word}' matches exactly the feet)" if word else ""
     if len(missed) == len(feet) and not extra:
-        yield f"foot matches no link, the feet are {names(feet)}{instead}"
+        yield f"'foot' matches no link; the feet are {names(feet)}{suggestion}"
     elif missed:
-        yield f"foot does not match {names(missed)}, on which the robot stands{instead}"
+        yield f"'foot' does not match the feet {names(missed)}{suggestion}"
     elif extra:
-        yield f"foot matches {names(extra)}, too, besides the feet{instead}"
+        yield f"'foot' also matches {names(extra)}, which are not feet{suggestion}"
 
 
-def _exact_word(feet: Sequence[str], others: Sequence[str]) -> str | None:
-    """Return the shortest run of words that all feet have, and no other link."""
-    words = _words(feet[0])[:_MOST_LETTERS]
+def _unique_substring(feet: Sequence[str], others: Sequence[str]) -> str | None:
+    """Return the shortest run of words that all feet contain and no other link contains."""
+    words = _words(feet[0])[:_MAX_LENGTH]
     runs = {"".join(words[a:b]) for a in range(len(words)) for b in range(a + 1, len(words) + 1)}
     whole = [run for run in runs if run[0].isalpha() and run[-1].isalnum()]
     for run in sorted(whole, key=lambda run: (len(run), run)):
@@ -360,18 +366,17 @@ def _exact_word(feet: Sequence[str], others: Sequence[str]) -> str | None:
     return None
 
 
-def _said_of_others(robot: Facts) -> Iterator[str]:
+def _other_matches(robot: Facts) -> Iterator[str]:
     trunk = {link.name for link in robot.bodies[0].links}
-    legs = robot.leg_bodies
-    in_legs = {link.name for index in legs for link in robot.bodies[index].links}
-    every = [link.name for link in robot.links]
-    matches = [name for name in every if "base" in name]
-    astray = [name for name in matches if name not in trunk]
+    in_legs = {link.name for index in robot.leg_bodies for link in robot.bodies[index].links}
+    links = [link.name for link in robot.links]
+    matches = [name for name in links if "base" in name]
+    extra = [name for name in matches if name not in trunk]
     if not matches:
-        yield f"base matches no link, the trunk is {short(robot.bodies[0].top.name)}"
-    elif astray:
-        yield f"base matches {names(astray)}, too, which is not of the trunk"
+        yield f"'base' matches no link; the trunk is {short(robot.bodies[0].top.name)}"
+    elif extra:
+        yield f"'base' also matches {names(extra)}, not part of the trunk"
     for word in _LEG_WORDS:
-        astray = [name for name in every if word in name and name not in in_legs | trunk]
-        if astray:
-            yield f"{word} matches {names(astray)}, too, which is not of a leg"
+        extra = [name for name in links if word in name and name not in in_legs | trunk]
+        if extra:
+            yield f"'{word}' also matches {names(extra)}, not part of a leg"

@@ -1,4 +1,4 @@
-"""Simulators: what each of them makes of the file."""
+"""SIM: rules on how simulators load the robot."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -27,10 +27,10 @@ from terrainkit_robots.text import names, short
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.simulator_conventions.loading import Refusal
 
-_MOST_SHOWN = 40
-"""Of more joints the permutation is no message; the JSON report has it."""
+_MAX_JOINTS = 40
+"""Maximum number of joints for which the message contains the permutation."""
 
-_TELLING: tuple[tuple[str, str], ...] = (
+_EXPLAINED_BY: tuple[tuple[str, str], ...] = (
     (r"mass and inertia of moving bodies", "INR001"),
     (r"positive eigenvalues", "INR003"),
     (r"A \+ B >= C", "INR004"),
@@ -44,64 +44,64 @@ _TELLING: tuple[tuple[str, str], ...] = (
     (r"free joint can only be used on top level", "TRE008"),
     (r"could not parse|Error=XML_", "XML001"),
 )
-"""Words of MuJoCo's, and the rule that says more of what they mean."""
+"""Patterns of MuJoCo error messages, and the rules that explain them."""
 
 
 @rule("SIM001", "joint-order", "info")
 def joint_order(robot: Facts) -> Iterator[Violation]:
-    """A simulator lists the joints in another order than the file.
+    """A simulator orders the joints differently from the file.
 
-    A policy's observations and actions are lists of numbers in the order of the joints. One that
-    was trained in one simulator falls over in another, or on the real robot, until they are
-    reordered. Isaac Lab goes through the robot level by level, the others limb by limb.
+    The observations and actions of a policy are ordered by joint. A policy that was trained in one
+    simulator fails in another one, or on the real robot, unless they are reordered. Isaac Lab
+    traverses the tree breadth-first, the other simulators depth-first.
 
     Fix:
-        Reorder by the list that is printed: `there = [here[i] for i in order]`, where `here` is in
-        the order of the file. Better: address joints by their names. The JSON report has all orders
-        under `joint_orders`.
+        Address joints by name, or reorder by the printed list: `there = [here[i] for i in order]`,
+        where `here` is in the order of the file. The JSON report contains all orders under
+        `joint_orders`.
 
     Source:
-        MuJoCo's compiler and genesis-world 1.4.5, with which the orders were compared; Isaac Sim's
-        URDF importer, and joint lists published for Isaac Lab and Isaac Gym. Where these do not
-        settle it, the order is said to be verified.
+        Compared with MuJoCo's compiler, genesis-world 1.4.5, Isaac Sim's URDF importer, and
+        published joint lists for Isaac Lab and Isaac Gym. An order that these do not confirm is
+        marked as unverified.
     """
     file = file_order(robot)
     others = [order for order in simulator_orders(robot) if order.joints != file]
     if not others:
         return
     same = [name for name in SIMULATORS if name not in {order.simulator for order in others}]
-    told = "; ".join(_order(order, file) for order in others)
-    rest = f"; {_listed(same)} as the file" if same else ""
+    orders = "; ".join(_format_order(order, file) for order in others)
+    rest = f"; {_join(same)}: same as the file" if same else ""
     yield Violation(
         subject=robot.model.title,
         source=robot.model.source,
-        message=f"joints by their number in the file: {told}{rest}",
+        message=f"joint order, as indices into the file's order: {orders}{rest}",
         certainty="proven" if all(order.certain for order in others) else "likely",
         measured={"joints": len(file)},
     )
 
 
-def _order(order: SimulatorOrder, file: Sequence[str]) -> str:
-    doubt = "" if order.certain else " (to be verified)"
-    places = permutation(file, order.joints)
-    if places is None:
-        raise CannotCheckError("two joints have one name")
-    if len(places) > _MOST_SHOWN:
-        return f"{order.simulator}{doubt} another order of all {len(places)}"
-    return f"{order.simulator}{doubt} {places}"
+def _format_order(order: SimulatorOrder, file: Sequence[str]) -> str:
+    unverified = "" if order.certain else " (unverified)"
+    indices = permutation(file, order.joints)
+    if indices is None:
+        raise CannotCheckError("two joints have the same name")
+    if len(indices) > _MAX_JOINTS:
+        return f"{order.simulator}{unverified}: different ({len(indices)} joints)"
+    return f"{order.simulator}{unverified}: {indices}"
 
 
-def _listed(words: Sequence[str]) -> str:
+def _join(words: Sequence[str]) -> str:
     *first, last = words
     return f"{', '.join(first)} and {last}" if first else last
 
 
 @rule("SIM002", "merged-feet", "info", needs=("legs",))
 def merged_feet(robot: Facts) -> Iterator[Violation]:
-    """A simulator merges the feet into the shanks, unless it is told not to.
+    """A simulator merges the feet into the shanks by default.
 
-    A foot on a fixed joint is no body of its own there: its name is not found, and contact forces
-    are those of the shank. An attribute in the file keeps it in some simulators only.
+    A foot on a fixed joint is then not a separate body: its name does not exist, and contact forces
+    are reported for the shank. Each simulator has its own option to keep it.
 
     Fix:
         MuJoCo: `<mujoco><compiler fusestatic="false"/></mujoco>` in the URDF. Isaac Gym and Isaac
@@ -109,8 +109,8 @@ def merged_feet(robot: Facts) -> Iterator[Violation]:
         `gs.morphs.URDF`.
 
     Source:
-        MuJoCo's `fusestatic`, which is on for URDF; legged_gym's `collapse_fixed_joints`; Isaac
-        Lab's `merge_fixed_joints`; `merge_fixed_links` of genesis-world 1.4.5.
+        MuJoCo's `fusestatic`, which is enabled for URDF; legged_gym's `collapse_fixed_joints`;
+        Isaac Lab's `merge_fixed_joints`; `merge_fixed_links` of genesis-world 1.4.5.
     """
     merges = foot_merges(robot)
     if not merges:
@@ -123,8 +123,8 @@ def merged_feet(robot: Facts) -> Iterator[Violation]:
         subject=first.foot,
         source=first.joint.source,
         message=(
-            f"{_listed(by)} merge{'s' * (len(by) == 1)} {len(merges)} feet away unless told "
-            f"({example})"
+            f"{_join(by)} merge{'s' * (len(by) == 1)} {len(merges)} feet into their parent links "
+            f"by default ({example})"
         ),
         hint="; ".join(f"{simulator}: {TO_KEEP[simulator]}" for simulator in by),
         measured={"feet": len(merges)},
@@ -133,20 +133,19 @@ def merged_feet(robot: Facts) -> Iterator[Violation]:
 
 @rule("SIM003", "genesis-armature", "info")
 def genesis_armature(robot: Facts) -> Iterator[Violation]:
-    """Genesis gives joints a rotor inertia that is larger than what they move.
+    """The default armature of Genesis exceeds the inertia that a joint moves.
 
-    A joint without armature gets 0.1 kg m2 there. That is ten times the rotor of a small legged
-    robot: the joint reacts to the same torque many times slower than in other simulators, and
-    a policy that was trained with it does not transfer.
+    Genesis sets the armature of a joint without one to 0.1 kg m2, ten times that of a small legged
+    robot. The joint accelerates much more slowly than in other simulators, and a policy trained
+    with it does not transfer.
 
     Fix:
-        Give gs.morphs.URDF or MJCF a `default_armature` that is your motor's: rotor inertia times
-        the square of the gear ratio.
+        Set `default_armature` of gs.morphs.URDF or gs.morphs.MJCF to that of your motor: rotor
+        inertia times the square of the gear ratio.
 
     Source:
-        `default_armature` of the morphs of genesis-world 1.4.5, 0.1 unless MuJoCo's compatibility
-        is switched on. Compared with the inertia about each axis of all that the joint moves, the
-        other joints at 0.
+        `default_armature` in genesis-world 1.4.5 is 0.1 unless MuJoCo compatibility is enabled. It
+        is compared with the inertia about the joint axis of all links below, at joint positions 0.
     """
     moved = moved_by_joints(robot)
     slowed = [each for each in moved if each.inertia < GENESIS_ARMATURE]
@@ -158,9 +157,9 @@ def genesis_armature(robot: Facts) -> Iterator[Violation]:
         subject=worst.joint.name,
         source=worst.joint.source,
         message=(
-            f"Genesis adds {GENESIS_ARMATURE} {unit} of armature by default to joint "
-            f"{worst.joint.name}, which moves {worst.inertia:.2g} {unit}; {len(slowed)} of "
-            f"{len(robot.actuated)} joints get more than they move"
+            f"default armature of Genesis: {GENESIS_ARMATURE} {unit} exceeds the moved inertia of "
+            f"{len(slowed)} of {len(robot.actuated)} joints; smallest: {worst.joint.name} with "
+            f"{worst.inertia:.2g} {unit}"
         ),
         measured={"inertia": worst.inertia, "joints": len(slowed)},
     )
@@ -168,43 +167,43 @@ def genesis_armature(robot: Facts) -> Iterator[Violation]:
 
 @rule("SIM004", "mujoco-load-failure", "info", needs=("simulation",))
 def mujoco_load_failure(robot: Facts) -> Iterator[Violation]:
-    """MuJoCo does not load the file as it stands.
+    """MuJoCo cannot load the unmodified file.
 
-    MuJoCo stops at the first thing that it does not like, so that there may be more. Readers of
-    MuJoCo's are the base of mjlab and Genesis as well.
+    MuJoCo stops at the first error, so there may be more. mjlab and Genesis load robots with MuJoCo
+    as well.
 
     Fix:
-        Repair what it names; the rule that is named says how. Where a mesh is not found that is
-        there, look at meshdir and strippath of the <compiler> in the file.
+        Correct the reported element; the rule in the help explains how. If MuJoCo does not find an
+        existing mesh, check meshdir and strippath of <compiler>.
 
     Source:
-        The file is compiled with the MuJoCo that is installed; nothing is simulated.
+        The file is compiled with the installed version of MuJoCo. Nothing is simulated.
     """
     from terrainkit_robots.analysis.simulator_conventions.loading import (
         NotTriedError,
         refused_by_mujoco,
     )
 
-    _check_unchanged(robot)
+    _require_saved(robot)
     try:
         refusal = refused_by_mujoco(robot)
     except NotTriedError as reason:
         raise CannotCheckError(str(reason)) from None
     if refusal is not None:
-        yield _refused(robot, "MuJoCo", refusal, _more(robot, refusal.words))
+        yield _load_failure(robot, "MuJoCo", refusal, _explaining_rule(robot, refusal.words))
 
 
 @rule("SIM005", "yourdfpy-load-failure", "info", needs=("simulation",))
 def yourdfpy_load_failure(robot: Facts) -> Iterator[Violation]:
-    """The library yourdfpy does not load the file as it stands.
+    """The library yourdfpy cannot load the unmodified file.
 
-    Retargeting, planning and viewing tools in Python read URDF with it.
+    Python tools for retargeting, planning and visualization load URDF with yourdfpy.
 
     Fix:
-        Repair what it names. It says so in the words of the library that failed.
+        Correct the reported element. The message is from yourdfpy.
 
     Source:
-        The file is read with the yourdfpy that is installed; no meshes are opened.
+        The file is loaded with the installed version of yourdfpy, without meshes.
     """
     from terrainkit_robots.analysis.simulator_conventions.loading import (
         NotTriedError,
@@ -213,27 +212,27 @@ def yourdfpy_load_failure(robot: Facts) -> Iterator[Violation]:
 
     if robot.model.kind == "mjcf":
         return
-    _check_unchanged(robot)
+    _require_saved(robot)
     try:
         refusal = refused_by_yourdfpy(robot)
     except NotTriedError as reason:
         raise CannotCheckError(str(reason)) from None
     if refusal is not None:
-        yield _refused(robot, "yourdfpy", refusal, "")
+        yield _load_failure(robot, "yourdfpy", refusal, "")
 
 
-def _check_unchanged(robot: Facts) -> None:
-    """Refuse what is not on disk yet: both open files by themselves."""
-    if any(robot.meshes.is_held(path) for path in robot.model.sources):
-        raise CannotCheckError("the file is to be changed; ask again once it is written")
+def _require_saved(robot: Facts) -> None:
+    """Raise an error if the file has unsaved fixes: both libraries read it from disk."""
+    if any(robot.meshes.has_contents(path) for path in robot.model.sources):
+        raise CannotCheckError("the file has fixes that are not written yet")
 
 
-def _more(robot: Facts, words: str) -> str:
-    """Return the code of the rule that says more of what MuJoCo said; empty if none does."""
-    for pattern, code in _TELLING:
-        if re.search(pattern, words):
+def _explaining_rule(robot: Facts, error: str) -> str:
+    """Return the code of the rule that explains an error of MuJoCo, or an empty text."""
+    for pattern, code in _EXPLAINED_BY:
+        if re.search(pattern, error):
             return code
-    missing = re.search(r"Error opening file '([^']*)'", words)
+    missing = re.search(r"Error opening file '([^']*)'", error)
     if missing is None:
         return ""
     name = re.split(r"[/\\]", missing[1])[-1]
@@ -249,15 +248,13 @@ def _more(robot: Facts, words: str) -> str:
     return "" if all(mesh.found_by == "path" for mesh in found) else "MSH002"
 
 
-def _refused(robot: Facts, reader: str, refusal: "Refusal", code: str) -> Violation:
-    named = refusal.element
-    sources = {each.name: each.source for each in robot.model.joints}
-    sources |= {each.name: each.source for each in robot.model.links}
-    source = sources.get(named) if named else None
-    where = f" ({names([named])})" if named else ""
+def _load_failure(robot: Facts, loader: str, refusal: "Refusal", code: str) -> Violation:
+    sources = {each.name: each.source for each in (*robot.model.joints, *robot.model.links)}
+    source = sources.get(refusal.element) if refusal.element else None
+    element = f" ({names([refusal.element])})" if refusal.element else ""
     return Violation(
-        subject=named if source is not None else robot.model.title,
+        subject=refusal.element if source is not None else robot.model.title,
         source=source or robot.model.source,
-        message=f"{reader} does not load it as it stands: {short(refusal.words, 200)}{where}",
-        hint=f"{code} says more of this." if code else "",
+        message=f"{loader} cannot load the file: {short(refusal.words, 200)}{element}",
+        hint=f"See rule {code}." if code else "",
     )

@@ -1,4 +1,4 @@
-"""The tree: whether the joints hang the links into one."""
+"""TRE: rules on the kinematic tree of links and joints."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -10,41 +10,40 @@ from terrainkit_robots.description.model import Joint, Link
 from terrainkit_robots.lint.rule import Violation, get_rule, rule
 from terrainkit_robots.text import closest, names, short
 
-_MOST_MEANT = 20
-"""Of so many names that are not there it is looked up which one was meant; a generated file may
-have thousands."""
+_MAX_SUGGESTIONS = 20
+"""Maximum number of unknown names for which a similar name is suggested. Generated files may have
+thousands."""
 
-_ALIKE = 0.6
-"""From this share of common letters on, a name is suggested for another; as difflib does."""
+_MIN_SIMILARITY = 0.6
+"""Minimum share of common letters for a suggestion, as in difflib."""
 
-_MOST_COMPARED = 20_000
-"""With more links than this a name is not compared: it would take seconds."""
-
-
-def _most_alike(name: str, others: Sequence[str]) -> str:
-    """Return the one of `others` that is the most like `name`, if any is."""
-    return "" if len(others) > _MOST_COMPARED else closest(name, others, _ALIKE)
+_MAX_COMPARED = 20_000
+"""Maximum number of links to search for a suggestion. More would take seconds."""
 
 
-def _repeated(items: Sequence[Link] | Sequence[Joint]) -> Mapping[str, list[Link | Joint]]:
-    """Return those of the same name; what has no name is told elsewhere."""
-    named: dict[str, list[Link | Joint]] = {}
+def _nearest(name: str, others: Sequence[str]) -> str:
+    """Return the most similar name, or an empty text if none is similar."""
+    return "" if len(others) > _MAX_COMPARED else closest(name, others, _MIN_SIMILARITY)
+
+
+def _duplicates(items: Sequence[Link] | Sequence[Joint]) -> Mapping[str, list[Link | Joint]]:
+    """Return the items that share a name. XML013 reports missing names."""
+    by_name: dict[str, list[Link | Joint]] = {}
     for item in items:
         if item.name:
-            named.setdefault(item.name, []).append(item)
-    return {name: same for name, same in named.items() if len(same) > 1}
+            by_name.setdefault(item.name, []).append(item)
+    return {name: same for name, same in by_name.items() if len(same) > 1}
 
 
 @rule("TRE001", "duplicate-name", "error")
 def duplicate_name(robot: Facts) -> Iterator[Violation]:
     """Two links or two joints have the same name.
 
-    A name is how everything else refers to a link or joint. urdfdom refuses the file; MuJoCo takes
-    a second joint of the same name without a word, and gives it the limits of none. The rest of
-    this report takes the first one.
+    Names identify links and joints. urdfdom rejects the file. MuJoCo accepts a second joint of the
+    same name, but silently drops its limits. The rest of this report uses the first one.
 
     Fix:
-        Give each a name of its own, and change what refers to the second one.
+        Give each a unique name and update the references to the second one.
 
     Source:
         urdfdom: `joint '...' is not unique`; MuJoCo: `repeated URDF name`, for links only.
@@ -57,26 +56,26 @@ def duplicate_name(robot: Facts) -> Iterator[Violation]:
         ("links", [link for link in model.links if not link.virtual]),
         ("joints", model.joints),
     ):
-        for name, same in _repeated(items).items():
+        for name, same in _duplicates(items).items():
             lines = names(str(item.source.line) for item in same)
             yield Violation(
                 subject=name,
                 source=same[1].source,
-                message=f"{len(same)} {what} are called {short(name)}, on lines {lines}; "
-                "wanted a name of its own for each",
+                message=f"name {short(name)}: used by {len(same)} {what}, on lines {lines}; "
+                "expected unique names",
                 measured={"count": len(same)},
             )
 
 
 @rule("TRE002", "unknown-link", "error")
 def unknown_link(robot: Facts) -> Iterator[Violation]:
-    """A joint names a link that is not there.
+    """A joint refers to a link that does not exist.
 
-    The joint has no place in the tree, and all that hangs below it comes off: some readers refuse
-    the file, others go on without a leg.
+    The joint and everything below it are not part of the tree. Some readers reject the file, others
+    continue without the leg.
 
     Fix:
-        Correct the name, or add the link. Names are compared letter by letter, case included.
+        Correct the name, or add the link. Names are case-sensitive.
 
     Source:
         urdfdom: `child link [...] of joint [...] not found`; MuJoCo: `URDF joint parent or child
@@ -86,38 +85,36 @@ def unknown_link(robot: Facts) -> Iterator[Violation]:
     missing: dict[str, list[tuple[str, Joint]]] = {}
     for joint, reason in robot.tree.left_out:
         for role, name in (("parent", joint.parent), ("child", joint.child)):
-            # One without any name is told as an attribute that is missing.
+            # XML013 reports a missing name.
             if reason == "unknown-link" and name and name not in links:
                 missing.setdefault(name, []).append((role, joint))
-    for place, (name, uses) in enumerate(missing.items()):
+    for index, (name, uses) in enumerate(missing.items()):
         joints = names(f"{role} of joint {joint.name}" for role, joint in uses)
         yield Violation(
             subject=uses[0][1].name,
             source=uses[0][1].source,
-            message=f"link {short(name)} is not there, but is the {joints}; wanted a link of the "
-            "file",
-            hint=_suggestion(robot, name) if place < _MOST_MEANT else "",
+            message=f"link {short(name)}: does not exist, but is the {joints}; expected a link in "
+            "the file",
+            hint=_suggestion(robot, name) if index < _MAX_SUGGESTIONS else "",
         )
 
 
 def _suggestion(robot: Facts, name: str) -> str:
-    """Return a hint at the link that was meant, if there is one with a name like it."""
-    loose = _most_alike(name, robot.tree.roots[1:])
-    meant = loose or _most_alike(name, list(robot.tree.links))
-    if not meant:
-        return ""
-    return f"Is link {meant} meant? Names are compared letter by letter, case included."
+    """Return a hint with the link of the most similar name, if there is one."""
+    detached = _nearest(name, robot.tree.roots[1:])
+    nearest = detached or _nearest(name, list(robot.tree.links))
+    return f"Did you mean {nearest}? Names are case-sensitive." if nearest else ""
 
 
 @rule("TRE003", "multiple-parents", "error")
 def multiple_parents(robot: Facts) -> Iterator[Violation]:
     """A link is the child of two joints.
 
-    A URDF is a tree. A linkage that closes a loop cannot be written in it, and readers refuse the
-    file, or drop one of the joints.
+    A URDF describes a tree and cannot describe a closed kinematic loop. Readers reject the file, or
+    drop one of the joints.
 
     Fix:
-        Keep the joint that carries the link. Close a loop in MJCF with <equality><connect>, in SDF,
+        Remove all but one of these joints. Close a loop in MJCF with <equality><connect>, in SDF,
         or in the simulator.
 
     Source:
@@ -133,118 +130,117 @@ def multiple_parents(robot: Facts) -> Iterator[Violation]:
         yield Violation(
             subject=child,
             source=joints[0].source,
-            message=f"link {short(child)} is the child of {len(joints) + 1} joints, {listed}; "
-            "wanted one",
+            message=f"link {short(child)}: child of {len(joints) + 1} joints ({listed}); "
+            "expected 1",
             measured={"joints": len(joints) + 1},
         )
 
 
 @rule("TRE004", "cycle", "error")
 def cycle(robot: Facts) -> Iterator[Violation]:
-    """Joints hang links in a circle.
+    """Joints form a cycle.
 
-    Each link of the circle is above all others and below them, so none of them is connected to the
-    robot. Readers refuse the file, loop for ever, or lose the links.
+    Each link in the cycle is both parent and child of the others, so none of them is connected to
+    the robot. Readers reject the file, loop forever, or drop the links.
 
     Fix:
-        Look for the joint whose parent and child are exchanged.
+        Look for a joint with parent and child swapped.
 
     Source:
         urdfdom: `No root link found. The robot xml is not a valid tree.`; MuJoCo: `URDF body not
         found`.
     """
-    # Where a link has a second parent, the joint that closes the circle is told as that.
-    two_parents = {j.child for j, reason in robot.tree.left_out if reason == "second-parent"}
-    closing = {joint.child: joint for joint, why in robot.tree.left_out if why == "cycle"}
-    for circle in robot.tree.cycles:
-        if two_parents.isdisjoint(circle):
-            around = [circle[0], *circle[:0:-1], circle[0]]
-            what = (
-                f"{len(circle)} links hang in a circle" if circle[1:] else "a link hangs on itself"
-            )
+    # TRE003 reports the joint that closes a cycle if its child has another parent.
+    with_two_parents = {j.child for j, reason in robot.tree.left_out if reason == "second-parent"}
+    closing = {joint.child: joint for joint, reason in robot.tree.left_out if reason == "cycle"}
+    for links in robot.tree.cycles:
+        if with_two_parents.isdisjoint(links):
+            path = names([links[0], *links[:0:-1], links[0]], separator=" > ")
+            size = f"{len(links)} links" if links[1:] else "1 link"
             yield Violation(
-                subject=circle[0],
-                source=closing[circle[0]].source,
-                message=f"{what}: {names(around, separator=' > ')}; wanted a tree",
-                measured={"links": len(circle)},
+                subject=links[0],
+                source=closing[links[0]].source,
+                message=f"cycle of {size}: {path}; expected a tree",
+                measured={"links": len(links)},
             )
 
 
 @rule("TRE005", "multiple-roots", "error")
 def multiple_roots(robot: Facts) -> Iterator[Violation]:
-    """A link hangs on nothing, and is not the root.
+    """The robot has more than one root link.
 
-    urdfdom refuses a file with two roots. MuJoCo welds the second one to the world without a word,
-    where it floats in the air, and the robot walks away without it.
+    urdfdom rejects a file with two roots. MuJoCo silently welds the second root to the world, where
+    it stays behind when the robot moves.
 
     Fix:
-        Add the joint that holds it, or remove the link.
+        Add the joint that connects the link to the robot, or remove the link.
 
     Source:
-        urdfdom: `Two root links found`; MuJoCo 4.0, tried.
+        urdfdom: `Two root links found`; observed in MuJoCo 4.0.
     """
     if robot.model.kind == "mjcf":
-        return  # bodies beside the robot are its surroundings
-    root, loose = _roots(robot.tree)
-    for name in loose:
+        return  # other bodies belong to the scene
+    root, others = _roots(robot.tree)
+    for name in others:
         yield Violation(
             subject=name,
             source=robot.tree.links[name].source,
-            message=f"link {short(name)} is the child of no joint, and is not the root either, "
-            f"which is {short(root)}; wanted one root",
+            message=f"link {short(name)}: has no parent joint, in addition to the root link "
+            f"{short(root)}; expected 1 root",
         )
 
 
 def _roots(tree: Tree) -> tuple[str, list[str]]:
-    """Return the root, and others that are not there because of a joint that is told of."""
-    group = _groups(tree)
-    told = {
-        group[joint.child]
-        for joint, why in tree.left_out
-        if why in ("unknown-link", "cycle") and joint.child in group
+    """Return the root, and the other roots that no other finding explains."""
+    components = _components(tree)
+    explained = {
+        components[joint.child]
+        for joint, reason in tree.left_out
+        if reason in ("unknown-link", "cycle") and joint.child in components
     }
-    root, *loose = [n for n in tree.roots if group[n] == n and n not in told] or [""]
-    # A joint whose child is not there holds one of these, under another name.
-    misnamed = [joint.child for joint, _ in tree.left_out if joint.child not in tree.links]
-    for child in misnamed[:_MOST_MEANT]:
-        if loose:
-            loose.remove(_most_alike(child, loose) or loose[0])
-    return root, loose[len(misnamed[_MOST_MEANT:]) :]
+    roots = [n for n in tree.roots if components[n] == n and n not in explained]
+    root, *others = roots or [""]
+    # A joint with an unknown child link was probably meant to hold one of these.
+    unknown = [joint.child for joint, _ in tree.left_out if joint.child not in tree.links]
+    for child in unknown[:_MAX_SUGGESTIONS]:
+        if others:
+            others.remove(_nearest(child, others) or others[0])
+    return root, others[len(unknown[_MAX_SUGGESTIONS:]) :]
 
 
-def _groups(tree: Tree) -> dict[str, str]:
-    """Return for each link the first root of those that it is joined to, up or down.
+def _components(tree: Tree) -> dict[str, str]:
+    """Return for each link the first root of its connected component.
 
-    Joints that have no place in the tree count: each of them is told of already.
+    Joints that are not part of the tree count as connections, because other rules report them.
     """
-    beside: dict[str, list[str]] = {name: [] for name in tree.links}
+    neighbors: dict[str, list[str]] = {name: [] for name in tree.links}
     for joint in (*tree.above.values(), *(joint for joint, _ in tree.left_out)):
-        if joint.parent in beside and joint.child in beside:
-            beside[joint.parent].append(joint.child)
-            beside[joint.child].append(joint.parent)
-    group: dict[str, str] = {}
+        if joint.parent in neighbors and joint.child in neighbors:
+            neighbors[joint.parent].append(joint.child)
+            neighbors[joint.child].append(joint.parent)
+    component: dict[str, str] = {}
     for root in tree.roots:
         stack = [root]
         while stack:
             name = stack.pop()
-            if name not in group:
-                group[name] = root
-                stack += beside[name]
-    return group
+            if name not in component:
+                component[name] = root
+                stack += neighbors[name]
+    return component
 
 
 @rule("TRE006", "no-links", "error")
 def no_links(robot: Facts) -> Iterator[Violation]:
     """The robot has no links.
 
-    MuJoCo loads such a file as an empty world, and training goes on with nothing in it.
+    MuJoCo loads such a file as an empty world without an error.
 
     Fix:
-        Check that this is the file you meant, and that its links are directly in <robot>, or its
-        bodies in <worldbody>.
+        Check that this is the correct file, and that links are children of <robot>, or bodies
+        children of <worldbody>.
 
     Source:
-        urdfdom: `No link elements found in urdf file`; MuJoCo 4.0, tried.
+        urdfdom: `No link elements found in urdf file`; observed in MuJoCo 4.0.
     """
     model = robot.model
     if model.links:
@@ -255,24 +251,23 @@ def no_links(robot: Facts) -> Iterator[Violation]:
     yield Violation(
         subject=model.title,
         source=model.source,
-        message=f"the robot has 0 {what} and {len(model.joints)} joints; wanted at least 1 of them",
+        message=f"number of {what}: got 0, with {len(model.joints)} joints; expected at least 1",
     )
 
 
 @rule("TRE007", "no-free-joint", "error", fixes="safe", needs=("legs",))
 def no_free_joint(robot: Facts) -> Iterator[Violation]:
-    """A MJCF robot with legs has no free joint: it is welded to the world.
+    """A legged MJCF robot has no free joint.
 
-    Without a joint MuJoCo makes the trunk a part of the world. The legs hang in the air, and
-    whatever the policy does, the robot does not move.
+    MuJoCo welds a body without joints to its parent. The trunk is then fixed to the world, and the
+    robot cannot move.
 
     Fix:
-        Put <freejoint/> into the body of the trunk, as its first element, and add its seven numbers
-        to the front of qpos in every keyframe.
+        Add <freejoint/> as the first element of the trunk's body, and insert its 7 values at the
+        front of qpos in every keyframe.
 
     Source:
-        MuJoCo's documentation, XML reference, body/freejoint: a body without joints is welded to
-        its parent.
+        MuJoCo's XML reference, body/freejoint.
     """
     model, tree = robot.model, robot.tree
     if model.kind != "mjcf" or not tree.order:
@@ -286,12 +281,12 @@ def no_free_joint(robot: Facts) -> Iterator[Violation]:
     fix = None
     if root.source.element is not None and not model.home:
         edit = InsertChild(source=root.source, xml="<freejoint/>", first=True)
-        fix = Fix(safety="safe", description=f"Put <freejoint/> into {root.name}.", edits=(edit,))
+        fix = Fix(safety="safe", description=f"Add <freejoint/> to {root.name}.", edits=(edit,))
     yield Violation(
         subject=root.name,
         source=root.source,
-        message=f"body {root.name} has no joint to the world, so it is welded there, but the robot "
-        f"has {len(robot.legs)} legs; wanted a free joint",
+        message=f"body {root.name}: is welded to the world, but the robot has {len(robot.legs)} "
+        "legs; expected a free joint",
         certainty="likely",
         measured={"legs": len(robot.legs)},
         fix=fix,
@@ -300,57 +295,55 @@ def no_free_joint(robot: Facts) -> Iterator[Violation]:
 
 @rule("TRE008", "inner-floating-joint", "error")
 def inner_floating_joint(robot: Facts) -> Iterator[Violation]:
-    """A floating or planar joint lies inside the robot.
+    """A floating or planar joint is inside the robot.
 
-    What hangs on it is connected to the rest by nothing: it falls off, or drifts away in a plane.
-    MuJoCo refuses a free joint there, and other simulators take it for a fixed one.
+    The links below such a joint are not attached to the robot: they fall off or drift away. MuJoCo
+    rejects a free joint inside the tree, and other simulators replace it by a fixed joint.
 
     Fix:
-        Give the joint the type that it has on the robot. A floating joint belongs between the world
-        (an empty root link) and the trunk.
+        Use the joint type of the real robot. A floating joint belongs between the world (an empty
+        root link) and the trunk.
 
     Source:
         wiki.ros.org/urdf/XML/joint; MuJoCo: `free joint can only be used on top level`.
     """
     tree = robot.tree
     for joint in tree.above.values():
-        if joint.kind in ("floating", "planar") and not _stands_for_world(robot, joint.parent):
+        if joint.kind in ("floating", "planar") and not _is_world(robot, joint.parent):
             yield Violation(
                 subject=joint.name,
                 source=joint.source,
-                message=f"joint {short(joint.name)} between {short(joint.parent)} and "
-                f"{short(joint.child)} is {joint.kind}, which connects the two by nothing; wanted "
-                "a fixed joint, or one with a single axis",
+                message=f"type of joint {short(joint.name)} between links {short(joint.parent)} "
+                f"and {short(joint.child)}: got {joint.kind}; expected fixed, revolute, continuous "
+                "or prismatic",
             )
 
 
-def _stands_for_world(robot: Facts, name: str) -> bool:
-    """Return whether a link is a root that only says where the robot is."""
+def _is_world(robot: Facts, name: str) -> bool:
+    """Return whether a link is a root that represents the world."""
     return name not in robot.tree.above and (name == "world" or _is_empty(robot.tree.links[name]))
 
 
 def _is_empty(link: Link) -> bool:
-    """Return whether a link is only a frame; some are drawn, so that they are seen."""
+    """Return whether a link has neither mass nor collision shapes. It may have visuals."""
     return link.inertial is None and not link.collisions
 
 
 @rule("TRE009", "dummy-root", "info")
 def dummy_root(robot: Facts) -> Iterator[Violation]:
-    """The root link is empty, and the trunk hangs on it by a fixed joint.
+    """The root link is empty and has the trunk as its fixed child.
 
-    That is common, for readers that want a root without inertia. But the trunk then has two names:
-    a simulator that merges fixed joints calls it by the root's, others by its own, and what a
-    configuration says of the one that is not there is never true. A root called world is worse:
-    MuJoCo and Gazebo bolt what hangs on it to the ground.
+    Such a dummy root is common, because KDL does not support a root link with inertia. But the
+    trunk then has two names: simulators that merge fixed joints use the name of the root, others
+    use the name of the trunk. A configuration with the other name matches nothing. If the root is
+    called `world`, MuJoCo and Gazebo fix the robot to the ground, which is a warning.
 
     Fix:
-        Nothing, if your configuration uses the name that your simulator does. A robot that walks
-        should not hang on a fixed joint below a link called world: remove both, or make the joint
-        floating.
+        Nothing, if your configuration uses the same name as your simulator. If a legged robot is
+        attached to a link called `world` by a fixed joint, remove both, or make the joint floating.
 
     Source:
-        KDL's warning about a root link with inertia, which is why people add one; Isaac Gym:
-        collapse_fixed_joints.
+        KDL's warning about a root link with inertia; Isaac Gym: collapse_fixed_joints.
     """
     tree, bodies = robot.tree, robot.bodies
     if not tree.order or not bodies or bodies[0].top.name != tree.order[0]:
@@ -361,12 +354,12 @@ def dummy_root(robot: Facts) -> Iterator[Violation]:
     joint = tree.above[trunk]
     while joint.parent != root.name:
         joint = tree.above[joint.parent]
-    bolted = root.name == "world" and robot.model.kind != "mjcf" and bool(robot.legs)
+    is_welded = root.name == "world" and robot.model.kind != "mjcf" and bool(robot.legs)
     yield Violation(
         subject=root.name,
         source=root.source,
-        message=f"root link {short(root.name)} has no mass and no collision shape; the trunk is "
-        f"{short(trunk)}, on the fixed joint {short(joint.name)}"
-        + (", and is bolted to the world; wanted a floating joint, or none" if bolted else ""),
-        severity="warning" if bolted else None,
+        message=f"root link {short(root.name)}: has no mass and no collision shape; the trunk is "
+        f"{short(trunk)}, attached by the fixed joint {short(joint.name)}"
+        + (", which welds it to the world; expected a floating joint" if is_welded else ""),
+        severity="warning" if is_welded else None,
     )

@@ -1,4 +1,4 @@
-"""What is written: rules on the text of the file. The readers found it; here it gets its name."""
+"""XML: rules on the text of the file. The readers detect these problems while parsing."""
 
 from collections.abc import Iterator
 
@@ -13,7 +13,7 @@ def _problems(robot: Facts, code: str) -> Iterator[Problem]:
     return (problem for problem in robot.model.problems if problem.code == code)
 
 
-def _defect(
+def _violation(
     robot: Facts, problem: Problem, fix: Fix | None = None, severity: Severity | None = None
 ) -> Violation:
     return Violation(
@@ -29,46 +29,46 @@ def _defect(
 def malformed_xml(robot: Facts) -> Iterator[Violation]:
     """The file is not well-formed XML.
 
-    Readers differ in what they make of a broken file: some stop, some lose every element after the
-    mistake without a word. What can be recovered is checked all the same, so that one missing
-    bracket does not hide the rest.
+    Readers handle malformed XML differently: some stop, others silently drop every element after
+    the error. Elements that can be recovered are still checked, so that one missing bracket does
+    not hide other problems.
 
     Fix:
-        Repair the XML at the line given; an editor that knows XML shows the same place.
+        Correct the XML at the reported line. An editor with XML support highlights it.
 
     Source:
-        XML 1.0, section 2.1; the message is libxml2's.
+        XML 1.0, section 2.1. The message is from libxml2.
     """
     for problem in _problems(robot, "XML001"):
-        yield _defect(robot, problem)
+        yield _violation(robot, problem)
 
 
 @rule("XML002", "unknown-root", "error")
 def unknown_root(robot: Facts) -> Iterator[Violation]:
     """The root element is neither <robot> nor <mujoco>.
 
-    The file is something else (SDF, a launch file, a scene), or its root was lost. Nothing in it is
-    read as a robot.
+    The file is in another format, such as SDF or a launch file, or its root element is missing.
+    No robot can be read from it.
 
     Fix:
-        Give the URDF, xacro or MJCF file of the robot. SDF has to be converted first.
+        Pass the URDF, xacro or MJCF file of the robot. Convert SDF to one of these first.
 
     Source:
         The URDF specification (wiki.ros.org/urdf/XML) and MuJoCo's XML reference.
     """
     for problem in _problems(robot, "XML002"):
-        yield _defect(robot, problem)
+        yield _violation(robot, problem)
 
 
 @rule("XML003", "unnamed-robot", "warning", fixes="safe")
 def unnamed_robot(robot: Facts) -> Iterator[Violation]:
     """The robot has no name.
 
-    URDF requires one: urdfdom and everything built on it refuse a <robot> without a name, other
-    readers invent one.
+    URDF requires a name. urdfdom and the tools built on it reject a <robot> without a name. Other
+    readers make one up.
 
     Fix:
-        Add a name attribute to <robot>.
+        Add a `name` attribute to <robot>.
 
     Source:
         wiki.ros.org/urdf/XML/robot: the attribute `name` is required.
@@ -77,206 +77,207 @@ def unnamed_robot(robot: Facts) -> Iterator[Violation]:
         name = "".join(c if c.isalnum() and c.isascii() else "_" for c in robot.model.file.stem)
         name = name if name[:1].isalpha() else f"robot_{name}"
         edit = SetAttribute(source=problem.source, name="name", value=name)
-        fix = Fix(safety="safe", description=f"Call it {name}, after its file.", edits=(edit,))
-        yield _defect(robot, problem, fix if problem.source.element is not None else None)
+        fix = Fix(
+            safety="safe", description=f'Add name="{name}", from the file name.', edits=(edit,)
+        )
+        yield _violation(robot, problem, fix if problem.source.element is not None else None)
 
 
 @rule("XML004", "unexpanded-xacro", "error")
 def unexpanded_xacro(robot: Facts) -> Iterator[Violation]:
-    """Xacro was left in a file that is read as plain URDF.
+    """A plain URDF file contains xacro.
 
-    To a URDF reader a macro is an unknown element that is skipped, and `${length}` is no number:
-    whole legs vanish, or sizes become zero.
+    A URDF reader skips macros as unknown elements and cannot parse `${length}` as a number. Whole
+    legs disappear, or sizes become zero.
 
     Fix:
-        Call the file .xacro and check that, or expand it: xacro robot.xacro > robot.urdf.
+        Rename the file to .xacro, or expand it: xacro robot.xacro > robot.urdf.
 
     Source:
-        wiki.ros.org/xacro: expansion is a step of its own, before the file is a URDF.
+        wiki.ros.org/xacro: xacro is expanded before the file is read as URDF.
     """
     for problem in _problems(robot, "XML004"):
-        yield _defect(robot, problem)
+        yield _violation(robot, problem)
 
 
 @rule("XML005", "xacro-failed", "error")
 def xacro_failed(robot: Facts) -> Iterator[Violation]:
-    """The xacro file could not be expanded.
+    """The xacro file cannot be expanded.
 
-    An argument has no value, a package is not on this machine, or an expression fails. Without
-    expansion there is no robot to check.
+    An argument has no value, a package is not found, or an expression is invalid. Without the
+    expanded file there is no robot to check.
 
     Fix:
-        Give the argument with --xacro-arg name:=value, the package with --package name=folder.
+        Set the argument with --xacro-arg name:=value, or the package with --package NAME=DIR.
 
     Source:
-        wiki.ros.org/xacro; the message is that of the xacro package.
+        wiki.ros.org/xacro. The message is from the xacro package.
     """
     for problem in _problems(robot, "XML005"):
-        yield _defect(robot, problem)
+        yield _violation(robot, problem)
 
 
 @rule("XML006", "invalid-number", "error", fixes="safe")
 def invalid_number(robot: Facts) -> Iterator[Violation]:
-    """A number is not a number, or there are too few or too many of them.
+    """An attribute is not a number, or has too few or too many numbers.
 
-    Readers take what they can: "0,5" is 0 to one and an error to another, a missing third
-    coordinate is zero or what was there before, and NaN spreads through the whole simulation.
+    Readers disagree about invalid numbers: "0,5" is 0 or an error, and a missing third coordinate
+    is 0 or undefined. NaN spreads through the whole simulation.
 
     Fix:
-        Write plain numbers with a decimal point and spaces between them.
+        Write numbers with a decimal point, separated by spaces.
 
     Source:
-        urdfdom parses in the C locale; MuJoCo: `bad format in attribute`, `does not have enough
-        data`.
+        urdfdom parses numbers in the C locale; MuJoCo: `bad format in attribute`, `does not have
+        enough data`.
     """
     for problem in _problems(robot, "XML006"):
-        meant, name = problem.details.get("repaired", ""), problem.details.get("attribute", "")
+        value, name = problem.details.get("repaired", ""), problem.details.get("attribute", "")
         fix = None
-        if meant and problem.source.element is not None:
-            edit = SetAttribute(source=problem.source, name=name, value=meant)
-            fix = Fix(safety="safe", description=f'Write {name}="{meant}".', edits=(edit,))
-        yield _defect(robot, problem, fix)
+        if value and problem.source.element is not None:
+            edit = SetAttribute(source=problem.source, name=name, value=value)
+            fix = Fix(safety="safe", description=f'Set {name}="{value}".', edits=(edit,))
+        yield _violation(robot, problem, fix)
 
 
 @rule("XML007", "unknown-tag", "warning")
 def unknown_tag(robot: Facts) -> Iterator[Violation]:
-    """A tag or attribute looks like a misspelt one.
+    """A tag or attribute is unknown and similar to a standard one.
 
-    URDF readers skip what they do not know. A <colision> is no collision shape, and a limit with
-    an attribute `uper` has an upper limit of 0, without a word from anyone. MuJoCo refuses a MJCF
-    file with such a word, which is an error.
+    URDF readers silently skip unknown names. A <colision> adds no collision shape, and a limit with
+    an attribute `uper` has an upper limit of 0. MuJoCo rejects an MJCF file with an unknown name,
+    so there it is an error.
 
     Fix:
-        Write the tag or attribute that is named; extensions of your own are best given a name that
-        is not like a standard one.
+        Correct the spelling. Rename your own extensions if they resemble standard names.
 
     Source:
         wiki.ros.org/urdf/XML, from link to safety_controller; MuJoCo's XML reference.
     """
     for problem in _problems(robot, "XML007"):
-        refused = problem.details.get("refused") == "mujoco"
-        yield _defect(robot, problem, severity="error" if refused else None)
+        is_rejected = problem.details.get("refused") == "mujoco"
+        yield _violation(robot, problem, severity="error" if is_rejected else None)
 
 
 @rule("XML008", "duplicate-material", "error", fixes="safe")
 def duplicate_material(robot: Facts) -> Iterator[Violation]:
     """A visual or collision has two materials.
 
-    MuJoCo refuses the whole file: `repeated element: 'material'`. Other readers take the first.
+    MuJoCo rejects the whole file: `repeated element: 'material'`. Other readers use the first one.
 
     Fix:
-        Keep the first material.
+        Remove all materials but the first.
 
     Source:
-        Seen in MuJoCo 4.0; wiki.ros.org/urdf/XML/link allows one.
+        Observed in MuJoCo 4.0; wiki.ros.org/urdf/XML/link allows one material.
     """
     for problem in _problems(robot, "XML008"):
         fix = None
         if problem.source.element is not None:
             edit = RemoveElement(source=problem.source)
-            fix = Fix(safety="safe", description="Take the second material away.", edits=(edit,))
-        yield _defect(robot, problem, fix)
+            fix = Fix(safety="safe", description="Remove the second material.", edits=(edit,))
+        yield _violation(robot, problem, fix)
 
 
 @rule("XML009", "byte-order-mark", "error", fixes="safe")
 def byte_order_mark(robot: Facts) -> Iterator[Violation]:
-    """Something invisible stands before the XML.
+    """There are invisible characters before the XML.
 
-    A byte order mark, or a blank line before <?xml ...?>, comes from an editor. Strict readers
-    refuse the file with an error that points at nothing to be seen.
+    Some editors write a byte order mark or a blank line before <?xml ...?>. Strict readers reject
+    the file, with an error message that points at nothing visible.
 
     Fix:
-        Save the file as UTF-8 without a byte order mark, with <?xml ...?> or <robot> right at its
-        start.
+        Save the file as UTF-8 without a byte order mark, starting with <?xml ...?> or <robot>.
 
     Source:
-        XML 1.0, section 2.8: the declaration has to come first. lxml refuses text with a mark that
-        was decoded as such, and so do readers that pass strings.
+        XML 1.0, section 2.8: the declaration must come first. lxml and other readers reject strings
+        that start with a byte order mark.
     """
     for problem in _problems(robot, "XML009"):
-        yield _defect(robot, problem, without_mark(problem))
+        yield _violation(robot, problem, without_mark(problem))
 
 
 @rule("XML010", "entity-declarations", "error")
 def entity_declarations(robot: Facts) -> Iterator[Violation]:
-    """The file declares entities of its own.
+    """The file declares its own XML entities.
 
-    An entity can pull in another file, or grow to gigabytes. Most readers of robots do not resolve
-    them, so that what they stand for is missing; here they are never resolved.
+    An entity can include another file or expand to gigabytes. Most robot readers do not resolve
+    entities, so their content is missing. check-robot never resolves them.
 
     Fix:
-        Write out what the entities stand for, or use xacro properties.
+        Replace the entities by their content, or use xacro properties.
 
     Source:
-        OWASP on XML external entities; tinyxml2, which urdfdom and MuJoCo use, has no entities.
+        OWASP on XML external entities; tinyxml2, which urdfdom and MuJoCo use, does not support
+        entities.
     """
     for problem in _problems(robot, "XML010"):
-        yield _defect(robot, problem)
+        yield _violation(robot, problem)
 
 
 @rule("XML011", "mjcf-parse-error", "error")
 def mjcf_parse_error(robot: Facts) -> Iterator[Violation]:
-    """MuJoCo's own parser refuses the file.
+    """MuJoCo cannot parse the MJCF file.
 
-    The message is MuJoCo's. The element was left out, and the rest is checked.
+    The message is from MuJoCo. check-robot skips the element and checks the rest.
 
     Fix:
-        Repair the element as MuJoCo's XML reference describes it.
+        Correct the element according to MuJoCo's XML reference.
 
     Source:
         mujoco.MjSpec.from_string, the parser behind every MuJoCo loader.
     """
     for problem in _problems(robot, "XML011"):
-        yield _defect(robot, problem)
+        yield _violation(robot, problem)
 
 
 @rule("XML012", "invalid-include", "error")
 def invalid_include(robot: Facts) -> Iterator[Violation]:
     """An included file is missing, includes itself, or cannot be read.
 
-    MuJoCo refuses the whole model for it. What is not in that file is checked.
+    MuJoCo rejects the whole model. check-robot checks the other files.
 
     Fix:
-        Put the file where the include says, relative to the folder of the main file.
+        Put the file at the included path, which is relative to the folder of the main file.
 
     Source:
         MuJoCo's XML reference, `include`.
     """
     for problem in _problems(robot, "XML012"):
-        yield _defect(robot, problem)
+        yield _violation(robot, problem)
 
 
 @rule("XML013", "missing-attribute", "error")
 def missing_attribute(robot: Facts) -> Iterator[Violation]:
-    """An element lacks what it cannot do without.
+    """A required attribute or element is missing.
 
-    A link without a name, a mesh without a file or a box without a size: readers refuse it, or take
-    an empty name and a size of zero.
+    Examples are a link without a name, a mesh without a file and a box without a size. Readers
+    reject them, or use an empty name and a size of zero.
 
     Fix:
-        Add the attribute or element that is named.
+        Add the attribute or element that the message names.
 
     Source:
-        wiki.ros.org/urdf/XML: what is marked as required there.
+        wiki.ros.org/urdf/XML: the attributes marked as required.
     """
     for problem in _problems(robot, "XML013"):
-        yield _defect(robot, problem)
+        yield _violation(robot, problem)
 
 
 @rule("XML014", "unsupported-quaternion", "error", fixes="unsafe")
 def unsupported_quaternion(robot: Facts) -> Iterator[Violation]:
-    """A rotation is written as a quaternion, which simulators skip.
+    """A rotation is given as a quaternion, which simulators ignore.
 
-    `quat_xyzw` came with URDF 1.1. MuJoCo and yourdfpy take such an origin for one that is not
-    turned, without a word: links and joints point another way than in the tool that wrote the file.
-    Readers of URDF 1.0 skip it too, or refuse the file for its version.
+    URDF 1.1 introduced `quat_xyzw`. MuJoCo and yourdfpy silently ignore it, so links and joints
+    have another orientation than in the tool that wrote the file. Readers of URDF 1.0 ignore it
+    as well, or reject the file because of its version.
 
     Fix:
-        Write the same rotation as roll, pitch and yaw, with which the file may be of version 1.0.
-        `terrainkit onboard` does so, too.
+        Write the same rotation as `rpy`; the file can then be version 1.0. `terrainkit onboard`
+        converts it, too.
 
     Source:
-        Pull requests 194 and 235 of urdfdom; seen skipped by MuJoCo 4.0 and yourdfpy 0.0.60.
+        Pull requests 194 and 235 of urdfdom; MuJoCo 4.0 and yourdfpy 0.0.60 ignore it.
     """
     for problem in _problems(robot, "XML014"):
         fix = None
@@ -286,5 +287,5 @@ def unsupported_quaternion(robot: Facts) -> Iterator[Violation]:
                 SetAttribute(source=problem.source, name="rpy", value=rpy),
                 RemoveAttribute(source=problem.source, name="quat_xyzw"),
             )
-            fix = Fix(safety="unsafe", description=f'Write rpy="{rpy}".', edits=edits)
-        yield _defect(robot, problem, fix)
+            fix = Fix(safety="unsafe", description=f'Set rpy="{rpy}".', edits=edits)
+        yield _violation(robot, problem, fix)

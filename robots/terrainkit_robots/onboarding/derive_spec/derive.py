@@ -18,7 +18,7 @@ from terrainkit_robots.onboarding.derive_spec.motors import (
     efforts,
     velocities,
 )
-from terrainkit_robots.spec.column import Column, provenances, rounded
+from terrainkit_robots.spec.column import Column, collect_provenance, rounded
 from terrainkit_robots.spec.robot_spec import Provenance, RobotSpec
 from terrainkit_robots.text import names
 
@@ -87,7 +87,7 @@ def derive_spec(
         **heights,
         mirror=twins,
         provenance={
-            **provenances(columns),
+            **collect_provenance(columns),
             "soft_limits": _suggested(f"{_SOFT:g} of each range, about its middle"),
             "reset_range": _suggested(reset_reason),
             **{name: origin for name, (_, origin) in lengths.items()},

@@ -10,7 +10,7 @@ from lxml import etree
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.description.urdf.reader import rotation_of
+from terrainkit_robots.transforms import rpy_to_matrix
 
 FILE = Path("/robots/robot.urdf")
 
@@ -76,7 +76,7 @@ def test_frames_of_links_and_of_the_joint_add_up_along_fixed_joints():
     np.testing.assert_allclose(merged[0].poses[0], np.eye(4))
     np.testing.assert_allclose(merged[0].poses[1][:3, 3], [1, 0, 0], atol=1e-15)
     np.testing.assert_allclose(merged[1].mount[:3, 3], [1, 2, 0], atol=1e-15)
-    np.testing.assert_allclose(merged[1].mount[:3, :3], rotation_of(np.array([0, 0, np.pi / 2])))
+    np.testing.assert_allclose(merged[1].mount[:3, :3], rpy_to_matrix(np.array([0, 0, np.pi / 2])))
     np.testing.assert_allclose(merged[1].poses[1][:3, 3], [0, 0, 3])
 
 
@@ -219,8 +219,8 @@ def test_merged_bodies_are_sums_of_spatial_inertias(parts):
         principal = 0.1 + np.abs(moments)
         inner += link(k, mass, words(xyz), words([*principal, 0, 0, 0]), words(rpy))
         inner += joint("root", k, xyz=words(place), rpy=words(turn))
-        spin = rotation_of(np.array(turn)) @ rotation_of(np.array(rpy))
-        c = cross(rotation_of(np.array(turn)) @ xyz + np.array(place))
+        spin = rpy_to_matrix(np.array(turn)) @ rpy_to_matrix(np.array(rpy))
+        c = cross(rpy_to_matrix(np.array(turn)) @ xyz + np.array(place))
         about = spin @ np.diag(principal) @ spin.T - mass * c @ c
         total += np.block([[about, mass * c], [-mass * c, mass * np.eye(3)]])
     (body,) = bodies(inner)

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.contact import SOLE, convex_hull, level_turn, margin, sole
 from terrainkit_robots.description.model import Geometry, Link, Source
-from terrainkit_robots.description.urdf.reader import rotation_of
 from terrainkit_robots.mesh.mesh_cache import Meshes
+from terrainkit_robots.transforms import rpy_to_matrix
 
 SOURCE = Source(file=Path("robot.urdf"), line=1)
 SIDEWAYS = np.array([0.0, 1.0, 0.0])
@@ -18,7 +18,7 @@ SIDEWAYS = np.array([0.0, 1.0, 0.0])
 
 def pose(xyz=(0, 0, 0), rpy=(0, 0, 0)):
     made = np.eye(4)
-    made[:3, :3], made[:3, 3] = rotation_of(np.array(rpy)), xyz
+    made[:3, :3], made[:3, 3] = rpy_to_matrix(np.array(rpy)), xyz
     return made
 
 
@@ -101,7 +101,7 @@ def test_where_an_ellipsoid_touches():
 @given(turn=st.tuples(*[st.floats(-4, 4)] * 3))
 def test_an_ellipsoid_touches_on_its_surface(turn):
     point = contact(foot(("ellipsoid", (0.3, 0.2, 0.1), pose())), pose(rpy=turn))[0]
-    local = rotation_of(np.array(turn)).T @ point
+    local = rpy_to_matrix(np.array(turn)).T @ point
     assert ((local / [0.3, 0.2, 0.1]) ** 2).sum() == pytest.approx(1)
 
 
@@ -245,7 +245,7 @@ def test_on_one_point_and_on_none():
 
 @given(st.tuples(st.floats(-5, 5), st.floats(-5, 5)), st.floats(-7, 7))
 def test_margins_turn_and_move_with_the_robot(point, angle):
-    turn = rotation_of(np.array([0, 0, angle]))[:2, :2]
+    turn = rpy_to_matrix(np.array([0, 0, angle]))[:2, :2]
     point = np.array(point)
     moved = margin(turn @ point + 3, SQUARE @ turn.T + 3)
     assert moved == pytest.approx(margin(point, SQUARE), abs=1e-6)

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from terrainkit_robots.analysis.bodies.bodies import Placed
 from terrainkit_robots.analysis.bodies.shapes import bounds, has_extent, lowest, reach, volume
 from terrainkit_robots.description.model import Geometry, MeshFile, Source
-from terrainkit_robots.description.urdf.reader import rotation_of
 from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes
+from terrainkit_robots.transforms import rpy_to_matrix
 
 SOURCE = Source(file=Path("robot.urdf"), line=1)
 SIZES = {
@@ -31,7 +31,7 @@ def geometry(shape, size=None, mesh=None):
 
 def placed(geometry, xyz=(0, 0, 0), rpy=(0, 0, 0)):
     pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = rotation_of(np.array(rpy)), xyz
+    pose[:3, :3], pose[:3, 3] = rpy_to_matrix(np.array(rpy)), xyz
     return Placed(geometry=geometry, link="l", pose=pose)
 
 

@@ -12,7 +12,7 @@ import pytest
 from terrainkit_robots.analysis.bodies.bodies import merge_bodies
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.bodies.tree import build_tree
-from terrainkit_robots.description.mjcf.document import MOST_ELEMENTS
+from terrainkit_robots.description.mjcf.document import MAX_ELEMENTS
 from terrainkit_robots.description.mjcf.reader import read_mjcf
 from terrainkit_robots.description.model import Geometry, Joint, Link, Problem, RobotModel
 from terrainkit_robots.description.xml.document import parse_xml
@@ -533,8 +533,8 @@ def test_a_mesh_that_is_in_the_model_itself_has_no_file() -> None:
         )
     )
     inline, fitted = link(robot, "a").collisions
-    assert (inline.shape, inline.mesh, inline.fitted) == ("unknown", None, False)
-    assert fitted.fitted
+    assert (inline.shape, inline.mesh, inline.fit_to_mesh) == ("unknown", None, False)
+    assert fitted.fit_to_mesh
     assert fitted.mesh is not None
 
 
@@ -1056,7 +1056,7 @@ def test_what_would_fill_the_memory_is_not_made(text: str) -> None:
 
 
 def test_more_elements_than_mujoco_reads_in_time_are_told() -> None:
-    robot = read(in_world("<body/>" * (MOST_ELEMENTS + 1)))
+    robot = read(in_world("<body/>" * (MAX_ELEMENTS + 1)))
     assert only(robot).code == "XML011"
     assert robot.links == ()
 

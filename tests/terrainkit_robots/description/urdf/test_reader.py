@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.description.urdf.reader import rotation_of
+from terrainkit_robots.transforms import rpy_to_matrix
 
 FILE = Path("/robots/robot.urdf")
 URDFS = [
@@ -446,7 +446,7 @@ def about(axis, angle):
 def test_roll_pitch_and_yaw_turn_about_fixed_axes_in_turn(rpy):
     roll, pitch, yaw = rpy
     wanted = about("z", yaw) @ about("y", pitch) @ about("x", roll)
-    np.testing.assert_allclose(rotation_of(np.array(rpy)), wanted, atol=1e-14)
+    np.testing.assert_allclose(rpy_to_matrix(np.array(rpy)), wanted, atol=1e-14)
 
 
 # Against another reader

@@ -237,7 +237,7 @@ def test_damage_is_told_or_harmless(tmp_path_factory, cuts):
 
 
 def test_a_large_file_is_not_looked_at(file, monkeypatch):
-    monkeypatch.setattr(xml_document, "MOST_BYTES", 2**20)
+    monkeypatch.setattr(xml_document, "MAX_BYTES", 2**20)
     document = parse(file, b"<robot>" + b" " * 2**20 + b"</robot>")
     assert document.root is None
     assert codes(document) == ["XML001"]
@@ -245,7 +245,7 @@ def test_a_large_file_is_not_looked_at(file, monkeypatch):
 
 
 def test_a_document_of_very_many_elements_is_not_looked_at(file, monkeypatch):
-    monkeypatch.setattr(xml_document, "MOST_ELEMENTS", 1000)
+    monkeypatch.setattr(xml_document, "MAX_ELEMENTS", 1000)
     document = parse(file, "<robot>" + "<link/>" * 1000 + "</robot>")
     assert document.root is None
     assert "1000 elements" in document.problems[0].message
@@ -318,7 +318,7 @@ def test_bytes_are_read_as_they_are(file):
 
 
 def test_no_more_is_read_than_is_needed(file, monkeypatch):
-    monkeypatch.setattr(xml_document, "MOST_BYTES", 1000)
+    monkeypatch.setattr(xml_document, "MAX_BYTES", 1000)
     file.write_bytes(b" " * 5000)
     assert len(read_bytes(file)) == 1001
 

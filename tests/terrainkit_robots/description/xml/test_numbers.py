@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from terrainkit_robots.description.xml.numbers import parse_numbers, without_commas
+from terrainkit_robots.description.xml.numbers import parse_numbers, replace_commas
 
 
 @pytest.mark.parametrize(
@@ -129,7 +129,7 @@ def test_a_very_long_text_is_no_number():
     ],
 )
 def test_what_was_meant_by_commas(text, count, meant):
-    assert without_commas(text, count) == meant
+    assert replace_commas(text, count) == meant
     assert parse_numbers(meant, count) is not None
 
 
@@ -148,17 +148,17 @@ def test_what_was_meant_by_commas(text, count, meant):
     ],
 )
 def test_commas_that_mean_nothing(text, count):
-    assert without_commas(text, count) == ""
+    assert replace_commas(text, count) == ""
 
 
 def test_one_number_with_a_comma_is_a_decimal():
     # Of two numbers it could be either, and the count decides.
-    assert without_commas("1,5", 1) == "1.5"
-    assert without_commas("1,5", 2) == "1 5"
+    assert replace_commas("1,5", 1) == "1.5"
+    assert replace_commas("1,5", 2) == "1 5"
 
 
 @given(st.text(alphabet="0123456789.-, ", max_size=20), st.integers(1, 4))
 def test_what_was_meant_has_no_commas_and_is_numbers(text, count):
-    meant = without_commas(text, count)
+    meant = replace_commas(text, count)
     assert meant == "" or parse_numbers(meant, count) is not None
-    assert without_commas(meant, count) == ""
+    assert replace_commas(meant, count) == ""

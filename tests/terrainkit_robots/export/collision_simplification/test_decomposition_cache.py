@@ -1,3 +1,4 @@
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -6,7 +7,7 @@ import trimesh
 
 from terrainkit_robots.export.collision_simplification import decomposition_cache as module
 from terrainkit_robots.export.collision_simplification.decomposition_cache import (
-    PartCache,
+    DecompositionCache,
     cache_folder,
     packed,
     unpacked,
@@ -26,10 +27,10 @@ def assert_same(found, wanted):
 
 
 def test_what_is_put_is_got_again_by_its_key(tmp_path):
-    cache = PartCache(tmp_path / "deep" / "cache")
+    cache = DecompositionCache(tmp_path / "deep" / "cache")
     assert cache.get("a") is None
     cache.put("a", [PART, PART])
-    assert_same(PartCache(tmp_path / "deep" / "cache").get("a"), [PART, PART])
+    assert_same(DecompositionCache(tmp_path / "deep" / "cache").get("a"), [PART, PART])
     assert cache.get("b") is None
     assert [file.name for file in (tmp_path / "deep" / "cache").iterdir()] == ["a.npz"]
 
@@ -45,7 +46,7 @@ DAMAGES = {
 
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_a_damaged_file_counts_as_none_and_is_written_anew(tmp_path, damage):
-    cache = PartCache(tmp_path)
+    cache = DecompositionCache(tmp_path)
     cache.put("a", [PART])
     file = tmp_path / "a.npz"
     file.write_bytes(DAMAGES[damage](file.read_bytes()))
@@ -76,40 +77,34 @@ def test_nothing_is_unpickled(tmp_path):
             return Path.touch, (tmp_path / "executed",)
 
     np.savez(tmp_path / "a.npz", points_0=np.array([Evil()], dtype=object))
-    assert PartCache(tmp_path).get("a") is None
+    assert DecompositionCache(tmp_path).get("a") is None
     assert not (tmp_path / "executed").exists()
 
 
 def test_a_long_file_is_not_read(tmp_path, monkeypatch):
-    cache = PartCache(tmp_path)
+    cache = DecompositionCache(tmp_path)
     cache.put("a", [PART])
     monkeypatch.setattr(module, "_MOST_BYTES", 10)
     assert cache.get("a") is None
 
 
 def test_no_folder_keeps_nothing():
-    cache = PartCache(None)
+    cache = DecompositionCache(None)
     cache.put("a", [PART])
     assert cache.get("a") is None
 
 
 def test_where_nothing_can_be_written_nothing_is_kept(tmp_path):
     (tmp_path / "file").write_text("in the way")
-    cache = PartCache(tmp_path / "file" / "cache")
+    cache = DecompositionCache(tmp_path / "file" / "cache")
     cache.put("a", [PART])
     assert cache.get("a") is None
 
 
-class TestFolder:
-    @pytest.fixture(autouse=True)
-    def linux(self, monkeypatch):
-        monkeypatch.setattr(module.sys, "platform", "linux")
-
-    def test_is_where_the_system_says(self, monkeypatch, tmp_path):
-        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-        assert cache_folder() == tmp_path / "terrainkit" / "coacd"
-
-    @pytest.mark.parametrize("named", ["", "not/absolute"])
-    def test_is_in_the_home_else(self, monkeypatch, named):
-        monkeypatch.setenv("XDG_CACHE_HOME", named)
-        assert cache_folder() == Path.home() / ".cache" / "terrainkit" / "coacd"
+@pytest.mark.skipif(sys.platform != "linux", reason="XDG folders")
+@pytest.mark.parametrize("variable", ["", "not/absolute"])
+def test_cache_folder_follows_xdg(monkeypatch, tmp_path, variable):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert cache_folder() == tmp_path / "terrainkit" / "coacd"
+    monkeypatch.setenv("XDG_CACHE_HOME", variable)
+    assert cache_folder() == Path.home() / ".cache" / "terrainkit" / "coacd"

@@ -8,8 +8,11 @@ from terrainkit_robots.analysis.bodies.shapes import volume
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import Geometry, Link, MeshFile, RobotModel, Source
 from terrainkit_robots.export.collision_simplification import simplify as module
-from terrainkit_robots.export.collision_simplification.simplify import VolumeError, treat
-from terrainkit_robots.export.mesh_export.mesh_export import pack
+from terrainkit_robots.export.collision_simplification.simplify import (
+    VolumeError,
+    simplify_collisions,
+)
+from terrainkit_robots.export.mesh_export.mesh_export import export_meshes
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.mesh.surface import MeshError, Surface, binary_stl
 
@@ -47,7 +50,7 @@ def robot(*collisions, visuals=()):
 
 
 def treated(how, *collisions, **options):
-    return treat(robot(*collisions), Meshes(FILES), how, **options)
+    return simplify_collisions(robot(*collisions), Meshes(FILES), how, **options)
 
 
 def shapes(done):
@@ -60,7 +63,7 @@ def volumes(done):
 
 def test_kept():
     model, meshes = robot(mesh("thin.stl")), Meshes(FILES)
-    done = treat(model, meshes)
+    done = simplify_collisions(model, meshes)
     assert done.model is model
     assert done.meshes is meshes
     assert not done.contents
@@ -107,7 +110,9 @@ class TestHull:
 
     def test_of_few_corners(self):
         ball = trimesh.creation.icosphere(subdivisions=4, radius=0.1)
-        done = treat(robot(mesh("a.stl")), Meshes({Path("a.stl"): stl_of(ball)}), "hull")
+        done = simplify_collisions(
+            robot(mesh("a.stl")), Meshes({Path("a.stl"): stl_of(ball)}), "hull"
+        )
         (shape,) = shapes(done)
         hull = done.meshes.welded(shape.mesh.path)
         assert 300 < len(hull.points) <= 500
@@ -115,7 +120,7 @@ class TestHull:
 
     def test_corners_of_no_triangle_do_not_count(self):
         data = BOX.export(file_type="obj").encode() + b"\nv 9 9 9\n"
-        done = treat(robot(mesh("a.obj")), Meshes({Path("a.obj"): data}), "hull")
+        done = simplify_collisions(robot(mesh("a.obj")), Meshes({Path("a.obj"): data}), "hull")
         assert volumes(done) == pytest.approx([0.006])
 
 
@@ -173,7 +178,9 @@ class TestPrimitives:
         assert done.errors[0].percent == pytest.approx(0, abs=0.01)
 
     def test_one_that_mujoco_would_fit(self):
-        assert shapes(treated("primitives", mesh("box.stl", fitted=True)))[0].fitted is False
+        assert (
+            shapes(treated("primitives", mesh("box.stl", fit_to_mesh=True)))[0].fit_to_mesh is False
+        )
 
 
 class TestWhatStays:
@@ -190,9 +197,11 @@ class TestWhatStays:
 
     def test_what_is_only_seen(self):
         visual = mesh("thin.stl")
-        done = treat(robot(mesh("thin.stl"), visuals=(visual,)), Meshes(FILES), "hull")
+        done = simplify_collisions(
+            robot(mesh("thin.stl"), visuals=(visual,)), Meshes(FILES), "hull"
+        )
         assert done.model.links[0].visuals == (visual,)
-        assert done.meshes.readable(visual.mesh)
+        assert done.meshes.is_readable(visual.mesh)
 
 
 def test_progress_passes_on_each_mesh_once():
@@ -219,11 +228,11 @@ def test_the_same_each_time(how):
 
 def test_a_robot_of_meshes(robot_file):
     model = load_robot(robot_file("h1/urdf/h1.urdf"))
-    done = treat(model, Meshes(), "hull")
+    done = simplify_collisions(model, Meshes(), "hull")
     assert len(done.errors) == 18
     # never smaller than the mesh, but for corners that a hull may not have
     assert all(-1 < error.percent < 200 for error in done.errors)
-    packed = pack(done.model, done.meshes)
+    packed = export_meshes(done.model, done.meshes)
     names = {s.mesh.filename for link in packed.model.links for s in link.collisions if s.mesh}
     assert names <= set(packed.files)
     assert len(names) == 18

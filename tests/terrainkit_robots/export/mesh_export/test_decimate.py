@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from terrainkit_robots.export.mesh_export.decimate import coarser
+from terrainkit_robots.export.mesh_export.decimate import decimate
 from terrainkit_robots.mesh.surface import MeshError, Surface, signed_volume
 
 
@@ -14,12 +14,12 @@ BALL = surface_of(trimesh.creation.icosphere(subdivisions=5, radius=0.1))
 
 
 def test_what_has_few_faces_stays():
-    assert coarser(BALL, len(BALL.faces)) is BALL
+    assert decimate(BALL, len(BALL.faces)) is BALL
 
 
 @pytest.mark.parametrize("most", [10_000, 2_000, 300])
 def test_as_many_faces_as_are_wanted_and_the_same_shape(most):
-    coarse = coarser(BALL, most)
+    coarse = decimate(BALL, most)
     assert 0.2 * most < len(coarse.faces) <= most
     assert signed_volume(coarse) == pytest.approx(signed_volume(BALL), rel=0.1)
 
@@ -29,4 +29,4 @@ def test_nothing_is_left_of_dust():
     corners = np.repeat(points, 3, axis=0) + 1e-6 * np.tile(np.eye(3), (3000, 1))
     dust = Surface(points=corners, faces=np.arange(9000).reshape(-1, 3))
     with pytest.raises(MeshError, match="has nothing left"):
-        coarser(dust, 100)
+        decimate(dust, 100)

@@ -67,7 +67,8 @@ class TestFormats:
         data = f"""<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema">
           <asset><unit meter="0.001"/><up_axis>Z_UP</up_axis></asset>
           <library_geometries><geometry id="g"><mesh>
-            <source id="p"><float_array>{points}</float_array></source>
+            <source id="p"><float_array>{points}</float_array>
+              <technique_common><accessor stride="3"/></technique_common></source>
             <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
             <triangles><input semantic="VERTEX" source="#v" offset="0"/><p>{faces}</p></triangles>
           </mesh></geometry></library_geometries>

@@ -8,7 +8,7 @@ import trimesh
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import Geometry, Link, MeshFile, RobotModel, Source
 from terrainkit_robots.description.xml.document import RobotFileError
-from terrainkit_robots.export.mesh_export.mesh_export import pack
+from terrainkit_robots.export.mesh_export.mesh_export import export_meshes
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.mesh.surface import Surface, binary_stl, signed_volume, welded
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -40,7 +40,7 @@ def robot(*, visuals=(), collisions=()):
 
 def packed(*, visuals=(), collisions=(), **contents):
     held = {Path(name.replace("__", ".")): data for name, data in contents.items()}
-    return pack(robot(visuals=visuals, collisions=collisions), Meshes(held))
+    return export_meshes(robot(visuals=visuals, collisions=collisions), Meshes(held))
 
 
 class TestNames:
@@ -56,13 +56,13 @@ class TestNames:
     def test_one_content_is_stored_once(self):
         shapes = [mesh("a.stl"), mesh("b/c.stl"), mesh("a.stl", (1, 1, 2))]
         held = {Path("a.stl"): BOX, Path("b/c.stl"): BOX}
-        done = pack(robot(visuals=shapes, collisions=shapes), Meshes(held), folder="m")
+        done = export_meshes(robot(visuals=shapes, collisions=shapes), Meshes(held), folder="m")
         assert list(done.files) == ["m/a.stl"]
         assert {each.mesh.filename for each in done.model.links[0].visuals} == {"m/a.stl"}
 
     def test_distinct_files_of_one_name(self):
         held = {Path("a/hip.stl"): BOX, Path("b/hip.stl"): BALL}
-        done = pack(robot(visuals=[mesh("a/hip.stl"), mesh("b/hip.stl")]), Meshes(held))
+        done = export_meshes(robot(visuals=[mesh("a/hip.stl"), mesh("b/hip.stl")]), Meshes(held))
         assert done.files == {"meshes/hip.stl": BOX, "meshes/hip_2.stl": BALL}
 
     def test_a_mirrored_use_is_a_file_of_its_own(self):
@@ -136,8 +136,8 @@ class TestCollisionMeshes:
         assert "it has no surface" in done.notes[0]
 
     def test_to_which_mujoco_fits_a_primitive_collide_as_they_are(self):
-        done = packed(collisions=[mesh("a.stl", fitted=True)], a__stl=BOX)
-        assert not done.model.links[0].collisions[0].fitted
+        done = packed(collisions=[mesh("a.stl", fit_to_mesh=True)], a__stl=BOX)
+        assert not done.model.links[0].collisions[0].fit_to_mesh
         assert "to which MuJoCo fitted a primitive" in done.notes[0]
 
 
@@ -172,7 +172,7 @@ def source(robot_file, request):
 
 @pytest.fixture(scope="module")
 def done(source):
-    return pack(source, Meshes())
+    return export_meshes(source, Meshes())
 
 
 def corners(meshes, mesh):
@@ -206,12 +206,12 @@ class TestRobots:
             assert b.max(axis=0) == pytest.approx(a.max(axis=0), abs=1e-6)
 
     def test_the_same_bytes_each_time_and_none_twice(self, source, done):
-        again = pack(source, Meshes())
+        again = export_meshes(source, Meshes())
         assert dict(again.files) == dict(done.files)
         assert list(again.files) == list(done.files)
         assert len(set(done.files.values())) == len(done.files)
 
 
 def test_links_without_shapes_stay():
-    (link,) = pack(robot(), Meshes()).model.links
+    (link,) = export_meshes(robot(), Meshes()).model.links
     assert link.name == "leg"

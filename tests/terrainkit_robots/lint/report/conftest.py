@@ -1,4 +1,4 @@
-"""Reports with everything in them that a format has to cope with."""
+"""Reports with everything that a format has to handle."""
 
 from pathlib import Path
 
@@ -7,13 +7,13 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.fix import Fix
 from terrainkit_robots.description.model import RobotModel, Source
-from terrainkit_robots.lint.report.repaired import Repaired
+from terrainkit_robots.lint.report.fixed_report import FixedReport
 from terrainkit_robots.lint.runner import Finding, Report, Skipped
 from terrainkit_robots.lint.selection import Suppressed, UnusedSuppression
 from terrainkit_robots.lint.suppressions import read_comments
 
 NASTY = 'a,b:c%d|e{0}<b>@me`*_\x1b[31m\r\n::error::x\u202e\udc80"'
-"""A name with something in it for each format to trip over."""
+"""A name with characters that each format has to escape."""
 
 
 @pytest.fixture
@@ -31,7 +31,7 @@ def finding():
         fields = {
             "certainty": "proven",
             "subject": "calf",
-            "message": "the mass is -1 kg; wanted above 0",
+            "message": "the mass is -1 kg; expected > 0",
             "hint": "Weigh it.",
             "file": Path("robot.urdf"),
             "line": 12,
@@ -44,8 +44,8 @@ def finding():
 
 @pytest.fixture
 def report(model, finding):
-    """An error, two warnings and a note; a finding ignored by a comment, a rule not asked."""
-    fix = Fix(safety="safe", description="take the lead off", edits=())
+    """Return a report with all severities, a suppressed finding and skipped rules."""
+    fix = Fix(safety="safe", description="change the limit", edits=())
     quiet = finding(line=30, subject="hatch")
     (comment,) = read_comments(
         Path("robot.urdf"), b"<robot><!-- terrainkit: ignore INR002 so --></robot>"
@@ -59,17 +59,17 @@ def report(model, finding):
             finding("LEG001", "legs", "info", line=1, measured={"legs": 4}),
         ),
         skipped=(
-            Skipped(code="SYM001", reason="no legs were found"),
-            Skipped(code="SYM002", reason="no legs were found"),
-            Suppressed(code="INR002", reason="ignored: so", comment=comment, finding=quiet),
-            UnusedSuppression(code="INR999", reason="comment at robot.urdf:3: no such rule"),
+            Skipped(code="SYM001", reason="no legs detected"),
+            Skipped(code="SYM002", reason="no legs detected"),
+            Suppressed(code="INR002", reason="suppressed: so", comment=comment, finding=quiet),
+            UnusedSuppression(code="INR999", reason="comment at robot.urdf:3: unknown rule"),
         ),
     )
 
 
 @pytest.fixture
 def nasty(model, finding):
-    """A robot whose names want to break out, with numbers that no format has."""
+    """Return a report with special characters and infinite numbers."""
     path = Path(f"dir with space/{NASTY.replace(chr(0), '')}.urdf")
     bad = finding(
         subject=NASTY,
@@ -86,11 +86,11 @@ def nasty(model, finding):
 
 
 @pytest.fixture
-def repaired(model, finding):
-    """What is left once one fix was made and another was not."""
+def fixed_report(model, finding):
+    """Return a report with a fixed and an unfixed finding."""
     fix = Fix(safety="safe", description="name it", edits=())
     done = finding("XML003", "unnamed-robot", "warning", fix=fix)
     left = finding("JNT009", "unit-axis", "warning", fix=fix)
-    return Repaired(
+    return FixedReport(
         facts=Facts(model()), findings=(left,), fixed=(done,), unfixed=((left, "no space"),)
     )

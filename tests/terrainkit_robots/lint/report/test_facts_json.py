@@ -14,7 +14,7 @@ def record(path):
     return made
 
 
-def test_a_quadruped(robot_file):
+def test_facts_json_quadruped(robot_file):
     facts = record(robot_file("go2/urdf/go2.urdf"))
     assert facts["total_mass"] == pytest.approx(15.0191, abs=1e-3)
     assert (facts["links"], facts["bodies"], facts["joints"]) == (29, 13, 12)
@@ -35,7 +35,7 @@ def test_a_quadruped(robot_file):
     assert (facts["action_size"], facts["observation_size"]) == (12, 48)
 
 
-def test_a_robot_without_legs_has_the_same_keys(robot_file, tmp_path):
+def test_facts_json_without_legs_has_same_keys(robot_file, tmp_path):
     file = tmp_path / "arm.urdf"
     file.write_text('<robot name="arm"><link name="only"/></robot>')
     facts = record(file)
@@ -44,7 +44,7 @@ def test_a_robot_without_legs_has_the_same_keys(robot_file, tmp_path):
     assert facts["standing_pose"] is facts["spawn_height"] is facts["holding_torques"] is None
 
 
-def test_joint_orders_by_simulator(robot_file):
+def test_facts_json_joint_orders_by_simulator(robot_file):
     orders = record(robot_file("a1/urdf/a1.urdf"))["joint_orders"]
     assert list(orders) == ["file", "mujoco", "isaac_gym", "isaac_lab", "genesis"]
     legs = {name: [joint[:2] for joint in orders[name]["joints"]] for name in list(orders)[1:]}
@@ -58,7 +58,7 @@ def test_joint_orders_by_simulator(robot_file):
 
 
 @pytest.mark.parametrize("mass", ["1e308", "1e400", "nan", "-1"])
-def test_numbers_beyond_all_bounds_are_none_or_finite(tmp_path, mass):
+def test_facts_json_extreme_mass_is_none_or_finite(tmp_path, mass):
     file = tmp_path / "robot.urdf"
     inertial = f'<inertial><mass value="{mass}"/></inertial>'
     file.write_text(f'<robot name="r"><link name="a">{inertial}</link></robot>')
@@ -70,11 +70,11 @@ def test_numbers_beyond_all_bounds_are_none_or_finite(tmp_path, mass):
     ("value", "kept"),
     [(1 / 3, 0.333333), (1234567.8, 1234570.0), (0.0, 0.0), (math.inf, None), (math.nan, None)],
 )
-def test_six_digits_are_kept(value, kept):
+def test_number_keeps_six_digits(value, kept):
     assert number(value) == kept
 
 
-def test_gains_need_a_simulation(robot_file):
+def test_suggested_gains_require_simulation(robot_file):
     robot = Facts(load_robot(robot_file("go2/urdf/go2.urdf")))
     assert facts_json(robot)["suggested_gains"] is None
     gains = facts_json(robot, simulated=True)["suggested_gains"]
@@ -83,7 +83,7 @@ def test_gains_need_a_simulation(robot_file):
     assert gains["FL_calf_joint"]["reason"]
 
 
-def test_a_robot_that_cannot_be_simulated_gets_no_gains(tmp_path):
+def test_suggested_gains_none_if_not_simulatable(tmp_path):
     path = tmp_path / "robot.urdf"
     path.write_text('<robot name="r"/>')
     assert facts_json(Facts(load_robot(path)), simulated=True)["suggested_gains"] is None

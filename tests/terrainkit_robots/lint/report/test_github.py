@@ -1,21 +1,21 @@
-from terrainkit_robots.lint.report.github import write
+from terrainkit_robots.lint.report.github import format_reports
 
 
-def test_each_finding_is_a_command_with_its_level(report):
-    assert write([report]).splitlines() == [
+def test_each_finding_is_a_command(report):
+    assert format_reports([report]).splitlines() == [
         "::error file=robot.urdf,line=12,title=INR002 negative-mass::"
-        "the mass is -1 kg; wanted above 0%0AWeigh it.",
+        "the mass is -1 kg; expected > 0%0AWeigh it.",
         "::warning file=robot.urdf,line=40,title=JNT007 degrees::"
-        "the mass is -1 kg; wanted above 0%0AWeigh it.",
+        "the mass is -1 kg; expected > 0%0AWeigh it.",
         "::warning file=robot.urdf,title=JNT007 degrees::"
-        "the mass is -1 kg; wanted above 0%0AWeigh it.",
+        "the mass is -1 kg; expected > 0%0AWeigh it.",
         "::notice file=robot.urdf,line=1,title=LEG001 legs::"
-        "the mass is -1 kg; wanted above 0%0AWeigh it.",
+        "the mass is -1 kg; expected > 0%0AWeigh it.",
     ]
 
 
-def test_no_name_ends_a_command_or_starts_one(nasty):
-    (line,) = write([nasty]).split("\n")[:-1]
+def test_command_escapes_names(nasty):
+    (line,) = format_reports([nasty]).split("\n")[:-1]
     assert line.count("\r") == 0
     head, _, message = line.removeprefix("::error ").partition("::")
     properties = dict(part.split("=", 1) for part in head.split(","))
@@ -26,5 +26,5 @@ def test_no_name_ends_a_command_or_starts_one(nasty):
     line.encode()
 
 
-def test_nothing_found_is_no_text():
-    assert write([]) == ""
+def test_no_reports_give_empty_text():
+    assert format_reports([]) == ""

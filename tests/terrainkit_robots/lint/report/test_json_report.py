@@ -1,11 +1,11 @@
 import json
 
 import terrainkit
-from terrainkit_robots.lint.report.json_report import write
+from terrainkit_robots.lint.report.json_report import format_reports
 
 
-def test_one_robot_is_one_document_with_the_keys_of_the_contract(report):
-    document = json.loads(write([report]))
+def test_one_robot_is_one_document(report):
+    document = json.loads(format_reports([report]))
     assert document["schema_version"] == 1
     assert document["tool"] == {"name": "terrainkit", "version": terrainkit.__version__}
     assert (document["file"], document["kind"], document["verdict"]) == (
@@ -20,7 +20,7 @@ def test_one_robot_is_one_document_with_the_keys_of_the_contract(report):
         "severity": "error",
         "certainty": "proven",
         "subject": "calf",
-        "message": "the mass is -1 kg; wanted above 0",
+        "message": "the mass is -1 kg; expected > 0",
         "hint": "Weigh it.",
         "file": "robot.urdf",
         "line": 12,
@@ -31,17 +31,17 @@ def test_one_robot_is_one_document_with_the_keys_of_the_contract(report):
     assert [s["code"] for s in document["skipped"]] == ["SYM001", "SYM002", "INR002", "INR999"]
 
 
-def test_several_robots_are_a_line_each(report, nasty):
-    lines = write([report, nasty, report]).splitlines()
+def test_several_robots_are_json_lines(report, nasty):
+    lines = format_reports([report, nasty, report]).splitlines()
     assert [json.loads(line)["verdict"] for line in lines] == ["fail"] * 3
 
 
-def test_no_robot_is_no_text():
-    assert write([]) == ""
+def test_no_reports_give_empty_text():
+    assert format_reports([]) == ""
 
 
-def test_numbers_that_json_has_not_are_null_and_text_is_whole(nasty):
-    text = write([nasty])
+def test_infinite_numbers_are_null(nasty):
+    text = format_reports([nasty])
     text.encode("ascii")
     document = json.loads(text, parse_constant=int)
     json.dumps(document, ensure_ascii=False).encode()  # no halves of characters
@@ -51,7 +51,7 @@ def test_numbers_that_json_has_not_are_null_and_text_is_whole(nasty):
     assert "\\udc80" in document["findings"][0]["subject"]
 
 
-def test_what_was_fixed_is_told(repaired):
-    document = json.loads(write([repaired]))
+def test_fixed_findings_are_listed(fixed_report):
+    document = json.loads(format_reports([fixed_report]))
     assert [f["code"] for f in document["fixed"]] == ["XML003"]
     assert [(f["code"], f["reason"]) for f in document["unfixed"]] == [("JNT009", "no space")]

@@ -1,6 +1,6 @@
 import re
 
-from terrainkit_robots.lint.report.markdown import write
+from terrainkit_robots.lint.report.markdown import format_reports
 
 
 def rows(text):
@@ -10,7 +10,7 @@ def rows(text):
 
 
 def test_each_finding_is_a_row(report):
-    text = write([report])
+    text = format_reports([report])
     assert text.startswith(
         "## robot.urdf\n\n**1 error, 2 warnings, 1 note** (fixable: 1 with --fix)"
     )
@@ -18,15 +18,15 @@ def test_each_finding_is_a_row(report):
         "error",
         "INR002 negative-mass",
         "robot.urdf:12",
-        "the mass is -1 kg; wanted above 0",
+        "the mass is -1 kg; expected &gt; 0",
         "Weigh it.",
     ]
     assert len(rows(text)) == 4
-    assert "\n- SYM001, SYM002: no legs were found\n" in text
+    assert "\n- SYM001, SYM002: no legs detected\n" in text
 
 
-def test_no_name_breaks_a_row_or_becomes_markup_or_calls_people(nasty):
-    text = write([nasty])
+def test_names_are_escaped(nasty):
+    text = format_reports([nasty])
     (row,) = rows(text)
     assert len(row) == 5
     for wrong in ("<b>", "@me", "\x1b", "\r", "\u202e"):
@@ -35,11 +35,11 @@ def test_no_name_breaks_a_row_or_becomes_markup_or_calls_people(nasty):
     text.encode()
 
 
-def test_what_was_fixed_and_what_was_not(repaired):
-    text = write([repaired])
-    assert "Fixed:\n\n- XML003: unnamed-robot: the mass is -1 kg; wanted above 0\n" in text
-    assert "Could not be fixed:\n\n- JNT009: calf: no space\n" in text
+def test_fixed_and_unfixed_findings_are_listed(fixed_report):
+    text = format_reports([fixed_report])
+    assert "Fixed:\n\n- XML003: unnamed-robot: the mass is -1 kg; expected &gt; 0\n" in text
+    assert "Not fixed:\n\n- JNT009: calf: no space\n" in text
 
 
-def test_robots_are_sections(report):
-    assert write([report, report]).count("\n## robot.urdf\n") == 1  # and one at the very start
+def test_each_robot_is_a_section(report):
+    assert format_reports([report, report]).count("\n## robot.urdf\n") == 1

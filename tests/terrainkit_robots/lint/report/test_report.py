@@ -1,11 +1,11 @@
 import pytest
 
-from terrainkit_robots.lint.report import FORMATS, as_text
+from terrainkit_robots.lint.report import FORMATS, format_reports
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_every_format_ends_its_lines_and_has_every_code(name, report):
-    text = as_text([report], name)
+def test_every_format_lists_every_code(name, report):
+    text = format_reports([report], name)
     assert text.endswith("\n")
     for code in ("INR002", "JNT007", "LEG001"):
         assert code in text

@@ -11,32 +11,32 @@ def summary(path):
     return dict(robot_summary(lint(Facts(load_robot(path)), [])))
 
 
-def test_a_quadruped():
+def test_summary_of_a_quadruped():
     lines = summary(bundled.find("quadruped"))
     assert lines["robot"] == "quadruped (URDF)"
     assert lines["size"] == "15.02 kg, 17 links in 13 rigid bodies, 12 joints"
-    assert lines["legs"] == "4, 0.448 m long: FL_foot, FR_foot, RL_foot, RR_foot"
-    assert list(lines) == ["robot", "size", "legs", "stands", "  roll", "  hip", "  knee"]
+    assert lines["legs"] == "4, 0.448 m long; feet: FL_foot, FR_foot, RL_foot, RR_foot"
+    assert list(lines) == ["robot", "size", "legs", "standing", "  roll", "  hip", "  knee"]
     # The calf's 5.1 N m of the 45.43 N m that the motor has behind its lever.
     assert lines["  knee"].startswith("-1.4")
 
 
-def test_two_joints_of_one_role_are_told_apart():
+def test_repeated_roles_are_numbered():
     assert "  roll 2" in summary(bundled.find("biped"))
 
 
-def test_a_robot_without_legs_and_without_a_name(tmp_path):
+def test_summary_without_legs_and_name(tmp_path):
     (tmp_path / "robot.urdf").write_text('<robot><link name="a"/></robot>')
     assert summary(tmp_path / "robot.urdf") == {
-        "robot": "without a name (URDF)",
+        "robot": "unnamed (URDF)",
         "size": "0 kg, 1 link in 1 rigid body, 0 joints",
-        "legs": "none were found",
+        "legs": "none detected",
     }
 
 
 @pytest.mark.parametrize("value", ["1e300", "1e-300", "1e11", "nan", "-1e308"])
 @pytest.mark.parametrize("words", ['effort="{}"', 'upper="{}"', 'mass value="{}"', 'xyz="0 0 {}"'])
-def test_numbers_out_of_all_proportion_stay_short(tmp_path, words, value):
+def test_extreme_numbers_stay_short(tmp_path, words, value):
     text = bundled.find("quadruped").read_text()
     start = words.partition("{")[0]
     head, _, rest = text.partition(start)
@@ -45,7 +45,7 @@ def test_numbers_out_of_all_proportion_stay_short(tmp_path, words, value):
         assert max(map(len, line.split())) < 25
 
 
-def test_gains_are_suggested_once_a_robot_may_be_simulated():
+def test_gains_are_shown_if_simulated():
     report = lint(Facts(load_robot(bundled.find("quadruped"))), [])
     assert report.simulated
     told = dict(robot_summary(report))

@@ -1,4 +1,5 @@
 import math
+import re
 from dataclasses import replace
 
 import pytest
@@ -7,18 +8,18 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.rule import get_rule
-from terrainkit_robots.simulation import standing
+from terrainkit_robots.lint.rules import dyn
 
-TWEEZERS = """
-<robot name="tweezers">
+GRIPPER = """
+<robot name="gripper">
   <link name="pole">
     <inertial><mass value="5"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
   </link>
-  {jaws}
+  {fingers}
 </robot>
 """
 
-JAW = """
+FINGER = """
   <link name="{side}">
     <inertial><mass value="1e-4"/>
       <inertia ixx="1e-8" iyy="1e-8" izz="1e-8" ixy="0" ixz="0" iyz="0"/></inertial>
@@ -30,8 +31,8 @@ JAW = """
   </joint>
 """
 
-SLIDER = """
-<robot name="gantry">
+LIFT = """
+<robot name="lift">
   <link name="pole"/>
   <link name="tray"><inertial><mass value="1"/>
     <inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial></link>
@@ -43,7 +44,7 @@ SLIDER = """
 """
 
 
-def found(code, path):
+def check(code, path):
     return list(get_rule(code).check(Facts(load_robot(path))))
 
 
@@ -57,52 +58,51 @@ def robot(tmp_path):
     return write
 
 
-def test_a_slide_is_thrown_at_metres_per_second(robot):
-    jaws = "".join(JAW.format(side=side, y=y) for side, y in (("left", 0.1), ("right", -0.1)))
-    (defect,) = found("DYN001", robot(TWEEZERS.format(jaws=jaws)))
-    assert "_joint reached " in defect.message
-    assert "wanted at most 100 m/s; without self-collision" in defect.message
-    assert "rad" not in defect.message
+def test_unstable_drop_units_of_sliding_joint(robot):
+    fingers = "".join(FINGER.format(side=side, y=y) for side, y in (("left", 0.1), ("right", -0.1)))
+    (violation,) = check("DYN001", robot(GRIPPER.format(fingers=fingers)))
+    assert " m/s at " in violation.message
+    assert "expected at most 100 m/s; without self-collision" in violation.message
+    assert "rad" not in violation.message
 
 
 @pytest.mark.parametrize(
     ("tilt", "lifted", "severity"),
     [(2, (), None), (5, (), "info"), (12, (), "warning"), (5, ("toe",), "warning")],
 )
-def test_leaning_a_little_is_a_note(monkeypatch, stood, tilt, lifted, severity):
-    leant = replace(stood, tilt=math.radians(tilt), lifted=lifted)
-    monkeypatch.setattr(standing, "stand_still", lambda *_, **__: leant)
-    defects = found("DYN002", bundled.find("quadruped"))
-    assert [defect.severity for defect in defects] == ([severity] if severity else [])
-    assert all("tilts by" in defect.message for defect in defects)
+def test_does_not_stand_severity(monkeypatch, stood, tilt, lifted, severity):
+    standing_with = replace(stood, tilt=math.radians(tilt), lifted=lifted)
+    monkeypatch.setattr(dyn, "stand_still", lambda *_, **__: standing_with)
+    violations = check("DYN002", bundled.find("quadruped"))
+    assert [violation.severity for violation in violations] == ([severity] if severity else [])
+    assert all("tilts by" in violation.message for violation in violations)
 
 
-def test_how_many_joints_meet_others_is_told_of_each_alone():
-    (defect,) = found("DYN003", bundled.find("quadruped"))
-    assert defect.message.startswith(
-        "6 of 12 joints meet another body before their limits, moved one at a time from the "
-        "default pose; worst "
+def test_unreachable_limits_counts_blocked_joints():
+    (violation,) = check("DYN003", bundled.find("quadruped"))
+    assert violation.message.startswith(
+        "blocked by a collision before their limits, moved one at a time from the default pose: "
+        "6 of 12 joints; worst "
     )
-    assert " rad: " in defect.message
+    assert " rad, where " in violation.message
 
 
-def test_one_joint_is_one_and_a_slide_needs_newtons(robot):
-    (defect,) = found("DYN003", robot(SLIDER))
-    assert defect.message == (
-        "1 of 1 joint cannot lift what hangs from it all the way; worst lift, which needs 9.81 of "
-        "5 N"
+def test_unreachable_limits_units_of_sliding_joint(robot):
+    (violation,) = check("DYN003", robot(LIFT))
+    assert violation.message == (
+        "too weak to lift the limb over the whole range: 1 of 1 joint; worst lift: got 9.81 N; "
+        "expected at most its effort limit of 5 N"
     )
 
 
-def test_a_light_slide_is_told_kilograms(sliding_shanks):
-    (defect,) = found("DYN004", sliding_shanks)
-    assert "_calf_joint moves 0." in defect.message
-    assert " kg, so that explicit PD" in defect.message
-    assert " kg is suggested, and one for " in defect.message
+def test_low_joint_inertia_units_of_sliding_joint(sliding_shanks):
+    (violation,) = check("DYN004", sliding_shanks)
+    assert re.search(r"_calf_joint \(kp .*, mass 0\.[0-9]+ kg\): got ", violation.message)
+    assert re.search(r"an armature of [0-9.]+ kg; the same applies to ", violation.message)
 
 
-def test_other_light_joints_are_counted():
-    (defect,) = found("DYN004", bundled.find("quadruped"))
-    others = defect.measured["joints"] - 1
+def test_low_joint_inertia_counts_other_joints():
+    (violation,) = check("DYN004", bundled.find("quadruped"))
+    others = violation.measured["joints"] - 1
     assert others > 1
-    assert defect.message.endswith(f" kg m2 is suggested, and one for {others} other joints")
+    assert violation.message.endswith(f" kg m2; the same applies to {others} other joints")

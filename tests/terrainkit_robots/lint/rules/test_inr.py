@@ -10,7 +10,7 @@ from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.rule import get_rule, rules
 from terrainkit_robots.mesh.mesh_cache import Meshes
 
-HEALTHY = [
+ROBOTS = [
     "a1/urdf/a1.urdf",
     "go2/urdf/go2.urdf",
     "go2_mjcf/go2.xml",
@@ -33,30 +33,30 @@ ARM = """<robot name="arm">
   </link>
   {more}
 </robot>"""
-SOUND = {"mass": 1, "ixx": 0.014, "iyy": 0.0136, "izz": 0.0008, "more": ""}
+DEFAULTS = {"mass": 1, "ixx": 0.014, "iyy": 0.0136, "izz": 0.0008, "more": ""}
 
 
-class Counting(Meshes):
-    """Mesh files, and which were asked for."""
+class RecordingMeshes(Meshes):
+    """Mesh files that record which of them are read."""
 
     def __init__(self):
         super().__init__()
-        self.asked = set()
+        self.requested = set()
 
     def vertices(self, mesh):
-        self.asked.add(mesh.filename)
+        self.requested.add(mesh.filename)
         return super().vertices(mesh)
 
 
-def found(path, meshes=None):
-    """Return code, severity and subject of what INR finds that is more than information."""
+def check(path, meshes=None):
+    """Return code, severity and subject of the errors and warnings of the INR rules."""
     facts = Facts(load_robot(path), meshes)
     return [
-        (rule.code, defect.severity or rule.severity, defect.subject)
+        (rule.code, violation.severity or rule.severity, violation.subject)
         for rule in rules()
         if rule.family == "INR"
-        for defect in rule.check(facts)
-        if defect.severity != "info"
+        for violation in rule.check(facts)
+        if violation.severity != "info"
     ]
 
 
@@ -64,30 +64,29 @@ def found(path, meshes=None):
 def arm(tmp_path):
     def write(**changed):
         path = tmp_path / "arm.urdf"
-        path.write_text(ARM.format(**SOUND | changed))
+        path.write_text(ARM.format(**DEFAULTS | changed))
         return path
 
     return write
 
 
-@pytest.mark.parametrize("name", HEALTHY)
-def test_healthy_robots_have_sound_inertias(robot_file, name):
-    left = found(robot_file(name))
-    # Covers of the calves have shapes but no mass; MuJoCo makes the robot 1.3 % heavier for them.
+@pytest.mark.parametrize("name", ROBOTS)
+def test_inr_accepts_published_robots(robot_file, name):
+    # The covers of the calves have shapes but no mass, so MuJoCo adds 1.3 % of the total mass.
     known = [("INR011", "warning", "FL_calflower")] if name == "go2/urdf/go2.urdf" else []
-    assert left == known
+    assert check(robot_file(name)) == known
 
 
-def test_the_real_defects_of_anymal_c_are_found(robot_file):
+def test_the_real_defects_of_anymal_c_are_check(robot_file):
     cameras = [f"depth_camera_{side}_camera" for side in ("front", "rear", "left", "right")]
-    assert found(robot_file("anymal_c/urdf/anymal_c.urdf")) == [
+    assert check(robot_file("anymal_c/urdf/anymal_c.urdf")) == [
         ("INR003", "error", "hatch"),
         *(("INR004", "error", camera) for camera in cameras),
     ]
 
 
-def test_the_real_defects_of_cassie_are_found(robot_file):
-    assert found(robot_file("cassie/urdf/cassie.urdf")) == [
+def test_the_real_defects_of_cassie_are_check(robot_file):
+    assert check(robot_file("cassie/urdf/cassie.urdf")) == [
         ("INR001", "warning", "left_pelvis_abduction"),
         ("INR003", "error", "base"),
         ("INR004", "error", "left_toe"),
@@ -95,18 +94,18 @@ def test_the_real_defects_of_cassie_are_found(robot_file):
     ]
 
 
-def test_of_cassie_it_is_told_that_links_have_no_mass(robot_file):
+def test_massless_body_lists_links_of_cassie(robot_file):
     facts = Facts(load_robot(robot_file("cassie/urdf/cassie.urdf")))
     rule = next(rule for rule in rules() if rule.code == "INR001")
-    (told,) = rule.check(facts)
-    assert told.severity == "warning"
-    assert "left_pelvis_abduction, right_pelvis_abduction" in told.message
+    (violation,) = rule.check(facts)
+    assert violation.severity == "warning"
+    assert "left_pelvis_abduction, right_pelvis_abduction" in violation.message
 
 
-def test_no_visual_mesh_of_a_healthy_robot_is_opened(robot_file):
-    meshes = Counting()
-    found(robot_file("go2/urdf/go2.urdf"), meshes)
-    assert meshes.asked == set()
+def test_inr_reads_no_visual_mesh(robot_file):
+    meshes = RecordingMeshes()
+    check(robot_file("go2/urdf/go2.urdf"), meshes)
+    assert meshes.requested == set()
 
 
 @pytest.mark.parametrize(
@@ -123,51 +122,51 @@ def test_no_visual_mesh_of_a_healthy_robot_is_opened(robot_file):
         (1e-6, "INR007", "warning"),
     ],
 )
-def test_units_of_an_inertia(arm, factor, code, severity):
-    scaled = {name: SOUND[name] * factor for name in ("ixx", "iyy", "izz")}
-    assert found(arm(**scaled)) == ([] if code is None else [(code, severity, "tip")])
+def test_inertia_with_wrong_units(arm, factor, code, severity):
+    scaled = {name: DEFAULTS[name] * factor for name in ("ixx", "iyy", "izz")}
+    assert check(arm(**scaled)) == ([] if code is None else [(code, severity, "tip")])
 
 
 @pytest.mark.parametrize(
     ("mass", "code"),
     [(1000.0, "INR010"), (50.0, "INR010"), (20.0, None), (0.05, None), (0.001, "INR010")],
 )
-def test_units_of_a_mass(arm, mass, code):
-    scaled = {name: SOUND[name] * mass for name in ("ixx", "iyy", "izz")}
-    assert found(arm(mass=mass, **scaled)) == ([] if code is None else [(code, "warning", "tip")])
+def test_mass_with_wrong_units(arm, mass, code):
+    scaled = {name: DEFAULTS[name] * mass for name in ("ixx", "iyy", "izz")}
+    assert check(arm(mass=mass, **scaled)) == ([] if code is None else [(code, "warning", "tip")])
 
 
 @pytest.mark.parametrize("digits", [3, 4, 5, 6])
-def test_plates_and_rods_in_few_digits_are_no_defect(arm, digits):
+def test_triangle_inequality_tolerates_rounding(arm, digits):
     rng = np.random.default_rng(0)
     for _ in range(20):
         a, b = rng.uniform(0.1, 1.0, 2) * 1e-2
         moments = {"ixx": a, "iyy": b, "izz": a + b}
         rounded = {name: f"{value:.{digits}g}" for name, value in moments.items()}
         ratio = triangle_ratio(np.sort([float(text) for text in rounded.values()]))
-        codes = {code for code, *_ in found(arm(mass=5, **rounded))}
+        codes = {code for code, *_ in check(arm(mass=5, **rounded))}
         assert ("INR004" in codes) == (ratio < 0.999)
         assert ratio > 0.999 or digits == 3
 
 
-def test_what_mujoco_refuses_is_found_and_what_it_takes_is_not(arm):
+def test_inertia_rules_agree_with_mujoco(arm):
     rng = np.random.default_rng(1)
-    refused = 0
+    rejected = 0
     for _ in range(60):
         moments = dict(zip(("ixx", "iyy", "izz"), rng.uniform(-0.002, 0.014, 3), strict=True))
         path = arm(**moments)
         try:
             mujoco.MjModel.from_xml_path(str(path))
-            taken = True
+            valid = True
         except ValueError:
-            taken = False
-        refused += not taken
-        codes = {code for code, *_ in found(path)}
-        assert bool(codes & {"INR003", "INR004"}) != taken, moments
-    assert 10 < refused < 50
+            valid = False
+        rejected += not valid
+        codes = {code for code, *_ in check(path)}
+        assert bool(codes & {"INR003", "INR004"}) != valid, moments
+    assert 10 < rejected < 50
 
 
-def test_the_mass_that_is_added_is_what_mujoco_adds(arm):
+def test_inferred_mass_agrees_with_mujoco(arm):
     hood = """<joint name="mount" type="fixed"><parent link="tip"/><child link="hood"/></joint>
       <link name="hood">
         <collision><geometry><cylinder radius="0.03" length="0.1"/></geometry></collision>
@@ -177,33 +176,36 @@ def test_the_mass_that_is_added_is_what_mujoco_adds(arm):
     compiled = mujoco.MjModel.from_xml_path(str(path))
     facts = Facts(load_robot(path))
     rule = next(rule for rule in rules() if rule.code == "INR011")
-    (defect,) = rule.check(facts)
-    assert defect.measured["added"] == pytest.approx(compiled.body_mass.sum() - 1.0)
-    assert re.search(r"adds 0\.316 kg .* 31\.6% of the declared 1 kg", defect.message)
+    (violation,) = rule.check(facts)
+    assert violation.measured["added"] == pytest.approx(compiled.body_mass.sum() - 1.0)
+    assert re.search(r"got 0\.316 kg, 31\.6% of the declared 1 kg", violation.message)
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "words"),
+    ("old", "new", "message"),
     [
-        (' iyy="0.0136"', "", "an <inertia> without iyy; wanted all of ixx, iyy and izz"),
-        (' ixx="0.014"', "", "an <inertia> without ixx; wanted all of"),
-        ("<inertia ", "<unknown ", "no <inertia>; wanted an <inertia>"),
+        (' iyy="0.0136"', "", "<inertia> without iyy; expected ixx, iyy and izz"),
+        (' ixx="0.014"', "", "<inertia> without ixx; expected "),
+        ("<inertia ", "<unknown ", "no <inertia>; expected <inertia>"),
     ],
 )
-def test_what_an_inertia_lacks_is_named(arm, old, new, words):
+def test_inertia_names_missing_elements(arm, old, new, message):
     path = arm()
     path.write_text(path.read_text().replace(old, new))
-    (defect,) = get_rule("INR003").check(Facts(load_robot(path)))
-    assert f"link tip has a mass of 1 kg, but {words}" in defect.message
+    (violation,) = get_rule("INR003").check(Facts(load_robot(path)))
+    assert f"inertia of link tip (mass 1 kg): got {message}" in violation.message
 
 
-def test_of_mjcf_its_own_attributes_are_named(tmp_path):
+def test_inertia_names_mjcf_attributes(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(
         '<mujoco><worldbody><body name="a"><freejoint/><inertial pos="0 0 0" mass="1"/>'
         '<body name="b"><joint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>'
         '<body name="c"><joint/><inertial pos="0 0 0" mass="1"/></body></body></worldbody></mujoco>'
     )
-    told = {defect.subject: defect for defect in get_rule("INR003").check(Facts(load_robot(path)))}
-    assert "c" in told
-    assert "neither diaginertia nor fullinertia" in told["c"].message
+    violations = {
+        violation.subject: violation
+        for violation in get_rule("INR003").check(Facts(load_robot(path)))
+    }
+    assert "c" in violations
+    assert "neither diaginertia nor fullinertia" in violations["c"].message

@@ -6,7 +6,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.rule import rules
 
-ALL = [
+ROBOTS = [
     "a1/urdf/a1.urdf",
     "go2/urdf/go2.urdf",
     "go2_mjcf/go2.xml",
@@ -19,20 +19,20 @@ ALL = [
 ]
 
 
-def found(path, text=None):
-    """Return code and subject of what SYM finds."""
+def check(path, text=None):
+    """Return code and subject of the findings of the SYM rules."""
     contents = {} if text is None else {path: text.encode()}
     facts = Facts(load_robot(path, contents=contents))
     return [
-        (rule.code, defect.subject)
+        (rule.code, violation.subject)
         for rule in rules()
         if rule.family == "SYM"
-        for defect in rule.check(facts)
+        for violation in rule.check(facts)
     ]
 
 
-def edited(text, tag, name, pattern, replacement):
-    """Return the text with one change inside the link or joint of that name."""
+def replace(text, tag, name, pattern, replacement):
+    """Return the text with one replacement inside the link or joint of that name."""
     start = re.search(rf'<{tag}\s+name="{name}"', text).start()
     end = text.index(f"</{tag}>", start)
     block, count = re.subn(pattern, replacement, text[start:end], count=1)
@@ -40,9 +40,9 @@ def edited(text, tag, name, pattern, replacement):
     return text[:start] + block + text[end:]
 
 
-@pytest.mark.parametrize("name", ALL)
-def test_real_robots_are_the_same_left_and_right(robot_file, name):
-    assert found(robot_file(name)) == []
+@pytest.mark.parametrize("name", ROBOTS)
+def test_sym_accepts_published_robots(robot_file, name):
+    assert check(robot_file(name)) == []
 
 
 @pytest.mark.parametrize("leg", ["FL", "FR", "RL", "RR"])
@@ -61,15 +61,15 @@ def test_real_robots_are_the_same_left_and_right(robot_file, name):
         ("joint", "calf_joint", r'axis\s+xyz="0 1 0"', 'axis xyz="0.2 0.98 0"', "SYM007"),
     ],
 )
-def test_the_odd_leg_of_four_is_named(robot_file, leg, tag, name, pattern, replacement, finding):
+def test_sym_reports_modified_leg(robot_file, leg, tag, name, pattern, replacement, finding):
     path = robot_file("go2/urdf/go2.urdf")
-    text = edited(path.read_text(), tag, f"{leg}_{name}", pattern, replacement)
-    assert found(path, text) == [(finding, f"{leg}_{name}")]
+    text = replace(path.read_text(), tag, f"{leg}_{name}", pattern, replacement)
+    assert check(path, text) == [(finding, f"{leg}_{name}")]
 
 
-def test_what_hangs_below_a_defect_is_not_told_again(robot_file):
+def test_sym_reports_no_child_joints(robot_file):
     path = robot_file("g1/g1_29dof.urdf")
     text = path.read_text()
-    turned = edited(text, "joint", "left_hip_roll_joint", r'rpy="[^"]*"', 'rpy="0.2 -0.1749 0"')
-    assert {code for code, _ in found(path, turned)} == {"SYM006"}
-    assert len(found(path, turned)) == 1
+    modified = replace(text, "joint", "left_hip_roll_joint", r'rpy="[^"]*"', 'rpy="0.2 -0.1749 0"')
+    assert {code for code, _ in check(path, modified)} == {"SYM006"}
+    assert len(check(path, modified)) == 1

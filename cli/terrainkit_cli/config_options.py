@@ -1,0 +1,276 @@
+"""The values of a config as options: `--rows 4`, `--rewards.tracking-lin-vel 1.5`.
+
+`--help` shows the values that the options change: those of the task or the file that is named.
+"""
+
+import dataclasses
+import inspect
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar, get_args, get_origin
+
+import tyro
+
+from terrainkit.errors import ConfigError
+from terrainkit.schema import (
+    NONE,
+    Config,
+    convert,
+    field_docs,
+    field_types,
+    replace,
+    without_meta,
+    without_none,
+)
+from terrainkit_cli.parse import Command, UsageError, check_options, option_names, parse, value_of
+from terrainkit_cli.robot_options import Text
+
+if TYPE_CHECKING:
+    from typing import Self
+
+    from terrainkit_robots.rl.config import Task
+
+_C = TypeVar("_C", bound=Config)
+_HELP = ("-h", "--help")
+_NOT_GIVEN = object()
+"""Value of an option that is not on the command line."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConfigCommand(Command):
+    """A command with an option for each value of a config."""
+
+    @abstractmethod
+    def default_config(self) -> Config:
+        """Return the config whose values the options change.
+
+        Raises:
+            ConfigError: if it cannot be read.
+        """
+
+    @classmethod
+    def with_options(
+        cls, config: Config, omit: Sequence[str] = (), aliases: Mapping[str, str] | None = None
+    ) -> "type[Self]":
+        """Return this command with an option for each value of `config`.
+
+        Args:
+            config: The config, whose values are the defaults.
+            omit: Names of fields without an option.
+            aliases: Shorter option of a nested value: {"env.num_envs": "--num-envs"}.
+        """
+        values = _options_class(config, omit, aliases or {})
+        annotation = Annotated[values, tyro.conf.arg(name="")]  # type: ignore[valid-type]
+        command = dataclasses.make_dataclass(
+            cls.__name__,
+            [("values", annotation, field(default_factory=values))],
+            bases=(cls,),
+            frozen=True,
+            kw_only=True,
+            namespace={"defaults": config},
+        )
+        command.__doc__ = inspect.getdoc(cls)
+        return command
+
+    def given(self) -> dict[str, Any]:
+        """Return the values on the command line by field name; those of sections are nested.
+
+        Raises:
+            ConfigError: if a value is invalid.
+        """
+        return _given("", self.defaults, self.values) if hasattr(self, "values") else {}
+
+    def changed_config(self) -> Any:
+        """Return the config with the values on the command line.
+
+        Raises:
+            ConfigError: as :meth:`default_config`, or if a value is invalid.
+        """
+        config = self.defaults if hasattr(self, "values") else self.default_config()
+        return with_values(config, self.given())
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskCommand(ConfigCommand):
+    """A command for a robot and its task, with an option for each value of the task."""
+
+    robot: Annotated[
+        str, tyro.conf.Positional, tyro.conf.arg(metavar="ROBOT", help_behavior_hint="")
+    ] = ""
+    """Name of a task, or a folder of terrainkit onboard."""
+
+    config: Text = ""
+    """TOML file with values of the task; options override it."""
+
+    ALIASES: ClassVar[Mapping[str, str]] = {}
+    """Shorter options of values of the task."""
+
+    @classmethod
+    def options(cls, arguments: Sequence[str]) -> "type[Self]":
+        """Return this command with an option for each value of the task that is named.
+
+        Raises:
+            ConfigError: if there is no such task, or its file is invalid.
+            UsageError: if an option is unknown.
+        """
+        from terrainkit_robots.rl.config import Task
+
+        flags = option_names(_options_class(Task(), (), {}), flags_only=True)
+        own = _own_words(arguments, [*option_names(cls), *_HELP], flags)
+        words = [word for word in own if word not in _HELP]
+        try:
+            command = parse(cls, "", words)
+        except UsageError:
+            command = cls()  # the error is reported when all words are parsed
+        try:
+            task = command.default_config()
+        except ConfigError:
+            if words == own:
+                raise
+            task = Task()  # --help works without a valid task
+        made = cls.with_options(task, aliases=cls.ALIASES)
+        check_options(made, arguments)
+        return made
+
+    def default_config(self) -> "Task":
+        """Return the task whose values the options change: that of the robot, then --config.
+
+        Raises:
+            ConfigError: if there is no such task, or the file is invalid.
+        """
+        from terrainkit_robots.rl.config import Task
+        from terrainkit_robots.rl.tasks import get_task
+
+        task = get_task(self.robot).task if self.robot else Task()
+        return Task.load(self.config, task) if self.config else task
+
+
+def with_values(config: _C, values: Mapping[str, Any], path: str = "") -> _C:
+    """Return a copy of a config with other values; those of nested configs are mappings."""
+    changed = {
+        name: with_values(getattr(config, name), value, f"{path}{name}.")
+        if isinstance(value, Mapping)
+        else value
+        for name, value in values.items()
+    }
+    return replace(path, config, changed) if changed else config
+
+
+def _given(path: str, config: Config, options: object) -> dict[str, Any]:
+    values: dict[str, Any] = {}
+    annotations = field_types(type(config))
+    for name, words in vars(options).items():
+        default = getattr(config, name)
+        if isinstance(default, Config):
+            if nested := _given(f"{path}{name}.", default, words):
+                values[name] = nested
+        elif isinstance(words, bool):
+            if words != default:
+                values[name] = words
+        elif words is not _NOT_GIVEN:
+            values[name] = _from_words(
+                f"--{path}{name}".replace("_", "-"), annotations[name], words
+            )
+    return values
+
+
+def _from_words(name: str, annotation: Any, words: list[str]) -> Any:
+    """Return the value that the words of an option stand for."""
+    kind, _ = without_meta(without_none(annotation))
+    if words == [NONE] and without_none(annotation) is not annotation:
+        return None
+    several = get_origin(kind) is tuple
+    item = get_args(kind)[0] if several else kind
+    is_text = item is str or get_origin(item) is Literal
+    values = words if is_text else [value_of(word) for word in words]
+    return convert(name, values if several else values[0], annotation)
+
+
+def _options_class(config: Config, omit: Sequence[str], aliases: Mapping[str, str]) -> type[Any]:
+    """Return a dataclass with a field for each option, for tyro."""
+    annotations, docs = field_types(type(config)), field_docs(type(config))
+    options: list[Any] = []
+    for name, annotation in annotations.items():
+        value = getattr(config, name)
+        if isinstance(value, Config):
+            prefix = f"{name}."
+            inner = {k.removeprefix(prefix): v for k, v in aliases.items() if k.startswith(prefix)}
+            nested = _options_class(value, (), inner)
+            options.append((name, nested, field(default_factory=nested)))
+        elif name not in omit:
+            about = tyro.conf.arg(
+                help=docs.get(name, ""),
+                help_behavior_hint=f"(default: {_shown(value)})",
+                aliases=[aliases[name]] if name in aliases else None,
+            )
+            if annotation is bool:
+                options.append((name, Annotated[bool, about], field(default=value)))
+            else:
+                kind = Annotated[object, _words_spec(annotation), about]
+                options.append((name, kind, field(default=_NOT_GIVEN)))
+    namespace = {"__doc__": inspect.getdoc(config)}
+    name = f"{type(config).__name__}Options"
+    return dataclasses.make_dataclass(name, options, frozen=True, kw_only=True, namespace=namespace)
+
+
+def _words_spec(annotation: Any) -> Any:
+    """Return how tyro reads an option: as words, which are converted after parsing.
+
+    tyro would read a tuple or a union through typeguard, whose import is slow.
+    """
+    kind, _ = without_meta(without_none(annotation))
+    args = get_args(kind) if get_origin(kind) is tuple else ()
+    any_number = Ellipsis in args or (args and without_none(annotation) is not annotation)
+    return tyro.constructors.PrimitiveConstructorSpec(
+        nargs="*" if any_number else len(args) or 1,
+        metavar=_metavar(annotation),
+        instance_from_str=lambda words: words,
+        is_instance=lambda _: True,
+        str_from_instance=lambda _: [],
+    )
+
+
+def _metavar(annotation: Any) -> str:
+    if (inner := without_none(annotation)) is not annotation:
+        return f"{_metavar(inner)}|{NONE}"
+    kind, _ = without_meta(annotation)
+    args = get_args(kind)
+    if get_origin(kind) is Literal:
+        return "{" + ",".join(map(str, args)) + "}"
+    if get_origin(kind) is tuple:
+        return f"[{_metavar(args[0])} ...]" if Ellipsis in args else " ".join(map(_metavar, args))
+    return {int: "INT", float: "FLOAT", str: "TEXT", bool: "{true,false}"}.get(kind, "VALUE")
+
+
+def _shown(value: object) -> str:
+    """Return a value as it is written on the command line."""
+    if isinstance(value, tuple):
+        return " ".join(map(_shown, value))
+    if isinstance(value, bool) or value is None:
+        return str(value).lower()
+    return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else f"{value}"
+
+
+def _own_words(
+    arguments: Sequence[str], own_options: Sequence[str], flags: Sequence[str]
+) -> list[str]:
+    """Return `arguments` without options that are not in `own_options`, and their values.
+
+    How many values an unknown option has is not known yet: the next word, and then all numbers.
+    """
+    own, words = [], list(arguments)
+    while words:
+        word = words.pop(0)
+        name, equals, _ = word.partition("=")
+        name = name.replace("_", "-")
+        if not name.startswith("--") or name in own_options:
+            own.append(word)
+            continue
+        first = not equals and name not in flags
+        while words and not words[0].startswith("--"):
+            if not first and isinstance(value_of(words[0]), str):
+                break
+            words.pop(0)
+            first = False
+    return own

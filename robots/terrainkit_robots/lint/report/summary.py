@@ -1,0 +1,59 @@
+"""Summaries of reports: counts, locations and reasons, as all formats for people print them."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+from terrainkit_robots.lint.report.grouping import group_findings
+from terrainkit_robots.lint.rule import Severity
+from terrainkit_robots.lint.runner import Finding, Report, Skipped
+from terrainkit_robots.lint.selection import UnusedSuppression
+from terrainkit_robots.text import count as count
+from terrainkit_robots.text import display_path
+
+SEVERITY_LABELS: dict[Severity, str] = {"error": "error", "warning": "warning", "info": "note"}
+"""Label of each severity, in the order of reports."""
+
+
+def summarize_findings(reports: Sequence[Report]) -> str:
+    """Return the number of findings, such as `2 errors, 1 warning` or `no problems found`.
+
+    A finding that repeats over joints or links counts once.
+    """
+    counts = Counter(finding.severity for finding in _unique_findings(reports))
+    parts = [count(counts[s], label) for s, label in SEVERITY_LABELS.items() if counts[s]]
+    if not counts["error"] + counts["warning"]:
+        parts.insert(0, "no problems found")
+    return ", ".join(parts)
+
+
+def summarize_fixes(reports: Sequence[Report]) -> str:
+    """Return how many findings each option fixes, or an empty text if none can be fixed."""
+    fixes = [f.fix.safety for f in _unique_findings(reports) if f.fix is not None]
+    options = {"safe": "--fix", "unsafe": "--unsafe-fixes"}
+    parts = [f"{fixes.count(s):,} with {option}" for s, option in options.items() if s in fixes]
+    return f"fixable: {', '.join(parts)}" if parts else ""
+
+
+def _unique_findings(reports: Sequence[Report]) -> list[Finding]:
+    return [
+        group.first
+        for report in reports
+        for group in group_findings(report.facts.model, report.findings)
+    ]
+
+
+def format_location(finding: Finding) -> str:
+    """Return file and line in the form that editors and terminals open."""
+    file = display_path(finding.file)
+    return f"{file}:{finding.line}" if finding.line else file
+
+
+def group_skipped(skipped: Sequence[Skipped]) -> list[tuple[bool, str, str]]:
+    """Return one entry per reason: whether it is a warning, the codes of the rules, the reason.
+
+    An unused suppression comment is a warning.
+    """
+    reasons: dict[tuple[bool, str], dict[str, None]] = {}
+    for each in skipped:
+        reasons.setdefault((isinstance(each, UnusedSuppression), each.reason), {})[each.code] = None
+    return [(warn, ", ".join(codes), reason) for (warn, reason), codes in reasons.items()]

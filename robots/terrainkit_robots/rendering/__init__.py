@@ -1,0 +1,1 @@
+"""Render robot pictures and policy videos off-screen with MuJoCo."""

@@ -1,0 +1,558 @@
+"""Task: the configuration of training, with legged_gym's names and nesting.
+
+A task is set from the command line and TOML files, and saved beside the policy that it trained.
+Subclass `Task`, or one of its sections, for a task of your own; see docs/adding_a_robot.md.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from terrainkit.errors import ConfigError
+from terrainkit.schema import (
+    Config,
+    Fraction,
+    Interval,
+    NonNegativeFloat,
+    NonNegativeInterval,
+    PositiveFloat,
+    PositiveInt,
+)
+
+MAX_SCAN_POINTS = 10_000
+"""Largest number of points of the height scan."""
+
+HiddenDims = Annotated[tuple[Annotated[int, Meta(ge=1, le=65536)], ...], Meta(min_length=1)]
+ScanPoints = Annotated[tuple[float, ...], Meta(min_length=1)]
+Activation = Literal[
+    "elu", "selu", "relu", "crelu", "lrelu", "tanh", "sigmoid", "softplus", "gelu", "swish", "mish"
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Env(Config):
+    """Environments and episodes."""
+
+    num_envs: PositiveInt = 512
+    """Number of parallel environments; 512 to 1024 train fastest on a CPU."""
+
+    episode_length_s: Annotated[float, Meta(gt=0, le=1e6)] = 20.0
+    """Length after which an episode is truncated [s]."""
+
+    num_threads: Annotated[int, Meta(ge=0, le=4096)] = 0
+    """Threads of the physics simulation; 0 for one per processor."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Terrain(Config):
+    """Terrain, terrain curriculum and height scan."""
+
+    collision: Literal["auto", "hfield", "boxes", "plane"] = "auto"
+    """Collision geometry of the terrain: the map's heightfield, its boxes, the better of the two
+    for the map, or a flat plane in place of the map."""
+
+    curriculum: bool = True
+    """Whether robots that walk far enough move to more difficult rows of the map."""
+
+    max_init_level: Annotated[int, Meta(ge=0)] = 5
+    """Highest row to start on; the last row of the map if it has fewer."""
+
+    measure_heights: bool | None = None
+    """Whether the policy observes the height scan; none: on any terrain but a plane."""
+
+    measured_points_x: ScanPoints = tuple(round(-0.8 + 0.1 * k, 1) for k in range(17))
+    """Points of the height scan along the heading of the robot [m]."""
+
+    measured_points_y: ScanPoints = tuple(round(-0.5 + 0.1 * k, 1) for k in range(11))
+    """Points of the height scan to the left of the robot [m]."""
+
+    def __post_init__(self) -> None:
+        """Validate the values, and the size of the height scan."""
+        super().__post_init__()
+        points = len(self.measured_points_x) * len(self.measured_points_y)
+        if points > MAX_SCAN_POINTS:
+            raise ConfigError(
+                f"measured_points_x, measured_points_y: got {points} points; "
+                f"expected at most {MAX_SCAN_POINTS}"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class InitState(Config):
+    """Random initial state of an episode. Heights and default pose are in the robot's spec."""
+
+    reset_range: NonNegativeInterval | None = None
+    """Factors on the default joint positions; none: those of the robot's spec."""
+
+    position: NonNegativeFloat = 0.5
+    """Largest offset from the spawn origin along x and along y, where the terrain allows it [m]."""
+
+    yaw: NonNegativeFloat = 3.14159
+    """Largest heading to either side [rad]."""
+
+    lin_vel: NonNegativeFloat = 0.5
+    """Largest base linear velocity along each axis [m/s]."""
+
+    ang_vel: NonNegativeFloat = 0.5
+    """Largest base angular velocity about each axis [rad/s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Control(Config):
+    """Actions and PD control. Values that are none are those of the robot's spec."""
+
+    control_type: Literal["P", "V", "T"] = "P"
+    """Quantity that an action controls: position, velocity or torque of each joint."""
+
+    stiffness: NonNegativeFloat | None = None
+    """P gain of every joint that has one [N m/rad]."""
+
+    damping: NonNegativeFloat | None = None
+    """D gain of every joint [N m s/rad]."""
+
+    action_scale: PositiveFloat | None = None
+    """Factor from action to position [rad], velocity [rad/s] or torque [N m]; none: the spec's for
+    P, the largest velocity for V, the largest torque for T."""
+
+    decimation: Annotated[int, Meta(ge=1, le=1000)] = 4
+    """Number of simulation steps per policy step."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asset(Config):
+    """Parts of the robot that are simulated."""
+
+    collisions: Literal["all", "feet_and_termination"] = "all"
+    """Bodies that collide with the terrain: all with collision geometry, or only the feet and the
+    bodies that end an episode. The latter is 1.5 times as fast, but the legs pass through the
+    edges of stairs, and `rewards.collision` counts nothing."""
+
+    self_collisions: bool = False
+    """Whether the bodies of a robot collide with each other."""
+
+    joint_friction: bool = False
+    """Whether to simulate dry joint friction; this takes a quarter of the speed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Commands(Config):
+    """Ranges from which velocity commands are sampled."""
+
+    lin_vel_x: Interval = (-1.0, 1.0)
+    """Forward velocity [m/s]."""
+
+    lin_vel_y: Interval = (-0.5, 0.5)
+    """Velocity to the left [m/s]."""
+
+    ang_vel_yaw: Interval = (-1.0, 1.0)
+    """Yaw velocity to the left [rad/s]; with a heading command, its limits."""
+
+    heading: Interval = (-3.14159, 3.14159)
+    """Heading in the world frame [rad]."""
+
+    heading_command: bool | None = None
+    """Whether to command a heading in place of a yaw velocity; none: on any terrain but a plane,
+    because a robot that keeps turning does not cross the terrain."""
+
+    heading_stiffness: NonNegativeFloat = 0.5
+    """Yaw velocity per heading error [1/s]."""
+
+    resampling_time: PositiveFloat = 10.0
+    """Time after which a new command is sampled [s]."""
+
+    min_norm: NonNegativeFloat = 0.2
+    """Norm below which linear and yaw velocity commands are set to zero [m/s, rad/s]."""
+
+    standing: Fraction = 0.1
+    """Fraction of the commands that are zero."""
+
+    curriculum: bool = False
+    """Whether the range of `lin_vel_x` grows once the robots track it well."""
+
+    max_curriculum: NonNegativeFloat = 1.0
+    """Largest range of `lin_vel_x` to either side [m/s]."""
+
+    def __post_init__(self) -> None:
+        """Validate the values, and that the curriculum can grow."""
+        super().__post_init__()
+        low, high = self.lin_vel_x
+        if self.curriculum and self.max_curriculum <= min(-low, high):
+            raise ConfigError(
+                f"max_curriculum: got {self.max_curriculum:g}; expected more than lin_vel_x, "
+                f"{low:g} to {high:g}, or no curriculum"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class DomainRand(Config):
+    """Domain randomization."""
+
+    friction: NonNegativeInterval | None = (0.5, 1.25)
+    """Friction coefficient of the robot's contacts; none: that of the robot."""
+
+    added_mass: Interval | None = (-1.0, 1.0)
+    """Mass added to the base [kg]."""
+
+    com_shift: NonNegativeFloat = 0.03
+    """Largest offset of the base's center of mass along each axis [m]."""
+
+    gains: NonNegativeInterval | None = (0.9, 1.1)
+    """Factors on stiffness and damping of each joint."""
+
+    motor_strength: NonNegativeInterval | None = (0.9, 1.1)
+    """Factor on all torques of a robot."""
+
+    joint_offset: NonNegativeFloat = 0.02
+    """Largest zero offset of each joint, sampled at each reset [rad]."""
+
+    push_interval_s: NonNegativeFloat = 15.0
+    """Time between pushes [s]; 0 for no pushes."""
+
+    max_push_vel_xy: NonNegativeFloat = 1.0
+    """Largest velocity that a push adds along x and along y [m/s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rewards(Config):
+    """Scale of each reward, per second, and the parameters of the rewards.
+
+    A reward with the scale 0 is not computed.
+    """
+
+    tracking_lin_vel: float = 1.5
+    """Tracking of the linear velocity command."""
+
+    tracking_ang_vel: float = 0.75
+    """Tracking of the yaw velocity command."""
+
+    lin_vel_z: float = -2.0
+    """Vertical base velocity, squared."""
+
+    ang_vel_xy: float = -0.05
+    """Roll and pitch velocity of the base, squared."""
+
+    orientation: float = -1.0
+    """Tilt of the base."""
+
+    base_height: float = 0.0
+    """Deviation of the base height from its target."""
+
+    torques: float = -0.0002
+    """Joint torques, squared."""
+
+    dof_power: float = 0.0
+    """Mechanical power of the joints."""
+
+    dof_vel: float = 0.0
+    """Joint velocities, squared."""
+
+    dof_acc: float = -2.5e-7
+    """Joint accelerations, squared."""
+
+    action_rate: float = -0.01
+    """Change of the action, squared."""
+
+    action_smoothness: float = 0.0
+    """Second difference of the action, squared."""
+
+    collision: float = -1.0
+    """Contacts of penalized bodies."""
+
+    termination: float = 0.0
+    """Falls."""
+
+    dof_pos_limits: float = -10.0
+    """Joint positions beyond their soft limits."""
+
+    dof_vel_limits: float = 0.0
+    """Joint velocities beyond their soft limits."""
+
+    torque_limits: float = 0.0
+    """Torques beyond their soft limits."""
+
+    feet_air_time: float = 1.0
+    """Time that the feet spend in the air."""
+
+    foot_clearance: float = 0.0
+    """Deviation of the swing height of the feet from its target."""
+
+    stumble: float = 0.0
+    """Feet that hit vertical surfaces."""
+
+    stand_still: float = -0.2
+    """Deviation from the default pose at zero command."""
+
+    feet_contact_forces: float = 0.0
+    """Large contact forces on the feet."""
+
+    tracking_sigma: PositiveFloat = 0.25
+    """Tracking rewards are exp(-error^2 / sigma) [m2/s2]."""
+
+    only_positive_rewards: bool = False
+    """Whether the total reward of a step, without `termination`, is clipped at 0."""
+
+    soft_dof_vel_limit: NonNegativeFloat = 0.9
+    """Soft velocity limit of a joint, as a fraction of its velocity limit."""
+
+    soft_torque_limit: NonNegativeFloat = 0.9
+    """Soft torque limit of a joint, as a fraction of its torque limit."""
+
+    base_height_target: float | None = None
+    """Base height above the ground [m]; none: that of the robot's spec."""
+
+    air_time_target: NonNegativeFloat = 0.15
+    """Air time above which `feet_air_time` is positive [s]."""
+
+    foot_clearance_target: NonNegativeFloat = 0.08
+    """Height of a swinging foot above the ground [m]."""
+
+    max_contact_force: NonNegativeFloat = 100.0
+    """Contact force above which `feet_contact_forces` counts [N]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Termination(Config):
+    """Conditions that end an episode as a fall."""
+
+    contact_force: NonNegativeFloat = 1.0
+    """Largest contact force on a termination body [N]."""
+
+    tilt: Annotated[float, Meta(gt=0, le=math.pi)] = 1.3
+    """Largest angle between the z axes of base and world [rad]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ObsScales(Config):
+    """Scales of the observations."""
+
+    lin_vel: NonNegativeFloat = 2.0
+    """Scale of linear velocities and their commands."""
+
+    ang_vel: NonNegativeFloat = 0.25
+    """Scale of angular velocities and their command."""
+
+    dof_pos: NonNegativeFloat = 1.0
+    """Scale of joint positions."""
+
+    dof_vel: NonNegativeFloat = 0.05
+    """Scale of joint velocities."""
+
+    height_measurements: NonNegativeFloat = 5.0
+    """Scale of the height scan."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Normalization(Config):
+    """Scales and limits of observations and actions."""
+
+    obs_scales: ObsScales = field(default_factory=ObsScales)
+    """Scales of the observations."""
+
+    clip_observations: PositiveFloat = 100.0
+    """Largest observation."""
+
+    clip_actions: PositiveFloat = 100.0
+    """Largest action."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noise(Config):
+    """Uniform noise on the observations of the policy, to either side, before the scales."""
+
+    noise_level: NonNegativeFloat = 1.0
+    """Factor on all noise; 0 for none."""
+
+    dof_pos: NonNegativeFloat = 0.01
+    """Noise of joint positions [rad]."""
+
+    dof_vel: NonNegativeFloat = 1.5
+    """Noise of joint velocities [rad/s]."""
+
+    ang_vel: NonNegativeFloat = 0.2
+    """Noise of the base angular velocity [rad/s]."""
+
+    gravity: NonNegativeFloat = 0.05
+    """Noise of the gravity direction."""
+
+    height_measurements: NonNegativeFloat = 0.1
+    """Noise of the height scan [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sim(Config):
+    """Physics simulation."""
+
+    dt: Annotated[float, Meta(gt=0, le=0.1)] = 0.005
+    """Time step [s]."""
+
+    iterations: PositiveInt = 10
+    """Largest number of solver iterations."""
+
+    ls_iterations: PositiveInt = 10
+    """Largest number of line search iterations."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Policy(Config):
+    """Actor and critic networks."""
+
+    init_noise_std: PositiveFloat = 1.0
+    """Initial standard deviation of the actions."""
+
+    actor_hidden_dims: HiddenDims = (128, 128, 128)
+    """Widths of the hidden layers of the actor."""
+
+    critic_hidden_dims: HiddenDims = (128, 128, 128)
+    """Widths of the hidden layers of the critic."""
+
+    activation: Activation = "elu"
+    """Activation of the hidden layers, as rsl-rl names it."""
+
+    obs_normalization: bool = True
+    """Whether observations are normalized by their running mean and standard deviation."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Algorithm(Config):
+    """PPO."""
+
+    value_loss_coef: NonNegativeFloat = 1.0
+    """Weight of the value loss."""
+
+    clip_param: PositiveFloat = 0.2
+    """Clipping of the policy ratio."""
+
+    entropy_coef: NonNegativeFloat = 0.005
+    """Weight of the entropy bonus."""
+
+    num_learning_epochs: PositiveInt = 5
+    """Learning epochs per update."""
+
+    num_mini_batches: PositiveInt = 4
+    """Mini-batches per epoch."""
+
+    learning_rate: PositiveFloat = 1e-3
+    """Initial learning rate."""
+
+    schedule: Literal["adaptive", "fixed"] = "adaptive"
+    """Whether the learning rate follows the KL divergence of the updates."""
+
+    gamma: Fraction = 0.99
+    """Discount factor."""
+
+    lam: Fraction = 0.95
+    """Lambda of generalized advantage estimation."""
+
+    desired_kl: PositiveFloat = 0.02
+    """KL divergence that the adaptive schedule aims at."""
+
+    max_grad_norm: PositiveFloat = 1.0
+    """Largest gradient norm."""
+
+    symmetry: Literal["none", "augmentation", "loss"] = "none"
+    """Symmetry: add mirrored samples to each batch, or add a mirror loss."""
+
+    mirror_loss_coeff: NonNegativeFloat = 0.5
+    """Weight of the mirror loss."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Runner(Config):
+    """Length of training, checkpoints and logging."""
+
+    num_steps_per_env: PositiveInt = 24
+    """Steps of each environment per iteration."""
+
+    max_iterations: PositiveInt = 1500
+    """Number of learning iterations."""
+
+    save_interval: PositiveInt = 100
+    """Iterations between checkpoints."""
+
+    seed: Annotated[int, Meta(ge=0, le=2**32 - 1)] = 1
+    """Seed of all random numbers."""
+
+    logger: Literal["tensorboard", "wandb"] = "tensorboard"
+    """Where metrics are logged."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task(Config):
+    """Configuration of training. SI units and radians."""
+
+    env: Env = field(default_factory=Env)
+    """Environments and episodes."""
+
+    terrain: Terrain = field(default_factory=Terrain)
+    """Terrain, terrain curriculum and height scan."""
+
+    init_state: InitState = field(default_factory=InitState)
+    """Random initial state of an episode."""
+
+    control: Control = field(default_factory=Control)
+    """Actions and PD control."""
+
+    asset: Asset = field(default_factory=Asset)
+    """Parts of the robot that are simulated."""
+
+    commands: Commands = field(default_factory=Commands)
+    """Ranges from which velocity commands are sampled."""
+
+    domain_rand: DomainRand = field(default_factory=DomainRand)
+    """Domain randomization."""
+
+    rewards: Rewards = field(default_factory=Rewards)
+    """Scales and parameters of the rewards."""
+
+    termination: Termination = field(default_factory=Termination)
+    """Conditions that end an episode as a fall."""
+
+    normalization: Normalization = field(default_factory=Normalization)
+    """Scales and limits of observations and actions."""
+
+    noise: Noise = field(default_factory=Noise)
+    """Noise on observations."""
+
+    sim: Sim = field(default_factory=Sim)
+    """Physics simulation."""
+
+    policy: Policy = field(default_factory=Policy)
+    """Actor and critic networks."""
+
+    algorithm: Algorithm = field(default_factory=Algorithm)
+    """PPO."""
+
+    runner: Runner = field(default_factory=Runner)
+    """Length of training, checkpoints and logging."""
+
+    def __post_init__(self) -> None:
+        """Validate the sections, and values that depend on each other."""
+        super().__post_init__()
+        if self.max_episode_length < 1:
+            raise ConfigError(
+                f"env.episode_length_s: got {self.env.episode_length_s:g}; expected at least one "
+                f"policy step, {self.dt:g} s"
+            )
+        if self.asset.collisions != "all" and self.rewards.collision:
+            raise ConfigError(
+                f"rewards.collision: got {self.rewards.collision:g}; expected 0 with "
+                f"asset.collisions {self.asset.collisions}, where penalized bodies do not collide"
+            )
+        samples = self.env.num_envs * self.runner.num_steps_per_env
+        if samples < self.algorithm.num_mini_batches:
+            raise ConfigError(
+                f"algorithm.num_mini_batches: got {self.algorithm.num_mini_batches}; expected at "
+                f"most the number of samples, env.num_envs * runner.num_steps_per_env = {samples}"
+            )
+
+    @property
+    def dt(self) -> float:
+        """Time between policy steps [s]."""
+        return self.sim.dt * self.control.decimation
+
+    @property
+    def max_episode_length(self) -> int:
+        """Policy steps in the longest episode."""
+        return round(self.env.episode_length_s / self.dt)

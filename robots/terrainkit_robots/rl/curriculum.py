@@ -1,0 +1,151 @@
+"""The terrain curriculum: robots that succeed move to harder rows of the map."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.curriculum import assign_levels
+from terrainkit.curriculum import update_levels as next_levels
+from terrainkit.errors import ConfigError
+from terrainkit_robots.rl.terrain import Terrain
+
+Ids = NDArray[np.int64]
+
+SUCCESS_DECAY = 0.95
+"""Weight of the previous success rate when an episode ends."""
+
+
+class TerrainCurriculum:
+    """Terrain levels of n environments, and success rates of the patches.
+
+    A robot moves up when it covered half a patch. It moves down when it fell before that, or
+    covered less than half the distance that its commands integrate to over the episode it had.
+    (legged_gym multiplies the current command by the length of a full episode, so a robot that is
+    commanded to stop moves down.)
+    """
+
+    def __init__(self, terrain: Terrain, num_envs: int, max_init_level: int, seed: int) -> None:
+        rows, cols = terrain.env_origins.shape[:2]
+        self.levels, self.columns = assign_levels(
+            num_envs, rows, cols, min(max_init_level, rows - 1), seed
+        )
+        self.commanded = np.zeros((num_envs, 2))
+        """Displacement that the commands of the episode integrate to [m], shape (n, 2)."""
+
+        self.success = np.full((rows, cols), np.nan)
+        """Running success rate of each patch, NaN without episodes, shape (rows, cols)."""
+
+        self._terrain, self._seed, self._updates = terrain, seed, 0
+
+    @property
+    def env_origins(self) -> NDArray[np.float32]:
+        """Spawn origin of each robot [m], shape (n, 3)."""
+        return self._terrain.env_origins[self.levels, self.columns]
+
+    def accumulate_command(
+        self, commands: NDArray[np.float32], yaw: NDArray[np.float32], dt: float
+    ) -> None:
+        """Integrate the commanded displacement over a step.
+
+        Args:
+            commands: Velocity commands, shape (n, 3).
+            yaw: Heading of each robot [rad], shape (n,).
+            dt: Length of the step [s].
+        """
+        c, s = np.cos(yaw), np.sin(yaw)
+        x, y = commands[:, 0], commands[:, 1]
+        self.commanded[:, 0] += dt * (c * x - s * y)
+        self.commanded[:, 1] += dt * (s * x + c * y)
+
+    def on_episode_end(
+        self,
+        env_ids: Ids,
+        distance: NDArray[np.float64],
+        fallen: NDArray[np.bool_],
+        *,
+        update_levels: bool,
+    ) -> None:
+        """Record the success of complete episodes, and update the terrain levels.
+
+        Args:
+            env_ids: Environments whose episode ended by a fall or a time-out, shape (k,).
+            distance: Distance from the start position [m], shape (k,).
+            fallen: Whether the episode ended with a fall, shape (k,).
+            update_levels: Whether robots change levels.
+        """
+        commanded = np.linalg.norm(self.commanded[env_ids], axis=1)
+        crossed = distance > self._terrain.patch_length / 2
+        success = crossed | (~fallen & (distance >= commanded / 2))
+        for level, column, succeeded in zip(
+            self.levels[env_ids], self.columns[env_ids], success, strict=True
+        ):
+            rate = self.success[level, column]
+            decay = 0.0 if np.isnan(rate) else SUCCESS_DECAY
+            self.success[level, column] = decay * np.nan_to_num(rate) + (1 - decay) * succeeded
+        rows = len(self._terrain.env_origins)
+        if update_levels and rows > 1:
+            self._updates += 1
+            self.levels[env_ids] = next_levels(
+                self.levels[env_ids],
+                distance,
+                np.where(fallen, np.inf, commanded),
+                rows=rows,
+                patch_length=self._terrain.patch_length,
+                seed=(self._seed, self._updates),
+            )
+
+    def reset(self, env_ids: Ids) -> None:
+        """Clear the commanded displacement of new episodes."""
+        self.commanded[env_ids] = 0
+
+    def log(self) -> dict[str, float]:
+        """Return the mean level, and level and success rate of each terrain, to log."""
+        names = self._terrain.terrain_names
+        env_names = names[self.levels, self.columns]
+        log = {"Curriculum/level": float(self.levels.mean())}
+        for name in dict.fromkeys(names.ravel().tolist()):
+            if (env_names == name).any():
+                log[f"Curriculum/level_{name}"] = float(self.levels[env_names == name].mean())
+            rates = self.success[names == name]
+            if not np.isnan(rates).all():
+                log[f"Curriculum/success_{name}"] = float(rates[~np.isnan(rates)].mean())
+        return log
+
+    def state_dict(self) -> dict[str, Any]:
+        """Return everything that changes, for a checkpoint."""
+        return {
+            "levels": self.levels.copy(),
+            "columns": self.columns.copy(),
+            "commanded": self.commanded.copy(),
+            "success": self.success.copy(),
+            "updates": self._updates,
+        }
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Continue from a checkpoint; with another number of robots, keep only their levels.
+
+        Raises:
+            ConfigError: If the checkpoint's map has other rows or columns.
+        """
+        rows, cols = self.success.shape
+        if state["success"].shape != self.success.shape:
+            raise ConfigError(
+                f"the checkpoint's map has {state['success'].shape[0]} x "
+                f"{state['success'].shape[1]} patches; this one has {rows} x {cols}"
+            )
+        levels, columns = np.asarray(state["levels"]), np.asarray(state["columns"])
+        if ((levels < 0) | (levels >= rows) | (columns < 0) | (columns >= cols)).any():
+            raise ConfigError(f"the checkpoint's robots are not on {rows} x {cols} patches")
+        self.success[:] = state["success"]
+        self._updates = int(state["updates"])
+        if len(levels) == len(self.levels):
+            self.levels[:], self.columns[:] = levels, columns
+            self.commanded[:] = state["commanded"]
+            return
+        for column in np.unique(self.columns):
+            saved = levels[columns == column]
+            if len(saved):
+                mine = self.columns == column
+                self.levels[mine] = np.resize(saved, int(mine.sum()))

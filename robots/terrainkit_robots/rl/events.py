@@ -1,0 +1,183 @@
+"""Events: reset states, pushes, and the parameters that differ between simulated robots."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.errors import ConfigError
+from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.rl.config import DomainRand, InitState
+from terrainkit_robots.rl.scene import Robot, Scene
+from terrainkit_robots.rl.simulation import Simulation
+from terrainkit_robots.rl.terrain import Terrain
+
+FloatArray = NDArray[np.float32]
+Ids = NDArray[np.int64]
+
+MAX_RESET_RELIEF = 0.06
+"""Height range of the ground under a robot that is not reset exactly at its origin [m]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RandomizedParams:
+    """Physical parameters of n robots with g colliding geoms and j joints."""
+
+    friction: FloatArray
+    """Mean contact friction, shape (n, 1)."""
+
+    geom_friction: FloatArray
+    """Friction of each colliding geom, shape (n, g)."""
+
+    added_mass: FloatArray
+    """Mass added to the base [kg], shape (n, 1)."""
+
+    com_shift: FloatArray
+    """Shift of the base's center of mass [m], shape (n, 3)."""
+
+    stiffness: FloatArray
+    """Factor on the stiffness of each joint, shape (n, j)."""
+
+    damping: FloatArray
+    """Factor on the damping of each joint, shape (n, j)."""
+
+    strength: FloatArray
+    """Factor on all torques, shape (n, 1)."""
+
+
+def sample_params(
+    rng: np.random.Generator, num_envs: int, sim: Simulation, cfg: DomainRand
+) -> RandomizedParams:
+    """Sample the physical parameters of `num_envs` robots."""
+    joints, scene = sim.scene.model.nu, sim.scene
+    nominal = scene.model.geom_friction[scene.geoms, 0].astype(np.float32)
+
+    def uniform(limits: tuple[float, float] | None, width: int, default: float) -> FloatArray:
+        low, high = limits or (default, default)
+        return rng.uniform(low, high, (num_envs, width)).astype(np.float32)
+
+    friction = uniform(cfg.friction, 1, float(nominal.mean()) if len(nominal) else 1.0)
+    geom_friction = nominal if cfg.friction is None else friction
+    return RandomizedParams(
+        friction=friction,
+        geom_friction=np.broadcast_to(geom_friction, (num_envs, len(nominal))).copy(),
+        added_mass=uniform(cfg.added_mass, 1, 0.0),
+        com_shift=rng.uniform(-cfg.com_shift, cfg.com_shift, (num_envs, 3)).astype(np.float32),
+        stiffness=uniform(cfg.gains, joints, 1.0),
+        damping=uniform(cfg.gains, joints, 1.0),
+        strength=uniform(cfg.motor_strength, 1, 1.0),
+    )
+
+
+def apply_params(sim: Simulation, params: RandomizedParams) -> None:
+    """Write the parameters of each robot to its simulation.
+
+    Raises:
+        ConfigError: If the mass of a base is not positive.
+    """
+    batch, scene, model = sim.batch, sim.scene, sim.scene.model
+    base = scene.base
+    min_mass = float(model.body_mass[base] + params.added_mass.min())
+    if min_mass <= 0:
+        raise ConfigError(
+            f"domain_rand.added_mass: a base of {model.body_mass[base]:.3g} kg would weigh "
+            f"{min_mass:.3g} kg; expected more than 0 kg"
+        )
+    mass = batch.expand("body_mass")
+    mass[:, base] = model.body_mass[base] + params.added_mass[:, 0]
+    # The added mass has the shape of the base, so the inertia grows in proportion.
+    batch.expand("body_inertia")[:, base] = (
+        model.body_inertia[base] * (mass[:, base] / model.body_mass[base])[:, None]
+    )
+    batch.expand("body_ipos")[:, base] = model.body_ipos[base] + params.com_shift
+    batch.expand("geom_friction")[:, scene.geoms, 0] = params.geom_friction
+    # MuJoCo's affine actuators: force = gain * ctrl + bias . (1, q, dq).
+    gain, bias = batch.expand("actuator_gainprm"), batch.expand("actuator_biasprm")
+    k, d, s = params.stiffness, params.damping, params.strength
+    has_stiffness = model.actuator_biasprm[:, 1] != 0
+    has_damping = model.actuator_biasprm[:, 2] != 0
+    factor = np.where(has_stiffness, k, np.where(has_damping, d, 1))
+    gain[:, :, 0] = model.actuator_gainprm[:, 0] * factor * s
+    bias[:, :, 1] = model.actuator_biasprm[:, 1] * k * s
+    bias[:, :, 2] = model.actuator_biasprm[:, 2] * d * s
+    with quiet_mujoco():
+        batch.set_const()
+
+
+class Pushes:
+    """Velocity pushes at regular intervals; each robot has its own phase."""
+
+    def __init__(self, cfg: DomainRand, num_envs: int, dt: float) -> None:
+        self.velocity = np.zeros((num_envs, 3), np.float32)
+        """Velocity added in this step, world frame [m/s], shape (n, 3)."""
+
+        self.steps_until_push = np.zeros(num_envs, np.int64)
+        """Steps until the next push, shape (n,)."""
+
+        self._interval = max(1, round(cfg.push_interval_s / dt))
+        self._max_vel = cfg.max_push_vel_xy if cfg.push_interval_s else 0.0
+
+    def reset(self, rng: np.random.Generator, env_ids: Ids) -> None:
+        """Sample when the first push of new episodes happens."""
+        self.velocity[env_ids] = 0
+        if self._max_vel:
+            self.steps_until_push[env_ids] = rng.integers(1, self._interval + 1, len(env_ids))
+
+    def apply(self, rng: np.random.Generator, qvel: NDArray[np.float64]) -> None:
+        """Push the robots that are due, by adding to `qvel`, shape (n, nv)."""
+        self.velocity[:] = 0
+        if not self._max_vel:
+            return
+        self.steps_until_push -= 1
+        env_ids = np.flatnonzero(self.steps_until_push <= 0)
+        self.steps_until_push[env_ids] = self._interval
+        self.velocity[env_ids, :2] = rng.uniform(-self._max_vel, self._max_vel, (len(env_ids), 2))
+        qvel[:, :2] += self.velocity[:, :2]
+
+
+def sample_reset_state(
+    rng: np.random.Generator,
+    env_origins: FloatArray,
+    scene: Scene,
+    robot: Robot,
+    terrain: Terrain,
+    cfg: InitState,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Sample positions and velocities at reset, shapes (k, nq) and (k, nv).
+
+    `env_origins` has shape (k, 3) [m]. Where the ground beside an origin is uneven, the sampled
+    offset is halved, and then dropped.
+    """
+    count, limit = len(env_origins), cfg.position
+    qpos = np.tile(scene.home, (count, 1))
+    offset = rng.uniform(-limit, limit, (count, 2)).astype(np.float32)
+    ring_x, ring_y = _footprint(robot)
+    for factor in (0.5, 0.0, 1.0):  # the last pass checks the origin itself
+        x, y = (env_origins[:, :2] + offset).T
+        height = terrain.height(x[:, None] + ring_x, y[:, None] + ring_y)
+        highest = height.max(axis=1)
+        uneven = highest - height.min(axis=1) > MAX_RESET_RELIEF
+        if not uneven.any():
+            break
+        offset[uneven] *= factor
+    qpos[:, :2] = env_origins[:, :2] + offset
+    qpos[:, 2] = highest + float(robot.spec.spawn_height or 0.0)
+    yaw = rng.uniform(-cfg.yaw, cfg.yaw, count)
+    qpos[:, 3], qpos[:, 6] = np.cos(yaw / 2), np.sin(yaw / 2)
+    factors = rng.uniform(
+        *(cfg.reset_range or robot.spec.reset_range), (count, len(robot.default_pose))
+    )
+    qpos[:, scene.joint_qpos] = np.clip(robot.default_pose * factors, robot.lower, robot.upper)
+    qvel = np.zeros((count, scene.model.nv))
+    qvel[:, :3] = rng.uniform(-cfg.lin_vel, cfg.lin_vel, (count, 3))
+    qvel[:, 3:6] = rng.uniform(-cfg.ang_vel, cfg.ang_vel, (count, 3))
+    return qpos, qvel
+
+
+def _footprint(robot: Robot) -> FloatArray:
+    """Return points that cover the area of the feet at any heading [m], shape (2, p)."""
+    radius = 0.5 * max(float(robot.spec.leg_length or 0.4), float(robot.spec.stance_width or 0.2))
+    angle = np.arange(8) * (np.pi / 4)
+    circle = np.stack([np.cos(angle), np.sin(angle)])
+    rings = [np.zeros((2, 1)), radius / 2 * circle, radius * circle]
+    return np.concatenate(rings, axis=1).astype(np.float32)

@@ -1,0 +1,463 @@
+"""Run folders and checkpoints: what training writes, and what it needs to continue.
+
+A run has `task.toml`, `robot.toml` (the spec as it was trained), `run.toml` (robot, terrain and
+versions), `map.toml` (the config of its map, if any), and `model_<iteration>.pt` checkpoints.
+"""
+
+import hashlib
+import io
+import re
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from terrainkit.atomic_write import atomic_write
+from terrainkit.errors import ConfigError, ExportError, listing
+from terrainkit.toml_text import parse_toml
+from terrainkit_robots.mesh.sniff import open_regular
+from terrainkit_robots.rl import tasks
+from terrainkit_robots.rl.config import Task
+from terrainkit_robots.rl.scene import SPEC_FILE, Robot
+from terrainkit_robots.spec.spec_file import read_spec
+from terrainkit_robots.text import free_name
+
+if TYPE_CHECKING:
+    from terrainkit.config import MapConfig
+
+RUN_FILE, TASK_FILE, MAP_FILE = "run.toml", "task.toml", "map.toml"
+FORMAT_VERSION = 1
+"""Version of the files of a run and of the checkpoint format."""
+
+CHECKPOINT_FORMAT = "terrainkit checkpoint"
+CHECKPOINT_KEYS = {
+    "iteration": int,
+    "robot": str,
+    "joints": list,
+    "observed": dict,
+    "actor_state_dict": dict,
+    "critic_state_dict": dict,
+}
+"""Keys of every checkpoint, and their types; a checkpoint of training has more."""
+
+MAX_TEXT_SIZE, MAX_CHECKPOINT_SIZE = 1 << 20, 1 << 32
+"""Limits on the size of files that are read [bytes]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Run:
+    """A training run."""
+
+    folder: Path
+    """Folder of the run."""
+
+    task: Task
+    """Its task."""
+
+    robot: Robot
+    """The robot, with the spec it was trained with."""
+
+    robot_name: str
+    """Name of a registered robot, or the absolute path of its folder."""
+
+    terrain: str
+    """The terrain, as `load_terrain` takes it: `plane` or a path."""
+
+    checkpoint: Path | None
+    """The selected checkpoint, by default the last; None if there is none."""
+
+
+def checkpoint_name(iteration: int) -> str:
+    """Return the file name of a checkpoint."""
+    return f"model_{iteration}.pt"
+
+
+def checkpoints(folder: Path) -> dict[int, Path]:
+    """Return the checkpoints in a folder by iteration, in order."""
+    paths = folder.glob("model_*.pt")
+    matches = ((re.fullmatch(r"model_([0-9]{1,12})\.pt", path.name), path) for path in paths)
+    return dict(sorted((int(match[1]), path) for match, path in matches if match))
+
+
+def default_folder(robot: str) -> Path:
+    """Return the folder of a new run, `logs/<robot>/<date-time>`."""
+    # The name may come from an untrusted file.
+    parent = Path("logs") / (re.sub(r"[^\w.-]+", "_", robot).strip(".") or "robot")
+    existing = {path.name for path in parent.iterdir()} if parent.is_dir() else set()
+    return parent / free_name(datetime.now().strftime("%Y-%m-%d_%H-%M-%S"), existing)
+
+
+def resolve_terrain(terrain: str | Path) -> str:
+    """Return the terrain as a run records it: `plane`, or an absolute path."""
+    return "plane" if str(terrain) == "plane" else str(Path(terrain).resolve())
+
+
+def resolve_robot(robot: str | Path) -> str:
+    """Return the robot as a run records it: a registered name, or its folder's absolute path.
+
+    Raises:
+        ConfigError: If there is no such robot.
+    """
+    found = tasks.get_task(robot)
+    return str(robot) if str(robot) in tasks.task_names() else str(found.folder.resolve())
+
+
+def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | Path) -> Run:
+    """Create the folder of a new run.
+
+    Args:
+        folder: The folder; parents are created.
+        task: The task.
+        robot_name: A registered robot, or the folder of an onboarded one.
+        terrain: The terrain, as `load_terrain` takes it.
+
+    Raises:
+        ConfigError: If there is no such robot, or the terrain's file cannot be read.
+        ExportError: If the folder is not empty, or cannot be written.
+    """
+    robot_folder, source = tasks.get_task(robot_name).folder, resolve_terrain(terrain)
+    about = {
+        "format_version": FORMAT_VERSION,
+        "robot": resolve_robot(robot_name),
+        "terrain": source,
+        **({"terrain_sha256": _sha256(Path(source))} if source.endswith(".xml") else {}),
+        "seed": task.runner.seed,
+        "begun": datetime.now().astimezone().isoformat(timespec="seconds"),
+        "versions": {
+            name: version(name) for name in ("terrainkit", "mujoco", "rsl-rl-lib", "torch")
+        },
+        "robot_sha256": _robot_digests(robot_folder),
+    }
+    import tomli_w
+
+    files = {
+        RUN_FILE: tomli_w.dumps(about),
+        TASK_FILE: task.to_toml(),
+        SPEC_FILE: _read_text(robot_folder / SPEC_FILE),
+    }
+    if (config := _map_config(source)) is not None:
+        files[MAP_FILE] = config.to_toml()
+    write_run_folder(folder, {name: text.encode() for name, text in files.items()})
+    return open_run(folder)
+
+
+def write_run_folder(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write a new folder with some files, completely or not at all.
+
+    Raises:
+        ExportError: If the folder is not empty, or cannot be written.
+    """
+    try:
+        if folder.is_dir() and any(folder.iterdir()):
+            raise ExportError(
+                f"{folder} exists; choose another folder, or continue with --resume {folder}"
+            )
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".terrainkit-", dir=folder.parent) as work:
+            made = Path(work) / folder.name
+            made.mkdir()
+            for name, data in files.items():
+                (made / name).write_bytes(data)
+            if folder.is_dir():
+                folder.rmdir()
+            made.rename(folder)
+    except OSError as error:
+        raise ExportError(f"cannot write {folder}: {error.strerror or error}") from error
+
+
+def rewrite_task(run: Run, task: Task) -> None:
+    """Replace the task in a run's folder."""
+    with atomic_write(run.folder / TASK_FILE, overwrite=True) as path:
+        path.write_text(task.to_toml(), encoding="utf-8")
+
+
+def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
+    """Open a run.
+
+    Args:
+        name: Its folder, one of its checkpoints, or a robot with a shipped policy.
+        checkpoint: Iteration of the checkpoint to select; by default the one that `name` is, or
+            the last.
+
+    Raises:
+        ConfigError: If there is no such run or checkpoint, or its robot is missing.
+    """
+    folder, named = _resolve_run(name)
+    about = _read_about(folder)
+    for key in ("robot", "terrain"):
+        if not isinstance(about.get(key), str):
+            raise ConfigError(
+                f"{folder / RUN_FILE}: {key}: got {about.get(key, 'nothing')!r}; expected a string"
+            )
+    robot_name, terrain = about["robot"], about["terrain"]
+    found = tasks.get_task(robot_name)
+    robot = Robot.from_spec(read_spec(folder / SPEC_FILE), found.folder)
+    if not robot.mjcf.is_file():
+        raise ConfigError(f"the robot of {folder} is missing: there is no file {robot.mjcf}")
+    if terrain != "plane":
+        # A map whose file is missing is generated again from its config.
+        file, config = folder / terrain, folder / MAP_FILE
+        terrain = resolve_terrain(config if config.is_file() and not file.is_file() else file)
+    saved = checkpoints(folder)
+    if checkpoint is not None and checkpoint not in saved:
+        raise ConfigError(
+            f"{folder}: got checkpoint {checkpoint}; expected one of: {listing(map(str, saved))}"
+        )
+    if checkpoint is None:
+        selected = named or (saved[max(saved)] if saved else None)
+    else:
+        selected = saved[checkpoint]
+    return Run(
+        folder=folder,
+        task=Task.load(folder / TASK_FILE, found.task),
+        robot=robot,
+        robot_name=robot_name,
+        terrain=terrain,
+        checkpoint=selected,
+    )
+
+
+def _resolve_run(name: str | Path) -> tuple[Path, Path | None]:
+    """Return the folder of a run, and the checkpoint if `name` is one.
+
+    A run in the working directory takes precedence over a shipped policy of the same name.
+    """
+    path, is_robot = Path(name), str(name) in tasks.task_names()
+    try:
+        if (path / RUN_FILE).is_file() or (path.is_dir() and not is_robot):
+            return path, None
+        if path.is_file():
+            return path.parent, path
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"cannot read {name}: {error}") from error
+    if not is_robot:
+        raise ConfigError(
+            f"run: got {name}; expected a folder that terrainkit train wrote, a checkpoint in "
+            f"one, or a robot: {listing(tasks.task_names())}"
+        )
+    shipped = tasks.get_task(str(name)).trained_run
+    if not shipped.is_dir():
+        raise ConfigError(
+            f"no policy is shipped with {name}; terrainkit train {name} writes a run with one"
+        )
+    return shipped, None
+
+
+def is_shipped(run: Run) -> bool:
+    """Return whether a run is part of a package, so that its folder must not be written."""
+    return run.folder.resolve() == tasks.get_task(run.robot_name).trained_run.resolve()
+
+
+def changed_robot_files(run: Run) -> tuple[str, ...]:
+    """Return the names of the robot's files that differ from those it was trained with.
+
+    Raises:
+        ConfigError: If a file cannot be read.
+    """
+    recorded = _read_about(run.folder).get("robot_sha256")
+    if not isinstance(recorded, dict):  # a run of an earlier version
+        return ()
+    current = _robot_digests(tasks.get_task(run.robot_name).folder)
+    names = sorted({*recorded, *current})
+    return tuple(name for name in names if recorded.get(name) != current.get(name))
+
+
+def is_same_terrain(run: Run, terrain: str | Path) -> bool:
+    """Return whether a terrain is the run's; maps with the same config are the same.
+
+    Raises:
+        ConfigError: If a file cannot be read.
+        MapFileError: If the map cannot be read.
+    """
+    source, config_file = resolve_terrain(terrain), run.folder / MAP_FILE
+    if config_file.is_file():
+        from terrainkit.config import MapConfig
+
+        return _map_config(source) == MapConfig.load(config_file)
+    recorded = _read_about(run.folder).get("terrain_sha256")
+    return source == run.terrain and recorded in (None, recorded and _sha256(Path(source)))
+
+
+def can_continue(run: Run, robot: str | Path, terrain: str | Path, task: Task) -> bool:
+    """Return whether a run can continue exactly with a robot, terrain and task.
+
+    Raises:
+        ConfigError: If a file of the robot or terrain was modified since.
+    """
+    num_envs, num_threads = run.task.env.num_envs, run.task.env.num_threads
+    env = replace(task.env, num_envs=num_envs, num_threads=num_threads)
+    if (
+        replace(task, env=env, runner=run.task.runner) != run.task
+        or resolve_terrain(terrain) != run.terrain
+        or resolve_robot(robot) != run.robot_name
+    ):
+        return False
+    if not is_same_terrain(run, terrain):
+        raise ConfigError(
+            f"{run.terrain} has changed since {run.folder} was trained on it; with another "
+            "--terrain, a new run starts with its networks"
+        )
+    if files := changed_robot_files(run):
+        raise ConfigError(
+            f"{' and '.join(files)} of {run.robot_name} changed since {run.folder} was trained; "
+            "with a copy of the robot in another folder, a new run starts with its networks"
+        )
+    return "processes" in read_checkpoint(last_checkpoint(run))
+
+
+def parts_to_load(run: Run, terrain: str | Path, task: Task) -> dict[str, bool]:
+    """Return which parts of a run a new run starts with; see `LeggedRunner.load`."""
+    rates = [(each.learning_rate, each.schedule) for each in (task.algorithm, run.task.algorithm)]
+    is_plane, was_plane = (each.terrain.collision == "plane" for each in (task, run.task))
+    return {
+        "actor": True,
+        "critic": True,
+        "optimizer": rates[0] == rates[1],
+        "curriculum": is_plane == was_plane and is_same_terrain(run, terrain),
+    }
+
+
+def last_checkpoint(run: Run) -> Path:
+    """Return the selected checkpoint of a run.
+
+    Raises:
+        ConfigError: If there is none.
+    """
+    if run.checkpoint is None:
+        raise ConfigError(f"{run.folder} has no checkpoint yet; train it first")
+    return run.checkpoint
+
+
+def save_checkpoint(path: Path, state: Mapping[str, Any]) -> None:
+    """Write a checkpoint completely, or not at all; see `LeggedRunner.state_dict`.
+
+    Raises:
+        ExportError: If the file cannot be written.
+    """
+    import torch
+
+    data = io.BytesIO()  # torch itself aborts the process on a full disk
+    header = {"format": CHECKPOINT_FORMAT, "version": FORMAT_VERSION}
+    torch.save(_to_plain({**header, **state}), data)
+    with atomic_write(path, overwrite=True) as target:
+        target.write_bytes(data.getbuffer())
+
+
+def read_checkpoint(path: Path) -> dict[str, Any]:
+    """Read a checkpoint, without executing code from it; arrays become tensors.
+
+    Raises:
+        ConfigError: If it is missing, damaged, or not written by terrainkit.
+    """
+    import torch
+
+    try:
+        if path.exists() and not path.is_file():
+            raise ConfigError(f"{path} is not a file; expected a checkpoint")
+        if path.stat().st_size > MAX_CHECKPOINT_SIZE:
+            raise ConfigError(f"{path}: over {MAX_CHECKPOINT_SIZE} bytes; expected a checkpoint")
+        with zipfile.ZipFile(path) as file:  # compressed parts could expand to any size
+            if any(part.compress_type != zipfile.ZIP_STORED for part in file.infolist()):
+                raise ConfigError(f"{path} is not a checkpoint of terrainkit: it is compressed")
+        state = torch.load(path, map_location="cpu", weights_only=True)
+    except OSError as error:
+        raise ConfigError(f"cannot read {path}: {error.strerror or error}") from error
+    except ConfigError:
+        raise
+    except Exception as error:  # whatever torch raises for a damaged file
+        raise ConfigError(f"{path} is not a checkpoint of terrainkit, or is damaged") from error
+    return _checked(path, state)
+
+
+def _checked(path: Path, state: Any) -> dict[str, Any]:
+    """Return a checkpoint's content after checking its keys."""
+    if not isinstance(state, dict) or state.get("format") != CHECKPOINT_FORMAT:
+        raise ConfigError(f"{path} is not a checkpoint of terrainkit")
+    if state.get("version") != FORMAT_VERSION:
+        got = state.get("version", "nothing")
+        raise ConfigError(f"{path}: version: got {got!r}; expected {FORMAT_VERSION}")
+    for key, kind in CHECKPOINT_KEYS.items():
+        if not isinstance(state.get(key), kind):
+            raise ConfigError(f"{path}: {key} is missing or not a {kind.__name__}")
+    return state
+
+
+def policy_state(state: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the part of a checkpoint without which there is no policy or critic."""
+    return {key: state[key] for key in CHECKPOINT_KEYS}
+
+
+def _to_plain(value: Any) -> Any:
+    """Return a value as dicts, lists, numbers and tensors, which can be read safely."""
+    import torch
+
+    if isinstance(value, Mapping):
+        return {key: _to_plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_to_plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return torch.from_numpy(np.ascontiguousarray(value))
+    if isinstance(value, torch.Tensor):
+        return value.detach().to("cpu").clone()  # a view would save its whole storage
+    if isinstance(value, np.generic):
+        return value.item()
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    raise TypeError(f"a checkpoint cannot hold a {type(value).__name__}")
+
+
+def _robot_digests(folder: Path) -> dict[str, str]:
+    """Return the SHA-256 of a robot's spec and model by file name."""
+    return {
+        name: _sha256(folder / name) for name in (SPEC_FILE, read_spec(folder / SPEC_FILE).mjcf)
+    }
+
+
+def _sha256(path: Path) -> str:
+    try:
+        with open_regular(path) as file:
+            return hashlib.sha256(file.read()).hexdigest()
+    except OSError as error:
+        raise ConfigError(f"cannot read {path}: {error.strerror or error}") from error
+
+
+def _read_about(folder: Path) -> dict[str, Any]:
+    path = folder / RUN_FILE
+    if not path.is_file():
+        raise ConfigError(f"{folder} has no {RUN_FILE}; terrainkit train writes such a folder")
+    about = parse_toml(_read_text(path))
+    if about.get("format_version") != FORMAT_VERSION:
+        got = about.get("format_version", "nothing")
+        raise ConfigError(f"{path}: format_version: got {got!r}; expected {FORMAT_VERSION}")
+    return dict(about)
+
+
+def _read_text(path: Path) -> str:
+    try:
+        with open_regular(path) as file:
+            data = file.read(MAX_TEXT_SIZE + 1)
+        if len(data) > MAX_TEXT_SIZE:
+            raise ConfigError(f"{path}: over {MAX_TEXT_SIZE} bytes; expected a file of a run")
+        return data.decode()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else None
+        raise ConfigError(f"cannot read {path}: {reason or error}") from error
+
+
+def _map_config(terrain: str) -> "MapConfig | None":
+    """Return the config of a map; None for another terrain."""
+    if terrain.endswith(".toml"):
+        from terrainkit.config import MapConfig
+
+        return MapConfig.load(terrain)
+    if terrain.endswith(".npz"):
+        from terrainkit.terrain_map import TerrainMap
+
+        return TerrainMap.load(terrain).config
+    return None

@@ -1,0 +1,118 @@
+"""Many MuJoCo simulations of one scene, stepped together by `mujoco.batch.Batch`."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.errors import ConfigError, MemoryLimitError
+from terrainkit.memory import check_memory
+from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.rl.config import Task
+from terrainkit_robots.rl.scene import Robot, Scene
+
+Ids = NDArray[np.int64]
+
+
+class Simulation:
+    """n simulations of a scene; the bound arrays change with every step."""
+
+    def __init__(self, scene: Scene, num_envs: int, num_threads: int = 0) -> None:
+        """Allocate the simulations in the model's default state.
+
+        Raises:
+            ConfigError: If this version of MuJoCo has no batches.
+        """
+        import mujoco
+
+        try:
+            from mujoco.batch import Batch
+        except ImportError:
+            raise ConfigError(
+                f"MuJoCo: got version {mujoco.__version__}; expected 3.17 or newer, which steps "
+                "many simulations at once: pip install 'terrainkit[train]'"
+            ) from None
+        warning = mujoco.mjtWarning
+        self._unstable = [
+            int(each)
+            for each in (
+                warning.mjWARN_BADQPOS,
+                warning.mjWARN_BADQVEL,
+                warning.mjWARN_BADQACC,
+                warning.mjWARN_BADCTRL,
+            )
+        ]
+        self._stage = mujoco.mjtStage.mjSTAGE_VEL
+        self._no_stage = mujoco.mjtStage.mjSTAGE_NONE
+        self.scene = scene
+        self.batch = Batch(scene.model, num_envs, num_threads)
+        self.qpos: NDArray[np.float64] = self.batch.bind("qpos")
+        self.qvel: NDArray[np.float64] = self.batch.bind("qvel")
+        self.ctrl: NDArray[np.float64] = self.batch.bind("ctrl")
+        self.torque: NDArray[np.float64] = self.batch.bind("actuator_force")
+        self._sensordata: NDArray[np.float64] = self.batch.bind("sensordata")
+
+    def step(self, count: int) -> NDArray[np.bool_]:
+        """Step every simulation `count` times.
+
+        Returns:
+            Unstable simulations, shape (n,). MuJoCo has reset them to its default state.
+        """
+        # A reset also restores the counters, so only counts that start at 0 are reliable.
+        self.batch.warning[:, self._unstable, 1] = 0
+        with quiet_mujoco():
+            self.batch.step(nstep=count, stage=self._stage)
+        unstable: NDArray[np.bool_] = (self.batch.warning[:, self._unstable, 1] > 0).any(axis=1)
+        return unstable
+
+    def reset(self, env_ids: Ids, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> None:
+        """Reset the simulations `env_ids` (sorted) to positions (k, nq) and velocities (k, nv)."""
+        self.batch.reset(env_ids, stage=self._no_stage)
+        self.qpos[env_ids] = qpos
+        self.qvel[env_ids] = qvel
+        self.forward(env_ids)
+
+    def forward(self, env_ids: Ids) -> None:
+        """Update the sensors of states that were written, except for contacts."""
+        with quiet_mujoco():
+            self.batch.forward(env_ids, stage=self._stage)
+
+    def sensor(self, name: str, env_ids: Any = slice(None)) -> NDArray[np.float32]:
+        """Return a copy of the data of the sensors `name`, shape (n, bodies, 3)."""
+        values = self._sensordata[env_ids, self.scene.sensors[name]].astype(np.float32)
+        return values.reshape(len(values), -1, 3)
+
+
+def check_memory(task: Task, robot: Robot, *, scan: bool, ngeom: int) -> None:
+    """Check that training with the task's environments fits in memory.
+
+    Raises:
+        MemoryLimitError: If it does not fit; the message names a number of environments that does.
+    """
+    num_envs, message = task.env.num_envs, ""
+    while num_envs:
+        try:
+            needed = num_envs * bytes_per_env(task, robot, scan=scan, ngeom=ngeom)
+            check_memory(needed, f"training with {num_envs} environments")
+        except MemoryLimitError as error:
+            message, num_envs = message or str(error), num_envs // 2
+        else:
+            break
+    if message:
+        raise MemoryLimitError(
+            f"{message}; env.num_envs {num_envs} would fit" if num_envs else message
+        )
+
+
+def bytes_per_env(task: Task, robot: Robot, *, scan: bool, ngeom: int) -> int:
+    """Estimate the memory that training takes for each environment, within a factor of two."""
+    joints, feet = len(robot.default_pose), len(robot.spec.feet)
+    points = len(task.terrain.measured_points_x) * len(task.terrain.measured_points_y)
+    observations = 29 + 7 * joints + 3 * feet + 2 * scan * points
+    physics = 40 + 45 * joints + 37 * feet + 3 * ngeom
+    steps, algorithm, policy = task.runner.num_steps_per_env, task.algorithm, task.policy
+    samples = steps / algorithm.num_mini_batches * (1 if algorithm.symmetry == "none" else 2)
+    hidden = sum(policy.actor_hidden_dims) + sum(policy.critic_hidden_dims)
+    learning = max(3 * steps * observations, samples * (5 * hidden + 2 * observations))
+    storage = steps * (observations + 3 * joints + 7)
+    return round(8 * physics + 4 * (12 * observations + storage + learning))

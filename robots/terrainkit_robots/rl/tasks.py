@@ -1,0 +1,143 @@
+"""Tasks by name: the folder of a robot, and the configuration of its training.
+
+A task is registered with one line::
+
+    register_task("rover", Path(__file__).parent / "rover", RoverTask())
+
+In an installed package, an entry point of the group `terrainkit.tasks` with the name of the task
+points to the module with that line, which is imported when the task is used. The tasks of the
+bundled robots are TOML files beside them. The folder of an onboarded robot needs no registration.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from terrainkit.errors import ConfigError, known_names, shorten
+from terrainkit_robots.description import bundled
+from terrainkit_robots.rl.config import Task
+from terrainkit_robots.rl.scene import SPEC_FILE
+from terrainkit_robots.spec.spec_file import read_spec
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+ENTRY_POINTS = "terrainkit.tasks"
+"""Entry point group in which other packages name their tasks."""
+
+TRAINED_FOLDER = "trained"
+"""Folder of a bundled robot with one run per task: its trained policy."""
+
+_registered: dict[str, "TaskSpec"] = {}
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskSpec:
+    """A robot, and the configuration of its training."""
+
+    name: str
+    """Name of the task. For a folder it is the name in its robot.toml, which a registered task may
+    have too: store the folder to find it again."""
+
+    folder: Path
+    """Folder with robot.toml."""
+
+    task: Task
+    """Configuration of training."""
+
+    @property
+    def trained_run(self) -> Path:
+        """Folder of the run with the bundled trained policy; it may not exist."""
+        return self.folder / TRAINED_FOLDER / self.name
+
+    shipped = trained_run
+
+
+def register_task(name: str, folder: str | Path, task: Task | None = None) -> TaskSpec:
+    """Register a task; a second call replaces the configuration.
+
+    Args:
+        name: Name of the task, for `terrainkit train`.
+        folder: Folder of an onboarded robot; it is not read.
+        task: Configuration of training; the default one unless given.
+
+    Raises:
+        ConfigError: if the name is not a file name, or is registered with another folder.
+    """
+    task = Task() if task is None else task
+    if not isinstance(name, str) or name in ("", "..") or Path(name).name != name:
+        raise ConfigError(f"task name: got {name!r}; expected a name without slashes")
+    if not isinstance(task, Task):
+        raise ConfigError(f"task {name}: got {task!r}; expected an instance of Task")
+    spec = TaskSpec(name=name, folder=Path(folder).absolute(), task=task)
+    registered = _registered.setdefault(name, spec)
+    if registered.folder != spec.folder:
+        raise ConfigError(f"task {name}: registered with {registered.folder}; expected a new name")
+    _registered[name] = spec
+    return spec
+
+
+def task_names() -> tuple[str, ...]:
+    """Return the names of all tasks in alphabetical order; imports no module of a task."""
+    return tuple(sorted({*_registered, *_plugins()}))
+
+
+def get_task(name_or_folder: str | Path) -> TaskSpec:
+    """Return the task of that name, or the default task of the robot in that folder.
+
+    A name has priority over a folder of that name; `./quadruped` is always a folder.
+
+    Raises:
+        ConfigError: if there is neither, listing the known names, or it cannot be loaded.
+    """
+    name = str(name_or_folder)
+    if name not in _registered and (plugin := _plugins().get(name)) is not None:
+        _load_plugin(plugin)
+    if name in _registered:
+        return _registered[name]
+    folder = Path(name_or_folder)
+    try:
+        if folder.is_dir():
+            if not (folder / SPEC_FILE).exists():
+                raise ConfigError(
+                    f"{folder} has no {SPEC_FILE}; expected a folder of terrainkit onboard"
+                )
+            spec = read_spec(folder / SPEC_FILE)
+            return TaskSpec(name=spec.name, folder=folder.absolute(), task=Task())
+    except OSError as error:
+        raise ConfigError(f"cannot read {shorten(name)}: {error.strerror or error}") from error
+    raise ConfigError(
+        f"no task or robot folder {shorten(repr(name))}; "
+        f"{known_names(name, task_names(), 'tasks are')}"
+    )
+
+
+def _plugins() -> dict[str, "EntryPoint"]:
+    """Return the entry point of each task of another installed package, by name."""
+    from importlib.metadata import entry_points
+
+    return {point.name: point for point in entry_points(group=ENTRY_POINTS)}
+
+
+def _load_plugin(plugin: "EntryPoint") -> None:
+    """Import the module that registers the task of an entry point.
+
+    Raises:
+        ConfigError: if the import fails, or the module does not register the task.
+    """
+    try:
+        plugin.load()
+    except Exception as error:  # a module of another package may raise anything
+        message = " ".join(f"{type(error).__name__}: {error}".split()).removesuffix(":")
+        raise ConfigError(
+            f"task {plugin.name} ({plugin.value}) cannot be loaded: {message}"
+        ) from error
+    if plugin.name not in _registered:
+        raise ConfigError(
+            f"task {plugin.name}: {plugin.value} does not register it; "
+            f"expected a call of register_task({plugin.name!r}, ...)"
+        )
+
+
+for _path in Path(bundled.__file__).parent.glob("*/tasks/*.toml"):
+    register_task(_path.stem, _path.parents[1], Task.load(_path))

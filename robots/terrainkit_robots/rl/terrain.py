@@ -1,0 +1,293 @@
+"""The terrain under the robots: its MuJoCo model, its heights, and its spawn origins."""
+
+import tempfile
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.errors import ConfigError
+from terrainkit_robots.quiet_mujoco import quiet_mujoco
+
+if TYPE_CHECKING:
+    from terrainkit.terrain_map import TerrainMap
+
+FloatArray = NDArray[np.float32]
+Collision = Literal["auto", "hfield", "boxes", "plane"]
+
+MIN_NORMAL_Z = 0.1
+"""Smallest vertical component of a plane's normal that makes it ground, and not a wall."""
+
+
+class Terrain(ABC):
+    """A terrain to train on."""
+
+    env_origins: FloatArray
+    """Spawn origins [m], shape (rows, cols, 3); rows are curriculum levels."""
+
+    terrain_names: NDArray[np.str_]
+    """Name of each patch's terrain, shape (rows, cols)."""
+
+    patch_length: float = 8.0
+    """Distance to walk to cross a patch [m]."""
+
+    lower: tuple[float, float]
+    """Lower corner, x and y [m]."""
+
+    upper: tuple[float, float]
+    """Upper corner, x and y [m]."""
+
+    is_flat: bool = False
+    """Whether the ground is level everywhere, so that a height scan carries no information."""
+
+    @abstractmethod
+    def spec(self) -> Any:
+        """Return the terrain as an `mujoco.MjSpec`."""
+
+    @abstractmethod
+    def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return the height at points [m], broadcast over `x` and `y`."""
+
+
+class Plane(Terrain):
+    """An infinite plane at height 0."""
+
+    is_flat = True
+    terrain_names = np.array([["plane"]])
+    lower, upper = (-np.inf, -np.inf), (np.inf, np.inf)
+
+    def __init__(self) -> None:
+        self.env_origins = np.zeros((1, 1, 3), np.float32)
+
+    def spec(self) -> Any:
+        """Return a plane with a checkered surface."""
+        import mujoco
+
+        spec = mujoco.MjSpec()
+        _add_material(spec)
+        plane = mujoco.mjtGeom.mjGEOM_PLANE
+        spec.worldbody.add_geom(name="ground", type=plane, size=[0, 0, 0.1], material="ground")
+        return spec
+
+    def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return zeros."""
+        return np.zeros(np.broadcast_shapes(x.shape, y.shape), np.float32)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HeightGrid:
+    """The surface of a MuJoCo heightfield and of boxes on its samples.
+
+    A look-up takes 3 microseconds for the 187 points of a height scan; ray casting takes 80 on a
+    heightfield and 4000 on boxes. :mod:`terrainkit.surface` has walls, which a heightfield lacks.
+    """
+
+    heights: FloatArray
+    """Heights of the samples [m], shape (nx, ny)."""
+
+    first_sample: tuple[float, float]
+    """Position of `heights[0, 0]` [m]."""
+
+    cell: float
+    """Distance between samples [m]."""
+
+    box_tops: FloatArray | None = None
+    """Top of the box around each sample, -inf without one [m], shape (nx, ny)."""
+
+    def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return the height at points [m]; the outermost samples extend outwards.
+
+        A cell is two triangles with the diagonal of MuJoCo's heightfield, from (i, j) to
+        (i + 1, j + 1). Bilinear interpolation is off by up to 3.6 cm on stairs.
+        """
+        nx, ny = self.heights.shape
+        u = np.clip((x - np.float32(self.first_sample[0])) / np.float32(self.cell), 0, nx - 1)
+        v = np.clip((y - np.float32(self.first_sample[1])) / np.float32(self.cell), 0, ny - 1)
+        i = np.minimum(u.astype(np.int32), nx - 2)
+        j = np.minimum(v.astype(np.int32), ny - 2)
+        u, v = u - i.astype(np.float32), v - j.astype(np.float32)
+        flat, corner = self.heights.reshape(-1), i * ny + j
+        near, far = flat[corner], flat[corner + (ny + 1)]
+        side = flat[corner + np.where(u > v, ny, 1)]  # the triangle's corner off the diagonal
+        high, low = np.maximum(u, v), np.minimum(u, v)
+        height = near + high * (side - near) + low * (far - side)
+        if self.box_tops is None:
+            return height
+        nearest = (i + (u >= 0.5)) * ny + j + (v >= 0.5)
+        return np.maximum(self.box_tops.reshape(-1)[nearest], height)
+
+
+class MapTerrain(Terrain):
+    """A terrainkit map."""
+
+    def __init__(self, terrain_map: "TerrainMap", collision: Any = "auto") -> None:
+        from terrainkit.export.mjcf import collision_boxes, without_boxes
+
+        self.env_origins = terrain_map.env_origins
+        self.terrain_names = np.array(terrain_map.terrain_names)[terrain_map.terrain_types]
+        self.patch_length = terrain_map.config.patch_size[0]
+        self.lower, self.upper = terrain_map.grid.lower, terrain_map.grid.upper
+        self._map, self._collision = terrain_map, collision
+        heights, tops = np.ascontiguousarray(terrain_map.heights), None
+        cover = collision_boxes(terrain_map, collision)
+        if cover is not None:
+            tops = np.where(cover.covered, heights, np.float32(-np.inf))
+            heights = without_boxes(heights, cover)
+        self._grid = HeightGrid(
+            heights=heights,
+            first_sample=terrain_map.first_sample,
+            cell=terrain_map.grid.cell,
+            box_tops=tops,
+        )
+
+    def spec(self) -> Any:
+        """Return the map as terrainkit exports it for MuJoCo."""
+        import mujoco
+
+        with tempfile.TemporaryDirectory() as folder:
+            path = self._map.save(Path(folder) / "ground.xml", collision=self._collision)
+            spec = mujoco.MjSpec.from_file(str(path))
+        _add_material(spec)
+        for geom in spec.geoms:
+            geom.material, geom.rgba = "ground", [1, 1, 1, 1]
+        return spec
+
+    def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return the height of the surface that MuJoCo collides with."""
+        return self._grid.height(x, y)
+
+
+class ModelTerrain(Terrain):
+    """A static MuJoCo model whose heights are measured by rays; robots spawn at its origin."""
+
+    terrain_names = np.array([["custom"]])
+
+    def __init__(self, path: Path, *, cell: float = 0.05, half_size: float = 20.0) -> None:
+        """Measure the square of `half_size` [m] around the origin with samples every `cell` [m].
+
+        Raises:
+            ConfigError: If MuJoCo cannot read the model, or there is no ground at the origin.
+        """
+        import mujoco
+
+        self._path = path
+        try:
+            with quiet_mujoco():
+                model = mujoco.MjModel.from_xml_path(str(path))
+        except ValueError as error:
+            reason = " ".join(str(error).split())
+            raise ConfigError(f"MuJoCo cannot read {path}: {reason}") from None
+        if model.nv:
+            raise ConfigError(f"{path}: got {model.nv} degrees of freedom; expected a static model")
+        n = 2 * round(half_size / cell) + 1
+        axis = ((np.arange(n) - n // 2) * cell).astype(np.float32)
+        heights = _cast_rays(model, axis)
+        center = heights[n // 2, n // 2]
+        if np.isnan(center):
+            raise ConfigError(f"{path}: no ground at the origin, where robots spawn")
+        # Where there is no ground, robots fall: any height far below will do.
+        heights = np.where(np.isnan(heights), np.nanmin(heights) - 10, heights)
+        self._grid = HeightGrid(
+            heights=heights.astype(np.float32),
+            first_sample=(float(axis[0]), float(axis[0])),
+            cell=cell,
+        )
+        self.env_origins = np.array([[[0, 0, center]]], np.float32)
+        self.lower, self.upper = (-half_size, -half_size), (half_size, half_size)
+
+    def spec(self) -> Any:
+        """Return the model."""
+        import mujoco
+
+        return mujoco.MjSpec.from_file(str(self._path))
+
+    def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return the height, accurate to the size of a cell at edges."""
+        return self._grid.height(x, y)
+
+
+def _cast_rays(model: Any, axis: FloatArray) -> NDArray[np.float64]:
+    """Return the height at each point of a square grid, NaN without ground, shape (n, n)."""
+    import mujoco
+
+    # Rays hit visible geoms; robots touch colliding ones.
+    model.geom_group[:] = np.where(collides(model), 0, 1)
+    model.geom_matid[:], model.geom_rgba[:, 3] = -1, 1
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    top = float((data.geom_xpos[:, 2] + model.geom_rbound).max(initial=0.0)) + 1
+    # A plane has no bounding radius: add its rise within the square.
+    normal = data.geom_xmat.reshape(-1, 3, 3)[:, :, 2]
+    planes = (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE) & (normal[:, 2] > MIN_NORMAL_Z)
+    slope = -normal[planes, :2] / normal[planes, 2:]
+    rise = np.abs(slope).sum(axis=1) * float(axis[-1])
+    top += float((rise - (slope * data.geom_xpos[planes, :2]).sum(axis=1)).max(initial=0.0))
+    down, geom = np.array([0.0, 0.0, -1.0]), np.zeros(1, np.int32)
+    groups = np.array([1, 0, 0, 0, 0, 0], np.uint8)
+    heights = np.full((len(axis), len(axis)), np.nan)
+    for i, x in enumerate(axis):
+        for j, y in enumerate(axis):
+            start = np.array([x, y, top], float)
+            distance = mujoco.mj_ray(model, data, start, down, groups, 1, -1, geom, None)
+            if distance >= 0:
+                heights[i, j] = top - distance
+    return heights
+
+
+def collides(model: Any) -> NDArray[np.bool_]:
+    """Return which geoms of a MuJoCo model collide, shape (ngeom,)."""
+    return np.asarray((model.geom_contype != 0) | (model.geom_conaffinity != 0))
+
+
+def _add_material(spec: Any) -> None:
+    """Add a checkered material, on which motion is visible."""
+    import mujoco
+
+    spec.add_texture(
+        name="ground",
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        rgb1=[0.62, 0.65, 0.68],
+        rgb2=[0.54, 0.57, 0.6],
+        width=300,
+        height=300,
+    )
+    material = spec.add_material(name="ground", texrepeat=[1, 1], texuniform=True)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "ground"
+
+
+def load_terrain(source: str | Path, collision: Collision = "auto") -> Terrain:
+    """Load the terrain that `source` names.
+
+    Args:
+        source: `plane`, a map (.npz), the config of a map (.toml), which is generated, or a
+            static MuJoCo model (.xml).
+        collision: Collision geometry of a map; `plane` replaces any source by a plane.
+
+    Raises:
+        ConfigError: If `source` is none of these.
+        MapFileError: If the map is missing, truncated or of another version.
+    """
+    if collision == "plane" or str(source) == "plane":
+        return Plane()
+    path = Path(source)
+    if path.suffix == ".npz":
+        from terrainkit.terrain_map import TerrainMap
+
+        return MapTerrain(TerrainMap.load(path), collision)
+    if path.suffix == ".toml":
+        from terrainkit.config import MapConfig
+        from terrainkit.generation import generate
+
+        return MapTerrain(generate(MapConfig.load(path)), collision)
+    if path.suffix == ".xml":
+        if not path.is_file():
+            raise ConfigError(f"there is no file {path}")
+        return ModelTerrain(path)
+    raise ConfigError(
+        f"terrain: got {str(source)!r}; expected plane, a map (.npz), the config of a map (.toml), "
+        "or a MuJoCo model (.xml)"
+    )

@@ -1,0 +1,171 @@
+"""Training: from a robot, a terrain and a task to a run with a policy.
+
+The command `terrainkit train` calls `train`, and so can your program::
+
+    result = train("quadruped", "map.npz")
+"""
+
+import os
+from dataclasses import dataclass, replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from terrainkit.errors import ConfigError, ExportError, TerrainkitError
+from terrainkit_robots.rl import tasks
+from terrainkit_robots.rl.config import Task
+from terrainkit_robots.rl.run import (
+    Run,
+    can_continue,
+    checkpoints,
+    create_run,
+    default_folder,
+    last_checkpoint,
+    parts_to_load,
+    rewrite_task,
+)
+from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.terrain import load_terrain
+
+if TYPE_CHECKING:
+    from terrainkit_robots.rl.runner import ProgressCallback
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TrainResult:
+    """The result of training."""
+
+    folder: Path | None
+    """Folder of the run; None except in the main process."""
+
+    iteration: int
+    """Completed iterations."""
+
+    signal: int
+    """The signal that stopped training early, such as SIGINT; 0 for none."""
+
+
+def train(
+    robot: str | Path,
+    terrain: str | Path = "plane",
+    task: Task | None = None,
+    *,
+    folder: Path | None = None,
+    resume: Run | None = None,
+    device: str = "cpu",
+    progress_callback: "ProgressCallback | None" = None,
+) -> TrainResult:
+    """Train a policy, and write checkpoints at intervals, at the end, and when interrupted.
+
+    Args:
+        robot: A registered robot, or the folder of an onboarded one.
+        terrain: `plane`, a map, the config of a map, or a MuJoCo model.
+        task: The task; by default the one the robot is registered with.
+        folder: Folder of the run; by default `logs/<robot>/<date-time>`.
+        resume: A run to continue. With the same robot, terrain and task (the number of
+            environments and `runner` may differ) it continues exactly, by default in its own
+            folder. Otherwise a new run starts with its networks; with its optimizer if the learning
+            rate and schedule are the same; and with its terrain levels if the map is.
+        device: Device of the networks: `cpu`, `cuda`, `cuda:1`. The physics runs on the CPU.
+        progress_callback: Called after each iteration.
+
+    Raises:
+        ConfigError: If the arguments do not fit together, or training diverges.
+        MemoryLimitError: If the environments do not fit in memory.
+        ExportError: If the folder exists, or the disk is full.
+    """
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # before torch is imported
+    import torch
+
+    from terrainkit_robots.rl.env import LeggedEnv
+    from terrainkit_robots.rl.runner import LeggedRunner, resolve_device, stop_on_signal
+
+    task = tasks.get_task(robot).task if task is None else task
+    if task.runner.logger == "wandb" and find_spec("wandb") is None:
+        raise ConfigError("runner.logger: wandb is not installed: pip install wandb")
+    continued = resume if resume and can_continue(resume, robot, terrain, task) else None
+    share = _process_share(task)
+    device = resolve_device(device)
+    if device != "cpu" and int(os.environ.get("WORLD_SIZE", "1")) > 1:
+        device = resolve_device(f"cuda:{os.environ.get('LOCAL_RANK', '0')}")
+    model = continued.robot if continued else Robot.load(tasks.get_task(robot).folder)
+    torch.set_num_threads(share.env.num_threads)
+    torch.manual_seed(share.runner.seed)
+    env = LeggedEnv(share, model, load_terrain(terrain, task.terrain.collision), device)
+    with stop_on_signal() as stop_signal:
+        runner = LeggedRunner(
+            env, device=device, progress_callback=progress_callback, should_stop=stop_signal
+        )
+        try:
+            if resume is not None:
+                parts = None if continued else parts_to_load(resume, terrain, task)
+                runner.load(last_checkpoint(resume), parts)
+            completed, total = runner.current_learning_iteration, task.runner.max_iterations
+            if completed >= total:
+                raise ConfigError(
+                    f"runner.max_iterations: got {total}; expected more than the {completed} "
+                    "iterations that are completed"
+                )
+            if runner.is_main_process:
+                runner.folder = _run_folder(folder, robot, terrain, task, continued)
+            try:
+                # Resets of a new run would otherwise all time out in the same step.
+                is_new = not env.steps_since_reset.any()
+                runner.learn(total - completed, init_at_random_ep_len=is_new)
+            except (TerrainkitError, OSError) as error:
+                raise _with_last_checkpoint(error, runner.folder) from error
+        finally:
+            if torch.distributed.is_available() and torch.distributed.is_initialized():
+                torch.distributed.destroy_process_group()
+    iteration = runner.current_learning_iteration
+    return TrainResult(
+        folder=runner.folder,
+        iteration=iteration,
+        signal=stop_signal() if iteration < total else 0,
+    )
+
+
+def _process_share(task: Task) -> Task:
+    """Return the task of this process: under torchrun, its share of the environments."""
+    rank, count = int(os.environ.get("RANK", "0")), int(os.environ.get("WORLD_SIZE", "1"))
+    num_envs, local_count = task.env.num_envs, int(os.environ.get("LOCAL_WORLD_SIZE", "1"))
+    if num_envs < count:
+        raise ConfigError(
+            f"env.num_envs: got {num_envs}; expected one for each of {count} processes"
+        )
+    available = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0)
+    threads = task.env.num_threads or max(1, len(available) // local_count)
+    num_envs = num_envs // count + (rank < num_envs % count)
+    return replace(
+        task,
+        env=replace(task.env, num_envs=num_envs, num_threads=threads),
+        runner=replace(task.runner, seed=task.runner.seed + rank),
+    )
+
+
+def _run_folder(
+    folder: Path | None,
+    robot: str | Path,
+    terrain: str | Path,
+    task: Task,
+    continued: Run | None,
+) -> Path:
+    """Return the folder to write: that of the continued run, unless it has later checkpoints."""
+    if folder is None and continued is not None:
+        saved = checkpoints(continued.folder)
+        if saved and saved[max(saved)] == continued.checkpoint:
+            if task != continued.task:
+                rewrite_task(continued, task)
+            return continued.folder
+    folder = folder or default_folder(tasks.get_task(robot).name)
+    return create_run(folder, task, robot, terrain).folder
+
+
+def _with_last_checkpoint(error: Exception, folder: Path | None) -> TerrainkitError:
+    """Return the error with a hint at the last checkpoint."""
+    saved = checkpoints(folder) if folder else {}
+    hint = f"the last checkpoint is {saved[max(saved)]}" if saved else "there is no checkpoint"
+    if isinstance(error, TerrainkitError):
+        return type(error)(f"{error}; {hint}")
+    reason = error.strerror if isinstance(error, OSError) else None
+    return ExportError(f"cannot write in {folder}: {reason or error}; {hint}")

@@ -1,0 +1,273 @@
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass, field, replace
+from typing import Annotated
+
+import pytest
+import tyro
+
+from terrainkit.errors import ConfigError
+from terrainkit.schema import field_types, flatten
+from terrainkit_cli.config_options import TaskCommand
+from terrainkit_cli.parse import UsageError, parse
+from terrainkit_cli.robot_options import Output, Text
+from terrainkit_robots.rl import tasks
+from terrainkit_robots.rl.config import Commands, Env, Rewards, Task
+from terrainkit_robots.rl.tasks import get_task, register_task
+
+
+@dataclass(frozen=True, kw_only=True)
+class Train(TaskCommand):
+    """Train a policy.
+
+    On a ground.
+    """
+
+    terrain: Text = ""
+    """The ground: an option that is called as a section is."""
+
+    named: Annotated[str, tyro.conf.arg(name="robot")] = ""
+    """An option with another name than its field."""
+
+    output: Output = ""
+    """An option with a short name."""
+
+    quick: bool = False
+    """A flag."""
+
+    def run(self) -> int:
+        """Do nothing."""
+        return 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoverRewards(Rewards):
+    """What a rover is rewarded for."""
+
+    wheel_slip: float = -0.5
+    """Wheels that slide."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RoverTask(Task):
+    """A task with fields of its own."""
+
+    rewards: RoverRewards = field(default_factory=RoverRewards)
+    """What is rewarded."""
+
+    laps: int = 3
+    """A value that is in no section."""
+
+
+@pytest.fixture
+def rover(monkeypatch, tmp_path):
+    monkeypatch.setattr(tasks, "_registered", dict(tasks._registered))
+    return register_task("rover", tmp_path, RoverTask(env=Env(num_envs=17)))
+
+
+def parse_words(*words):
+    """Return the command that words describe, as `terrainkit train` reads them."""
+    return parse(Train.options(words), "terrainkit train", list(words))
+
+
+def changes(command):
+    """Return what the command line changed, by name."""
+    before = dict(flatten(command.default_config()))
+    return {name: new for name, new in flatten(command.changed_config()) if new != before[name]}
+
+
+def test_each_value_of_the_task_has_an_option():
+    words = (
+        "quadruped --rewards.tracking-lin-vel 1.25 --commands.lin-vel-x -1 2 --terrain rough.npz "
+        "--terrain.collision plane --rewards.dof-acc -1e-8 --domain-rand.friction none "
+        "--domain-rand.added-mass 0 3 --terrain.measure_heights true --quick "
+        "--policy.actor-hidden-dims 64 32 --algorithm.symmetry loss --env.num-envs=64 "
+        "--normalization.obs-scales.lin-vel 1 --commands.heading-command true --robot x -o y"
+    )
+    made = parse_words(*words.split())
+    assert (made.robot, made.terrain, made.quick) == ("quadruped", "rough.npz", True)
+    assert (made.named, made.output) == ("x", "y")
+    assert changes(made) == {
+        "rewards.tracking_lin_vel": 1.25,
+        "commands.lin_vel_x": (-1.0, 2.0),
+        "terrain.collision": "plane",
+        "rewards.dof_acc": -1e-8,
+        "domain_rand.friction": None,
+        "domain_rand.added_mass": (0.0, 3.0),
+        "terrain.measure_heights": True,
+        "policy.actor_hidden_dims": (64, 32),
+        "algorithm.symmetry": "loss",
+        "env.num_envs": 64,
+        "normalization.obs_scales.lin_vel": 1.0,
+        "commands.heading_command": True,
+    }
+
+
+def words_of(name, annotation, value):
+    """Return the words on the command line that set a value."""
+    *sections, last = name.replace("_", "-").split(".")
+    if annotation is bool:
+        return ["--" + ".".join([*sections, last if value else f"no-{last}"])]
+    values = value if isinstance(value, tuple) else (value,)
+    words = [str(each).lower() if each is None else str(each) for each in values]
+    return ["--" + ".".join([*sections, last]), *words]
+
+
+def test_every_default_can_be_given():
+    words = ["quadruped"]
+    for name, value in flatten(Task()):
+        section = getattr(Task(), name.partition(".")[0])
+        annotation = field_types(type(section)).get(name.partition(".")[2])
+        words += words_of(name, annotation, value)
+    assert parse_words(*words).changed_config() == Task()
+
+
+def test_robot_may_come_last():
+    made = parse_words(
+        "--rewards.tracking-lin-vel", "2", "--commands.lin-vel-y", "0", "1", "quadruped"
+    )
+    assert made.robot == "quadruped"
+    assert made.changed_config().commands == Commands(lin_vel_y=(0.0, 1.0))
+    own = get_task("quadruped").task
+    assert (
+        parse_words("quadruped").changed_config()
+        == Train(robot="quadruped").changed_config()
+        == own
+    )
+    assert parse_words().robot == ""
+
+
+def test_options_override_file_and_task(tmp_path, rover):
+    path = tmp_path / "mine.toml"
+    path.write_text("laps = 4\n[rewards]\nwheel_slip = -3\ntorques = -1\n")
+    made = parse_words("rover", "--config", str(path), "--rewards.torques", "-2")
+    assert made.default_config() == Task.from_toml(path.read_text(), rover.task)
+    task = made.changed_config()
+    assert (task.laps, task.rewards.wheel_slip, task.rewards.torques) == (4, -3.0, -2.0)
+    assert task.env.num_envs == 17
+
+
+@pytest.mark.parametrize("words", [("rover", "--laps", "5"), ("--laps", "5", "rover")])
+def test_custom_task_has_its_own_options(rover, words):
+    made = parse_words(*words, "--rewards.wheel-slip", "-1", "--rewards.tracking-lin-vel", "3")
+    rewards = RoverRewards(wheel_slip=-1.0, tracking_lin_vel=3.0)
+    assert made.changed_config() == replace(rover.task, laps=5, rewards=rewards)
+
+
+def test_onboarded_folder_has_the_default_task(tmp_path):
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    shutil.copy(get_task("quadruped").folder / "robot.toml", folder)
+    assert parse_words(str(folder), "--env.num-envs", "8").changed_config() == Task(
+        env=Env(num_envs=8)
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (
+            ("quadruped", "--rewards.traking-lin-vel", "1"),
+            r"^no option --rewards\.traking-lin-vel; did you mean --rewards\.tracking-lin-vel\?; ",
+        ),
+        (("quadruped", "--rewards.wheel-slip", "1"), r"^no option --rewards\.wheel-slip"),
+        (("quadruped", "--reward.torques", "1"), r"did you mean --rewards\.torques\?"),
+        (("quadruped", "--rewards.torques"), r"Missing value for argument '--rewards\.torques'"),
+        (("quadruped", "--terain", "x"), r"^no option --terain; did you mean --terrain\?; --help"),
+        (("quadruped", "rough.npz"), r"Unrecognized .*rough\.npz"),
+    ],
+)
+def test_unknown_option_suggests_nearest_one(words, told):
+    with pytest.raises(UsageError, match=told) as error:
+        parse_words(*words)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--rewards.torques", "x"), r"^--rewards\.torques: got 'x'; expected a number$"),
+        (
+            ("--rewards.tracking-sigma", "0"),
+            r"^--rewards\.tracking-sigma: got 0; expected a number > 0",
+        ),
+        (
+            ("--commands.lin-vel-x", "2", "1"),
+            r"^--commands\.lin-vel-x: got \(2, 1\).*the lower one first",
+        ),
+        (
+            ("--domain-rand.friction", "1"),
+            r"^--domain-rand\.friction: got \(1,\); expected 2 values",
+        ),
+        (("--env.num-envs", "1e3"), r"^--env\.num-envs: got 1000\.0; expected an integer"),
+        (
+            ("--terrain.collision", "mesh"),
+            r"^--terrain\.collision: got 'mesh'; expected one of: auto, ",
+        ),
+        (("--terrain.measure-heights", "yes"), r"-heights: got 'yes'; expected true or false, or"),
+        (
+            ("--normalization.obs-scales.lin-vel", "-1"),
+            r"^--normalization\.obs-scales\.lin-vel: got -1",
+        ),
+        (("--env.episode-length-s", "0.001"), r"^env\.episode_length_s: got 0\.001; expected at"),
+    ],
+)
+def test_invalid_value_is_named(words, told):
+    with pytest.raises(ConfigError, match=told):
+        parse_words("quadruped", *words).changed_config()
+
+
+def test_unknown_robot_or_file_is_rejected(tmp_path):
+    with pytest.raises(ConfigError, match=r"folder 'quadrupd'; did you mean 'quadruped'\?"):
+        parse_words("quadrupd", "--rewards.torques", "1")
+    with pytest.raises(ConfigError, match=r"cannot read .*missing\.toml"):
+        parse_words("quadruped", "--config", str(tmp_path / "missing.toml"))
+
+
+@pytest.mark.usefixtures("rover")
+def test_help_shows_values_of_the_task(capsys):
+    with pytest.raises(SystemExit) as end:
+        parse_words("rover", "--help")
+    assert end.value.code in (0, None)
+    told = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert "Train a policy. On a ground." in told
+    assert "--terrain PATH The ground: an option" in told
+    assert "--env.num-envs INT Number of parallel environments" in told
+    assert "(default: 17)" in told
+    assert "--rewards.wheel-slip FLOAT Wheels that slide. (default: -0.5)" in told
+    assert "--laps INT A value that is in no section. (default: 3)" in told
+    assert "--domain-rand.friction FLOAT FLOAT|none" in told
+    assert "(default: 0.5 1.25)" in told
+
+
+def test_help_works_without_a_valid_task(capsys):
+    for words in (("--help",), ("-h", "no_such_robot")):
+        with pytest.raises(SystemExit):
+            parse_words(*words)
+        assert "--rewards.tracking-lin-vel FLOAT" in capsys.readouterr().out
+
+
+def test_torch_mujoco_typeguard_are_not_imported():
+    code = (
+        "import sys; from dataclasses import dataclass\n"
+        "from terrainkit_cli.config_options import TaskCommand\n"
+        "assert not {'terrainkit_robots.rl', 'mujoco'} & set(sys.modules)\n"
+        "@dataclass(frozen=True, kw_only=True)\n"
+        "class Train(TaskCommand):\n"
+        "    def run(self): return 0\n"
+        "Train.options(['quadruped', '--env.num-envs', '4'])\n"
+        "assert not {'torch', 'mujoco', 'typeguard', 'rsl_rl'} & set(sys.modules)\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_flags_can_be_set_and_cleared(tmp_path):
+    path = tmp_path / "task.toml"
+    path.write_text("[asset]\nself_collisions = true\n")
+    words = ("quadruped", "--config", str(path))
+    assert parse_words(*words).changed_config().asset.self_collisions
+    cleared = parse_words(*words, "--asset.no-self-collisions").changed_config()
+    assert not cleared.asset.self_collisions
+    before = parse_words("--asset.self-collisions", "quadruped")
+    assert (before.robot, before.changed_config().asset.self_collisions) == ("quadruped", True)

@@ -1,0 +1,222 @@
+import re
+from itertools import product
+
+import cv2
+import mujoco
+import numpy as np
+import pytest
+
+from terrainkit_robots.description import bundled
+from terrainkit_robots.rendering import robot_pictures
+from terrainkit_robots.rendering.child_process import RenderError
+from terrainkit_robots.rendering.robot_pictures import (
+    DEFAULT_RGBA,
+    FIELD_OF_VIEW,
+    VIEWS,
+    fit_camera,
+    geom_points,
+    render_robot,
+    robot_frames,
+    show_robot_geoms,
+)
+
+SIZE = (144, 120)
+QUADRUPED = bundled.find("quadruped").with_suffix(".xml")
+CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
+
+
+@pytest.fixture(scope="module")
+def red(tmp_path_factory):
+    """Return pictures of the bundled quadruped in red; skips where MuJoCo cannot render."""
+    text = QUADRUPED.read_text()
+    file = tmp_path_factory.mktemp("robot") / "robot.xml"
+    file.write_text(re.sub(r'(<material [^>]*rgba=)"[^"]*"', r'\1"1 0 0 1"', text))
+    try:
+        pictures = render_robot(file, size=SIZE)
+    except RenderError as error:
+        pytest.skip(str(error))
+    assert [each.name for each in file.parent.iterdir()] == ["robot.xml"]  # and no log
+    return {
+        name: cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR).astype(int)
+        for name, data in pictures.items()
+    }
+
+
+def test_render_robot_fills_each_view(red):
+    assert list(red) == ["front", "side", "corner"]
+    for picture in red.values():
+        assert picture.shape == (SIZE[1], SIZE[0], 3)
+        robot = picture[:, :, 2] - picture[:, :, 1] > 60
+        rows, columns = np.flatnonzero(robot.any(axis=1)), np.flatnonzero(robot.any(axis=0))
+        assert robot.mean() > 0.05
+        assert rows[0] > 1
+        assert rows[-1] < SIZE[1] - 2
+        assert columns[0] > 1
+        assert columns[-1] < SIZE[0] - 2
+        filled = max(np.ptp(rows) / SIZE[1], np.ptp(columns) / SIZE[0])
+        assert filled == pytest.approx(0.86, abs=0.06)
+
+
+def test_render_robot_draws_light_floor_with_shadow(red):
+    for picture in red.values():
+        floor = picture[abs(picture[:, :, 2] - picture[:, :, 1]) < 20]
+        assert np.median(floor) > 220
+        assert 0.01 < (floor.mean(axis=1) < 170).mean() < 0.4
+
+
+def test_render_robot_views_differ(red):
+    front, side, corner = red.values()
+    assert np.abs(front - side).mean() > 5
+    assert np.abs(corner - side).mean() > 5
+
+
+def world(content):
+    return f"<mujoco><worldbody>{content}</worldbody></mujoco>"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (world(""), r"robot\.xml has no geoms to render"),
+        (world('<geom type="plane" size="1 1 1"/>'), "no geoms to render"),
+        (world('<geom size="1" pos="1e9 0 0"/>'), "more than 1000 m from the origin"),
+        ("<mujoco", "XML"),
+        (world('<geom type="mesh" mesh="m"/>'), "mesh"),
+    ],
+)
+def test_robot_frames_rejects_model(tmp_path, text, message):
+    (tmp_path / "robot.xml").write_text(text)
+    with pytest.raises(RenderError, match=message):
+        next(robot_frames(tmp_path / "robot.xml", SIZE))
+
+
+def test_render_robot_does_not_retry_after_rejected_model(tmp_path, monkeypatch):
+    (tmp_path / "robot.xml").write_text(world(""))
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    with pytest.raises(RenderError, match=r"^robot\.xml has no geoms to render$"):
+        render_robot(tmp_path / "robot.xml")
+
+
+def compiled(content):
+    material = "<asset><material name='glass' rgba='1 1 1 0'/></asset>"
+    return mujoco.MjModel.from_xml_string(
+        f"<mujoco>{material}<worldbody>{content}</worldbody></mujoco>"
+    )
+
+
+def shown_names(content):
+    model = compiled(content)
+    return [model.geom(int(i)).name for i in show_robot_geoms(model)]
+
+
+def body(*geoms):
+    shapes = "".join(f'<geom name="{name}" size="1" {rest}/>' for name, rest in geoms)
+    return f"<body><freejoint/>{shapes}</body>"
+
+
+HIDDEN = 'group="3"'
+
+
+def test_show_robot_geoms_prefers_visible_groups():
+    assert shown_names(body(("visual", 'group="2"'), ("collision", HIDDEN))) == ["visual"]
+    other_links = body(("visual", ""), ("a", HIDDEN)) + body(("b", HIDDEN))
+    assert shown_names(other_links) == ["visual"]
+
+
+def test_show_robot_geoms_falls_back_to_collision_geoms():
+    assert shown_names(body(("a", HIDDEN)) + body(("b", HIDDEN))) == ["a", "b"]
+
+
+def test_show_robot_geoms_skips_planes():
+    floor = '<geom name="floor" type="plane" size="1 1 1"/>'
+    assert shown_names(floor + body(("visual", ""))) == ["visual"]
+    assert shown_names(floor) == []
+
+
+def test_show_robot_geoms_includes_static_base():
+    base = '<geom name="base" size="1"/>'
+    assert shown_names(base + body(("visual", ""))) == ["base", "visual"]
+
+
+def test_show_robot_geoms_hides_transparent_geoms():
+    clear = ("clear", 'rgba="1 1 1 0"')
+    assert shown_names(body(clear, ("visual", ""))) == ["visual"]
+    assert shown_names(body(("glass", 'material="glass"'), ("visual", ""))) == ["visual"]
+    painted = ("painted", 'material="glass" rgba="1 0 0 1"')  # geom colors override materials
+    assert shown_names(body(painted, ("visual", ""))) == ["painted", "visual"]
+
+
+def test_show_robot_geoms_colors_transparent_robot():
+    model = compiled(body(("clear", 'rgba="1 1 1 0"'), ("glass", 'material="glass"')))
+    assert show_robot_geoms(model).tolist() == [0, 1]
+    assert (model.geom_matid == -1).all()
+    assert (model.geom_rgba == DEFAULT_RGBA).all()
+
+
+@pytest.mark.parametrize(
+    ("shape", "half_size"),
+    [
+        ('type="sphere" size="0.3"', (0.3, 0.3, 0.3)),
+        ('type="box" size="0.1 0.2 0.3"', (0.1, 0.2, 0.3)),
+        ('type="box" size="0.1 0.2 0.3" euler="90 0 0"', (0.1, 0.3, 0.2)),
+        ('type="cylinder" size="0.1 0.4"', (0.1, 0.1, 0.4)),
+        ('type="capsule" size="0.1 0.4"', (0.1, 0.1, 0.5)),
+        ('type="capsule" size="0.1 0.4" euler="0 90 0"', (0.5, 0.1, 0.1)),
+        ('type="ellipsoid" size="0.1 0.2 0.3"', (0.1, 0.2, 0.3)),
+    ],
+)
+def test_geom_points_bound_shape(shape, half_size):
+    model = compiled(f'<body pos="1 2 3"><freejoint/><geom {shape}/></body>')
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    points = geom_points(model, data, np.array([0]))
+    np.testing.assert_allclose(points.max(axis=0), np.add([1, 2, 3], half_size), atol=1e-6)
+    np.testing.assert_allclose(points.min(axis=0), np.subtract([1, 2, 3], half_size), atol=1e-6)
+
+
+def test_geom_points_of_mesh_are_vertices():
+    vertices = "0 0 0  1 0 0  0 2 0  0 0 3"
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><asset><mesh name="m" vertex="{vertices}"/></asset>'
+        '<worldbody><geom type="mesh" mesh="m"/></worldbody></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    points = geom_points(model, data, np.array([0]))
+    np.testing.assert_allclose(points.min(axis=0), [0, 0, 0], atol=1e-6)
+    np.testing.assert_allclose(points.max(axis=0), [1, 2, 3], atol=1e-6)
+
+
+def project(points, view, aspect):
+    """Return image coordinates of points, from -1 to 1, and their depth."""
+    target, distance = fit_camera(points, *view, aspect)
+    a, e = np.radians(view)
+    forward = np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)])
+    right = np.array([np.sin(a), -np.cos(a), 0])
+    offset = points - (target - distance * forward)
+    depth, half = offset @ forward, np.tan(np.radians(FIELD_OF_VIEW) / 2)
+    up = np.cross(right, forward)
+    return offset @ right / (depth * half * aspect), offset @ up / (depth * half), depth
+
+
+@pytest.mark.parametrize("size", [0.01, 0.05, 3.0, 100.0])
+@pytest.mark.parametrize("sides", [(1, 1, 1), (1, 0.1, 0.1), (0.1, 0.1, 1), (1, 1, 0)])
+@pytest.mark.parametrize("view", VIEWS.values(), ids=VIEWS)
+@pytest.mark.parametrize("aspect", [0.5, 1, 2])
+def test_fit_camera_fills_picture(size, sides, view, aspect):
+    x, y, depth = project(CORNERS * size * sides + [5, -3, 0.5], view, aspect)
+    assert depth.min() > 0
+    largest = max((x, y), key=lambda offset: abs(offset).max())
+    assert largest.max() == pytest.approx(0.86, abs=1e-6)
+    assert largest.min() == pytest.approx(-0.86, abs=1e-6)
+
+
+def test_fit_camera_of_point_keeps_distance():
+    target, distance = fit_camera(np.array([[1.0, 2, 3]]), 0, 0, 1)
+    assert distance > 0
+    np.testing.assert_allclose(target, [1, 2, 3])
+
+
+@pytest.mark.parametrize(("radius", "cell"), [(0.25, 0.1), (0.5, 0.2), (1.3, 0.5), (25, 10)])
+def test_grid_spacing_is_round_number(radius, cell):
+    assert robot_pictures.grid_spacing(radius) == cell

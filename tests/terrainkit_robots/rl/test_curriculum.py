@@ -1,0 +1,433 @@
+"""The curriculum: simulated robots end on the ground that suits them."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+
+from terrainkit.errors import ConfigError
+from terrainkit_robots.description import bundled
+from terrainkit_robots.rl.commands import VelocityCommand, sample_commands
+from terrainkit_robots.rl.config import Commands, DomainRand, Env, InitState, Task, Terrain
+from terrainkit_robots.rl.curriculum import TerrainCurriculum
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.terrain import Plane
+
+torch.set_num_threads(1)
+
+_STEP = 1.0
+"""Time step of the simulated walks [s]."""
+
+
+class Patches(Plane):
+    """A plane that counts as a map of patches, 8 m long."""
+
+    is_flat = False
+
+    def __init__(self, rows: int = 10, names: tuple[str, ...] = ("flat", "rough")) -> None:
+        self.env_origins = np.zeros((rows, len(names), 3), np.float32)
+        self.env_origins[..., 0] = 8 * np.arange(rows)[:, None] + 4
+        self.env_origins[..., 1] = 8 * np.arange(len(names)) + 4
+        self.terrain_names = np.tile(np.array(names), (rows, 1))
+
+
+def live(
+    curriculum: TerrainCurriculum,
+    skill: NDArray[np.float64],
+    episodes: int,
+    commands: Commands,
+    *,
+    noise: float,
+) -> None:
+    """Let robots live episodes of 20 s: each follows its commands up to the level of its skill.
+
+    On harder ground a robot falls in place. It follows at nine tenths of the speed asked for.
+    """
+    n, rng = len(skill), np.random.default_rng(7)
+    steering = VelocityCommand(commands, n, 1.0, heading_command=True)
+    everyone = np.arange(n)
+    for _ in range(episodes):
+        curriculum.reset(everyone)
+        fails = curriculum.levels > skill + rng.normal(0, noise, n)
+        pos, yaw = np.zeros((n, 2)), rng.uniform(-np.pi, np.pi, n).astype(np.float32)
+        for step in range(20):
+            if step % 10 == 0:
+                wanted, heading = sample_commands(rng, n, commands, commands.lin_vel_x)
+            if commands.heading_command:
+                steering.heading, steering.commands = heading, wanted
+                steering.update_heading(yaw)
+            curriculum.accumulate_command(wanted, yaw, _STEP)
+            c, s = np.cos(yaw), np.sin(yaw)
+            pos[:, 0] += 0.9 * _STEP * (c * wanted[:, 0] - s * wanted[:, 1])
+            pos[:, 1] += 0.9 * _STEP * (s * wanted[:, 0] + c * wanted[:, 1])
+            yaw += np.float32(_STEP) * wanted[:, 2]
+        distance = np.where(fails, 0.1, np.linalg.norm(pos, axis=1))
+        curriculum.on_episode_end(everyone, distance, fails, update_levels=True)
+
+
+def walk(curriculum: TerrainCurriculum, forward: float, seconds: float) -> None:
+    """Ask every robot to go east."""
+    n = len(curriculum.levels)
+    wanted = np.tile(np.array([forward, 0, 0], np.float32), (n, 1))
+    for _ in range(round(seconds / _STEP)):
+        curriculum.accumulate_command(wanted, np.zeros(n, np.float32), _STEP)
+
+
+def end_all(curriculum: TerrainCurriculum, distance: float, *, fallen: bool = False) -> None:
+    n = len(curriculum.levels)
+    curriculum.on_episode_end(
+        np.arange(n), np.full(n, distance), np.full(n, fallen), update_levels=True
+    )
+
+
+@pytest.fixture
+def curriculum() -> TerrainCurriculum:
+    """Four robots at level 4 of 10, on a patch 8 m long."""
+    made = TerrainCurriculum(Patches(), 4, 5, 1)
+    made.levels[:] = 4
+    return made
+
+
+class TestConvergence:
+    @pytest.mark.parametrize("heading", [False, True])
+    @pytest.mark.parametrize("skill", [2, 5, 7])
+    def test_to_the_level_of_skill(self, skill: int, *, heading: bool) -> None:
+        curriculum = TerrainCurriculum(Patches(), 100, 5, 1)
+        live(
+            curriculum, np.full(100, skill + 0.5), 60, Commands(heading_command=heading), noise=0.5
+        )
+        assert curriculum.levels.mean() == pytest.approx(skill, abs=0.75)
+        assert curriculum.levels.std() < 1.5
+
+    def test_of_each_for_itself(self) -> None:
+        curriculum = TerrainCurriculum(Patches(), 200, 5, 1)
+        skill = np.repeat([1.5, 6.5], 100)
+        live(curriculum, skill, 80, Commands(), noise=0.5)
+        assert curriculum.levels[:100].mean() == pytest.approx(1, abs=0.75)
+        assert curriculum.levels[100:].mean() == pytest.approx(6, abs=0.75)
+
+    def test_of_the_perfect_to_the_top_three_rows(self) -> None:
+        curriculum = TerrainCurriculum(Patches(), 100, 5, 1)
+        live(curriculum, np.full(100, np.inf), 60, Commands(), noise=0.5)
+        assert set(curriculum.levels) == {7, 8, 9}
+        before = curriculum.levels.copy()
+        live(curriculum, np.full(100, np.inf), 5, Commands(), noise=0.5)
+        assert curriculum.levels.min() >= 7
+        assert (curriculum.levels != before).any()
+
+    def test_of_the_hopeless_to_the_first_row(self) -> None:
+        curriculum = TerrainCurriculum(Patches(), 100, 5, 1)
+        live(curriculum, np.full(100, -np.inf), 10, Commands(), noise=0.5)
+        assert set(curriculum.levels) == {0}
+
+    def test_of_the_same_seed_is_the_same(self) -> None:
+        levels = []
+        for _ in range(2):
+            curriculum = TerrainCurriculum(Patches(), 50, 5, 3)
+            live(curriculum, np.full(50, np.inf), 40, Commands(), noise=0.5)
+            levels.append(curriculum.levels)
+        np.testing.assert_array_equal(*levels)
+
+    def test_columns_are_kept(self) -> None:
+        curriculum = TerrainCurriculum(Patches(), 10, 5, 1)
+        assert curriculum.columns.tolist() == [0] * 5 + [1] * 5
+        live(curriculum, np.full(10, 3.0), 10, Commands(), noise=0.5)
+        assert curriculum.columns.tolist() == [0] * 5 + [1] * 5
+        np.testing.assert_array_equal(curriculum.env_origins[:, 0], 8 * curriculum.levels + 4)
+
+
+class TestOneEpisode:
+    """Half of 8 m is crossed; half of what was asked is enough to stay."""
+
+    @pytest.mark.parametrize(
+        ("asked", "distance", "fallen", "level"),
+        [
+            (10.0, 4.5, False, 5),  # crossed
+            (10.0, 3.9, False, 3),  # less than half of what was asked
+            (7.0, 3.6, False, 4),  # more than half of it
+            (1.0, 0.1, False, 3),
+            (1.0, 0.6, False, 4),
+            (1.0, 0.9, True, 3),  # as asked, but it fell
+            (10.0, 4.5, True, 5),  # fell after it had crossed
+        ],
+    )
+    def test_moves(
+        self,
+        curriculum: TerrainCurriculum,
+        asked: float,
+        distance: float,
+        *,
+        fallen: bool,
+        level: int,
+    ) -> None:
+        walk(curriculum, asked / 10, 10)
+        end_all(curriculum, distance, fallen=fallen)
+        assert curriculum.levels.tolist() == [level] * 4
+
+    def test_told_to_stand_is_not_moved(self, curriculum: TerrainCurriculum) -> None:
+        walk(curriculum, 0.0, 20)
+        end_all(curriculum, 0.02)
+        assert curriculum.levels.tolist() == [4] * 4
+
+    def test_told_to_stand_and_fallen_moves_down(self, curriculum: TerrainCurriculum) -> None:
+        walk(curriculum, 0.0, 20)
+        end_all(curriculum, 0.02, fallen=True)
+        assert curriculum.levels.tolist() == [3] * 4
+
+    def test_only_the_time_lived_counts(self, curriculum: TerrainCurriculum) -> None:
+        """Asked for 1 m/s during 2 s, not during an episode of 20 s."""
+        walk(curriculum, 1.0, 2)
+        end_all(curriculum, 1.8)
+        assert curriculum.levels.tolist() == [4] * 4
+
+    def test_commands_that_change_count_as_they_were(self, curriculum: TerrainCurriculum) -> None:
+        """There and back again: the robot is where it was asked to be."""
+        walk(curriculum, 1.0, 10)
+        walk(curriculum, -1.0, 10)
+        end_all(curriculum, 0.2)
+        assert curriculum.levels.tolist() == [4] * 4
+
+    def test_commands_are_in_the_frame_of_the_robot(self, curriculum: TerrainCurriculum) -> None:
+        yaw = np.array([0, np.pi / 2, np.pi, -np.pi / 2], np.float32)
+        curriculum.accumulate_command(
+            np.tile(np.array([1, 0.5, 0.3], np.float32), (4, 1)), yaw, 2.0
+        )
+        expected = [[2, 1], [-1, 2], [-2, -1], [1, -2]]
+        np.testing.assert_allclose(curriculum.commanded, expected, atol=1e-6)
+
+    def test_new_episode_is_asked_nothing_yet(self, curriculum: TerrainCurriculum) -> None:
+        walk(curriculum, 1.0, 10)
+        curriculum.reset(np.array([1, 3]))
+        assert curriculum.commanded[:, 0].tolist() == [10, 0, 10, 0]
+
+    def test_only_those_that_ended_move(self, curriculum: TerrainCurriculum) -> None:
+        curriculum.on_episode_end(
+            np.array([2]), np.array([5.0]), np.array([False]), update_levels=True
+        )
+        assert curriculum.levels.tolist() == [4, 4, 5, 4]
+
+    def test_without_curriculum_nobody_moves_but_all_are_counted(
+        self, curriculum: TerrainCurriculum
+    ) -> None:
+        curriculum.on_episode_end(
+            np.array([2]), np.array([5.0]), np.array([False]), update_levels=False
+        )
+        assert curriculum.levels.tolist() == [4] * 4
+        assert curriculum.success[4, 1] == 1
+
+    def test_nobody_ended(self, curriculum: TerrainCurriculum) -> None:
+        curriculum.on_episode_end(np.arange(0), np.zeros(0), np.zeros(0, bool), update_levels=True)
+        assert curriculum.levels.tolist() == [4] * 4
+
+    def test_one_row_has_no_levels(self) -> None:
+        curriculum = TerrainCurriculum(Plane(), 3, 5, 1)
+        end_all(curriculum, 100.0)
+        assert curriculum.levels.tolist() == [0] * 3
+
+
+class TestSuccess:
+    def test_rates_by_level_and_column(self, curriculum: TerrainCurriculum) -> None:
+        curriculum.levels[:] = [0, 0, 4, 9]
+        assert np.isnan(curriculum.success).all()
+        fallen = np.array([True, False, False, False])
+        curriculum.on_episode_end(
+            np.arange(4), np.full(4, 5.0) * ~fallen, fallen, update_levels=False
+        )
+        # Of the two at level 0 the first fell, and the second weighs a twentieth.
+        assert curriculum.success[0, 0] == pytest.approx(0.05)
+        assert curriculum.success[4, 1] == curriculum.success[9, 1] == 1
+        assert np.isnan(curriculum.success).sum() == 20 - 3
+
+    def test_rate_is_that_of_late(self, curriculum: TerrainCurriculum) -> None:
+        rng = np.random.default_rng(0)
+        for chance in (0.2, 0.8):
+            rates = []
+            for _ in range(400):
+                fallen = np.array([rng.random() > chance])
+                curriculum.on_episode_end(np.array([0]), np.zeros(1), fallen, update_levels=False)
+                rates.append(curriculum.success[4, 0])
+            assert np.mean(rates[100:]) == pytest.approx(chance, abs=0.05)
+
+    def test_log_has_level_and_success_of_each_terrain(self, curriculum: TerrainCurriculum) -> None:
+        curriculum.levels[:] = [2, 3, 9, 7]
+        curriculum.success[2, 0], curriculum.success[3, 0] = 0.5, 0.25
+        assert curriculum.log() == {
+            "Curriculum/level": 5.25,
+            "Curriculum/level_flat": 2.5,
+            "Curriculum/success_flat": 0.375,
+            "Curriculum/level_rough": 8.0,
+        }
+
+    def test_log_combines_columns_of_the_same_terrain(self) -> None:
+        curriculum = TerrainCurriculum(Patches(names=("flat", "steps", "flat")), 3, 0, 1)
+        curriculum.levels[:] = [1, 5, 3]
+        assert curriculum.log() == {
+            "Curriculum/level": 3,
+            "Curriculum/level_flat": 2,
+            "Curriculum/level_steps": 5,
+        }
+
+    def test_log_combines_patches_of_the_same_terrain(self) -> None:
+        terrain = Patches(rows=2)
+        terrain.terrain_names = np.array([["flat", "rough"], ["rough", "flat"]])
+        curriculum = TerrainCurriculum(terrain, 4, 0, 1)
+        curriculum.levels[:], curriculum.columns[:] = [0, 1, 1, 1], [0, 0, 1, 1]
+        curriculum.success[:] = [[0.1, 0.2], [0.4, 0.7]]
+        assert curriculum.log() == {
+            "Curriculum/level": 0.75,
+            "Curriculum/level_flat": pytest.approx(2 / 3),
+            "Curriculum/success_flat": pytest.approx(0.4),
+            "Curriculum/level_rough": 1,
+            "Curriculum/success_rough": pytest.approx(0.3),
+        }
+
+    def test_log_leaves_out_terrain_without_robots(self) -> None:
+        curriculum = TerrainCurriculum(Patches(), 1, 0, 1)
+        assert curriculum.log() == {"Curriculum/level": 0, "Curriculum/level_flat": 0}
+
+
+class TestCheckpoint:
+    def test_goes_on_as_if_unbroken(self) -> None:
+        whole, first = (TerrainCurriculum(Patches(), 20, 5, 1) for _ in range(2))
+        skill = np.full(20, np.inf)
+        for each in (whole, first):
+            live(each, skill, 30, Commands(), noise=0.5)
+        other = TerrainCurriculum(Patches(), 20, 5, 99)
+        other._seed = 1
+        other.load_state_dict(first.state_dict())
+        for each in (whole, other):
+            live(each, skill, 10, Commands(), noise=0.5)
+        np.testing.assert_array_equal(other.levels, whole.levels)
+        np.testing.assert_array_equal(other.columns, whole.columns)
+        np.testing.assert_array_equal(other.commanded, whole.commanded)
+        np.testing.assert_array_equal(other.success, whole.success)
+
+    def test_is_a_copy(self, curriculum: TerrainCurriculum) -> None:
+        state = curriculum.state_dict()
+        live(curriculum, np.full(4, np.inf), 5, Commands(), noise=0.5)
+        assert state["levels"].tolist() == [4] * 4
+        assert np.isnan(np.asarray(state["success"])).all()
+
+    @pytest.mark.parametrize("n", [2, 6, 30])
+    def test_another_number_of_robots_keeps_levels_by_column(self, n: int) -> None:
+        before = TerrainCurriculum(Patches(), 10, 5, 1)
+        before.levels[:5], before.levels[5:] = 2, 8
+        before.success[3, 1] = 0.5
+        curriculum = TerrainCurriculum(Patches(), n, 5, 1)
+        curriculum.load_state_dict(before.state_dict())
+        assert len(curriculum.levels) == n
+        assert set(curriculum.levels[curriculum.columns == 0]) == {2}
+        assert set(curriculum.levels[curriculum.columns == 1]) == {8}
+        assert curriculum.success[3, 1] == 0.5
+
+    def test_mean_level_is_about_kept(self) -> None:
+        before = TerrainCurriculum(Patches(), 100, 5, 1)
+        before.levels[:] = np.random.default_rng(0).integers(0, 10, 100)
+        curriculum = TerrainCurriculum(Patches(), 200, 5, 1)
+        curriculum.load_state_dict(before.state_dict())
+        assert curriculum.levels.mean() == pytest.approx(before.levels.mean(), abs=0.01)
+
+    @pytest.mark.parametrize("other", [Patches(rows=9), Patches(names=("flat",))])
+    def test_another_map(self, other: Patches) -> None:
+        state = TerrainCurriculum(Patches(), 4, 5, 1).state_dict()
+        curriculum = TerrainCurriculum(other, 4, 5, 1)
+        with pytest.raises(ConfigError, match="checkpoint's map has 10 x 2 patches; this one has"):
+            curriculum.load_state_dict(state)
+
+
+class TestEnvironment:
+    """The curriculum of a real environment, whose robots do nothing but stand."""
+
+    def make(self, **terrain: Any) -> LeggedEnv:
+        task = Task(
+            env=Env(num_envs=6, num_threads=1, episode_length_s=0.2),
+            terrain=Terrain(measure_heights=False, **terrain),
+            commands=Commands(lin_vel_x=(1, 1), lin_vel_y=(0, 0), ang_vel_yaw=(0, 0), standing=0),
+            init_state=InitState(lin_vel=0, ang_vel=0, yaw=0),
+            domain_rand=DomainRand(push_interval_s=0),
+        )
+        env = LeggedEnv(task, Robot.load(Path(str(bundled.find("quadruped"))).parent), Patches())
+        env.curriculum.levels[:] = 4
+        env.reset()
+        return env
+
+    def walk(self, env: LeggedEnv, steps: int) -> dict[str, float]:
+        extras: dict[str, Any] = {}
+        for _ in range(steps):
+            *_, extras = env.step(torch.zeros(6, 12))
+        log: dict[str, float] = extras.get("log", {})
+        return log
+
+    def test_start_is_at_the_origin_of_the_level(self) -> None:
+        env = self.make()
+        off = env.state.base_pos[:, :2] - env.curriculum.env_origins[:, :2]
+        assert np.abs(off).max() <= 0.5
+        assert (env.curriculum.env_origins[:, 0] == 36).all()
+
+    def test_asked_is_what_commands_ask(self) -> None:
+        env = self.make()
+        self.walk(env, 5)
+        np.testing.assert_allclose(env.curriculum.commanded[:, 0], 0.1, atol=0.005)
+
+    def test_idle_robots_move_down_when_their_time_is_over(self) -> None:
+        env = self.make()
+        self.walk(env, 9)
+        assert env.curriculum.levels.tolist() == [4] * 6
+        log = self.walk(env, 1)
+        assert env.curriculum.levels.tolist() == [3] * 6
+        assert log["Curriculum/level"] == log["Curriculum/level_rough"] == 3
+        assert log["Curriculum/success_flat"] == 0
+        assert (env.curriculum.commanded == 0).all()
+        assert np.abs(env.state.base_pos[:, 0] - 28).max() <= 0.55
+
+    def test_first_reset_moves_nobody(self) -> None:
+        env = self.make()
+        assert np.isnan(env.curriculum.success).all()
+        assert env.curriculum.levels.tolist() == [4] * 6
+
+    def test_episodes_cut_by_random_lengths_move_nobody(self) -> None:
+        """As rsl-rl's runner does it with `init_at_random_ep_len`."""
+        env = self.make()
+        env.episode_length_buf = torch.tensor([0, 1, 2, 3, 5, 9])
+        self.walk(env, 10)
+        assert env.curriculum.levels.tolist() == [3, 4, 4, 4, 4, 4]
+        # From then on their episodes are whole.
+        self.walk(env, 10)
+        assert env.curriculum.levels.tolist() == [2, 3, 3, 3, 3, 3]
+
+    def test_crossing_moves_up(self) -> None:
+        env = self.make()
+        env.sim.qpos[2, 0] += 5
+        self.walk(env, 10)
+        assert env.curriculum.levels.tolist() == [3, 3, 5, 3, 3, 3]
+
+    def test_leaving_the_map_is_crossing(self) -> None:
+        """A patch may be narrower than it is long: its side is nearer than half its length."""
+        env = self.make()
+        env.terrain.lower = (-np.inf, 2.0)
+        env.sim.qpos[1, 1] -= 2.9
+        *_, extras = env.step(torch.zeros(6, 12))
+        assert extras["log"]["Episode/falls"] == 1
+        assert env.curriculum.levels.tolist() == [4, 5, 4, 4, 4, 4]
+        assert env.curriculum.success[4, 0] == 1
+
+    def test_falls_move_down(self) -> None:
+        env = self.make()
+        self.walk(env, 2)
+        env.sim.qpos[1, 3:7] = (0, 1, 0, 0)
+        self.walk(env, 1)
+        assert env.curriculum.levels.tolist() == [4, 3, 4, 4, 4, 4]
+
+    def test_without_curriculum(self) -> None:
+        env = self.make(curriculum=False)
+        log = self.walk(env, 10)
+        assert env.curriculum.levels.tolist() == [4] * 6
+        assert log["Curriculum/success_flat"] == 0
+
+    def test_hardest_first_row(self) -> None:
+        assert set(TerrainCurriculum(Patches(), 500, 2, 1).levels) == {0, 1, 2}
+        assert set(TerrainCurriculum(Patches(rows=3), 500, 5, 1).levels) == {0, 1, 2}
