@@ -83,7 +83,7 @@ class Simulation:
         return values.reshape(len(values), -1, 3)
 
 
-def check_memory(task: Task, robot: Robot, *, scan: bool, ngeom: int) -> None:
+def check_env_memory(task: Task, robot: Robot, *, scan: bool, ngeom: int) -> None:
     """Check that training with the task's environments fits in memory.
 
     Raises:

@@ -5,7 +5,7 @@ import pytest
 
 from terrainkit.errors import MemoryLimitError
 from terrainkit_robots.rl.config import Env, Runner, Task
-from terrainkit_robots.rl.simulation import bytes_per_env, check_memory
+from terrainkit_robots.rl.simulation import bytes_per_env, check_env_memory
 
 MEASURED = """
 import re, sys
@@ -58,5 +58,5 @@ def test_what_would_fit_is_said(quadruped, monkeypatch):
     with pytest.raises(
         MemoryLimitError, match=r"with 40000 environments needs .*; env\.num_envs 5000 would fit"
     ):
-        check_memory(task, quadruped, scan=False, ngeom=50)
-    check_memory(Task(env=Env(num_envs=5000)), quadruped, scan=False, ngeom=50)
+        check_env_memory(task, quadruped, scan=False, ngeom=50)
+    check_env_memory(Task(env=Env(num_envs=5000)), quadruped, scan=False, ngeom=50)
