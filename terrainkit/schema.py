@@ -27,6 +27,8 @@ _MAX_MESSAGE = 500
 
 _MAX_INT = 2**63
 
+_DOT_HINT = " (a key with a dot needs quotes)"
+
 SORTED = Meta(extra={"sorted": True})
 """Of two numbers, the second may not be below the first."""
 
@@ -57,8 +59,9 @@ class Config:
         cls = type(self)
         if "__dataclass_fields__" not in vars(cls):
             raise ConfigError(f"{cls.__name__} lacks @dataclass(frozen=True, kw_only=True)")
-        for name, annotation in field_types(cls).items():
-            object.__setattr__(self, name, convert(name, getattr(self, name), annotation))
+        annotations = field_types(cls)
+        for key, name in field_keys(cls).items():
+            object.__setattr__(self, name, convert(key, getattr(self, name), annotations[name]))
 
     @classmethod
     def from_table(
@@ -75,15 +78,18 @@ class Config:
             ConfigError: if a key is unknown or missing, or a value is invalid.
         """
         cls = cls if default is None else type(default)
-        annotations = field_types(cls)
+        annotations, names = field_types(cls), field_keys(cls)
         for key in table:
-            if key not in annotations:
+            if key not in names:
                 nested = (k for k, _ in flatten(default or ()) if k.endswith(f".{key}"))
-                known = known_names(key, annotations, "it has", next(nested, ""))
+                known = known_names(key, names, "it has", next(nested, ""))
                 owner = path.removesuffix(".") or "config"
-                raise ConfigError(f"{owner} has no key {shorten(repr(key))}; {known}")
+                hint = _DOT_HINT if isinstance(table[key], Mapping) and path else ""
+                raise ConfigError(f"{owner} has no key {shorten(repr(key))}{hint}; {known}")
         values = {
-            key: _with_configs(path + key_text(key), value, annotations[key], default, key)
+            names[key]: _with_configs(
+                path + key_text(key), value, annotations[names[key]], getattr(default, key, None)
+            )
             for key, value in table.items()
         }
         for field in dataclasses.fields(cls) if default is None else ():
@@ -136,6 +142,12 @@ def field_types(cls: type[Any]) -> dict[str, Any]:
     """Return the annotation of each field of a dataclass, by name."""
     annotations = typing.get_type_hints(cls, include_extras=True)
     return {field.name: annotations[field.name] for field in dataclasses.fields(cls)}
+
+
+@cache
+def field_keys(cls: type[Any]) -> dict[str, str]:
+    """Return the name of each field by its TOML key: `key` in its metadata, or else the name."""
+    return {field.metadata.get("key", field.name): field.name for field in dataclasses.fields(cls)}
 
 
 @cache
@@ -232,12 +244,13 @@ def convert(name: str, value: object, annotation: Any) -> Any:
     if not is_config(kind) and not isinstance(value, Mapping):
         try:
             converted = msgspec.convert(value, annotation)
-            if _is_valid(converted, metas):
+            if _is_valid(value, metas):
                 return converted
         except (msgspec.ValidationError, UnicodeEncodeError):
             pass
-    near = nearest(str(value), args) if origin is Literal else ""
+    near = nearest(str(value), map(str, args)) if origin is Literal else ""
     meant = f"; did you mean {near!r}?" if near else ""
+    meant += _DOT_HINT if isinstance(value, Mapping) and "." in name else ""
     raise ConfigError(f"{name}: got {show(value)}; expected {describe(annotation)}{meant}")
 
 
@@ -266,6 +279,8 @@ def show(value: object) -> str:
         return "an integer beyond 64 bits"
     if isinstance(value, Config | Mapping):
         return "a table" if isinstance(value, Mapping) else type(value).__name__
+    if isinstance(value, tuple):
+        return shorten(f"[{', '.join(map(show, value))}]")
     return shorten(repr(value))
 
 
@@ -300,7 +315,11 @@ def _describe(annotation: Any) -> str:
     elif origin is Mapping:
         text = f"a table, each value {_describe(args[1])}"
     else:
-        text = f"a table ({kind.__name__})" if is_config(kind) else _WORDS.get(kind, str(kind))
+        text = (
+            f"a table ({kind.__name__})"
+            if is_config(kind)
+            else _WORDS.get(kind, f"a {kind.__name__}")
+        )
     if {"ge", "le"} <= set(limits):
         text += f" from {_number(limits['ge'])} to {_number(limits['le'])}"
     else:
@@ -313,21 +332,21 @@ def _number(value: float) -> str:
     return str(value) if isinstance(value, int) else f"{value:.15g}"
 
 
-def _with_configs(path: str, value: Any, annotation: Any, owner: Config | None, key: str) -> Any:
+def _with_configs(path: str, value: Any, annotation: Any, default: Any = None) -> Any:
     """Return a value from TOML, with a Config for each table where one is expected."""
     kind, _ = without_meta(without_none(annotation))
-    args, default = get_args(kind), getattr(owner, key, None)
+    args = get_args(kind)
     if value == NONE and without_none(annotation) is not annotation:
         return None
     if is_config(kind) and isinstance(value, Mapping):
         return kind.from_table(value, default, f"{path}.")
-    if is_config(args[-1] if get_origin(kind) is Mapping else None) and isinstance(value, Mapping):
-        parts = {k: f"{path}.{key_text(k)}" for k in value}
-        return {k: _with_configs(parts[k], v, args[-1], None, "") for k, v in value.items()}
+    if get_origin(kind) is Mapping and is_config(args[1]) and isinstance(value, Mapping):
+        return {
+            key: _with_configs(f"{path}.{key_text(key)}", item, args[1])
+            for key, item in value.items()
+        }
     if get_origin(kind) is tuple and is_config(args[0]) and isinstance(value, list):
-        return tuple(
-            _with_configs(f"{path}[{i}]", v, args[0], None, "") for i, v in enumerate(value)
-        )
+        return tuple(_with_configs(f"{path}[{i}]", item, args[0]) for i, item in enumerate(value))
     return value
 
 

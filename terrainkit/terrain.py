@@ -19,6 +19,7 @@ from terrainkit.parameter import (
     convert_parameter,
     parameters_of,
 )
+from terrainkit.schema import show
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +82,7 @@ class Terrain(ABC):
                 expected = "one value" + (
                     " or a pair (easy, hard)" if parameter.allows_range else ""
                 )
-                raise ConfigError(f"{cls.kind()}.{name}: got {value}; expected {expected}")
+                raise ConfigError(f"{cls.kind()}.{name}: got {show(value)}; expected {expected}")
             easy, hard = (convert_parameter(cls.kind(), name, end, parameter) for end in value)
             return at_difficulty((easy, hard), difficulty)
         return value

@@ -1,9 +1,9 @@
-"""XRF: the robot against another description of it."""
+"""Rules that compare the robot with another description of it (XRF)."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,64 +20,67 @@ from terrainkit_robots.analysis.legs.effort import effort_of
 from terrainkit_robots.description.model import Joint, Mimic, Source
 from terrainkit_robots.lint.compare.body_masses import body_gap, dropped_mass, is_known, share
 from terrainkit_robots.lint.rule import Severity, Violation, rule
-from terrainkit_robots.text import names, short
+from terrainkit_robots.text import count, names, short
 from terrainkit_robots.transforms import Matrix
 
 if TYPE_CHECKING:
     from terrainkit_robots.lint.compare.kinematics import KinematicDifference
     from terrainkit_robots.lint.compare.pairing import Pairing
 
+_MAX_AXIS_ANGLE = 0.01
+"""Allowed angle between axes [rad]: axes with two digits, such as 0.71 0.71 0."""
 
-_AXIS = 0.01
-"""Angle by which axes may differ [rad]: two digits, as in 0.71 0.71 0."""
+_MAX_HINGE_ERROR, _MAX_SLIDE_ERROR = 0.002, 0.0005
+"""Allowed difference of limits [rad], [m]: 1.57 instead of 1.5708, or degrees with one decimal."""
 
-_TURN, _SLIDE = 0.002, 0.0005
-"""By how much limits may differ [rad], [m]: 1.57 is written for 1.5708, and degrees to a tenth."""
+_MAX_EFFORT_DIFFERENCE = 0.01
+"""Allowed relative difference of efforts, velocities and mimic multipliers, for rounding."""
 
-_STRENGTH = 0.01
-"""Share by which efforts, velocities and the factors of mimics may differ: rounding."""
+_MAX_MASS_DIFFERENCE, _MAX_MASS_ERROR = 0.01, 0.05
+"""Relative difference of masses: limits of the warning (cables and screws) and the error (a payload
+or a missing part)."""
 
-_MASS, _MASS_FAR = 0.01, 0.05
-"""Share by which total masses may differ: cables and screws; a payload, or a part that is lost."""
+_MAX_COM_DISTANCE = 0.002
+"""Allowed distance of centers of mass [m]; rounding causes less than 0.1 mm."""
 
-_CENTER = 0.002
-"""How far apart centres of mass may be [m]: files that were rounded differ by less than 0.1 mm."""
+_MAX_INERTIA_DIFFERENCE = 0.05
+"""Allowed difference of inertias, as a share of the largest element."""
 
-_INERTIA = 0.05
-"""Share of its largest element by which an inertia may differ."""
+_MIN_MASS = 1e-3
+"""Bodies lighter than this are placeholders whose inertia has no meaning [kg]."""
 
-_NO_MASS = 1e-3
-"""Bodies lighter than this are placeholders [kg], whose inertia is that of nothing."""
+_MAX_LISTED_BODIES = 3
+"""Number of bodies listed as the main causes of a mass difference."""
 
-_MOST_NAMED = 3
-"""So many bodies are named that differ most in mass."""
-
-_T = TypeVar("_T")
+_JointPair = tuple[Joint, Joint]
 
 
 @per_robot
-def _pairing_or_none(robot: Facts) -> "Pairing | None":
+def _optional_pairing(robot: Facts) -> "Pairing | None":
     from terrainkit_robots.lint.compare.pairing import pair_robots
 
-    assert robot.against is not None
-    return pair_robots(robot, robot.against)
+    return pair_robots(robot, _other(robot))
 
 
 def _pairing(robot: Facts) -> "Pairing":
-    pairing = _pairing_or_none(robot)
+    pairing = _optional_pairing(robot)
     if pairing is None:
         empty = robot if not robot.links else _other(robot)
-        raise CannotCheckError(f"{_file(empty)} has no links")
+        raise CannotCheckError(f"{short(empty.model.file.name)} has no links")
     return pairing
 
 
-def _joints(robot: Facts) -> tuple[tuple[Joint, Joint], ...]:
-    """Return the pairs of joints, of which there has to be one."""
+def _joint_pairs(robot: Facts) -> tuple[_JointPair, ...]:
+    """Return the pairs of joints.
+
+    Raises:
+        CannotCheckError: If there is none.
+    """
     pairing = _pairing(robot)
     if not robot.joints or not _other(robot).joints:
         raise CannotCheckError("one of the two has no joints with one degree of freedom")
     if not pairing.joints:
-        raise CannotCheckError(f"no joint of {_there(robot)} has the name of one of this robot")
+        raise CannotCheckError(f"no joint of {_other_name(robot)} has the name of a joint here")
     return pairing.joints
 
 
@@ -86,169 +89,147 @@ def _other(robot: Facts) -> Facts:
     return robot.against
 
 
-def _file(robot: Facts) -> str:
-    return short(robot.model.file.name)
-
-
-def _there(robot: Facts) -> str:
-    """Return what to call the other file; with its folder if both have the same name."""
+def _other_name(robot: Facts) -> str:
+    """Return the name of the other file, with its folder if both files have the same name."""
     other = _other(robot).model.file
     same = other.name == robot.model.file.name
     return short(str(Path(*other.parts[-2:])) if same else other.name)
 
 
-def _called(one: Joint, other: Joint) -> str:
-    """Return the name of a joint, and the other name that it has there."""
+def _joint_name(one: Joint, other: Joint) -> str:
     return one.name if one.name == other.name else f"{one.name} ({other.name} there)"
 
 
 @rule("XRF001", "joint-set-differs", "error", needs=("against",))
-def joint_set_differs(robot: Facts) -> Iterator[Violation]:
-    """One of the two files has a joint that the other lacks.
+def compare_joint_sets(robot: Facts) -> Iterator[Violation]:
+    """One file has a joint that the other one lacks.
 
-    A policy has as many actions as the robot has joints. What was trained on one file does not fit
-    the other: the wrong number of actions, or numbers for the wrong joints.
+    A policy has one action for each joint. A policy trained on one file has the wrong number of
+    actions for the other file, or drives the wrong joints.
 
     Fix:
-        Give both the same joints. A joint that is fixed in one of them, as arms often are for
-        walking, has to be fixed in the other as well; one that has another name, renamed.
+        Give both files the same joints. A joint that is fixed in one file, such as an arm joint
+        during walking, must be fixed in the other as well. Rename joints with different names.
 
     Source:
-        Joints with one degree of freedom belong together that have the same name, but for capitals
-        and an ending like _joint.
+        Joints with one degree of freedom are matched by name; case and a suffix such as _joint are
+        ignored.
     """
-    pairing, other = _pairing(robot), _other(robot)
-    mine = [joint for joint in robot.joints if joint.name in pairing.joint_names.only_ours]
-    yours = [joint for joint in other.joints if joint.name in pairing.joint_names.only_theirs]
-    there = _there(robot)
-    for fixed, joints in _split(mine, other):
-        how = f"fixed in {there}" if fixed else f"not in {there}"
-        yield _lone(joints, f"{how}, {_moves(joints)} here", joints[0].source, robot)
-    for fixed, joints in _split(yours, robot):
-        how = "fixed here" if fixed else "not here"
-        source = _held_by(robot, joints[0]) or robot.model.source
-        yield _lone(joints, f"{how}, {_moves(joints)} in {there}", source, robot)
-    renamed = pairing.joint_names.renamed
+    pairing, other, there = _pairing(robot), _other(robot), _other_name(robot)
+    joint_names = pairing.joint_names
+    ours = [joint for joint in robot.joints if joint.name in joint_names.only_ours]
+    theirs = [joint for joint in other.joints if joint.name in joint_names.only_theirs]
+    counts = {"here": len(robot.joints), "there": len(other.joints)}
+    for joints, side, fixed, missing in (
+        (ours, other, f"that move here but are fixed in {there}", f"missing in {there}"),
+        (theirs, robot, f"that move in {there} but are fixed here", f"of {there} missing here"),
+    ):
+        for is_fixed, text in ((True, fixed), (False, missing)):
+            group = [j for j in joints if (_fixed_source(side, j) is not None) == is_fixed]
+            if group:
+                source = group[0].source
+                if side is robot:
+                    source = _fixed_source(robot, group[0]) or robot.model.source
+                yield Violation(
+                    subject=group[0].name,
+                    source=source,
+                    message=f"joints {text}: got {len(group)} "
+                    f"({names(joint.name for joint in group)}); expected 0; moving joints: "
+                    f"{counts['here']} here, {counts['there']} in {there}",
+                    measured={"joints": len(group), **counts},
+                )
+    renamed = joint_names.renamed
     if renamed:
-        listed = names([f"{a} is {b}" for a, b in renamed])
         yield Violation(
             subject=renamed[0][0],
             source=next(j.source for j in robot.joints if j.name == renamed[0][0]),
             severity="info",
             certainty="likely",
-            message=f"{_count(len(renamed), 'joint')} of {there} with a slightly other name "
-            f"{'is' if len(renamed) == 1 else 'are'} taken for the same: {listed}",
+            message=f"{count(len(renamed), 'joint')} of {there} matched by a similar name: "
+            f"{names([f'{a} is {b}' for a, b in renamed])}",
             measured={"joints": len(renamed)},
         )
 
 
-def _split(joints: Sequence[Joint], other: Facts) -> Iterator[tuple[bool, list[Joint]]]:
-    """Yield the joints whose child is fixed in the other robot, and those whose child is not."""
-    for fixed in (True, False):
-        chosen = [joint for joint in joints if (_held_by(other, joint) is not None) == fixed]
-        if chosen:
-            yield fixed, chosen
-
-
-def _held_by(robot: Facts, joint: Joint) -> Source | None:
-    """Return where it is written that the link below a joint of the other robot does not move."""
+def _fixed_source(robot: Facts, joint: Joint) -> Source | None:
+    """Return the source of the fixed joint above the child of a joint of the other robot."""
     above = robot.tree.above.get(joint.child)
     return above.source if above is not None and above.kind == "fixed" else None
 
 
-def _lone(joints: Sequence[Joint], what: str, source: Source, robot: Facts) -> Violation:
-    count, there = (len(robot.joints), len(_other(robot).joints)), _there(robot)
-    listed = names(joint.name for joint in joints)
-    return Violation(
-        subject=joints[0].name,
-        source=source,
-        message=f"{f'joint {listed} is' if len(joints) == 1 else f'{len(joints)} joints are'} "
-        f"{what}{'' if len(joints) == 1 else f': {listed}'}; "
-        f"{count[0]} joints move here, {count[1]} in {there}",
-        measured={"joints": len(joints), "here": count[0], "there": count[1]},
-    )
-
-
-def _moves(joints: Sequence[Joint]) -> str:
-    return "and moves" if len(joints) == 1 else "and move"
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"
-
-
 @rule("XRF002", "joint-differs", "error", needs=("against",))
-def joint_differs(robot: Facts) -> Iterator[Violation]:
-    """A joint moves another way than in the other file.
+def compare_joints(robot: Facts) -> Iterator[Violation]:
+    """The type, axis or mimic of a joint differs between the files.
 
-    It slides in one and turns in the other, turns about another axis or the other way round, or
-    follows another joint in one of them. The same action then does something else.
+    The same action then causes a different motion.
 
     Fix:
-        Give the joint the same type, axis and mimic in both. An axis that points the other way also
-        needs its limits, and each number of a default pose, with the other sign.
+        Give the joint the same type, axis and mimic in both files. If an axis is inverted, negate
+        its limits and its default position as well.
 
     Source:
-        Both formats give the axis in the frame of the link below; it is seen from the base where
-        the frames are turned against each other.
+        Both formats give the axis in the frame of the child link. If these frames are rotated
+        against each other, the axes are compared in the frame of the base.
     """
-    there = _there(robot)
-    for one, other in _joints(robot):
-        what, severity = _unlike(robot, one, other)
-        if what:
+    there = _other_name(robot)
+    for one, other in _joint_pairs(robot):
+        quantity, difference, severity = _difference(robot, one, other)
+        if quantity:
             yield Violation(
                 subject=one.name,
                 source=one.source,
                 severity=severity,
-                message=f"joint {_called(one, other)} {what} ({there}, line {other.source.line})",
+                message=f"{quantity} of joint {_joint_name(one, other)}: got {difference} "
+                f"({there}, line {other.source.line})",
             )
 
 
-def _unlike(robot: Facts, one: Joint, other: Joint) -> tuple[str, Severity | None]:
-    """Return how two joints differ, and how bad that is; nothing if they do not."""
+def _difference(robot: Facts, one: Joint, other: Joint) -> tuple[str, str, Severity | None]:
+    """Return what differs between two joints, how, and the severity; empty texts if nothing."""
     if one.kind != other.kind and "prismatic" in (one.kind, other.kind):
-        return f"is {one.kind} here and {other.kind} there", "error"
+        return "type", f"{one.kind} here and {other.kind} there; expected the same", "error"
     angle = _axis_angle(robot, one, other)
-    if angle > _AXIS:
-        axes = f"({_vector(one.direction)}) here and ({_vector(other.direction)}) there"
-        way = "turns the other way: its axis is" if angle > math.pi - _AXIS else "has another axis:"
-        apart = f"{math.degrees(angle):.3g} deg apart; wanted {math.degrees(_AXIS):.1g} deg at most"
-        return f"{way} {axes}, {apart}", "error"
-    return _unlike_mimic(robot, one, other)
+    if angle > _MAX_AXIS_ANGLE:
+        axes = f"({_format_axis(one.direction)}) here and ({_format_axis(other.direction)}) there"
+        opposite = ", the opposite direction" if angle > math.pi - _MAX_AXIS_ANGLE else ""
+        limit = f"{math.degrees(_MAX_AXIS_ANGLE):.1g} deg"
+        angle_text = f"{math.degrees(angle):.3g} deg apart{opposite}; expected at most {limit}"
+        return "axis", f"{axes}, {angle_text}", "error"
+    return _mimic_difference(robot, one, other)
 
 
-def _unlike_mimic(robot: Facts, one: Joint, other: Joint) -> tuple[str, Severity | None]:
-    mine, yours = one.mimic, other.mimic
-    if mine is None and yours is None:
-        return "", None
-    if mine is None or yours is None:
-        target = (mine or yours or Mimic(source=one.source, joint="")).joint
-        where, free = ("here", "there") if mine else ("there", "here")
-        return f"follows {short(target)} {where} and moves by itself {free}", "warning"
+def _mimic_difference(robot: Facts, one: Joint, other: Joint) -> tuple[str, str, Severity | None]:
+    ours, theirs = one.mimic, other.mimic
+    if ours is None and theirs is None:
+        return "", "", None
+    if ours is None or theirs is None:
+        texts = [f"a mimic of {short(m.joint)}" if m else "none" for m in (ours, theirs)]
+        return "mimic", f"{texts[0]} here and {texts[1]} there; expected the same", "warning"
     partner = dict(_pairing(robot).joint_names.pairs)
-    same = partner.get(mine.joint, mine.joint) == yours.joint
-    close = share(mine.multiplier, yours.multiplier) <= _STRENGTH
-    if same and close and abs(mine.offset - yours.offset) <= _margin(one):
-        return "", None
-    return f"follows {_followed(mine)} here and {_followed(yours)} there", "error"
+    same = partner.get(ours.joint, ours.joint) == theirs.joint
+    close = share(ours.multiplier, theirs.multiplier) <= _MAX_EFFORT_DIFFERENCE
+    if same and close and abs(ours.offset - theirs.offset) <= _limit_tolerance(one):
+        return "", "", None
+    text = f"{_format_mimic(ours)} here and {_format_mimic(theirs)} there; expected the same"
+    return "mimic", text, "error"
 
 
-def _followed(mimic: Mimic) -> str:
+def _format_mimic(mimic: Mimic) -> str:
     return f"{mimic.multiplier:.4g} x {short(mimic.joint)} + {mimic.offset:.4g}"
 
 
 def _axis_angle(robot: Facts, one: Joint, other: Joint) -> float:
-    """Return the angle between two axes [rad], in their own frames or seen from the base."""
+    """Return the smaller angle between two axes, in their own frames or in the base frame [rad]."""
     own = _angle(one.direction, other.direction)
-    if own <= _AXIS:
+    if own <= _MAX_AXIS_ANGLE:
         return own
     base = _pairing(robot).base
-    mine = _axis_from(base[0], robot, one)
-    return min(own, _angle(mine, _axis_from(base[1], _other(robot), other)))
+    ours = _axis_in_link(base[0], robot, one)
+    return min(own, _angle(ours, _axis_in_link(base[1], _other(robot), other)))
 
 
-def _axis_from(link: str, robot: Facts, joint: Joint) -> Matrix:
-    """Return the axis of a joint as a link sees it with all joints at 0."""
+def _axis_in_link(link: str, robot: Facts, joint: Joint) -> Matrix:
+    """Return the axis of a joint in the frame of a link, all joints at 0."""
     from terrainkit_robots.lint.compare.pairing import from_link
 
     pose = from_link(robot, link) @ robot.at_zero[robot.body_of[joint.child].index]
@@ -259,343 +240,347 @@ def _angle(a: Matrix, b: Matrix) -> float:
     return math.atan2(float(np.linalg.norm(np.cross(a, b))), float(a @ b))
 
 
-def _vector(vector: Matrix) -> str:
-    return " ".join(f"{x:.3g}" for x in vector + 0.0)
+def _format_axis(axis: Matrix) -> str:
+    return " ".join(f"{x:.3g}" for x in axis + 0.0)
 
 
-def _margin(joint: Joint) -> float:
-    return _SLIDE if joint.kind == "prismatic" else _TURN
+def _limit_tolerance(joint: Joint) -> float:
+    return _MAX_SLIDE_ERROR if joint.kind == "prismatic" else _MAX_HINGE_ERROR
 
 
-def _alike(robot: Facts, one: Joint, other: Joint) -> bool:
-    """Return whether two joints move alike, so that their numbers can be compared."""
-    return _unlike(robot, one, other)[1] != "error"
+def _comparable_joints(robot: Facts) -> list[_JointPair]:
+    """Return the pairs of joints with the same motion, whose numbers can be compared."""
+    return [(a, b) for a, b in _joint_pairs(robot) if _difference(robot, a, b)[2] != "error"]
 
 
 @rule("XRF003", "joint-limits-differ", "warning", needs=("against",))
-def limits_differ(robot: Facts) -> Iterator[Violation]:
-    """A joint has other limits than in the other file.
+def compare_limits(robot: Facts) -> Iterator[Violation]:
+    """The limits of a joint differ between the files.
 
-    Limits clip targets, end episodes and are what rewards keep away from. A policy from one
-    simulator runs into stops in the other that it does not know.
+    Limits clip targets, end episodes, and define penalties. A policy trained with one file reaches
+    limits in the other file that it does not know.
 
     Fix:
-        Find out which limits the robot has, and write them into both.
+        Find out the limits of the real robot, and write them into both files.
 
     Source:
-        MuJoCo reads both formats; the margin is 0.002 rad, 0.5 mm, and 1 % of a speed.
+        MuJoCo reads both formats; the tolerance is 0.002 rad, 0.5 mm, and 1 % of a velocity.
     """
-    there = _there(robot)
-    alike = [(a, b) for a, b in _joints(robot) if _alike(robot, a, b)]
-    for group in _grouped(alike, _range_gap):
+    there = _other_name(robot)
+    pairs = _comparable_joints(robot)
+    for group in _grouped(pairs, _range_difference):
         one, other = group[0]
         unit = one.unit
-        yield _joints_defect(
+        yield _group_violation(
             group,
-            f"{_range(one, unit)} here and {_range(other, unit)} in {there}; wanted the same to "
-            f"{_margin(one)} {unit}",
+            "limits",
+            f"{_format_range(one)} here and {_format_range(other)} in {there}; expected a "
+            f"difference of at most {_limit_tolerance(one)} {unit}",
         )
-    for group in _grouped(alike, _speed_gap):
+    for group in _grouped(pairs, _velocity_difference):
         one, other = group[0]
         assert one.limit is not None
         assert other.limit is not None
-        yield _joints_defect(
+        yield _group_violation(
             group,
-            f"velocity {one.limit.velocity:.6g} {one.speed_unit} here and "
-            f"{other.limit.velocity:.6g} {one.speed_unit} in {there}; wanted the same to "
-            f"{_STRENGTH:.0%}",
+            "velocity limit",
+            f"{one.limit.velocity:.6g} {one.speed_unit} here and {other.limit.velocity:.6g} "
+            f"{one.speed_unit} in {there}; expected a difference of at most "
+            f"{_MAX_EFFORT_DIFFERENCE:.0%}",
         )
 
 
-def _range_gap(one: Joint, other: Joint) -> tuple[object, ...] | None:
-    """Return the ranges of two joints, if they differ."""
+def _range_difference(one: Joint, other: Joint) -> tuple[object, ...] | None:
+    """Return the ranges of two joints if they differ."""
     a, b = one.range, other.range
-    if a == b or (a and b and np.abs(np.subtract(a, b)).max() <= _margin(one)):
+    if a == b or (a and b and np.abs(np.subtract(a, b)).max() <= _limit_tolerance(one)):
         return None
     return one.kind == "prismatic", a, b
 
 
-def _speed_gap(one: Joint, other: Joint) -> tuple[object, ...] | None:
-    """Return the velocities of two joints, if both have one and they differ."""
+def _velocity_difference(one: Joint, other: Joint) -> tuple[object, ...] | None:
+    """Return the velocities of two joints if both are given and they differ."""
     a = one.limit.velocity if one.limit else None
     b = other.limit.velocity if other.limit else None
-    if not a or not b or share(a, b) <= _STRENGTH:
+    if not a or not b or share(a, b) <= _MAX_EFFORT_DIFFERENCE:
         return None
     return one.kind == "prismatic", a, b
 
 
-def _range(joint: Joint, unit: str) -> str:
+def _format_range(joint: Joint) -> str:
     if joint.range is None:
-        return "no limits"
-    return f"limits ({joint.range[0]:.6g}, {joint.range[1]:.6g}) {unit}"
+        return "none"
+    return f"({joint.range[0]:.6g}, {joint.range[1]:.6g}) {joint.unit}"
 
 
 def _grouped(
-    pairs: Sequence[tuple[Joint, Joint]], key: Callable[[Joint, Joint], tuple[object, ...] | None]
-) -> Iterator[list[tuple[Joint, Joint]]]:
-    """Yield the pairs with the same difference together; those without are left out."""
-    groups: dict[tuple[object, ...], list[tuple[Joint, Joint]]] = {}
+    pairs: Sequence[_JointPair], key: Callable[[Joint, Joint], tuple[object, ...] | None]
+) -> Iterator[list[_JointPair]]:
+    """Yield groups of pairs with the same difference, without the pairs that agree."""
+    groups: dict[tuple[object, ...], list[_JointPair]] = {}
     for one, other in pairs:
-        found = key(one, other)
-        if found is not None:
-            groups.setdefault(found, []).append((one, other))
+        difference = key(one, other)
+        if difference is not None:
+            groups.setdefault(difference, []).append((one, other))
     yield from groups.values()
 
 
-def _joints_defect(
-    group: Sequence[tuple[Joint, Joint]], what: str, severity: Severity | None = None
+def _group_violation(
+    group: Sequence[_JointPair], quantity: str, difference: str, severity: Severity | None = None
 ) -> Violation:
     one, other = group[0]
-    listed = names(_called(a, b) for a, b in group)
-    several = f"{len(group)} joints ({listed}) have" if len(group) > 1 else f"joint {listed} has"
+    listed = names(_joint_name(a, b) for a, b in group)
+    joints = f"{len(group)} joints ({listed})" if len(group) > 1 else f"joint {listed}"
     return Violation(
         subject=one.name,
         source=(one.limit or one).source,
         severity=severity,
-        message=f"{several} {what} (line {(other.limit or other).source.line} there)",
+        message=f"{quantity} of {joints}: got {difference} "
+        f"(line {(other.limit or other).source.line} there)",
         measured={"joints": len(group)},
     )
 
 
 @rule("XRF004", "joint-order-differs", "warning", needs=("against",))
-def joint_order_differs(robot: Facts) -> Iterator[Violation]:
-    """The joints come in another order than in the other file.
+def compare_joint_order(robot: Facts) -> Iterator[Violation]:
+    """The order of the joints differs between the files.
 
-    Simulators number joints by the order in the file. Actions and observations of a policy that was
-    trained on one file then go to the wrong joints of the other, and nothing says so.
+    Simulators number joints in the order of the file. The actions and observations of a policy
+    trained on one file then belong to other joints of the other file, without a message.
 
     Fix:
-        Permute actions and observations with the list in the message, or reorder one of the files.
+        Permute actions and observations with the lists in the message, or reorder one of the files.
 
     Source:
-        The order is that of the tree, depth first, siblings as in the file: what MuJoCo makes of
-        both formats.
+        The order is that of the tree, depth first, siblings as in the file, which is MuJoCo's order
+        for both formats.
     """
-    common = [(one.name, other.name) for one, other in _joints(robot)]
-    ours = dict(common)
-    theirs = [name for name in tree_order(_other(robot)) if name in ours.values()]
-    places = permutation(list(ours.values()), theirs)
-    if places is None or not is_moved(places):
+    pairs, other, there = _joint_pairs(robot), _other(robot), _other_name(robot)
+    ours = {one.name: two.name for one, two in pairs}
+    theirs = [name for name in tree_order(other) if name in ours.values()]
+    indices = permutation(list(ours.values()), theirs)
+    if indices is None or not is_moved(indices):
         return
-    there = _there(robot)
-    few = len(common) < max(len(robot.joints), len(_other(robot).joints))
+    subset = len(pairs) < max(len(robot.joints), len(other.joints))
     yield Violation(
         subject=robot.model.title,
         source=robot.model.source,
-        message=f"the joints {f'that both have ({len(common)}) ' if few else ''}come in another "
-        f"order than in {there}: {_paste('theirs', 'ours', places)}, where ours are values in the "
-        f"order {names(ours, most=4)} and theirs in that of {there}: {names(theirs, most=4)}; back "
-        f"again: {_paste('ours', 'theirs', _back(places))}",
-        measured={"permutation": str(places), "back": str(_back(places))},
+        message=f"order of the {f'{len(pairs)} common ' if subset else ''}joints: got "
+        f"{names(ours, most=4)} here and {names(theirs, most=4)} in {there}; "
+        f"{_format_permutation('theirs', 'ours', indices)}",
+        measured={"permutation": str(indices), "back": str(_inverse(indices))},
     )
 
 
-def _paste(to: str, of: str, places: Sequence[int]) -> str:
-    return f"{to} = {of}[{list(places)}]"
+def _format_permutation(target: str, source: str, indices: Sequence[int]) -> str:
+    """Return a permutation and its inverse as two expressions that can be pasted into code."""
+    inverse = _inverse(indices)
+    return f"{target} = {source}[{list(indices)}] and {source} = {target}[{inverse}]"
 
 
-def _back(places: Sequence[int]) -> list[int]:
-    return [int(place) for place in np.argsort(places)]
+def _inverse(indices: Sequence[int]) -> list[int]:
+    return [int(index) for index in np.argsort(indices)]
 
 
 @rule("XRF005", "actuator-order-differs", "warning", needs=("against",))
-def actuator_order_differs(robot: Facts) -> Iterator[Violation]:
-    """The actuators of a MJCF file come in another order than the joints.
+def compare_actuator_order(robot: Facts) -> Iterator[Violation]:
+    """The order of the actuators of an MJCF file differs from that of the joints.
 
-    Controls go by actuator, positions by joint. Who sends actions in the order of the joints, as
-    those of a URDF are, drives other joints than meant.
+    Controls are ordered by actuator, positions by joint. Actions in the order of the joints, as in
+    a URDF, drive the wrong joints.
 
     Fix:
-        Permute actions with the list in the message, or write the actuators in the joints' order.
+        Permute actions with the lists in the message, or reorder the actuators.
 
     Source:
-        MuJoCo: `ctrl` is in the order of <actuator>, `qpos` in that of the bodies. Unitree's own
-        MJCF of Go2 has its right legs first among the actuators, and last among the joints.
+        MuJoCo: `ctrl` has the order of <actuator>, `qpos` that of the bodies. In Unitree's MJCF of
+        Go2 the right legs come first in the actuators and last in the joints.
     """
-    other, there = _other(robot), _there(robot)
+    other, there = _other(robot), _other_name(robot)
     partner = dict(_pairing(robot).joint_names.pairs)
     ours = [partner[name] for name in actuator_order(robot) if name in partner]
     theirs = actuator_order(other)
     common = [name for name in theirs if name in ours]
-    places = permutation([name for name in ours if name in common], common)
-    inside = [
-        f"the actuators of {file} come in another order than its joints: {how}"
-        for file, how in (("this file", _against_joints(robot)), (there, _against_joints(other)))
-        if how
-    ]
-    if not common:  # one of them, or none, is a MJCF with actuators
-        yield from (_actuators(robot, told) for told in inside)
-    elif places and is_moved(places):
-        told = (
-            f"the actuators come in another order than those of {there}: "
-            f"{_paste('theirs', 'ours', places)}; back again: "
-            f"{_paste('ours', 'theirs', _back(places))}"
+    indices = permutation([name for name in ours if name in common], common)
+    within = [
+        f"actuator order of {file}: got another order than that of its joints; {difference}"
+        for file, difference in (
+            ("this file", _actuator_difference(robot)),
+            (there, _actuator_difference(other)),
         )
-        yield _actuators(robot, "; ".join([told, *inside]))
-    elif inside:
-        yield _actuators(robot, "; ".join(["both files have one order", *inside]), "info")
+        if difference
+    ]
+    if not common:  # at most one of the files is an MJCF with actuators
+        yield from (_actuator_violation(robot, message) for message in within)
+    elif indices and is_moved(indices):
+        between = (
+            f"actuator order: got another order than in {there}; "
+            f"{_format_permutation('theirs', 'ours', indices)}"
+        )
+        yield _actuator_violation(robot, "; ".join([between, *within]))
+    elif within:
+        yield _actuator_violation(robot, "; ".join(["both files agree", *within]), "info")
 
 
-def _against_joints(robot: Facts) -> str:
-    """Return how the actuators of a file are ordered against its own joints; nothing if alike."""
-    driven = actuator_order(robot)
-    joints = [name for name in tree_order(robot) if name in driven]
-    places = permutation(joints, driven)
-    if places is None or not is_moved(places):
+def _actuator_difference(robot: Facts) -> str:
+    """Return the permutation between the actuators and joints of a file; empty if they agree."""
+    actuated = actuator_order(robot)
+    joints = [name for name in tree_order(robot) if name in actuated]
+    indices = permutation(joints, actuated)
+    if indices is None or not is_moved(indices):
         return ""
     return (
-        f"{_paste('ctrl', 'joints', places)}, where joints are "
-        f"values in the order {names(joints, most=4)} and ctrl in that of the actuators: "
-        f"{names(driven, most=4)}; back again: {_paste('joints', 'ctrl', _back(places))}"
+        f"{_format_permutation('ctrl', 'joints', indices)}, where joints has the order "
+        f"{names(joints, most=4)} and ctrl the order {names(actuated, most=4)}"
     )
 
 
-def _actuators(robot: Facts, message: str, severity: Severity | None = None) -> Violation:
+def _actuator_violation(robot: Facts, message: str, severity: Severity | None = None) -> Violation:
     first = next((actuator.source for actuator in robot.model.actuators), robot.model.source)
     return Violation(subject=robot.model.title, source=first, message=message, severity=severity)
 
 
 @rule("XRF006", "effort-differs", "warning", needs=("against",))
-def effort_differs(robot: Facts) -> Iterator[Violation]:
-    """A joint has another largest torque or force than in the other file.
+def compare_effort(robot: Facts) -> Iterator[Violation]:
+    """The effort limit of a joint differs between the files.
 
-    The robot is stronger in one simulator than in the other: what it learns to do in the one, it
-    cannot do in the other, or on the robot.
+    The robot is stronger in one simulator than in the other. Motions learned in one of them fail in
+    the other, or on the real robot.
 
     Fix:
-        Look up what the motor gives behind its gear and linkage, and write it into both.
+        Look up the torque of the motor after gear and linkage, and write it into both files.
 
     Source:
-        effort in URDF; in MJCF what the actuators of the joint give at most, and actuatorfrcrange.
+        effort in URDF; in MJCF the largest force of the joint's actuators, and actuatorfrcrange.
     """
-    other, there = _other(robot), _there(robot)
-    alike = [(a, b) for a, b in _joints(robot) if _alike(robot, a, b)]
-    efforts = {a.name: (effort_of(robot, a), effort_of(other, b)) for a, b in alike}
+    other, there = _other(robot), _other_name(robot)
+    pairs = _comparable_joints(robot)
+    efforts = {a.name: (effort_of(robot, a), effort_of(other, b)) for a, b in pairs}
 
-    def gap(one: Joint, _: Joint) -> tuple[object, ...] | None:
+    def difference(one: Joint, _: Joint) -> tuple[object, ...] | None:
         a, b = efforts[one.name]
-        if not a or not b or share(a, b) <= _STRENGTH:
+        if not a or not b or share(a, b) <= _MAX_EFFORT_DIFFERENCE:
             return None
         return one.kind == "prismatic", a, b
 
-    def lone(one: Joint, _: Joint) -> tuple[object, ...] | None:
+    def missing(one: Joint, _: Joint) -> tuple[object, ...] | None:
         a, b = efforts[one.name]
         return None if bool(a) == bool(b) else (bool(a),)
 
-    for group in _grouped(alike, gap):
+    for group in _grouped(pairs, difference):
         one, unit = group[0][0], group[0][0].effort_unit
         a, b = (effort or 0.0 for effort in efforts[one.name])
-        yield _joints_defect(
+        yield _group_violation(
             group,
-            f"effort {a:.5g} {unit} here and {b:.5g} {unit} in {there}, {share(a, b):.1%} apart; "
-            f"wanted {_STRENGTH:.0%} at most",
+            "effort limit",
+            f"{a:.5g} {unit} here and {b:.5g} {unit} in {there}, {share(a, b):.1%} apart; "
+            f"expected at most {_MAX_EFFORT_DIFFERENCE:.0%}",
         )
-    for group in _grouped(alike, lone):
+    for group in _grouped(pairs, missing):
         limited = bool(efforts[group[0][0].name][0])
         bare = other if limited else robot
-        driven = bool(bare.model.actuators) or bare.model.kind != "mjcf"
-        yield _joints_defect(
+        has_actuators = bool(bare.model.actuators) or bare.model.kind != "mjcf"
+        without, note = there if limited else "this file", ", which has no actuators"
+        yield _group_violation(
             group,
-            f"an effort limit {'here' if limited else f'in {there}'} and none "
-            f"{f'in {there}' if limited else 'here'}"
-            f"{'' if driven else ', where nothing drives a joint'}",
-            severity=None if driven else "info",
+            "effort limit",
+            f"none in {without}{'' if has_actuators else note}; expected the limit of "
+            f"{'this file' if limited else there}",
+            severity=None if has_actuators else "info",
         )
 
 
 @rule("XRF007", "total-mass-differs", "warning", needs=("against",))
-def total_mass_differs(robot: Facts) -> Iterator[Violation]:
-    """The robot is heavier in one file than in the other.
+def compare_total_mass(robot: Facts) -> Iterator[Violation]:
+    """The total mass of the robot differs between the files.
 
-    A part is missing in one of them, or counted twice. A policy learns how hard to push from the
-    weight that it carries.
+    A part is missing in one file, or counted twice. A policy adapts its forces to the weight of the
+    robot.
 
     Fix:
-        Look at the bodies that the message names: a link whose mass was typed anew, or one that a
-        conversion lost or gave the density of water.
+        Check the bodies listed in the message: a mass may have been mistyped, or lost or replaced
+        by the density of water during a conversion.
 
     Source:
-        Masses as declared; in MJCF those that MuJoCo makes from shapes count. Some simulators weigh
-        less: MuJoCo drops the trunk's mass of a URDF without floating joint, which it welds to the
-        world (seen with version 4.0).
+        Declared masses; in MJCF also those that MuJoCo computes from shapes. MuJoCo 4.0 drops the
+        mass of the trunk of a URDF without a floating joint, since it welds the trunk to the world.
     """
-    pairing, other, there = _pairing(robot), _other(robot), _there(robot)
+    pairing, other, there = _pairing(robot), _other(robot), _other_name(robot)
     a, b = robot.total_mass, other.total_mass
     for each, mass in ((robot, a), (other, b)):
         if math.isnan(mass):
-            raise CannotCheckError(f"masses of {_file(each)} hang on mesh files")
-    apart = share(a, b)
-    if apart > _MASS:
+            file = short(each.model.file.name)
+            raise CannotCheckError(f"masses of {file} are computed from mesh files")
+    difference = share(a, b)
+    if difference > _MAX_MASS_DIFFERENCE:
+        bodies = sorted(pairing.bodies, key=lambda pair: -abs(pair[0].mass - pair[1].mass))
+        causes = [
+            f"{short(one.name)} {one.mass:.4g} and {two.mass:.4g} kg"
+            for one, two in bodies[:_MAX_LISTED_BODIES]
+            if share(one.mass, two.mass) > _MAX_MASS_DIFFERENCE
+        ]
         yield Violation(
             subject=robot.model.title,
             source=robot.model.source,
-            severity="error" if apart > _MASS_FAR else None,
-            message=f"the robot has {a:.5g} kg here and {b:.5g} kg in {there}: {apart:.1%} apart, "
-            f"wanted {_MASS:.0%} at most{_heaviest_gaps(pairing)}",
-            measured={"here": a, "there": b, "share": apart},
+            severity="error" if difference > _MAX_MASS_ERROR else None,
+            message=f"total mass: got {a:.5g} kg here and {b:.5g} kg in {there}, {difference:.1%} "
+            f"apart; expected at most {_MAX_MASS_DIFFERENCE:.0%}"
+            f"{f'; largest differences: {names(causes)}' if causes else ''}",
+            measured={"here": a, "there": b, "share": difference},
         )
-    yield from _as_it_stands(robot, other)
+    yield from _dropped_masses(robot, other)
 
 
-def _heaviest_gaps(pairing: "Pairing") -> str:
-    """Return the bodies that differ most in mass, as the end of a message."""
-    gaps = sorted(pairing.bodies, key=lambda pair: -abs(pair[0].mass - pair[1].mass))
-    told = [
-        f"{short(one.name)} {one.mass:.4g} and {other.mass:.4g} kg"
-        for one, other in gaps[:_MOST_NAMED]
-        if share(one.mass, other.mass) > _MASS
-    ]
-    return f"; most of it: {', '.join(told)}" if told else ""
-
-
-def _as_it_stands(robot: Facts, other: Facts) -> Iterator[Violation]:
-    """Yield what MuJoCo makes of the mass of a URDF whose MJCF floats."""
+def _dropped_masses(robot: Facts, other: Facts) -> Iterator[Violation]:
+    """Yield the mass that MuJoCo drops from a URDF whose MJCF has a floating base."""
     for urdf, mjcf in ((robot, other), (other, robot)):
-        floats = any(joint.kind == "floating" for joint in mjcf.model.joints)
-        dropped = dropped_mass(urdf) if mjcf.model.kind == "mjcf" and floats else 0.0
-        if dropped > _MASS * urdf.total_mass:
-            root = urdf.bodies[0].top.name
+        floating = any(joint.kind == "floating" for joint in mjcf.model.joints)
+        dropped = dropped_mass(urdf) if mjcf.model.kind == "mjcf" and floating else 0.0
+        if dropped > _MAX_MASS_DIFFERENCE * urdf.total_mass:
+            root, file = urdf.bodies[0].top.name, short(urdf.model.file.name)
             yield Violation(
                 subject=root,
                 source=robot.model.source,
                 severity="info",
-                message=f"MuJoCo drops {dropped:.5g} of the {urdf.total_mass:.5g} kg of "
-                f"{_file(urdf)} if it loads the file as it stands, and none of the "
-                f"{mjcf.total_mass:.5g} kg of {_file(mjcf)}: the URDF has no floating joint, so "
-                f"{root} is welded to the world with all that is fixed to it",
-                hint="Give MuJoCo the MJCF, or the URDF with a floating joint above its base.",
+                message=f"mass that MuJoCo drops when it loads {file}: got {dropped:.5g} of "
+                f"{urdf.total_mass:.5g} kg; expected 0 kg, as for {short(mjcf.model.file.name)} "
+                f"with {mjcf.total_mass:.5g} kg; the URDF has no floating joint, so that {root} is "
+                "welded to the world with all links fixed to it",
+                hint="Load the MJCF, or add a floating joint above the base of the URDF.",
                 measured={"dropped": dropped, "declared": urdf.total_mass},
             )
 
 
 @rule("XRF008", "kinematics-differ", "error", needs=("against",))
-def kinematics_differ(robot: Facts) -> Iterator[Violation]:
-    """With its joints at the same positions, a link is elsewhere than in the other file.
+def compare_kinematics(robot: Facts) -> Iterator[Violation]:
+    """The pose of a link differs between the files at equal joint positions.
 
-    A length, an origin or the zero of a joint differs. Feet then touch the ground where the policy
-    does not expect it.
+    A length, an origin, or the zero position of a joint differs. The feet then touch the ground
+    where the policy does not expect it.
 
     Fix:
-        Look at the first link that is off: its joint's origin, in both files.
+        Compare the origin of the joint of the first link that differs.
 
     Source:
-        Both robots are put into 20 random poses. yourdfpy says where the links of a URDF are then,
-        MuJoCo where those of a MJCF are: two implementations that share nothing.
+        Both robots are compared in 20 random poses. The link poses of a URDF are computed by
+        yourdfpy and those of an MJCF by MuJoCo, two independent implementations.
     """
     from terrainkit_robots.lint.compare.kinematics import largest_difference
 
-    held = [one.name for one, other in _joints(robot) if not _alike(robot, one, other)]
+    held = [a.name for a, b in _joint_pairs(robot) if _difference(robot, a, b)[2] == "error"]
     gap = largest_difference(robot, _other(robot), held=held)
     if gap.agrees:
         return
-    same_base = gap.base[0] == gap.base[1]
+    severity: Severity | None = "warning" if gap.turned_only else None
+    if gap.base_only and gap.base[0] != gap.base[1]:
+        severity = "info"
     links = {link.name: link for link in robot.links}
     subject = gap.base[0] if gap.base_only else gap.first
     yield Violation(
         subject=subject,
         source=links[subject].source,
-        severity=_severity(gap, same_base),
-        message=_gap_message(gap, _there(robot)),
+        severity=severity,
+        message=_kinematics_message(gap, _other_name(robot)),
         measured={
             "distance": gap.distance,
             "angle": gap.angle,
@@ -607,84 +592,79 @@ def kinematics_differ(robot: Facts) -> Iterator[Violation]:
     )
 
 
-def _severity(gap: "KinematicDifference", same_base: bool) -> Severity | None:
-    if gap.base_only and not same_base:
-        return "info"
-    return "warning" if gap.turned_only else None
-
-
-def _gap_message(gap: "KinematicDifference", there: str) -> str:
-    """Return what is where, seen from the base."""
+def _kinematics_message(gap: "KinematicDifference", there: str) -> str:
     from terrainkit_robots.lint.compare.kinematics import ANGLE, DISTANCE
 
     ours, theirs = gap.base
     base = ours if ours == theirs else f"{ours} ({theirs} there)"
-    turned = f"{math.degrees(gap.angle):.3g} deg"
-    where = f"pose {gap.pose} of {gap.poses} (seed {gap.seed})"
-    wanted = f"wanted {1000 * DISTANCE:g} mm and {math.degrees(ANGLE):.1g} deg at most"
+    angle = f"{math.degrees(gap.angle):.3g} deg"
+    expected = f"expected at most {1000 * DISTANCE:g} mm and {math.degrees(ANGLE):.1g} deg"
     if gap.base_only:
         return (
-            f"the frame of {base} is elsewhere on the trunk than in {there}: seen from it, all of "
-            f"{gap.links} links are off in the same way, by up to {1000 * gap.distance:.4g} mm and "
-            f"{turned}; {wanted}"
+            f"frame of {base} on the trunk: got a difference to {there} of "
+            f"{1000 * gap.distance:.4g} mm and {angle}, the same for all {gap.links} links; "
+            f"{expected}"
         )
     if gap.turned_only:
         return (
-            f"link frames are turned against those of {there}, each by the same at every pose: "
-            f"{gap.first} first, {gap.link} most, by {turned}; all origins agree to "
-            f"{1000 * gap.distance:.2g} mm; {wanted}"
+            f"rotation of link frames against those of {there}: got up to {angle} at {gap.link}, "
+            f"the same in every pose, first at {gap.first}; {expected}; all origins agree to "
+            f"{1000 * gap.distance:.2g} mm"
         )
     return (
-        f"seen from {base}, link {gap.link} is {1000 * gap.distance:.4g} mm from where {there} has "
-        f"it in {where}, and the frames are turned by up to {turned}; {wanted}; of {gap.links} "
-        f"links the first in the tree that is off is {gap.first}"
+        f"position of link {gap.link} relative to {base}: got a difference to {there} of "
+        f"{1000 * gap.distance:.4g} mm and up to {angle} in pose {gap.pose} of {gap.poses} (seed "
+        f"{gap.seed}); {expected}; the first of {gap.links} links that differs is {gap.first}"
     )
 
 
 @rule("XRF009", "inertia-differs", "warning", needs=("against",))
-def inertia_differs(robot: Facts) -> Iterator[Violation]:
-    """A body has another inertia, or its mass elsewhere, than in the other file.
+def compare_inertia(robot: Facts) -> Iterator[Violation]:
+    """The mass, center of mass or inertia of a body differs between the files.
 
-    The total mass can agree while the robot is another one: top-heavy, or with feet that are harder
-    to swing. A conversion that replaced an inertia by a placeholder looks like that.
+    Robots with equal total mass can still differ, such as in the height of the center of mass or
+    the inertia of the feet. A typical cause is a conversion that replaced an inertia by a
+    placeholder.
 
     Fix:
-        Take the numbers that come from CAD. Round ones, or three of the same, are placeholders.
+        Use the numbers that come from CAD. Round or equal numbers are placeholders.
 
     Source:
-        Links that fixed joints hold together count as one body, as simulators merge them; bodies
-        are compared as many as have the same joints in both files.
+        Links that are connected by fixed joints count as one body, as simulators merge them. Only
+        bodies with the same joints in both files are compared.
     """
-    pairing, there = _pairing(robot), _there(robot)
-    told = share(robot.total_mass, _other(robot).total_mass) > _MASS  # by XRF007
-    for one, other in pairing.bodies:
-        if min(one.mass, other.mass) < _NO_MASS or not (is_known(one) and is_known(other)):
+    pairing, other, there = _pairing(robot), _other(robot), _other_name(robot)
+    total_differs = share(robot.total_mass, other.total_mass) > _MAX_MASS_DIFFERENCE
+    for one, two in pairing.bodies:
+        if min(one.mass, two.mass) < _MIN_MASS or not (is_known(one) and is_known(two)):
             continue
-        gap = body_gap(robot, _other(robot), pairing, one, other)
-        what = ""
-        if gap.mass > _MASS:
-            masses = f"has {one.mass:.4g} kg here and {other.mass:.4g} kg in {there}"
-            what = "" if told else f"{masses}; wanted {_MASS:.0%} apart at most"
-        elif gap.center > _CENTER:
-            what = (
-                f"has its centre of mass {1000 * gap.center:.3g} mm from where it is in {there}; "
-                f"wanted {1000 * _CENTER:g} mm at most"
+        gap, body, message = body_gap(robot, other, pairing, one, two), short(one.name), ""
+        if gap.mass > _MAX_MASS_DIFFERENCE:
+            if not total_differs:  # else reported by XRF007
+                message = (
+                    f"mass of body {body}: got {one.mass:.4g} kg here and {two.mass:.4g} kg in "
+                    f"{there}; expected a difference of at most {_MAX_MASS_DIFFERENCE:.0%}"
+                )
+        elif gap.center > _MAX_COM_DISTANCE:
+            message = (
+                f"center of mass of body {body}: got a distance of {1000 * gap.center:.3g} mm from "
+                f"that in {there}; expected at most {1000 * _MAX_COM_DISTANCE:g} mm"
             )
-        elif gap.inertia > _INERTIA:
-            what = (
-                f"has principal moments {_moments(one.principal)} kg m2 here and "
-                f"{_moments(other.principal)} kg m2 in {there}: its inertia is {gap.inertia:.0%} "
-                f"apart, wanted {_INERTIA:.0%} at most"
+        elif gap.inertia > _MAX_INERTIA_DIFFERENCE:
+            message = (
+                f"principal moments of body {body}: got {_format_moments(one.principal)} kg m2 "
+                f"here and {_format_moments(two.principal)} kg m2 in {there}, an inertia "
+                f"{gap.inertia:.0%} apart; expected at most {_MAX_INERTIA_DIFFERENCE:.0%}"
             )
-        if what:
+        if message:
             link = next(link for link in one.links if link.name == one.name)
             yield Violation(
                 subject=one.name,
                 source=(link.inertial or link).source,
-                message=f"body {short(one.name)} {what}",
+                message=message,
                 measured={"mass": gap.mass, "center": gap.center, "inertia": gap.inertia},
             )
 
 
-def _moments(moments: Matrix) -> str:
+def _format_moments(moments: Matrix) -> str:
     return f"({', '.join(f'{moment:.3g}' for moment in moments)})"

@@ -1,131 +1,130 @@
-"""The robot against its spec: whether robot.toml speaks of this robot."""
+"""Rules that compare the robot with its robot.toml (XRF)."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.bodies.joint_order import actuator_order, is_moved, permutation
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.effort import effort_of
 from terrainkit_robots.description.model import Joint
-from terrainkit_robots.lint.rule import Violation, rule
+from terrainkit_robots.lint.rule import Certainty, Violation, rule
 from terrainkit_robots.spec.per_joint import match_joints
 from terrainkit_robots.text import closest, names, short
 
 if TYPE_CHECKING:
     from terrainkit_robots.spec.robot_spec import RobotSpec
 
+_MIN_SIMILARITY = 0.75
+"""Share of common letters above which a name is suggested for an unknown one."""
 
-_CLOSE = 0.75
-"""Share of common letters from which a name is what another was meant for."""
+_LIMIT_TOLERANCE = 1e-3
+"""Distance of a position from a limit that is attributed to rounding [rad] or [m]."""
 
-_SLACK = 1e-3
-"""A position this far outside of a limit was rounded [rad] or [m]."""
-
-_MORE = 1.01
-"""Factor on a declared limit up to which a number is the same, rounded."""
-
-_BODIES = ("feet", "shanks", "thighs", "termination_contacts", "penalized_contacts")
+_MAX_LIMIT_RATIO = 1.01
+"""Allowed ratio of a limit of the spec to that of the description, for rounding."""
 
 
 def _spec(robot: Facts) -> "RobotSpec":
-    assert robot.spec is not None  # what the rules need
+    assert robot.spec is not None  # ensured by needs=("spec",)
     return robot.spec
 
 
-def _joints(robot: Facts) -> list[str]:
-    """Return the joints that tables are asked about: those of the spec, where it has them right."""
+def _table_joints(robot: Facts) -> list[str]:
+    """Return the joints of the spec if all of them are actuated, else the actuated joints."""
     actuated = [joint.name for joint in robot.actuated]
     order = _spec(robot).joint_order
     return list(order) if order and set(order) <= set(actuated) else actuated
 
 
-def _found(robot: Facts) -> dict[str, Joint]:
-    """Return the joints of the file by name, the last one of each."""
+def _joints_by_name(robot: Facts) -> dict[str, Joint]:
     return {joint.name: joint for joint in robot.model.joints}
 
 
-def _at(
-    robot: Facts, subject: str, message: str, measured: Mapping[str, float] | None = None
+def _violation(
+    robot: Facts,
+    subject: str,
+    message: str,
+    measured: Mapping[str, float] | None = None,
+    certainty: Certainty = "proven",
 ) -> Violation:
-    """Return a defect at the joint or link of that name, or at the robot."""
-    place = _found(robot).get(subject) or robot.tree.links.get(subject)
+    """Return a violation at the joint or link of that name, or at the robot."""
+    element = _joints_by_name(robot).get(subject) or robot.tree.links.get(subject)
     return Violation(
         subject=short(subject) or robot.model.title,
-        source=place.source if place is not None else robot.model.source,
+        source=element.source if element is not None else robot.model.source,
         message=message,
+        certainty=certainty,
         measured=measured or {},
     )
 
 
-def _meant(name: str, known: Sequence[str]) -> str:
-    near = closest(name, known, _CLOSE)
+def _suggestion(name: str, known: Sequence[str]) -> str:
+    near = closest(name, known, _MIN_SIMILARITY)
     return f"; did you mean {near}?" if near else ""
 
 
 @rule("XRF010", "spec-joints", "error", needs=("spec",))
 def spec_joints(robot: Facts) -> Iterator[Violation]:
-    """The joints of the spec are not those that the robot's motors drive.
+    """The joints of the spec are not the actuated joints of the robot.
 
-    Actions and observations have one number for each joint in `joint_order`. A name that is not
-    there stops the training; a joint that is left out hangs limp.
+    Actions and observations have one number for each joint in `joint_order`. An unknown name stops
+    the training; a joint that is missing stays limp.
 
     Fix:
-        Name each actuated joint once in joint_order, or make the others fixed in the description.
+        List each actuated joint once in joint_order, or make the others fixed in the description.
 
     Source:
         RobotSpec.joint_order; legged_gym and Isaac Lab have one action for each joint.
     """
     order = _spec(robot).joint_order
     actuated = [joint.name for joint in robot.actuated]
-    misspelt = set()
+    unlisted = [name for name in actuated if name not in order]
+    misspelled = set()
     for name in order:
         if name in actuated:
             continue
-        if name in _found(robot):
-            yield _at(robot, name, f"joint_order has {short(name)}, which no motor drives")
-            continue
-        near = closest(name, [other for other in actuated if other not in order], _CLOSE)
-        misspelt.add(near)
-        meant = f"; did you mean {near}?" if near else ""
-        message = f"joint_order has {short(name)}, which is no joint of the robot{meant}"
-        yield _at(robot, name, message)
-    missing = [name for name in actuated if name not in order and name not in misspelt]
+        got = f"{short(name)}, which has no actuator"
+        if name not in _joints_by_name(robot):
+            misspelled.add(closest(name, unlisted, _MIN_SIMILARITY))
+            got = f"{short(name)}, which is not a joint of the robot{_suggestion(name, unlisted)}"
+        yield _violation(robot, name, f"joint_order: got {got}")
+    missing = [name for name in unlisted if name not in misspelled]
     if missing:
-        count = f"{len(missing)} of {len(actuated)} joints that motors drive"
-        yield _at(robot, missing[0], f"joint_order lacks {count}: {names(missing)}")
+        yield _violation(
+            robot,
+            missing[0],
+            f"joint_order: got {len(actuated) - len(missing)} of {len(actuated)} actuated joints; "
+            f"expected also {names(missing)}",
+        )
 
 
 @rule("XRF011", "spec-joint-order", "warning", needs=("spec",))
 def spec_joint_order(robot: Facts) -> Iterator[Violation]:
-    """The spec has the joints in another order than the file.
+    """The joint order of the spec differs from that of the file.
 
-    A policy that was trained in one order and runs in the other moves the wrong legs. Numbers have
-    to be sorted on the way; which one goes where is given ready to paste.
+    A policy trained with one order moves the wrong legs with the other. Actions and observations
+    must be permuted; the message contains the indices.
 
     Fix:
-        Sort actions and observations by the permutation, or use the file's order in joint_order.
+        Permute actions and observations, or use the order of the file in joint_order.
 
     Source:
-        The order of the actuators in a MJCF, else that of the tree, depth first as in MuJoCo.
+        The order of the actuators in an MJCF, else that of the tree, depth first as in MuJoCo.
     """
     ours = _spec(robot).joint_order
-    order, what = actuator_order(robot), "actuators"
+    order, elements = actuator_order(robot), "actuators"
     if set(order) != set(ours):
-        order, what = tuple(joint.name for joint in robot.actuated), "joints"
-    places = permutation(ours, order)
-    if places is None or not is_moved(places):
+        order, elements = tuple(joint.name for joint in robot.actuated), "joints"
+    indices = permutation(ours, order)
+    if indices is None or not is_moved(indices):
         return
-    first = next(k for k, place in enumerate(places) if place != k)
+    first = next(k for k, index in enumerate(indices) if index != k)
     yield Violation(
         subject=robot.model.title,
         source=robot.model.source,
-        message=(
-            f"joint_order has other places than the {what} of {robot.model.file.name}: at {first} "
-            f"it has {short(ours[first])}, the file {short(order[first])}; "
-            f"of_file = of_spec[{places}]"
-        ),
-        measured={"moved": sum(place != k for k, place in enumerate(places))},
+        message=f"joint_order[{first}]: got {short(ours[first])}; expected {short(order[first])}, "
+        f"as in the {elements} of {robot.model.file.name}, or of_file = of_spec[{indices}]",
+        measured={"moved": sum(index != k for k, index in enumerate(indices))},
     )
 
 
@@ -133,214 +132,217 @@ def spec_joint_order(robot: Facts) -> Iterator[Violation]:
 def spec_tables(robot: Facts) -> Iterator[Violation]:
     """A table of the spec does not match each joint exactly once.
 
-    A joint without a gain would hang limp, and of two keys that match one joint it is open which
-    counts. A key that matches nothing is a slip, and its number is never used.
+    A joint without a gain stays limp, and if two keys match a joint, its value is ambiguous. A key
+    that matches no joint is probably misspelled.
 
     Fix:
-        Use names of joints, or patterns that match the whole name of each joint once.
+        Use joint names, or patterns that match the whole name of each joint once.
 
     Source:
-        Isaac Lab and mjlab refuse such tables in the same way.
+        Isaac Lab and mjlab reject such tables as well.
     """
     from terrainkit_robots.spec.robot_spec import JOINT_TABLES
 
-    joints = _joints(robot)
+    joints = _table_joints(robot)
     for table in (*JOINT_TABLES, "soft_limits"):
         matching = match_joints(getattr(_spec(robot), table), joints)
         for clash in matching.clashes(table, partial=table == "soft_limits"):
-            yield _at(robot, clash.subject, clash.message)
+            yield _violation(robot, clash.subject, clash.message)
 
 
 @rule("XRF013", "spec-feet", "error", needs=("spec", "legs"))
 def spec_feet(robot: Facts) -> Iterator[Violation]:
-    """The feet of the spec are not those that the robot stands on.
+    """The feet of the spec are not the feet of the robot.
 
-    Rewards for air time and slipping are given for contacts of the feet. With a foot missing, or a
-    shank in its place, the robot learns to limp or to kneel.
+    Rewards for air time and slip use the contacts of the feet. With a missing foot, or a shank
+    instead of a foot, the robot learns to limp or to kneel.
 
     Fix:
-        Name in feet the link on which each leg stands, one for each leg.
+        List in feet the link on which each leg stands, one for each leg.
 
     Source:
-        The legs as LEG001 tells them.
+        The legs as detected by LEG001.
     """
     feet = _spec(robot).feet
     if any(name not in robot.body_of for name in feet):
-        return  # which another rule tells
-    standing = [leg.limb.chain[-1] for leg in robot.legs]
-    wanted = f"the feet are {names(leg.foot for leg in robot.legs)}"
+        return  # reported by XRF014
+    leg_ends = [leg.limb.chain[-1] for leg in robot.legs]
+    expected = f"expected {names(leg.foot for leg in robot.legs)}"
     used: dict[int, str] = {}
     for name in feet:
         index = robot.body_of[name].index
-        if index not in standing:
-            message = f"feet has {short(name)}, on which no leg stands; {wanted}"
+        if index not in leg_ends:
+            message = f"feet: got {short(name)}, which is not the end of a leg; {expected}"
         elif index in used:
-            message = f"feet has {short(used[index])} and {short(name)} of one leg; {wanted}"
+            message = (
+                f"feet: got {short(used[index])} and {short(name)} of the same leg; {expected}"
+            )
         else:
             used[index] = name
             continue
-        yield replace(_at(robot, name, message), certainty="likely")
+        yield _violation(robot, name, message, certainty="likely")
     missing = [leg.foot for leg in robot.legs if leg.limb.chain[-1] not in used]
     if missing:
-        count = f"{len(missing)} of {len(robot.legs)}"
-        message = f"feet lacks {count}: {names(missing)}"
-        yield replace(_at(robot, missing[0], message), certainty="likely")
+        count = len(robot.legs)
+        message = (
+            f"feet: got {count - len(missing)} of {count} feet; expected also {names(missing)}"
+        )
+        yield _violation(robot, missing[0], message, certainty="likely")
 
 
 @rule("XRF014", "spec-bodies", "error", needs=("spec",))
 def spec_bodies(robot: Facts) -> Iterator[Violation]:
-    """The spec names a body that the robot has not, or has bodies of legs in another order.
+    """The spec names an unknown body, or bodies of legs in another order than the feet.
 
-    A contact of a body that is not there is never felt: an episode does not end when the robot
-    falls, or a framework stops with an error. Shanks and thighs go with the foot at the same place.
+    A contact of an unknown body is never detected: an episode does not terminate when the robot
+    falls, or a framework stops with an error. Shanks and thighs must be in the order of the feet.
 
     Fix:
-        Use the names of links of the description.
+        Use the link names of the description.
 
     Source:
-        RobotSpec; legged_gym finds no body silently, Isaac Lab refuses to start.
+        RobotSpec; legged_gym finds no body without a message, Isaac Lab does not start.
     """
     spec = _spec(robot)
     known = [link.name for link in robot.links]
-    for field in ("base", *_BODIES):
-        value = getattr(spec, field)
-        for name in (value,) if field == "base" else value:
+    fields = {
+        "base": (spec.base,),
+        "feet": spec.feet,
+        "shanks": spec.shanks,
+        "thighs": spec.thighs,
+        "termination_contacts": spec.termination_contacts,
+        "penalized_contacts": spec.penalized_contacts,
+    }
+    for field, bodies in fields.items():
+        for name in bodies:
             if name not in robot.body_of:
-                verb = "is" if field == "base" else "has"
-                message = f"{field} {verb} {short(name)}, which is no body{_meant(name, known)}"
-                yield _at(robot, name, message)
+                near = _suggestion(name, known)
+                message = f"{field}: got {short(name)}, which is not a link of the robot{near}"
+                yield _violation(robot, name, message)
     for field in ("shanks", "thighs"):
-        yield from _astray(robot, field, getattr(spec, field), spec.feet)
+        bodies = fields[field]
+        if len(bodies) != len(spec.feet):
+            continue
+        if any(name not in robot.body_of for name in (*bodies, *spec.feet)):
+            continue
+        for name, foot in zip(bodies, spec.feet, strict=True):
+            carried = [other for other in spec.feet if _is_ancestor(robot, name, other)]
+            if carried and foot not in carried:
+                message = (
+                    f"{field}: got {short(name)}, the parent of {names(carried)}, at the index of "
+                    f"{short(foot)}; expected the order of feet"
+                )
+                yield _violation(robot, name, message)
 
 
-def _astray(
-    robot: Facts, field: str, bodies: Sequence[str], feet: Sequence[str]
-) -> Iterator[Violation]:
-    """Yield bodies of legs that carry another foot than the one at their place."""
-    if len(bodies) != len(feet) or any(n not in robot.body_of for n in (*bodies, *feet)):
-        return
-    for name, foot in zip(bodies, feet, strict=True):
-        carried = [other for other in feet if _carries(robot, name, other)]
-        if carried and foot not in carried:
-            message = (
-                f"{field} has {short(name)} at the place of {short(foot)} in feet, but it carries "
-                f"{names(carried)}"
-            )
-            yield _at(robot, name, message)
-
-
-def _carries(robot: Facts, name: str, foot: str) -> bool:
-    wanted, at = robot.body_of[name].index, robot.body_of[foot].index
-    index: int | None = at
-    while index is not None and index > wanted:
+def _is_ancestor(robot: Facts, name: str, foot: str) -> bool:
+    ancestor = robot.body_of[name].index
+    index: int | None = robot.body_of[foot].index
+    while index is not None and index > ancestor:
         index = robot.bodies[index].parent
-    return index == wanted
+    return index == ancestor
 
 
 @rule("XRF015", "spec-pose", "error", needs=("spec",))
 def spec_pose(robot: Facts) -> Iterator[Violation]:
-    """The default pose of the spec is outside of a joint's limits.
+    """The default pose of the spec is outside of the joint limits.
 
-    The simulator pushes the joint back at the first step, and an action of 0 asks for a position
-    that cannot be reached.
+    The simulator pushes the joint back at the first step, and a zero action commands a position
+    that the joint cannot reach.
 
     Fix:
-        Choose a position between the limits.
+        Choose a position within the limits.
 
     Source:
         Limits of the description; MuJoCo enforces them as constraints.
     """
-    found = _found(robot)
-    for name, position in match_joints(_spec(robot).default_pose, _joints(robot)).values.items():
-        limits = found[name].range
+    joints, pose = _joints_by_name(robot), _spec(robot).default_pose
+    for name, position in match_joints(pose, _table_joints(robot)).values.items():
+        limits, unit = joints[name].range, joints[name].unit
         if limits is None:
             continue
-        over, side = max((position - limits[1], "upper"), (limits[0] - position, "lower"))
-        if over <= _SLACK:
-            continue
-        unit = found[name].unit
-        limit = limits[1] if side == "upper" else limits[0]
-        message = (
-            f"default_pose has {short(name)} at {position:.4g} {unit}, {over:.3g} {unit} outside "
-            f"of its {side} limit of {limit:.4g} {unit}"
-        )
-        yield _at(robot, name, message, {"position": position, "limit": limit})
+        excess = max(limits[0] - position, position - limits[1])
+        if excess > _LIMIT_TOLERANCE:
+            message = (
+                f"default_pose of {short(name)}: got {position:.4g} {unit}, {excess:.3g} {unit} "
+                f"outside of the limits; expected {limits[0]:.4g} to {limits[1]:.4g} {unit}"
+            )
+            limit = limits[1] if position > limits[1] else limits[0]
+            yield _violation(robot, name, message, {"position": position, "limit": limit})
 
 
 @rule("XRF016", "spec-motor-limits", "warning", needs=("spec",))
 def spec_motor_limits(robot: Facts) -> Iterator[Violation]:
-    """The spec gives a motor more torque or speed than the file declares.
+    """An effort or velocity limit of the spec exceeds that of the description.
 
-    The policy learns to use what the motor does not have, and fails on the robot.
+    The policy learns with torques or velocities that the motor does not have, and fails on the real
+    robot.
 
     Fix:
-        Take the declared number, or correct the description if that is wrong.
+        Use the limit of the description, or correct the description if it is wrong.
 
     Source:
-        Limits of the description, and the force ranges of a MJCF's actuators.
+        Limits of the description, and the force ranges of an MJCF's actuators.
     """
-    yield from _stronger(robot, "effort", lambda j: effort_of(robot, j), lambda j: j.effort_unit)
-    yield from _stronger(robot, "velocity", _velocity_of, lambda j: j.speed_unit)
+    yield from _exceeded(robot, "effort", lambda j: effort_of(robot, j), lambda j: j.effort_unit)
+    yield from _exceeded(
+        robot, "velocity", lambda j: j.limit.velocity if j.limit else None, lambda j: j.speed_unit
+    )
 
 
-def _velocity_of(joint: Joint) -> float | None:
-    return joint.limit.velocity if joint.limit else None
-
-
-def _stronger(
+def _exceeded(
     robot: Facts,
     table: str,
-    declared: Callable[[Joint], float | None],
+    limit_of: Callable[[Joint], float | None],
     unit_of: Callable[[Joint], str],
 ) -> Iterator[Violation]:
-    found = {joint.name: joint for joint in robot.actuated}
-    for name, value in match_joints(getattr(_spec(robot), table), _joints(robot)).values.items():
-        limit = declared(found[name])
-        if limit is None or limit <= 0 or value <= _MORE * limit:
-            continue
-        unit = unit_of(found[name])
-        message = (
-            f"{table} of {short(name)} is {value:.4g} {unit} in the spec, {value / limit:.3g} "
-            f"times the {limit:.4g} {unit} of {robot.model.file.name}"
-        )
-        yield _at(robot, name, message, {table: value, "declared": limit})
+    joints = {joint.name: joint for joint in robot.actuated}
+    values = match_joints(getattr(_spec(robot), table), _table_joints(robot)).values
+    for name, value in values.items():
+        limit, unit = limit_of(joints[name]), unit_of(joints[name])
+        if limit is not None and limit > 0 and value > _MAX_LIMIT_RATIO * limit:
+            message = (
+                f"{table} of {short(name)}: got {value:.4g} {unit}, {value / limit:.3g} times the "
+                f"limit of {robot.model.file.name}; expected at most {limit:.4g} {unit}"
+            )
+            yield _violation(robot, name, message, {table: value, "declared": limit})
 
 
 @rule("XRF017", "spec-mirror", "error", needs=("spec",))
 def spec_mirror(robot: Facts) -> Iterator[Violation]:
     """The mirror map of the spec does not fit the joints of the robot.
 
-    Mirrored experience teaches a policy to walk alike on both sides. With a wrong twin or sign half
-    of that experience contradicts the other half.
+    Mirrored samples teach a policy a symmetric gait. With a wrong joint or sign, the mirrored
+    samples contradict the others.
 
     Fix:
-        Take twin and sign from the axes: FL_hip_joint = { joint = "FR_hip_joint", sign = -1 }.
+        Take joint and sign from the axes: FL_hip_joint = { joint = "FR_hip_joint", sign = -1 }.
 
     Source:
-        A reflection turns a rotation by q about an axis a into one by -q about the reflected a.
+        A reflection turns a rotation by q about an axis a into one by -q about the reflected axis.
     """
     from terrainkit_robots.analysis.symmetry.mirror_map import mirror_map
 
-    mirror, measured = _spec(robot).mirror, mirror_map(robot)
+    mirror, expected = _spec(robot).mirror, mirror_map(robot)
     known = [joint.name for joint in robot.actuated]
-    for name, twin in mirror.items():
-        unknown = next((each for each in (name, twin.joint) if each not in known), None)
-        back = mirror.get(twin.joint)
-        own = measured.get(name)
+    for name, image in mirror.items():
+        unknown = next((each for each in (name, image.joint) if each not in known), None)
+        back = mirror.get(image.joint)
+        own = expected.get(name)
+        got = f"{short(image.joint)} with sign {image.sign:+d}"
         if unknown is not None:
-            meant = _meant(unknown, known)
-            message = f"mirror has {short(unknown)}, which is no joint that a motor drives{meant}"
-            yield _at(robot, unknown, message)
-        elif back is None or back.joint != name or back.sign != twin.sign:
-            has = "nothing" if back is None else f"{short(back.joint)} with sign {back.sign:+d}"
+            message = f"mirror: got {short(unknown)}, which is not an actuated joint"
+            yield _violation(robot, unknown, message + _suggestion(unknown, known))
+        elif back is None or back.joint != name or back.sign != image.sign:
+            text = "no entry" if back is None else f"{short(back.joint)} with sign {back.sign:+d}"
             message = (
-                f"mirror has {short(twin.joint)} with sign {twin.sign:+d} for {short(name)}, but "
-                f"for {short(twin.joint)} it has {has}"
+                f"mirror of {short(name)}: got {got}, but {text} for {short(image.joint)}; "
+                "expected both to agree"
             )
-            yield _at(robot, name, message)
-        elif own is not None and own.joint == twin.joint and own.sign != twin.sign:
+            yield _violation(robot, name, message)
+        elif own is not None and own.joint == image.joint and own.sign != image.sign:
             message = (
-                f"mirror has sign {twin.sign:+d} between {short(name)} and {short(twin.joint)}; "
-                f"their axes say {own.sign:+d}"
+                f"mirror of {short(name)}: got {got}; expected sign {own.sign:+d}, as their axes "
+                "require"
             )
-            yield _at(robot, name, message)
+            yield _violation(robot, name, message)

@@ -38,7 +38,7 @@ def test_go2(robot_file):
     assert f"ctrl = joints[{GO2}]" in order.message
     assert "4 joints" in effort.message
     assert "35.55 N m here and 45.43 N m in go2.xml" in effort.message
-    assert "15.019 kg here and 15.206 kg in go2.xml: 1.2%" in mass.message
+    assert "15.019 kg here and 15.206 kg in go2.xml, 1.2%" in mass.message
     assert "FL_calf 0.194 and 0.2414 kg" in mass.message
 
 

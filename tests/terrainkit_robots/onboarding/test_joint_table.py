@@ -6,11 +6,11 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.onboarding.joint_rows import joint_rows, shown
+from terrainkit_robots.onboarding.joint_table import format_number, joint_table
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
 
-def spec_of(order, **changes):
+def make_spec(order, **changes):
     tables = {
         "default_pose": {".*": 0.5},
         "stiffness": {".*": 20.0},
@@ -45,9 +45,9 @@ def arm(kind, limits):
     return Facts(load_robot(path, contents={path: text.encode()}))
 
 
-def test_a_leg_joint_has_its_role_limits_gains_and_what_it_holds(quadruped):
+def test_joint_table_of_leg_joint(quadruped):
     order = [joint.name for joint in quadruped.actuated]
-    header, *rows = joint_rows(quadruped, spec_of(order))
+    header, *rows = joint_table(quadruped, make_spec(order))
     row = dict(zip(header, rows[2], strict=True))
     torque = abs(quadruped.stance.torques["FL_calf_joint"])
     assert row == {
@@ -61,40 +61,40 @@ def test_a_leg_joint_has_its_role_limits_gains_and_what_it_holds(quadruped):
         "armature [kg m2]": "0.01",
         "effort [N m]": "30",
         "velocity [rad/s]": "12.2",
-        "holds [N m]": f"{torque:.1f} ({torque / 30:.0%})",
+        "holding torque [N m]": f"{torque:.1f} ({torque / 30:.0%})",
     }
     assert [each[1] for each in rows] == order
 
 
-def test_rows_are_in_the_order_of_the_spec(quadruped):
+def test_joint_table_follows_joint_order(quadruped):
     order = [joint.name for joint in quadruped.actuated][::-1]
-    assert [row[1] for row in joint_rows(quadruped, spec_of(order))[1:]] == order
+    assert [row[1] for row in joint_table(quadruped, make_spec(order))[1:]] == order
 
 
-def test_without_legs_there_is_no_role_and_nothing_to_hold():
-    header, row = joint_rows(arm("prismatic", '<limit lower="0" upper="2"/>'), spec_of(["j"]))
+def test_joint_table_without_legs_has_no_leg_columns():
+    header, row = joint_table(arm("prismatic", '<limit lower="0" upper="2"/>'), make_spec(["j"]))
     assert header[:4] == ("#", "joint", "limits [m]", "default [m]")
-    assert "holds" not in " ".join(header)
+    assert "holding" not in " ".join(header)
     assert row[2] == "0 to 2"
 
 
-def test_a_joint_without_limits_has_none():
-    _, row = joint_rows(arm("continuous", ""), spec_of(["j"]))
+def test_joint_table_of_joint_without_limits():
+    _, row = joint_table(arm("continuous", ""), make_spec(["j"]))
     assert row[2] == "none"
 
 
-def test_units_of_hinges_and_slides_together():
+def test_joint_table_lists_units_of_both_kinds():
     path = bundled.find("quadruped")
     text = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
     <joint name="h" type="continuous"><parent link="a"/><child link="b"/></joint>
     <joint name="s" type="prismatic"><parent link="b"/><child link="c"/></joint></robot>"""
     facts = Facts(load_robot(path, contents={path: text.encode()}))
-    assert joint_rows(facts, spec_of(["h", "s"]))[0][3] == "default [rad or m]"
+    assert joint_table(facts, make_spec(["h", "s"]))[0][3] == "default [rad or m]"
 
 
-def test_a_spec_that_misses_a_joint_or_has_others_leaves_cells_empty(quadruped):
-    spec = replace(spec_of(["FL_calf_joint", "other"]), stiffness={"FL_.*": 20.0, "x(": 1.0})
-    header, first, other = joint_rows(quadruped, spec)
+def test_joint_table_leaves_unknown_values_empty(quadruped):
+    spec = replace(make_spec(["FL_calf_joint", "other"]), stiffness={"FL_.*": 20.0, "x(": 1.0})
+    header, first, other = joint_table(quadruped, spec)
     place = header.index("kp [N m/rad]")
     assert (first[place], other[place]) == ("20", "")
     assert other[2:4] == ("", "")
@@ -118,5 +118,5 @@ def test_a_spec_that_misses_a_joint_or_has_others_leaves_cells_empty(quadruped):
         (1e300, "1e+300"),
     ],
 )
-def test_numbers(value, text):
-    assert shown(value) == text
+def test_format_number(value, text):
+    assert format_number(value) == text

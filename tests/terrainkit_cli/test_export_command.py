@@ -11,12 +11,11 @@ pytest.importorskip("torch", reason="the extra `train` is not installed")
 import torch
 
 from terrainkit_cli import training_extra
-from terrainkit_robots.rl import registry
+from terrainkit_robots.rl import tasks
+from terrainkit_robots.rl.config import Env, Policy, Runner, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.registry import SHIPPED
 from terrainkit_robots.rl.run import create_run
 from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.task import Env, Policy, Runner, Task
 from terrainkit_robots.rl.terrain import Plane
 
 FILES = ["policy.json", "policy.onnx", "policy.pt"]
@@ -56,20 +55,21 @@ def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_a_run_is_exported_into_its_own_folder(here, run_folder):
+def test_export_run_into_its_own_folder(here, run_folder):
     run = here("export", "run")
     assert run.returncode == 0, run.stderr
     assert run.stderr == ""
     assert names(run_folder / "exported") == FILES
     first, second = run.stdout.splitlines()
     assert first.startswith("wrote run/exported/policy.onnx, run/exported/policy.pt, ")
-    assert first.endswith("from 45 observations to 12 actions, of model_2.pt")
-    assert second.startswith("checked: policy.pt answers as the checkpoint does, to 0.0e+00; ")
+    assert first.endswith("45 observations to 12 actions, from model_2.pt")
+    assert second.startswith("verified: largest difference from the checkpoint: policy.onnx ")
+    assert second.endswith(", policy.pt 0.0e+00")
     told = json.loads((run_folder / "exported" / "policy.json").read_text())
     assert told["iteration"] == 2
 
 
-def test_a_checkpoint_is_named_by_its_file_or_its_iteration(here, run_folder, tmp_path):
+def test_export_checkpoint_by_file_or_iteration(here, run_folder, tmp_path):
     iterations = {}
     for name, words in {
         "a": ("run/model_1.pt",),
@@ -86,7 +86,7 @@ def test_a_checkpoint_is_named_by_its_file_or_its_iteration(here, run_folder, tm
 
 
 @pytest.mark.usefixtures("run_folder")
-def test_files_are_overwritten_only_if_told(here, tmp_path):
+def test_export_overwrites_only_if_told(here, tmp_path):
     assert here("export", "run", "-o", "policy").returncode == 0
     (tmp_path / "policy" / "policy.pt").write_bytes(b"mine")
     run = here("export", "run", "-o", "policy")
@@ -98,17 +98,15 @@ def test_files_are_overwritten_only_if_told(here, tmp_path):
     assert (tmp_path / "policy" / "policy.pt").stat().st_size > 1000
 
 
-def test_a_robot_whose_policy_is_shipped_is_exported_by_its_name(
-    here, trained, tmp_path, monkeypatch
-):
-    bundled = registry.find("quadruped")
+def test_export_bundled_policy_by_name(here, trained, tmp_path, monkeypatch):
+    bundled = tasks.get_task("quadruped")
     folder = tmp_path / "package"
-    shutil.copytree(bundled.folder, folder, ignore=shutil.ignore_patterns(SHIPPED))
-    monkeypatch.setitem(registry._registered, "quadruped", replace(bundled, folder=folder))
+    shutil.copytree(bundled.folder, folder, ignore=shutil.ignore_patterns(tasks.TRAINED_FOLDER))
+    monkeypatch.setitem(tasks._registered, "quadruped", replace(bundled, folder=folder))
     run = here("export", "quadruped")
     assert run.returncode == 2
     assert "no policy is shipped with quadruped" in run.stderr
-    shipped = registry.find("quadruped").shipped
+    shipped = tasks.get_task("quadruped").trained_run
     shutil.copytree(trained, shipped)
     run = here("export", "quadruped")
     assert run.returncode == 0, run.stderr
@@ -116,7 +114,7 @@ def test_a_robot_whose_policy_is_shipped_is_exported_by_its_name(
     assert names(shipped) == names(trained)
 
 
-def test_a_map_is_exported_as_before(here, tmp_path):
+def test_export_map(here, tmp_path):
     words = ("--rows", 1, "--cols", 1, "--terrain", "stairs", "--patch-size", 4, 4, "--border", 1)
     assert here("generate", "-o", "map.npz", *words).returncode == 0
     run = here("export", "map.npz", "-o", "map.stl", "--full")
@@ -128,19 +126,22 @@ def test_a_map_is_exported_as_before(here, tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ((), "nothing to export; wanted a map (.npz), a run, or a robot's name"),
-        (("unicorn",), "no map, run or robot unicorn; wanted a map (.npz), a folder that"),
+        ((), "MAP or RUN is missing"),
+        (("unicorn",), "no map, run or robot unicorn; expected a map (.npz), a run"),
         (("unicorn",), "or one of: biped, quadruped"),
         (("none.npz", "-o", "a.stl"), "no file none.npz"),
-        (("none.pt",), "no run none.pt"),
+        (("none.pt",), "run: got none.pt"),
         (("empty",), "empty has no run.toml"),
         (("text.txt", "-o", "a.stl"), "text.txt"),
-        (("map.npz",), "map.npz is a map; wanted --output FILE, whose suffix names the format"),
-        (("map.npz", "-o", "a.xml", "--checkpoint", 3), "--checkpoint is for runs"),
-        (("run", "--collision", "boxes"), "run is no map; --collision is for maps"),
-        (("run", "--y-up"), "run is no map; --y-up is for maps"),
-        (("run", "--checkpoint", 7), "run has no checkpoint 7; there are: 1, 2"),
-        (("run", "--checkpoint", -7), "run has no checkpoint -7"),
+        (("map.npz",), "--output is missing; expected a file"),
+        (
+            ("map.npz", "-o", "a.xml", "--checkpoint", 3),
+            "--checkpoint: got the map map.npz",
+        ),
+        (("run", "--collision", "boxes"), "--collision: got the run run; expected a map"),
+        (("run", "--y-up"), "--y-up: got the run run; expected a map"),
+        (("run", "--checkpoint", 7), "run: got checkpoint 7; expected one of: 1, 2"),
+        (("run", "--checkpoint", -7), "run: got checkpoint -7"),
         (("run", "-o", "nowhere/policy"), "there is no folder nowhere"),
         (("run", "-o", "text.txt"), "text.txt exists"),
         (("x" * 5000,), "cannot read"),
@@ -148,7 +149,7 @@ def test_a_map_is_exported_as_before(here, tmp_path):
     ids=lambda value: " ".join(map(str, value))[:40] if isinstance(value, tuple) else "",
 )
 @pytest.mark.usefixtures("run_folder")
-def test_bad_input_is_one_line_and_exit_2_and_writes_nothing(here, tmp_path, words, said):
+def test_export_rejects_invalid_input(here, tmp_path, words, said):
     (tmp_path / "empty").mkdir()
     (tmp_path / "text.txt").write_text("no map")
     if "map.npz" in words:
@@ -164,7 +165,7 @@ def test_bad_input_is_one_line_and_exit_2_and_writes_nothing(here, tmp_path, wor
 
 
 @pytest.mark.usefixtures("run_folder")
-def test_a_truncated_checkpoint_is_one_line(here, run_folder):
+def test_export_rejects_a_truncated_checkpoint(here, run_folder):
     path = run_folder / "model_2.pt"
     path.write_bytes(path.read_bytes()[:1000])
     run = here("export", "run")
@@ -175,7 +176,7 @@ def test_a_truncated_checkpoint_is_one_line(here, run_folder):
 
 
 @pytest.mark.usefixtures("run_folder")
-def test_without_the_extra_it_is_said_what_to_install(here, monkeypatch):
+def test_export_names_the_missing_extra(here, monkeypatch):
     monkeypatch.setattr(training_extra, "_PACKAGES", ("torch", "no_such_package"))
     run = here("export", "run")
     assert run.returncode == 2
@@ -185,14 +186,14 @@ def test_without_the_extra_it_is_said_what_to_install(here, monkeypatch):
     )
 
 
-def test_help_tells_of_maps_and_of_policies(terrainkit):
+def test_export_help_covers_maps_and_policies(terrainkit):
     said = terrainkit("export", "--help").stdout
     assert "MAP.npz|RUN" in said
     assert "policy.onnx" in said
     assert "heightfield" in said
 
 
-def test_the_help_and_the_export_of_a_map_import_no_torch(tmp_path, terrainkit):
+def test_export_map_imports_no_torch(tmp_path, terrainkit):
     assert terrainkit("generate", "-o", "map.npz", "--rows", 1, "--cols", 2).returncode == 0
     code = (
         "import sys; from terrainkit_cli.main import main;"

@@ -21,7 +21,7 @@ legged_gym and Isaac Lab use for their own robots."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class ConfiguredRobot:
+class ConfigRobot:
     """A robot, as a configuration is written of it."""
 
     spec: RobotSpec
@@ -29,10 +29,10 @@ class ConfiguredRobot:
     bodies: Sequence[str] = ()
     """Every body there is once fixed joints are merged; if empty, those that the spec names."""
 
-    ranges: Mapping[str, tuple[float, float]] | None = None
+    limits: Mapping[str, tuple[float, float]] | None = None
     """Lower and upper limit of joints, as the URDF has them; None if they are not known."""
 
-    undriven: Sequence[str] = ()
+    unactuated: Sequence[str] = ()
     """Joints of the URDF that move and have no motor: they follow another, or swing."""
 
     @property
@@ -53,14 +53,14 @@ class ConfiguredRobot:
         """Return the share of the joints' ranges that rewards leave free, between 0 and 1."""
         soft = self._matched("soft_limits", self.spec.soft_limits)
         shares = []
-        for joint, (lower, upper) in (self.ranges or {}).items():
+        for joint, (lower, upper) in (self.limits or {}).items():
             if joint in soft and upper > lower:
                 shares.append((soft[joint][1] - soft[joint][0]) / (upper - lower))
         share = median(shares) if shares else USUAL_SOFT_FACTOR
         return round(share, 4) if 0 < share <= 1 else 1.0
 
     @cached_property
-    def wheels(self) -> tuple[str, ...]:
+    def velocity_joints(self) -> tuple[str, ...]:
         """Return the joints that are told a speed: what has damping alone stays nowhere.
 
         Raises:
@@ -72,9 +72,9 @@ class ConfiguredRobot:
         )
 
     @cached_property
-    def placed(self) -> tuple[str, ...]:
+    def position_joints(self) -> tuple[str, ...]:
         """Return the joints that are told a position: all but wheels."""
-        return tuple(joint for joint in self.spec.joint_order if joint not in self.wheels)
+        return tuple(joint for joint in self.spec.joint_order if joint not in self.velocity_joints)
 
     def by_joint(self, name: str) -> dict[str, float]:
         """Return the table `name` of the spec by joint, in their order; joints may be missing.
@@ -116,7 +116,7 @@ class ConfiguredRobot:
     def soft_limits(self, *, depth: int = 0) -> list[str]:
         """Return a comment on `soft_factor`."""
         text = "Share of each joint's range that rewards leave free"
-        more = ", the median" if self.ranges else ""
+        more = ", the median" if self.limits else ""
         return comment(f"{text}{more}; limits by joint are in robot.toml.", depth=depth)
 
     def scales(self, joints: Iterable[str]) -> dict[str, float]:
