@@ -118,13 +118,8 @@ class Evaluate(PolicyCommand):
     """Replace an existing file."""
 
     def run(self) -> int:
-<<<<<<< HEAD
-        """Measure, and print or write the result."""
-        from terrainkit.atomic_write import check_target
-=======
         """Evaluate, and print or write the result."""
         from terrainkit.atomic_write import atomic_write, check_target
->>>>>>> main
 
         output = Path(self.output) if self.output else None
         if output is not None:

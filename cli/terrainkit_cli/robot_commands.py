@@ -246,29 +246,13 @@ def _write_fixes(result: "FixResult", *, unsafe: bool) -> "Report":
 
 
 def _check_output(output: Path, inputs: Sequence[Path]) -> None:
-<<<<<<< HEAD
-    """Raise an error if the report cannot be written, or would replace what it is about."""
-    from terrainkit.atomic_write import check_target
-=======
     """Raise an error if the report cannot be written, or would replace a checked file."""
     from terrainkit.atomic_write import check_target
->>>>>>> main
 
     check_target(output, overwrite=True)
     for path in inputs:
         if output.exists() and path.exists() and output.samefile(path):
-<<<<<<< HEAD
-            raise ConfigError(f"--output {output} would replace {path}, which is checked")
-
-
-def _write(output: Path, text: str) -> None:
-    from terrainkit.atomic_write import atomic_write
-
-    with atomic_write(output, overwrite=True) as path:
-        path.write_bytes(text.encode("utf-8", "backslashreplace"))
-=======
             raise ConfigError(f"--output {output} would replace the checked file {path}")
->>>>>>> main
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -89,20 +89,13 @@ def test_map_config_is_frozen():
         ({"rows": 2.0}, r"rows: got 2\.0; expected an integer"),
         ({"cell": 0.0}, r"cell: got 0\.0; expected a number from 0\.0001 to"),
         ({"cell": math.nan}, r"cell: got nan; expected a number from 0\.0001 to"),
-<<<<<<< HEAD
         (
             {"cell": 0.3},
             r"patch_size: got 8 m; expected a whole number of cells of 0\.3 m, such as 7\.8 m",
         ),
-        ({"patch_size": (8.0, 0.0)}, r"patch_size: got \(8\.0, 0\.0\); expected 2 values, each"),
-        ({"patch_size": (8.0, math.inf)}, r"patch_size: got \(8\.0, inf\); expected 2 values"),
-        ({"patch_size": (8.0, 4.03)}, r"patch_size: got 4\.03 m; expected .* 4 m or 4\.1 m"),
-=======
-        ({"cell": 0.3}, r"patch_size: got 8 m; expected a whole number of cells of 0\.3 m, such as 7\.8 m"),
         ({"patch_size": (8.0, 0.0)}, r"patch_size: got \[8\.0, 0\.0\]; expected 2 values, each"),
         ({"patch_size": (8.0, math.inf)}, r"patch_size: got \[8\.0, inf\]; expected 2 values"),
         ({"patch_size": (8.0, 4.03)}, r"patch_size: got 4\.03 m; expected .* 4 m or 4\.1 m"),
->>>>>>> main
         ({"patch_size": 8.0}, r"patch_size: got 8\.0; expected 2 values"),
         ({"border": -1.0}, r"border: got -1\.0; expected a number from 0 to"),
         (

@@ -14,18 +14,10 @@ import torch
 from numpy.typing import NDArray
 from tensordict import TensorDict
 
-<<<<<<< HEAD
-from terrainkit.atomic_write import atomic_write, check_target
-from terrainkit.errors import ConfigError, ExportError
-from terrainkit_robots.policy.actor import actor_of
-from terrainkit_robots.policy.description import ONNX, TORCHSCRIPT, description, width_of
-from terrainkit_robots.policy.rollout import walk
-=======
 from terrainkit.atomic_write import atomic_write, check_target
 from terrainkit.errors import ExportError
 from terrainkit_robots.policy.evaluate import evaluation_task
 from terrainkit_robots.policy.load import load_policy
->>>>>>> main
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import Run, read_checkpoint
 from terrainkit_robots.rl.runner import single_torch_thread
