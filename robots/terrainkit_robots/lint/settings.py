@@ -18,8 +18,9 @@ from typing import Annotated, Any, Self
 
 from msgspec import Meta
 
+from terrainkit.annotations import show
 from terrainkit.errors import ConfigError, listing, nearest
-from terrainkit.schema import Config, show
+from terrainkit.schema import Config
 from terrainkit.toml_text import parse_toml, read_text
 from terrainkit_robots.lint.rule import FAMILIES, Rule, rules
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-import tomli_w
+import tomlkit
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit.toml_text import parse_toml
@@ -31,6 +31,6 @@ def bundle_policy(run: runs.Run, folder: Path) -> runs.Run:
     about["terrain"] = "plane" if is_plane else runs.MAP_FILE
     state = runs.policy_state(runs.read_checkpoint(run.checkpoint))
     files = {name: (run.folder / name).read_bytes() for name in names}
-    runs.write_run_folder(folder, files | {runs.RUN_FILE: tomli_w.dumps(about).encode()})
+    runs.write_run_folder(folder, files | {runs.RUN_FILE: tomlkit.dumps(about).encode()})
     runs.save_checkpoint(folder / runs.checkpoint_name(state["iteration"]), state)
     return runs.open_run(folder)

@@ -19,9 +19,10 @@ from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.runner import LeggedRunner, single_torch_thread
-from terrainkit_robots.rl.scene import Robot, lowest_point
+from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.simulation.geoms import lowest_point
 
 if TYPE_CHECKING:
     from terrainkit_robots.lint.settings import Settings

@@ -12,7 +12,7 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.lint.compare.kinematics import largest_difference
+from terrainkit_robots.lint.compare.link_poses import compare_link_poses
 from terrainkit_robots.lint.rule import rules
 from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.onboarding.frameworks.frameworks import framework_names
@@ -82,7 +82,7 @@ def check_folder(file, onboarded):
     assert not [f for f in report.findings if f.severity != "info"], report.findings
     # They match the source, as read by yourdfpy (URDF) and MuJoCo (MJCF).
     for written in (urdf, mjcf):
-        difference = largest_difference(source, Facts(written), poses=100)
+        difference = compare_link_poses(source, Facts(written), poses=100)
         assert difference.distance < 1e-4, difference
         if source.total_mass == source.total_mass:  # NaN where MuJoCo computes it from meshes
             assert Facts(written).total_mass == pytest.approx(source.total_mass, rel=1e-3)

@@ -19,7 +19,7 @@ TASK = Task(
 @pytest.mark.parametrize(
     ("name", "joints", "observed"), [("go2/urdf/go2.urdf", 12, 45), ("h1/urdf/h1.urdf", 10, 39)]
 )
-def test_a_real_robot_is_onboarded_and_trains(robot_file, tmp_path, name, joints, observed):
+def test_real_robot_is_onboarded_and_trained(robot_file, tmp_path, name, joints, observed):
     """Twenty updates show no walking: that nothing breaks, and that all numbers stay numbers."""
     folder = tmp_path / "robot"
     done = onboard(robot_file(name), folder, OnboardOptions(render_pictures=False))

@@ -18,14 +18,19 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.effort import effort_of
 from terrainkit_robots.description.model import Joint, Mimic, Source
-from terrainkit_robots.lint.compare.body_masses import body_gap, dropped_mass, is_known, share
+from terrainkit_robots.lint.compare.body_masses import (
+    body_difference,
+    dropped_mass,
+    has_valid_inertial,
+    relative_difference,
+)
 from terrainkit_robots.lint.rule import Severity, Violation, rule
 from terrainkit_robots.text import count, names, short
 from terrainkit_robots.transforms import Matrix
 
 if TYPE_CHECKING:
-    from terrainkit_robots.lint.compare.kinematics import KinematicDifference
-    from terrainkit_robots.lint.compare.pairing import Pairing
+    from terrainkit_robots.lint.compare.link_poses import LinkPoseDifference
+    from terrainkit_robots.lint.compare.robot_pairs import RobotPairs
 
 _MAX_AXIS_ANGLE = 0.01
 """Allowed angle between axes [rad]: axes with two digits, such as 0.71 0.71 0."""
@@ -56,13 +61,13 @@ _JointPair = tuple[Joint, Joint]
 
 
 @per_robot
-def _optional_pairing(robot: Facts) -> "Pairing | None":
-    from terrainkit_robots.lint.compare.pairing import pair_robots
+def _optional_pairing(robot: Facts) -> "RobotPairs | None":
+    from terrainkit_robots.lint.compare.robot_pairs import pair_robots
 
     return pair_robots(robot, _other(robot))
 
 
-def _pairing(robot: Facts) -> "Pairing":
+def _pairing(robot: Facts) -> "RobotPairs":
     pairing = _optional_pairing(robot)
     if pairing is None:
         empty = robot if not robot.links else _other(robot)
@@ -117,8 +122,8 @@ def compare_joint_sets(robot: Facts) -> Iterator[Violation]:
     """
     pairing, other, there = _pairing(robot), _other(robot), _other_name(robot)
     joint_names = pairing.joint_names
-    ours = [joint for joint in robot.joints if joint.name in joint_names.only_ours]
-    theirs = [joint for joint in other.joints if joint.name in joint_names.only_theirs]
+    ours = [joint for joint in robot.joints if joint.name in joint_names.only_first]
+    theirs = [joint for joint in other.joints if joint.name in joint_names.only_second]
     counts = {"here": len(robot.joints), "there": len(other.joints)}
     for joints, side, fixed, missing in (
         (ours, other, f"that move here but are fixed in {there}", f"missing in {there}"),
@@ -207,7 +212,7 @@ def _mimic_difference(robot: Facts, one: Joint, other: Joint) -> tuple[str, str,
         return "mimic", f"{texts[0]} here and {texts[1]} there; expected the same", "warning"
     partner = dict(_pairing(robot).joint_names.pairs)
     same = partner.get(ours.joint, ours.joint) == theirs.joint
-    close = share(ours.multiplier, theirs.multiplier) <= _MAX_EFFORT_DIFFERENCE
+    close = relative_difference(ours.multiplier, theirs.multiplier) <= _MAX_EFFORT_DIFFERENCE
     if same and close and abs(ours.offset - theirs.offset) <= _limit_tolerance(one):
         return "", "", None
     text = f"{_format_mimic(ours)} here and {_format_mimic(theirs)} there; expected the same"
@@ -230,9 +235,9 @@ def _axis_angle(robot: Facts, one: Joint, other: Joint) -> float:
 
 def _axis_in_link(link: str, robot: Facts, joint: Joint) -> Matrix:
     """Return the axis of a joint in the frame of a link, all joints at 0."""
-    from terrainkit_robots.lint.compare.pairing import from_link
+    from terrainkit_robots.lint.compare.robot_pairs import trunk_pose_in_link
 
-    pose = from_link(robot, link) @ robot.at_zero[robot.body_of[joint.child].index]
+    pose = trunk_pose_in_link(robot, link) @ robot.at_zero[robot.body_of[joint.child].index]
     return pose[:3, :3] @ joint.direction
 
 
@@ -302,7 +307,7 @@ def _velocity_difference(one: Joint, other: Joint) -> tuple[object, ...] | None:
     """Return the velocities of two joints if both are given and they differ."""
     a = one.limit.velocity if one.limit else None
     b = other.limit.velocity if other.limit else None
-    if not a or not b or share(a, b) <= _MAX_EFFORT_DIFFERENCE:
+    if not a or not b or relative_difference(a, b) <= _MAX_EFFORT_DIFFERENCE:
         return None
     return one.kind == "prismatic", a, b
 
@@ -459,7 +464,7 @@ def compare_effort(robot: Facts) -> Iterator[Violation]:
 
     def difference(one: Joint, _: Joint) -> tuple[object, ...] | None:
         a, b = efforts[one.name]
-        if not a or not b or share(a, b) <= _MAX_EFFORT_DIFFERENCE:
+        if not a or not b or relative_difference(a, b) <= _MAX_EFFORT_DIFFERENCE:
             return None
         return one.kind == "prismatic", a, b
 
@@ -473,8 +478,8 @@ def compare_effort(robot: Facts) -> Iterator[Violation]:
         yield _group_violation(
             group,
             "effort limit",
-            f"{a:.5g} {unit} here and {b:.5g} {unit} in {there}, {share(a, b):.1%} apart; "
-            f"expected at most {_MAX_EFFORT_DIFFERENCE:.0%}",
+            f"{a:.5g} {unit} here and {b:.5g} {unit} in {there}, "
+            f"{relative_difference(a, b):.1%} apart; expected at most {_MAX_EFFORT_DIFFERENCE:.0%}",
         )
     for group in _grouped(pairs, missing):
         limited = bool(efforts[group[0][0].name][0])
@@ -511,13 +516,13 @@ def compare_total_mass(robot: Facts) -> Iterator[Violation]:
         if math.isnan(mass):
             file = short(each.model.file.name)
             raise CannotCheckError(f"masses of {file} are computed from mesh files")
-    difference = share(a, b)
+    difference = relative_difference(a, b)
     if difference > _MAX_MASS_DIFFERENCE:
         bodies = sorted(pairing.bodies, key=lambda pair: -abs(pair[0].mass - pair[1].mass))
         causes = [
             f"{short(one.name)} {one.mass:.4g} and {two.mass:.4g} kg"
             for one, two in bodies[:_MAX_LISTED_BODIES]
-            if share(one.mass, two.mass) > _MAX_MASS_DIFFERENCE
+            if relative_difference(one.mass, two.mass) > _MAX_MASS_DIFFERENCE
         ]
         yield Violation(
             subject=robot.model.title,
@@ -565,17 +570,17 @@ def compare_kinematics(robot: Facts) -> Iterator[Violation]:
         Both robots are compared in 20 random poses. The link poses of a URDF are computed by
         yourdfpy and those of an MJCF by MuJoCo, two independent implementations.
     """
-    from terrainkit_robots.lint.compare.kinematics import largest_difference
+    from terrainkit_robots.lint.compare.link_poses import compare_link_poses
 
     held = [a.name for a, b in _joint_pairs(robot) if _difference(robot, a, b)[2] == "error"]
-    gap = largest_difference(robot, _other(robot), held=held)
-    if gap.agrees:
+    gap = compare_link_poses(robot, _other(robot), locked=held)
+    if gap.is_within_tolerance:
         return
-    severity: Severity | None = "warning" if gap.turned_only else None
-    if gap.base_only and gap.base[0] != gap.base[1]:
+    severity: Severity | None = "warning" if gap.is_rotation_only else None
+    if gap.is_base_offset and gap.base[0] != gap.base[1]:
         severity = "info"
     links = {link.name: link for link in robot.links}
-    subject = gap.base[0] if gap.base_only else gap.first
+    subject = gap.base[0] if gap.is_base_offset else gap.first
     yield Violation(
         subject=subject,
         source=links[subject].source,
@@ -592,20 +597,20 @@ def compare_kinematics(robot: Facts) -> Iterator[Violation]:
     )
 
 
-def _kinematics_message(gap: "KinematicDifference", there: str) -> str:
-    from terrainkit_robots.lint.compare.kinematics import ANGLE, DISTANCE
+def _kinematics_message(gap: "LinkPoseDifference", there: str) -> str:
+    from terrainkit_robots.lint.compare.link_poses import MAX_ANGLE, MAX_DISTANCE
 
     ours, theirs = gap.base
     base = ours if ours == theirs else f"{ours} ({theirs} there)"
     angle = f"{math.degrees(gap.angle):.3g} deg"
-    expected = f"expected at most {1000 * DISTANCE:g} mm and {math.degrees(ANGLE):.1g} deg"
-    if gap.base_only:
+    expected = f"expected at most {1000 * MAX_DISTANCE:g} mm and {math.degrees(MAX_ANGLE):.1g} deg"
+    if gap.is_base_offset:
         return (
             f"frame of {base} on the trunk: got a difference to {there} of "
             f"{1000 * gap.distance:.4g} mm and {angle}, the same for all {gap.links} links; "
             f"{expected}"
         )
-    if gap.turned_only:
+    if gap.is_rotation_only:
         return (
             f"rotation of link frames against those of {there}: got up to {angle} at {gap.link}, "
             f"the same in every pose, first at {gap.first}; {expected}; all origins agree to "
@@ -634,11 +639,13 @@ def compare_inertia(robot: Facts) -> Iterator[Violation]:
         bodies with the same joints in both files are compared.
     """
     pairing, other, there = _pairing(robot), _other(robot), _other_name(robot)
-    total_differs = share(robot.total_mass, other.total_mass) > _MAX_MASS_DIFFERENCE
+    total_differs = relative_difference(robot.total_mass, other.total_mass) > _MAX_MASS_DIFFERENCE
     for one, two in pairing.bodies:
-        if min(one.mass, two.mass) < _MIN_MASS or not (is_known(one) and is_known(two)):
+        if min(one.mass, two.mass) < _MIN_MASS:
             continue
-        gap, body, message = body_gap(robot, other, pairing, one, two), short(one.name), ""
+        if not (has_valid_inertial(one) and has_valid_inertial(two)):
+            continue
+        gap, body, message = body_difference(robot, other, pairing, one, two), short(one.name), ""
         if gap.mass > _MAX_MASS_DIFFERENCE:
             if not total_differs:  # else reported by XRF007
                 message = (

@@ -9,9 +9,9 @@ from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.lint.compare.kinematics import largest_difference, random_positions
+from terrainkit_robots.lint.compare.link_poses import compare_link_poses, sample_positions
 from terrainkit_robots.lint.compare.mjcf_poses import mjcf_poses
-from terrainkit_robots.lint.compare.pairing import pair_robots
+from terrainkit_robots.lint.compare.robot_pairs import pair_robots
 from terrainkit_robots.lint.compare.urdf_poses import urdf_poses
 
 REAL = [
@@ -46,9 +46,9 @@ def poses_of(robot, positions):
 
 
 def worst(robot, count=5):
-    """Return how far our own kinematics is from yourdfpy's or MuJoCo's [m], and in its turns."""
-    pairing = pair_robots(robot, robot)
-    positions, _ = random_positions(pairing, poses=count, seed=1)
+    """Return the largest difference of our link poses to those of yourdfpy or MuJoCo."""
+    pairs = pair_robots(robot, robot)
+    positions, _ = sample_positions(pairs, poses=count, seed=1)
     theirs = poses_of(robot, positions)
     ours = body_poses(robot.bodies, positions)
     top = theirs[robot.bodies[0].top.name]
@@ -61,7 +61,7 @@ def worst(robot, count=5):
     return max(gaps)
 
 
-def test_it_agrees_on_turns_that_are_told_by_quaternions(tmp_path):
+def test_quaternion_origins_agree(tmp_path):
     path = tmp_path / "robot.urdf"
     text = ARM.replace('rpy="0.2 -0.3 0.4"', 'quat_xyzw="0.1 0.2 0.3 0.9"')
     assert text != ARM
@@ -70,18 +70,18 @@ def test_it_agrees_on_turns_that_are_told_by_quaternions(tmp_path):
 
 
 @pytest.mark.parametrize("name", REAL)
-def test_our_own_kinematics_agrees_on_real_robots(robot_file, name):
+def test_body_poses_agree_on_real_robots(robot_file, name):
     assert worst(Facts(load_robot(robot_file(name)))) < 1e-9
 
 
 @pytest.mark.parametrize("name", BUNDLED)
-def test_our_own_kinematics_agrees_on_bundled_robots(robot_of, name):
+def test_body_poses_agree_on_bundled_robots(robot_of, name):
     assert worst(robot_of(name)) < 1e-9
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-10, 9e-10, 1e-8])
-def test_a_joint_that_points_straight_up_is_exact(tmp_path, off):
-    path = tmp_path / "arm.xacro"  # whose angles are written anew
+def test_vertical_joint_is_exact(tmp_path, off):
+    path = tmp_path / "arm.xacro"  # whose angles are written again
     path.write_text(ARM.replace("0.2 -0.3 0.4", f"0.2 {math.pi / 2 - off!r} 0.4"))
     robot = Facts(load_robot(path))
     assert robot.model.kind == "xacro"
@@ -89,7 +89,7 @@ def test_a_joint_that_points_straight_up_is_exact(tmp_path, off):
 
 
 @pytest.mark.parametrize("kind", ["urdf", "xacro"])
-def test_a_slide_whose_axis_is_not_of_unit_length_goes_as_far_as_asked(tmp_path, kind):
+def test_prismatic_axis_is_normalized(tmp_path, kind):
     path = tmp_path / f"arm.{kind}"
     path.write_text(ARM)
     robot = Facts(load_robot(path))
@@ -101,78 +101,78 @@ def test_a_slide_whose_axis_is_not_of_unit_length_goes_as_far_as_asked(tmp_path,
 
 
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
-def test_a_urdf_and_its_mjcf_agree(robot_of, name):
+def test_bundled_urdf_and_mjcf_agree(robot_of, name):
     one, other = robot_of(f"{name}.urdf"), robot_of(f"{name}.xml")
-    gap = largest_difference(one, other, poses=100)
-    assert gap.agrees
+    gap = compare_link_poses(one, other, poses=100)
+    assert gap.is_within_tolerance
     assert gap.distance < 1e-5
     assert gap.angle < 1e-5
     assert (gap.poses, gap.links, gap.first) == (100, len(one.links), "")
-    assert not gap.base_only
-    assert not gap.turned_only
+    assert not gap.is_base_offset
+    assert not gap.is_rotation_only
 
 
-def test_the_first_link_that_is_off_is_named_and_how_far_it_is(robot_of):
+def test_first_different_link_is_named(robot_of):
     longer = ('<origin xyz="0 0 -0.213"/>', '<origin xyz="0 0 -0.223"/>')
-    gap = largest_difference(robot_of("quadruped.urdf", longer), robot_of("quadruped.xml"))
-    assert not gap.agrees
+    gap = compare_link_poses(robot_of("quadruped.urdf", longer), robot_of("quadruped.xml"))
+    assert not gap.is_within_tolerance
     assert gap.distance == pytest.approx(0.01, abs=1e-6)
     assert gap.first == "FL_calf"
     assert gap.link in ("FL_calf", "FL_foot")
     assert 0 <= gap.pose < 20
 
 
-def test_it_is_the_same_both_ways_and_every_time(robot_of):
+def test_comparison_is_symmetric_and_deterministic(robot_of):
     one = robot_of(ARM)
     other = robot_of(ARM, ('rpy="0.2 -0.3 0.4"', 'rpy="0.2 -0.3 0.41"'))
-    there, back = largest_difference(one, other), largest_difference(other, one)
+    there, back = compare_link_poses(one, other), compare_link_poses(other, one)
     assert (there.distance, there.angle) == (back.distance, back.angle)
-    assert there == largest_difference(one, other)
+    assert there == compare_link_poses(one, other)
     assert there.angle == pytest.approx(0.01, rel=1e-6)
-    assert there != largest_difference(one, other, seed=1)
+    assert there != compare_link_poses(one, other, seed=1)
 
 
-def test_a_joint_that_is_held_does_not_count(robot_of):
+def test_locked_joint_is_not_compared(robot_of):
     one, other = robot_of(ARM), robot_of(ARM, ('"0 0.6 0.8"', '"0 -0.6 -0.8"'))
-    assert not largest_difference(one, other).agrees
-    assert largest_difference(one, other, held=["turn"]).agrees
+    assert not compare_link_poses(one, other).is_within_tolerance
+    assert compare_link_poses(one, other, locked=["turn"]).is_within_tolerance
 
 
-def test_the_base_frame_alone(robot_of):
+def test_base_offset_is_detected(robot_of):
     other = robot_of(ARM, ('xyz="0.1 0 0" rpy="0.2', 'xyz="0.1 0 0.05" rpy="0.2'))
-    gap = largest_difference(robot_of(ARM), other)
-    assert gap.base_only
+    gap = compare_link_poses(robot_of(ARM), other)
+    assert gap.is_base_offset
     assert gap.base == ("a", "a")
     assert gap.distance == pytest.approx(0.05)
 
 
-def test_a_frame_that_is_turned_by_the_same_at_every_pose(robot_of):
+def test_constant_rotation_is_detected(robot_of):
     turned = ('<origin xyz="0 0.2 0"/>', '<origin xyz="0 0.2 0" rpy="0 0 0.5"/>')
-    gap = largest_difference(robot_of(ARM), robot_of(ARM, turned))
-    assert gap.turned_only
+    gap = compare_link_poses(robot_of(ARM), robot_of(ARM, turned))
+    assert gap.is_rotation_only
     assert gap.angle == pytest.approx(0.5)
     assert gap.link == gap.first == "c"
 
 
-def test_joints_that_follow_are_where_the_other_puts_them(robot_of):
+def test_mimic_joints_follow(robot_of):
     follows = ("<limit lower", '<mimic joint="slide" multiplier="2" offset="0.3"/><limit lower')
     robot = robot_of(ARM, follows)
-    ours, theirs = random_positions(pair_robots(robot, robot), poses=7, seed=3)
+    ours, theirs = sample_positions(pair_robots(robot, robot), poses=7, seed=3)
     np.testing.assert_allclose(ours["turn"], 2 * ours["slide"] + 0.3)
     np.testing.assert_array_equal(ours["turn"], theirs["turn"])
-    assert largest_difference(robot, robot).distance == 0.0
+    assert compare_link_poses(robot, robot).distance == 0.0
 
 
-def test_followers_of_followers_are_where_the_others_put_them(robot_of):
+def test_chained_mimic_joints_follow(robot_of):
     more = """<link name="d"/><joint name="last" type="continuous"><parent link="c"/>
       <child link="d"/><mimic joint="turn" multiplier="-2"/></joint></robot>"""
     follows = ("<limit lower", '<mimic joint="slide" offset="0.5"/><limit lower')
     robot = robot_of(ARM, follows, ("</robot>", more))
-    pairing = pair_robots(robot, robot)
-    ours, _ = random_positions(pairing, poses=7, seed=3)
+    pairs = pair_robots(robot, robot)
+    ours, _ = sample_positions(pairs, poses=7, seed=3)
     np.testing.assert_allclose(ours["turn"], ours["slide"] + 0.5)
     np.testing.assert_allclose(ours["last"], -2 * ours["turn"])
-    held, _ = random_positions(pairing, poses=7, seed=3, held=("turn",))
+    held, _ = sample_positions(pairs, poses=7, seed=3, locked=("turn",))
     assert not held["turn"].any()
     assert not held["last"].any()
 
@@ -187,7 +187,7 @@ REFERENCE = """<mujoco><compiler angle="radian"/><worldbody><body name="a"><free
 
 
 @pytest.mark.parametrize("named", [{}, {"turn": np.array([0.3, -0.2])}])
-def test_joints_that_are_not_named_are_at_zero_in_mjcf_too(robot_of, named):
+def test_other_joints_are_at_zero_in_mjcf(robot_of, named):
     robot = robot_of(REFERENCE)
     poses = mjcf_poses(robot, named)
     for body, pose in zip(robot.bodies, body_poses(robot.bodies, named), strict=True):
@@ -195,17 +195,17 @@ def test_joints_that_are_not_named_are_at_zero_in_mjcf_too(robot_of, named):
         np.testing.assert_allclose(np.broadcast_to(pose, theirs.shape), theirs, atol=1e-12)
 
 
-def test_a_joint_that_only_one_file_has_is_at_zero(robot_of):
+def test_joint_of_one_file_is_at_zero(robot_of):
     fixed = REFERENCE.replace('<joint name="turn" axis="0 0 1" pos="0.1 0 0" ref="0.5"/>', "")
     turned = f'pos="{1.1 - 0.1 * math.cos(0.5)!r} {0.1 * math.sin(0.5)!r} 0" euler="0 0 -0.5"'
     fixed = fixed.replace('pos="1 0 0"', turned)
-    assert largest_difference(robot_of(fixed), robot_of(REFERENCE)).agrees
+    assert compare_link_poses(robot_of(fixed), robot_of(REFERENCE)).is_within_tolerance
 
 
-def test_positions_are_within_the_limits_of_both(robot_of):
+def test_positions_are_within_both_limits(robot_of):
     narrow = ('lower="-1" upper="2"', 'lower="-0.5" upper="3"')
-    pairing = pair_robots(robot_of(ARM), robot_of(ARM, narrow))
-    ours, _ = random_positions(pairing, poses=500, seed=0)
+    pairs = pair_robots(robot_of(ARM), robot_of(ARM, narrow))
+    ours, _ = sample_positions(pairs, poses=500, seed=0)
     assert ours["turn"].min() >= -0.5
     assert ours["turn"].max() <= 2.0
     assert np.ptp(ours["turn"]) > 2.3
@@ -214,24 +214,24 @@ def test_positions_are_within_the_limits_of_both(robot_of):
 
 
 @pytest.mark.parametrize("limit", ['lower="-1e9" upper="1e9"', 'lower="50" upper="60"', ""])
-def test_limits_that_make_no_sense_are_not_believed(robot_of, limit):
+def test_invalid_limits_are_replaced(robot_of, limit):
     robot = robot_of(ARM, ('lower="-1" upper="2"', limit))
-    ours, _ = random_positions(pair_robots(robot, robot), poses=50, seed=0)
+    ours, _ = sample_positions(pair_robots(robot, robot), poses=50, seed=0)
     assert np.abs(ours["turn"]).max() <= math.pi
-    assert largest_difference(robot, robot).agrees
+    assert compare_link_poses(robot, robot).is_within_tolerance
 
 
-# Files as people have them
+# Incomplete and invalid files
 
 
-def test_a_mjcf_whose_meshes_are_not_there(robot_file):
+def test_mjcf_without_meshes_is_compared(robot_file):
     one = Facts(load_robot(robot_file("go2/urdf/go2.urdf")))
-    gap = largest_difference(one, Facts(load_robot(robot_file("go2_mjcf/go2.xml"))), poses=100)
+    gap = compare_link_poses(one, Facts(load_robot(robot_file("go2_mjcf/go2.xml"))), poses=100)
     assert gap.distance < 1e-4
     assert gap.base == ("base", "base_link")
 
 
-def test_a_urdf_with_defects_is_compared_without_a_word(robot_of, caplog, capfd):
+def test_urdf_with_errors_is_compared(robot_of, caplog, capfd):
     broken = robot_of(
         """
         <robot>
@@ -248,14 +248,14 @@ def test_a_urdf_with_defects_is_compared_without_a_word(robot_of, caplog, capfd)
         """
     )
     with caplog.at_level(logging.WARNING):
-        gap = largest_difference(broken, broken)
-    assert gap.agrees
+        gap = compare_link_poses(broken, broken)
+    assert gap.is_within_tolerance
     assert gap.links == 3
     assert caplog.text == ""
     assert capfd.readouterr() == ("", "")
 
 
-def test_a_mjcf_in_degrees_with_a_zero_elsewhere(robot_of):
+def test_mjcf_in_degrees_with_reference_is_compared(robot_of):
     mjcf = """
     <mujoco><worldbody><body name="a"><geom size="0.1"/>
       <body name="b" pos="0.1 0 0" euler="0 0 90"><joint name="turn" ref="30" axis="0 0 1"/>
@@ -266,11 +266,11 @@ def test_a_mjcf_in_degrees_with_a_zero_elsewhere(robot_of):
       <joint name="turn" type="continuous"><parent link="a"/><child link="b"/>
         <origin xyz="0.1 0 0" rpy="0 0 1.04719755119659774"/><axis xyz="0 0 1"/></joint></robot>
     """
-    assert largest_difference(robot_of(urdf), robot_of(mjcf)).distance < 1e-12
-    assert largest_difference(robot_of(urdf), robot_of(mjcf)).angle < 1e-7
+    assert compare_link_poses(robot_of(urdf), robot_of(mjcf)).distance < 1e-12
+    assert compare_link_poses(robot_of(urdf), robot_of(mjcf)).angle < 1e-7
 
 
-def test_bodies_and_joints_without_names_are_found_by_their_place(robot_of):
+def test_unnamed_bodies_are_matched_by_index(robot_of):
     mjcf = """
     <mujoco><worldbody><body><freejoint/><geom size="0.1"/>
       <body pos="0 1 0"><joint axis="1 0 0"/><geom size="0.1"/>
@@ -289,7 +289,7 @@ def test_bodies_and_joints_without_names_are_found_by_their_place(robot_of):
     ],
 )
 @pytest.mark.parametrize("name", ["quadruped.urdf", "quadruped.xml"])
-def test_a_file_that_changed_since_is_not_compared(robot_of, name, change, reason):
+def test_changed_file_cannot_be_compared(robot_of, name, change, reason):
     robot = robot_of(name, ("FL_calf_joint", "turn"))
     file = robot.model.file
     if change is None:
@@ -297,15 +297,15 @@ def test_a_file_that_changed_since_is_not_compared(robot_of, name, change, reaso
     else:
         file.write_text(change(file.read_text()))
     with pytest.raises(CannotCheckError, match=reason):
-        largest_difference(robot, robot)
+        compare_link_poses(robot, robot)
 
 
-def test_robots_without_a_common_link_are_not_compared(robot_of):
+def test_robots_without_common_links_cannot_be_compared(robot_of):
     other = robot_of(ARM.replace('link name="', 'link name="x').replace('link="', 'link="x'))
     none = robot_of(ARM.replace('name="', 'name="x').replace('link="', 'link="x'))
-    assert largest_difference(robot_of(ARM), other).agrees  # their joints have the same names
+    assert compare_link_poses(robot_of(ARM), other).is_within_tolerance
     with pytest.raises(CannotCheckError, match="no links"):
-        largest_difference(robot_of(ARM), none)
+        compare_link_poses(robot_of(ARM), none)
 
 
 def chain(count):
@@ -318,21 +318,21 @@ def chain(count):
     return f'<robot name="r">{links}{joints}</robot>'
 
 
-def test_a_robot_that_takes_too_long_is_not_compared(robot_of):
+def test_large_robot_cannot_be_compared(robot_of):
     robot = robot_of(chain(2000))
     began = time.monotonic()
     with pytest.raises(CannotCheckError, match="2000 joints"):
-        largest_difference(robot, robot)
+        compare_link_poses(robot, robot)
     assert time.monotonic() - began < 2.0
-    assert largest_difference(*[robot_of(chain(60))] * 2).agrees
+    assert compare_link_poses(*[robot_of(chain(60))] * 2).is_within_tolerance
 
 
-def test_two_joints_of_one_name_have_no_position(robot_of):
+def test_duplicate_joint_names_cannot_be_compared(robot_of):
     robot = robot_of(ARM.replace('"slide"', '"turn"'))
-    with pytest.raises(CannotCheckError, match=r"turn .* twice"):
-        largest_difference(robot, robot)
+    with pytest.raises(CannotCheckError, match="two joints called turn"):
+        compare_link_poses(robot, robot)
 
 
-def test_numbers_that_nothing_can_hold_are_no_crash(robot_of):
+def test_extreme_numbers_are_compared(robot_of):
     robot = robot_of(ARM, ('xyz="0.1 0 0"', 'xyz="1e29 0 0"'), ('"0 0.6 0.8"', '"0 1e-200 0"'))
-    assert largest_difference(robot, robot).links == 3
+    assert compare_link_poses(robot, robot).links == 3

@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from dataclasses import fields
 
 import mujoco
@@ -5,12 +7,12 @@ import numpy as np
 import pytest
 import torch
 
-from terrainkit.errors import ConfigError
-from terrainkit_robots.rl.config import DomainRand
+from terrainkit.errors import MemoryLimitError, ConfigError
+from terrainkit_robots.rl.config import DomainRand, Env, Runner, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.events import RandomizedParams
 from terrainkit_robots.rl.scene import build_scene
-from terrainkit_robots.rl.simulation import Simulation
+from terrainkit_robots.rl.simulation import Simulation, bytes_per_env, check_memory
 from terrainkit_robots.rl.terrain import MapTerrain, Plane
 
 
@@ -24,8 +26,8 @@ def sim(cart, calm):
     return sim
 
 
-class TestStepping:
-    def test_is_mujocos_own(self, sim):
+class TestSimulation:
+    def test_step_matches_mj_step(self, sim):
         model = sim.scene.model
         data = mujoco.MjData(model)
         data.qpos[:] = sim.qpos[1]
@@ -38,7 +40,7 @@ class TestStepping:
         np.testing.assert_array_equal(sim.qpos[1], data.qpos)
         np.testing.assert_array_equal(sim.qvel[1], data.qvel)
 
-    def test_sensors_are_those_of_the_state_now(self, sim):
+    def test_sensors_match_the_current_state(self, sim):
         sim.step(4)
         data = mujoco.MjData(sim.scene.model)
         data.qpos[:], data.qvel[:] = sim.qpos[2], sim.qvel[2]
@@ -48,19 +50,19 @@ class TestStepping:
             found = sim.sensor(name)[2].ravel()
             np.testing.assert_allclose(found, data.sensordata[where], atol=1e-5)
 
-    def test_simulations_know_nothing_of_each_other(self, sim):
+    def test_simulations_are_independent(self, sim):
         sim.step(10)
         heights = sim.qpos[:, 2].copy()
         assert heights[0] < heights[1] < heights[2]
 
-    def test_blocks_are_copies(self, sim):
+    def test_sensor_returns_copies(self, sim):
         before = sim.sensor("foot_position")
         kept = before.copy()
         sim.step(10)
         np.testing.assert_array_equal(before, kept)
         assert not np.allclose(sim.sensor("foot_position"), kept)
 
-    def test_some_can_begin_anew(self, sim):
+    def test_reset_of_some_simulations(self, sim):
         sim.step(10)
         untouched = sim.qpos[[0, 2]].copy()
         start = sim.scene.home.copy()
@@ -73,25 +75,25 @@ class TestStepping:
         np.testing.assert_array_equal(sim.qpos[[0, 2]], untouched)
 
 
-class TestBadStates:
+class TestUnstable:
     @pytest.mark.parametrize("value", [np.nan, np.inf, 1e12, -1e12])
     @pytest.mark.parametrize("field", ["qvel", "qpos"])
-    def test_are_told(self, sim, field, value):
+    def test_bad_values_are_reported(self, sim, field, value):
         getattr(sim, field)[1, 7] = value
         assert sim.step(4).tolist() == [False, True, False]
         assert np.isfinite(sim.qpos).all()
 
-    def test_controls_that_are_no_numbers_are_told(self, sim):
+    def test_nonfinite_controls_are_reported(self, sim):
         sim.ctrl[2, 0] = np.nan
         assert sim.step(4).tolist() == [False, False, True]
 
-    def test_are_told_every_time(self, sim):
+    def test_reported_every_time(self, sim):
         for _ in range(3):
             sim.qvel[1, 7] = np.nan
             assert sim.step(4).tolist() == [False, True, False]
             assert not sim.step(4).any()
 
-    def test_are_told_of_what_has_just_begun_anew(self, sim):
+    def test_reported_after_a_reset(self, sim):
         # A reset sets the counts of warnings back too.
         for _ in range(3):
             sim.qvel[1, 7] = np.nan
@@ -99,7 +101,7 @@ class TestBadStates:
             ids = np.array([1])
             sim.reset(ids, sim.scene.home[None], np.zeros((1, sim.scene.model.nv)))
 
-    def test_leave_the_others_as_they_are(self, cart, calm):
+    def test_other_simulations_are_unaffected(self, cart, calm):
         def run(bad):
             scene = build_scene(cart, Plane(), calm())
             sim = Simulation(scene, 3, 1)
@@ -111,14 +113,14 @@ class TestBadStates:
 
         np.testing.assert_array_equal(run(bad=True), run(bad=False))
 
-    def test_leave_no_log_behind(self, sim, tmp_path, monkeypatch):
+    def test_no_mujoco_log_file(self, sim, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
         sim.qvel[1, 7] = np.nan
         sim.step(4)
         assert list(tmp_path.iterdir()) == []
 
 
-def test_threads_do_not_matter(quadruped, lively, mixed_map):
+def test_num_threads_does_not_change_results(quadruped, lively, mixed_map):
     def run(threads):
         env = LeggedEnv(lively(9, num_threads=threads), quadruped, MapTerrain(mixed_map))
         made = torch.Generator().manual_seed(0)
@@ -132,7 +134,7 @@ def test_threads_do_not_matter(quadruped, lively, mixed_map):
     assert run(1) == run(2)
 
 
-class TestRandomization:
+class TestApplyParamsToEnv:
     @pytest.fixture
     def varied(self, cart, calm):
         return LeggedEnv(
@@ -150,8 +152,8 @@ class TestRandomization:
             Plane(),
         )
 
-    def test_is_drawn_within_its_ranges(self, varied):
-        found = varied.differences
+    def test_params_are_within_their_ranges(self, varied):
+        found = varied.params
         assert found.friction.shape == found.added_mass.shape == found.strength.shape == (5, 1)
         assert found.stiffness.shape == found.damping.shape == found.com_shift.shape == (5, 3)
         for values, low, high in (
@@ -166,8 +168,8 @@ class TestRandomization:
             assert (values <= high).all()
             assert np.ptp(values) > 0.1 * (high - low)
 
-    def test_reaches_every_simulation(self, varied):
-        scene, found = varied.scene, varied.differences
+    def test_params_reach_every_simulation(self, varied):
+        scene, found = varied.scene, varied.params
         nominal, base, hinge, wheel = scene.model, scene.base, 1, 0
         for k in range(5):
             model = varied.sim.batch.get_model(k)
@@ -189,14 +191,14 @@ class TestRandomization:
             np.testing.assert_allclose(model.actuator_gainprm[wheel, 0], kd, rtol=1e-6)
             np.testing.assert_allclose(model.actuator_biasprm[wheel, :3], [0, 0, -kd], rtol=1e-6)
 
-    def test_what_follows_from_it_is_computed_anew(self, varied):
+    def test_derived_constants_are_updated(self, varied):
         base = varied.scene.base
         nominal = varied.scene.model.body_subtreemass[base]
-        for k, (added,) in enumerate(varied.differences.added_mass):
+        for k, (added,) in enumerate(varied.params.added_mass):
             model = varied.sim.batch.get_model(k)
             assert model.body_subtreemass[base] == pytest.approx(nominal + added)
 
-    def test_leaves_everything_else(self, varied):
+    def test_other_parameters_are_unchanged(self, varied):
         nominal, base = varied.scene.model, varied.scene.base
         others = np.arange(nominal.nbody) != base
         model = varied.sim.batch.get_model(3)
@@ -205,7 +207,7 @@ class TestRandomization:
         np.testing.assert_array_equal(model.geom_friction[ground], nominal.geom_friction[ground])
         np.testing.assert_array_equal(model.geom_friction[:, 1:], nominal.geom_friction[:, 1:])
 
-    def test_none_leaves_the_robot_as_it_is(self, cart, calm):
+    def test_no_randomization_keeps_the_model(self, cart, calm):
         env = LeggedEnv(calm(2), cart, Plane())
         model = env.sim.batch.get_model(1)
         for name in (
@@ -220,9 +222,7 @@ class TestRandomization:
                 getattr(model, name), getattr(env.scene.model, name), rtol=1e-6, err_msg=name
             )
 
-    def test_a_base_that_would_lose_all_of_its_mass_is_refused(
-        self, cart, calm, tmp_path, monkeypatch
-    ):
+    def test_negative_base_mass_is_rejected(self, cart, calm, tmp_path, monkeypatch):
         # It weighs 4 kg.
         monkeypatch.chdir(tmp_path)
         with pytest.raises(ConfigError, match="added_mass") as caught:
@@ -230,7 +230,7 @@ class TestRandomization:
         assert "\n" not in str(caught.value)
         assert list(tmp_path.iterdir()) == []
 
-    def test_heavier_robots_press_harder(self, quadruped, calm):
+    def test_added_mass_changes_contact_forces(self, quadruped, calm):
         task = calm(3, domain_rand=DomainRand(
             friction=None, added_mass=(-2.0, 3.0), com_shift=0.0, gains=None,
             motor_strength=None, joint_offset=0.0, push_interval_s=0.0,
@@ -243,6 +243,61 @@ class TestRandomization:
         np.testing.assert_allclose(env.state.foot_force.sum(axis=1)[:, 2], weight, rtol=0.02)
         assert np.ptp(weight) > 1
 
-    def test_every_difference_has_a_row_for_each_robot(self, varied):
+    def test_every_param_has_num_envs_rows(self, varied):
         for field in fields(RandomizedParams):
-            assert len(getattr(varied.differences, field.name)) == 5
+            assert len(getattr(varied.params, field.name)) == 5
+
+
+MEASURED = """
+import re, sys
+from pathlib import Path
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.rl.tasks import get_task
+from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.runner import LeggedRunner
+from terrainkit_robots.rl.config import Algorithm, Env, Runner, Task, Terrain
+
+def peak():
+    status = Path("/proc/self/status").read_text()  # ru_maxrss counts who started it, too
+    return 1024 * int(re.search(r"VmHWM:\\s*(\\d+) kB", status)[1])
+
+robot, few, many = Robot.load(get_task("quadruped").folder), 64, 1024
+terrain = Terrain(measure_heights=sys.argv[1] == "True")
+peaks = []
+for count in (few, many):
+    task = Task(
+        env=Env(num_envs=count, num_threads=1),
+        terrain=terrain,
+        algorithm=Algorithm(num_learning_epochs=1),
+        runner=Runner(num_steps_per_env=12),
+    )
+    LeggedRunner(LeggedEnv(task, robot, Plane())).learn(1)
+    peaks.append(peak())
+print((peaks[1] - peaks[0]) / (many - few))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Linux tells the peak of a process")
+@pytest.mark.parametrize("scan", [False, True])
+def test_memory_estimate_matches_measurement(quadruped, scan):
+    run = subprocess.run(
+        [sys.executable, "-c", MEASURED, str(scan)],
+        env={"PYTHONPATH": ":".join(filter(None, sys.path)), "OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    measured, task = float(run.stdout), Task(runner=Runner(num_steps_per_env=12))
+    assert 0.7 < bytes_per_env(task, quadruped, scan=scan, ngeom=50) / measured < 2.0
+
+
+def test_check_memory_names_what_fits(quadruped, monkeypatch):
+    monkeypatch.setattr("terrainkit.memory._free_memory", lambda: 1 << 30)
+    task = Task(env=Env(num_envs=40_000))
+    with pytest.raises(
+        MemoryLimitError, match=r"with 40000 environments needs .*; env\.num_envs 5000 would fit"
+    ):
+        check_memory(task, quadruped, scan=False, ngeom=50)
+    check_memory(Task(env=Env(num_envs=5000)), quadruped, scan=False, ngeom=50)

@@ -4,19 +4,26 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
+import mujoco
 import numpy as np
 import pytest
 import torch
 
+from terrainkit import MapConfig, generate
 from terrainkit_robots.description import bundled
 from terrainkit_robots.rl.config import Control, DomainRand, Env, InitState, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.events import Pushes, RandomizedParams, apply_params, sample_params
+from terrainkit_robots.rl.events import (
+    Pushes,
+    RandomizedParams,
+    apply_params,
+    sample_params,
+    sample_reset_state,
+)
 from terrainkit_robots.rl.scene import Robot, build_scene
 from terrainkit_robots.rl.simulation import Simulation
-from terrainkit_robots.rl.terrain import Plane
-
-torch.set_num_threads(1)
+from terrainkit_robots.rl.terrain import MapTerrain, Plane
+from terrainkit_robots.transforms import quat_to_yaw
 
 _NONE = DomainRand(
     friction=None,
@@ -42,8 +49,8 @@ def draw(sim: Simulation, settings: DomainRand, n: int = 5, seed: int = 0) -> Ra
     return sample_params(np.random.default_rng(seed), n, sim, settings)
 
 
-class TestDraw:
-    def test_ranges_are_filled_and_kept(self) -> None:
+class TestSampleParams:
+    def test_values_fill_their_ranges(self) -> None:
         settings = DomainRand(
             friction=(0.2, 0.4),
             added_mass=(-2, 3),
@@ -69,19 +76,19 @@ class TestDraw:
             middle = np.full(width, (low + high) / 2)
             np.testing.assert_allclose(values.mean(axis=0), middle, atol=3 * near, err_msg=name)
 
-    def test_joints_differ_each_for_itself(self) -> None:
+    def test_joints_are_independent(self) -> None:
         drawn = draw(physics_of(), DomainRand(), n=500)
         assert abs(np.corrcoef(drawn.stiffness[:, 0], drawn.stiffness[:, 1])[0, 1]) < 0.2
         assert abs(np.corrcoef(drawn.stiffness[:, 0], drawn.damping[:, 0])[0, 1]) < 0.2
 
-    def test_none_is_nominal(self) -> None:
+    def test_none_gives_nominal_values(self) -> None:
         drawn = draw(physics_of(), _NONE)
         assert (drawn.added_mass == 0).all()
         assert (drawn.com_shift == 0).all()
         for factor in (drawn.stiffness, drawn.damping, drawn.strength):
             assert (factor == 1).all()
 
-    def test_seed_decides(self) -> None:
+    def test_same_seed_gives_same_values(self) -> None:
         sim = physics_of()
         one, other, third = (draw(sim, DomainRand(), seed=seed) for seed in (1, 1, 2))
         for each in fields(RandomizedParams):
@@ -99,9 +106,9 @@ _CHANGED = (
 )
 
 
-class TestApply:
+class TestApplyParams:
     @pytest.mark.parametrize("kind", ["P", "V", "T"])
-    def test_none_leaves_the_model_as_it_is(self, kind: Literal["P", "V", "T"]) -> None:
+    def test_nominal_params_keep_the_model(self, kind: Literal["P", "V", "T"]) -> None:
         sim = physics_of(kind)
         apply_params(sim, draw(sim, _NONE))
         for field in _CHANGED:
@@ -109,7 +116,7 @@ class TestApply:
             expected = np.broadcast_to(getattr(sim.scene.model, field), found.shape)
             np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9, err_msg=field)
 
-    def test_mass_and_its_inertia(self) -> None:
+    def test_added_mass_scales_inertia(self) -> None:
         sim = physics_of()
         base, model = sim.scene.base, sim.scene.model
         drawn = draw(sim, replace(_NONE, added_mass=(1.5, 1.5)))
@@ -131,7 +138,7 @@ class TestApply:
         np.testing.assert_allclose(shift, drawn.com_shift, atol=1e-7)
         assert np.abs(shift).max() > 0.05
 
-    def test_friction_of_all_that_touches(self) -> None:
+    def test_friction_of_colliding_geoms(self) -> None:
         sim = physics_of()
         apply_params(sim, draw(sim, replace(_NONE, friction=(0.3, 0.3))))
         friction, own = sim.batch.expand("geom_friction"), sim.scene.geoms
@@ -181,7 +188,7 @@ class TestApply:
         np.testing.assert_allclose(gain, np.tile(drawn.strength, 12), rtol=1e-6)
         assert (sim.batch.expand("actuator_biasprm") == 0).all()
 
-    def test_twice_is_once(self) -> None:
+    def test_apply_is_idempotent(self) -> None:
         """A checkpoint's differences are applied over those of the start."""
         sim = physics_of()
         first, second = draw(sim, DomainRand(), seed=1), draw(sim, DomainRand(), seed=2)
@@ -203,8 +210,8 @@ def make_env(settings: DomainRand, n: int = 6, **changes: Any) -> LeggedEnv:
     return LeggedEnv(task, robot_named("quadruped"), Plane())
 
 
-class TestEnvironment:
-    def test_nothing_random_makes_all_alike(self) -> None:
+class TestInEnvironment:
+    def test_robots_are_identical_without_randomization(self) -> None:
         env = make_env(_NONE)
         for _ in range(5):
             env.step(torch.full((6, 12), 0.1))
@@ -221,7 +228,7 @@ class TestEnvironment:
         ],
         ids=lambda change: next(iter(change)),
     )
-    def test_each_makes_them_differ(self, change: dict[str, Any]) -> None:
+    def test_each_setting_makes_robots_differ(self, change: dict[str, Any]) -> None:
         env = make_env(replace(_NONE, **change))
         for _ in range(5):
             env.step(torch.full((6, 12), 0.1))
@@ -240,14 +247,14 @@ class TestEnvironment:
             speeds.append(float(np.abs(feet).mean()))
         assert speeds[0] > 5 * speeds[1]
 
-    def test_motors_keep_to_their_effort(self) -> None:
+    def test_strength_respects_effort_limits(self) -> None:
         env = make_env(DomainRand(motor_strength=(2, 2), push_interval_s=0))
         env.step(torch.full((6, 12), 50.0))
         torque = np.abs(env.state.torques)
         assert (torque <= env.robot.effort * 1.0001).all()
         assert (torque.max(axis=0) > 0.99 * env.robot.effort).any()
 
-    def test_privileged_observations_tell_what_was_drawn(self) -> None:
+    def test_privileged_observations_have_the_params(self) -> None:
         env = make_env(DomainRand())
         seen = env.get_observations()["privileged"].numpy()
         here, start = {}, 0
@@ -259,7 +266,7 @@ class TestEnvironment:
         np.testing.assert_allclose(here["com_shift"], 10 * env.params.com_shift)
         np.testing.assert_array_equal(here["joint_offset"], env.joint_offset)
 
-    def test_joint_offsets_are_new_at_each_reset(self) -> None:
+    def test_joint_offsets_are_resampled_at_reset(self) -> None:
         env = make_env(replace(_NONE, joint_offset=0.05))
         before = env.joint_offset.copy()
         assert 0.04 < np.abs(before).max() <= 0.05
@@ -268,7 +275,7 @@ class TestEnvironment:
         changed = (env.joint_offset != before).any(axis=1)
         assert changed.tolist() == [False, True, False, False, False, False]
 
-    def test_robot_holds_what_it_measures(self) -> None:
+    def test_joint_offset_shifts_the_position(self) -> None:
         """With zero action the measured pose, not the true one, goes to the default."""
         env = make_env(replace(_NONE, joint_offset=0.05))
         env.scene.model.opt.gravity[:] = 0
@@ -296,20 +303,20 @@ class TestEnvironment:
         assert 0.3 < np.abs(velocity).max() <= 0.5
         assert (velocity[..., 2] == 0).all()
 
-    def test_pushes_may_come_at_any_time_of_an_episode(self) -> None:
+    def test_first_push_time_is_uniform(self) -> None:
         pushes = Pushes(DomainRand(push_interval_s=0.1), 2000, 0.02)
-        pushes.begin(np.random.default_rng(0), np.arange(2000))
+        pushes.reset(np.random.default_rng(0), np.arange(2000))
         times, counts = np.unique(pushes.steps_until_push, return_counts=True)
         assert times.tolist() == [1, 2, 3, 4, 5]
         np.testing.assert_allclose(counts, 400, rtol=0.15)
 
-    def test_a_new_episode_has_a_time_of_its_own(self) -> None:
+    def test_reset_samples_a_new_push_time(self) -> None:
         pushes = Pushes(DomainRand(push_interval_s=15), 6, 0.02)
         rng = np.random.default_rng(0)
-        pushes.begin(rng, np.arange(6))
+        pushes.reset(rng, np.arange(6))
         before = pushes.steps_until_push.copy()
         pushes.velocity[:] = 1
-        pushes.begin(rng, np.array([1, 4]))
+        pushes.reset(rng, np.array([1, 4]))
         assert np.flatnonzero(pushes.steps_until_push != before).tolist() == [1, 4]
         assert pushes.velocity[:, 0].tolist() == [1, 0, 1, 1, 0, 1]
 
@@ -318,3 +325,133 @@ class TestEnvironment:
         for _ in range(5):
             env.step(torch.zeros(6, 12))
         assert (env.push_vel == 0).all()
+
+
+@pytest.fixture(scope="module")
+def default_ground():
+    """Return a map of every default terrain at its easiest, a middling and its hardest."""
+    return MapTerrain(generate(MapConfig(rows=3, seed=5)))
+
+
+@pytest.fixture(scope="module")
+def plane_scene(quadruped, calm):
+    return build_scene(quadruped, Plane(), calm())
+
+
+def drawn(robot, scene, ground, settings, origins, seed=0):
+    rng = np.random.default_rng(seed)
+    return sample_reset_state(rng, origins, scene, robot, ground, settings)
+
+
+def deepest(env, qpos, down=0.0):
+    """Return how deep a robot is in the ground, below 0 [m], once it is lowered by `down`."""
+    data = mujoco.MjData(env.scene.model)
+    data.qpos[:] = qpos
+    data.qpos[2] -= down
+    mujoco.mj_forward(env.scene.model, data)
+    return min([contact.dist for contact in data.contact], default=0.0)
+
+
+def everywhere(env):
+    """Start on every patch of the map, each its own robot."""
+    rows, cols = env.terrain.env_origins.shape[:2]
+    env.curriculum.levels[:] = np.repeat(np.arange(rows), cols)
+    env.curriculum.columns[:] = np.tile(np.arange(cols), rows)
+    env.reset()
+
+
+class TestSampleResetState:
+    def test_shapes(self, quadruped, plane_scene):
+        qpos, qvel = drawn(
+            quadruped, plane_scene, Plane(), InitState(), np.zeros((7, 3), np.float32)
+        )
+        assert qpos.shape == (7, plane_scene.model.nq)
+        assert qvel.shape == (7, plane_scene.model.nv)
+        np.testing.assert_allclose(np.linalg.norm(qpos[:, 3:7], axis=1), 1)
+
+    def test_reset_values_fill_their_ranges(self, quadruped, plane_scene):
+        settings = InitState(
+            position=0.4, yaw=1.0, lin_vel=0.3, ang_vel=0.6, reset_range=(0.8, 1.2)
+        )
+        origins = np.tile(np.float32([3, -2, 0]), (400, 1))
+        qpos, qvel = drawn(quadruped, plane_scene, Plane(), settings, origins)
+        offset = qpos[:, :2] - [3, -2]
+        for values, most in (
+            (offset, 0.4),
+            (quat_to_yaw(qpos[:, 3:7].astype(np.float32)), 1.0),
+            (qvel[:, :3], 0.3),
+            (qvel[:, 3:6], 0.6),
+        ):
+            assert np.abs(values).max() <= most + 1e-6
+            assert values.min() < -0.9 * most
+            assert values.max() > 0.9 * most
+        factors = qpos[:, plane_scene.joint_qpos] / np.where(
+            quadruped.default_pose == 0, np.nan, quadruped.default_pose
+        )
+        assert np.nanmin(factors) >= 0.8 - 1e-6
+        assert np.nanmax(factors) <= 1.2 + 1e-6
+        assert (qvel[:, plane_scene.joint_qvel] == 0).all()
+
+    def test_joints_respect_soft_limits(self, quadruped, plane_scene):
+        settings = InitState(reset_range=(0.0, 9.0))
+        qpos, _ = drawn(quadruped, plane_scene, Plane(), settings, np.zeros((50, 3), np.float32))
+        joints = qpos[:, plane_scene.joint_qpos]
+        assert (joints >= quadruped.lower - 1e-6).all()
+        assert (joints <= quadruped.upper + 1e-6).all()
+
+    def test_same_seed_gives_same_state(self, quadruped, plane_scene):
+        origins = np.zeros((5, 3), np.float32)
+        first, second, other = (
+            drawn(quadruped, plane_scene, Plane(), InitState(), origins, seed) for seed in (1, 1, 2)
+        )
+        np.testing.assert_array_equal(first[0], second[0])
+        np.testing.assert_array_equal(first[1], second[1])
+        assert not np.array_equal(first[0], other[0])
+
+    def test_origins_only_shift_the_position(self, quadruped, plane_scene):
+        origins = np.float32([[1, 1, 0], [50, 1, 0]])
+        settings = InitState(position=0.0, yaw=0.0, reset_range=(1.0, 1.0))
+        qpos, _ = drawn(quadruped, plane_scene, Plane(), settings, origins)
+        np.testing.assert_allclose(qpos[:, :2], origins[:, :2])
+        np.testing.assert_allclose(qpos[0, 7:], qpos[1, 7:])
+
+
+class TestResetOnTerrain:
+    @pytest.mark.parametrize("name", ["quadruped", "biped"])
+    def test_feet_are_on_the_ground_at_origin(self, name, calm, default_ground, request):
+        rows, cols = default_ground.env_origins.shape[:2]
+        env = LeggedEnv(calm(rows * cols), request.getfixturevalue(name), default_ground)
+        everywhere(env)
+        np.testing.assert_allclose(
+            env.sim.qpos[:, :2], env.curriculum.env_origins[:, :2], atol=1e-6
+        )
+        for down, touching in ((0.0, False), (0.02, True)):
+            found = [deepest(env, qpos, down) < 0 for qpos in env.sim.qpos]
+            assert found == [touching] * len(found)
+
+    @pytest.mark.parametrize("name", ["quadruped", "biped"])
+    def test_no_geom_is_below_the_ground(self, name, lively, default_ground, request):
+        rows, cols = default_ground.env_origins.shape[:2]
+        env = LeggedEnv(lively(rows * cols), request.getfixturevalue(name), default_ground)
+        for _ in range(3):
+            everywhere(env)
+            depths = np.array([deepest(env, qpos) for qpos in env.sim.qpos])
+            assert depths.min() > -0.02, f"{np.mean(depths < -0.02):.0%} are deeper"
+
+    def test_robots_start_beside_the_origin(self, quadruped, lively, default_ground):
+        rows, cols = default_ground.env_origins.shape[:2]
+        env = LeggedEnv(lively(rows * cols), quadruped, default_ground)
+        everywhere(env)
+        offset = np.abs(env.sim.qpos[:, :2] - env.curriculum.env_origins[:, :2])
+        assert (offset <= 0.5 + 1e-6).all()
+        assert (offset.max(axis=1) > 0.1).mean() > 0.3
+
+    def test_no_robot_falls_at_once(self, quadruped, lively, default_ground):
+        rows, cols = default_ground.env_origins.shape[:2]
+        env = LeggedEnv(lively(rows * cols), quadruped, default_ground)
+        everywhere(env)
+        fallen = np.zeros(rows * cols, bool)
+        for _ in range(10):
+            _, _, dones, _ = env.step(torch.zeros(rows * cols, 12))
+            fallen |= dones.numpy()
+        assert fallen.mean() < 0.02

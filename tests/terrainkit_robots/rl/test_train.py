@@ -61,7 +61,7 @@ def full_disk(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
 
-def test_training_makes_a_run(task, tmp_path):
+def test_train_writes_a_run(task, tmp_path):
     trained = train("quadruped", "plane", task, folder=tmp_path / "run")
     assert (trained.folder, trained.iteration, trained.signal) == (tmp_path / "run", 4, 0)
     run = open_run(tmp_path / "run")
@@ -69,14 +69,14 @@ def test_training_makes_a_run(task, tmp_path):
     assert run.checkpoint == tmp_path / "run" / "model_4.pt"
 
 
-def test_the_folder_has_the_robot_and_the_time_in_its_name(task, tmp_path, monkeypatch):
+def test_train_names_the_default_folder(task, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     folder = train("quadruped", "plane", lasting(task, 1)).folder
     assert folder.parent == Path("logs/quadruped")
     assert (folder / "model_1.pt").exists()
 
 
-def test_a_run_goes_on_exactly_in_its_own_folder(task, tmp_path):
+def test_resume_continues_exactly_in_its_folder(task, tmp_path):
     train("quadruped", "plane", task, folder=tmp_path / "whole")
     train("quadruped", "plane", lasting(task, 2), folder=tmp_path / "run")
     done = train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
@@ -87,7 +87,7 @@ def test_a_run_goes_on_exactly_in_its_own_folder(task, tmp_path):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_run_goes_on_as_if_it_had_not_been(task, tmp_path, number):
+def test_interrupted_run_resumes_exactly(task, tmp_path, number):
     def interrupt(progress: TrainingProgress) -> None:
         if progress.iteration == 2:
             signal.raise_signal(number)
@@ -103,7 +103,7 @@ def test_an_interrupted_run_goes_on_as_if_it_had_not_been(task, tmp_path, number
     assert same_weights(tmp_path / "whole" / "model_4.pt", tmp_path / "run" / "model_4.pt")
 
 
-def test_a_signal_in_the_last_iteration_ends_nothing_early(task, tmp_path):
+def test_signal_in_last_iteration_is_ignored(task, tmp_path):
     def interrupt(progress: TrainingProgress) -> None:
         if progress.iteration == 4:
             signal.raise_signal(signal.SIGTERM)
@@ -112,7 +112,7 @@ def test_a_signal_in_the_last_iteration_ends_nothing_early(task, tmp_path):
     assert (done.iteration, done.signal) == (4, 0)
 
 
-def test_a_second_interrupt_ends_it_at_once(task, tmp_path, monkeypatch):
+def test_second_signal_raises_keyboard_interrupt(task, tmp_path, monkeypatch):
     monkeypatch.setattr(runner, "SIGNAL_INTERVAL", 0.0)
 
     def interrupt(_progress: TrainingProgress) -> None:
@@ -124,7 +124,7 @@ def test_a_second_interrupt_ends_it_at_once(task, tmp_path, monkeypatch):
     assert checkpoints(tmp_path / "run") == {}
 
 
-def test_torchrun_tells_its_processes_again_what_the_terminal_told_them(task, tmp_path):
+def test_repeated_signal_counts_once(task, tmp_path):
     def interrupt(progress: TrainingProgress) -> None:
         if progress.iteration == 2:
             signal.raise_signal(signal.SIGINT)
@@ -137,7 +137,7 @@ def test_torchrun_tells_its_processes_again_what_the_terminal_told_them(task, tm
     assert list(checkpoints(tmp_path / "run")) == [2]
 
 
-def test_a_thread_may_train_too(task, tmp_path):
+def test_train_runs_in_a_thread(task, tmp_path):
     trained: list[Any] = []
     work = threading.Thread(
         target=lambda: trained.append(
@@ -149,7 +149,7 @@ def test_a_thread_may_train_too(task, tmp_path):
     assert trained[0].iteration == 1
 
 
-def test_with_more_environments_a_run_goes_on_in_its_folder(task, tmp_path):
+def test_resume_accepts_other_num_envs(task, tmp_path):
     train("quadruped", "plane", lasting(task, 1), folder=tmp_path / "run")
     more = lasting(replace(task, env=replace(task.env, num_envs=6)), 2)
     done = train("quadruped", "plane", more, resume=open_run(tmp_path / "run"))
@@ -157,7 +157,7 @@ def test_with_more_environments_a_run_goes_on_in_its_folder(task, tmp_path):
     assert open_run(tmp_path / "run").task.env.num_envs == 6
 
 
-def test_curves_of_a_run_that_broke_off_have_each_iteration_once(task, tmp_path):
+def test_tensorboard_has_each_iteration_once_after_a_crash(task, tmp_path):
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
     task = replace(task, runner=replace(task.runner, save_interval=2))
@@ -168,7 +168,7 @@ def test_curves_of_a_run_that_broke_off_have_each_iteration_once(task, tmp_path)
     assert [event.step for event in curves.Scalars("Loss/value")] == [1, 2, 3, 4]
 
 
-def test_from_an_earlier_checkpoint_nothing_is_overwritten(task, tmp_path):
+def test_resume_from_earlier_checkpoint_overwrites_nothing(task, tmp_path):
     run, branch = tmp_path / "run", tmp_path / "branch"
     train(
         "quadruped",
@@ -184,12 +184,12 @@ def test_from_an_earlier_checkpoint_nothing_is_overwritten(task, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["quadruped.xml", "robot.toml"])
-def test_a_robot_that_has_changed_begins_a_new_run_elsewhere(task, tmp_path, name):
+def test_resume_rejects_a_modified_robot(task, tmp_path, name):
     mine, run = tmp_path / "mine", tmp_path / "run"
     shutil.copytree(tasks.get_task("quadruped").folder, mine)
     train(mine, "plane", lasting(task, 1), folder=run)
     (mine / name).write_text((mine / name).read_text() + "\n")
-    with pytest.raises(ConfigError, match=rf"mine has another {name} than .*run was trained with"):
+    with pytest.raises(ConfigError, match=rf"{name} of .*mine changed since .*run was trained"):
         train(mine, "plane", task, resume=open_run(run))
     assert list(checkpoints(run)) == [1]
     other = tmp_path / "other"
@@ -198,7 +198,7 @@ def test_a_robot_that_has_changed_begins_a_new_run_elsewhere(task, tmp_path, nam
     assert list(checkpoints(done.folder)) == [1]
 
 
-def test_another_task_begins_a_new_run_with_the_networks(task, tmp_path, mixed_map):
+def test_resume_with_other_task_starts_new_run(task, tmp_path, mixed_map):
     run = tmp_path / "run"
     train("quadruped", "plane", task, folder=run)
     other = lasting(replace(task, rewards=replace(task.rewards, base_height=-1.0)), 1)
@@ -224,7 +224,7 @@ def test_another_task_begins_a_new_run_with_the_networks(task, tmp_path, mixed_m
     assert open_run(done.folder).terrain == str(path)
 
 
-def test_a_new_run_learns_in_steps_as_large_as_the_other_unless_told(task, tmp_path):
+def test_new_run_keeps_optimizer_unless_rates_differ(task, tmp_path):
     """With Adam begun anew, at the first step's rate, one update undoes what was learned."""
     train("quadruped", "plane", task, folder=tmp_path / "run")
     run = open_run(tmp_path / "run")
@@ -245,7 +245,7 @@ def test_a_new_run_learns_in_steps_as_large_as_the_other_unless_told(task, tmp_p
         assert int(after["state"][0]["step"]) == done + 4
 
 
-def test_robots_stay_on_their_levels_of_a_map_whatever_the_task(task, tmp_path, mixed_map):
+def test_new_run_keeps_levels_on_same_map(task, tmp_path, mixed_map):
     path, copied, other = (tmp_path / f"{name}.npz" for name in ("map", "copied", "other"))
     mixed_map.save(path)
     mixed_map.save(copied)
@@ -254,20 +254,20 @@ def test_robots_stay_on_their_levels_of_a_map_whatever_the_task(task, tmp_path, 
     train("quadruped", path, task, folder=tmp_path / "run")
     run = open_run(tmp_path / "run")
     before = read_checkpoint(run.checkpoint)
-    careers = before["processes"][0]["env"]["careers"]
-    top = len(careers["success"]) - 1
-    careers["levels"][:] = top
+    curriculum = before["processes"][0]["env"]["curriculum"]
+    top = len(curriculum["success"]) - 1
+    curriculum["levels"][:] = top
     save_checkpoint(run.checkpoint, before)
     rewarded = replace(task, rewards=replace(task.rewards, base_height=-1.0))
     for ground, levels in ((path, {top}), (copied, {top}), (other, {0})):
         folder = tmp_path / f"from_{ground.stem}"
         train("quadruped", ground, rewarded, resume=run, folder=folder)
-        after = read_checkpoint(open_run(folder).checkpoint)["processes"][0]["env"]["careers"]
+        after = read_checkpoint(open_run(folder).checkpoint)["processes"][0]["env"]["curriculum"]
         assert set(after["levels"].tolist()) == levels
 
 
 @pytest.mark.parametrize("before", ["plane", "auto"])
-def test_a_map_can_be_left_flat_at_first_or_later(task, tmp_path, mixed_map, before):
+def test_resume_switches_between_plane_and_map(task, tmp_path, mixed_map, before):
     path = mixed_map.save(tmp_path / "map.npz")
     after = {"plane": "auto", "auto": "plane"}[before]
     first, second = (
@@ -280,7 +280,7 @@ def test_a_map_can_be_left_flat_at_first_or_later(task, tmp_path, mixed_map, bef
     assert done.iteration == 1
 
 
-def test_a_checkpoint_of_another_name_is_gone_on_with_in_a_new_run(task, tmp_path, monkeypatch):
+def test_resume_from_renamed_checkpoint_starts_new_run(task, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run = tmp_path / "run"
     train("quadruped", "plane", lasting(task, 1), folder=run)
@@ -290,7 +290,7 @@ def test_a_checkpoint_of_another_name_is_gone_on_with_in_a_new_run(task, tmp_pat
     assert [path.name for path in run.glob("*.pt")] == ["best.pt"]
 
 
-def test_a_policy_alone_is_gone_on_with_in_a_new_run(task, tmp_path):
+def test_resume_from_policy_starts_new_run(task, tmp_path):
     run = tmp_path / "run"
     train("quadruped", "plane", lasting(task, 1), folder=run)
     path = run / "model_1.pt"
@@ -300,20 +300,22 @@ def test_a_policy_alone_is_gone_on_with_in_a_new_run(task, tmp_path):
     assert list(checkpoints(run)) == [1]
 
 
-def test_a_run_that_is_done_says_so(task, tmp_path):
+def test_resume_rejects_a_completed_run(task, tmp_path):
     train("quadruped", "plane", task, folder=tmp_path / "run")
-    with pytest.raises(ConfigError, match=r"4 iterations are done; runner\.max_iterations is 4"):
+    with pytest.raises(
+        ConfigError, match=r"runner\.max_iterations: got 4; expected more than the 4"
+    ):
         train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
 
 
-def test_a_run_of_another_robot_is_told(task, tmp_path):
+def test_resume_rejects_another_robot(task, tmp_path):
     train("quadruped", "plane", lasting(task, 1), folder=tmp_path / "run")
-    with pytest.raises(ConfigError, match="is of another robot, quadruped"):
+    with pytest.raises(ConfigError, match="belongs to another robot, quadruped"):
         train("biped", "plane", task, resume=open_run(tmp_path / "run"), folder=tmp_path / "b")
     assert not (tmp_path / "b").exists()
 
 
-def test_a_run_that_is_there_is_not_overwritten(task, tmp_path):
+def test_train_rejects_a_nonempty_folder(task, tmp_path):
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "mine.txt").touch()
     with pytest.raises(ExportError, match="exists"):
@@ -321,7 +323,7 @@ def test_a_run_that_is_there_is_not_overwritten(task, tmp_path):
     assert [path.name for path in (tmp_path / "run").iterdir()] == ["mine.txt"]
 
 
-def test_a_disk_that_fills_up_leaves_the_checkpoint_before(task, tmp_path, capfd):
+def test_full_disk_keeps_the_last_checkpoint(task, tmp_path, capfd):
     task = replace(task, runner=replace(task.runner, save_interval=2))
     disk = full_disk(20_000)
 
@@ -343,7 +345,7 @@ def test_a_disk_that_fills_up_leaves_the_checkpoint_before(task, tmp_path, capfd
     assert capfd.readouterr() == ("", "")
 
 
-def test_a_disk_that_is_too_full_for_the_curves_is_one_error(task, tmp_path, capfd):
+def test_full_disk_for_logs_is_one_error(task, tmp_path, capfd):
     disk = full_disk(200)
 
     def fill(progress: TrainingProgress) -> None:
@@ -360,44 +362,44 @@ def test_a_disk_that_is_too_full_for_the_curves_is_one_error(task, tmp_path, cap
     assert capfd.readouterr() == ("", "")
 
 
-def test_training_that_diverges_points_at_the_last_checkpoint(task, tmp_path):
+def test_divergence_names_the_last_checkpoint(task, tmp_path):
     algorithm = replace(task.algorithm, learning_rate=1e30, schedule="fixed")
     mad = replace(task, algorithm=algorithm)
     with pytest.raises(ConfigError, match=r"networks have diverged.*; there is no checkpoint"):
         train("quadruped", "plane", mad, folder=tmp_path / "run")
 
 
-def test_too_many_environments_are_refused_before_anything_is_made(task, tmp_path):
+def test_too_many_environments_write_nothing(task, tmp_path):
     many = replace(task, env=replace(task.env, num_envs=100_000_000))
     with pytest.raises(MemoryLimitError, match=r"100000000 environments needs .* GB .* would fit"):
         train("quadruped", "plane", many, folder=tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
 
-def test_wandb_has_to_be_installed(task, tmp_path, monkeypatch):
+def test_missing_wandb_is_reported(task, tmp_path, monkeypatch):
     monkeypatch.setattr("terrainkit_robots.rl.train.find_spec", lambda _: None)
     task = replace(task, runner=replace(task.runner, logger="wandb"))
-    with pytest.raises(ConfigError, match="wandb, which is not installed: pip install wandb"):
+    with pytest.raises(ConfigError, match="wandb is not installed: pip install wandb"):
         train("quadruped", "plane", task, folder=tmp_path / "run")
 
 
 @pytest.mark.parametrize("device", ["gpu", "cuda:99", "meta"])
-def test_a_device_that_is_not_there_is_told(task, tmp_path, device):
+def test_train_rejects_unknown_device(task, tmp_path, device):
     if torch.cuda.is_available():
         pytest.skip("there is one")
-    with pytest.raises(ConfigError, match=f"device '{device}'; here there is: cpu"):
+    with pytest.raises(ConfigError, match=f"device: got '{device}'; expected one of: cpu"):
         train("quadruped", "plane", task, folder=tmp_path / "run", device=device)
 
 
-def test_processes_share_the_environments(task, tmp_path, monkeypatch):
+def test_train_rejects_more_processes_than_environments(task, tmp_path, monkeypatch):
     monkeypatch.setenv("WORLD_SIZE", "9")
     with pytest.raises(
-        ConfigError, match=r"env\.num_envs is 4; wanted one for each of 9 processes"
+        ConfigError, match=r"env\.num_envs: got 4; expected one for each of 9 processes"
     ):
         train("quadruped", "plane", task, folder=tmp_path / "run")
 
 
-def test_a_spec_that_does_not_fit_its_robot_is_told(task, tmp_path):
+def test_train_rejects_a_mismatched_spec(task, tmp_path):
     mine = tmp_path / "mine"
     mine.mkdir()
     for path in tasks.get_task("quadruped").folder.iterdir():
@@ -410,7 +412,7 @@ def test_a_spec_that_does_not_fit_its_robot_is_told(task, tmp_path):
     assert not (tmp_path / "run").exists()
 
 
-def test_waiting_threads_are_told_to_be_passive(task, tmp_path, monkeypatch):
+def test_train_sets_passive_wait_policy(task, tmp_path, monkeypatch):
     monkeypatch.delenv("OMP_WAIT_POLICY", raising=False)
     train("quadruped", "plane", lasting(task, 1), folder=tmp_path / "run")
     assert os.environ["OMP_WAIT_POLICY"] == "PASSIVE"
