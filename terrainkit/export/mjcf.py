@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.annotations import convert
-from terrainkit.box_decomposition import BoxDecomposition, around, level_cells
+from terrainkit.box_decomposition import BoxDecomposition, level_cells, neighborhood
 from terrainkit.memory import check_memory
 from terrainkit.mesh.closed import THICKNESS
 
