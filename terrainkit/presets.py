@@ -1,9 +1,10 @@
 """Presets: named lists of sub-terrains."""
 
 from terrainkit import registry
-from terrainkit.errors import ConfigError, known_names
+from terrainkit.errors import ConfigError
 from terrainkit.parameter import parameters_of
 from terrainkit.sub_terrain import SubTerrain
+from terrainkit.text import known_names
 
 _PROPORTIONS = {
     # The columns of legged_gym in its order. Its "stairs up" are climbed from the platform outward,
