@@ -35,7 +35,7 @@ _MIN_RANGE_SHARE = 0.1
 _FULL_RANGE_SHARE = 0.99
 """Usable share of the joint range from which a joint reaches its limits."""
 
-_SEVERITIES: tuple[Severity, ...] = ("info", "warning", "error")
+_LEVELS: tuple[Severity, ...] = ("info", "warning", "error")
 
 _MIN_MARGIN = 0.005
 """Distance of the center of mass from the edge of the support that a biped needs to stand with
@@ -89,7 +89,7 @@ def unstable_drop(robot: Facts) -> Iterator[Violation]:
     yield Violation(
         subject=robot.model.title,
         source=robot.model.source,
-        severity=_SEVERITIES[level - with_hulls],
+        severity=_LEVELS[level - with_hulls],
         certainty="likely" if with_hulls else "proven",
         message=f"largest velocity when {start} without torques: got {got}; expected at most "
         f"{_MAX_SPEED:.0f} {unit}{calm}",
@@ -140,7 +140,7 @@ def does_not_stand(robot: Facts) -> Iterator[Violation]:
     yield Violation(
         subject=robot.model.title,
         source=robot.model.source,
-        severity=_SEVERITIES[level],
+        severity=_LEVELS[level],
         certainty="likely",
         message=f"standing pose {control}: {', '.join(assessment.faults)}"
         + ("; without self-collision the robot stands" if stands_without else ""),
@@ -202,7 +202,7 @@ def unreachable_limits(robot: Facts) -> Iterator[Violation]:
     sources = {joint.name: joint.source for joint in robot.joints}
     for reach in reaches:
         message = ""
-        if _is_blocked_by_limb(robot, reach):
+        if _has_limb_collision(robot, reach):
             message = (
                 f"usable range of {_describe(reach)}; expected at least {_MIN_RANGE_SHARE:.0%} of "
                 "its range"
@@ -257,7 +257,7 @@ def _describe(reach: Reach) -> str:
     )
 
 
-def _is_blocked_by_limb(robot: Facts, reach: Reach) -> bool:
+def _has_limb_collision(robot: Facts, reach: Reach) -> bool:
     """Return whether both directions are blocked by two bodies of which one carries the other."""
     if reach.share >= _MIN_RANGE_SHARE:
         return False

@@ -56,14 +56,14 @@ _JointPair = tuple[Joint, Joint]
 
 
 @per_robot
-def _optional_pairing(robot: Facts) -> "Pairing | None":
+def _pair_robots(robot: Facts) -> "Pairing | None":
     from terrainkit_robots.lint.compare.pairing import pair_robots
 
     return pair_robots(robot, _other(robot))
 
 
 def _pairing(robot: Facts) -> "Pairing":
-    pairing = _optional_pairing(robot)
+    pairing = _pair_robots(robot)
     if pairing is None:
         empty = robot if not robot.links else _other(robot)
         raise CannotCheckError(f"{short(empty.model.file.name)} has no links")
@@ -173,13 +173,13 @@ def compare_joints(robot: Facts) -> Iterator[Violation]:
     """
     there = _other_name(robot)
     for one, other in _joint_pairs(robot):
-        quantity, difference, severity = _difference(robot, one, other)
-        if quantity:
+        label, difference, severity = _difference(robot, one, other)
+        if label:
             yield Violation(
                 subject=one.name,
                 source=one.source,
                 severity=severity,
-                message=f"{quantity} of joint {_joint_name(one, other)}: got {difference} "
+                message=f"{label} of joint {_joint_name(one, other)}: got {difference} "
                 f"({there}, line {other.source.line})",
             )
 
@@ -248,7 +248,7 @@ def _limit_tolerance(joint: Joint) -> float:
     return _MAX_SLIDE_ERROR if joint.kind == "prismatic" else _MAX_HINGE_ERROR
 
 
-def _comparable_joints(robot: Facts) -> list[_JointPair]:
+def _matching_joints(robot: Facts) -> list[_JointPair]:
     """Return the pairs of joints with the same motion, whose numbers can be compared."""
     return [(a, b) for a, b in _joint_pairs(robot) if _difference(robot, a, b)[2] != "error"]
 
@@ -267,11 +267,11 @@ def compare_limits(robot: Facts) -> Iterator[Violation]:
         MuJoCo reads both formats; the tolerance is 0.002 rad, 0.5 mm, and 1 % of a velocity.
     """
     there = _other_name(robot)
-    pairs = _comparable_joints(robot)
+    pairs = _matching_joints(robot)
     for group in _grouped(pairs, _range_difference):
         one, other = group[0]
         unit = one.unit
-        yield _group_violation(
+        yield _report_group(
             group,
             "limits",
             f"{_format_range(one)} here and {_format_range(other)} in {there}; expected a "
@@ -281,7 +281,7 @@ def compare_limits(robot: Facts) -> Iterator[Violation]:
         one, other = group[0]
         assert one.limit is not None
         assert other.limit is not None
-        yield _group_violation(
+        yield _report_group(
             group,
             "velocity limit",
             f"{one.limit.velocity:.6g} {one.speed_unit} here and {other.limit.velocity:.6g} "
@@ -325,8 +325,8 @@ def _grouped(
     yield from groups.values()
 
 
-def _group_violation(
-    group: Sequence[_JointPair], quantity: str, difference: str, severity: Severity | None = None
+def _report_group(
+    group: Sequence[_JointPair], label: str, difference: str, severity: Severity | None = None
 ) -> Violation:
     one, other = group[0]
     listed = names(_joint_name(a, b) for a, b in group)
@@ -335,7 +335,7 @@ def _group_violation(
         subject=one.name,
         source=(one.limit or one).source,
         severity=severity,
-        message=f"{quantity} of {joints}: got {difference} "
+        message=f"{label} of {joints}: got {difference} "
         f"(line {(other.limit or other).source.line} there)",
         measured={"joints": len(group)},
     )
@@ -367,12 +367,12 @@ def compare_joint_order(robot: Facts) -> Iterator[Violation]:
         source=robot.model.source,
         message=f"order of the {f'{len(pairs)} common ' if subset else ''}joints: got "
         f"{names(ours, most=4)} here and {names(theirs, most=4)} in {there}; "
-        f"{_format_permutation('theirs', 'ours', indices)}",
+        f"{_format_order('theirs', 'ours', indices)}",
         measured={"permutation": str(indices), "back": str(_inverse(indices))},
     )
 
 
-def _format_permutation(target: str, source: str, indices: Sequence[int]) -> str:
+def _format_order(target: str, source: str, indices: Sequence[int]) -> str:
     """Return a permutation and its inverse as two expressions that can be pasted into code."""
     inverse = _inverse(indices)
     return f"{target} = {source}[{list(indices)}] and {source} = {target}[{inverse}]"
@@ -411,15 +411,15 @@ def compare_actuator_order(robot: Facts) -> Iterator[Violation]:
         if difference
     ]
     if not common:  # at most one of the files is an MJCF with actuators
-        yield from (_actuator_violation(robot, message) for message in within)
+        yield from (_report_actuators(robot, message) for message in within)
     elif indices and is_moved(indices):
         between = (
             f"actuator order: got another order than in {there}; "
-            f"{_format_permutation('theirs', 'ours', indices)}"
+            f"{_format_order('theirs', 'ours', indices)}"
         )
-        yield _actuator_violation(robot, "; ".join([between, *within]))
+        yield _report_actuators(robot, "; ".join([between, *within]))
     elif within:
-        yield _actuator_violation(robot, "; ".join(["both files agree", *within]), "info")
+        yield _report_actuators(robot, "; ".join(["both files agree", *within]), "info")
 
 
 def _actuator_difference(robot: Facts) -> str:
@@ -430,12 +430,12 @@ def _actuator_difference(robot: Facts) -> str:
     if indices is None or not is_moved(indices):
         return ""
     return (
-        f"{_format_permutation('ctrl', 'joints', indices)}, where joints has the order "
+        f"{_format_order('ctrl', 'joints', indices)}, where joints has the order "
         f"{names(joints, most=4)} and ctrl the order {names(actuated, most=4)}"
     )
 
 
-def _actuator_violation(robot: Facts, message: str, severity: Severity | None = None) -> Violation:
+def _report_actuators(robot: Facts, message: str, severity: Severity | None = None) -> Violation:
     first = next((actuator.source for actuator in robot.model.actuators), robot.model.source)
     return Violation(subject=robot.model.title, source=first, message=message, severity=severity)
 
@@ -454,7 +454,7 @@ def compare_effort(robot: Facts) -> Iterator[Violation]:
         effort in URDF; in MJCF the largest force of the joint's actuators, and actuatorfrcrange.
     """
     other, there = _other(robot), _other_name(robot)
-    pairs = _comparable_joints(robot)
+    pairs = _matching_joints(robot)
     efforts = {a.name: (effort_of(robot, a), effort_of(other, b)) for a, b in pairs}
 
     def difference(one: Joint, _: Joint) -> tuple[object, ...] | None:
@@ -470,7 +470,7 @@ def compare_effort(robot: Facts) -> Iterator[Violation]:
     for group in _grouped(pairs, difference):
         one, unit = group[0][0], group[0][0].effort_unit
         a, b = (effort or 0.0 for effort in efforts[one.name])
-        yield _group_violation(
+        yield _report_group(
             group,
             "effort limit",
             f"{a:.5g} {unit} here and {b:.5g} {unit} in {there}, {share(a, b):.1%} apart; "
@@ -481,7 +481,7 @@ def compare_effort(robot: Facts) -> Iterator[Violation]:
         bare = other if limited else robot
         has_actuators = bool(bare.model.actuators) or bare.model.kind != "mjcf"
         without, note = there if limited else "this file", ", which has no actuators"
-        yield _group_violation(
+        yield _report_group(
             group,
             "effort limit",
             f"none in {without}{'' if has_actuators else note}; expected the limit of "
@@ -528,10 +528,10 @@ def compare_total_mass(robot: Facts) -> Iterator[Violation]:
             f"{f'; largest differences: {names(causes)}' if causes else ''}",
             measured={"here": a, "there": b, "share": difference},
         )
-    yield from _dropped_masses(robot, other)
+    yield from _missing_mass(robot, other)
 
 
-def _dropped_masses(robot: Facts, other: Facts) -> Iterator[Violation]:
+def _missing_mass(robot: Facts, other: Facts) -> Iterator[Violation]:
     """Yield the mass that MuJoCo drops from a URDF whose MJCF has a floating base."""
     for urdf, mjcf in ((robot, other), (other, robot)):
         floating = any(joint.kind == "floating" for joint in mjcf.model.joints)
@@ -592,7 +592,7 @@ def compare_kinematics(robot: Facts) -> Iterator[Violation]:
     )
 
 
-def _kinematics_message(gap: "KinematicDifference", there: str) -> str:
+def _kinematics_message(gap: "KinematicDifference", other: str) -> str:
     from terrainkit_robots.lint.compare.kinematics import ANGLE, DISTANCE
 
     ours, theirs = gap.base
@@ -601,18 +601,18 @@ def _kinematics_message(gap: "KinematicDifference", there: str) -> str:
     expected = f"expected at most {1000 * DISTANCE:g} mm and {math.degrees(ANGLE):.1g} deg"
     if gap.base_only:
         return (
-            f"frame of {base} on the trunk: got a difference to {there} of "
+            f"frame of {base} on the trunk: got a difference to {other} of "
             f"{1000 * gap.distance:.4g} mm and {angle}, the same for all {gap.links} links; "
             f"{expected}"
         )
     if gap.turned_only:
         return (
-            f"rotation of link frames against those of {there}: got up to {angle} at {gap.link}, "
+            f"rotation of link frames against those of {other}: got up to {angle} at {gap.link}, "
             f"the same in every pose, first at {gap.first}; {expected}; all origins agree to "
             f"{1000 * gap.distance:.2g} mm"
         )
     return (
-        f"position of link {gap.link} relative to {base}: got a difference to {there} of "
+        f"position of link {gap.link} relative to {base}: got a difference to {other} of "
         f"{1000 * gap.distance:.4g} mm and up to {angle} in pose {gap.pose} of {gap.poses} (seed "
         f"{gap.seed}); {expected}; the first of {gap.links} links that differs is {gap.first}"
     )
