@@ -27,6 +27,8 @@ _MAX_MESSAGE = 500
 
 _MAX_INT = 2**63
 
+_DOT_HINT = " (a key with a dot needs quotes)"
+
 SORTED = Meta(extra={"sorted": True})
 """Of two numbers, the second may not be below the first."""
 
@@ -81,7 +83,8 @@ class Config:
                 nested = (k for k, _ in flatten(default or ()) if k.endswith(f".{key}"))
                 known = known_names(key, annotations, "it has", next(nested, ""))
                 owner = path.removesuffix(".") or "config"
-                raise ConfigError(f"{owner} has no key {shorten(repr(key))}; {known}")
+                hint = _DOT_HINT if isinstance(table[key], Mapping) and path else ""
+                raise ConfigError(f"{owner} has no key {shorten(repr(key))}{hint}; {known}")
         values = {
             key: _with_configs(path + key_text(key), value, annotations[key], default, key)
             for key, value in table.items()
@@ -232,12 +235,13 @@ def convert(name: str, value: object, annotation: Any) -> Any:
     if not is_config(kind) and not isinstance(value, Mapping):
         try:
             converted = msgspec.convert(value, annotation)
-            if _is_valid(converted, metas):
+            if _is_valid(value, metas):
                 return converted
         except (msgspec.ValidationError, UnicodeEncodeError):
             pass
-    near = nearest(str(value), args) if origin is Literal else ""
+    near = nearest(str(value), map(str, args)) if origin is Literal else ""
     meant = f"; did you mean {near!r}?" if near else ""
+    meant += _DOT_HINT if isinstance(value, Mapping) and "." in name else ""
     raise ConfigError(f"{name}: got {show(value)}; expected {describe(annotation)}{meant}")
 
 
@@ -266,6 +270,8 @@ def show(value: object) -> str:
         return "an integer beyond 64 bits"
     if isinstance(value, Config | Mapping):
         return "a table" if isinstance(value, Mapping) else type(value).__name__
+    if isinstance(value, tuple):
+        return shorten(f"[{', '.join(map(show, value))}]")
     return shorten(repr(value))
 
 

@@ -19,6 +19,7 @@ from terrainkit.parameter import (
     convert_parameter,
     parameters_of,
 )
+from terrainkit.schema import show
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,7 +79,7 @@ class Terrain(ABC):
         if isinstance(value, tuple):
             if not parameter.ramps or len(value) != 2:
                 expected = "one value or a pair (easy, hard)" if parameter.ramps else "one value"
-                raise ConfigError(f"{cls.kind()}.{name}: got {value}; expected {expected}")
+                raise ConfigError(f"{cls.kind()}.{name}: got {show(value)}; expected {expected}")
             easy, hard = (convert_parameter(cls.kind(), name, end, parameter) for end in value)
             return at_difficulty((easy, hard), difficulty)
         return value

@@ -201,13 +201,13 @@ def _check(name: str, command: CheckRobot, options: "Settings") -> _Checked:
     from terrainkit_robots.lint.selection import lint_selected
     from terrainkit_robots.lint.settings import read_settings
     from terrainkit_robots.mesh.mesh_cache import Meshes
-    from terrainkit_robots.spec.spec_file import read_spec
+    from terrainkit_robots.spec.robot_spec import RobotSpec
 
     path = find_robot(name)
     ours = path == bundled.find(name)
     settings = options.over(read_settings(Path() if ours else path.parent))
     other = _other(command.against, settings)
-    spec = read_spec(Path(command.spec)) if command.spec else None
+    spec = RobotSpec.load(Path(command.spec)) if command.spec else None
 
     def look(contents: Mapping[Path, bytes]) -> "Report":
         model = load_robot(

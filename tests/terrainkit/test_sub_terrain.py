@@ -55,13 +55,13 @@ def test_unknown_parameter_suggests_nearest_name():
         (
             "gap",
             {"width": (0.1, 0.2, 0.3)},
-            r"0\.3\); expected .* pair \(easy, hard\)",
+            r"0\.3\]; expected .* pair \(easy, hard\)",
         ),
-        ("wave", {"number": (1, 4)}, r"wave\.number: got \(1, 4\); expected one value$"),
+        ("wave", {"number": (1, 4)}, r"wave\.number: got \[1, 4\]; expected one value$"),
         (
             "slope",
             {"inverted": (False, True)},
-            r"got \(False, True\); expected one value$",
+            r"got \[False, True\]; expected one value$",
         ),
         ("slope", {"inverted": 1}, r"slope\.inverted: got 1; expected true or false"),
     ],
@@ -83,7 +83,7 @@ def test_proportion_out_of_range_is_rejected(proportion, said):
     ("given", "message"),
     [
         ({"terrain": 3}, "terrain: got 3; expected a string"),
-        ({"terrain": ["gap"]}, r"terrain: got \('gap',\); expected a string"),
+        ({"terrain": ["gap"]}, r"terrain: got \['gap'\]; expected a string"),
         ({"terrain": "gap", "proportion": "1"}, "proportion: got '1'; expected a number"),
         ({"terrain": "gap", "proportion": True}, "proportion: got True; expected a number"),
         ({"terrain": "gap", "name": None}, "name: got None; expected a string"),

@@ -194,11 +194,11 @@ def test_unknown_option_suggests_nearest_one(words, told):
         ),
         (
             ("--commands.lin-vel-x", "2", "1"),
-            r"^--commands\.lin-vel-x: got \(2, 1\).*the lower one first",
+            r"^--commands\.lin-vel-x: got \[2, 1\].*the lower one first",
         ),
         (
             ("--domain-rand.friction", "1"),
-            r"^--domain-rand\.friction: got \(1,\); expected 2 values",
+            r"^--domain-rand\.friction: got \[1\]; expected 2 values",
         ),
         (("--env.num-envs", "1e3"), r"^--env\.num-envs: got 1000\.0; expected an integer"),
         (

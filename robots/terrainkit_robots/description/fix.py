@@ -1,4 +1,4 @@
-"""What a fix would change: edits of single elements and whole new files, as plain data."""
+"""Fixes as data: edits of XML elements, and new files."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from terrainkit_robots.description.model import Source
 
 @dataclass(frozen=True, kw_only=True)
 class SetAttribute:
-    """Give the element's attribute a value; adds it after the others if it is not there."""
+    """Set an attribute of an element. A new attribute is added after the others."""
 
     source: Source
     name: str
@@ -19,7 +19,7 @@ class SetAttribute:
 
 @dataclass(frozen=True, kw_only=True)
 class RemoveAttribute:
-    """Take an attribute away."""
+    """Remove an attribute."""
 
     source: Source
     name: str
@@ -27,25 +27,25 @@ class RemoveAttribute:
 
 @dataclass(frozen=True, kw_only=True)
 class RemoveElement:
-    """Take an element away, with all that is in it."""
+    """Remove an element and its children."""
 
     source: Source
 
 
 @dataclass(frozen=True, kw_only=True)
 class InsertChild:
-    """Put an element into another, as its first or last child."""
+    """Insert an element as the first or last child of another."""
 
     source: Source
     xml: str
-    """The element, on one line, without indentation."""
+    """The element on one line, without indentation."""
 
     first: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReplaceBytes:
-    """Put other bytes in the place of some, anywhere in a file of text."""
+    """Replace a range of bytes in a text file."""
 
     source: Source
     start: int
@@ -55,11 +55,11 @@ class ReplaceBytes:
 
 @dataclass(frozen=True, kw_only=True)
 class WriteFile:
-    """Write a new file, such as a mesh in another format; never over an existing one."""
+    """Create a file, such as a mesh in another format. Existing files are never replaced."""
 
     path: Path
     content: Callable[[], bytes]
-    """Makes the content, when the fix is applied."""
+    """Returns the content. Called when the fix is applied."""
 
 
 Edit = SetAttribute | RemoveAttribute | RemoveElement | InsertChild | ReplaceBytes | WriteFile
@@ -67,13 +67,13 @@ Edit = SetAttribute | RemoveAttribute | RemoveElement | InsertChild | ReplaceByt
 
 @dataclass(frozen=True, kw_only=True)
 class Fix:
-    """A repair that can be made without asking further."""
+    """Edits that correct a violation."""
 
     safety: Literal["safe", "unsafe"]
-    """Safe: the robot stays the same to every reader that could read it. Unsafe: a number, a shape
-    or another file changes, and whoever applies it should look at the result."""
+    """`safe` if the robot stays the same for every reader that accepted the file. `unsafe` if a
+    number, a shape or another file changes, so that the result should be inspected."""
 
     description: str
-    """What it does, as a sentence."""
+    """What the fix does, as a sentence."""
 
     edits: tuple[Edit, ...]

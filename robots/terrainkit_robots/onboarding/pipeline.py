@@ -113,12 +113,12 @@ def bring_in(file: Path, wishes: Wishes) -> BroughtIn:
     """
     from terrainkit_robots.onboarding.report_md import report_page
     from terrainkit_robots.onboarding.verify import prove
-    from terrainkit_robots.spec.spec_file import read_spec
+    from terrainkit_robots.spec.robot_spec import RobotSpec
 
     _check_frameworks(wishes.configs)
     if wishes.target is not None:
         check_folder(wishes.target, overwrite=wishes.overwrite)
-    given = Given(spec=read_spec(wishes.spec), file=str(wishes.spec)) if wishes.spec else None
+    given = Given(spec=RobotSpec.load(wishes.spec), file=str(wishes.spec)) if wishes.spec else None
     wishes.say(f"checking {file.name}")
     report, repaired = _mended(*_repaired(file, wishes))
     for crash in report.crashed:

@@ -90,7 +90,6 @@ def onboard(
     from terrainkit_robots.export.mesh_export.mesh_export import export_meshes
     from terrainkit_robots.export.unsupported import unsupported_elements
     from terrainkit_robots.export.urdf import urdf_text
-    from terrainkit_robots.spec.spec_file import to_toml
 
     if floating is None and given is not None:
         floating = given.spec.floating
@@ -108,7 +107,7 @@ def onboard(
         URDF: urdf_text(facts.model, feet=spec.feet),
         MJCF: _mjcf(facts, spec, excluded),
         SCENE: scene_text(facts.model.name, MJCF, height=max(_height(facts), 0.1)),
-        SPEC: to_toml(spec),
+        SPEC: spec.to_toml(),
     }
     return Onboarded(
         facts=facts,

@@ -25,7 +25,7 @@ from terrainkit_robots.mesh.sniff import open_regular
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.scene import SPEC_FILE, Robot
-from terrainkit_robots.spec.spec_file import read_spec
+from terrainkit_robots.spec.robot_spec import RobotSpec
 from terrainkit_robots.text import free_name
 
 if TYPE_CHECKING:
@@ -197,7 +197,7 @@ def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
             )
     robot_name, terrain = about["robot"], about["terrain"]
     found = tasks.get_task(robot_name)
-    robot = Robot.from_spec(read_spec(folder / SPEC_FILE), found.folder)
+    robot = Robot.from_spec(RobotSpec.load(folder / SPEC_FILE), found.folder)
     if not robot.mjcf.is_file():
         raise ConfigError(f"the robot of {folder} is missing: there is no file {robot.mjcf}")
     if terrain != "plane":
@@ -415,7 +415,8 @@ def _to_plain(value: Any) -> Any:
 def _robot_digests(folder: Path) -> dict[str, str]:
     """Return the SHA-256 of a robot's spec and model by file name."""
     return {
-        name: _sha256(folder / name) for name in (SPEC_FILE, read_spec(folder / SPEC_FILE).mjcf)
+        name: _sha256(folder / name)
+        for name in (SPEC_FILE, RobotSpec.load(folder / SPEC_FILE).mjcf)
     }
 
 

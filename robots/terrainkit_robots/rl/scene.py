@@ -17,7 +17,6 @@ from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.terrain import Terrain, collides
 from terrainkit_robots.spec.per_joint import match_joints
 from terrainkit_robots.spec.robot_spec import RobotSpec
-from terrainkit_robots.spec.spec_file import read_spec
 
 FloatArray = NDArray[np.float32]
 
@@ -102,7 +101,7 @@ class Robot:
         """
         if not (folder / SPEC_FILE).exists():
             raise ConfigError(f"{folder}: got no {SPEC_FILE}; expected an onboarded robot's folder")
-        return cls.from_spec(read_spec(folder / SPEC_FILE), folder)
+        return cls.from_spec(RobotSpec.load(folder / SPEC_FILE), folder)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

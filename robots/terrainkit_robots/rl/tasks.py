@@ -17,7 +17,7 @@ from terrainkit.errors import ConfigError, known_names, shorten
 from terrainkit_robots.description import bundled
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.scene import SPEC_FILE
-from terrainkit_robots.spec.spec_file import read_spec
+from terrainkit_robots.spec.robot_spec import RobotSpec
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -102,7 +102,7 @@ def get_task(name_or_folder: str | Path) -> TaskSpec:
                 raise ConfigError(
                     f"{folder} has no {SPEC_FILE}; expected a folder of terrainkit onboard"
                 )
-            spec = read_spec(folder / SPEC_FILE)
+            spec = RobotSpec.load(folder / SPEC_FILE)
             return TaskSpec(name=spec.name, folder=folder.absolute(), task=Task())
     except OSError as error:
         raise ConfigError(f"cannot read {shorten(name)}: {error.strerror or error}") from error

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from terrainkit.errors import ConfigError
+from terrainkit.toml_text import key_text
 from terrainkit_robots.spec.pattern import compiled, longest_of, ways
-from terrainkit_robots.spec.toml_text import key_text
 from terrainkit_robots.text import closest, names, short
 
 T = TypeVar("T")

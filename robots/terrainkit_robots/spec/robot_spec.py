@@ -1,175 +1,197 @@
-"""RobotSpec: what training needs to know of a robot, in one place, with units and origins.
+"""RobotSpec: what training needs to know about a robot, with units and provenance.
 
-A robot that was onboarded has it as `robot.toml`; users edit that file. Tables by joint take
-patterns, as the frameworks of the field do: a key is the name of a joint, or a regular expression
-that has to match the whole of it.
+An onboarded robot has it as `robot.toml`, which users edit. Tables by joint accept patterns, as in
+Isaac Lab and mjlab: a key is the name of a joint, or a regular expression that matches a whole
+name. Beside each number the file has its unit and where it came from; the table `provenance` keeps
+the latter as data.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
-from typing import Any, Literal
+import textwrap
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, Literal, Self, get_args, get_origin
 
-from terrainkit.coerce import coerce
+from msgspec import Meta
+
 from terrainkit.errors import ConfigError, listing
-from terrainkit_robots.spec.checked import checked
+from terrainkit.schema import (
+    SORTED,
+    UNIQUE,
+    Config,
+    field_docs,
+    field_types,
+    without_meta,
+    without_none,
+)
+from terrainkit.toml_text import LINE_LENGTH, comment_text, line_text
 from terrainkit_robots.spec.per_joint import by_joint
 
+FORMAT_VERSION = 1
+"""Version of the file format; it changes when an old file would be misread."""
+
 Origin = Literal["declared", "measured", "solved", "suggested", "given"]
-"""Where a value came from: written in the robot's file; measured on it, in geometry or simulation;
-solved, as the standing pose is; suggested, by a rule that `reason` states; or given, in a spec that
-somebody edited."""
+"""Where a value came from: declared in the robot's file; measured on its geometry or in simulation;
+solved, as the standing pose; suggested by a rule that `reason` states; given in an edited spec."""
+
+Name = Annotated[
+    str,
+    Meta(
+        min_length=1,
+        pattern=r"^[^\0\ud800-\udfff]+$",
+        description="a non-empty string without NUL and surrogates",
+    ),
+]
+Names = Annotated[tuple[Name, ...], UNIQUE]
+
+Position = Annotated[float, Meta(extra={"unit": "rad or m"})]
+Scale = Annotated[float, Meta(ge=0, extra={"unit": "rad or m"})]
+Stiffness = Annotated[float, Meta(ge=0, extra={"unit": "N m/rad or N/m"})]
+Damping = Annotated[float, Meta(ge=0, extra={"unit": "N m s/rad or N s/m"})]
+Effort = Annotated[float, Meta(gt=0, extra={"unit": "N m or N"})]
+Velocity = Annotated[float, Meta(ge=0, extra={"unit": "rad/s or m/s"})]
+Armature = Annotated[float, Meta(ge=0, extra={"unit": "kg m2 or kg"})]
+Factor = Annotated[float, Meta(ge=0, extra={"unit": "1"})]
+Height = Annotated[float, Meta(extra={"unit": "m"})]
+Length = Annotated[float, Meta(ge=0, extra={"unit": "m"})]
+
+_HEAD = """\
+# {name} as training sees it. SI units, radians, z up; edit what you like.
+#
+# In a table by joint a key is the name of a joint, or a regular expression that matches the whole
+# of it, such as ".*_hip_joint"; every joint has to be matched exactly once. Beside each number are
+# its unit and where it came from when this file was written; the table [provenance] keeps that.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Provenance:
+class Provenance(Config):
     """Where a value came from."""
 
     origin: Origin
+    """Kind of source."""
 
     reason: str = ""
-    """How, in a few words."""
+    """Method, in a few words."""
 
-    def __post_init__(self) -> None:
-        """Check it.
+    def to_table(self) -> dict[str, Any]:
+        """Return the values that a TOML file holds, by key."""
+        return {key: value for key, value in super().to_table().items() if value}
 
-        Raises:
-            ConfigError: if the origin is another, or the reason is no text.
-        """
-        coerce("origin", self.origin, Origin)
-        coerce("reason", self.reason, str)
+    def __str__(self) -> str:
+        """Return such as `measured: drop test`."""
+        return f"{self.origin}: {self.reason}" if self.reason else self.origin
 
 
 @dataclass(frozen=True, kw_only=True)
-class Twin:
-    """The mirror image of a joint: q of the joint looks like `sign` times q of the twin."""
+class MirrorJoint(Config):
+    """The mirror image of a joint: q of the joint looks like `sign` times q of the other joint."""
 
-    joint: str
-    """Name of the twin; a joint in the mirror plane is its own."""
+    joint: Name
+    """Name of the other joint; a joint in the mirror plane is its own mirror image."""
 
-    sign: int
+    sign: Literal[1, -1]
     """+1 or -1."""
 
-    def __post_init__(self) -> None:
-        """Check it.
-
-        Raises:
-            ConfigError: if the sign is neither, or the joint is no name.
-        """
-        coerce("joint", self.joint, str)
-        if coerce("sign", self.sign, int) not in (-1, 1):
-            raise ConfigError(f"sign is {self.sign}; wanted 1 or -1")
-
-
-PerJoint = Mapping[str, float]
-
-
-def _in(unit: str, least: float | None = None, *, above: bool = False) -> Mapping[str, Any]:
-    """Return what is known of numbers in `unit`, nowhere below `least`, or all `above` it."""
-    return {"unit": unit, "least": least, "above": above}
-
 
 @dataclass(frozen=True, kw_only=True)
-class RobotSpec:
-    """A robot as training sees it. SI units and radians."""
+class RobotSpec(Config):
+    """A robot as training sees it. SI units and radians.
 
-    name: str
+    The tables need not name all joints: an edited file is read first and checked then.
+
+    Raises:
+        ConfigError: if a value has the wrong type, is not finite, or is out of range.
+    """
+
+    name: Name
     """Name of the robot."""
 
-    urdf: str
+    urdf: Name
     """Its URDF, relative to the folder of the spec."""
 
-    mjcf: str
+    mjcf: Name
     """Its MJCF, relative to the folder of the spec."""
 
     floating: bool
     """Whether the base moves freely; False for an arm that is bolted down."""
 
-    joint_order: tuple[str, ...]
+    joint_order: Names
     """The actuated joints in the order of actions, observations and MuJoCo's actuators."""
 
-    base: str
+    base: Name
     """Body that carries the limbs."""
 
-    feet: tuple[str, ...] = ()
+    feet: Names = ()
     """Bodies that touch the ground, one a leg, in the order of the legs."""
 
-    shanks: tuple[str, ...] = ()
+    shanks: Names = ()
     """Bodies below the knees, one a leg, in the order of `feet`."""
 
-    thighs: tuple[str, ...] = ()
+    thighs: Names = ()
     """Bodies between hip and knee, one a leg, in the order of `feet`."""
 
-    termination_contacts: tuple[str, ...] = ()
+    termination_contacts: Names = ()
     """Bodies whose contact with the ground ends an episode."""
 
-    penalized_contacts: tuple[str, ...] = ()
+    penalized_contacts: Names = ()
     """Bodies whose contacts cost reward."""
 
-    default_pose: PerJoint = field(metadata=_in("rad or m"))
+    default_pose: Mapping[Name, Position]
     """Position of each joint that actions are added to."""
 
-    stiffness: PerJoint = field(metadata=_in("N m/rad or N/m", 0.0))
+    stiffness: Mapping[Name, Stiffness]
     """Proportional gain of each joint."""
 
-    damping: PerJoint = field(metadata=_in("N m s/rad or N s/m", 0.0))
+    damping: Mapping[Name, Damping]
     """Derivative gain of each joint."""
 
-    effort: PerJoint = field(metadata=_in("N m or N", 0.0, above=True))
+    effort: Mapping[Name, Effort]
     """Largest torque or force of each joint."""
 
-    velocity: PerJoint = field(metadata=_in("rad/s or m/s", 0.0))
+    velocity: Mapping[Name, Velocity]
     """Largest speed of each joint."""
 
-    armature: PerJoint = field(metadata=_in("kg m2 or kg", 0.0))
+    armature: Mapping[Name, Armature]
     """Inertia of each motor's rotor, reflected to the joint."""
 
-    action_scale: PerJoint = field(metadata=_in("rad or m", 0.0))
+    action_scale: Mapping[Name, Scale]
     """Change of a joint's target for an action of 1; of a joint without stiffness, such as a wheel,
     the target is a speed."""
 
-    soft_limits: Mapping[str, tuple[float, float]] = field(metadata=_in("rad or m"))
+    soft_limits: Mapping[Name, Annotated[tuple[Position, Position], SORTED]]
     """Lower and upper position of each joint with limits, that rewards keep it within."""
 
-    reset_range: tuple[float, float] = field(default=(0.5, 1.5), metadata=_in("1", 0.0))
+    reset_range: Annotated[tuple[Factor, Factor], SORTED] = (0.5, 1.5)
     """Factors on the default pose between which a joint starts an episode."""
 
-    base_height_target: float | None = field(default=None, metadata=_in("m"))
+    base_height_target: Height | None = None
     """Height of the base's origin above the ground that rewards ask for."""
 
-    spawn_height: float | None = field(default=None, metadata=_in("m"))
+    spawn_height: Height | None = None
     """Height of the base's origin above the ground at which the robot is let go."""
 
-    leg_length: float | None = field(default=None, metadata=_in("m", 0.0))
+    leg_length: Length | None = None
     """From hip over knee and ankle to the contact, mean of the legs."""
 
-    stance_width: float | None = field(default=None, metadata=_in("m", 0.0))
+    stance_width: Length | None = None
     """Distance between the feet that are farthest apart to the left and right."""
 
-    foot_radius: float | None = field(default=None, metadata=_in("m", 0.0))
+    foot_radius: Length | None = None
     """Radius of a ball foot; of a flat sole half of its width."""
 
-    mirror: Mapping[str, Twin] = field(default_factory=dict)
+    mirror: Mapping[Name, MirrorJoint] = field(default_factory=dict)
     """The twin of each actuated joint that has one, by name."""
 
-    provenance: Mapping[str, Provenance] = field(default_factory=dict)
+    provenance: Mapping[Name, Provenance] = field(default_factory=dict)
     """Where values came from: by the name of the field, and by `field.key` what differs in a table,
     such as `effort.FL_calf_joint`."""
 
     def __post_init__(self) -> None:
-        """Check every value; numbers become floats, lists tuples.
-
-        Whether the tables name all joints is not asked here: a file that is edited has to be read
-        before it can be told what is wrong with it.
-
-        Raises:
-            ConfigError: if a value is of another kind, not finite, or out of its range.
-        """
-        for each in fields(self):
-            object.__setattr__(self, each.name, checked(each, getattr(self, each.name)))
-        known = [each.name for each in fields(self)]
+        super().__post_init__()
+        known = field_types(RobotSpec)
         for key in self.provenance:
             if key.partition(".")[0] not in known:
-                raise ConfigError(f"provenance has {key!r}; wanted one of: {listing(known)}")
+                raise ConfigError(f"provenance: got {key!r}; expected one of: {listing(known)}")
 
     def per_joint(self, name: str) -> dict[str, float]:
         """Return the value of each joint in the table `name`, in the order of `joint_order`.
@@ -184,12 +206,57 @@ class RobotSpec:
             raise ConfigError(f"no table by joint {name!r}; there are: {listing(JOINT_TABLES)}")
         return by_joint(getattr(self, name), self.joint_order, name)
 
+    @classmethod
+    def from_table(
+        cls, table: Mapping[str, Any], default: Self | None = None, path: str = ""
+    ) -> Self:
+        """Return the spec that a TOML table describes; see :meth:`Config.from_table`."""
+        version = table.get("format_version", "nothing")
+        if version != FORMAT_VERSION or isinstance(version, bool):
+            raise ConfigError(f"format_version: got {version}; expected {FORMAT_VERSION}")
+        values = {key: value for key, value in table.items() if key != "format_version"}
+        return super().from_table(values, default, path)
 
-JOINT_TABLES = tuple(each.name for each in fields(RobotSpec) if each.type == PerJoint)
-"""Tables that have a value for every joint."""
+    def to_toml(self) -> str:
+        """Return the spec as TOML with comments; :meth:`from_toml` restores it."""
+        docs, values, tables = field_docs(RobotSpec), [], []
+        for name, value in self.to_table().items():
+            about = "".join(f"# {line}\n" for line in textwrap.wrap(docs[name], LINE_LENGTH - 2))
+            unit = unit_of(name)
+            comments = ("no unit" if unit == "1" else unit, self._origin_text(name))
+            if isinstance(value, Mapping):
+                header = f"{about}[{name}]{comment_text(*comments)}"
+                tables.append("\n".join([header, *self._table_lines(name, value), ""]))
+            elif value is not None:
+                values.append(f"{about}{line_text(name, value, *comments)}\n")
+        head = _HEAD.format(name=comment_text(self.name)[4:] or "The robot")
+        return "\n".join([head, f"format_version = {FORMAT_VERSION}\n", *values, *tables])
+
+    def _table_lines(self, name: str, table: Mapping[str, Any]) -> Iterator[str]:
+        for key, value in table.items():
+            item = value.to_table() if isinstance(value, Config) else value
+            origin = self._origin_text(f"{name}.{key}") if name != "provenance" else ""
+            yield line_text(key, item, origin)
+
+    def _origin_text(self, key: str) -> str:
+        return str(self.provenance.get(key, ""))
 
 
 def unit_of(name: str) -> str:
-    """Return the unit of the field `name`; empty for one that is not a number."""
-    unit: str = RobotSpec.__dataclass_fields__[name].metadata.get("unit", "")
-    return unit
+    """Return the unit of the field `name`; empty if it is not a number."""
+    return next(_units(field_types(RobotSpec)[name]), "")
+
+
+def _units(annotation: Any) -> Iterator[str]:
+    kind, metas = without_meta(without_none(annotation))
+    yield from (meta.extra["unit"] for meta in metas if meta.extra and "unit" in meta.extra)
+    for part in get_args(kind):
+        yield from _units(part)
+
+
+JOINT_TABLES = tuple(
+    name
+    for name, annotation in field_types(RobotSpec).items()
+    if get_origin(annotation) is Mapping and without_meta(get_args(annotation)[1])[0] is float
+)
+"""Tables that have a value for every joint."""

@@ -13,7 +13,6 @@ from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.onboarding.robot_files import onboard
 from terrainkit_robots.spec.robot_spec import RobotSpec
-from terrainkit_robots.spec.spec_file import read_spec, to_toml
 
 every_robot = pytest.mark.parametrize("name", bundled.names())
 every_format = pytest.mark.parametrize("suffix", [".urdf", ".xml"])
@@ -328,7 +327,7 @@ def test_check_robot_has_nothing_to_say(name, suffix):
 
 @every_robot
 def test_the_spec_is_what_onboarding_would_derive_but_for_what_was_edited(name):
-    spec = read_spec(bundled.find(name).with_name("robot.toml"))
+    spec = RobotSpec.load(bundled.find(name).with_name("robot.toml"))
     derived = onboard(facts(name, ".urdf")).spec
     edited = {key for key, told in spec.provenance.items() if told.origin == "given"}
     for each in dataclasses.fields(RobotSpec):
@@ -347,7 +346,7 @@ def test_the_spec_is_what_onboarding_would_derive_but_for_what_was_edited(name):
 @every_format
 def test_check_robot_has_nothing_to_say_of_the_spec(name, suffix):
     path = bundled.find(name)
-    spec = read_spec(path.with_name("robot.toml"))
+    spec = RobotSpec.load(path.with_name("robot.toml"))
     robot = Facts(load_robot(path.with_suffix(suffix)), spec=spec)
     loud = [f for f in lint(robot).findings if f.severity != "info"]
     assert not loud, "\n".join(f"{f.code} {f.subject}: {f.message}" for f in loud)
@@ -355,7 +354,7 @@ def test_check_robot_has_nothing_to_say_of_the_spec(name, suffix):
 
 @every_robot
 def test_the_spec_names_bodies_and_joints_of_the_model(name):
-    spec = read_spec(bundled.find(name).with_name("robot.toml"))
+    spec = RobotSpec.load(bundled.find(name).with_name("robot.toml"))
     model = compiled(name)
     assert (bundled.find(name).parent / spec.mjcf).is_file()
     assert list(spec.joint_order) == hinges(model)
@@ -372,4 +371,4 @@ def test_the_spec_names_bodies_and_joints_of_the_model(name):
 @every_robot
 def test_the_spec_is_as_it_would_be_written(name):
     path = bundled.find(name).with_name("robot.toml")
-    assert path.read_text() == to_toml(read_spec(path))
+    assert path.read_text() == RobotSpec.load(path).to_toml()

@@ -4,7 +4,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.export.base_link import with_world_base
 from terrainkit_robots.onboarding.pipeline import Wishes, bring_in
-from terrainkit_robots.spec.spec_file import read_spec
+from terrainkit_robots.spec.robot_spec import RobotSpec
 
 MASS = '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/><geom size="0.1" mass="0"/>'
 CART = f"""<mujoco model="cart"><worldbody>
@@ -35,7 +35,7 @@ def brought_in(tmp_path, text, **wishes):
     robot = facts(tmp_path, text)
     folder = tmp_path / "robot"
     done = bring_in(robot.model.file, Wishes(target=folder, pictures=False, **wishes))
-    return done, read_spec(folder / "robot.toml")
+    return done, RobotSpec.load(folder / "robot.toml")
 
 
 def test_a_cart_slides_on_the_world(tmp_path):

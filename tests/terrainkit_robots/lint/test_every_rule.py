@@ -95,9 +95,9 @@ class Case:
             file.write_bytes(self.other_text.encode())
             other = Facts(load_robot(file))
         if self.spec is not None:
-            from terrainkit_robots.spec.spec_file import from_toml
+            from terrainkit_robots.spec.robot_spec import RobotSpec
 
-            spec = from_toml(self.spec)
+            spec = RobotSpec.from_toml(self.spec)
         model = load_robot(path, contents=contents)
         return Facts(model, Meshes(contents), against=other, spec=spec)
 

@@ -19,7 +19,7 @@ from terrainkit_robots.onboarding.frameworks import frameworks
 from terrainkit_robots.onboarding.pipeline import Wishes, bring_in
 from terrainkit_robots.onboarding.summary import summary
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.spec.spec_file import read_spec
+from terrainkit_robots.spec.robot_spec import RobotSpec
 
 REAL = [
     "a1/urdf/a1.urdf",
@@ -59,7 +59,7 @@ def check(file, tmp_path):
     assert done.proof.locked == (len(done.made.facts.legs) == 2)
     source = Facts(load_robot(file))
     urdf, mjcf = (load_robot(folder / name) for name in ("robot.urdf", "robot.xml"))
-    spec = read_spec(folder / "robot.toml")
+    spec = RobotSpec.load(folder / "robot.toml")
     assert not urdf.problems
     assert not mjcf.problems
     # The two agree with each other and with the spec, as the rules see it,
@@ -146,7 +146,7 @@ def test_a_spec_that_was_edited_goes_before(tmp_path):
     ]
     edited = tmp_path / "mine.toml"
     edited.write_text("\n".join(lines))
-    wanted = read_spec(edited)
+    wanted = RobotSpec.load(edited)
     done = bring_in(
         bundled.find("quadruped"),
         Wishes(target=tmp_path / "again", pictures=False, spec=edited),
@@ -203,7 +203,7 @@ def test_an_arm_is_brought_in_without_legs(tmp_path):
     file = tmp_path / "arm.urdf"
     file.write_text(ARM)
     done = bring_in(file, wishes(tmp_path))
-    spec = read_spec(done.folder / "robot.toml")
+    spec = RobotSpec.load(done.folder / "robot.toml")
     assert (spec.feet, spec.floating, spec.base_height_target) == ((), False, None)
     assert done.proof.standing is None
     assert dict(summary(done))["stands"] == "not asked: it has no legs"

@@ -87,7 +87,7 @@ def test_non_finite_numbers_are_rejected(section):
         (Env, "num_threads", -1, "num_threads: got -1; expected an integer from 0 to 4096"),
         (Terrain, "collision", "mesh", "expected one of: auto, hfield, boxes, plane"),
         (Terrain, "curriculum", 1, "curriculum: got 1; expected true or false"),
-        (Terrain, "measured_points_x", [], r"measured_points_x: got \(\); expected a non-empty"),
+        (Terrain, "measured_points_x", [], r"measured_points_x: got \[\]; expected a non-empty"),
         (InitState, "reset_range", (0.5, -1), "reset_range: got .*each a number >= 0"),
         (InitState, "reset_range", (1.5, 0.5), "the lower one first, or none"),
         (InitState, "position", -0.1, "position: got -0.1; expected a number >= 0"),
@@ -105,7 +105,7 @@ def test_non_finite_numbers_are_rejected(section):
         (Rewards, "tracking_lin_vel", "much", "tracking_lin_vel: got 'much'; expected a number"),
         (Termination, "tilt", 4, "tilt: got 4; expected a number > 0 and <= 3.14159"),
         (Sim, "dt", 1, "dt: got 1; expected a number > 0 and <= 0.1"),
-        (Policy, "actor_hidden_dims", (), r"actor_hidden_dims: got \(\)"),
+        (Policy, "actor_hidden_dims", (), r"actor_hidden_dims: got \[\]"),
         (Policy, "critic_hidden_dims", (128, 10**12), "critic_hidden_dims: .* from 1 to 65536"),
         (Policy, "activation", "relu6", "got 'relu6'; expected one of: elu, .*mean 'relu'"),
         (Algorithm, "gamma", 1.01, "gamma: got 1.01; expected a number from 0 to 1"),
@@ -188,7 +188,7 @@ def test_fields_of_subclass_are_validated():
     assert NoisyTask(din=Noisy(level=2, ends=[0, 1])).din.ends == (0.0, 1.0)
     for values, told in {
         (("level", 0),): "level: got 0; expected a number > 0",
-        (("names", (1,)),): "names: got .1,.; expected a list, each value a string",
+        (("names", (1,)),): "names: got .1.; expected a list, each value a string",
         (("ends", (0, 6)),): "ends: got .*; expected",
         (("ends", (1, 0)),): "the lower one first",
     }.items():

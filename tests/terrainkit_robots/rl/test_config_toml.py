@@ -146,7 +146,7 @@ def test_subclass_adds_keys():
     ("text", "told"),
     [
         ("rewards = 1", r"rewards: got 1; expected a table \(Rewards\)"),
-        ("[[rewards]]\nx = 1", r"rewards: got \(.*; expected a table"),
+        ("[[rewards]]\nx = 1", r"rewards: got \[.*; expected a table"),
         (
             "tracking_lin_vel = 1",
             r"no key 'tracking_lin_vel'; did you mean 'rewards\.track",

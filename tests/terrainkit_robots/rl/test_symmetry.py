@@ -17,7 +17,7 @@ from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.symmetry import MirrorMaps, augment, mirror_maps
 from terrainkit_robots.rl.terrain import Plane, Terrain
-from terrainkit_robots.spec.robot_spec import Twin
+from terrainkit_robots.spec.robot_spec import MirrorJoint
 
 torch.set_num_threads(1)
 
@@ -280,7 +280,9 @@ class TestErrors:
 
     def test_twin_that_is_not_one(self) -> None:
         robot = robot_named("quadruped")
-        mirror = dict(robot.spec.mirror) | {"FL_hip_joint": Twin(joint="RR_hip_joint", sign=-1)}
+        mirror = dict(robot.spec.mirror) | {
+            "FL_hip_joint": MirrorJoint(joint="RR_hip_joint", sign=-1)
+        }
         env = make_env("", robot=replace(robot, spec=replace(robot.spec, mirror=mirror)))
         with pytest.raises(ConfigError, match="FL_hip_joint is paired with 'RR_hip_joint'"):
             mirror_maps(env)

@@ -5,16 +5,22 @@ import numpy as np
 import pytest
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots.spec.robot_spec import JOINT_TABLES, Provenance, RobotSpec, Twin, unit_of
+from terrainkit_robots.spec.robot_spec import (
+    JOINT_TABLES,
+    MirrorJoint,
+    Provenance,
+    RobotSpec,
+    unit_of,
+)
 
 
-def test_every_number_has_a_unit():
+def test_unit_of_is_given_for_every_number():
     for field in fields(RobotSpec):
         numeric = "float" in str(field.type)
         assert bool(unit_of(field.name)) == numeric, field.name
 
 
-def test_tables_by_joint():
+def test_joint_tables_are_those_of_numbers():
     assert JOINT_TABLES == (
         "default_pose",
         "stiffness",
@@ -26,7 +32,7 @@ def test_tables_by_joint():
     )
 
 
-def test_values_are_those_of_the_field(spec):
+def test_values_are_converted(spec):
     made = spec(
         joint_order=["b"], stiffness={"b": 3}, reset_range=[0, 2], spawn_height=np.float64(1)
     )
@@ -37,7 +43,7 @@ def test_values_are_those_of_the_field(spec):
     assert type(made.spawn_height) is float
 
 
-def test_per_joint_is_in_the_order_of_the_joints(spec):
+def test_per_joint_keeps_the_joint_order(spec):
     made = spec(joint_order=("b", "a"), stiffness={"[ab]": 7})
     assert list(made.per_joint("stiffness").items()) == [("b", 7.0), ("a", 7.0)]
     with pytest.raises(ConfigError, match="no table by joint 'soft_limits'; there are: default_"):
@@ -49,50 +55,74 @@ def test_per_joint_is_in_the_order_of_the_joints(spec):
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
-        ({"stiffness": {"FL_hip_joint": -1}}, "stiffness.FL_hip_joint is -1; wanted 0 or more N m"),
-        ({"stiffness": {"a.b": float("nan")}}, 'stiffness."a.b" is nan; wanted 0 or more N m/rad'),
-        ({"damping": {"a": float("inf")}}, "damping.a is inf; wanted 0 or more N m s/rad or N s/m"),
-        ({"effort": {"a": "1"}}, "effort.a is '1'; wanted a number"),
-        ({"effort": {"a": 0}}, "effort.a is 0; wanted more than 0 N m or N"),
-        ({"effort": {"a": True}}, "effort.a is True; wanted a number"),
+        (
+            {"stiffness": {"FL_hip_joint": -1}},
+            "stiffness.FL_hip_joint: got -1; expected",
+        ),
+        (
+            {"stiffness": {"a.b": float("nan")}},
+            'stiffness."a.b": got nan; expected a number >=',
+        ),
+        (
+            {"damping": {"a": float("inf")}},
+            "damping.a: got inf; expected a number >= 0 [N m s",
+        ),
+        ({"effort": {"a": "1"}}, "effort.a: got '1'; expected a number > 0 [N m or N]"),
+        ({"effort": {"a": 0}}, "effort.a: got 0; expected a number > 0 [N m or N]"),
+        ({"effort": {"a": True}}, "effort.a: got True; expected a number"),
         (
             {"effort": {"a": {"b": 1}}},
-            "effort.a is a table; wanted more than 0 N m or N, a name with",
+            ": got a table; expected a number > 0 [N m or N] (a key with a dot needs quotes)",
         ),
-        ({"effort": 3}, "effort is 3; wanted a table"),
-        ({"effort": {"": 3}}, "a key of effort is ''; wanted a name"),
-        ({"default_pose": {"a": 1e400}}, "default_pose.a is inf; wanted a finite number rad or m"),
-        ({"soft_limits": {"a": [1, 0]}}, "soft_limits.a is [1.0, 0.0]; wanted the lower number"),
-        ({"soft_limits": {"a": [1]}}, "soft_limits.a has 1 values; wanted 2"),
-        ({"soft_limits": {"a": 1}}, "soft_limits.a is 1; wanted a list"),
-        ({"reset_range": (-1, 1)}, "reset_range is -1; wanted 0 or more"),
-        ({"foot_radius": -0.1}, "foot_radius is -0.1; wanted 0 or more m"),
-        ({"spawn_height": float("nan")}, "spawn_height is nan; wanted a finite number m"),
-        ({"spawn_height": {}}, "spawn_height is a table; wanted a finite number m"),
-        ({"name": ""}, "name is ''; wanted a name"),
-        ({"name": 3}, "name is 3; wanted a text"),
-        ({"urdf": "a\0b"}, "urdf is 'a\\x00b'; wanted text without NUL"),
-        ({"base": "\ud800"}, "wanted text without NUL and lone surrogates"),
-        ({"floating": 1}, "floating is 1; wanted true or false"),
-        ({"joint_order": ("a", "a")}, "joint_order has 'a' twice; wanted each name once"),
-        ({"joint_order": "ab"}, "joint_order is 'ab'; wanted a list"),
-        ({"feet": ("a", "")}, "feet is ''; wanted a name"),
-        ({"mirror": {"a": "b"}}, "mirror.a is 'b'; wanted Twin"),
-        ({"provenance": {"x": Provenance(origin="solved")}}, "provenance has 'x'; wanted one of:"),
-        ({"provenance": {"x.a": Provenance(origin="solved")}}, "provenance has 'x.a'; wanted one"),
+        ({"effort": 3}, "effort: got 3; expected a table"),
+        ({"effort": {"": 3}}, "key of effort: got ''; expected a non-empty string"),
+        ({"default_pose": {"a": 1e400}}, "default_pose.a: got inf; expected a number [rad or m]"),
+        (
+            {"soft_limits": {"a": [1, 0]}},
+            "soft_limits.a: got [1, 0]; expected 2 values",
+        ),
+        ({"soft_limits": {"a": [1]}}, "soft_limits.a: got [1]; expected 2 values"),
+        ({"soft_limits": {"a": 1}}, "soft_limits.a: got 1; expected 2 values"),
+        (
+            {"reset_range": (-1, 1)},
+            "reset_range: got [-1, 1]; expected 2 values",
+        ),
+        ({"foot_radius": -0.1}, "foot_radius: got -0.1; expected a number >= 0 [m]"),
+        ({"spawn_height": float("nan")}, "spawn_height: got nan; expected a number [m], or none"),
+        ({"spawn_height": {}}, "spawn_height: got a table; expected a number [m]"),
+        ({"name": ""}, "name: got ''; expected a non-empty string"),
+        ({"name": 3}, "name: got 3; expected a non-empty string"),
+        ({"urdf": "a\0b"}, "urdf: got 'a\\x00b'; expected a non-empty string without NUL"),
+        ({"base": "\ud800"}, "expected a non-empty string without NUL and surrogates"),
+        ({"floating": 1}, "floating: got 1; expected true or false"),
+        ({"joint_order": ("a", "a")}, "joint_order: got ['a', 'a']; expected a list, each value a"),
+        ({"joint_order": "ab"}, "joint_order: got 'ab'; expected a list"),
+        (
+            {"feet": ("a", "")},
+            "feet: got ['a', '']; expected a list",
+        ),
+        ({"mirror": {"a": "b"}}, "mirror.a: got 'b'; expected a table (MirrorJoint)"),
+        (
+            {"provenance": {"x": Provenance(origin="solved")}},
+            "provenance: got 'x'; expected",
+        ),
+        (
+            {"provenance": {"x.a": Provenance(origin="solved")}},
+            "provenance: got 'x.a'; expect",
+        ),
     ],
 )
-def test_a_wrong_value_is_named(spec, changed, message):
+def test_invalid_value_is_named(spec, changed, message):
     with pytest.raises(ConfigError, match=re.escape(message)):
         spec(**changed)
 
 
-def test_origins_and_signs_are_checked():
-    with pytest.raises(ConfigError, match="origin is 'guessed'; wanted one of: declared, measured"):
-        Provenance(origin="guessed")
-    with pytest.raises(ConfigError, match="reason is 3; wanted a text"):
-        Provenance(origin="solved", reason=3)
-    with pytest.raises(ConfigError, match="sign is 0; wanted 1 or -1"):
-        Twin(joint="a", sign=0)
-    with pytest.raises(ConfigError, match="joint is None; wanted a text"):
-        Twin(joint=None, sign=1)
+def test_provenance_and_mirror_are_validated():
+    for make, message in {
+        lambda: Provenance(origin="guessed"): "origin: got 'guessed'; expected one of: declar",
+        lambda: Provenance(origin="solved", reason=3): "reason: got 3; expected a string",
+        lambda: MirrorJoint(joint="a", sign=0): "sign: got 0; expected one of: 1, -1",
+        lambda: MirrorJoint(joint=None, sign=1): "joint: got None; expected a non-empty string",
+    }.items():
+        with pytest.raises(ConfigError, match=message):
+            make()

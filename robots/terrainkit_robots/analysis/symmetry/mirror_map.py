@@ -5,7 +5,7 @@ import numpy as np
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.kinematics import axis_in_trunk
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.spec.robot_spec import Twin
+from terrainkit_robots.spec.robot_spec import MirrorJoint
 
 _NEAR = 0.02
 """A body this share of the robot's size away from the mirror plane lies in it, as in
@@ -15,7 +15,7 @@ _ALONG = 0.7
 """Cosine from which two axes are the same one."""
 
 
-def mirror_map(robot: Facts) -> dict[str, Twin]:
+def mirror_map(robot: Facts) -> dict[str, MirrorJoint]:
     """Return the twin of each actuated joint that has one.
 
     A joint in the mirror plane is its own: a waist that yaws does so the other way, one that
@@ -24,7 +24,7 @@ def mirror_map(robot: Facts) -> dict[str, Twin]:
     driven = {joint.name for joint in robot.actuated}
     points = np.array([pose[:3, 3] for pose in robot.at_zero]).reshape(-1, 3)
     near = max(_NEAR * float(np.linalg.norm(np.ptp(points, axis=0))), 1e-3) if len(points) else 0.0
-    found: dict[str, Twin] = {}
+    found: dict[str, MirrorJoint] = {}
     for body in robot.bodies:
         joint = body.joint
         if joint is None or joint.name not in driven:
@@ -33,11 +33,11 @@ def mirror_map(robot: Facts) -> dict[str, Twin]:
         if twin is None:
             sign = _own_sign(robot, body, near)
             if sign:
-                found[joint.name] = Twin(joint=joint.name, sign=sign)
+                found[joint.name] = MirrorJoint(joint=joint.name, sign=sign)
             continue
         other, sign = robot.bodies[twin[0]].joint, twin[1]
         if sign and other is not None and other.name in driven:
-            found[joint.name] = Twin(joint=other.name, sign=sign)
+            found[joint.name] = MirrorJoint(joint=other.name, sign=sign)
     return {joint.name: found[joint.name] for joint in robot.actuated if joint.name in found}
 
 

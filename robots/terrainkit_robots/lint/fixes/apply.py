@@ -1,8 +1,8 @@
-"""Fixes, applied: from what a robot's rules propose to files that those rules find nothing in.
+"""Apply the fixes of findings to the files of a robot.
 
-All of it happens in memory, in rounds: fixes that do not touch each other are made, the result is
-checked again, and what is found then is fixed in turn. Only `write_fixes` writes, and it writes to
-the robot's own files and new ones near them, wherever else the file may point.
+Fixes are applied in memory, in rounds: all fixes that do not overlap are applied, the robot is
+checked again, and new findings are fixed in the next round. Only `write_fixes` writes, and only to
+the robot's own files and to new files near them, regardless of the paths in the robot's file.
 """
 
 import difflib
@@ -22,84 +22,84 @@ from terrainkit_robots.description.xml.document import read_bytes
 from terrainkit_robots.lint.fixes.edits import EditedBytes, EditError
 from terrainkit_robots.lint.runner import Finding, Report
 from terrainkit_robots.mesh.mesh_cache import MeshError
+from terrainkit_robots.text import display_path
 
-Look = Callable[[Mapping[Path, bytes]], Report]
-"""Reads and checks a robot, with these contents in the place of the files of these paths."""
+CheckContents = Callable[[Mapping[Path, bytes]], Report]
+"""Loads and checks a robot. The argument replaces the content of files, by path."""
 
-_MOST_ROUNDS = 50
-"""So often a robot is checked again; fixes that wait for each other need a handful of rounds."""
+_MAX_ROUNDS = 50
+"""Maximum number of rounds. Fixes that depend on each other need a few."""
 
-_FOLDERS = {"urdf", "xacro", "mjcf", "xml", "robots"}
-"""What the folder of the robot's file is called in a package, by custom."""
+_ROBOT_FOLDERS = {"urdf", "xacro", "mjcf", "xml", "robots"}
+"""Conventional names of the folder of the robot's file in a package."""
 
-_NEW_FILES = frozenset({".stl", ".obj"})
-"""What a fix may add is a mesh, whatever its name was made from."""
+_NEW_SUFFIXES = frozenset({".stl", ".obj"})
+"""Suffixes of files that a fix may create."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Unfixed:
-    """A finding that has a fix which was not made, or did not help."""
+    """A finding whose fix was not applied or had no effect."""
 
     finding: Finding
-
     reason: str
-    """Why."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FixResult:
-    """What fixes make of a robot. Nothing of it is written yet."""
+    """The result of fixing a robot. Nothing is written yet."""
 
     before: Mapping[Path, bytes]
-    """What the files that change held, by the path under which they were read."""
+    """Original contents of the changed files, by the path under which they were read."""
 
     after: Mapping[Path, bytes]
-    """What they are to hold."""
+    """Fixed contents of the changed files."""
 
     new: Mapping[Path, bytes]
-    """Files to be added."""
+    """Contents of the files to create."""
 
     fixed: tuple[Finding, ...]
-    """What was found, and is not found any more."""
+    """Findings that no longer occur."""
 
     unfixed: tuple[Unfixed, ...]
-    """What could be fixed, and was not."""
+    """Findings that have a fix and still occur."""
 
     report: Report
-    """What is found once the files are written."""
+    """The report on the fixed robot."""
 
 
-def fix_robot(file: Path, look: Look, *, unsafe: bool = False) -> FixResult:
-    """Return what the fixes of a robot make of it; nothing is written.
+def fix_robot(file: Path, check: CheckContents, *, unsafe: bool = False) -> FixResult:
+    """Apply the fixes of a robot in memory. Nothing is written.
 
     Args:
         file: The robot's file.
-        look: Reads and checks it.
-        unsafe: Whether fixes that change a number, a shape or another file are made, too.
+        check: Function that loads and checks the robot.
+        unsafe: Whether to apply fixes that change a number, a shape or another file.
     """
-    report = look({})
+    report = check({})
     files = _Files(file)
-    made: list[Finding] = []
+    applied: list[Finding] = []
     reasons: dict[_Key, str] = {}
-    seen = {_state(files.now)}
-    while len(seen) <= _MOST_ROUNDS:
-        now, done, reasons = _round(files, report, unsafe=unsafe, made=made)
-        if _state(now) in seen:
-            reasons |= dict.fromkeys(map(_key, done), "its fix changes nothing, or undoes another")
+    seen = {_state(files.current)}
+    while len(seen) <= _MAX_ROUNDS:
+        current, done, reasons = _apply_round(files, report, unsafe=unsafe, applied=applied)
+        if _state(current) in seen:
+            reasons |= dict.fromkeys(map(_key, done), "the fix has no effect or reverts another")
             break
-        seen.add(_state(now))
-        files.now = now
-        made += done
-        report = look(files.contents(report.facts.model))
+        seen.add(_state(current))
+        files.current = current
+        applied += done
+        report = check(files.contents(report.facts.model))
     left = {_key(finding) for finding in report.findings}
-    changed = [path for path, data in files.before.items() if files.now.get(path, data) != data]
+    changed = [p for p, data in files.original.items() if files.current.get(p, data) != data]
+    created = [path for path in files.current if path not in files.original]
     return FixResult(
-        before={files.given[path]: files.before[path] for path in changed},
-        after={files.given[path]: files.now[path] for path in changed},
-        new={files.given[path]: files.now[path] for path in files.now if path not in files.before},
-        fixed=tuple({_key(f): f for f in made if _key(f) not in left}.values()),
+        before={files.path[p]: files.original[p] for p in changed},
+        after={files.path[p]: files.current[p] for p in changed},
+        new={files.path[p]: files.current[p] for p in created},
+        fixed=tuple({_key(f): f for f in applied if _key(f) not in left}.values()),
         unfixed=tuple(
-            Unfixed(finding=f, reason=reasons.get(_key(f), "too many fixes wait for each other"))
+            Unfixed(finding=f, reason=reasons.get(_key(f), f"not done after {_MAX_ROUNDS} rounds"))
             for f in report.findings
             if f.fix is not None
         ),
@@ -114,60 +114,60 @@ def _key(finding: Finding) -> _Key:
     return finding.code, finding.subject, finding.message
 
 
-def _state(now: Mapping[Path, bytes]) -> frozenset[tuple[Path, bytes]]:
-    return frozenset((path, hashlib.sha256(data).digest()) for path, data in now.items())
+def _state(contents: Mapping[Path, bytes]) -> frozenset[tuple[Path, bytes]]:
+    return frozenset((path, hashlib.sha256(data).digest()) for path, data in contents.items())
 
 
 def _package(folder: Path) -> Path:
-    """Return the folder that is the robot's own: that of its package, if it is in one."""
-    above = folder.parent
-    return above if folder.name in _FOLDERS or (above / "package.xml").is_file() else folder
+    """Return the folder of the robot's package, or the folder itself if there is no package."""
+    parent = folder.parent
+    return parent if folder.name in _ROBOT_FOLDERS or (parent / "package.xml").is_file() else folder
 
 
-def _where(path: Path) -> Path:
-    """Return where a path leads; unlike `Path.resolve`, of a loop of links, too."""
+def _resolve(path: Path) -> Path:
+    """Return the target of a path. Unlike `Path.resolve`, this accepts loops of links."""
     return Path(os.path.realpath(path))
 
 
 class _Files:
-    """The files of a robot, each known by where its path leads."""
+    """The files of a robot, by resolved path."""
 
     def __init__(self, file: Path) -> None:
-        self.folder = _where(file.parent)
-        self.given: dict[Path, Path] = {_where(file): file}
-        """The path that was given for each."""
+        self.folder = _resolve(file.parent)
+        self.path: dict[Path, Path] = {_resolve(file): file}
+        """The path under which each file was read."""
 
-        self.before: dict[Path, bytes] = {}
-        """What those hold that fixes were to be made in."""
+        self.original: dict[Path, bytes] = {}
+        """Original contents of the files that a fix edits."""
 
-        self.now: dict[Path, bytes] = {}
-        """What is to be in their place, and what is to be added."""
+        self.current: dict[Path, bytes] = {}
+        """Current contents of changed and new files."""
 
     def contents(self, model: RobotModel) -> dict[Path, bytes]:
-        """Return what to read in the place of files, by every path that leads to them."""
-        contents = self.now | {self.given[path]: data for path, data in self.now.items()}
+        """Return the current contents by every path that leads to a file."""
+        contents = self.current | {self.path[p]: data for p, data in self.current.items()}
         for source in model.sources:
-            if _where(source) in self.now:
-                contents[source] = self.now[_where(source)]
+            if _resolve(source) in self.current:
+                contents[source] = self.current[_resolve(source)]
         return contents
 
-    def text(self, path: Path) -> bytes:
-        """Return what is in a file now."""
-        if path not in self.before:
-            self.before[path] = read_bytes(path)
-        return self.now.get(path, self.before[path])
+    def read(self, path: Path) -> bytes:
+        """Return the current content of a file."""
+        if path not in self.original:
+            self.original[path] = read_bytes(path)
+        return self.current.get(path, self.original[path])
 
 
-def _round(
-    files: _Files, report: Report, *, unsafe: bool, made: Sequence[Finding]
+def _apply_round(
+    files: _Files, report: Report, *, unsafe: bool, applied: Sequence[Finding]
 ) -> tuple[dict[Path, bytes], list[Finding], dict[_Key, str]]:
-    """Make all fixes that can be made at once.
+    """Apply all fixes that do not overlap.
 
     Returns:
-        What the files hold then, which findings were fixed, and why the others were not.
+        The new contents, the findings whose fixes were applied, and the reasons for the others.
     """
-    grown = {edit for finding in made for edit in _growing(finding)}
-    stage = _Stage(files, report.facts.model)
+    inserted = {edit for finding in applied for edit in _insertions(finding)}
+    batch = _Batch(files, report.facts.model)
     done: list[Finding] = []
     reasons: dict[_Key, str] = {}
     for finding in report.findings:
@@ -175,123 +175,127 @@ def _round(
             continue
         try:
             if finding.fix.safety != "safe" and not unsafe:
-                raise EditError("its fix is unsafe: the robot would not stay the same")
-            if not grown.isdisjoint(_growing(finding)):
-                raise EditError("its fix was made, and did not help")
-            stage.add(finding.fix)
+                raise EditError("the fix is unsafe, because it changes the robot")
+            if not inserted.isdisjoint(_insertions(finding)):
+                raise EditError("the fix was applied without effect")
+            batch.add(finding.fix)
         except (TerrainkitError, MeshError, OSError, ValueError, MemoryError) as error:
             reasons[_key(finding)] = str(error) or type(error).__name__
         else:
             done.append(finding)
-    return stage.result(), done, reasons
+    return batch.result(), done, reasons
 
 
-def _growing(finding: Finding) -> Iterator[tuple[_Key, Edit]]:
-    """Yield the edits that would make a file longer each time, if they did not help."""
+def _insertions(finding: Finding) -> Iterator[tuple[_Key, Edit]]:
+    """Yield the edits that would make a file longer in each round if they had no effect."""
     for edit in finding.fix.edits if finding.fix else ():
         if isinstance(edit, InsertChild | ReplaceBytes):
             source = replace(edit.source, line=0)
             yield _key(finding), replace(edit, source=source)
 
 
-class _Stage:
-    """Files with the fixes of one round in them."""
+class _Batch:
+    """The files with the fixes of one round."""
 
     def __init__(self, files: _Files, model: RobotModel) -> None:
         self._files = files
         self._model = model
-        self._sources = {_where(source) for source in model.sources}
-        self._texts: dict[Path, EditedBytes] = {}
+        self._sources = {_resolve(source) for source in model.sources}
+        self._edited: dict[Path, EditedBytes] = {}
         self._new: dict[Path, bytes] = {}
 
     def add(self, fix: Fix) -> None:
-        """Make all edits of a fix, or none.
+        """Apply all edits of a fix, or none.
 
         Raises:
-            TerrainkitError: if one of them cannot or may not be made.
+            TerrainkitError: if an edit is not possible or not allowed.
         """
         if self._model.kind == "xacro":
-            raise EditError("the robot is made from xacro, which no fix can change")
+            raise EditError("xacro files cannot be fixed")
         edits: dict[Path, list[Edit]] = {}
         new: dict[Path, bytes] = {}
         for edit in fix.edits:
             if isinstance(edit, WriteFile):
-                new[self._to_be_added(edit)] = edit.content()
+                new[self._new_path(edit)] = edit.content()
             else:
-                edits.setdefault(self._to_be_changed(edit.source.file), []).append(edit)
-        added = {path: data for path, data in new.items() if self._is_new(path, data)}
-        texts = {path: self._text(path) for path in edits}
-        prepared = {path: texts[path].prepare(edits[path]) for path in edits}
-        for path, each in prepared.items():
-            texts[path].make(each)
-        self._new |= added
+                edits.setdefault(self._source_path(edit.source.file), []).append(edit)
+        created = {path: data for path, data in new.items() if self._is_new(path, data)}
+        edited = {path: self._edited_bytes(path) for path in edits}
+        splices = {path: edited[path].prepare(edits[path]) for path in edits}
+        for path, each in splices.items():
+            edited[path].apply(each)
+        self._new |= created
 
     def result(self) -> dict[Path, bytes]:
-        """Return what the files hold now."""
-        edited = {path: text.result() for path, text in self._texts.items()}
-        return self._files.now | edited | self._new
+        """Return the current contents of the files."""
+        edited = {path: each.result() for path, each in self._edited.items()}
+        return self._files.current | edited | self._new
 
-    def _text(self, path: Path) -> EditedBytes:
-        if path not in self._texts:
-            self._texts[path] = EditedBytes(self._files.text(path))
-        return self._texts[path]
+    def _edited_bytes(self, path: Path) -> EditedBytes:
+        if path not in self._edited:
+            self._edited[path] = EditedBytes(self._files.read(path))
+        return self._edited[path]
 
-    def _to_be_changed(self, given: Path) -> Path:
-        """Return where the path of a file leads, if it is one of the robot's own."""
-        path = _where(given)
+    def _source_path(self, file: Path) -> Path:
+        """Return the resolved path of a file, if it belongs to the robot."""
+        path = _resolve(file)
         if path not in self._sources:
-            raise EditError(f"{given} is no text of this robot")
-        if path not in self._files.given and not path.is_relative_to(self._files.folder):
-            raise EditError(f"{given} is outside of {self._files.folder}: it is left as it is")
-        self._files.given.setdefault(path, given)
+            raise EditError(f"{display_path(file)} is not a file of this robot")
+        if path not in self._files.path and not path.is_relative_to(self._files.folder):
+            folder = display_path(self._files.folder)
+            raise EditError(f"{display_path(file)} is outside of {folder} and is not changed")
+        self._files.path.setdefault(path, file)
         return path
 
-    def _to_be_added(self, edit: WriteFile) -> Path:
-        """Return where the path of a new file leads, if there may be one.
+    def _new_path(self, edit: WriteFile) -> Path:
+        """Return the resolved path of a new file, if it may be created.
 
-        That is in the folder of the robot, or of its package, as is meshes/ beside urdf/: the file
-        names its meshes, and must not say where else something is written.
+        It must be in the folder of the robot or of its package, such as meshes/ beside urdf/. The
+        robot's file defines the names of meshes, but must not select other folders for writing.
         """
-        path = _where(edit.path.parent) / edit.path.name
+        path = _resolve(edit.path.parent) / edit.path.name
         package = _package(self._files.folder)
-        hidden = path.is_relative_to(package) and any(
+        is_hidden = path.is_relative_to(package) and any(
             part.startswith(".") for part in path.relative_to(package).parts
         )
-        if hidden or not path.is_relative_to(package):
-            raise EditError(f"{edit.path} would be outside of {package}: nothing is written there")
-        if path.suffix.lower() not in _NEW_FILES:
-            raise EditError(f"{edit.path} would be no mesh, to go by its name")
+        name = display_path(edit.path)
+        if is_hidden or not path.is_relative_to(package):
+            raise EditError(f"{name} is outside of {display_path(package)} and is not written")
+        if path.suffix.lower() not in _NEW_SUFFIXES:
+            expected = " or ".join(sorted(_NEW_SUFFIXES))
+            raise EditError(f"suffix of the new file {name}: expected {expected}")
         if not path.parent.is_dir():
-            raise EditError(f"there is no folder {edit.path.parent}")
-        short = Path(os.path.normpath(edit.path))  # without the .. of urdf/../meshes
-        self._files.given.setdefault(path, short if _where(short) == path else edit.path)
+            raise EditError(f"the folder {display_path(edit.path.parent)} does not exist")
+        normal = Path(os.path.normpath(edit.path))  # without the .. of urdf/../meshes
+        self._files.path.setdefault(path, normal if _resolve(normal) == path else edit.path)
         return path
 
     def _is_new(self, path: Path, data: bytes) -> bool:
-        """Return whether a file is to be added; False if it is there already, the same."""
-        there = self._new.get(path, self._files.now.get(path))
-        if there is None:
+        """Return whether a file has to be created, or False if it exists with the same content."""
+        existing = self._new.get(path, self._files.current.get(path))
+        if existing is None:
             if not os.path.lexists(path):
                 return True
-            there = path.read_bytes() if _is_plain(path, len(data)) else None
-        if there != data:
-            raise EditError(f"{self._files.given[path]} is there, and is another file")
+            existing = path.read_bytes() if _is_regular(path, len(data)) else None
+        if existing != data:
+            name = display_path(self._files.path[path])
+            raise EditError(f"{name} exists with different content")
         return False
 
 
-def _is_plain(path: Path, size: int) -> bool:
-    """Return whether there is a plain file of that size."""
+def _is_regular(path: Path, size: int) -> bool:
+    """Return whether the path is a regular file of this size."""
     status = path.stat(follow_symlinks=False)
     return stat.S_ISREG(status.st_mode) and status.st_size == size
 
 
 def write_fixes(result: FixResult) -> None:
-    """Write the files, the new ones before those that name them.
+    """Write the fixed files. New files are written before the files that refer to them.
 
-    Each is written whole or not at all, through links to where they lead, and keeps its mode.
+    Each file is replaced atomically and keeps its mode. Symbolic links are followed.
 
     Raises:
-        ExportError: if one cannot be written, or has changed since it was read.
+        ExportError: if a file cannot be written, or has changed since it was read.
     """
     for path, data in result.new.items():
         with atomic_write(path) as temporary:
@@ -303,9 +307,9 @@ def write_fixes(result: FixResult) -> None:
 def _rewrite(path: Path, before: bytes, after: bytes) -> None:
     try:
         if read_bytes(path) != before:
-            raise ExportError(f"{path} has changed since it was read; nothing was written to it")
+            raise ExportError(f"{path} has changed since it was read and is not written")
         if not os.access(path, os.W_OK):
-            raise ExportError(f"cannot write {path}: it is read-only")
+            raise ExportError(f"cannot write {path}: the file is read-only")
         mode = stat.S_IMODE(path.stat().st_mode)
     except OSError as error:
         raise ExportError(f"cannot write {path}: {error.strerror or error}") from error
@@ -315,21 +319,23 @@ def _rewrite(path: Path, before: bytes, after: bytes) -> None:
 
 
 def unified_diff(result: FixResult) -> str:
-    """Return the changes as text that `patch -p0` takes; new files have a line each."""
-    parts = [f"New file {path} ({len(data)} bytes)\n" for path, data in result.new.items()]
+    """Return the changes as a diff for `patch -p0`, with one line per new file."""
+    parts = [
+        f"New file {display_path(path)} ({len(data)} bytes)\n" for path, data in result.new.items()
+    ]
     for path, before in result.before.items():
         parts += _diff(path, before, result.after[path])
     return "".join(parts)
 
 
 def _diff(path: Path, before: bytes, after: bytes) -> Iterator[str]:
-    old, new = _lines(before), _lines(after)
-    for line in difflib.unified_diff(old, new, str(path), str(path)):
+    old, new, name = _lines(before), _lines(after), display_path(path)
+    for line in difflib.unified_diff(old, new, name, name):
         yield line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
 
 
 def _lines(data: bytes) -> list[str]:
-    """Return the lines with their ends: not those that str would also see, such as U+2028."""
+    """Return the lines with their line ends. Other separators (U+2028) do not split lines."""
     try:
         text = data.decode()
     except UnicodeDecodeError:

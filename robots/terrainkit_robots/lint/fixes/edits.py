@@ -1,7 +1,7 @@
-"""Edits: from a file's bytes to those with a fix in them, all others as they were.
+"""Edit XML as bytes, so that everything outside of an edit stays unchanged.
 
-A file is not parsed and written again, which would lose its quotes, line ends and alignment. expat
-says at which byte an element begins and ends, and only what an edit names is replaced.
+Parsing and serializing a file would change its quotes, line ends and alignment. Instead, expat
+returns the byte positions of the elements, and only the edited bytes are replaced.
 """
 
 import itertools
@@ -27,14 +27,14 @@ from terrainkit_robots.description.model import Source
 
 
 class EditError(TerrainkitError):
-    """An edit that cannot be made: its element is not there, or another edit is in its way."""
+    """An edit that is not possible, because its element is missing or it overlaps another edit."""
 
 
 def edit_bytes(data: bytes, edits: Sequence[Edit]) -> bytes:
-    """Return `data` with `edits` made in it, and not a byte changed beside them.
+    """Return `data` with `edits` applied. All other bytes are unchanged.
 
     Raises:
-        EditError: if one of them cannot be made, or two of them change the same place.
+        EditError: if an edit is not possible, or two edits overlap.
     """
     edited = EditedBytes(data)
     edited.add(edits)
@@ -43,81 +43,77 @@ def edit_bytes(data: bytes, edits: Sequence[Edit]) -> bytes:
 
 @dataclass(frozen=True, kw_only=True)
 class _Splice:
-    """Bytes in the place of others."""
+    """A replacement of a range of bytes."""
 
     start: int
     end: int
     replacement: bytes
 
-    claim: tuple[int, int]
-    """What no other fix may touch: the whole tag, where one of its attributes is set."""
-
-
-Prepared = tuple[_Splice, ...]
-"""Edits of one file that can be made."""
+    lock: tuple[int, int]
+    """Range that no other fix may change. For an attribute, this is the whole tag."""
 
 
 class EditedBytes:
-    """The bytes of a file, and the edits made in them so far."""
+    """The bytes of a file, and the edits applied so far."""
 
     def __init__(self, data: bytes) -> None:
         self._text = _Text(data)
         self._splices: list[_Splice] = []
-        self._claims: list[tuple[int, int]] = []
+        self._locks: list[tuple[int, int]] = []
 
     def add(self, edits: Sequence[Edit]) -> None:
-        """Make all of `edits`, or none; see `prepare`."""
-        self.make(self.prepare(edits))
+        """Apply all of `edits`, or none; see `prepare`."""
+        self.apply(self.prepare(edits))
 
-    def prepare(self, edits: Sequence[Edit]) -> Prepared:
-        """Return what `make` takes to make all of `edits`; nothing is made yet.
+    def prepare(self, edits: Sequence[Edit]) -> tuple[_Splice, ...]:
+        """Return the splices that `apply` needs for `edits`, without applying them.
 
-        Those made earlier are in the way where they touch the same tag, even another of its
-        attributes: whoever worked them out did not know of each other.
+        An earlier edit of the same tag is a conflict, even if it changes another attribute, because
+        the fixes were computed independently.
 
         Raises:
-            EditError: if one of them cannot be made, or another edit is in its way.
+            EditError: if an edit is not possible, or conflicts with another edit.
         """
-        splices = sorted(_plan(self._text, edits), key=_place)
+        splices = sorted(_make_splices(self._text, edits), key=_range)
         for one, other in itertools.pairwise(splices):
             if one.end > other.start:
-                raise EditError("two edits change the same place")
-        if any(self._taken(splice.claim) for splice in splices):
-            raise EditError("another fix changes the same place")
+                raise EditError("two edits change the same bytes")
+        if any(self._is_locked(splice.lock) for splice in splices):
+            raise EditError("another fix changes the same element")
         return tuple(splices)
 
-    def make(self, prepared: Prepared) -> None:
-        """Make what was prepared, with nothing made since."""
-        self._splices += prepared
-        for claim in {splice.claim for splice in prepared}:
-            insort(self._claims, claim)
+    def apply(self, splices: Sequence[_Splice]) -> None:
+        """Apply the result of `prepare`. No other edit may have been applied in between."""
+        self._splices += splices
+        for lock in {splice.lock for splice in splices}:
+            insort(self._locks, lock)
 
     def result(self) -> bytes:
-        """Return the bytes with all edits in them."""
+        """Return the bytes with all edits applied."""
         parts: list[bytes] = []
-        at = 0
-        for splice in sorted(self._splices, key=_place):
-            parts += (self._text.data[at : splice.start], splice.replacement)
-            at = splice.end
-        return b"".join((*parts, self._text.data[at:]))
+        position = 0
+        for splice in sorted(self._splices, key=_range):
+            parts += (self._text.data[position : splice.start], splice.replacement)
+            position = splice.end
+        return b"".join((*parts, self._text.data[position:]))
 
-    def _taken(self, claim: tuple[int, int]) -> bool:
-        """Return whether an earlier claim has bytes of this one, or is the same point."""
-        start, end = claim
-        place = bisect_left(self._claims, claim)
-        if place < len(self._claims):
-            following = self._claims[place]
-            if following == claim or following[0] < end:
+    def _is_locked(self, lock: tuple[int, int]) -> bool:
+        """Return whether a range overlaps a locked range, or is the same insertion point."""
+        start, end = lock
+        index = bisect_left(self._locks, lock)
+        if index < len(self._locks):
+            following = self._locks[index]
+            if following == lock or following[0] < end:
                 return True
-        return place > 0 and self._claims[place - 1][1] > start
+        return index > 0 and self._locks[index - 1][1] > start
 
 
-def _place(splice: _Splice) -> tuple[int, int]:
+def _range(splice: _Splice) -> tuple[int, int]:
     return splice.start, splice.end
 
 
-_AHEAD = re.compile(rb"(?:\xef\xbb\xbf|\s)*")
-"""What may stand before the XML; the reader of documents skips the same."""
+_PREFIX = re.compile(rb"(?:\xef\xbb\xbf|\s)*")
+"""Bytes before the XML that readers skip: byte order marks and white space."""
 
 _ATTRIBUTE = re.compile(
     rb"(?P<space>\s+)(?P<name>[^\s=/>]+)\s*=\s*(?P<quote>[\"'])(?P<value>.*?)(?P=quote)", re.DOTALL
@@ -131,28 +127,28 @@ _COMMENTS = re.compile(rb"(?:[ \t]*<!--(?:(?!-->)[^\n])*-->)+(?=[ \t]*\r?\n)")
 
 @dataclass(frozen=True, kw_only=True)
 class _Element:
-    """Where an element is, in bytes from the start of the file."""
+    """The position of an element, in bytes from the start of the file."""
 
     index: int
-    """Which one it is, in the order of start tags."""
+    """Index in the order of start tags."""
 
     name: bytes
     start: int
     name_end: int
     attributes_end: int
-    """Where the last attribute ends, or the name if there is none."""
+    """End of the last attribute, or of the name if there is none."""
 
     tag_end: int
-    """Where the start tag ends."""
+    """End of the start tag."""
 
     close: int
-    """Where the end tag starts; `tag_end` if there is none."""
+    """Start of the end tag, or `tag_end` if there is none."""
 
     end: int
 
     @property
-    def closed(self) -> bool:
-        """Whether the start tag is all there is: it ends in `/>`."""
+    def is_empty_tag(self) -> bool:
+        """Whether the element is a single tag that ends with `/>`."""
         return self.tag_end == self.end
 
     @property
@@ -161,7 +157,7 @@ class _Element:
 
 
 class _Text:
-    """The bytes of a file of text, and where its elements are."""
+    """The bytes of an XML file, and the positions of its elements."""
 
     def __init__(self, data: bytes) -> None:
         self.data = data
@@ -170,68 +166,66 @@ class _Text:
         """Return the element at `source`.
 
         Raises:
-            EditError: if it cannot be found.
+            EditError: if it does not exist.
         """
         if source.element is None:
-            raise EditError("the element cannot be edited: its file is made from others, or broken")
+            raise EditError("the element cannot be edited: its file is generated or malformed")
         count = len(self._index[0])
         if not 0 <= source.element < count:
-            raise EditError(f"there is no element {source.element}; the file has {count} elements")
+            raise EditError(f"element index: got {source.element}; expected less than {count}")
         return self._element(source.element)
 
     def child(self, parent: _Element) -> _Element | None:
-        """Return the first element in an element."""
+        """Return the first child of an element."""
         index, starts = parent.index + 1, self._index[0]
         inside = index < len(starts) and starts[index] < parent.close
         return self._element(index) if inside else None
 
     def attributes(self, element: _Element) -> list[re.Match[bytes]]:
-        """Return the attributes of an element, in their order."""
+        """Return the attributes of an element in order."""
         return list(_ATTRIBUTE.finditer(self.data, element.name_end, element.attributes_end))
 
-    def indentation(self, at: int) -> bytes | None:
-        """Return the white space before `at` on its line; None if there is more than that."""
-        ahead = self.data[self.line_start(at) : at]
-        return None if ahead.strip() else ahead
+    def indent_before(self, position: int) -> bytes | None:
+        """Return the line up to `position` if it is white space, else None."""
+        before = self.data[self.line_start(position) : position]
+        return None if before.strip() else before
 
-    def line_start(self, at: int) -> int:
-        """Return where the line of `at` starts."""
-        return self.data.rfind(b"\n", 0, at) + 1
+    def line_start(self, position: int) -> int:
+        """Return the start of the line."""
+        return self.data.rfind(b"\n", 0, position) + 1
 
-    def line_end(self, at: int) -> int | None:
-        """Return where the line of `at` ends, its end included; None if more than blanks follow."""
-        newline = self.data.find(b"\n", at)
+    def line_end(self, position: int) -> int | None:
+        """Return the end of the line after its newline, or None if text follows `position`."""
+        newline = self.data.find(b"\n", position)
         end = len(self.data) if newline < 0 else newline + 1
-        return None if self.data[at:end].strip() else end
+        return None if self.data[position:end].strip() else end
 
     @cached_property
-    def step(self) -> bytes:
-        """By how much the file indents a child."""
+    def indent(self) -> bytes:
+        """White space by which the file indents children."""
         if len(self._index[0]) > 1:
-            indentation = self.indentation(self._index[0][1])
-            if indentation:
-                return indentation
+            return self.indent_before(self._index[0][1]) or b"  "
         return b"  "
 
-    def newline(self, at: int) -> bytes:
-        """Return how the lines around `at` end."""
-        found = self.data.rfind(b"\n", 0, at)
-        found = self.data.find(b"\n", at) if found < 0 else found
+    def newline(self, position: int) -> bytes:
+        """Return the line end that is used near `position`."""
+        found = self.data.rfind(b"\n", 0, position)
+        found = self.data.find(b"\n", position) if found < 0 else found
         return b"\r\n" if found > 0 and self.data[found - 1 : found] == b"\r" else b"\n"
 
     def encode(self, text: str) -> bytes:
-        """Return text as it is written in this file."""
+        """Return text in the encoding of this file."""
         return text.encode(self._encoding, "xmlcharrefreplace")
 
     def _element(self, index: int) -> _Element:
         start, close = self._index[0][index], self._index[1][index]
         tag = _START_TAG.match(self.data, start)
         if tag is None:
-            raise EditError("the file is not written in an encoding that can be edited; try UTF-8")
+            raise EditError("the encoding of the file is not supported; expected UTF-8")
         end_tag = _END_TAG.match(self.data, close) if close > start else None
-        closed = tag.group().endswith(b"/>")
-        if not closed and end_tag is None:
-            raise EditError("the element's end was not found")
+        is_empty_tag = tag.group().endswith(b"/>")
+        if not is_empty_tag and end_tag is None:
+            raise EditError("the element has no end tag")
         return _Element(
             index=index,
             name=tag["name"],
@@ -239,107 +233,107 @@ class _Text:
             name_end=tag.end("name"),
             attributes_end=tag.end("attributes"),
             tag_end=tag.end(),
-            close=tag.end() if closed else close,
-            end=tag.end() if closed or end_tag is None else end_tag.end(),
+            close=tag.end() if is_empty_tag else close,
+            end=tag.end() if is_empty_tag or end_tag is None else end_tag.end(),
         )
 
     @property
     def _index(self) -> tuple[Sequence[int], Sequence[int]]:
-        return self._parsed[0], self._parsed[1]
+        return self._positions[0], self._positions[1]
 
     @property
     def _encoding(self) -> str:
-        return self._parsed[2]
+        return self._positions[2]
 
     @cached_property
-    def _parsed(self) -> tuple[Sequence[int], Sequence[int], str]:
-        """Where each element starts, where each ends, and the encoding."""
-        ahead = _AHEAD.match(self.data)
-        assert ahead is not None
+    def _positions(self) -> tuple[Sequence[int], Sequence[int], str]:
+        """Start of each element, start of each end tag, and the encoding."""
+        prefix = _PREFIX.match(self.data)
+        assert prefix is not None
         starts, closes, open_elements = array("q"), array("q"), array("q")
         encoding = "utf-8"
         parser = expat.ParserCreate()
 
-        def declared(_version: str, name: str | None, _standalone: int) -> None:
+        def declaration(_version: str, name: str | None, _alone: int) -> None:
             nonlocal encoding
             encoding = name or encoding
 
         def entity(*_: object) -> None:
-            raise EditError("the file declares entities; such a file is not edited")
+            raise EditError("files that declare entities are not edited")
 
         def start(*_: object) -> None:
             open_elements.append(len(starts))
-            starts.append(ahead.end() + parser.CurrentByteIndex)
+            starts.append(prefix.end() + parser.CurrentByteIndex)
             closes.append(0)
 
         def end(_name: str) -> None:
-            closes[open_elements.pop()] = ahead.end() + parser.CurrentByteIndex
+            closes[open_elements.pop()] = prefix.end() + parser.CurrentByteIndex
 
-        parser.XmlDeclHandler = declared
+        parser.XmlDeclHandler = declaration
         parser.EntityDeclHandler = entity
         parser.StartElementHandler = start
         parser.EndElementHandler = end
         try:
-            parser.Parse(self.data[ahead.end() :], True)
+            parser.Parse(self.data[prefix.end() :], True)
         except expat.ExpatError as error:
             raise EditError(f"the file is not well-formed: {error}") from error
-        except (ValueError, LookupError) as error:  # what Python says to an encoding
+        except (ValueError, LookupError) as error:  # unknown encoding
             raise EditError(f"the file's encoding cannot be edited: {error}") from error
         return starts, closes, encoding
 
 
-def _plan(text: _Text, edits: Sequence[Edit]) -> Iterator[_Splice]:
-    """Yield what to replace for each of `edits`."""
-    named: set[tuple[int | None, str]] = set()
+def _make_splices(text: _Text, edits: Sequence[Edit]) -> Iterator[_Splice]:
+    """Yield the splices for `edits`."""
+    changed: set[tuple[int | None, str]] = set()
     children: dict[int, list[InsertChild]] = {}
     for edit in edits:
         match edit:
             case SetAttribute() | RemoveAttribute():
-                if (edit.source.element, edit.name) in named:
+                if (edit.source.element, edit.name) in changed:
                     raise EditError(f"two edits change the attribute {edit.name!r}")
-                named.add((edit.source.element, edit.name))
-                yield _attribute(text, edit)
+                changed.add((edit.source.element, edit.name))
+                yield _edit_attribute(text, edit)
             case RemoveElement():
-                yield _removed(text, text.element(edit.source))
+                yield _remove(text, text.element(edit.source))
             case InsertChild():
                 children.setdefault(text.element(edit.source).index, []).append(edit)
             case ReplaceBytes():
-                yield _replaced(text, edit)
+                yield _replace(text, edit)
             case WriteFile():
-                raise EditError(f"{edit.path.name} is another file; it is not written into this")
-    for inserted in children.values():
-        yield from _inserted(text, text.element(inserted[0].source), inserted)
+                raise EditError(f"{edit.path.name} is a new file and no edit of this one")
+    for insertions in children.values():
+        yield from _insert(text, text.element(insertions[0].source), insertions)
 
 
-def _replaced(text: _Text, edit: ReplaceBytes) -> _Splice:
+def _replace(text: _Text, edit: ReplaceBytes) -> _Splice:
     size = len(text.data)
     if not 0 <= edit.start <= edit.end <= size:
-        raise EditError(f"there are no bytes {edit.start} to {edit.end}; the file has {size}")
-    claim = edit.start, edit.end
-    return _Splice(start=edit.start, end=edit.end, replacement=edit.replacement, claim=claim)
+        raise EditError(f"byte range: got {edit.start} to {edit.end}; expected within 0 to {size}")
+    lock = edit.start, edit.end
+    return _Splice(start=edit.start, end=edit.end, replacement=edit.replacement, lock=lock)
 
 
-def _attribute(text: _Text, edit: SetAttribute | RemoveAttribute) -> _Splice:
+def _edit_attribute(text: _Text, edit: SetAttribute | RemoveAttribute) -> _Splice:
     element = text.element(edit.source)
     attributes = text.attributes(element)
     found = next((a for a in attributes if a["name"] == text.encode(edit.name)), None)
     if isinstance(edit, RemoveAttribute):
         if found is None:
-            raise EditError(f"there is no attribute {edit.name!r} to remove")
-        return _Splice(start=found.start(), end=found.end(), replacement=b"", claim=element.tag)
+            raise EditError(f"attribute {edit.name!r} does not exist")
+        return _Splice(start=found.start(), end=found.end(), replacement=b"", lock=element.tag)
     if found is not None:
-        value = _escaped(text, edit.value, found["quote"])
+        value = _escape(text, edit.value, found["quote"])
         start, end = found.span("value")
-        return _Splice(start=start, end=end, replacement=value, claim=element.tag)
+        return _Splice(start=start, end=end, replacement=value, lock=element.tag)
     if _NAME.fullmatch(edit.name) is None:
-        raise EditError(f"{edit.name!r} is no name of an attribute")
+        raise EditError(f"{edit.name!r} is not a valid attribute name")
     quote = attributes[-1]["quote"] if attributes else b'"'
-    value = quote + _escaped(text, edit.value, quote) + quote
+    value = quote + _escape(text, edit.value, quote) + quote
     return _Splice(
         start=element.attributes_end,
         end=element.attributes_end,
-        replacement=_gap(attributes) + text.encode(edit.name) + b"=" + value,
-        claim=element.tag,
+        replacement=_separator(attributes) + text.encode(edit.name) + b"=" + value,
+        lock=element.tag,
     )
 
 
@@ -348,76 +342,76 @@ _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _ESCAPES = {"&": "&amp;", "<": "&lt;", "\t": "&#9;", "\n": "&#10;", "\r": "&#13;"}
 
 
-def _escaped(text: _Text, value: str, quote: bytes) -> bytes:
+def _escape(text: _Text, value: str, delimiter: bytes) -> bytes:
     if _NOT_XML.search(value):
-        raise EditError(f"{value!r} has a character that XML cannot hold")
-    escapes = _ESCAPES | ({'"': "&quot;"} if quote == b'"' else {"'": "&apos;"})
+        raise EditError(f"{value!r} contains a character that is not allowed in XML")
+    escapes = _ESCAPES | ({'"': "&quot;"} if delimiter == b'"' else {"'": "&apos;"})
     return text.encode("".join(escapes.get(letter, letter) for letter in value))
 
 
-def _gap(attributes: Sequence[re.Match[bytes]]) -> bytes:
-    """Return what to write before one more attribute: a new line, if each has one of its own."""
+def _separator(attributes: Sequence[re.Match[bytes]]) -> bytes:
+    """Return the white space before a new attribute: a new line if each attribute has its own."""
     own_lines = [b"\n" in attribute["space"] for attribute in attributes]
     if own_lines and own_lines[-1] and all(own_lines[1:]):
         return attributes[-1]["space"]
     return b" "
 
 
-def _removed(text: _Text, element: _Element) -> _Splice:
+def _remove(text: _Text, element: _Element) -> _Splice:
     if element.index == 0:
         raise EditError("the root element cannot be removed")
     start, end = element.start, element.end
     line_end = text.line_end(end)
     if line_end is not None:
-        if text.indentation(start) is not None:
+        if text.indent_before(start) is not None:
             start, end = text.line_start(start), line_end
-        else:  # no blanks are left at the end of the line
+        else:  # remove the white space at the end of the line
             while text.data[start - 1 : start] in (b" ", b"\t"):
                 start -= 1
-    return _Splice(start=start, end=end, replacement=b"", claim=(start, end))
+    return _Splice(start=start, end=end, replacement=b"", lock=(start, end))
 
 
-def _inserted(text: _Text, parent: _Element, edits: Sequence[InsertChild]) -> Iterator[_Splice]:
+def _insert(text: _Text, parent: _Element, edits: Sequence[InsertChild]) -> Iterator[_Splice]:
     for edit in edits:
         _check_element(edit.xml)
     first = [text.encode(edit.xml) for edit in edits if edit.first]
     last = [text.encode(edit.xml) for edit in edits if not edit.first]
     if not text.data[parent.tag_end : parent.close].strip():
-        yield _filled(text, parent, [*first, *last])
+        yield _fill(text, parent, [*first, *last])
         return
-    own, child = text.indentation(parent.start), text.child(parent)
-    indentation = None if own is None else own + text.step
+    parent_indent, child = text.indent_before(parent.start), text.child(parent)
+    indent = None if parent_indent is None else parent_indent + text.indent
     if child is not None:
-        indentation = text.indentation(child.start)
-    ahead = b"" if indentation is None else text.newline(parent.start) + indentation
+        indent = text.indent_before(child.start)
+    separator = b"" if indent is None else text.newline(parent.start) + indent
     if first:
         comments = _COMMENTS.match(text.data, parent.tag_end)
-        yield _insertion(comments.end() if comments else parent.tag_end, ahead, first)
+        yield _insert_at(comments.end() if comments else parent.tag_end, separator, first)
     if last:
         content = text.data[parent.tag_end : parent.close].rstrip()
-        yield _insertion(parent.tag_end + len(content), ahead, last)
+        yield _insert_at(parent.tag_end + len(content), separator, last)
 
 
-def _insertion(at: int, ahead: bytes, xmls: Sequence[bytes]) -> _Splice:
-    new = b"".join(ahead + xml for xml in xmls)
-    return _Splice(start=at, end=at, replacement=new, claim=(at, at))
+def _insert_at(position: int, separator: bytes, elements: Sequence[bytes]) -> _Splice:
+    new = b"".join(separator + element for element in elements)
+    return _Splice(start=position, end=position, replacement=new, lock=(position, position))
 
 
-def _filled(text: _Text, parent: _Element, xmls: Sequence[bytes]) -> _Splice:
-    """Return how children come into an element that has none."""
-    own = text.indentation(parent.start)
+def _fill(text: _Text, parent: _Element, elements: Sequence[bytes]) -> _Splice:
+    """Return the splice that adds children to an empty element."""
+    indent = text.indent_before(parent.start)
     newline = text.newline(parent.start)
-    outer = b"" if own is None else newline + own
-    inner = b"" if own is None else outer + text.step
-    content = b"".join(inner + xml for xml in xmls) + outer
-    if not parent.closed:
-        claim = parent.tag_end, parent.close
-        return _Splice(start=claim[0], end=claim[1], replacement=content, claim=claim)
+    outer = b"" if indent is None else newline + indent
+    inner = b"" if indent is None else outer + text.indent
+    content = b"".join(inner + element for element in elements) + outer
+    if not parent.is_empty_tag:
+        lock = parent.tag_end, parent.close
+        return _Splice(start=lock[0], end=lock[1], replacement=content, lock=lock)
     return _Splice(
         start=parent.attributes_end,
         end=parent.tag_end,
         replacement=b">" + content + b"</" + parent.name + b">",
-        claim=parent.tag,
+        lock=parent.tag,
     )
 
 
@@ -425,4 +419,4 @@ def _check_element(xml: str) -> None:
     try:
         expat.ParserCreate().Parse(xml.encode(), True)
     except (expat.ExpatError, UnicodeEncodeError) as error:
-        raise EditError(f"{xml!r} is no element: {error}") from error
+        raise EditError(f"{xml!r} is not a valid XML element: {error}") from error

@@ -8,7 +8,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.effort import effort_of
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.spec.column import Column, rounded
-from terrainkit_robots.spec.robot_spec import Provenance, Twin
+from terrainkit_robots.spec.robot_spec import MirrorJoint, Provenance
 
 if TYPE_CHECKING:
     from terrainkit_robots.simulation.pd_gains import Gain
@@ -36,7 +36,7 @@ _RANGE_SHARE = 0.25
 """An action of 1 moves a target by this share of the joint's range at most."""
 
 
-def efforts(robot: Facts, gains: "Mapping[str, Gain]", twins: Mapping[str, Twin]) -> Column:
+def efforts(robot: Facts, gains: "Mapping[str, Gain]", twins: Mapping[str, MirrorJoint]) -> Column:
     """Return the largest torque of each joint [N m] or force [N]."""
     declared = {joint.name: _sound(effort_of(robot, joint)) for joint in robot.actuated}
     holding = robot.stance.torques if robot.stance is not None else {}
@@ -52,7 +52,7 @@ def efforts(robot: Facts, gains: "Mapping[str, Gain]", twins: Mapping[str, Twin]
     return column
 
 
-def velocities(robot: Facts, twins: Mapping[str, Twin]) -> Column:
+def velocities(robot: Facts, twins: Mapping[str, MirrorJoint]) -> Column:
     """Return the largest speed of each joint [rad/s] or [m/s]."""
     declared = {
         joint.name: _sound(joint.limit.velocity if joint.limit else None)
@@ -130,7 +130,10 @@ def _in_file(robot: Facts) -> Provenance:
 
 
 def _of_twin(
-    column: Column, joint: Joint, declared: Mapping[str, float | None], twins: Mapping[str, Twin]
+    column: Column,
+    joint: Joint,
+    declared: Mapping[str, float | None],
+    twins: Mapping[str, MirrorJoint],
 ) -> float | None:
     """Add what is declared of the joint on the other side, and return that; None if nothing is."""
     twin = twins.get(joint.name)

@@ -3,7 +3,7 @@ import pytest
 
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.symmetry.mirror_map import mirror_map
-from terrainkit_robots.spec.robot_spec import Twin
+from terrainkit_robots.spec.robot_spec import MirrorJoint
 
 WAIST = """
 <robot name="r">
@@ -35,7 +35,7 @@ def waist(robot, axis, kind="revolute", y=0):
     ],
 )
 def test_a_joint_in_the_plane_is_its_own_twin(robot, axis, kind, sign):
-    assert waist(robot, axis, kind) == {"w": Twin(joint="w", sign=sign)}
+    assert waist(robot, axis, kind) == {"w": MirrorJoint(joint="w", sign=sign)}
 
 
 def test_a_joint_of_one_arm_has_no_twin(robot):

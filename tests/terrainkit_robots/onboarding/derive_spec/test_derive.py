@@ -7,8 +7,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
-from terrainkit_robots.spec.robot_spec import JOINT_TABLES, unit_of
-from terrainkit_robots.spec.spec_file import from_toml, to_toml
+from terrainkit_robots.spec.robot_spec import JOINT_TABLES, RobotSpec, unit_of
 
 ARM = """
 <robot name="arm">
@@ -75,14 +74,14 @@ def test_a_robot_without_legs(robot, gains):
     assert spec.soft_limits == {"turn": (0.5, 2.4)}  # the pose is at the limit, and allowed
     assert spec.reset_range == (1.0, 1.5)
     assert spec.provenance["default_pose"].origin == "suggested"
-    assert from_toml(to_toml(spec)) == spec
+    assert RobotSpec.from_toml(spec.to_toml()) == spec
 
 
 @pytest.mark.parametrize("name", ["quadruped.urdf", "quadruped.xml", "biped.urdf", "biped.xml"])
 def test_a_spec_fits_the_robot_that_it_is_of(bundled, gains, name):
     facts = bundled(name)
     spec = derived(facts, gains)
-    assert from_toml(to_toml(spec)) == spec
+    assert RobotSpec.from_toml(spec.to_toml()) == spec
     report = lint(bundled(name, spec=spec), simulate=False)
     assert report.crashed == ()
     own = [f for f in report.findings if f.severity != "info"]
@@ -136,7 +135,7 @@ def test_numbers_without_measure_break_nothing(bundled, gains, tmp_path, old, va
     new = f'{old.split("=")[0]}="{value}"'
     facts = bundled("quadruped.urdf", (old, new), tmp_path=tmp_path)
     spec = derived(facts, gains)
-    assert from_toml(to_toml(spec)) == spec
+    assert RobotSpec.from_toml(spec.to_toml()) == spec
     assert all(math.isfinite(v) for table in JOINT_TABLES for v in getattr(spec, table).values())
 
 
@@ -159,4 +158,4 @@ def test_robots_of_others(robot_file, gains, file, base, torso):
     assert set(spec.mirror) == set(spec.joint_order)
     for name, twin in spec.mirror.items():
         assert spec.mirror[twin.joint].joint == name
-    assert from_toml(to_toml(spec)) == spec
+    assert RobotSpec.from_toml(spec.to_toml()) == spec
