@@ -16,10 +16,10 @@ import torch
 from clock import seconds
 
 import terrainkit
-from terrainkit_robots.rl import registry
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import MapTerrain, Plane, Terrain
 
 _ENVS = 512
@@ -28,7 +28,7 @@ _ITERATIONS = 5
 
 
 def run() -> Iterator[tuple[str, float]]:
-    found = registry.find("quadruped")
+    found = get_task("quadruped")
     task = replace(found.task, env=replace(found.task.env, num_envs=_ENVS))
     robot = Robot.load(found.folder)
     grounds: dict[str, tuple[Terrain, str]] = {

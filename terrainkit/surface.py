@@ -90,3 +90,43 @@ def _fan(
     direction = _ALONG[edge]
     normal = np.stack([-direction[:, 1], direction[:, 0]], axis=1)
     return height, along[:, None] * direction + away[:, None] * normal
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HeightfieldSurface:
+    """The surface of a MuJoCo heightfield, which has no walls, and of boxes on its samples.
+
+    In single precision. Looking up the 187 points of a height scan takes 3 microseconds; casting
+    rays takes 80 on a heightfield and 4000 on boxes.
+    """
+
+    heights: NDArray[np.float32]
+    """Heights of the samples [m], shape (nx, ny)."""
+    first_sample: tuple[float, float]
+    """Position of `heights[0, 0]` [m]."""
+    cell: float
+    """Distance between samples [m]."""
+    box_tops: NDArray[np.float32] | None = None
+    """Top of the box around each sample, -inf without one [m], shape (nx, ny)."""
+
+    def height(self, x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the height at points [m]; the outermost samples extend outwards.
+
+        A cell is two triangles with the diagonal of MuJoCo's heightfield, from (i, j) to
+        (i + 1, j + 1). Bilinear interpolation is off by up to 3.6 cm on stairs.
+        """
+        nx, ny = self.heights.shape
+        u = np.clip((x - np.float32(self.first_sample[0])) / np.float32(self.cell), 0, nx - 1)
+        v = np.clip((y - np.float32(self.first_sample[1])) / np.float32(self.cell), 0, ny - 1)
+        i = np.minimum(u.astype(np.int32), nx - 2)
+        j = np.minimum(v.astype(np.int32), ny - 2)
+        u, v = u - i.astype(np.float32), v - j.astype(np.float32)
+        flat, corner = self.heights.reshape(-1), i * ny + j
+        near, far = flat[corner], flat[corner + (ny + 1)]
+        side = flat[corner + np.where(u > v, ny, 1)]  # the triangle's corner off the diagonal
+        high, low = np.maximum(u, v), np.minimum(u, v)
+        height = near + high * (side - near) + low * (far - side)
+        if self.box_tops is None:
+            return height
+        nearest = (i + (u >= 0.5)) * ny + j + (v >= 0.5)
+        return np.maximum(self.box_tops.reshape(-1)[nearest], height)

@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.annotations import show
 from terrainkit.errors import ConfigError, known_names
 from terrainkit.grid import Grid
 from terrainkit.parameter import (
@@ -19,7 +20,6 @@ from terrainkit.parameter import (
     convert_parameter,
     parameters_of,
 )
-from terrainkit.schema import show
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,7 +3,7 @@
 import numpy as np
 from lxml import etree
 
-from defects.collision import in_thigh
+from defects.collision import pick_thigh
 from defects.mutant import (
     LEG,
     Mutant,
@@ -110,7 +110,7 @@ def _is_last(body: etree._Element) -> bool:
 
 @mutation("COL005", "warning", "MJCF: overlap of trunk and thigh", "mjcf")
 def overlap(robot: Mutant) -> Subjects:
-    thigh, position = in_thigh(robot, primitive=None)
+    thigh, position = pick_thigh(robot, primitive=None)
     geom = etree.Element("geom", type="sphere", size="0.06", contype="1", conaffinity="1")
     set_numbers(geom, "pos", position)
     trunk = _base(robot)

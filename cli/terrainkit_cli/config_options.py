@@ -8,21 +8,13 @@ import inspect
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar, get_origin
 
 import tyro
 
+from terrainkit.annotations import NONE, convert, parse_annotation
 from terrainkit.errors import ConfigError
-from terrainkit.schema import (
-    NONE,
-    Config,
-    convert,
-    field_docs,
-    field_types,
-    replace,
-    without_meta,
-    without_none,
-)
+from terrainkit.schema import Config, field_docs, field_types, replace
 from terrainkit_cli.parse import Command, UsageError, check_options, option_names, parse, value_of
 from terrainkit_cli.robot_options import Text
 
@@ -177,11 +169,11 @@ def _given(path: str, config: Config, options: object) -> dict[str, Any]:
 
 def _from_words(name: str, annotation: Any, words: list[str]) -> Any:
     """Return the value that the words of an option stand for."""
-    kind, _ = without_meta(without_none(annotation))
-    if words == [NONE] and without_none(annotation) is not annotation:
+    kind, origin, args, _, is_optional = parse_annotation(annotation)
+    if words == [NONE] and is_optional:
         return None
-    several = get_origin(kind) is tuple
-    item = get_args(kind)[0] if several else kind
+    several = origin is tuple
+    item = parse_annotation(args[0]).kind if several else kind
     is_text = item is str or get_origin(item) is Literal
     values = words if is_text else [value_of(word) for word in words]
     return convert(name, values if several else values[0], annotation)
@@ -219,9 +211,9 @@ def _words_spec(annotation: Any) -> Any:
 
     tyro would read a tuple or a union through typeguard, whose import is slow.
     """
-    kind, _ = without_meta(without_none(annotation))
-    args = get_args(kind) if get_origin(kind) is tuple else ()
-    any_number = Ellipsis in args or (args and without_none(annotation) is not annotation)
+    parsed = parse_annotation(annotation)
+    args = parsed.args if parsed.origin is tuple else ()
+    any_number = Ellipsis in args or (args and parsed.is_optional)
     return tyro.constructors.PrimitiveConstructorSpec(
         nargs="*" if any_number else len(args) or 1,
         metavar=_metavar(annotation),
@@ -232,15 +224,14 @@ def _words_spec(annotation: Any) -> Any:
 
 
 def _metavar(annotation: Any) -> str:
-    if (inner := without_none(annotation)) is not annotation:
-        return f"{_metavar(inner)}|{NONE}"
-    kind, _ = without_meta(annotation)
-    args = get_args(kind)
-    if get_origin(kind) is Literal:
-        return "{" + ",".join(map(str, args)) + "}"
-    if get_origin(kind) is tuple:
-        return f"[{_metavar(args[0])} ...]" if Ellipsis in args else " ".join(map(_metavar, args))
-    return {int: "INT", float: "FLOAT", str: "TEXT", bool: "{true,false}"}.get(kind, "VALUE")
+    kind, origin, args, _, is_optional = parse_annotation(annotation)
+    if origin is Literal:
+        text = "{" + ",".join(map(str, args)) + "}"
+    elif origin is tuple:
+        text = f"[{_metavar(args[0])} ...]" if ... in args else " ".join(map(_metavar, args))
+    else:
+        text = {int: "INT", float: "FLOAT", str: "TEXT", bool: "{true,false}"}.get(kind, "VALUE")
+    return f"{text}|{NONE}" if is_optional else text
 
 
 def _shown(value: object) -> str:

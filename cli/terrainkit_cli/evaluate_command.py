@@ -1,9 +1,9 @@
-"""The command that measures what a policy can do."""
+"""The command that evaluates a policy."""
 
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -13,52 +13,55 @@ from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import NO_NUMBER, Checkpoint, Output, number_given, plain
 
 if TYPE_CHECKING:
-    from terrainkit_robots.policy.evaluate import Asked
-    from terrainkit_robots.policy.score import Evaluation, Score
+    from terrainkit_robots.policy.evaluate import (
+        EvaluationConfig,
+        EvaluationResult,
+        RolloutMetrics,
+    )
     from terrainkit_robots.rl.run import Run
 
-_NOT_ASKED = (-math.inf, -math.inf, -math.inf)
+_NO_COMMAND = (-math.inf, -math.inf, -math.inf)
 """No command; not None, since tyro's errors about a union name its members."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PolicyCommand(Command):
-    """A command that rolls the policy of a run."""
+    """A command that rolls out the policy of a run."""
 
     policy: Annotated[
         str, tyro.conf.Positional, tyro.conf.arg(metavar="RUN", help_behavior_hint="")
     ] = ""
-    """A folder that terrainkit train wrote, a checkpoint in one, or a robot whose policy is
-    shipped."""
+    """A folder written by terrainkit train, a checkpoint in one, or a robot with a bundled
+    policy."""
 
-    terrain: Annotated[str, plain("GROUND")] = ""
-    """Ground: plane, a map (.npz), the config of one (.toml), or a MuJoCo model (.xml); unless
-    given, that of the training."""
+    terrain: Annotated[str, plain("MAP")] = ""
+    """Terrain: plane, a map (.npz), a map config (.toml), or a MuJoCo model (.xml); by default the
+    terrain of the training."""
 
     command: Annotated[
         tuple[float, float, float],
         tyro.conf.arg(metavar="VX VY YAW", help_behavior_hint=""),
-    ] = _NOT_ASKED
-    """Ask every robot for this: speed forward, to the left [m/s], turning to the left [rad/s]."""
+    ] = _NO_COMMAND
+    """Command for all robots: forward and left velocity [m/s], yaw rate [rad/s]."""
 
     random_commands: bool = False
-    """Ask for what the task draws at random."""
+    """Sample commands as in training."""
 
     num_envs: Annotated[
-        int, tyro.conf.arg(metavar="INT", help_behavior_hint="(default: as many as are of use)")
+        int, tyro.conf.arg(metavar="INT", help_behavior_hint="(default: depends on the terrain)")
     ] = NO_NUMBER
-    """Robots."""
+    """Number of robots."""
 
     checkpoint: Checkpoint = NO_NUMBER
-    """The checkpoint to take."""
+    """The checkpoint to load."""
 
     seed: int = 1
-    """Start of all random numbers: those of where robots start."""
+    """Seed of the start positions and of random commands."""
 
     device: str = "cpu"
-    """Device of the policy, by torch's name."""
+    """Device of the policy, as torch names it."""
 
-    def open(self) -> "Run":
+    def load_run(self) -> "Run":
         """Return the run.
 
         Raises:
@@ -67,25 +70,25 @@ class PolicyCommand(Command):
         from terrainkit_cli.training_extra import require_training
 
         if not self.policy:
-            raise ConfigError("no RUN; wanted the folder of a run, a checkpoint, or a robot's name")
+            raise ConfigError("RUN is missing; expected a run, a checkpoint, or a robot's name")
         require_training()
         from terrainkit_robots.rl.run import open_run
 
         return open_run(self.policy, number_given(self.checkpoint))
 
-    def asked(self, seconds: float) -> "Asked":
-        """Return what is to be rolled.
+    def evaluation_config(self, seconds: float) -> "EvaluationConfig":
+        """Return the settings of the rollout.
 
         Raises:
-            ConfigError: if an option is outside its limits.
+            ConfigError: if an option is out of range.
         """
-        from terrainkit_robots.policy.evaluate import Asked
+        from terrainkit_robots.policy.evaluate import EvaluationConfig
 
-        return Asked(
+        return EvaluationConfig(
             seconds=seconds,
             terrain=self.terrain or None,
             num_envs=number_given(self.num_envs),
-            command=None if self.command == _NOT_ASKED else self.command,
+            command=None if self.command == _NO_COMMAND else self.command,
             random_commands=self.random_commands,
             seed=self.seed,
             device=self.device,
@@ -96,72 +99,106 @@ class PolicyCommand(Command):
 class Evaluate(PolicyCommand):
     """Measure how well a policy walks: velocity errors, falls, success by terrain and level.
 
-    On a plane, each robot gets a command of a grid over the ranges of the task. On a map, robots
-    walk forward from every patch, each until it has crossed half a patch. There is no noise, and
-    there are no pushes; the first 2 s after a command are not measured, nor what comes after a
-    fall. The same seed gives the same result. It is JSON.
+    On a plane each robot gets a command of a grid over the ranges of the task. On a map the robots
+    walk forward from every patch, each until it has crossed half a patch. There is no noise, no
+    push and no domain randomization. The first 2 s after a command are not measured, nor is
+    anything after a fall. The same seed gives the same result.
     """
 
     seconds: float = 20.0
-    """How long robots walk [s]."""
+    """Duration of the rollout [s]."""
+
+    format: Literal["table", "json"] = "table"
+    """Format of the printed result."""
 
     output: Output = ""
-    """Where to write the JSON; unless given, it is printed."""
+    """Write the result to this file, as JSON."""
 
     overwrite: bool = False
     """Replace an existing file."""
 
     def run(self) -> int:
-        """Measure, and print or write the result."""
-        from terrainkit.atomic import check_target
+        """Evaluate, and print or write the result."""
+        from terrainkit.atomic import atomic_write, check_target
 
         output = Path(self.output) if self.output else None
         if output is not None:
-            check_target(output, overwrite=self.overwrite)  # before the wait
-        run = self.open()
+            check_target(output, overwrite=self.overwrite)  # before the rollout
+        run = self.load_run()
         from terrainkit_robots.policy.evaluate import evaluate
-        from terrainkit_robots.policy.score import write_evaluation
 
         with render.steps() as steps:
-            found = evaluate(
+            result = evaluate(
                 run,
-                self.asked(self.seconds),
-                lambda done: steps.say(f"robots walk: {done:.0%} of {self.seconds:g} s"),
+                self.evaluation_config(self.seconds),
+                lambda done: steps.say(f"rollout: {done:.0%} of {self.seconds:g} s"),
             )
-        if output is None:
-            render.report(found.as_json())
-        else:
-            write_evaluation(found, output, overwrite=self.overwrite)
+        if self.format == "json" and output is None:
+            render.report(result.as_json())
+            return 0
+        render.result(headline(result))
+        render.table(result_rows(result))
+        if output is not None:
+            with atomic_write(output, overwrite=self.overwrite) as path:
+                path.write_text(result.as_json(), encoding="utf-8")
             render.result(f"wrote {output}")
-        render.headline(headline(found))
         return 0
 
 
-def headline(found: "Evaluation") -> str:
-    """Return an evaluation in a line."""
-    whole = found.whole
-    success = "" if whole.success is None else f", {whole.success:.0%} success"
-    off = f"off by {'; '.join(errors(whole))}"
+def headline(result: "EvaluationResult") -> str:
+    """Return the metrics of all robots as one line."""
+    whole = result.metrics
+    success = "" if whole.success is None else f", {_percent(whole.success)} success"
+    error = "; ".join(format_errors(whole))
     if whole.lin_vel_error is None:
-        off = "errors are measured from 2 s after a command on, and none walked so long"
+        error = "not measured: no robot walked longer than 2 s after a command"
     return (
-        f"{found.robot}, {found.checkpoint}, on {found.terrain}: {whole.robots} robots, "
-        f"{whole.falls} fell{success}; {off}"
+        f"{result.robot}, {result.checkpoint}, on {result.config.terrain}: {whole.robots} robots, "
+        f"{whole.falls} fell{success}; error {error}"
     )
 
 
-def errors(score: "Score") -> tuple[str, str]:
-    """Return the errors of velocity and of turning in words."""
-    pairs = (
-        (score.lin_vel_error, score.lin_vel_error_1s, "m/s"),
-        (score.ang_vel_error, score.ang_vel_error_1s, "rad/s"),
-    )
-    first, second = (
-        f"{number(now)} {unit} ({number(mean)} averaged over 1 s)" for now, mean, unit in pairs
-    )
-    return first, second
+def format_errors(metrics: "RolloutMetrics") -> tuple[str, str]:
+    """Return the errors of the velocity and of the yaw rate as text."""
+    lin, ang = _number(metrics.lin_vel_error), _number(metrics.ang_vel_error)
+    lin_1s, ang_1s = _number(metrics.lin_vel_error_1s), _number(metrics.ang_vel_error_1s)
+    return f"{lin} m/s ({lin_1s} averaged over 1 s)", f"{ang} rad/s ({ang_1s} averaged over 1 s)"
 
 
-def number(value: float | None) -> str:
-    """Return an error as it is printed; a dash if it was never measured."""
+def result_rows(result: "EvaluationResult") -> list[tuple[str, ...]]:
+    """Return the groups of a result as rows of a table: by command, or by terrain and level."""
+    groups = result.groups
+    if "by_command" in groups:
+        rows: list[tuple[str, ...]] = [("forward", "left", "yaw", "fell", "m/s", "rad/s")]
+        for group in groups["by_command"]:
+            command = (f"{value:g}" for value in group.command or ())
+            fell = str(group.falls) if group.robots == 1 else f"{group.falls}/{group.robots}"
+            errors = _number(group.lin_vel_error), _number(group.ang_vel_error)
+            rows.append((*command, fell, *errors))
+        return rows
+    if "by_terrain" not in groups:
+        return []
+    levels = [group.level for group in groups["by_level"]]
+    success = {(each.terrain, each.level): each.success for each in groups["by_terrain_and_level"]}
+    head = "terrain", "robots", "fell", "m/s", "rad/s", "success"
+    rows = [(*head, *(f"level {level}" if level == levels[0] else str(level) for level in levels))]
+    for group in groups["by_terrain"]:
+        cells = (
+            str(group.terrain),
+            str(group.robots),
+            str(group.falls),
+            _number(group.lin_vel_error),
+            _number(group.ang_vel_error),
+            _percent(group.success),
+        )
+        by_level = (_percent(success.get((group.terrain, level))) for level in levels)
+        rows.append((*cells, *by_level))
+    return rows
+
+
+def _number(value: float | None) -> str:
     return "-" if value is None else f"{value:.3f}"
+
+
+def _percent(value: float | None) -> str:
+    return "-" if value is None else f"{value:.0%}"

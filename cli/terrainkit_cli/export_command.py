@@ -1,8 +1,8 @@
-"""The command that writes maps and policies for others to read."""
+"""The command that exports maps and policies."""
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import tyro
 
@@ -13,21 +13,18 @@ from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import NO_NUMBER, Checkpoint, number_given, plain
 from terrainkit_cli.terrain_commands import written
 
-if TYPE_CHECKING:
-    from terrainkit_robots.policy.export import Exported
-
 
 @dataclass(frozen=True, kw_only=True)
 class Export(Command):
-    """Write a map for others (.xml for MuJoCo, .stl, .ply, .obj, .glb, .png), or a trained policy.
+    """Export a map (.xml for MuJoCo, .stl, .ply, .obj, .glb, .png), or a trained policy.
 
-    A map, of a file in .npz, is written in the format that the suffix of --output names.
+    A map (.npz) is exported in the format named by the suffix of --output.
 
-    A policy is that of a run: a folder that terrainkit train wrote, a checkpoint in one, or the
-    name of a robot whose policy is shipped. It is written to a folder as policy.onnx, policy.pt
-    for TorchScript, and policy.json, which holds the order and the scales of observations, the
-    default pose, gains, limits, and the order of joints. What is written is asked on observations
-    of a rollout, and has to answer as the checkpoint does.
+    A policy is exported from a run: a folder written by terrainkit train, a checkpoint in one, or
+    the name of a robot with a bundled policy. The output folder gets policy.onnx, policy.pt
+    (TorchScript) and policy.json, which describes the observations and their scales, the default
+    pose, gains, limits, and the order of the joints. The exported policies are verified against
+    the checkpoint.
     """
 
     subject: Annotated[
@@ -35,38 +32,38 @@ class Export(Command):
         tyro.conf.Positional,
         tyro.conf.arg(metavar="MAP.npz|RUN", help_behavior_hint=""),
     ] = ""
-    """The map, or the run."""
+    """The map or the run."""
 
     output: Annotated[str, plain("PATH", "-o")] = ""
-    """Where to write. Of a map, a file, whose suffix names the format. Of a policy, a folder;
-    unless given, `exported` in the folder of the run, or ROBOT_policy here for a shipped one."""
+    """Where to write. For a map, a file whose suffix names the format. For a policy, a folder; by
+    default `exported` in the folder of the run, or ROBOT_policy for a bundled policy."""
 
     collision: Annotated[
         Literal["auto", "hfield", "boxes"] | None,
         tyro.conf.arg(metavar="{auto,hfield,boxes}", help_behavior_hint="(default: auto)"),
     ] = None
-    """For .xml: one heightfield, or boxes with vertical walls where the ground is level. auto takes
-    boxes where they hold all of the ground and are few."""
+    """For .xml: one heightfield, or boxes with vertical walls where the terrain is level. auto
+    selects boxes if a moderate number of them covers the whole terrain."""
 
     full: bool = False
-    """For meshes: two triangles for every cell, instead of joining coplanar faces."""
+    """For meshes: write two triangles per cell instead of merging coplanar faces."""
 
     closed: bool = False
     """For meshes: add a skirt and a bottom, for a watertight solid."""
 
     y_up: bool = False
-    """For meshes: turn the map so that y is up, as glTF viewers and game engines expect."""
+    """For meshes: rotate the map so that y is up, as glTF viewers and game engines expect."""
 
     checkpoint: Checkpoint = NO_NUMBER
-    """Of a run: the checkpoint to take."""
+    """For a run: the checkpoint to export."""
 
     overwrite: bool = False
     """Replace existing files."""
 
     def run(self) -> int:
-        """Write what the subject is."""
+        """Export the map or the policy."""
         if not self.subject:
-            raise ConfigError("nothing to export; wanted a map (.npz), a run, or a robot's name")
+            raise ConfigError("MAP or RUN is missing; expected a map, a run, or a robot's name")
         if is_run(self.subject):
             self._export_policy()
         else:
@@ -84,43 +81,52 @@ class Export(Command):
 
     def _export_map(self) -> None:
         if self.checkpoint != NO_NUMBER:
-            raise ConfigError(f"{self.subject} is a map; --checkpoint is for runs")
+            raise ConfigError(f"--checkpoint: got the map {self.subject}; expected a run")
         terrain_map = TerrainMap.load(self.subject)
         if not self.output:
             raise ConfigError(
-                f"{self.subject} is a map; wanted --output FILE, whose suffix names the format"
+                "--output is missing; expected a file, whose suffix names the format of the map"
             )
         output = Path(self.output)
         terrain_map.save(output, overwrite=self.overwrite, **self._map_options())
         render.result(written(terrain_map, output))
         if output.suffix == ".xml" and "<hfield" in output.read_text():
             render.result(
-                "on its heightfield, walls lean over one cell; "
-                "--collision boxes keeps them vertical where the ground is level"
+                "walls of the heightfield are one cell wide; "
+                "--collision boxes makes them vertical where the terrain is level"
             )
 
     def _export_policy(self) -> None:
         if options := self._map_options():
             name = next(iter(options)).replace("_", "-")
-            raise ConfigError(f"{self.subject} is no map; --{name} is for maps")
+            raise ConfigError(f"--{name}: got the run {self.subject}; expected a map")
         from terrainkit_cli.training_extra import require_training
 
-        require_training()
+        require_training("onnx", "onnxruntime")
         from terrainkit_robots.policy.export import export_policy
         from terrainkit_robots.rl.run import is_shipped, open_run
 
         run = open_run(self.subject, number_given(self.checkpoint))
-        own = Path(f"{run.folder.name}_policy") if is_shipped(run) else run.folder / "exported"
-        folder = Path(self.output) if self.output else own
-        done = export_policy(run, folder, overwrite=self.overwrite)
-        _tell(done, run.checkpoint)
+        default = run.folder / "exported"
+        if is_shipped(run):
+            default = Path(f"{run.folder.name}_policy")
+        folder = Path(self.output) if self.output else default
+        result = export_policy(run, folder, overwrite=self.overwrite)
+        checkpoint = run.checkpoint.name if run.checkpoint else ""
+        render.result(
+            f"wrote {', '.join(map(str, result.files))}: {result.num_observations} observations "
+            f"to {result.num_actions} actions, from {checkpoint}"
+        )
+        errors = zip(result.files, result.errors, strict=False)
+        differences = ", ".join(f"{file.name} {error:.1e}" for file, error in errors)
+        render.result(f"verified: largest difference from the checkpoint: {differences}")
 
 
 def is_run(subject: str) -> bool:
-    """Return whether a subject is a training run, rather than a map.
+    """Return whether a subject is a run or a robot, and not a map.
 
     Raises:
-        ConfigError: if it is neither, saying what exists.
+        ConfigError: if it is none of them.
     """
     path = Path(subject)
     try:
@@ -132,25 +138,11 @@ def is_run(subject: str) -> bool:
             return False
     except OSError as error:
         raise ConfigError(f"cannot read {subject}: {error.strerror or error}") from error
-    from terrainkit_robots.rl import registry
+    from terrainkit_robots.rl import tasks
 
-    if subject not in registry.names():
+    if subject not in tasks.task_names():
         raise ConfigError(
-            f"no map, run or robot {subject}; wanted a map (.npz), a folder that terrainkit train "
-            f"wrote, a checkpoint in one, or one of: {listing(registry.names())}"
+            f"no map, run or robot {subject}; expected a map (.npz), a run, a checkpoint, or "
+            f"one of: {listing(tasks.task_names())}"
         )
     return True
-
-
-def _tell(done: "Exported", checkpoint: Path | None) -> None:
-    """Say what was written, and how well it was checked."""
-    render.result(
-        f"wrote {', '.join(map(str, done.files))}: from {done.observations} observations to "
-        f"{done.actions} actions, of {checkpoint.name if checkpoint else 'no checkpoint'}"
-    )
-    render.result(
-        f"checked: policy.pt answers as the checkpoint does, to {done.error:.1e}"
-        + ("" if done.onnx_error is None else f"; policy.onnx to {done.onnx_error:.1e}")
-    )
-    if done.onnx_error is None:
-        render.note("policy.onnx was not checked: onnxruntime is not installed")

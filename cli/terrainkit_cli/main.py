@@ -20,6 +20,7 @@ COMMANDS = {
     "rule": "robot_commands",
     "onboard": "onboard_command",
     "train": "train_command",
+    "smoke-test": "smoke_test_command",
     "evaluate": "evaluate_command",
     "play": "play_command",
 }

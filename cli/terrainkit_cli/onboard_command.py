@@ -1,7 +1,9 @@
-"""The command that brings a new robot in."""
+"""The command that onboards a robot."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
@@ -24,58 +26,59 @@ from terrainkit_cli.robot_options import (
 )
 
 if TYPE_CHECKING:
-    from terrainkit_robots.onboarding.pipeline import BroughtIn, Wishes
+    from terrainkit_robots.onboarding.pipeline import OnboardOptions, OnboardResult
 
 
 @dataclass(frozen=True, kw_only=True)
 class Onboard(Command):
-    """Bring a robot in: from its URDF, xacro or MJCF file to a folder that is ready to train on.
+    """Convert a URDF, xacro or MJCF file into a folder that is ready for training.
 
-    The file is checked, and repaired where that is safe; the folder gets robot.toml (pose, gains,
-    names: edit it), robot.urdf, robot.xml, scene.xml, meshes, and report.md with pictures. Then the
-    robot is simulated, to show that it stands. The file itself is never changed.
+    The command checks the file, applies safe fixes and derives a default pose and PD gains. The
+    folder contains robot.toml (pose, gains, names: edit it), robot.urdf, robot.xml, scene.xml,
+    meshes, and report.md with pictures. The robot is then simulated to test that it stands. The
+    input file is never changed.
 
-    Exit code 0: done. 1: errors are left in the file, or the robot did not stand. 2: a file cannot
-    be opened or written, or an option is wrong.
+    Exit code 0: success. 1: errors remain in the file, or the robot does not stand. 2: a file
+    cannot be read or written, or an option is invalid.
     """
 
     file: Annotated[
         str, tyro.conf.Positional, tyro.conf.arg(metavar="FILE", help_behavior_hint="")
     ] = ""
-    """The robot's file, or the name of a bundled robot: quadruped, biped."""
+    """The robot file, or the name of a bundled robot: quadruped, biped."""
 
     output: Output = ""
-    """Folder to write; unless given, one with the robot's name here."""
+    """Folder to write. Default: a folder with the name of the robot."""
 
     collision: Literal["keep", "hull", "coacd", "primitives"] = "keep"
-    """What becomes of collision meshes: kept, their convex hulls, convex parts by CoACD where they
-    are far from convex, or the box, cylinder, capsule or ball that fits each best."""
+    """Simplify collision meshes: keep them; replace them by their convex hulls; decompose
+    nonconvex meshes into convex parts with CoACD; or fit a box, cylinder, capsule or sphere."""
 
     config: Annotated[Words, *repeated("FRAMEWORK")] = field(default_factory=list)
-    """Also write the configuration of: legged_gym, leggedgym_ex, isaaclab, mjlab, genesis."""
+    """Also write a configuration for: legged_gym, leggedgym_ex, isaaclab, mjlab, genesis."""
 
     base: Literal["auto", "floating", "fixed"] = "auto"
-    """Whether the base moves freely. Of itself, it does with legs, with wheels, or if the file says
-    so."""
+    """Whether the base is floating or fixed to the world. With auto, the base is floating if the
+    file says so, or if the robot has legs or wheels."""
 
     spec: Text = ""
-    """A robot.toml whose values go before what would be suggested: one that you have edited."""
+    """A robot.toml whose values override the derived ones, such as one that you have edited."""
 
     unsafe_fixes: bool = False
-    """Repair more: also where a number, a shape or a mesh changes. The file stays as it is."""
+    """Also apply fixes that change a number, a shape or a mesh. The input file is not changed."""
 
     force: bool = False
-    """Go on although errors are left that make another robot of it: in the text, the tree, joints,
-    meshes or masses."""
+    """Continue although errors remain in the XML, the tree, joints, meshes or masses. The result
+    may be a different robot."""
 
     overwrite: bool = False
-    """Replace the folder, if it is an onboarded robot."""
+    """Replace the folder if it contains an onboarded robot."""
 
     no_pictures: bool = False
-    """Draw no pictures."""
+    """Do not render pictures."""
 
     ignore: Annotated[Words, *repeated("CODES=REASON")] = field(default_factory=list)
-    """Do not ask these rules; the reason goes into the report."""
+    """Ignore these rules; the reason is written to the report."""
 
     package: Packages = field(default_factory=list)
     """Folder of a ROS package, for package:// and $(find ...)."""
@@ -84,90 +87,85 @@ class Onboard(Command):
     """Value of a xacro argument."""
 
     def run(self) -> int:
-        """Bring the robot in, and tell what was done."""
-        from terrainkit_robots.onboarding.pipeline import bring_in
-        from terrainkit_robots.onboarding.summary import summary
+        """Onboard the robot and print a summary."""
+        from terrainkit_robots.onboarding.pipeline import onboard
+        from terrainkit_robots.onboarding.summary import summarize
 
         if not self.file:
-            raise ConfigError("no FILE to onboard; wanted one, or quadruped, or biped")
+            raise ConfigError("FILE is missing; expected a robot file, quadruped or biped")
+        output = Path(self.output) if self.output else None
         with render.steps() as steps:
-            done = bring_in(find_robot(self.file), self._wishes(steps))
-        if done.folder is None:
-            render.report(_refusal(done))
-            render.error(f"{self.file}: errors are left{_advice(done, self)}; nothing was written")
+            result = onboard(find_robot(self.file), output, self._options(steps))
+        if result.folder is None:
+            render.report(_blocking_errors(result))
+            render.error(f"{self.file}: errors remain{self._advice(result)}; nothing was written")
             return 1
-        render.table([(f"  {word}", text) for word, text in summary(done)])
-        render.result(f"wrote {done.folder}; look at it, from its keyframe `home` on:")
-        render.result(f"  {_viewer(done.folder)}")
-        faults = _faults(done)
-        for fault in faults:
-            render.error(f"{self.file}: {fault}")
-        return int(bool(faults))
+        render.table([(f"  {label}", text) for label, text in summarize(result)])
+        render.result(f"wrote {result.folder}; view the robot with:")
+        scene = quote(str(result.folder / "scene.xml"))
+        render.result(f"  python -m mujoco.viewer --mjcf={scene}")
+        problems = _problems(result)
+        for problem in problems:
+            render.error(f"{self.file}: {problem}")
+        return int(bool(problems))
 
-    def _wishes(self, steps: render.Steps) -> "Wishes":
-        from functools import partial
-
+    def _options(self, steps: render.Steps) -> "OnboardOptions":
         from terrainkit_robots.export.collision_simplification.decomposition_cache import (
             cache_folder,
         )
         from terrainkit_robots.lint.settings import Settings
-        from terrainkit_robots.onboarding.pipeline import Wishes
+        from terrainkit_robots.onboarding.pipeline import OnboardOptions
 
-        return Wishes(
-            target=Path(self.output) if self.output else None,
+        return OnboardOptions(
             settings=Settings(
                 ignore=reasons(self.ignore),
                 packages=packages(self.package),
                 xacro_arguments=xacro_arguments(self.xacro_arg),
             ),
             collision=self.collision,
-            configs=tuple(word for words in self.config for word in listed(words)),
+            frameworks=tuple(word for words in self.config for word in listed(words)),
             floating={"auto": None, "floating": True, "fixed": False}[self.base],
             spec=Path(self.spec) if self.spec else None,
-            unsafe=self.unsafe_fixes,
-            cache=cache_folder(),
+            unsafe_fixes=self.unsafe_fixes,
             force=self.force,
             overwrite=self.overwrite,
-            pictures=not self.no_pictures,
-            say=steps.say,
+            render_pictures=not self.no_pictures,
+            cache_dir=cache_folder(),
             progress=partial(steps.bar, of="collision meshes"),
+            on_step=steps.say,
         )
 
+    def _advice(self, result: "OnboardResult") -> str:
+        """Return which option helps with the blocking errors."""
+        if not result.report.facts.bodies:
+            return ""
+        findings = result.report.findings
+        num_fixable = sum(f.severity == "error" and f.fix is not None for f in findings)
+        if num_fixable and not self.unsafe_fixes:
+            return f", {num_fixable} of them fixable with --unsafe-fixes"
+        return "; --force ignores them where MuJoCo accepts the robot"
 
-def _refusal(done: "BroughtIn") -> str:
-    """Return the errors of a robot that was not brought in."""
-    from dataclasses import replace
 
+def _blocking_errors(result: "OnboardResult") -> str:
+    """Return a report on the errors that prevent onboarding."""
     from terrainkit_robots.lint.report import format_reports
-    from terrainkit_robots.onboarding.pipeline import keeps_out
+    from terrainkit_robots.onboarding.pipeline import is_blocking
 
-    errors = tuple(filter(keeps_out, done.report.findings))
-    return format_reports([replace(done.report, findings=errors)], "text")
-
-
-def _advice(done: "BroughtIn", command: Onboard) -> str:
-    """Return what to do about errors that keep a robot out."""
-    if not done.report.facts.bodies:
-        return ""
-    unsafe = sum(f.severity == "error" and f.fix is not None for f in done.report.findings)
-    if unsafe and not command.unsafe_fixes:
-        return f", of which --unsafe-fixes repairs {unsafe}"
-    return "; --force goes on as far as MuJoCo does"
+    errors = tuple(filter(is_blocking, result.report.findings))
+    return format_reports([replace(result.report, findings=errors)], "text")
 
 
-def _viewer(folder: Path) -> str:
-    from shlex import quote
+def _problems(result: "OnboardResult") -> list[str]:
+    """Return why a robot that was written is not ready for training."""
+    from terrainkit_robots.text import count
 
-    return f"python -m mujoco.viewer --mjcf={quote(str(folder / 'scene.xml'))}"
-
-
-def _faults(done: "BroughtIn") -> list[str]:
-    """Return why a robot that was written is not yet one to train."""
-    from terrainkit_robots.lint.report.summary import count
-
-    left = [finding for finding in done.report.findings if finding.severity == "error"]
-    codes = ", ".join(dict.fromkeys(finding.code for finding in left))
-    faults = [f"{count(len(left), 'error')} left ({codes}); see report.md"] if left else []
-    if done.proof is not None and not done.proof.stood:
-        faults.append(f"it does not stand: {'; '.join(done.proof.faults)}")
-    return faults
+    errors = [finding for finding in result.report.findings if finding.severity == "error"]
+    codes = ", ".join(dict.fromkeys(finding.code for finding in errors))
+    remain = "remains" if len(errors) == 1 else "remain"
+    problems = (
+        [f"{count(len(errors), 'error')} {remain} ({codes}); see report.md"] if errors else []
+    )
+    verification = result.verification
+    if verification is not None and not verification.is_stable:
+        problems.append(f"the robot does not stand: {'; '.join(verification.failures)}")
+    return problems

@@ -237,9 +237,3 @@ def _clock(seconds: float) -> str:
     """Return a time such as 1:02:03."""
     minutes, rest = divmod(round(seconds), 60)
     return f"{minutes // 60}:{minutes % 60:02}:{rest:02}"
-
-
-def headline(text: str) -> None:
-    """Print what a result comes to on stderr, if that is a terminal and the result is elsewhere."""
-    if sys.stderr.isatty():
-        print(text, file=sys.stderr)

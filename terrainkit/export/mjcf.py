@@ -13,10 +13,10 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.annotations import convert
 from terrainkit.boxes import BoxCover, around, level_cells
 from terrainkit.capacity import require_memory
 from terrainkit.mesh.closed import THICKNESS
-from terrainkit.schema import convert
 
 if TYPE_CHECKING:
     from terrainkit.terrain_map import TerrainMap

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from terrainkit_cli.main import main
-from terrainkit_robots.rl import registry
+from terrainkit_robots.rl.tasks import get_task
 
 Run = subprocess.CompletedProcess[str]
 
@@ -53,7 +53,7 @@ def small(terrainkit) -> str:
 @pytest.fixture
 def walking(tmp_path) -> Path:
     """Return the folder of a run `walk` of a quadruped that walks, with two checkpoints."""
-    shipped = registry.find("quadruped").shipped
+    shipped = get_task("quadruped").trained_run
     (policy,) = shipped.glob("model_*.pt")
     folder = tmp_path / "walk"
     shutil.copytree(shipped, folder, ignore=shutil.ignore_patterns(policy.name))

@@ -1,13 +1,16 @@
 import json
 import sys
-from dataclasses import replace
 
 import pytest
 
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
-from terrainkit_cli import evaluate_command, training_extra
+from terrainkit_cli import training_extra
+from terrainkit_cli.evaluate_command import headline, result_rows
+from terrainkit_robots.policy.evaluate import EvaluationConfig, EvaluationResult, RolloutMetrics
 from terrainkit_robots.rl import run as run_module
+
+QUICK = ("--seconds", "0.04", "--num-envs", "1")
 
 
 @pytest.fixture
@@ -28,39 +31,49 @@ def one_line(err):
     return err
 
 
-def test_it_prints_json_and_nothing_else(here):
-    code, out, err = here("walk", "--seconds", "0.1", "--num-envs", "2")
+def test_evaluate_prints_a_table(here):
+    code, out, err = here("walk", "--seconds", "2.1", "--num-envs", "2")
     assert (code, err) == (0, "")
-    told = json.loads(out)
-    assert (told["robot"], told["checkpoint"], told["terrain"]) == (
-        "quadruped",
-        "model_7.pt",
-        "plane",
-    )
-    assert told["all"]["robots"] == 2
-    assert len(told["by_command"]) == 2
+    first, head, *rows = out.splitlines()
+    assert first.startswith("quadruped, model_7.pt, on plane: 2 robots, 0 fell; error 0.")
+    assert head.split() == ["forward", "left", "yaw", "fell", "m/s", "rad/s"]
+    assert len(rows) == 2
+    assert all(row.split()[3] == "0" for row in rows)
 
 
-def test_the_same_words_give_the_same_bytes(here):
-    words = ("walk", "--seconds", "0.2", "--num-envs", "2", "--seed", "3")
+def test_evaluate_prints_json(here):
+    code, out, err = here("walk", "--seconds", "0.1", "--num-envs", "2", "--format", "json")
+    assert (code, err) == (0, "")
+    document = json.loads(out)
+    names = document["robot"], document["checkpoint"], document["terrain"]
+    assert names == ("quadruped", "model_7.pt", "plane")
+    assert document["all"]["robots"] == 2
+    assert len(document["by_command"]) == 2
+
+
+def test_evaluate_is_reproducible(here):
+    words = ("walk", "--seconds", "0.2", "--num-envs", "2", "--seed", "3", "--format", "json")
     assert here(*words) == here(*words)
 
 
-def test_one_command_for_all(here):
-    words = ("walk", "--seconds", "2.1", "--num-envs", "1", "--command", "-0.5", "0", "0")
-    told = json.loads(here(*words)[1])
-    assert told["all"]["robots"] == 1
-    assert told["all"]["lin_vel_error"] < 0.25  # it walks backward as it is asked to
-    assert "by_command" not in told
+def test_evaluate_with_one_command(here):
+    options = ("--seconds", "2.1", "--num-envs", "1", "--format", "json")
+    document = json.loads(here("walk", *options, "--command", "-0.5", "0", "0")[1])
+    assert document["all"]["robots"] == 1
+    assert document["all"]["lin_vel_error"] < 0.25  # it walks backward
+    assert "by_command" not in document
 
 
-def test_it_writes_a_file_once(here, tmp_path, monkeypatch):
-    words = ("walk", "--seconds", "0.04", "--num-envs", "1", "-o", "result.json")
-    assert here(*words) == (0, "wrote result.json\n", "")
+def test_evaluate_writes_json_to_a_file(here, tmp_path, monkeypatch):
+    words = ("walk", *QUICK, "-o", "result.json")
+    code, out, err = here(*words)
+    assert (code, err) == (0, "")
+    assert out.startswith("quadruped, model_7.pt, on plane: 1 robots")
+    assert out.endswith("wrote result.json\n")
     before = (tmp_path / "result.json").read_text()
     assert json.loads(before)["seconds"] == 0.04
     with monkeypatch.context() as patch:
-        patch.setattr(run_module, "open_run", None)  # it is told before any work
+        patch.setattr(run_module, "open_run", None)  # the file is checked before any work
         code, _, err = here(*words)
     assert code == 2
     assert "result.json exists" in one_line(err)
@@ -68,80 +81,85 @@ def test_it_writes_a_file_once(here, tmp_path, monkeypatch):
     assert (tmp_path / "result.json").read_text() == before
 
 
-def test_a_checkpoint_is_asked_for_by_its_iteration(here):
-    words = ("--seconds", "0.04", "--num-envs", "1")
-    told = [
-        json.loads(here(*run, *words)[1])["checkpoint"]
+def test_evaluate_loads_the_given_checkpoint(here):
+    names = [
+        json.loads(here(*run, *QUICK, "--format", "json")[1])["checkpoint"]
         for run in (("walk",), ("walk", "--checkpoint", "3"), ("walk/model_3.pt",))
     ]
-    assert told == ["model_7.pt", "model_3.pt", "model_3.pt"]
+    assert names == ["model_7.pt", "model_3.pt", "model_3.pt"]
 
 
-def test_a_robot_whose_policy_is_shipped_walks(here):
-    words = ("--seconds", "3", "--num-envs", "1", "--command", "0.5", "0", "0.5")
-    told = json.loads(here("quadruped", *words)[1])
-    assert told["robot"] == "quadruped"
-    assert told["all"]["falls"] == 0
-    assert told["all"]["lin_vel_error"] < 0.25
-    assert told["all"]["ang_vel_error"] < 0.25
+def test_evaluate_bundled_policy_by_name(here):
+    options = ("--seconds", "3", "--num-envs", "1", "--command", "0.5", "0", "0.5")
+    document = json.loads(here("quadruped", *options, "--format", "json")[1])
+    assert document["robot"] == "quadruped"
+    assert document["all"]["falls"] == 0
+    assert document["all"]["lin_vel_error"] < 0.25
+    assert document["all"]["ang_vel_error"] < 0.25
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
-        ((), "no RUN; wanted"),
-        (("walk", "--checkpoint", "5"), "there are: 3, 7"),
-        (("walk", "--seconds", "-1"), "seconds is -1; wanted more than 0"),
-        (("walk", "--checkpoint", "-5"), "there are: 3, 7"),
-        (("walk", "--num-envs", "-3"), "num_envs is -3"),
-        (("walk", "--num-envs", "0"), "num_envs is 0"),
-        (("walk", "--terrain", "moon"), "terrain 'moon'; wanted plane"),
+        ((), "RUN is missing; expected"),
+        (("walk", "--checkpoint", "5"), "expected one of: 3, 7"),
+        (("walk", "--seconds", "-1"), "seconds: got -1; expected more than 0"),
+        (("walk", "--checkpoint", "-5"), "expected one of: 3, 7"),
+        (("walk", "--num-envs", "-3"), "num_envs: got -3"),
+        (("walk", "--num-envs", "0"), "num_envs: got 0"),
+        (("walk", "--terrain", "moon"), "moon"),
         (("walk", "--terrain", "gone.npz"), "gone.npz"),
-        (("walk", "--device", "abacus"), "device 'abacus'; here there is: cpu"),
+        (("walk", "--device", "abacus"), "abacus"),
         (("walk", "--command", "1", "0"), "--command"),
-        (("walk", "--command", "nan", "0", "0"), "wanted three numbers"),
-        (("walk", "--command", "1", "0", "0", "--random-commands"), "wanted one"),
+        (("walk", "--command", "nan", "0", "0"), "expected three finite numbers"),
+        (("walk", "--command", "1", "0", "0", "--random-commands"), "expected one of them"),
         (("walk", "-o", "nowhere/result.json"), "there is no folder nowhere"),
     ],
 )
-def test_what_cannot_be_is_one_line(here, words, told):
+def test_evaluate_rejects_invalid_input(here, words, message):
     code, out, err = here(*words)
     assert (code, out) == (2, "")
-    assert told in one_line(err)
+    assert message in one_line(err)
 
 
-def test_without_the_extra_it_says_what_to_install(here, monkeypatch):
+def test_evaluate_names_the_missing_extra(here, monkeypatch):
     monkeypatch.setattr(training_extra, "_PACKAGES", ("torch", "no_such_package"))
     code, _, err = here("walk")
     assert code == 2
     assert "pip install 'terrainkit[train]'" in one_line(err)
 
 
-def test_a_terminal_gets_a_headline(here, monkeypatch):
+def test_evaluate_json_is_clean_in_a_terminal(here, monkeypatch):
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    _, out, err = here("walk", "--seconds", "2.1", "--num-envs", "1", "--command", "0", "0", "0")
-    assert json.loads(out)
-    assert "quadruped, model_7.pt, on plane: 1 robots, 0 fell; off by 0." in err
+    assert json.loads(here("walk", *QUICK, "--format", "json")[1])
 
 
-def test_what_was_never_measured_is_told_and_is_a_dash():
-    from terrainkit_robots.policy.score import Evaluation, Score
+def make_metrics(**values):
+    errors = dict.fromkeys(["lin_vel_error", "lin_vel_error_1s", "ang_vel_error"])
+    errors["ang_vel_error_1s"] = None
+    return RolloutMetrics(**({"robots": 4, "falls": 4, "success": 0.25} | errors | values))
 
-    score = Score(
-        robots=4,
-        falls=4,
-        success=0.25,
-        lin_vel_error=None,
-        lin_vel_error_1s=None,
-        ang_vel_error=None,
-        ang_vel_error_1s=None,
+
+def make_result(metrics, **groups):
+    config = EvaluationConfig(terrain="hill.npz")
+    return EvaluationResult(
+        robot="hare", checkpoint="model_1.pt", config=config, metrics=metrics, groups=groups
     )
-    found = Evaluation(
-        robot="hare", checkpoint="model_1.pt", terrain="hill.npz", seconds=2, seed=1, whole=score
-    )
-    assert evaluate_command.headline(found) == (
+
+
+def test_headline_shows_missing_errors():
+    assert headline(make_result(make_metrics())) == (
         "hare, model_1.pt, on hill.npz: 4 robots, 4 fell, 25% success; "
-        "errors are measured from 2 s after a command on, and none walked so long"
+        "error not measured: no robot walked longer than 2 s after a command"
     )
-    measured = replace(score, lin_vel_error=0.12345)
-    assert evaluate_command.errors(measured)[0] == "0.123 m/s (- averaged over 1 s)"
+    line = headline(make_result(make_metrics(lin_vel_error=0.12345)))
+    assert "error 0.123 m/s (- averaged over 1 s)" in line
+
+
+def test_rows_by_terrain_show_success_by_level():
+    terrain, both = make_metrics(terrain="flat"), make_metrics(terrain="flat", level=1, success=1)
+    levels = [make_metrics(level=0), make_metrics(level=1)]
+    groups = {"by_terrain": [terrain], "by_level": levels, "by_terrain_and_level": [both]}
+    head, row = result_rows(make_result(make_metrics(), **groups))
+    assert head == ("terrain", "robots", "fell", "m/s", "rad/s", "success", "level 0", "1")
+    assert row == ("flat", "4", "4", "-", "-", "25%", "-", "100%")

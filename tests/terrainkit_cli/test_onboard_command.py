@@ -5,7 +5,7 @@ import sys
 import pytest
 
 from terrainkit_cli.main import main
-from terrainkit_robots.onboarding.frameworks import frameworks
+from terrainkit_robots.onboarding.frameworks.frameworks import framework_names
 
 ARM = """<robot name="arm">
   <link name="stand"><inertial><mass value="5"/>
@@ -43,26 +43,26 @@ def one_line(err):
     return err
 
 
-def test_a_quadruped_stands(here, tmp_path):
+def test_onboard_quadruped(here, tmp_path):
     code, out, err = here("quadruped", "-o", "robot", NO_PICTURES, "--config", "mjlab,genesis")
     assert (code, err) == (0, "")
-    assert "stands    yes: 5 s with the gains of robot.toml" in out
+    assert "standing  yes: 5 s with the gains of robot.toml" in out
     assert "python -m mujoco.viewer --mjcf=robot/scene.xml" in out
     assert (tmp_path / "robot/mjlab_config.py").exists()
     assert (tmp_path / "robot/genesis_config.py").exists()
 
 
-def test_the_folder_is_called_as_the_robot_unless_told(here, tmp_path):
+def test_onboard_default_folder_is_robot_name(here, tmp_path):
     assert here("arm.urdf", NO_PICTURES)[0] == 0
     assert (tmp_path / "arm/robot.toml").exists()
 
 
-def test_the_path_can_be_pasted(here):
+def test_onboard_quotes_viewer_path(here):
     _, out, _ = here("arm.urdf", NO_PICTURES, "-o", "my arm")
     assert "--mjcf='my arm/scene.xml'" in out
 
 
-def test_errors_that_keep_it_out_are_listed(here, tmp_path):
+def test_onboard_lists_blocking_errors(here, tmp_path):
     (tmp_path / "arm.urdf").write_text(ARM.replace('mass value="1"', 'mass value="-1"'))
     code, out, err = here("arm.urdf", NO_PICTURES)
     assert code == 1
@@ -71,11 +71,11 @@ def test_errors_that_keep_it_out_are_listed(here, tmp_path):
     assert not (tmp_path / "arm").exists()
 
 
-def test_errors_that_do_not_are_told(here, tmp_path):
+def test_onboard_reports_other_errors(here, tmp_path):
     (tmp_path / "arm.urdf").write_text(ARM.replace('lower="-1.5" upper="1.5" ', ""))
     code, _, err = here("arm.urdf", NO_PICTURES)
     assert code == 1
-    assert "1 error left (JNT006)" in one_line(err)
+    assert "1 error remains (JNT006)" in one_line(err)
     assert (tmp_path / "arm/report.md").exists()
 
 
@@ -86,13 +86,13 @@ def test_errors_that_do_not_are_told(here, tmp_path):
         (('type="revolute"', 'type="revolut"'), "JNT001"),
     ],
 )
-def test_a_joint_that_would_be_another_keeps_it_out(here, tmp_path, change, code):
+def test_onboard_blocks_invalid_joint(here, tmp_path, change, code):
     (tmp_path / "arm.urdf").write_text(ARM.replace(*change))
     assert code in here("arm.urdf", NO_PICTURES)[1]
     assert not (tmp_path / "arm").exists()
 
 
-def test_what_is_not_a_robot_is_not_to_be_forced(here, tmp_path):
+def test_onboard_does_not_suggest_force_without_robot(here, tmp_path):
     (tmp_path / "empty.urdf").write_text("")
     code, _, err = here("empty.urdf", NO_PICTURES)
     assert code == 1
@@ -102,18 +102,18 @@ def test_what_is_not_a_robot_is_not_to_be_forced(here, tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ([], "no FILE to onboard"),
+        ([], "FILE is missing"),
         (["nothing.urdf"], "there is no file nothing.urdf"),
-        (["arm.urdf", "-o", "no/where"], "there is no folder no"),
-        (["arm.urdf", "-o", "arm.urdf"], "not a folder"),
-        (["arm.urdf", "--config", "gym"], "no framework 'gym'; there are: "),
+        (["arm.urdf", "-o", "no/where"], "the folder no does not exist"),
+        (["arm.urdf", "-o", "arm.urdf"], "is not a folder"),
+        (["arm.urdf", "--config", "gym"], "framework: got 'gym'; expected "),
         (["arm.urdf", "--config", "legged_gym"], "no legs"),
         (["arm.urdf", "--spec", "arm.urdf"], "arm.urdf: not a TOML file"),
         (["arm.urdf", "--spec", "none.toml"], "cannot read none.toml"),
         (["arm.urdf", "--base", "flying"], "--base"),
     ],
 )
-def test_bad_input_is_one_line_and_writes_nothing(here, tmp_path, words, message):
+def test_onboard_rejects_input(here, tmp_path, words, message):
     before = sorted(tmp_path.iterdir())
     code, _, err = here(*words, *([NO_PICTURES] if words else []))
     assert code == 2
@@ -121,11 +121,11 @@ def test_bad_input_is_one_line_and_writes_nothing(here, tmp_path, words, message
     assert sorted(tmp_path.iterdir()) == before
 
 
-def test_the_spec_of_another_robot_is_refused(here, tmp_path):
+def test_onboard_rejects_spec_of_other_robot(here, tmp_path):
     assert here("arm.urdf", NO_PICTURES)[0] == 0
     code, _, err = here("quadruped", "--spec", "arm/robot.toml", "-o", "robot", NO_PICTURES)
     assert code == 2
-    assert "arm/robot.toml is of arm: none of its joints is in quadruped" in one_line(err)
+    assert "arm/robot.toml belongs to arm: none of its joints is in quadruped" in one_line(err)
     assert not (tmp_path / "robot").exists()
 
 
@@ -136,7 +136,7 @@ def test_the_spec_of_another_robot_is_refused(here, tmp_path):
         ("spawn_height = 0.3", "spawn_height = -0.3", "LEG008"),
     ],
 )
-def test_a_spec_that_is_wrong_for_the_robot_is_refused(here, tmp_path, before, after, message):
+def test_onboard_rejects_invalid_spec(here, tmp_path, before, after, message):
     assert here("quadruped", "-o", "first", NO_PICTURES)[0] == 0
     text = (tmp_path / "first/robot.toml").read_text()
     assert before in text
@@ -146,7 +146,7 @@ def test_a_spec_that_is_wrong_for_the_robot_is_refused(here, tmp_path, before, a
     assert f"mine.toml: {message}: " in one_line(err)
 
 
-def test_an_edited_spec_is_kept_when_its_folder_is_replaced(here, tmp_path):
+def test_onboard_backs_up_edited_spec(here, tmp_path):
     here("arm.urdf", NO_PICTURES)
     spec = tmp_path / "arm/robot.toml"
     spec.write_text(spec.read_text().replace("# Name of the robot.", "# Mine."))
@@ -154,11 +154,11 @@ def test_an_edited_spec_is_kept_when_its_folder_is_replaced(here, tmp_path):
     assert code == 0
     assert "robot.toml.before" in out
     assert "# Mine." in (tmp_path / "arm/robot.toml.before").read_text()
-    # Once more, and there is nothing new to be kept: what was kept stays.
+    # Without new edits, the backup stays.
     code, out, _ = here("arm.urdf", NO_PICTURES, "--overwrite")
     assert code == 0
     assert "# Mine." in (tmp_path / "arm/robot.toml.before").read_text()
-    # And it stays beside what is kept of another time.
+    # A second backup does not replace the first.
     spec.write_text(spec.read_text().replace("# Name of the robot.", "# Yours."))
     code, out, _ = here("arm.urdf", NO_PICTURES, "--overwrite")
     assert "robot.toml.before_2" in out
@@ -167,7 +167,7 @@ def test_an_edited_spec_is_kept_when_its_folder_is_replaced(here, tmp_path):
     assert here("arm.urdf", NO_PICTURES, "--overwrite")[0] == 0
 
 
-def test_an_edited_configuration_is_kept_and_a_file_of_ones_own_is_not_touched(here, tmp_path):
+def test_onboard_backs_up_configuration_and_keeps_foreign_file(here, tmp_path):
     words = ("quadruped", "-o", "robot", NO_PICTURES, "--overwrite", "--config", "mjlab")
     assert here(*words)[0] == 0
     config = tmp_path / "robot/mjlab_config.py"
@@ -179,11 +179,11 @@ def test_an_edited_configuration_is_kept_and_a_file_of_ones_own_is_not_touched(h
     (tmp_path / "robot/train_config.py").write_text("mine")
     code, _, err = here(*words)
     assert code == 2
-    assert "also holds train_config.py, which onboarding did not write" in one_line(err)
+    assert "also contains train_config.py, which onboarding did not write" in one_line(err)
     assert (tmp_path / "robot/train_config.py").read_text() == "mine"
 
 
-def test_settings_that_select_rules_let_no_broken_robot_in(here, tmp_path):
+def test_onboard_ignores_rule_selection_of_settings(here, tmp_path):
     text = (tmp_path / "arm.urdf").read_text()
     (tmp_path / "arm.urdf").write_text(text.replace('<mass value="1"', '<mass value="-1"', 1))
     (tmp_path / "pyproject.toml").write_text('[tool.terrainkit.check-robot]\nselect = ["NAM"]\n')
@@ -191,23 +191,23 @@ def test_settings_that_select_rules_let_no_broken_robot_in(here, tmp_path):
     assert not (tmp_path / "arm").exists()
 
 
-def test_the_help_names_every_framework(capsys):
+def test_onboard_help_lists_frameworks(capsys):
     with pytest.raises(SystemExit):
         main(["onboard", "--help"])
     said = " ".join(capsys.readouterr().out.split())
-    for name in frameworks.names():
+    for name in framework_names():
         assert name in said
 
 
-def test_a_graphics_library_that_is_not_there_only_costs_the_pictures(tmp_path):
-    """MuJoCo itself cannot be imported then."""
+def test_onboard_without_opengl_skips_pictures(tmp_path):
+    """`import mujoco` fails with this value of MUJOCO_GL."""
     command = [sys.executable, "-m", "terrainkit_cli.main", "onboard", "quadruped", "-o", "robot"]
     environment = os.environ | {"MUJOCO_GL": "nonsense"}
     run = subprocess.run(
         command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
     )
     assert (run.returncode, run.stderr) == (0, "")
-    assert "pictures  none: MuJoCo cannot draw here (nonsense: " in run.stdout
+    assert "pictures  none: MuJoCo cannot render here (nonsense: " in run.stdout
 
 
 INTERRUPTED = """
@@ -215,7 +215,7 @@ import os, signal, sys
 from terrainkit_cli.main import main
 from terrainkit_robots.onboarding import folder, pipeline
 
-signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
+signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs ignore SIGINT
 whole = folder.write_files
 
 def written_then_interrupted(*arguments):
@@ -227,7 +227,7 @@ sys.exit(main(["onboard", "quadruped", "-o", "robot"]))
 """
 
 
-def test_interrupted_it_leaves_nothing(tmp_path):
+def test_onboard_interrupted_leaves_no_files(tmp_path):
     run = subprocess.run(
         [sys.executable, "-c", INTERRUPTED],
         cwd=tmp_path,

@@ -31,7 +31,7 @@ def one_line(err):
     return err
 
 
-def test_it_writes_a_video_called_as_the_run(here, tmp_path):
+def test_play_writes_a_video_named_as_the_run(here, tmp_path):
     code, out, err = here("walk", *QUICK, *SMALL)
     if "MuJoCo cannot draw here" in err:
         pytest.skip(err)
@@ -46,7 +46,7 @@ def test_it_writes_a_video_called_as_the_run(here, tmp_path):
     assert frame.shape == (64, 96, 3)
 
 
-def test_a_robot_whose_policy_is_shipped_is_played_by_its_name(here, tmp_path):
+def test_play_bundled_policy_by_name(here, tmp_path):
     words = ("--seconds", "0.2", "--num-envs", "2", *SMALL)
     code, out, err = here("quadruped", *words)
     if "MuJoCo cannot draw here" in err:
@@ -56,7 +56,7 @@ def test_a_robot_whose_policy_is_shipped_is_played_by_its_name(here, tmp_path):
     assert (tmp_path / "quadruped.mp4").stat().st_size > 1000
 
 
-def test_without_what_writes_videos_it_says_what_to_install(here, monkeypatch):
+def test_play_names_the_missing_extra(here, monkeypatch):
     find_spec = importlib.util.find_spec
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name: None if "ffmpeg" in name else find_spec(name)
@@ -67,7 +67,7 @@ def test_without_what_writes_videos_it_says_what_to_install(here, monkeypatch):
     assert here("walk", *QUICK, "--no-video")[0] == 0
 
 
-def test_a_table_for_a_map(here, tmp_path):
+def test_play_prints_a_table_for_a_map(here, tmp_path):
     terrains = (SubTerrain(terrain="flat"), SubTerrain(terrain="stairs"))
     config = MapConfig(rows=2, cols=2, patch_size=(6, 6), border=1, terrains=terrains)
     generate(config).save(tmp_path / "map.npz")
@@ -80,13 +80,13 @@ def test_a_table_for_a_map(here, tmp_path):
     assert sorted(each.name for each in tmp_path.iterdir()) == ["map.npz", "walk"]
 
 
-def test_no_video_on_a_plane_is_a_line(here):
+def test_play_prints_a_line_for_a_plane(here):
     code, out, _ = here("walk", *QUICK, "--no-video")
     assert code == 0
     assert out.count("\n") == 1
 
 
-def test_the_table_is_there_even_if_nothing_can_be_drawn(here, tmp_path, monkeypatch):
+def test_play_prints_the_table_without_a_renderer(here, tmp_path, monkeypatch):
     def broken(*_, **__):
         raise RenderError("MuJoCo cannot draw here")
 
@@ -98,7 +98,7 @@ def test_the_table_is_there_even_if_nothing_can_be_drawn(here, tmp_path, monkeyp
     assert [each.name for each in tmp_path.iterdir()] == ["walk"]
 
 
-def test_an_existing_video_is_told_before_the_wait(here, tmp_path, monkeypatch):
+def test_play_checks_the_target_first(here, tmp_path, monkeypatch):
     monkeypatch.setattr(play, "play", None)
     (tmp_path / "walk.mp4").write_bytes(b"mine")
     code, out, err = here("walk", *QUICK)
@@ -110,25 +110,25 @@ def test_an_existing_video_is_told_before_the_wait(here, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        ((), "no RUN; wanted"),
+        ((), "RUN is missing; expected"),
         (("walk", "-o", "film.avi"), "ends in .mp4"),
         (("walk", "--size", "99", "64"), "expected two even numbers"),
-        (("walk", "--robots", "0"), "robots is 0"),
-        (("walk", "--seconds", "0"), "seconds is 0"),
-        (("walk", "--viewer", "--no-video"), "--viewer writes no video"),
-        (("walk", "--viewer", "-o", "a.mp4"), "--viewer writes no video"),
+        (("walk", "--robots", "0"), "robots: got 0"),
+        (("walk", "--seconds", "0"), "seconds: got 0"),
+        (("walk", "--viewer", "--no-video"), "--viewer: got --output or --no-video"),
+        (("walk", "--viewer", "-o", "a.mp4"), "--viewer: got --output or --no-video"),
     ],
 )
-def test_what_cannot_be_is_one_line(here, words, told):
+def test_play_rejects_invalid_input(here, words, told):
     code, out, err = here(*words)
     assert (code, out) == (2, "")
     assert told in one_line(err)
 
 
-def test_a_viewer_without_a_display_is_one_line(here, monkeypatch):
+def test_play_viewer_requires_a_display(here, monkeypatch):
     monkeypatch.setattr(play.sys, "platform", "linux")
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     code, _, err = here("walk", "--viewer")
     assert code == 2
-    assert "--viewer needs a display" in one_line(err)
+    assert "viewer: got no DISPLAY or WAYLAND_DISPLAY" in one_line(err)

@@ -34,7 +34,7 @@ def folder(tmp_path):
 
 @pytest.fixture
 def here(tmp_path, monkeypatch, capsys):
-    """Run `terrainkit` in this process, in an empty folder; a new one takes half a second."""
+    """Run `terrainkit` in this process, since a new process takes half a second."""
 
     def run(*words):
         capsys.readouterr()
@@ -46,7 +46,7 @@ def here(tmp_path, monkeypatch, capsys):
     return run
 
 
-# What is found, and how the command ends.
+# Findings and exit codes.
 
 
 @pytest.mark.parametrize(
@@ -64,12 +64,12 @@ def here(tmp_path, monkeypatch, capsys):
     ],
 )
 @pytest.mark.usefixtures("folder")
-def test_the_exit_code_says_what_was_found(here, words, code):
+def test_check_robot_exit_code(here, words, code):
     assert here("check-robot", *words).returncode == code
 
 
 @pytest.mark.usefixtures("folder")
-def test_a_finding_has_its_file_and_line_where_an_editor_looks_for_them(terrainkit):
+def test_check_robot_prints_file_and_line(terrainkit):
     run = terrainkit("check-robot", "bad.urdf", "--select", "negative-mass")
     assert "\nerror INR002 negative-mass\n  bad.urdf:4: " in run.stdout
     assert run.stdout.endswith("\nbad.urdf: 1 error\n")
@@ -77,7 +77,7 @@ def test_a_finding_has_its_file_and_line_where_an_editor_looks_for_them(terraink
 
 
 @pytest.mark.usefixtures("folder")
-def test_other_files_are_reported_although_one_cannot_be_opened(here):
+def test_check_robot_continues_after_missing_file(here):
     run = here("check-robot", "none.urdf", "bad.urdf", "--format", "json")
     assert json.loads(run.stdout)["file"] == "bad.urdf"
     assert run.stderr.count("\n") == 1
@@ -85,13 +85,13 @@ def test_other_files_are_reported_although_one_cannot_be_opened(here):
 
 
 @pytest.mark.parametrize("name", bundled.names())
-def test_a_bundled_robot_is_found_by_name(here, name):
+def test_check_robot_finds_bundled_robot(here, name):
     run = here("check-robot", name, "--strict")
     assert run.returncode == 0, run.stdout
     assert f"robot     {name} (URDF)\n" in run.stdout
 
 
-def test_a_file_of_that_name_goes_first_and_a_folder_does_not(here, tmp_path):
+def test_check_robot_prefers_file_to_bundled_robot(here, tmp_path):
     (tmp_path / "quadruped").mkdir()
     assert "robot     quadruped (URDF)" in here("check-robot", "quadruped").stdout
     (tmp_path / "biped").write_text(GOOD)
@@ -99,7 +99,7 @@ def test_a_file_of_that_name_goes_first_and_a_folder_does_not(here, tmp_path):
 
 
 @pytest.mark.usefixtures("folder")
-def test_several_files_are_json_lines_and_one_sarif_document(here):
+def test_check_robot_formats_several_files(here):
     words = ("good.urdf", "bad.urdf", "--select", "INR002")
     lines = here("check-robot", *words, "--format", "json").stdout.splitlines()
     assert [json.loads(line)["verdict"] for line in lines] == ["pass", "fail"]
@@ -113,12 +113,12 @@ def test_several_files_are_json_lines_and_one_sarif_document(here):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ((), "no FILE to check"),
+        ((), "FILE is missing"),
         (
             ("none.urdf",),
             "there is no file none.urdf, nor is a bundled robot called so; there are:",
         ),
-        ((".",), ". is a folder; wanted a URDF, xacro or MJCF file"),
+        ((".",), "cannot read .: got a folder; expected a robot file"),
         (("fifo",), "fifo is not a plain file"),
         (("good.urdf", "--select", "XYZ1"), "no rule 'XYZ1'; wanted a code"),
         (("good.urdf", "--ignore", "INR002"), "--ignore 'INR002'; wanted CODES=REASON"),
@@ -131,16 +131,16 @@ def test_several_files_are_json_lines_and_one_sarif_document(here):
             "package mine is to be in none, where there is no",
         ),
         (("good.urdf", "--xacro-arg", "a=1"), "--xacro-arg 'a=1'; wanted NAME:=VALUE"),
-        (("good.urdf", "--diff", "--format", "json"), "--diff shows a diff"),
+        (("good.urdf", "--diff", "--format", "json"), "--diff prints a diff"),
         (("good.urdf", "-o", "nowhere/a.txt"), "there is no folder nowhere"),
         (("good.urdf", "-o", "."), "it is a folder"),
         (("good.urdf", "-o", "/proc/report.txt"), "cannot write /proc/report.txt"),
-        (("good.urdf", "-o", "good.urdf"), "would replace good.urdf, which is checked"),
-        (("quadruped", "--fix"), "quadruped is a bundled robot, which is not changed"),
+        (("good.urdf", "-o", "good.urdf"), "would replace the checked file good.urdf"),
+        (("quadruped", "--fix"), "quadruped is a bundled robot and cannot be changed"),
     ],
     ids=lambda value: " ".join(map(str, value))[:60] if isinstance(value, tuple) else "",
 )
-def test_what_cannot_be_run_is_one_line_and_exit_2(here, folder, words, said):
+def test_check_robot_rejects_input(here, folder, words, said):
     os.mkfifo(folder / "fifo")
     before = sorted(folder.iterdir())
     run = here("check-robot", *words)
@@ -153,7 +153,7 @@ def test_what_cannot_be_run_is_one_line_and_exit_2(here, folder, words, said):
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read every file")
-def test_a_file_that_may_not_be_read_is_one_line(here, folder):
+def test_check_robot_without_read_permission(here, folder):
     (folder / "good.urdf").chmod(0)
     run = here("check-robot", "good.urdf")
     assert (run.returncode, run.stderr) == (
@@ -163,13 +163,13 @@ def test_a_file_that_may_not_be_read_is_one_line(here, folder):
 
 
 @pytest.mark.usefixtures("folder")
-def test_a_format_that_there_is_not_is_one_line(terrainkit):
+def test_check_robot_rejects_unknown_format(terrainkit):
     run = terrainkit("check-robot", "good.urdf", "--format", "xml")
     assert (run.returncode, run.stdout, run.stderr.count("\n")) == (2, "", 1)
     assert "invalid choice 'xml' for argument '--format'" in run.stderr
 
 
-def test_a_report_goes_to_a_file_which_may_be_there(here, folder):
+def test_check_robot_output_replaces_file(here, folder):
     (folder / "report.json").write_text("old")
     run = here("check-robot", "bad.urdf", "--format", "json", "-o", "report.json")
     assert run.returncode == 1
@@ -180,14 +180,14 @@ def test_a_report_goes_to_a_file_which_may_be_there(here, folder):
     ]
 
 
-def test_a_report_does_not_replace_what_it_is_about_through_a_link(here, folder):
+def test_check_robot_output_rejects_link_to_input(here, folder):
     (folder / "link.txt").symlink_to("good.urdf")
     run = here("check-robot", "good.urdf", "-o", "link.txt")
     assert run.returncode == 2
     assert (folder / "good.urdf").read_text() == GOOD
 
 
-def test_a_report_does_not_replace_another_file_that_it_is_about(here, folder):
+def test_check_robot_output_rejects_other_inputs(here, folder):
     run = here("check-robot", "none.urdf", "good.urdf", "bad.urdf", "-o", "bad.urdf")
     assert run.returncode == 2
     include = '<mujoco><worldbody><include file="part.xml"/></worldbody></mujoco>'
@@ -197,13 +197,13 @@ def test_a_report_does_not_replace_another_file_that_it_is_about(here, folder):
     assert run.returncode == 2
     assert (
         run.stderr
-        == "terrainkit: error: --output part.xml would replace part.xml, which is checked\n"
+        == "terrainkit: error: --output part.xml would replace the checked file part.xml\n"
     )
     assert (folder / "bad.urdf").read_text() == BAD
     assert (folder / "part.xml").read_text() == "<mujocoinclude/>"
 
 
-def test_a_xacro_file_has_its_arguments_and_packages_from_options_or_settings(here, folder):
+def test_check_robot_xacro_arguments_and_packages(here, folder):
     (folder / "parts").mkdir()
     (folder / "parts" / "trunk.urdf").write_text(GOOD)
     (folder / "robot.xacro").write_text(
@@ -222,7 +222,7 @@ def test_a_xacro_file_has_its_arguments_and_packages_from_options_or_settings(he
     assert "robot     4 (xacro)" in here(*words, "--xacro-arg", "called:=4").stdout
 
 
-def test_settings_come_from_the_folder_of_the_robot_and_the_command_line_wins(here, folder):
+def test_check_robot_options_override_settings_file(here, folder):
     (folder / "sub").mkdir()
     (folder / "sub" / "bad.urdf").write_text(BAD)
     (folder / "pyproject.toml").write_text(
@@ -239,7 +239,7 @@ def test_settings_come_from_the_folder_of_the_robot_and_the_command_line_wins(he
     assert "pyproject.toml: no key 'selekt'; there are: select, ignore" in run.stderr
 
 
-def test_names_that_the_terminal_cannot_write_are_escaped(terrainkit, folder, monkeypatch):
+def test_check_robot_escapes_unencodable_names(terrainkit, folder, monkeypatch):
     monkeypatch.setenv("PYTHONIOENCODING", "ascii")
     (folder / "good.urdf").write_text(GOOD.replace("box", "b\u00f6x"))
     run = terrainkit("check-robot", "good.urdf")
@@ -248,8 +248,8 @@ def test_names_that_the_terminal_cannot_write_are_escaped(terrainkit, folder, mo
 
 
 @pytest.mark.usefixtures("folder")
-def test_only_what_is_used_is_imported():
-    # Each of these would cost a tenth and more of the time of the whole command.
+def test_check_robot_avoids_slow_imports():
+    # Each import takes more than 10 % of the time of the whole command.
     heavy = ("typeguard", "rich", "jsonschema", "scipy", "unittest.mock", "asyncio")
     script = (
         "import sys; from terrainkit_cli.main import main; main(sys.argv[1:]);"
@@ -263,7 +263,7 @@ def test_only_what_is_used_is_imported():
 # Fixes.
 
 
-def test_a_fix_is_made_and_told_and_nothing_is_left_to_fix(here, folder):
+def test_check_robot_fix_writes_file(here, folder):
     run = here("check-robot", "unnamed.urdf", "--fix")
     assert run.returncode == 0
     assert "\nfixed\n  unnamed.urdf:2: XML003, " in run.stdout
@@ -275,23 +275,23 @@ def test_a_fix_is_made_and_told_and_nothing_is_left_to_fix(here, folder):
     assert (folder / "unnamed.urdf").read_text() == text
 
 
-def test_a_diff_is_shown_and_nothing_written(here, folder):
+def test_check_robot_diff_writes_nothing(here, folder):
     run = here("check-robot", "unnamed.urdf", "--diff", "--strict")
-    assert run.returncode == 1  # of the file as it stands
+    assert run.returncode == 1  # of the unfixed file
     assert run.stdout.startswith("--- unnamed.urdf\n+++ unnamed.urdf\n")
     assert "\n-<robot>\n+<robot name=" in run.stdout
     assert (folder / "unnamed.urdf").read_text() == UNNAMED
 
 
 @pytest.mark.usefixtures("folder")
-def test_a_diff_of_nothing_says_so(here):
+def test_check_robot_diff_without_changes(here):
     run = here("check-robot", "good.urdf", "--diff")
     assert (run.returncode, run.stdout) == (0, "")
     assert run.stderr == "terrainkit: there is nothing to fix\n"
 
 
 @pytest.mark.usefixtures("folder")
-def test_json_tells_what_was_fixed(here):
+def test_check_robot_json_lists_fixed_findings(here):
     run = here("check-robot", "unnamed.urdf", "--fix", "--format", "json")
     document = json.loads(run.stdout)
     assert [finding["code"] for finding in document["fixed"]] == ["XML003"]
@@ -302,7 +302,7 @@ def test_json_tells_what_was_fixed(here):
 
 
 @pytest.mark.usefixtures("folder")
-def test_a_terminal_gets_colors_and_no_escapes_of_the_file(folder):
+def test_check_robot_colors_exclude_escapes_of_file(folder):
     (folder / "bad.urdf").write_text(BAD.replace("trunk", "tr\u009b31munk"))
     script = "import pty, sys; sys.exit(pty.spawn(sys.argv[1:]) >> 8)"
     command = [sys.executable, "-c", script, sys.executable, "-m", "terrainkit_cli.main"]
@@ -323,16 +323,16 @@ def test_a_terminal_gets_colors_and_no_escapes_of_the_file(folder):
 # Rules.
 
 
-def test_a_rule_has_a_page(here):
+def test_rule_prints_page(here):
     run = here("rule", "inr002")
     assert run.returncode == 0
-    assert run.stdout.startswith("INR002 negative-mass (error), of mass and inertia\n\n")
+    assert run.stdout.startswith("INR002 negative-mass (error), mass and inertia\n\n")
     for part in ("\n\nFix: ", "\n\nSource: "):
         assert part in run.stdout
     assert here("rule", "negative-mass").stdout == run.stdout
 
 
-def test_every_rule_is_listed(here):
+def test_rule_all_lists_rules(here):
     listed = here("rule", "--all").stdout
     for rule in rules():
         assert re.search(rf"^  {rule.code} +{rule.name} +{rule.severity}\b", listed, re.MULTILINE)
@@ -341,18 +341,18 @@ def test_every_rule_is_listed(here):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("INR002", "--all"), "wanted the code or the name of a rule, or --all"),
+        (("INR002", "--all"), "got CODE and --all; expected one of them"),
         (("INR999",), "no rule 'INR999'; there are: XML001"),
     ],
 )
-def test_a_rule_that_there_is_not_is_one_line(here, words, said):
+def test_rule_rejects_unknown_code(here, words, said):
     run = here("rule", *words)
     assert (run.returncode, run.stdout) == (2, "")
     assert run.stderr.count("\n") == 1
     assert said in run.stderr
 
 
-def test_the_command_line_offers_every_format():
+def test_check_robot_offers_every_format():
     import typing
 
     from terrainkit_cli.robot_commands import CheckRobot

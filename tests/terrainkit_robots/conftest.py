@@ -4,6 +4,7 @@ import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,8 @@ import terrainkit_robots
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled as bundled_robots
 from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.onboarding.frameworks.frameworks import framework_names
+from terrainkit_robots.onboarding.pipeline import OnboardOptions, OnboardResult, onboard
 from terrainkit_robots.simulation.standing import Standing
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
@@ -29,6 +32,20 @@ def robot_file() -> Callable[[str], Path]:
         return ROBOTS / name
 
     return find
+
+
+@pytest.fixture(scope="session")
+def onboarded(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path], OnboardResult]:
+    """Onboard a legged robot once per test run, with all framework configurations."""
+
+    @cache
+    def run(file: Path) -> OnboardResult:
+        options = OnboardOptions(
+            frameworks=framework_names(), unsafe_fixes=True, render_pictures=False
+        )
+        return onboard(file, tmp_path_factory.mktemp("onboarded") / "robot", options)
+
+    return run
 
 
 @pytest.fixture(scope="session")

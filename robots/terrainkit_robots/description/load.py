@@ -1,4 +1,4 @@
-"""Robot files: from a path to a robot, whichever of the formats it is."""
+"""Load a robot from a URDF, xacro or MJCF file."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,31 +16,36 @@ def load_robot(
     xacro_arguments: Mapping[str, str] | None = None,
     contents: Mapping[Path, bytes] | None = None,
 ) -> RobotModel:
-    """Return the robot in a URDF, xacro or MJCF file; what is wrong with it is in its `problems`.
+    """Load the robot of a URDF, xacro or MJCF file.
+
+    A malformed file is not an error: what could not be read is listed in `problems` of the model.
 
     Args:
-        path: The file.
-        packages: Folder of each ROS package, where a search would not find it.
-        xacro_arguments: Value of each xacro argument.
-        contents: What to read instead of the files of these paths, such as what a fix would write.
+        path: Robot file.
+        packages: Folders of ROS packages by name, which take precedence over a search.
+        xacro_arguments: Values of xacro arguments by name.
+        contents: File contents by path, which are used instead of the files on disk.
+
+    Returns:
+        The robot model. It has no links if the file could not be parsed.
 
     Raises:
-        RobotFileError: if the file cannot be opened. A file that can is never an error.
+        RobotFileError: If the file cannot be opened.
     """
     packages, contents = packages or {}, contents or {}
     data = contents[path] if path in contents else read_bytes(path)
     document = parse_xml(path, data)
     if document.root is None:
-        return _nothing(document)
+        return _empty_model(document)
     tag = document.root.tag
     if tag == "mujoco" or tag == "mujocoinclude":
         from terrainkit_robots.description.mjcf.reader import read_mjcf
 
         return read_mjcf(document, contents=contents)
     if tag != "robot":
-        message = f"the root element is <{tag}>; wanted <robot> (URDF) or <mujoco> (MJCF)"
+        message = f"root element: got <{tag}>; expected <robot> (URDF) or <mujoco> (MJCF)"
         source = document.source(document.root)
-        return _nothing(document, Problem(code="XML002", message=message, source=source))
+        return _empty_model(document, Problem(code="XML002", message=message, source=source))
     from terrainkit_robots.description.urdf.reader import read_urdf
 
     if path.suffix == f".{XACRO}":
@@ -50,7 +55,7 @@ def load_robot(
     return read_urdf(document, packages=packages)
 
 
-def _nothing(document: XmlDocument, *problems: Problem) -> RobotModel:
+def _empty_model(document: XmlDocument, *problems: Problem) -> RobotModel:
     suffix = document.file.suffix
     return RobotModel(
         name="",

@@ -1,7 +1,7 @@
-"""The robot as its file says it is: plain data, each element with the file and line it came from.
+"""The robot model that URDF, xacro and MJCF files are read into.
 
-URDF, xacro and MJCF are read into the same classes. Nothing is corrected on the way: a mass that is
-negative stays negative, and what could not be read at all is a `Problem`.
+Every element records the file and line it came from. Values are not corrected: a negative mass
+stays negative. What could not be read is recorded as a `Problem`.
 """
 
 from collections.abc import Mapping
@@ -16,44 +16,45 @@ from terrainkit_robots.transforms import Matrix
 Kind = Literal["urdf", "xacro", "mjcf"]
 
 MOVING = frozenset({"revolute", "continuous", "prismatic"})
-"""Joints with one degree of freedom, as URDF calls them; MJCF's hinge and slide become these."""
+"""Joint types with one degree of freedom, in URDF's terms. MJCF's hinge and slide are mapped to
+these."""
 
 JOINT_TYPES = MOVING | {"fixed", "floating", "planar", "ball"}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Source:
-    """Where an element is written."""
+    """Location of an element in a file."""
 
     file: Path
-    """The file, as it was given or included."""
+    """Path of the file, as given or as included."""
 
     line: int
-    """Line on which the element starts; the first is 1, and 0 stands for the file as a whole."""
+    """Line on which the element starts, counted from 1; 0 stands for the whole file."""
 
     element: int | None = None
-    """Which element of the file it is, counted from 0 as they start; None where it cannot be
-    edited: in a file that is not well-formed, or made from xacro."""
+    """Index of the element in the file, in document order. None if the element cannot be edited,
+    because the file is malformed or was expanded from xacro."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Problem:
-    """Something that could not be read; the rule of the same code reports it."""
+    """Something that could not be read. The lint rule with the same code reports it."""
 
     code: str
-    """Code of the rule."""
+    """Code of the lint rule."""
 
     message: str
-    """What was found, and what was wanted."""
+    """What was found, and what was expected."""
 
     source: Source
-    """Where."""
+    """Location in the file."""
 
     subject: str = ""
-    """Name of the link, joint or file it belongs to."""
+    """Name of the link, joint or file that the problem belongs to."""
 
     details: Mapping[str, str] = field(default_factory=dict)
-    """What a fix needs to know, such as the attribute's name."""
+    """Data for an automatic fix, such as the name of the attribute."""
 
 
 def _identity() -> Matrix:
@@ -62,57 +63,57 @@ def _identity() -> Matrix:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Inertial:
-    """Mass and its distribution, as declared."""
+    """Mass and inertia of a link, as declared."""
 
     source: Source
 
     mass: float | None
-    """Mass [kg]; None if it is missing or not a number, NaN where MuJoCo takes it from a mesh."""
+    """Mass [kg]. None if missing or not a number; NaN if MuJoCo computes it from a mesh."""
 
     origin: Matrix = field(default_factory=_identity)
-    """Frame of the centre of mass and of the inertia in the link's, shape (4, 4) [m]."""
+    """Frame of the center of mass and of the inertia in the link frame, shape (4, 4) [m]."""
 
     inertia: Matrix | None = None
-    """Inertia about the centre of mass in the frame `origin`, shape (3, 3) [kg m2]; None if it is
-    missing or not of numbers, NaN where MuJoCo takes it from a mesh."""
+    """Inertia about the center of mass in the frame `origin`, shape (3, 3) [kg m2]. None if missing
+    or not numeric; NaN if MuJoCo computes it from a mesh."""
 
     inertia_source: Source | None = None
-    """The element that holds the six numbers, if it is another than `source`."""
+    """Element that holds the six inertia values, if it is not `source`."""
 
     attribute: str = ""
-    """The attribute that holds the inertia, `diaginertia` or `fullinertia`; MJCF only."""
+    """MJCF attribute that holds the inertia: `diaginertia` or `fullinertia`."""
 
     axes_attribute: str = ""
-    """The attribute that turns the axes of `origin`: `quat`, `euler` or others; MJCF only."""
+    """MJCF attribute that sets the orientation of `origin`, such as `quat` or `euler`."""
 
     missing: tuple[str, ...] = ()
-    """Those of ixx, iyy and izz that are not written; URDF only."""
+    """Names among ixx, iyy and izz that are missing; URDF only."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeshFile:
-    """A reference to a mesh file."""
+    """Reference to a mesh file."""
 
     source: Source
 
     filename: str
-    """The name, as written."""
+    """File name, as written."""
 
     path: Path
-    """Where that is on this machine; the file may not exist."""
+    """Resolved path; the file may not exist."""
 
     attribute: str = "filename"
-    """The attribute of `source` that holds the name."""
+    """Attribute of `source` that holds the file name."""
 
     found_by: Literal["path", "package", "search", "nothing"] = "path"
-    """How `path` came about: a plain path, a package that was named or has a package.xml, a search
-    in the folders around, or nothing (`path` is a guess)."""
+    """How `path` was resolved: as a plain path, through a package that was given or has a
+    package.xml, by a search of nearby folders, or not at all, in which case `path` is a guess."""
 
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    """Factor on each axis."""
+    """Scale along each axis."""
 
     scale_source: Source | None = None
-    """The element that holds the scale, if it is another than `source`."""
+    """Element that holds the scale, if it is not `source`."""
 
 
 ShapeKind = Literal["box", "sphere", "cylinder", "capsule", "ellipsoid", "plane", "mesh", "unknown"]
@@ -120,49 +121,51 @@ ShapeKind = Literal["box", "sphere", "cylinder", "capsule", "ellipsoid", "plane"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Geometry:
-    """A shape on a link, to be seen or to collide."""
+    """Visual or collision geometry of a link."""
 
     source: Source
 
     shape: ShapeKind
 
     name: str = ""
-    """Its own name, if it has one."""
+    """Name of the geometry, if it has one."""
 
     size: tuple[float, ...] = ()
-    """MuJoCo's size numbers [m]: box, three half lengths; sphere, radius; cylinder and capsule,
-    radius and half length along z; ellipsoid, three radii; none for a mesh or a plane."""
+    """MuJoCo's size parameters [m]. Box: three half lengths; sphere: radius; cylinder and capsule:
+    radius and half length along z; ellipsoid: three radii; mesh and plane: none."""
 
     size_source: Source | None = None
-    """The element that holds the size, if it is another than `source`."""
+    """Element that holds the size, if it is not `source`."""
 
     origin: Matrix = field(default_factory=_identity)
-    """Pose in the link's frame, shape (4, 4) [m]."""
+    """Pose in the link frame, shape (4, 4) [m]."""
 
     mesh: MeshFile | None = None
-    """The file of a mesh."""
+    """Mesh file of a mesh geometry."""
 
     contype: int = 1
-    """Bits of what it collides as; MJCF only."""
+    """Contact type bits; MJCF only."""
 
     conaffinity: int = 1
-    """Bits of what it collides with: two shapes do if the bits of one meet the other's."""
+    """Contact affinity bits. Two geometries collide if the contype of one and the conaffinity of
+    the other share a bit; MJCF only."""
 
     fit_to_mesh: bool = False
-    """Whether MuJoCo fits the primitive to the mesh, whose shape this is not; MJCF only."""
+    """Whether MuJoCo fits a primitive to `mesh`, so that the shape differs from the mesh; MJCF
+    only."""
 
     color: tuple[float, float, float, float] | None = None
-    """Red, green, blue and opacity that it is drawn with, in 0..1; None if the file gives none."""
+    """RGBA color in [0, 1]; None if the file sets no color."""
 
     @property
     def contacts(self) -> bool:
-        """Whether it can touch anything at all."""
+        """Whether the geometry can collide with anything."""
         return bool(self.contype or self.conaffinity)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Link:
-    """A rigid part: a URDF link or a MJCF body."""
+    """Rigid body: a URDF link or an MJCF body."""
 
     name: str
     source: Source
@@ -171,35 +174,36 @@ class Link:
     visuals: tuple[Geometry, ...] = ()
 
     virtual: bool = False
-    """Whether no element stands for it: it lies between two joints of one MJCF body."""
+    """Whether the link has no element of its own, because it lies between two joints of one MJCF
+    body."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Limit:
-    """Limits of a joint, as declared; None where there is none, or not a number."""
+    """Limits of a joint, as declared; None where a limit is missing or not a number."""
 
     source: Source
 
     lower: float | None = None
-    """Lowest position [rad] or [m]."""
+    """Lower position limit [rad] or [m]."""
 
     upper: float | None = None
-    """Highest position [rad] or [m]."""
+    """Upper position limit [rad] or [m]."""
 
     effort: float | None = None
-    """Largest torque [N m] or force [N]."""
+    """Maximum torque [N m] or force [N]."""
 
     velocity: float | None = None
-    """Largest speed [rad/s] or [m/s]; MJCF has none."""
+    """Maximum speed [rad/s] or [m/s]; MJCF has none."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Mimic:
-    """A joint that follows another: q = multiplier * q_of_target + offset."""
+    """Coupling of a joint to another one: q = multiplier * q_of_target + offset."""
 
     source: Source
     joint: str
-    """Name of the joint that is followed."""
+    """Name of the target joint."""
 
     multiplier: float = 1.0
     offset: float = 0.0
@@ -207,78 +211,78 @@ class Mimic:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Joint:
-    """What joins a link to its parent."""
+    """Connection of a link to its parent."""
 
     name: str
     source: Source
 
     kind: str
-    """One of JOINT_TYPES, or whatever else is written; MJCF's hinge is revolute where it has a
-    range and continuous where it has none, its slide prismatic, its free joint floating."""
+    """One of JOINT_TYPES, or the type as written. An MJCF hinge is revolute if it has a range and
+    continuous otherwise; a slide is prismatic and a free joint floating."""
 
     parent: str
-    """Name of the parent link; empty if missing, `world` for a root of MJCF."""
+    """Name of the parent link; empty if missing, `world` for a root body of an MJCF."""
 
     child: str
     """Name of the child link; empty if missing."""
 
     origin: Matrix = field(default_factory=_identity)
-    """The child's frame in the parent's at position `reference`, shape (4, 4) [m]."""
+    """Pose of the child frame in the parent frame at position `reference`, shape (4, 4) [m]."""
 
     axis: Matrix | None = None
-    """Axis in the child's frame as written, shape (3,), not normalised; None if missing, which
-    means (1, 0, 0) in URDF."""
+    """Axis in the child frame as written, not normalized, shape (3,). None if missing, which means
+    (1, 0, 0) in URDF."""
 
     axis_source: Source | None = None
-    """The element that holds the axis, if it is another than `source`."""
+    """Element that holds the axis, if it is not `source`."""
 
     anchor: Matrix = field(default_factory=lambda: np.zeros(3))
-    """A point of the axis in the child's frame, shape (3,) [m]; zero in URDF."""
+    """Point on the axis in the child frame, shape (3,) [m]; zero in URDF."""
 
     reference: float = 0.0
-    """Position at which `origin` holds [rad] or [m]; zero in URDF."""
+    """Joint position at which `origin` holds [rad] or [m]; zero in URDF."""
 
     limit: Limit | None = None
     mimic: Mimic | None = None
 
     damping: float = 0.0
-    """Viscous friction [N m s/rad] or [N s/m]."""
+    """Viscous damping [N m s/rad] or [N s/m]."""
 
     friction: float = 0.0
-    """Dry friction [N m] or [N], the same at every speed."""
+    """Coulomb friction [N m] or [N]."""
 
     armature: float = 0.0
-    """Reflected inertia of the rotor [kg m2] or [kg]; MJCF only."""
+    """Reflected rotor inertia [kg m2] or [kg]; MJCF only."""
 
     dont_collapse: bool = False
-    """Whether Isaac Gym is told to keep the child of this fixed joint as a body of its own."""
+    """Whether the URDF tells Isaac Gym not to merge the child of this fixed joint."""
 
     safety_controller: Source | None = None
-    """The element `safety_controller` with a k_position, if there is one."""
+    """The `safety_controller` element that sets a k_position, if there is one."""
 
     @property
     def moves(self) -> bool:
-        """Whether it is a joint with one degree of freedom."""
+        """Whether the joint has one degree of freedom."""
         return self.kind in MOVING
 
     @property
     def unit(self) -> str:
-        """Return the unit of where it is."""
+        """Return the unit of the joint position."""
         return "m" if self.kind == "prismatic" else "rad"
 
     @property
     def effort_unit(self) -> str:
-        """Return the unit of what drives it."""
+        """Return the unit of the joint effort."""
         return "N" if self.kind == "prismatic" else "N m"
 
     @property
     def speed_unit(self) -> str:
-        """Return the unit of how fast it moves."""
+        """Return the unit of the joint velocity."""
         return "m/s" if self.kind == "prismatic" else "rad/s"
 
     @property
     def range(self) -> tuple[float, float] | None:
-        """Return lower and upper [rad] or [m]; None where they are not limits that make sense."""
+        """Return the lower and upper limit [rad] or [m]; None if the joint has no valid limits."""
         limit = self.limit
         if self.kind == "continuous" or limit is None or None in (limit.lower, limit.upper):
             return None
@@ -288,7 +292,7 @@ class Joint:
 
     @property
     def direction(self) -> Matrix:
-        """Return the axis as a unit vector, shape (3,); (1, 0, 0) where there is none to be had."""
+        """Return the axis as a unit vector, shape (3,); (1, 0, 0) if it is missing or zero."""
         axis = np.array([1.0, 0, 0]) if self.axis is None else self.axis
         length = float(np.linalg.norm(axis)) if np.isfinite(axis).all() else 0.0
         return axis / length if 1e-12 < length < np.inf else np.array([1.0, 0, 0])
@@ -296,20 +300,20 @@ class Joint:
 
 @dataclass(frozen=True, kw_only=True)
 class Actuator:
-    """A motor of a MJCF file."""
+    """Actuator of an MJCF file."""
 
     name: str
     source: Source
     joint: str
-    """Name of the joint it drives; empty if it drives something else."""
+    """Name of the actuated joint; empty if the actuator does not act on a joint."""
 
     effort: float | None = None
-    """Largest torque [N m] or force [N] on the joint; None if it is unlimited."""
+    """Maximum torque [N m] or force [N] on the joint; None if unlimited."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RobotModel:
-    """A robot description."""
+    """Contents of a robot file."""
 
     name: str
     """Name of the robot; empty if it has none."""
@@ -317,40 +321,39 @@ class RobotModel:
     kind: Kind
 
     file: Path
-    """The file that was read."""
+    """Path of the robot file."""
 
     source: Source
-    """The root element, or the file."""
+    """Location of the root element, or of the file."""
 
     links: tuple[Link, ...] = ()
-    """In the order of the file, duplicates included."""
+    """Links in document order, including duplicates."""
 
     joints: tuple[Joint, ...] = ()
-    """In the order of the file, duplicates included."""
+    """Joints in document order, including duplicates."""
 
     actuators: tuple[Actuator, ...] = ()
-    """In the order of the file; MJCF only."""
+    """Actuators in document order; MJCF only."""
 
     home: Mapping[str, float] = field(default_factory=dict)
-    """Joint positions [rad] or [m] of the first keyframe, by joint; MJCF only."""
+    """Joint positions [rad] or [m] of the first keyframe by joint name; MJCF only."""
 
     imu: tuple[str, Matrix] | None = None
-    """Where turning and acceleration are sensed: a link, and the pose in its frame, shape (4, 4)
-    [m]; MJCF only."""
+    """Link of the IMU and its pose in the link frame, shape (4, 4) [m]; MJCF only."""
 
     floating: bool | None = None
-    """Whether the base moves freely; None where that has to be found out."""
+    """Whether the base is free; None if the file does not say."""
 
     excluded: frozenset[frozenset[str]] = frozenset()
-    """Pairs of links whose contacts are switched off; MJCF only."""
+    """Pairs of links whose contacts are disabled; MJCF only."""
 
     problems: tuple[Problem, ...] = ()
     """What could not be read."""
 
     sources: tuple[Path, ...] = ()
-    """Every file that was read as text: the file itself and what it includes."""
+    """Text files that were read: the robot file and everything it includes."""
 
     @property
     def title(self) -> str:
-        """Return what to call the robot: its name, or that of its file."""
+        """Return the name of the robot, or the name of its file."""
         return self.name or self.file.name

@@ -1,8 +1,9 @@
-"""Packages: which file on this machine a name in a robot's description means.
+"""Resolve file names of robot descriptions to files on this machine.
 
-`package://`, `model://` and `$(find ...)` name a ROS package, and ROS is seldom there when a robot
-is trained. So a package is looked for where it was given, up the tree, in ROS's own variables and
-in the folders around; a few hundred names are looked at, and nothing is fetched.
+`package://`, `model://` and `$(find ...)` name a ROS package, and ROS is often not installed where
+a robot is trained. Packages are looked up in the given folders, in the folders above the robot
+file, in ROS's environment variables and in nearby folders. A few hundred names are checked at most,
+and nothing is downloaded.
 """
 
 import os
@@ -25,174 +26,179 @@ _PACKAGE = re.compile(
 _DRIVE = re.compile(r"[A-Za-z]:[/\\]")
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:/")
 
-_MOST_ANCESTORS = 16
-"""Folders above the file that are asked for a package.xml."""
+_MAX_ANCESTORS = 16
+"""Number of folders above the file that are checked for a package.xml."""
 
-_NEAR_ANCESTORS = 4
-"""Folders above the file in which a search begins: file, urdf/, package, workspace."""
+_MAX_SEARCH_FOLDERS = 4
+"""Number of folders, from the file upward, in which a search starts: file, urdf/, package,
+workspace."""
 
-_MOST_ENTRIES = 400
-"""Entries of a folder that are looked at; of a home or temporary folder that is not all."""
+_MAX_ENTRIES = 400
+"""Maximum number of entries of a folder that are listed."""
 
-_MOST_PARTS = 64
-"""Parts of a path that is put right or searched for; no package is that deep."""
+_MAX_PARTS = 64
+"""Maximum depth of a path that is searched for."""
 
-_LONGEST = 4096
-"""Letters of a name that is looked for; no system has longer paths."""
+_MAX_LENGTH = 4096
+"""Maximum length of a file name; no operating system supports longer paths."""
 
-_MOST_BYTES = 100_000
-"""A package.xml is a page of text; of a larger file the beginning is read."""
+_MAX_BYTES = 100_000
+"""Bytes of a package.xml that are read."""
 
 
-class Packages:
-    """Where one robot file looks for others, each package searched for once."""
+class PackageResolver:
+    """Resolve the file names of one robot file; each package is searched for once."""
 
     def __init__(self, file: Path, packages: Mapping[str, Path]) -> None:
-        """Search from the folder of `file`; `packages` are those given by name."""
+        """Search from the folder of `file`; `packages` maps package names to folders."""
         self._folder = file.parent
-        self._given = packages
-        self._found: dict[str, tuple[tuple[Path, FoundBy], ...]] = {}
+        self._packages = packages
+        self._folders: dict[str, tuple[tuple[Path, FoundBy], ...]] = {}
         self._names: dict[Path, str | None] = {}
 
     def resolve(self, filename: str) -> tuple[Path, FoundBy]:
-        """Return where a file is that is called so, and how that was found.
+        """Resolve a file name.
 
-        By `path` if it is where the name says, by `package` if a package was given or has a
-        package.xml, by `search` if the folders around have it, or have it in other letters;
-        `nothing` comes with the place where it was expected.
+        Args:
+            filename: Name of a file, as written in the robot file.
+
+        Returns:
+            The path and how it was found: `path` if the file is where the name says, `package` if
+            the package was given or has a package.xml, `search` if it was found in a nearby folder
+            or with different letter case, `nothing` with the expected path if it was not found.
         """
-        if len(filename) > _LONGEST:
-            return _joined(self._folder, filename[:_LONGEST]), "nothing"
+        if len(filename) > _MAX_LENGTH:
+            return _join(self._folder, filename[:_MAX_LENGTH]), "nothing"
         match = _PACKAGE.fullmatch(filename)
         if match is not None:
-            return self._in_package(match["name"], match["rest"] or "")
-        return self._plain(filename)
+            return self._resolve_in_package(match["name"], match["rest"] or "")
+        return self._resolve_path(filename)
 
-    def find(self, name: str) -> Path | None:
+    def find_package(self, name: str) -> Path | None:
         """Return the folder of a package, or None if it is not found."""
-        candidates = self._candidates(name)
+        candidates = self._package_candidates(name)
         return candidates[0][0] if candidates else None
 
-    def _plain(self, filename: str) -> tuple[Path, FoundBy]:
+    def _resolve_path(self, filename: str) -> tuple[Path, FoundBy]:
         name = filename
         if filename.lower().startswith("file:"):
             name = re.sub(r"(?i)file:(//)?", "", filename)
             name = name if exists(self._folder / name) else unquote(name)
         elif _SCHEME.match(filename) and not _DRIVE.match(filename):
-            return _joined(self._folder, filename.rpartition("/")[2]), "nothing"  # not on here
-        written = _joined(self._folder, name)
+            return _join(self._folder, filename.rpartition("/")[2]), "nothing"  # a URL
+        written = _join(self._folder, name)
         if name and "\0" not in name and exists(written):
             return written, "path"
-        found = self._put_right(name) or self._around(name)
+        found = self._resolve_ignore_case(name) or self._search_nearby(name)
         return (found, "search") if found else (written, "nothing")
 
-    def _put_right(self, name: str) -> Path | None:
-        """Return the file that is there in other letters, or with slashes for backslashes."""
+    def _resolve_ignore_case(self, name: str) -> Path | None:
+        """Return the file whose name differs only in letter case or in backslashes."""
         if is_absolute(name):
             return None
         return find_ignore_case(self._folder, name)
 
-    def _around(self, name: str) -> Path | None:
-        """Return a file with the same end of its path, in the folders around."""
-        parts = _parts(name)
-        rooted = is_absolute(name)
+    def _search_nearby(self, name: str) -> Path | None:
+        """Return a file in a nearby folder whose path has the same end."""
+        parts = _split(name)
+        absolute = is_absolute(name)
         while parts and parts[0] in ("..", "."):
             parts = parts[1:]
-        if not parts or len(parts) > _MOST_PARTS:
+        if not parts or len(parts) > _MAX_PARTS:
             return None
-        ends = [parts[k:] for k in range(len(parts))] if rooted else [parts]
+        ends = [parts[k:] for k in range(len(parts))] if absolute else [parts]
         for end in ends:
             if len(end) == 1:
                 continue
-            for folder in self._near:
+            for folder in self._search_folders:
                 if exists(folder.joinpath(*end)):
                     return folder.joinpath(*end)
-        return self._by_name(parts[-1])
+        return self._search_by_name(parts[-1])
 
-    def _by_name(self, name: str) -> Path | None:
-        """Return a file of that name in a folder of meshes nearby."""
-        for folder in self._near[:2]:
+    def _search_by_name(self, name: str) -> Path | None:
+        """Return a file with this name in a nearby folder of meshes."""
+        for folder in self._search_folders[:2]:
             for sub in (
                 folder,
-                *(f for f in _subfolders(folder) if f.name.lower() in _MESH_FOLDERS),
+                *(f for f in _list_folders(folder) if f.name.lower() in _MESH_FOLDERS),
             ):
                 if exists(sub / name):
                     return sub / name
         return None
 
-    def _in_package(self, name: str, rest: str) -> tuple[Path, FoundBy]:
-        if not rest:  # what should be a package is the name of the file
-            alone = _joined(self._folder, name)
+    def _resolve_in_package(self, name: str, rest: str) -> tuple[Path, FoundBy]:
+        if not rest:  # a file name in the place of the package
+            alone = _join(self._folder, name)
             return alone, "search" if exists(alone) and not is_folder(alone) else "nothing"
-        candidates = self._candidates(name)
+        candidates = self._package_candidates(name)
         for folder, how in candidates:
-            if exists(_joined(folder, rest)):
-                return _joined(folder, rest), how
+            if exists(_join(folder, rest)):
+                return _join(folder, rest), how
         for folder, _ in candidates:
             found = find_ignore_case(folder, rest)
             if found is not None:
                 return found, "search"
-        found = self._around(rest)
+        found = self._search_nearby(rest)
         if found is not None:
             return found, "search"
         if candidates:
-            return _joined(candidates[0][0], rest), candidates[0][1]
-        return _joined(self._folder, rest), "nothing"
+            return _join(candidates[0][0], rest), candidates[0][1]
+        return _join(self._folder, rest), "nothing"
 
-    def _candidates(self, name: str) -> tuple[tuple[Path, FoundBy], ...]:
-        if name not in self._found:
-            places: dict[Path, FoundBy] = {}
-            for folder, how in self._places(name):
-                places.setdefault(folder, how)
-            self._found[name] = tuple(places.items())
-        return self._found[name]
+    def _package_candidates(self, name: str) -> tuple[tuple[Path, FoundBy], ...]:
+        if name not in self._folders:
+            paths: dict[Path, FoundBy] = {}
+            for folder, how in self._iter_package_folders(name):
+                paths.setdefault(folder, how)
+            self._folders[name] = tuple(paths.items())
+        return self._folders[name]
 
-    def _places(self, name: str) -> Iterator[tuple[Path, FoundBy]]:
-        """Yield the folders that may be the package, the surest first."""
-        if name in self._given:
-            yield self._given[name], "package"
+    def _iter_package_folders(self, name: str) -> Iterator[tuple[Path, FoundBy]]:
+        """Yield possible folders of a package, the most likely first."""
+        if name in self._packages:
+            yield self._packages[name], "package"
             return
         if name in (".", "..") or "\0" in name:
             return
-        for folder in self._above:
-            if self._declared(folder) == name:
+        for folder in self._ancestors:
+            if self._declared_name(folder) == name:
                 yield folder, "package"
-        for folder in self._above:
+        for folder in self._ancestors:
             if folder.name == name:
                 yield folder, "search"
-        for folder in _ros_folders(name):
-            if self._declared(folder) == name or exists(folder):
+        for folder in _iter_ros_paths(name):
+            if self._declared_name(folder) == name or exists(folder):
                 yield folder, "package"
-        yield from self._beside(name)
+        yield from self._iter_nearby_packages(name)
 
-    def _beside(self, name: str) -> Iterator[tuple[Path, FoundBy]]:
-        for folder in self._near:
+    def _iter_nearby_packages(self, name: str) -> Iterator[tuple[Path, FoundBy]]:
+        for folder in self._search_folders:
             if is_folder(folder / name):
-                yield folder / name, "package" if self._declared(folder / name) else "search"
-        for folder in self._near:
-            for sub in _subfolders(folder):
-                if self._declared(sub) == name:
+                yield folder / name, "package" if self._declared_name(folder / name) else "search"
+        for folder in self._search_folders:
+            for sub in _list_folders(folder):
+                if self._declared_name(sub) == name:
                     yield sub, "package"
                 if is_folder(sub / name):
                     yield sub / name, "search"
 
     @cached_property
-    def _above(self) -> tuple[Path, ...]:
-        """The folder of the file and those above it, the nearest first."""
+    def _ancestors(self) -> tuple[Path, ...]:
+        """Folder of the robot file and the folders above it, the nearest first."""
         try:
             folder = self._folder.resolve()
-        except (OSError, RuntimeError, ValueError):  # RuntimeError: a loop of links
+        except (OSError, RuntimeError, ValueError):  # RuntimeError: a cycle of symbolic links
             folder = self._folder.absolute()
-        return (folder, *islice(folder.parents, _MOST_ANCESTORS))
+        return (folder, *islice(folder.parents, _MAX_ANCESTORS))
 
     @property
-    def _near(self) -> tuple[Path, ...]:
-        return tuple(f for f in self._above[:_NEAR_ANCESTORS] if f != f.parent)
+    def _search_folders(self) -> tuple[Path, ...]:
+        return tuple(f for f in self._ancestors[:_MAX_SEARCH_FOLDERS] if f != f.parent)
 
-    def _declared(self, folder: Path) -> str | None:
-        """Return the name in the folder's package.xml, if there is one."""
+    def _declared_name(self, folder: Path) -> str | None:
+        """Return the package name in the folder's package.xml, or None."""
         if folder not in self._names:
-            self._names[folder] = _package_name(folder / "package.xml")
+            self._names[folder] = _read_package_name(folder / "package.xml")
         return self._names[folder]
 
 
@@ -200,72 +206,82 @@ _MESH_FOLDERS = {"meshes", "mesh", "assets", "stl", "dae", "obj", "visual", "col
 
 
 def resolve_in(folders: Iterable[Path], filename: str) -> tuple[Path, FoundBy]:
-    """Return where a file is that one of these folders has, and how that was found.
+    """Resolve a file name in a list of folders.
 
-    By `path` if one has it as it is written, by `search` if one has it in other letters; `nothing`
-    comes with the place in the first of them.
+    Args:
+        folders: Folders, the first of which is the expected one.
+        filename: Name of a file, as written in the robot file.
+
+    Returns:
+        The path and how it was found: `path` if a folder has the file, `search` if a folder has it
+        with different letter case, `nothing` with the path in the first folder otherwise.
     """
-    places, filename = list(folders), filename[:_LONGEST]
-    for folder in places:
-        if "\0" not in filename and exists(_joined(folder, filename)):
-            return _joined(folder, filename), "path"
+    paths, filename = list(folders), filename[:_MAX_LENGTH]
+    for folder in paths:
+        if "\0" not in filename and exists(_join(folder, filename)):
+            return _join(folder, filename), "path"
     if not is_absolute(filename):
-        for folder in places:
+        for folder in paths:
             found = find_ignore_case(folder, filename)
             if found is not None:
                 return found, "search"
-    return _joined(places[0], filename), "nothing"
+    return _join(paths[0], filename), "nothing"
 
 
 def is_package_uri(filename: str) -> bool:
-    """Return whether a file is named by its package: `package://`, `model://` or `$(find ...)`."""
+    """Return whether a file name names a package: `package://`, `model://` or `$(find ...)`."""
     return _PACKAGE.fullmatch(filename) is not None
 
 
 def is_absolute(filename: str) -> bool:
-    """Return whether a name starts at the root of a file system, that of Windows included."""
+    """Return whether a file name is an absolute path on Linux or Windows."""
     name = re.sub(r"(?i)^file:(//)?", "", filename)
     return name.startswith(("/", "~", "\\\\")) or _DRIVE.match(name) is not None
 
 
 def find_ignore_case(folder: Path, name: str) -> Path | None:
-    """Return the file that `name` means if case does not count, and a backslash is a slash."""
-    parts = _parts(name)
-    if not parts or len(parts) > _MOST_PARTS:
+    """Return the file that matches `name` in any letter case and with any slashes, or None."""
+    parts = _split(name)
+    if not parts or len(parts) > _MAX_PARTS:
         return None
     at = folder
     for part in parts:
         if part == ".." or exists(at / part):
             at = at / part
             continue
-        alike = [entry for entry in _entries(at) if entry.lower() == part.lower()]
-        if len(alike) != 1:
+        matches = [entry for entry in _list_names(at) if entry.lower() == part.lower()]
+        if len(matches) != 1:
             return None
-        at = at / alike[0]
+        at = at / matches[0]
     return at if exists(at) else None
 
 
 def filename_on_disk(filename: str, path: Path) -> str | None:
-    """Return `filename` as it has to be written for `path`, if it has other letters or backslashes.
+    """Return `filename` with the letter case and slashes of the file on disk.
 
-    None if it is right, if only the folder is another one, or if it starts at a root.
+    Args:
+        filename: Name of the file, as written in the robot file.
+        path: Path that it was resolved to.
+
+    Returns:
+        The corrected name. None if the name is correct, absolute, or belongs to another folder.
     """
-    if is_absolute(filename) or len(filename) > _LONGEST:
+    if is_absolute(filename) or len(filename) > _MAX_LENGTH:
         return None
     prefix = _prefix(filename)
-    pieces = re.split(r"([/\\]+)", filename[len(prefix) :])  # names, and what parts them
+    pieces = re.split(r"([/\\]+)", filename[len(prefix) :])  # names and separators
     named = [k for k in range(0, len(pieces), 2) if pieces[k] not in ("", ".", "..")]
     real = _names_on_disk(path, len(named))
     if [pieces[k].lower() for k in named] != [name.lower() for name in real]:
         return None
     for k, name in zip(named, real, strict=True):
         pieces[k] = name
-    right = prefix + "".join(pieces).replace("\\", "/")
-    return right if right != filename else None
+    corrected = prefix + "".join(pieces).replace("\\", "/")
+    return corrected if corrected != filename else None
 
 
 def _prefix(filename: str) -> str:
-    """Return what comes before the names of folders: a scheme, and the package."""
+    """Return the part of a name before its folders: a scheme and a package."""
     match = _PACKAGE.fullmatch(filename) or re.match(r"(?i)(?P<rest>)file:(//)?", filename)
     if match is None:
         return ""
@@ -273,28 +289,28 @@ def _prefix(filename: str) -> str:
 
 
 def _names_on_disk(path: Path, count: int) -> list[str]:
-    """Return the last names of a path as its folders list them, not as it is written.
+    """Return the last names of a path as listed by their folders.
 
-    A file system that takes no heed of case finds a file under any letters.
+    A case-insensitive file system finds a file under any letter case.
     """
     names: list[str] = []
     for at in (path, *path.parents):
         if len(names) == count:
             break
         if at.name not in ("", ".", ".."):
-            entries = _entries(at.parent)
-            alike = [entry for entry in entries if entry.lower() == at.name.lower()]
-            names.append(alike[0] if len(alike) == 1 and at.name not in entries else at.name)
+            entries = _list_names(at.parent)
+            matches = [entry for entry in entries if entry.lower() == at.name.lower()]
+            names.append(matches[0] if len(matches) == 1 and at.name not in entries else at.name)
     return names[::-1]
 
 
 def exists(path: Path) -> bool:
-    """Return whether there is something at `path`; False for a name that cannot be one."""
+    """Return whether `path` exists; False for an invalid path."""
     return _mode(path) is not None
 
 
 def is_folder(path: Path) -> bool:
-    """Return whether there is a folder at `path`."""
+    """Return whether `path` is a folder."""
     mode = _mode(path)
     return mode is not None and stat.S_ISDIR(mode)
 
@@ -302,34 +318,34 @@ def is_folder(path: Path) -> bool:
 def _mode(path: Path) -> int | None:
     try:
         return path.stat().st_mode
-    except (OSError, ValueError):  # too long, a loop of links, a NUL, no permission
+    except (OSError, ValueError):  # too long, a cycle of symbolic links, a NUL, no permission
         return None
 
 
-def _joined(folder: Path, name: str) -> Path:
-    """Return a path in `folder`, as written; `folder` itself for a name that can be none."""
+def _join(folder: Path, name: str) -> Path:
+    """Join a folder and a name, without characters that a path cannot have."""
     if "\0" in name:
         return folder / name.replace("\0", "")
     return folder / name if is_absolute(name) else folder / name.lstrip("/")
 
 
-def _parts(name: str) -> list[str]:
+def _split(name: str) -> list[str]:
     return [part for part in re.split(r"[/\\]+", _DRIVE.sub("", name)) if part not in ("", ".")]
 
 
-def _entries(folder: Path) -> list[str]:
+def _list_names(folder: Path) -> list[str]:
     try:
         with os.scandir(folder) as entries:
-            return [entry.name for entry in islice(entries, _MOST_ENTRIES)]
+            return [entry.name for entry in islice(entries, _MAX_ENTRIES)]
     except (OSError, ValueError):
         return []
 
 
-def _subfolders(folder: Path) -> list[Path]:
-    """Return the folders in a folder, without those that are hidden, by name."""
+def _list_folders(folder: Path) -> list[Path]:
+    """Return the folders in a folder that are not hidden, sorted by name."""
     try:
         with os.scandir(folder) as entries:
-            first = list(islice(entries, _MOST_ENTRIES))
+            first = list(islice(entries, _MAX_ENTRIES))
             return sorted(
                 Path(entry.path) for entry in first if entry.name[0] != "." and entry.is_dir()
             )
@@ -337,29 +353,29 @@ def _subfolders(folder: Path) -> list[Path]:
         return []
 
 
-def _ros_folders(name: str) -> Iterator[Path]:
-    """Yield where ROS would have the package."""
-    for prefix in _variable("AMENT_PREFIX_PATH"):
+def _iter_ros_paths(name: str) -> Iterator[Path]:
+    """Yield the paths at which ROS would install a package."""
+    for prefix in _path_variable("AMENT_PREFIX_PATH"):
         yield prefix / "share" / name
-    for folder in _variable("ROS_PACKAGE_PATH"):
+    for folder in _path_variable("ROS_PACKAGE_PATH"):
         if folder.name == name:
             yield folder
         yield folder / name
-        for sub in _subfolders(folder):
+        for sub in _list_folders(folder):
             yield sub / name
 
 
-def _variable(name: str) -> list[Path]:
+def _path_variable(name: str) -> list[Path]:
     return [Path(entry) for entry in os.environ.get(name, "").split(os.pathsep)[:50] if entry]
 
 
-def _package_name(path: Path) -> str | None:
+def _read_package_name(path: Path) -> str | None:
     mode = _mode(path)
     if mode is None or not stat.S_ISREG(mode):
         return None
     try:
         with path.open("rb") as stream:
-            text = stream.read(_MOST_BYTES)
+            text = stream.read(_MAX_BYTES)
     except OSError:
         return None
     match = re.search(rb"<name>\s*([^<\s]+)\s*</name>", text)

@@ -1,1 +1,1 @@
-"""Turn a robot file into a folder that is ready for training."""
+"""Onboard a robot: convert its file into a folder with everything that training needs."""

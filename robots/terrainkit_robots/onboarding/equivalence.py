@@ -1,7 +1,6 @@
-"""Agreement: whether what was written is the robot that was read.
+"""Compare written robot files with their source: link poses, masses and joint inertias.
 
-The source is followed by our own kinematics, the two files by MuJoCo's readers of URDF and MJCF.
-`check-robot --against` compares by yourdfpy, too, whose import would take half as long as the rest.
+The kinematics of the source are computed by this package, those of the written files by MuJoCo.
 """
 
 import math
@@ -21,215 +20,214 @@ from terrainkit_robots.transforms import Matrix
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
 
-POSES = 100
-"""Poses at which links are compared."""
+NUM_POSES = 100
+"""Number of random poses at which links are compared."""
 
-_WIDEST = np.pi
-"""A joint without limits is turned by up to this [rad]."""
+_MAX_POSITION = np.pi
+"""Random positions of joints without limits are at most this far from 0 [rad]."""
 
-_SAME_PLACE = 1e-4
-_SAME_TURN = 1e-3
-_SAME_MASS = 1e-3
-"""A written robot is the one that was read up to such a distance [m] and angle [rad] of its links,
-and such a share of its mass, and of the inertia that each joint carries."""
+_MAX_DISTANCE, _MAX_ANGLE, _MAX_RELATIVE_MASS = 1e-4, 1e-3, 1e-3
+"""Tolerances of link positions [m] and orientations [rad], and of masses and inertias."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Agreement:
-    """How far a written file is from the source."""
+class Equivalence:
+    """The differences between a written file and its source."""
 
     file: str
-    """The file."""
+    """Name of the written file."""
 
     mass: float
-    """Its mass over that of the source, less 1."""
+    """Relative error of the total mass."""
 
     inertia: float
-    """Largest such difference of the inertia that a joint carries, all joints at 0."""
+    """Largest relative error of the inertia about a joint axis, with all joints at 0."""
 
     joint: str
-    """The joint that has it; empty without joints."""
+    """The joint with the largest inertia error; empty without joints."""
 
     distance: float
-    """Largest distance of a link's frame from where it is in the source [m]."""
+    """Largest position error of a link frame [m]."""
 
     link: str
-    """The link that is farthest away."""
+    """The link with the largest position error."""
 
     angle: float
-    """Largest angle between a link's frame and that in the source [rad]."""
+    """Largest orientation error of a link frame [rad]."""
 
-    turned: str
-    """The link that is turned the most."""
+    rotated_link: str
+    """The link with the largest orientation error."""
 
     @property
-    def faults(self) -> tuple[str, ...]:
-        """Return what makes it another robot; nothing if it is the same."""
-        found = {
-            f"{self.link} is {1000 * self.distance:.3g} mm away": self.distance <= _SAME_PLACE,
-            f"{self.turned} is turned by {math.degrees(self.angle):.3g} degrees": self.angle
-            <= _SAME_TURN,
-            f"the mass is off by {self.mass:.2%}": abs(self.mass) <= _SAME_MASS,
-            f"what {self.joint} carries is off by {self.inertia:.2%}": self.inertia <= _SAME_MASS,
+    def failures(self) -> tuple[str, ...]:
+        """The differences that exceed the tolerances; empty if the robots are equivalent."""
+        checks = {
+            f"the position of {self.link} is off by {1000 * self.distance:.3g} mm": self.distance
+            <= _MAX_DISTANCE,
+            f"the orientation of {self.rotated_link} is off by "
+            f"{math.degrees(self.angle):.3g} degrees": self.angle <= _MAX_ANGLE,
+            f"the mass is off by {self.mass:.2%}": abs(self.mass) <= _MAX_RELATIVE_MASS,
+            f"the inertia about {self.joint} is off by {self.inertia:.2%}": self.inertia
+            <= _MAX_RELATIVE_MASS,
         }
-        return tuple(text for text, same in found.items() if not same)
+        return tuple(text for text, passed in checks.items() if not passed)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Expected:
-    """What a written file has to show."""
+class ReferenceKinematics:
+    """The poses, masses and inertias that written files must reproduce."""
 
     mass: float
-    """Mass of the robot [kg]."""
+    """Total mass [kg]."""
 
     base: str
-    """Its base, in the written files."""
+    """Name of the base link in the written files."""
 
-    draws: Mapping[str, Matrix]
-    """Positions of each joint, as it is written, shape (POSES,) [rad] or [m]."""
+    positions: Mapping[str, Matrix]
+    """Positions of each joint, by its written name, shape (NUM_POSES,) [rad] or [m]."""
 
-    places: Mapping[str, Matrix]
-    """Pose of each link in the frame of the base, shapes (POSES, 4, 4) [m]."""
+    link_poses: Mapping[str, Matrix]
+    """Pose of each link in the base frame, shape (NUM_POSES, 4, 4) [m]."""
 
-    carried: Mapping[str, float]
-    """Inertia that each joint, as it is written, carries at 0 [kg m2] or [kg]."""
+    inertias: Mapping[str, float]
+    """Inertia about each joint axis with all joints at 0, by written name [kg m2] or [kg]."""
 
 
-def expected(source: "Facts", written: "Facts") -> Expected:
-    """Return what the files of a robot have to show, over POSES seeded poses.
+def reference_kinematics(source: "Facts", written: "Facts") -> ReferenceKinematics:
+    """Return what the written files of a robot must reproduce, at seeded random poses.
 
     Args:
-        source: The robot as it was read, its masses known.
-        written: The robot as it is written, whose joints may have other names.
+        source: The source robot, with known masses.
+        written: The written robot, whose joints may have other names.
     """
-    draws, renamed = _draws(written), _renamed(source, written)
+    source_names = {joint.child: joint.name for joint in source.joints}
+    renamed = {
+        joint.name: source_names[joint.child]
+        for joint in written.joints
+        if joint.child in source_names
+    }
     inertias = {
         body.joint.name: inertia
         for body, inertia in zip(source.bodies, carried_inertias(source), strict=True)
         if body.joint is not None and math.isfinite(inertia) and inertia > 0
     }
-    return Expected(
+    positions = _random_positions(written)
+    source_positions = {renamed[name]: q for name, q in positions.items() if name in renamed}
+    poses = body_poses(source.bodies, source_positions)
+    link_poses = {
+        link.name: np.broadcast_to(pose @ local, (NUM_POSES, 4, 4))
+        for body, pose in zip(source.bodies, poses, strict=True)
+        for link, local in zip(body.links, body.poses, strict=True)
+    }
+    return ReferenceKinematics(
         mass=source.total_mass,
         base=written.bodies[0].top.name,
-        draws=draws,
-        places=_places(source, {renamed[name]: q for name, q in draws.items() if name in renamed}),
-        carried={n: inertias[name] for n, name in renamed.items() if name in inertias},
+        positions=positions,
+        link_poses=link_poses,
+        inertias={n: inertias[name] for n, name in renamed.items() if name in inertias},
     )
 
 
-def agreement(wanted: Expected, models: Mapping[str, Any]) -> tuple[Agreement, ...]:
-    """Return how far written files are from their source.
+def compare_models(
+    reference: ReferenceKinematics, models: Mapping[str, Any]
+) -> tuple[Equivalence, ...]:
+    """Return the differences of compiled models from the reference.
 
     Args:
-        wanted: What they have to show.
-        models: What MuJoCo made of them, by their names.
+        reference: What the models must reproduce.
+        models: The `mujoco.MjModel` of each written file, by file name.
     """
     with quiet_mujoco():
-        return tuple(_compared(file, model, wanted) for file, model in models.items())
+        return tuple(_compare(file, model, reference) for file, model in models.items())
 
 
-def _draws(facts: "Facts") -> dict[str, Matrix]:
-    """Return positions of each joint within its limits, shape (POSES,), of followers as well."""
+def _random_positions(facts: "Facts") -> dict[str, Matrix]:
+    """Return random positions of all joints within their limits, shape (NUM_POSES,)."""
     rng = np.random.default_rng(0)
-    drawn: dict[str, Matrix] = {}
+    positions: dict[str, Matrix] = {}
     for joint in facts.joints:
-        lower, upper = np.clip(range_of(joint), -_WIDEST, _WIDEST)
-        drawn[joint.name] = rng.uniform(lower, upper, POSES)
-    return drawn | follower_positions(facts.joints, drawn)
+        lower, upper = np.clip(range_of(joint), -_MAX_POSITION, _MAX_POSITION)
+        positions[joint.name] = rng.uniform(lower, upper, NUM_POSES)
+    return positions | follower_positions(facts.joints, positions)
 
 
-def _renamed(source: "Facts", written: "Facts") -> dict[str, str]:
-    """Return what the source calls each joint."""
-    before = {joint.child: joint.name for joint in source.joints}
-    return {joint.name: before[joint.child] for joint in written.joints if joint.child in before}
-
-
-def _places(facts: "Facts", positions: Mapping[str, Matrix]) -> dict[str, Matrix]:
-    """Return the pose of each link in the frame of the base, shapes (POSES, 4, 4) [m]."""
-    poses = body_poses(facts.bodies, positions)
-    return {
-        link.name: np.broadcast_to(pose @ local, (POSES, 4, 4))
-        for body, pose in zip(facts.bodies, poses, strict=True)
-        for link, local in zip(body.links, body.poses, strict=True)
+def _compare(file: str, model: Any, reference: ReferenceKinematics) -> Equivalence:
+    link_poses = _mujoco_link_poses(model, reference)
+    inertias = {
+        name: abs(inertia / reference.inertias[name] - 1)
+        for name, inertia in _mujoco_inertias(model, list(reference.positions)).items()
+        if name in reference.inertias
     }
+    expected = reference.link_poses
+    distances = {
+        name: float(np.linalg.norm(expected[name][:, :3, 3] - pose[:, :3, 3], axis=1).max())
+        for name, pose in link_poses.items()
+    }
+    angles = {name: _largest_angle(expected[name], pose) for name, pose in link_poses.items()}
+    link, rotated_link, joint = (
+        max(errors, key=errors.__getitem__, default="") for errors in (distances, angles, inertias)
+    )
+    mass = float(model.body_mass.sum())
+    return Equivalence(
+        file=file,
+        mass=mass / reference.mass - 1 if reference.mass else mass,
+        inertia=inertias.get(joint, 0.0),
+        joint=joint,
+        distance=distances.get(link, 0.0),
+        link=link,
+        angle=angles.get(rotated_link, 0.0),
+        rotated_link=rotated_link,
+    )
 
 
-def _followed(model: Any, wanted: Expected) -> dict[str, Matrix]:
-    """Return the poses of those links that MuJoCo has as bodies or sites, as `_places` does."""
+def _mujoco_link_poses(model: Any, reference: ReferenceKinematics) -> dict[str, Matrix]:
+    """Return poses in the base frame of the links that are bodies or sites in MuJoCo."""
     import mujoco
 
-    draws, links = wanted.draws, wanted.places
+    positions, links = reference.positions, reference.link_poses
     data = mujoco.MjData(model)
-    body, site = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_SITE
+    body_type, site_type = mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_SITE
     # The URDF reader makes the base a part of the world, at its origin.
-    root = max(mujoco.mj_name2id(model, body, wanted.base), 0)
-    bodies = {name: mujoco.mj_name2id(model, body, name) for name in links}
-    sites = {name: mujoco.mj_name2id(model, site, name) for name in links}
+    base = max(mujoco.mj_name2id(model, body_type, reference.base), 0)
+    bodies = {name: mujoco.mj_name2id(model, body_type, name) for name in links}
+    sites = {name: mujoco.mj_name2id(model, site_type, name) for name in links}
     bodies = {name: index for name, index in bodies.items() if index > 0}
     sites = {n: index for n, index in sites.items() if index >= 0 and n not in bodies}
-    here, there = list(bodies.values()), list(sites.values())
-    address = [int(model.joint(name).qposadr[0]) for name in draws]
-    positions = np.array(list(draws.values())).reshape(len(draws), POSES).T
-    poses = np.tile(np.eye(4), (POSES, len(bodies) + len(sites), 1, 1))
-    for pose, q in zip(poses, positions, strict=True):
-        data.qpos[address] = q
+    body_ids, site_ids = list(bodies.values()), list(sites.values())
+    addresses = [int(model.joint(name).qposadr[0]) for name in positions]
+    qpos = np.array(list(positions.values())).reshape(len(positions), NUM_POSES).T
+    poses = np.tile(np.eye(4), (NUM_POSES, len(bodies) + len(sites), 1, 1))
+    for pose, q in zip(poses, qpos, strict=True):
+        data.qpos[addresses] = q
         mujoco.mj_kinematics(model, data)
-        turn = data.xmat[root].reshape(3, 3)
-        places = np.concatenate([data.xpos[here], data.site_xpos[there]])
-        turns = np.concatenate([data.xmat[here], data.site_xmat[there]]).reshape(-1, 3, 3)
-        pose[:, :3, 3] = (places - data.xpos[root]) @ turn
-        pose[:, :3, :3] = turn.T @ turns
+        rotation = data.xmat[base].reshape(3, 3)
+        xpos = np.concatenate([data.xpos[body_ids], data.site_xpos[site_ids]])
+        xmat = np.concatenate([data.xmat[body_ids], data.site_xmat[site_ids]]).reshape(-1, 3, 3)
+        pose[:, :3, 3] = (xpos - data.xpos[base]) @ rotation
+        pose[:, :3, :3] = rotation.T @ xmat
     return {name: poses[:, index] for index, name in enumerate([*bodies, *sites])}
 
 
-def _carried(model: Any, draws: Mapping[str, Matrix]) -> dict[str, float]:
-    """Return the inertia that each joint carries in MuJoCo, all joints at 0, without armature."""
+def _mujoco_inertias(model: Any, joints: list[str]) -> dict[str, float]:
+    """Return the inertia about each joint axis without armature, with all joints at 0."""
     import mujoco
 
     data = mujoco.MjData(model)
-    dofs = {name: int(model.joint(name).dofadr[0]) for name in draws}
-    for name in draws:
+    for name in joints:
         data.qpos[int(model.joint(name).qposadr[0])] = 0.0
     mujoco.mj_fwdPosition(model, data)
-    row, found = np.zeros(model.nv), {}
-    for name, dof in dofs.items():
+    row, inertias = np.zeros(model.nv), {}
+    for name in joints:
+        dof = int(model.joint(name).dofadr[0])
         mujoco.mj_mulM(model, data, row, np.eye(model.nv)[dof])
-        found[name] = float(row[dof] - model.dof_armature[dof])
-    return found
+        inertias[name] = float(row[dof] - model.dof_armature[dof])
+    return inertias
 
 
-def _compared(file: str, model: Any, wanted: Expected) -> Agreement:
-    there, here = wanted.places, _followed(model, wanted)
-    shares = {
-        name: abs(inertia / wanted.carried[name] - 1)
-        for name, inertia in _carried(model, wanted.draws).items()
-        if name in wanted.carried
-    }
-    apart = {
-        name: float(np.linalg.norm(there[name][:, :3, 3] - pose[:, :3, 3], axis=1).max())
-        for name, pose in here.items()
-    }
-    angles = {name: _angle(there[name], pose) for name, pose in here.items()}
-    farthest, turned, joint = (
-        max(d, key=d.__getitem__, default="") for d in (apart, angles, shares)
-    )
-    mass = float(model.body_mass.sum())
-    return Agreement(
-        file=file,
-        mass=mass / wanted.mass - 1 if wanted.mass else mass,
-        inertia=shares.get(joint, 0.0),
-        joint=joint,
-        distance=apart.get(farthest, 0.0),
-        link=farthest,
-        angle=angles.get(turned, 0.0),
-        turned=turned,
-    )
-
-
-def _angle(one: Matrix, other: Matrix) -> float:
-    """Return the largest angle between rotations, which are close, shapes (..., 4, 4) [rad]."""
-    apart = np.swapaxes(one[..., :3, :3], -1, -2) @ other[..., :3, :3]
-    # Of a small angle the sine is exact where the cosine is all rounding.
-    sine = np.linalg.norm(apart - np.swapaxes(apart, -1, -2), axis=(-2, -1)) / math.sqrt(8)
-    cosine = (np.trace(apart, axis1=-2, axis2=-1) - 1) / 2
+def _largest_angle(one: Matrix, other: Matrix) -> float:
+    """Return the largest angle between similar rotations, shapes (..., 4, 4) [rad]."""
+    relative = np.swapaxes(one[..., :3, :3], -1, -2) @ other[..., :3, :3]
+    # The sine of a small angle is accurate; its cosine is dominated by rounding.
+    sine = np.linalg.norm(relative - np.swapaxes(relative, -1, -2), axis=(-2, -1)) / math.sqrt(8)
+    cosine = (np.trace(relative, axis1=-2, axis2=-1) - 1) / 2
     return float(np.arctan2(sine, cosine).max())

@@ -1,4 +1,4 @@
-"""The folder of an onboarded robot: there whole, or not at all."""
+"""The folder of an onboarded robot, which is written completely or not at all."""
 
 import shutil
 import tempfile
@@ -10,126 +10,144 @@ from terrainkit.errors import ExportError
 from terrainkit_robots.text import free_name, names
 
 SPEC = "robot.toml"
-"""A folder that holds this file is an onboarded robot."""
+"""A folder that contains this file is an onboarded robot."""
 
-_BEFORE = ".before"
-"""Ends the names of files with what was edited in a folder that is replaced."""
+_BACKUP_SUFFIX = ".before"
+"""Suffix of backups of edited files."""
 
-_OURS = frozenset({"robot.urdf", "robot.xml", "scene.xml", "report.md", "report", "meshes"})
-"""What onboarding writes, beside the files that are there to be edited."""
+_GENERATED = frozenset({"robot.urdf", "robot.xml", "scene.xml", "report.md", "report", "meshes"})
+"""Files and folders that onboarding writes, except those that users edit."""
 
 
 def check_folder(target: Path, *, overwrite: bool) -> None:
-    """Raise an error if an onboarded robot cannot or may not be written to `target`.
+    """Check that an onboarded robot can be written to a folder.
 
     Raises:
-        ExportError: if there is something that is not to be overwritten, or no folder to write in.
+        ExportError: if the folder must not be overwritten, or its parent does not exist.
     """
     try:
         if not target.parent.is_dir():
-            raise ExportError(f"cannot write {target}: there is no folder {target.parent}")
+            raise ExportError(f"cannot write {target}: the folder {target.parent} does not exist")
         if target.is_symlink() or (target.exists() and not target.is_dir()):
-            raise ExportError(f"cannot write {target}: it is there, and not a folder")
+            raise ExportError(f"cannot write {target}: it exists and is not a folder")
         if not target.is_dir():
             return
-        held = sorted(path.name for path in target.iterdir())
+        contents = sorted(path.name for path in target.iterdir())
     except OSError as error:
         raise ExportError(f"cannot write {target}: {error.strerror or error}") from error
-    if not held:
+    if not contents:
         return
     if not overwrite:
-        raise ExportError(f"{target} exists; another name would do, or --overwrite")
-    if SPEC not in held:
-        raise ExportError(f"{target} holds no {SPEC}: it is not an onboarded robot to overwrite")
-    edited = _to_be_edited()
-    foreign = [name for name in held if name not in _OURS and _edited_as(name) not in edited]
+        raise ExportError(f"{target} exists; use another name, or --overwrite")
+    if SPEC not in contents:
+        raise ExportError(
+            f"{target} contains no {SPEC}; only folders of onboarded robots are overwritten"
+        )
+    editable = _editable_files()
+    foreign = [
+        name
+        for name in contents
+        if name not in _GENERATED and _without_backup_suffix(name) not in editable
+    ]
     if foreign:
         raise ExportError(
-            f"{target} also holds {names(foreign)}, which onboarding did not write; "
-            "move it away to overwrite the rest"
+            f"{target} also contains {names(foreign)}, which onboarding did not write; "
+            "move these files to overwrite the rest"
         )
 
 
-def _to_be_edited() -> frozenset[str]:
-    """Return the names of the files that users edit: the spec, and configurations."""
+def _editable_files() -> frozenset[str]:
+    """Return the names of the files that users edit: the spec and framework configurations."""
     from terrainkit_robots.onboarding.frameworks import frameworks
 
-    return frozenset({SPEC, *map(frameworks.file_name, frameworks.names())})
+    file_names = map(frameworks.config_file_name, frameworks.framework_names())
+    return frozenset({SPEC, *file_names})
 
 
-def _edited_as(name: str) -> str:
-    """Return the name that a file had when it was edited."""
-    return name.partition(_BEFORE)[0]
+def _without_backup_suffix(name: str) -> str:
+    return name.partition(_BACKUP_SUFFIX)[0]
 
 
-def of_before(target: Path, files: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Return what may have been edited in a folder that is replaced, under names that tell.
+def edited_backups(target: Path, files: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Return backups of the edited files in a folder that will be replaced, by file name.
 
-    That is what differs from the files that come in its place, and all that was kept before.
+    A file is backed up if it differs from the new file of its name. Earlier backups are kept.
+
+    Args:
+        target: The folder, which may not exist.
+        files: The new files.
 
     Raises:
         ExportError: if a file cannot be read.
     """
-    edited = _to_be_edited()
+    editable = _editable_files()
     try:
-        held = {
+        existing = {
             path.name: path.read_bytes()
             for path in (sorted(target.iterdir()) if target.is_dir() else ())
-            if _edited_as(path.name) in edited
+            if _without_backup_suffix(path.name) in editable
         }
     except OSError as error:
         raise ExportError(f"cannot read {target}: {error.strerror or error}") from error
-    kept = {name: data for name, data in held.items() if name not in edited}
-    for name in sorted(held.keys() & edited):
-        if held[name] not in (files.get(name), *kept.values()):
-            kept[free_name(f"{name}{_BEFORE}", kept)] = held[name]
-    return kept
+    backups = {name: data for name, data in existing.items() if name not in editable}
+    for name in sorted(existing.keys() & editable):
+        if existing[name] not in (files.get(name), *backups.values()):
+            backups[free_name(f"{name}{_BACKUP_SUFFIX}", backups)] = existing[name]
+    return backups
 
 
 @contextmanager
 def new_folder(target: Path, *, overwrite: bool = False) -> Iterator[Path]:
-    """Yield an empty folder, and move it to `target` once the block is through.
+    """Yield an empty folder, and move it to `target` at the end of the block.
 
-    If the block raises, nothing has changed.
+    If the block raises an error, `target` is unchanged.
 
     Raises:
-        ExportError: as `check_folder`, and if the disk does not take it.
+        ExportError: as `check_folder`, and if the folder cannot be written.
     """
     check_folder(target, overwrite=overwrite)
     try:
-        # Beside the target, so that moving there is a rename on the same disk.
+        # In the same parent folder, so that the final move is a rename on the same disk.
         work = Path(tempfile.mkdtemp(prefix=".terrainkit-", dir=target.parent))
     except OSError as error:
         raise ExportError(f"cannot write {target}: {error.strerror or error}") from error
-    made = work / target.name
+    folder = work / target.name
     try:
-        made.mkdir()
-        yield made
+        folder.mkdir()
+        yield folder
         check_folder(target, overwrite=overwrite)
-        _swap(target, made, work / "before")
+        _replace_folder(target, folder, work / "before")
     except OSError as error:
         raise ExportError(f"cannot write {target}: {error.strerror or error}") from error
     finally:
         shutil.rmtree(work, ignore_errors=True)
 
 
-def _swap(target: Path, made: Path, before: Path) -> None:
-    """Move a folder to its place, and what is there out of the way; both or neither."""
+def _replace_folder(target: Path, folder: Path, old: Path) -> None:
+    """Move `target` to `old` if it exists, and `folder` to `target`; both or neither."""
     if target.is_dir():
-        target.replace(before)
+        target.replace(old)
     try:
-        made.replace(target)
+        folder.replace(target)
     except OSError:
-        if before.is_dir():
-            before.replace(target)
+        if old.is_dir():
+            old.replace(target)
         raise
 
 
 def write_files(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write files by their names in `folder`, which are relative and stay inside of it."""
+    """Write files into a folder.
+
+    Args:
+        folder: The folder.
+        files: Content of each file, by its path relative to the folder.
+
+    Raises:
+        ExportError: if a path is outside the folder.
+    """
     for name, data in files.items():
         path = folder / name
         if not path.resolve().is_relative_to(folder.resolve()):
-            raise ExportError(f"{name} lies outside of {folder}")
+            raise ExportError(f"{name} is outside of {folder}")
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)

@@ -1,251 +1,238 @@
-"""Bringing a robot in: read, repair, write, and prove, in the order that a newcomer would."""
+"""The onboarding pipeline: check a robot file, fix it, write its folder and verify the result."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from terrainkit.errors import TerrainkitError
-from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.export.canonical import plain_name
-from terrainkit_robots.lint.runner import Report
+from terrainkit_robots.lint.check import check_robot
+from terrainkit_robots.lint.runner import Finding, Report
 from terrainkit_robots.lint.settings import Settings, read_settings
-from terrainkit_robots.onboarding.folder import check_folder, new_folder, of_before, write_files
-from terrainkit_robots.onboarding.robot_files import MJCF, Given, Onboarded, onboard
+from terrainkit_robots.onboarding.folder import (
+    check_folder,
+    edited_backups,
+    new_folder,
+    write_files,
+)
+from terrainkit_robots.onboarding.frameworks.frameworks import config_file_name, robot_config_text
+from terrainkit_robots.onboarding.robot_files import (
+    MJCF,
+    RobotFiles,
+    SpecOverride,
+    make_robot_files,
+)
 
 if TYPE_CHECKING:
     from terrainkit_robots.export.collision_simplification.simplify import How, Progress
-    from terrainkit_robots.lint.runner import Finding
-    from terrainkit_robots.onboarding.verify import Proof
+    from terrainkit_robots.onboarding.verify import Verification
+
+_BLOCKING_RULES = ("XML", "MSH", "TRE", "INR", "JNT001", "JNT004", "JNT007", "JNT013")
+"""Codes, or starts of codes, of rules whose errors change the robot that would be written. For
+example, a joint of an unknown type would become fixed."""
+
+_FIXED_BY_EXPORT = frozenset({"MSH002", "MSH004", "MSH005", "MSH007", "MSH008", "XML014"})
+"""Rules whose errors cannot occur in the written files: meshes are converted and renamed, and
+rotations are written as roll, pitch and yaw."""
 
 
-def _unwrapped(items: Any, _total: int) -> Any:
+def _no_progress(items: Any, _total: int) -> Any:
     return items
 
 
-def _silent(_step: str) -> None:
-    pass
-
-
 @dataclass(frozen=True, kw_only=True)
-class Wishes:
-    """How a robot is to be brought in."""
-
-    target: Path | None = None
-    """Folder to write; None for one with the robot's name in the current folder."""
+class OnboardOptions:
+    """Options of `onboard`."""
 
     settings: Settings = field(default_factory=Settings)
-    """Packages, xacro arguments and rules that are not asked; those of files above the robot's own
-    are added."""
+    """ROS packages, xacro arguments and ignored rules; the settings files above the robot file are
+    added. A selection of rules has no effect."""
 
     collision: "How" = "keep"
-    """What becomes of collision meshes."""
+    """How collision meshes are simplified."""
 
-    configs: tuple[str, ...] = ()
-    """Frameworks to write a configuration for."""
+    frameworks: tuple[str, ...] = ()
+    """Training frameworks to write a configuration for."""
 
     floating: bool | None = None
-    """Whether the base moves freely; None to find out."""
+    """Whether the base is floating; None to decide from the file and the legs."""
 
     spec: Path | None = None
-    """A robot.toml whose values go before what would be suggested."""
+    """A robot.toml whose values override the derived ones."""
 
-    unsafe: bool = False
-    """Whether repairs that change a number, a shape or a mesh are made, too."""
+    unsafe_fixes: bool = False
+    """Whether to apply fixes that change a number, a shape or a mesh."""
 
     force: bool = False
-    """Whether to go on although parts, meshes or masses are not sound."""
+    """Whether to continue despite blocking errors."""
 
     overwrite: bool = False
-    """Whether a folder that is an onboarded robot may be replaced."""
+    """Whether to replace a folder that contains an onboarded robot."""
 
-    pictures: bool = True
-    """Whether pictures are drawn."""
+    render_pictures: bool = True
+    """Whether to render pictures for the report."""
 
-    cache: Path | None = None
-    """Folder that keeps convex parts from one run to the next."""
+    cache_dir: Path | None = None
+    """Folder that caches convex decompositions between runs."""
 
-    progress: "Progress" = _unwrapped
-    """Draws a bar while collision meshes are worked on."""
+    progress: "Progress" = _no_progress
+    """Wraps an iterable of collision meshes to display a progress bar."""
 
-    say: Callable[[str], None] = _silent
-    """Is told what is done next."""
+    on_step: Callable[[str], None] = lambda _: None
+    """Called with the name of each step when it starts."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class BroughtIn:
-    """What became of a robot."""
+class OnboardResult:
+    """The outcome of `onboard`."""
 
     report: Report
-    """What is found in it after the repairs."""
+    """Findings that remain after the fixes."""
 
-    repaired: tuple["Finding", ...] = ()
-    """What was found before, and repaired in what is written."""
+    fixed: tuple[Finding, ...] = ()
+    """Findings of the source file that do not apply to the written files."""
 
     folder: Path | None = None
-    """The folder that was written; None if errors kept the robot out."""
+    """The folder that was written; None if blocking errors remain."""
 
-    made: Onboarded | None = None
-    """What was written to it."""
+    robot: RobotFiles | None = None
+    """The robot in the folder; None if blocking errors remain."""
 
-    proof: "Proof | None" = None
-    """Whether that is the robot that was read, and whether it stands."""
+    verification: "Verification | None" = None
+    """The comparison of the written files with the source, and the standing test."""
 
     configs: tuple[str, ...] = ()
-    """Configuration files."""
+    """Names of the framework configurations."""
 
     pictures: tuple[str, ...] = ()
-    """Picture files."""
+    """Names of the picture files."""
 
-    no_pictures: str = ""
-    """Why there are no pictures."""
+    pictures_error: str = ""
+    """The reason why there are no pictures."""
 
-    kept: tuple[str, ...] = ()
-    """Files with what was edited in the folder before."""
+    backups: tuple[str, ...] = ()
+    """Names of the files that keep user edits of the replaced folder."""
 
 
-def bring_in(file: Path, wishes: Wishes) -> BroughtIn:
-    """Bring a robot in; its own file is not changed.
+def is_blocking(finding: Finding) -> bool:
+    """Return whether a finding means that the written files would describe another robot."""
+    return finding.severity == "error" and finding.code.startswith(_BLOCKING_RULES)
+
+
+def onboard(
+    path: str | Path, output: str | Path | None = None, options: OnboardOptions | None = None
+) -> OnboardResult:
+    """Convert a robot file into a folder for training; the file itself is not changed.
+
+    The folder contains robot.toml (default pose, gains, names), robot.urdf, robot.xml, scene.xml,
+    meshes, report.md and the requested framework configurations.
+
+    Args:
+        path: A URDF, xacro or MJCF file.
+        output: The folder to write. By default it has the robot's name and is created in the
+            working directory.
+        options: The options.
+
+    Returns:
+        The report and the written files. If blocking errors remain, and `options.force` is False,
+        nothing is written and `folder` is None.
 
     Raises:
-        TerrainkitError: if a file cannot be read or written, or an option is wrong.
+        TerrainkitError: if a file cannot be read or written, an option is invalid, or MuJoCo
+            rejects the robot.
     """
-    from terrainkit_robots.onboarding.report_md import report_page
-    from terrainkit_robots.onboarding.verify import prove
+    from terrainkit_robots.onboarding.report_md import report_markdown
+    from terrainkit_robots.onboarding.verify import verify
     from terrainkit_robots.spec.robot_spec import RobotSpec
 
-    _check_frameworks(wishes.configs)
-    if wishes.target is not None:
-        check_folder(wishes.target, overwrite=wishes.overwrite)
-    given = Given(spec=RobotSpec.load(wishes.spec), file=str(wishes.spec)) if wishes.spec else None
-    wishes.say(f"checking {file.name}")
-    report, repaired = _mended(*_repaired(file, wishes))
-    for crash in report.crashed:
-        raise TerrainkitError(f"{file}: {crash.code}: {crash.reason}")
-    if not wishes.force and any(map(keeps_out, report.findings)):
-        return BroughtIn(report=report, repaired=repaired)
-    target = wishes.target or Path(plain_name(report.facts.model))
-    check_folder(target, overwrite=wishes.overwrite)
-    wishes.say("finding the pose and the gains")
-    made = onboard(
+    path, options = Path(path), options or OnboardOptions()
+    config_names = {name: config_file_name(name) for name in options.frameworks}
+    if output is not None:
+        check_folder(Path(output), overwrite=options.overwrite)
+    override = None
+    if options.spec is not None:
+        override = SpecOverride(spec=RobotSpec.load(options.spec), file=str(options.spec))
+    options.on_step(f"checking {path.name}")
+    report, fixed = _fix_in_memory(path, options)
+    for rule in report.crashed:
+        raise TerrainkitError(f"{path}: {rule.code}: {rule.reason}")
+    if not options.force and any(map(is_blocking, report.findings)):
+        return OnboardResult(report=report, fixed=fixed)
+    target = Path(output or plain_name(report.facts.model))
+    check_folder(target, overwrite=options.overwrite)
+    options.on_step("deriving the default pose and the gains")
+    robot = make_robot_files(
         report.facts,
-        collision=wishes.collision,
-        floating=wishes.floating,
-        given=given,
-        cache=wishes.cache,
-        progress=wishes.progress,
+        collision=options.collision,
+        floating=options.floating,
+        override=override,
+        cache_dir=options.cache_dir,
+        progress=options.progress,
     )
-    configs = _configs(made, wishes.configs)
-    kept = of_before(target, {**made.files, **configs})
-    with new_folder(target, overwrite=wishes.overwrite) as folder:
-        wishes.say("proving that it stands")
-        write_files(folder, made.files)
-        write_files(folder, configs)
-        # The pictures are drawn by another process, which there is no need to wait for.
-        with ThreadPoolExecutor(1) as beside:
-            drawing = beside.submit(_pictures, folder) if wishes.pictures else None
-            proof = prove(report.facts, made, folder)
-            wishes.say("drawing pictures")
-        pictures, no_pictures = drawing.result() if drawing else ({}, "not wanted")
-        write_files(folder, dict(pictures) | kept)
-        done = BroughtIn(
+    configs = {
+        file: robot_config_text(name, robot.facts, robot.spec).encode()
+        for name, file in config_names.items()
+    }
+    backups = edited_backups(target, {**robot.files, **configs})
+    with new_folder(target, overwrite=options.overwrite) as folder:
+        options.on_step("simulating the standing pose")
+        write_files(folder, {**robot.files, **configs})
+        # The pictures are rendered by another process at the same time.
+        with ThreadPoolExecutor(1) as executor:
+            pictures_job = executor.submit(_render_pictures, folder, options.render_pictures)
+            verification = verify(report.facts, robot, folder)
+            options.on_step("rendering pictures")
+        pictures, pictures_error = pictures_job.result()
+        write_files(folder, {**pictures, **backups})
+        result = OnboardResult(
             report=report,
-            repaired=repaired,
+            fixed=fixed,
             folder=target,
-            made=made,
-            proof=proof,
+            robot=robot,
+            verification=verification,
             configs=tuple(configs),
             pictures=tuple(pictures),
-            no_pictures=no_pictures,
-            kept=tuple(kept),
+            pictures_error=pictures_error,
+            backups=tuple(backups),
         )
-        write_files(folder, {"report.md": report_page(done).encode()})
-    return done
+        write_files(folder, {"report.md": report_markdown(result).encode()})
+    return result
 
 
-_SOUND = ("XML", "MSH", "TRE", "INR", "JNT001", "JNT004", "JNT007", "JNT013")
-"""Rules, or families of them, whose errors mean that what would be written is not the robot that
-was meant: a joint of an unknown type would be fixed, one with inverted limits have none. With other
-errors, such as limits that are missing, it is that robot, and not yet one to train."""
-
-
-_MENDED = frozenset({"MSH002", "MSH004", "MSH005", "MSH007", "MSH008", "XML014"})
-"""Errors that are not in what is written. Mesh files are copied, whatever they were called and in
-whatever format; a copy that cannot be made of a collision mesh keeps the robot out. Rotations are
-written as roll, pitch and yaw."""
-
-
-def _mended(
-    report: Report, repaired: tuple["Finding", ...]
-) -> tuple[Report, tuple["Finding", ...]]:
-    """Return what is found and what is repaired, when the robot is written anew."""
-    gone = [f for f in report.findings if f.severity == "error" and f.code in _MENDED]
-    left = tuple(f for f in report.findings if f not in gone)
-    # What the fix would have done to the files is not what is done.
-    return replace(report, findings=left), (*repaired, *(replace(f, fix=None) for f in gone))
-
-
-def _check_frameworks(frameworks: Sequence[str]) -> None:
-    """Raise an error if there is no such framework."""
-    if frameworks:
-        from terrainkit_robots.onboarding.frameworks.frameworks import file_name
-
-        for name in frameworks:
-            file_name(name)
-
-
-def _configs(made: Onboarded, frameworks: Sequence[str]) -> dict[str, bytes]:
-    """Return configurations by the names of their files."""
-    if not frameworks:
-        return {}
-    from terrainkit_robots.onboarding.frameworks.frameworks import config_of, file_name
-
-    texts = {file_name(name): config_of(name, made.facts, made.spec) for name in frameworks}
-    return {name: text.encode() for name, text in texts.items()}
-
-
-def keeps_out(finding: "Finding") -> bool:
-    """Return whether a finding means that what would be written is another robot."""
-    return finding.severity == "error" and finding.code.startswith(_SOUND)
-
-
-def _repaired(file: Path, wishes: Wishes) -> tuple[Report, tuple["Finding", ...]]:
-    """Return what is found in a robot once it is repaired in memory, and what was repaired."""
-    from terrainkit_robots.description.load import load_robot
+def _fix_in_memory(path: Path, options: OnboardOptions) -> tuple[Report, tuple[Finding, ...]]:
+    """Return the report after all fixes, and the findings that were fixed."""
     from terrainkit_robots.lint.fixes.apply import fix_robot
-    from terrainkit_robots.lint.selection import lint_selected
-    from terrainkit_robots.mesh.mesh_cache import Meshes
 
-    # What is simulated is what will be written, not what was read; and what may keep a robot out
-    # is always asked.
-    found_settings = wishes.settings.over(read_settings(file.parent))
-    settings = replace(found_settings, select=(), simulate=False)
+    settings = options.settings.over(read_settings(path.parent))
+    # All rules are needed to find blocking errors. The written files are simulated, not this one.
+    settings = replace(settings, select=(), simulate=False)
+    report, fixed = check_robot(path, settings), ()
+    if report.facts.model.kind != "xacro" and any(f.fix is not None for f in report.findings):
+        first = report
 
-    def look(contents: Mapping[Path, bytes]) -> Report:
-        model = load_robot(
-            file,
-            packages=settings.packages,
-            xacro_arguments=settings.xacro_arguments,
-            contents=contents,
-        )
-        return lint_selected(Facts(model, Meshes(contents)), settings, contents)
+        def check(contents: Mapping[Path, bytes]) -> Report:
+            return check_robot(path, settings, contents=contents) if contents else first
 
-    found = look({})
-    fixable = [f for f in found.findings if f.fix is not None]
-    if found.facts.model.kind == "xacro" or not fixable:
-        return found, ()
-    result = fix_robot(file, lambda c: look(c) if c else found, unsafe=wishes.unsafe)
-    return result.report, result.fixed
+        result = fix_robot(path, check, unsafe=options.unsafe_fixes)
+        report, fixed = result.report, result.fixed
+    by_export = [f for f in report.findings if f.severity == "error" and f.code in _FIXED_BY_EXPORT]
+    remaining = tuple(f for f in report.findings if f not in by_export)
+    # The fix of the lint rule is not applied, so its description is removed.
+    fixed = (*fixed, *(replace(finding, fix=None) for finding in by_export))
+    return replace(report, findings=remaining), fixed
 
 
-def _pictures(folder: Path) -> tuple[dict[str, bytes], str]:
-    """Return pictures by the names of their files, and why there are none."""
+def _render_pictures(folder: Path, enabled: bool) -> tuple[dict[str, bytes], str]:
+    """Return pictures by file name, and the reason if there are none."""
     from terrainkit_robots.rendering.child_process import RenderError
     from terrainkit_robots.rendering.robot_pictures import render_robot
 
+    if not enabled:
+        return {}, "disabled"
     try:
-        drawn = render_robot(folder / MJCF)
+        pictures = render_robot(folder / MJCF)
     except RenderError as error:
         return {}, str(error)
-    return {f"report/{name}.png": data for name, data in drawn.items()}, ""
+    return {f"report/{name}.png": data for name, data in pictures.items()}, ""

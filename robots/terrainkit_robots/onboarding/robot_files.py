@@ -1,8 +1,4 @@
-"""Onboarding: from the facts of a robot to the files of its folder, in memory.
-
-What was read is brought into its normal form, its meshes are packed, gains and poses are suggested
-where nobody gave them, and everything is written as text. Nothing here touches the disk.
-"""
+"""The files of an onboarded robot, computed in memory from the facts of its source."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -27,109 +23,113 @@ if TYPE_CHECKING:
     from terrainkit_robots.spec.robot_spec import RobotSpec
 
 URDF, MJCF, SCENE, SPEC = "robot.urdf", "robot.xml", "scene.xml", "robot.toml"
-"""What the files of a folder are called."""
+"""Names of the files in the folder."""
 
-_AT_REST = 1e-4
-"""Shapes that are deeper than this inside each other at the standing pose push each other [m]."""
+_MAX_PENETRATION = 1e-4
+"""Links that penetrate each other by more than this at the default pose do not collide [m]."""
 
-_DRIVEN = ("stiffness", "damping", "effort", "armature", "velocity")
-"""What a motor takes from the spec."""
+_ACTUATOR_FIELDS = ("stiffness", "damping", "effort", "armature", "velocity")
+"""Fields of the spec that define an actuator."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Onboarded:
+class RobotFiles:
     """A robot that is ready to be written."""
 
     facts: Facts
-    """The robot as it is written."""
+    """Facts of the robot as it is written."""
 
     spec: "RobotSpec"
+    """Its spec, as in robot.toml."""
 
     files: Mapping[str, bytes]
-    """Content of each file of the folder, by its name in it."""
+    """Content of each file, by its name in the folder."""
 
     notes: tuple[str, ...]
-    """What was left out, changed or made on the way, a sentence each."""
+    """What was omitted, changed or added, one sentence each."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Given:
-    """A spec that somebody edited or measured, which goes before what would be suggested."""
+class SpecOverride:
+    """A spec with measured or edited values, which replace the derived ones."""
 
     spec: "RobotSpec"
+    """The spec."""
 
     file: str
-    """Where it was read from."""
+    """The file it was read from."""
 
 
-def onboard(
+def make_robot_files(
     source: Facts,
     *,
     collision: "How" = "keep",
     floating: bool | None = None,
-    given: Given | None = None,
-    cache: Path | None = None,
+    override: SpecOverride | None = None,
+    cache_dir: Path | None = None,
     progress: "Progress" = lambda items, _: items,
-) -> Onboarded:
-    """Return a robot's files: robot.toml, robot.urdf, robot.xml, scene.xml and its meshes.
+) -> RobotFiles:
+    """Return the files of a robot: robot.toml, robot.urdf, robot.xml, scene.xml and meshes.
 
     Args:
-        source: The robot as it was read.
-        collision: What becomes of its collision meshes.
-        floating: Whether the base moves freely; unless told, as the spec that is given or the file
-            says, or the legs suggest.
-        given: Values that go before what would be suggested.
-        cache: Folder that keeps convex parts from one run to the next.
-        progress: Draws a bar while collision meshes are worked on.
+        source: Facts of the source file.
+        collision: How collision meshes are simplified.
+        floating: Whether the base is floating; by default as in the overriding spec or the file,
+            or as the legs suggest.
+        override: Values that replace the derived ones.
+        cache_dir: Folder that caches convex decompositions between runs.
+        progress: Wraps an iterable of collision meshes to display a progress bar.
 
     Raises:
-        TerrainkitError: if there is no robot, a mesh of it cannot be had, the spec that is given is
-            of another, or MuJoCo refuses it.
+        TerrainkitError: if the file contains no robot, a mesh cannot be read, the overriding spec
+            belongs to another robot, or MuJoCo rejects the robot.
     """
     from terrainkit_robots.export.collision_simplification.simplify import simplify_collisions
     from terrainkit_robots.export.mesh_export.mesh_export import export_meshes
     from terrainkit_robots.export.unsupported import unsupported_elements
     from terrainkit_robots.export.urdf import urdf_text
 
-    if floating is None and given is not None:
-        floating = given.spec.floating
-    form = to_canonical(source, floating=floating)
-    treated = simplify_collisions(
-        form.model, source.meshes, collision, cache=cache, progress=progress
+    if floating is None and override is not None:
+        floating = override.spec.floating
+    canonical = to_canonical(source, floating=floating)
+    simplified = simplify_collisions(
+        canonical.model, source.meshes, collision, cache=cache_dir, progress=progress
     )
-    packed = export_meshes(treated.model, treated.meshes)
-    meshes = Meshes({Path(name): data for name, data in packed.files.items()})
-    doubts = _doubts(Facts(packed.model, meshes, spec=given.spec), given) if given else ()
-    spec = _spec(Facts(packed.model, meshes), given)
-    facts = Facts(_with_motors(packed.model, spec), meshes, spec=spec)
-    excluded, said = _excluded(facts)
+    exported = export_meshes(simplified.model, simplified.meshes)
+    meshes = Meshes({Path(name): data for name, data in exported.files.items()})
+    spec_notes: tuple[str, ...] = ()
+    if override is not None:
+        spec_notes = _check_override(Facts(exported.model, meshes, spec=override.spec), override)
+    spec = _make_spec(Facts(exported.model, meshes), override)
+    facts = Facts(_set_motor_limits(exported.model, spec), meshes, spec=spec)
+    excluded, contact_notes = _excluded_contacts(facts)
     texts = {
         URDF: urdf_text(facts.model, feet=spec.feet),
-        MJCF: _mjcf(facts, spec, excluded),
-        SCENE: scene_text(facts.model.name, MJCF, height=max(_height(facts), 0.1)),
+        MJCF: _mjcf_text(facts, spec, excluded),
+        SCENE: scene_text(facts.model.name, MJCF, height=max(_base_height(facts), 0.1)),
         SPEC: spec.to_toml(),
     }
-    return Onboarded(
+    return RobotFiles(
         facts=facts,
         spec=spec,
-        files={name: text.encode() for name, text in texts.items()} | dict(packed.files),
+        files={name: text.encode() for name, text in texts.items()} | dict(exported.files),
         notes=(
-            *doubts,
-            *form.notes,
+            *spec_notes,
+            *canonical.notes,
             *unsupported_elements(source.model),
-            *treated.notes,
-            *packed.notes,
-            *said,
+            *simplified.notes,
+            *exported.notes,
+            *contact_notes,
             *imu_notes(facts),
         ),
     )
 
 
-def _spec(facts: Facts, given: Given | None) -> "RobotSpec":
-    """Return the spec of a robot: what is given, or derived.
+def _make_spec(facts: Facts, override: SpecOverride | None) -> "RobotSpec":
+    """Return the derived spec, with the values of the overriding spec.
 
     Raises:
-        ExportError: if no gains can be suggested, since the robot cannot be simulated.
+        ExportError: if the robot cannot be simulated, so that no gains can be derived.
     """
     from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
     from terrainkit_robots.simulation.pd_gains import suggest_gains
@@ -138,105 +138,109 @@ def _spec(facts: Facts, given: Given | None) -> "RobotSpec":
     try:
         gains = suggest_gains(facts)
     except CannotCheckError as error:
-        raise ExportError(f"{facts.model.file}: no gains can be suggested: {error}") from None
+        raise ExportError(f"{facts.model.file}: cannot derive PD gains: {error}") from None
     floating = bool(facts.model.floating)
     derived = derive_spec(facts, gains=gains, floating=floating, urdf=URDF, mjcf=MJCF)
-    if given is None:
+    if override is None:
         return derived
-    mine = replace(given.spec, floating=floating, urdf=URDF, mjcf=MJCF)
-    return with_provenance(mine, derived, given.file)
+    spec = replace(override.spec, floating=floating, urdf=URDF, mjcf=MJCF)
+    return with_provenance(spec, derived, override.file)
 
 
-def _doubts(facts: Facts, given: Given) -> tuple[str, ...]:
-    """Return what is odd about the spec that is given.
+def _check_override(facts: Facts, override: SpecOverride) -> tuple[str, ...]:
+    """Return the warnings of the lint rules for the overriding spec.
 
     Raises:
-        ConfigError: if it is wrong for the robot.
+        ConfigError: if the spec does not fit the robot.
     """
     from terrainkit_robots.lint.rule import rules
     from terrainkit_robots.lint.runner import lint
 
-    others = set(given.spec.joint_order) - {joint.name for joint in facts.joints}
-    if others == set(given.spec.joint_order) and others:
+    file, joints = override.file, set(override.spec.joint_order)
+    if joints and joints.isdisjoint(joint.name for joint in facts.joints):
         raise ConfigError(
-            f"{given.file} is of {given.spec.name}: none of its joints is in {facts.model.title}"
+            f"{file} belongs to {override.spec.name}: none of its joints is in {facts.model.title}"
         )
-    asked = [rule for rule in rules() if "spec" in rule.needs]
-    found = lint(facts, asked).findings
-    wrong = [finding for finding in found if finding.severity == "error"]
-    if wrong:
-        more = f" (and {len(wrong) - 1} more; check-robot --spec has all)" if wrong[1:] else ""
-        raise ConfigError(f"{given.file}: {wrong[0].code}: {wrong[0].message}{more}")
-    odd = (finding for finding in found if finding.severity == "warning")
-    return tuple(f"{given.file}: {finding.code}: {finding.message}" for finding in odd)
+    findings = lint(facts, [rule for rule in rules() if "spec" in rule.needs]).findings
+    errors = [finding for finding in findings if finding.severity == "error"]
+    if errors:
+        more = f" (and {len(errors) - 1} more; see check-robot --spec)" if errors[1:] else ""
+        raise ConfigError(f"{file}: {errors[0].code}: {errors[0].message}{more}")
+    warnings = (finding for finding in findings if finding.severity == "warning")
+    return tuple(f"{file}: {finding.code}: {finding.message}" for finding in warnings)
 
 
-def _with_motors(model: "RobotModel", spec: "RobotSpec") -> "RobotModel":
-    """Return a robot whose joints have the efforts and speeds of its spec."""
-    efforts, speeds = spec.per_joint("effort"), spec.per_joint("velocity")
+def _set_motor_limits(model: "RobotModel", spec: "RobotSpec") -> "RobotModel":
+    """Return a model whose joints have the effort and velocity limits of the spec."""
+    effort, velocity = spec.per_joint("effort"), spec.per_joint("velocity")
     joints = tuple(
         replace(
             joint,
-            limit=replace(joint.limit, effort=efforts[joint.name], velocity=speeds[joint.name]),
+            limit=replace(joint.limit, effort=effort[joint.name], velocity=velocity[joint.name]),
         )
-        if joint.limit is not None and joint.name in efforts
+        if joint.limit is not None and joint.name in effort
         else joint
         for joint in model.joints
     )
-    motors = (replace(motor, effort=efforts[motor.joint]) for motor in model.actuators)
-    return replace(model, joints=joints, actuators=tuple(motors))
+    actuators = (replace(each, effort=effort[each.joint]) for each in model.actuators)
+    return replace(model, joints=joints, actuators=tuple(actuators))
 
 
-def _mjcf(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[str]]) -> str:
-    """Return the robot as MJCF, in which pairs of links are not to touch."""
-    single = merge_fixed_joints(replace(facts.model, excluded=excluded), keep=spec.feet)
-    columns = {name: spec.per_joint(name) for name in _DRIVEN}
-    drives = {
+def _mjcf_text(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[str]]) -> str:
+    """Return robot.xml, in which pairs of links are excluded from contact."""
+    merged = merge_fixed_joints(replace(facts.model, excluded=excluded), keep=spec.feet)
+    columns = {name: spec.per_joint(name) for name in _ACTUATOR_FIELDS}
+    actuators = {
         joint: ActuatorConfig(**{name: values[joint] for name, values in columns.items()})
         for joint in spec.joint_order
     }
-    bodies = {link.name for link in single.model.links}
+    bodies = {link.name for link in merged.model.links}
     frames = [
         Site(name=link, body=body, pose=pose)
-        for link, (body, pose) in single.frames.items()
+        for link, (body, pose) in merged.frames.items()
         if link not in bodies
     ]
     imu = imu_site(facts)
     if imu.name in spec.feet:
         imu = replace(imu, name=f"{imu.name}_site")
+    height = _base_height(facts)
     extras = Extras(
-        actuators=drives,
+        actuators=actuators,
         feet=foot_sites(facts, spec.feet),
         imu=imu,
         frames=tuple(frames),
-        excluded=single.model.excluded,
+        excluded=merged.model.excluded,
         home=facts.positions,
-        height=_height(facts),
-        height_at_zero=max(_height(facts), _clearance(facts, {})) if facts.stance else None,
+        height=height,
+        height_at_zero=max(height, _clearance(facts, {})) if facts.stance else None,
     )
-    return mjcf_text(single.model, extras)
+    return mjcf_text(merged.model, extras)
 
 
-def _excluded(facts: Facts) -> tuple[frozenset[frozenset[str]], tuple[str, ...]]:
-    """Return pairs of links that are not to touch, and what to say of them."""
-    declared = facts.model.excluded
+def _excluded_contacts(facts: Facts) -> tuple[frozenset[frozenset[str]], tuple[str, ...]]:
+    """Return the pairs of links that must not collide, and a note on each derived pair."""
+    from_file = facts.model.excluded
     try:
-        found = facts.overlaps.overlaps(facts.positions)
+        overlaps = facts.overlaps.overlaps(facts.positions)
     except CannotCheckError as error:
-        return declared, (f"did not look for shapes inside each other: {error}",)
-    pairs = {frozenset((o.first.link, o.second.link)): o.depth for o in found if o.depth > _AT_REST}
+        return from_file, (f"links that penetrate each other were not searched for: {error}",)
+    pairs = {
+        frozenset((overlap.first.link, overlap.second.link)): overlap.depth
+        for overlap in overlaps
+        if overlap.depth > _MAX_PENETRATION
+    }
     notes = tuple(
-        f"{' and '.join(sorted(pair))} do not touch each other in robot.xml: at the standing pose "
-        f"they are {1000 * depth:.1f} mm inside each other"
+        f"{' and '.join(sorted(pair))} do not collide in robot.xml: they penetrate each other by "
+        f"{1000 * depth:.1f} mm at the default pose"
         for pair, depth in pairs.items()
     )
-    return declared | frozenset(pairs), notes
+    return from_file | frozenset(pairs), notes
 
 
-def _height(facts: Facts) -> float:
-    """Return how high the base of a robot is that stands or lies on the ground [m]."""
+def _base_height(facts: Facts) -> float:
+    """Return the height of the base when the robot stands or lies on the ground [m]."""
     if not facts.model.floating and facts.bodies[0].virtual:
-        return 0.0  # its base is the world
+        return 0.0  # the base is the world
     if facts.stance is not None:
         return facts.stance.height
     if not facts.model.floating:
@@ -245,11 +249,11 @@ def _height(facts: Facts) -> float:
 
 
 def _clearance(facts: Facts, positions: Mapping[str, float]) -> float:
-    """Return how high the base is when the lowest shape touches the ground [m]."""
+    """Return the height of the base at which the lowest shape touches the ground [m]."""
     poses = body_poses(facts.bodies, positions)
-    depths = [
+    heights = [
         lowest(shape, pose, facts.meshes)
         for body, pose in zip(facts.bodies, poses, strict=True)
         for shape in (*body.collisions, *body.visuals)
     ]
-    return -min(depths, default=0.0)
+    return -min(heights, default=0.0)

@@ -1,67 +1,36 @@
-"""The shipping: of a run, what a robot needs that comes with a policy.
-
-What is left is small, names no folder of the machine that it was trained on, and is opened like any
-run: by the name of its task, once it is where :attr:`~.registry.Registered.shipped` says.
-"""
+"""Bundle a policy: copy the part of a run that is shipped with the package."""
 
 from pathlib import Path
 
-import tomli_w
+import tomlkit
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit.toml_text import parse_toml
-from terrainkit_robots.onboarding.folder import new_folder
-from terrainkit_robots.rl import registry
-from terrainkit_robots.rl.run import (
-    MAP_FILE,
-    RUN_FILE,
-    TASK_FILE,
-    Run,
-    checkpoint_name,
-    open_run,
-    policy_state,
-    read_checkpoint,
-    save_checkpoint,
-)
+from terrainkit_robots.rl import run as runs
 from terrainkit_robots.rl.scene import SPEC_FILE
+from terrainkit_robots.rl.tasks import task_names
 
 
-def ship(run: Run, folder: Path | str) -> Run:
-    """Write what is shipped of a run: its files, and one checkpoint with the networks alone.
-
-    Args:
-        run: A run on a plane or on a map, of a robot that is registered.
-        folder: Where; the task's `shipped`, for a policy that is found by its name.
-            Folders above it are made.
-
-    Returns:
-        The run that was written.
+def bundle_policy(run: runs.Run, folder: Path) -> runs.Run:
+    """Write a run without its training state and without paths of this machine.
 
     Raises:
-        ConfigError: if the run has no checkpoint, or its robot or ground is found on this machine
-            alone.
-        ExportError: if the folder holds something, or cannot be written.
+        ConfigError: If the run has no checkpoint, or its robot or terrain cannot be shipped.
+        ExportError: If the folder is not empty, or cannot be written.
     """
-    folder = Path(folder)
     if run.checkpoint is None:
-        raise ConfigError(f"{run.folder} has no checkpoint yet; wanted a run that has been trained")
-    if run.robot_name not in registry.names():
-        raise ConfigError(
-            f"{run.folder} is of the robot in {run.robot_name}; wanted one that is registered: "
-            f"{listing(registry.names())}"
-        )
-    noted = [TASK_FILE, SPEC_FILE] + [MAP_FILE] * (run.terrain != "plane")
-    if not (run.folder / noted[-1]).is_file():
-        raise ConfigError(
-            f"{run.folder} is on {run.terrain}, which is no map that can be made again"
-        )
-    about = parse_toml((run.folder / RUN_FILE).read_text(encoding="utf-8"))
-    about["terrain"] = "plane" if run.terrain == "plane" else MAP_FILE
-    state = policy_state(read_checkpoint(run.checkpoint))
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with new_folder(folder) as made:
-        for name in noted:
-            (made / name).write_bytes((run.folder / name).read_bytes())
-        (made / RUN_FILE).write_text(tomli_w.dumps(about), encoding="utf-8")
-        save_checkpoint(made / checkpoint_name(state["iteration"]), state)
-    return open_run(folder)
+        raise ConfigError(f"run {run.folder}: got no checkpoint; expected a trained run")
+    if run.robot_name not in task_names():
+        known = listing(task_names())
+        raise ConfigError(f"robot: got {run.robot_name}; expected a registered robot: {known}")
+    is_plane = run.terrain == "plane"
+    names = [runs.TASK_FILE, SPEC_FILE] + [runs.MAP_FILE] * (not is_plane)
+    if not (run.folder / names[-1]).is_file():
+        raise ConfigError(f"terrain: got {run.terrain}; expected plane or a map with a config")
+    about = parse_toml((run.folder / runs.RUN_FILE).read_text(encoding="utf-8"))
+    about["terrain"] = "plane" if is_plane else runs.MAP_FILE
+    state = runs.policy_state(runs.read_checkpoint(run.checkpoint))
+    files = {name: (run.folder / name).read_bytes() for name in names}
+    runs.write_run_folder(folder, files | {runs.RUN_FILE: tomlkit.dumps(about).encode()})
+    runs.save_checkpoint(folder / runs.checkpoint_name(state["iteration"]), state)
+    return runs.open_run(folder)

@@ -1,161 +1,228 @@
-"""Playing: a policy is rolled on some ground, measured as in an evaluation, and filmed.
+"""Play a policy: measure it as an evaluation does, and record a video or open a viewer.
 
-On a map there is a robot on each patch, and the video visits some of them, on different terrains.
-On a plane robots march in formation through a tour of commands.
+On a map there is one robot per patch, and the video follows some of them on different terrains. On
+a plane the robots walk in formation through a sequence of commands.
 """
 
 import os
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import cycle
-from typing import TYPE_CHECKING
+from itertools import cycle, zip_longest
 
 import numpy as np
-from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots.policy.actor import policy_of
-from terrainkit_robots.policy.evaluate import Asked, is_flat, prepared
-from terrainkit_robots.policy.recorder import Recorder
-from terrainkit_robots.policy.rollout import timetable, walk
-from terrainkit_robots.policy.score import Evaluation, summed_up
-from terrainkit_robots.policy.trials import roll_out
-from terrainkit_robots.rendering.video import DEFAULT_SIZE, VideoSpec
+from terrainkit_robots.policy.evaluate import (
+    EvaluationConfig,
+    EvaluationResult,
+    is_flat,
+    make_evaluation_env,
+    summarize,
+)
+from terrainkit_robots.policy.load import load_policy
+from terrainkit_robots.policy.rollout import (
+    EvaluationRollout,
+    FloatArray,
+    Progress,
+    command_schedule,
+    rollout,
+)
+from terrainkit_robots.rendering.video import DEFAULT_SIZE, Shot, VideoSpec
+from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.run import Run
 from terrainkit_robots.rl.runner import single_torch_thread
-from terrainkit_robots.rl.task import Commands
 
-if TYPE_CHECKING:
-    from terrainkit_robots.rl.run import Run
+DEFAULT_SECONDS, DEFAULT_ROBOTS = 12.0, 4
+"""Default duration [s], and default number of robots that a video of a map follows."""
 
-FloatArray = NDArray[np.float32]
-
-SECONDS = 12.0
-"""How long robots walk unless told [s]."""
-
-ROBOTS = 4
-"""Robots that a video follows on a map unless told."""
-
-_MARCHING = 9
-"""Robots on a plane unless told."""
+_FORMATION_ENVS, _MAX_FPS = 9, 25.0
+"""Default number of robots on a plane, and largest frame rate of a video [1/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Played:
-    """What came of it."""
+class PlayResult:
+    """Metrics of a played policy, and the video to render; None without a video."""
 
-    evaluation: Evaluation
-    """How the robots did."""
-
-    film: VideoSpec | None
-    """What is to be drawn; None if no film was wanted."""
+    evaluation: EvaluationResult
+    video: VideoSpec | None
 
 
 @single_torch_thread()
 def play(
-    run: "Run",
-    asked: Asked | None = None,
+    run: Run,
+    config: EvaluationConfig | None = None,
     *,
-    filmed: bool = True,
-    robots: int = ROBOTS,
+    video: bool = True,
+    robots: int = DEFAULT_ROBOTS,
     size: tuple[int, int] = DEFAULT_SIZE,
-    progress: Callable[[float], None] = lambda _: None,
-) -> Played:
-    """Roll the policy of a run.
+    progress: Progress = lambda _: None,
+) -> PlayResult:
+    """Roll out the policy of a run, and record a video.
 
     Args:
         run: The run.
-        asked: What is to be shown; on a plane, a tour of commands unless told.
-        filmed: Whether there is to be a video.
-        robots: How many robots it follows, one after the other; on a map.
+        config: Settings; without a command, the robots on a plane get :func:`demo_commands`.
+        video: Whether to record a video.
+        robots: Number of robots that the video of a map follows in turn.
         size: Width and height of the video [pixels].
-        progress: Is told the part that is done, 0 to 1.
+        progress: Progress callback.
 
     Raises:
-        ConfigError: if the run has no policy, or one of another robot; or if an option is wrong.
+        ConfigError: if the run has no policy, or one of another robot; if an option is invalid.
     """
     if robots < 1:
-        raise ConfigError(f"robots is {robots}; wanted 1 or more")
-    asked = asked or Asked(seconds=SECONDS)
-    env, commands = _prepared(run, asked)
-    recorder = Recorder(env) if filmed else None
+        raise ConfigError(f"robots: got {robots}; expected 1 or more")
+    config = config or EvaluationConfig(seconds=DEFAULT_SECONDS)
+    env, commands = _make_play_env(run, config)
+    recorder = PoseRecorder(env)
 
-    def watch(done: float) -> None:
-        progress(done)
-        if recorder is not None:
+    def update(fraction: float) -> None:
+        progress(fraction)
+        if video:
             recorder.record()
 
-    policy = policy_of(run, env)
-    outcome = roll_out(env, policy, asked.seconds, commands, watch, to_the_end=filmed)
-    evaluation = summed_up(run, asked, env, outcome)
-    film = None if recorder is None else recorder.film(robots, size)
-    return Played(evaluation=evaluation, film=film)
-
-
-def _prepared(run: "Run", asked: Asked) -> tuple[LeggedEnv, FloatArray | None]:
-    """Return the environment, and the commands of each robot, one after the other."""
-    if is_flat(run, asked):
-        asked = replace(asked, num_envs=asked.num_envs or _MARCHING)
-        if asked.command is None and not asked.random_commands:
-            tour = tour_of(run.task.commands)
-            env, _ = prepared(run, replace(asked, command=(0.0, 0.0, 0.0)))
-            return env, np.repeat(tour[:, None], env.num_envs, axis=1)
-    return prepared(run, asked, each=1)
-
-
-def tour_of(settings: Commands) -> FloatArray:
-    """Return commands that show what a policy can do, shape (4, 3).
-
-    Forward, forward in a bend, to the side, and turning on the spot; as fast as the task goes, but
-    for a quarter.
-    """
-    ahead, left, turn = (
-        0.75 * span[1] for span in (settings.lin_vel_x, settings.lin_vel_y, settings.ang_vel_yaw)
+    evaluation = EvaluationRollout(env)
+    policy = load_policy(run, env)
+    evaluation.run(policy, config.seconds, commands, update, stop_early=not video)
+    return PlayResult(
+        evaluation=summarize(run, config, evaluation),
+        video=recorder.make_video(robots, size) if video else None,
     )
-    return np.array([[ahead, 0, 0], [ahead, 0, turn], [0, left, 0], [0, 0, -turn]], np.float32)
 
 
 @single_torch_thread()
-def view(run: "Run", asked: Asked | None = None) -> None:
-    """Show one robot in MuJoCo's viewer, in real time, until its window is closed.
+def view(run: Run, config: EvaluationConfig | None = None) -> None:
+    """Show one robot in MuJoCo's viewer in real time, until its window is closed.
 
     Raises:
         ConfigError: if there is no display, or the run has no policy, or one of another robot.
     """
-    _require_display()
+    has_display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if sys.platform == "linux" and not has_display:
+        raise ConfigError("viewer: got no DISPLAY or WAYLAND_DISPLAY; expected a display")
     import mujoco
     import mujoco.viewer
 
-    asked = replace(asked or Asked(), num_envs=1)
-    env, commands = _prepared(run, asked)
-    steps = max(1, round(asked.seconds / env.cfg.dt))
-    walking = walk(env, policy_of(run, env), cycle(timetable(commands, steps)))
-    data, lamp = mujoco.MjData(env.scene.model), env.scene.model.vis.headlight
-    lamp.ambient[:], lamp.diffuse[:], lamp.specular[:] = 0.35, 0.65, 0.1  # it is all the light
+    config = replace(config or EvaluationConfig(), num_envs=1)
+    env, commands = _make_play_env(run, config)
+    model, data = env.scene.model, mujoco.MjData(env.scene.model)
+    schedule = command_schedule(commands, max(1, round(config.seconds / env.cfg.dt)))
+    steps = rollout(env, load_policy(run, env), cycle(schedule))
+    light = model.vis.headlight  # the only light of the scene
+    light.ambient[:], light.diffuse[:], light.specular[:] = 0.35, 0.65, 0.1
     try:
-        window = mujoco.viewer.launch_passive(env.scene.model, data)
-    except RuntimeError as error:  # macOS wants mjpython
-        raise ConfigError(f"MuJoCo's viewer cannot be opened: {error}") from None
-    with window:
-        window.cam.type = mujoco.mjtCamera.mjCAMERA_TRACKING
-        window.cam.trackbodyid = env.scene.base
-        while window.is_running():
-            begun = time.monotonic()
-            next(walking)
-            with window.lock():
+        viewer = mujoco.viewer.launch_passive(model, data)
+    except RuntimeError as error:  # macOS needs mjpython
+        raise ConfigError(f"cannot open MuJoCo's viewer: {error}") from None
+    with viewer:
+        viewer.cam.type = mujoco.mjtCamera.mjCAMERA_TRACKING
+        viewer.cam.trackbodyid = env.scene.base
+        while viewer.is_running():
+            start = time.monotonic()
+            next(steps)
+            with viewer.lock():
                 data.qpos[:], data.qvel[:] = env.sim.qpos[0], env.sim.qvel[0]
-                mujoco.mj_forward(env.scene.model, data)
-            window.sync()
-            time.sleep(max(0.0, env.cfg.dt - (time.monotonic() - begun)))
+                mujoco.mj_forward(model, data)
+            viewer.sync()
+            time.sleep(max(0.0, env.cfg.dt - (time.monotonic() - start)))
 
 
-def _require_display() -> None:
-    if sys.platform == "linux" and not (
-        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    ):
-        raise ConfigError(
-            "--viewer needs a display, and neither DISPLAY nor WAYLAND_DISPLAY is set; "
-            "without it, a video is written"
-        )
+def _make_play_env(run: Run, config: EvaluationConfig) -> tuple[LeggedEnv, FloatArray | None]:
+    """Return the environment, and the commands of its robots for :func:`command_schedule`."""
+    if not is_flat(run, config.terrain):
+        return make_evaluation_env(run, config, max_patch_envs=1)
+    start = replace(run.task.init_state, position=0.0, yaw=0.0)  # the formation sets them
+    run = replace(run, task=replace(run.task, init_state=start))
+    config = replace(config, num_envs=config.num_envs or _FORMATION_ENVS)
+    if config.command is not None or config.random_commands:
+        return make_evaluation_env(run, config)
+    env, _ = make_evaluation_env(run, replace(config, command=(0.0, 0.0, 0.0)))
+    return env, np.repeat(demo_commands(run.task.commands)[:, None], env.num_envs, axis=1)
+
+
+def demo_commands(commands: Commands) -> FloatArray:
+    """Return commands at three quarters of the task's limits, shape (4, 3).
+
+    They are forward, forward in a curve, sideways, and turning in place.
+    """
+    limits = (commands.lin_vel_x, commands.lin_vel_y, commands.ang_vel_yaw)
+    x, y, yaw = (0.75 * high for _, high in limits)
+    return np.array([[x, 0, 0], [x, 0, yaw], [0, y, 0], [0, 0, -yaw]], np.float32)
+
+
+class PoseRecorder:
+    """Records the poses and commands of all robots for a video."""
+
+    def __init__(self, env: LeggedEnv) -> None:
+        self.env = env
+        self.stride = max(1, round(1 / (env.cfg.dt * _MAX_FPS)))
+        self.num_steps = 0
+        self.poses: list[FloatArray] = []
+        self.commands: list[FloatArray] = []
+        self.first_fall = np.full(env.num_envs, np.inf)  # [frames]
+
+    def record(self) -> None:
+        """Record the state after a step, at the frame rate of the video."""
+        fallen = self.env.steps_since_reset == 0
+        frame = -(-self.num_steps // self.stride)
+        self.first_fall[fallen] = np.minimum(self.first_fall[fallen], frame)
+        if self.num_steps % self.stride == 0:
+            self.poses.append(self.env.sim.qpos.astype(np.float32))
+            self.commands.append(self.env.commands.copy())
+        self.num_steps += 1
+
+    def make_video(self, robots: int, size: tuple[int, int]) -> VideoSpec:
+        """Return a video of the formation on a plane, or of some robots in turn on a map."""
+        env, poses = self.env, np.stack(self.poses)
+        frames, n = poses.shape[:2]
+        if env.terrain.is_flat:
+            side = int(np.ceil(np.sqrt(n)))
+            row, col = np.divmod(np.arange(n), side)
+            spacing = 2.4 * max(0.5, float(env.robot.spec.base_height_target or 0.5))
+            poses[:, :, :2] += spacing * np.stack([-row, col - (side - 1) / 2], axis=1)
+            captions = tuple(_caption(commands[n // 2]) for commands in self.commands)
+            shots = [Shot(robot=n // 2, start=0, stop=frames, captions=captions)]
+        else:
+            tracked = select_tracked_robots(env, robots)
+            shots = [self._make_shot(robot, max(1, frames // len(tracked))) for robot in tracked]
+        fps = 1 / (env.cfg.dt * self.stride)
+        return VideoSpec(model=env.scene.model, poses=poses, shots=tuple(shots), fps=fps, size=size)
+
+    def _make_shot(self, robot: int, length: int) -> Shot:
+        """Return the first frames of a robot, up to its first fall."""
+        env = self.env
+        level, column = env.curriculum.levels[robot], env.curriculum.columns[robot]
+        caption, rows = str(env.terrain.terrain_names[level, column]), len(env.terrain.env_origins)
+        if rows > 1:
+            caption += f", level {level} of {rows - 1}"
+        stop = int(np.clip(self.first_fall[robot], 1, length))
+        return Shot(robot=robot, start=0, stop=stop, captions=(caption,) * stop)
+
+
+def select_tracked_robots(env: LeggedEnv, count: int) -> list[int]:
+    """Return robots for a video: on different terrains first, near the middle level."""
+    levels, names = env.curriculum.levels, env.terrain.terrain_names
+    by_terrain: dict[str, list[int]] = {name: [] for name in names.ravel().tolist()}
+    for robot in np.argsort(np.abs(levels - (len(names) - 1) / 2), kind="stable"):
+        by_terrain[names[levels[robot], env.curriculum.columns[robot]]].append(int(robot))
+    queues = [queue for queue in by_terrain.values() if queue]
+    if count < len(queues):
+        queues = [queues[round(k)] for k in np.linspace(0, len(queues) - 1, count)]
+    turns = zip_longest(*queues)
+    return [robot for turn in turns for robot in turn if robot is not None][:count]
+
+
+def _caption(command: FloatArray) -> str:
+    axes = (
+        ("forward", "backward", "m/s"),
+        ("left", "right", "m/s"),
+        ("turning left", "turning right", "rad/s"),
+    )
+    parts = [
+        f"{negative if value < 0 else positive} {abs(value):g} {unit}"
+        for value, (positive, negative, unit) in zip(np.round(command, 2), axes, strict=True)
+        if value
+    ]
+    return ", ".join(parts) or "standing"

@@ -47,24 +47,14 @@ class VelocityCommand:
     """The current commands of n robots."""
 
     def __init__(self, cfg: Commands, num_envs: int, dt: float, *, heading_command: bool) -> None:
+        # Forward and left velocity [m/s] and yaw rate [rad/s], and the heading to turn to [rad],
+        # NaN for none. With a heading command, the yaw rate is computed from the heading.
         self.commands = np.zeros((num_envs, 3), np.float32)
-        """Forward and left velocity [m/s], yaw rate [rad/s], shape (n, 3)."""
-
         self.heading = np.zeros(num_envs, np.float32)
-        """Heading to turn to [rad], NaN for none, shape (n,)."""
-
         self.heading_command = heading_command
-        """Whether the yaw rate is computed from the heading."""
-
-        self.fixed: FloatArray | None = None
-        """Commands that override the random ones, shape (n, 3)."""
-
-        self.lin_vel_x = cfg.lin_vel_x
-        """Current range of the forward speed [m/s]."""
-
-        self.tracking = np.zeros(2)
-        """Sum of the `tracking_lin_vel` reward since the last check, and its duration [s]."""
-
+        self.fixed: FloatArray | None = None  # overrides the sampled commands, shape (n, 3)
+        self.lin_vel_x = cfg.lin_vel_x  # current range of the forward speed [m/s]
+        self.tracking = np.zeros(2)  # sum of `tracking_lin_vel` since the last check; seconds
         self._cfg = cfg
         self._interval = max(1, round(cfg.resampling_time / dt))
 

@@ -10,9 +10,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from terrainkit.errors import ConfigError
-from terrainkit.schema import (
-    Config,
+from terrainkit.annotations import (
     Fraction,
     Interval,
     NonNegativeFloat,
@@ -20,6 +18,8 @@ from terrainkit.schema import (
     PositiveFloat,
     PositiveInt,
 )
+from terrainkit.errors import ConfigError
+from terrainkit.schema import Config
 
 MAX_SCAN_POINTS = 10_000
 """Largest number of points of the height scan."""
@@ -37,10 +37,8 @@ class Env(Config):
 
     num_envs: PositiveInt = 512
     """Number of parallel environments; 512 to 1024 train fastest on a CPU."""
-
     episode_length_s: Annotated[float, Meta(gt=0, le=1e6)] = 20.0
     """Length after which an episode is truncated [s]."""
-
     num_threads: Annotated[int, Meta(ge=0, le=4096)] = 0
     """Threads of the physics simulation; 0 for one per processor."""
 
@@ -52,19 +50,14 @@ class Terrain(Config):
     collision: Literal["auto", "hfield", "boxes", "plane"] = "auto"
     """Collision geometry of the terrain: the map's heightfield, its boxes, the better of the two
     for the map, or a flat plane in place of the map."""
-
     curriculum: bool = True
     """Whether robots that walk far enough move to more difficult rows of the map."""
-
     max_init_level: Annotated[int, Meta(ge=0)] = 5
     """Highest row to start on; the last row of the map if it has fewer."""
-
     measure_heights: bool | None = None
     """Whether the policy observes the height scan; none: on any terrain but a plane."""
-
     measured_points_x: ScanPoints = tuple(round(-0.8 + 0.1 * k, 1) for k in range(17))
     """Points of the height scan along the heading of the robot [m]."""
-
     measured_points_y: ScanPoints = tuple(round(-0.5 + 0.1 * k, 1) for k in range(11))
     """Points of the height scan to the left of the robot [m]."""
 
@@ -85,16 +78,12 @@ class InitState(Config):
 
     reset_range: NonNegativeInterval | None = None
     """Factors on the default joint positions; none: those of the robot's spec."""
-
     position: NonNegativeFloat = 0.5
     """Largest offset from the spawn origin along x and along y, where the terrain allows it [m]."""
-
     yaw: NonNegativeFloat = 3.14159
     """Largest heading to either side [rad]."""
-
     lin_vel: NonNegativeFloat = 0.5
     """Largest base linear velocity along each axis [m/s]."""
-
     ang_vel: NonNegativeFloat = 0.5
     """Largest base angular velocity about each axis [rad/s]."""
 
@@ -105,17 +94,13 @@ class Control(Config):
 
     control_type: Literal["P", "V", "T"] = "P"
     """Quantity that an action controls: position, velocity or torque of each joint."""
-
     stiffness: NonNegativeFloat | None = None
     """P gain of every joint that has one [N m/rad]."""
-
     damping: NonNegativeFloat | None = None
     """D gain of every joint [N m s/rad]."""
-
     action_scale: PositiveFloat | None = None
     """Factor from action to position [rad], velocity [rad/s] or torque [N m]; none: the spec's for
     P, the largest velocity for V, the largest torque for T."""
-
     decimation: Annotated[int, Meta(ge=1, le=1000)] = 4
     """Number of simulation steps per policy step."""
 
@@ -128,10 +113,8 @@ class Asset(Config):
     """Bodies that collide with the terrain: all with collision geometry, or only the feet and the
     bodies that end an episode. The latter is 1.5 times as fast, but the legs pass through the
     edges of stairs, and `rewards.collision` counts nothing."""
-
     self_collisions: bool = False
     """Whether the bodies of a robot collide with each other."""
-
     joint_friction: bool = False
     """Whether to simulate dry joint friction; this takes a quarter of the speed."""
 
@@ -142,35 +125,25 @@ class Commands(Config):
 
     lin_vel_x: Interval = (-1.0, 1.0)
     """Forward velocity [m/s]."""
-
     lin_vel_y: Interval = (-0.5, 0.5)
     """Velocity to the left [m/s]."""
-
     ang_vel_yaw: Interval = (-1.0, 1.0)
     """Yaw velocity to the left [rad/s]; with a heading command, its limits."""
-
     heading: Interval = (-3.14159, 3.14159)
     """Heading in the world frame [rad]."""
-
     heading_command: bool | None = None
     """Whether to command a heading in place of a yaw velocity; none: on any terrain but a plane,
     because a robot that keeps turning does not cross the terrain."""
-
     heading_stiffness: NonNegativeFloat = 0.5
     """Yaw velocity per heading error [1/s]."""
-
     resampling_time: PositiveFloat = 10.0
     """Time after which a new command is sampled [s]."""
-
     min_norm: NonNegativeFloat = 0.2
     """Norm below which linear and yaw velocity commands are set to zero [m/s, rad/s]."""
-
     standing: Fraction = 0.1
     """Fraction of the commands that are zero."""
-
     curriculum: bool = False
     """Whether the range of `lin_vel_x` grows once the robots track it well."""
-
     max_curriculum: NonNegativeFloat = 1.0
     """Largest range of `lin_vel_x` to either side [m/s]."""
 
@@ -191,25 +164,18 @@ class DomainRand(Config):
 
     friction: NonNegativeInterval | None = (0.5, 1.25)
     """Friction coefficient of the robot's contacts; none: that of the robot."""
-
     added_mass: Interval | None = (-1.0, 1.0)
     """Mass added to the base [kg]."""
-
     com_shift: NonNegativeFloat = 0.03
     """Largest offset of the base's center of mass along each axis [m]."""
-
     gains: NonNegativeInterval | None = (0.9, 1.1)
     """Factors on stiffness and damping of each joint."""
-
     motor_strength: NonNegativeInterval | None = (0.9, 1.1)
     """Factor on all torques of a robot."""
-
     joint_offset: NonNegativeFloat = 0.02
     """Largest zero offset of each joint, sampled at each reset [rad]."""
-
     push_interval_s: NonNegativeFloat = 15.0
     """Time between pushes [s]; 0 for no pushes."""
-
     max_push_vel_xy: NonNegativeFloat = 1.0
     """Largest velocity that a push adds along x and along y [m/s]."""
 
@@ -223,91 +189,62 @@ class Rewards(Config):
 
     tracking_lin_vel: float = 1.5
     """Tracking of the linear velocity command."""
-
     tracking_ang_vel: float = 0.75
     """Tracking of the yaw velocity command."""
-
     lin_vel_z: float = -2.0
     """Vertical base velocity, squared."""
-
     ang_vel_xy: float = -0.05
     """Roll and pitch velocity of the base, squared."""
-
     orientation: float = -1.0
     """Tilt of the base."""
-
     base_height: float = 0.0
     """Deviation of the base height from its target."""
-
     torques: float = -0.0002
     """Joint torques, squared."""
-
     dof_power: float = 0.0
     """Mechanical power of the joints."""
-
     dof_vel: float = 0.0
     """Joint velocities, squared."""
-
     dof_acc: float = -2.5e-7
     """Joint accelerations, squared."""
-
     action_rate: float = -0.01
     """Change of the action, squared."""
-
     action_smoothness: float = 0.0
     """Second difference of the action, squared."""
-
     collision: float = -1.0
     """Contacts of penalized bodies."""
-
     termination: float = 0.0
     """Falls."""
-
     dof_pos_limits: float = -10.0
     """Joint positions beyond their soft limits."""
-
     dof_vel_limits: float = 0.0
     """Joint velocities beyond their soft limits."""
-
     torque_limits: float = 0.0
     """Torques beyond their soft limits."""
-
     feet_air_time: float = 1.0
     """Time that the feet spend in the air."""
-
     foot_clearance: float = 0.0
     """Deviation of the swing height of the feet from its target."""
-
     stumble: float = 0.0
     """Feet that hit vertical surfaces."""
-
     stand_still: float = -0.2
     """Deviation from the default pose at zero command."""
-
     feet_contact_forces: float = 0.0
     """Large contact forces on the feet."""
-
     tracking_sigma: PositiveFloat = 0.25
     """Tracking rewards are exp(-error^2 / sigma) [m2/s2]."""
-
     only_positive_rewards: bool = False
     """Whether the total reward of a step, without `termination`, is clipped at 0."""
-
     soft_dof_vel_limit: NonNegativeFloat = 0.9
     """Soft velocity limit of a joint, as a fraction of its velocity limit."""
-
     soft_torque_limit: NonNegativeFloat = 0.9
     """Soft torque limit of a joint, as a fraction of its torque limit."""
-
     base_height_target: float | None = None
     """Base height above the ground [m]; none: that of the robot's spec."""
-
     air_time_target: NonNegativeFloat = 0.15
     """Air time above which `feet_air_time` is positive [s]."""
-
     foot_clearance_target: NonNegativeFloat = 0.08
     """Height of a swinging foot above the ground [m]."""
-
     max_contact_force: NonNegativeFloat = 100.0
     """Contact force above which `feet_contact_forces` counts [N]."""
 
@@ -318,7 +255,6 @@ class Termination(Config):
 
     contact_force: NonNegativeFloat = 1.0
     """Largest contact force on a termination body [N]."""
-
     tilt: Annotated[float, Meta(gt=0, le=math.pi)] = 1.3
     """Largest angle between the z axes of base and world [rad]."""
 
@@ -329,16 +265,12 @@ class ObsScales(Config):
 
     lin_vel: NonNegativeFloat = 2.0
     """Scale of linear velocities and their commands."""
-
     ang_vel: NonNegativeFloat = 0.25
     """Scale of angular velocities and their command."""
-
     dof_pos: NonNegativeFloat = 1.0
     """Scale of joint positions."""
-
     dof_vel: NonNegativeFloat = 0.05
     """Scale of joint velocities."""
-
     height_measurements: NonNegativeFloat = 5.0
     """Scale of the height scan."""
 
@@ -349,10 +281,8 @@ class Normalization(Config):
 
     obs_scales: ObsScales = field(default_factory=ObsScales)
     """Scales of the observations."""
-
     clip_observations: PositiveFloat = 100.0
     """Largest observation."""
-
     clip_actions: PositiveFloat = 100.0
     """Largest action."""
 
@@ -363,19 +293,14 @@ class Noise(Config):
 
     noise_level: NonNegativeFloat = 1.0
     """Factor on all noise; 0 for none."""
-
     dof_pos: NonNegativeFloat = 0.01
     """Noise of joint positions [rad]."""
-
     dof_vel: NonNegativeFloat = 1.5
     """Noise of joint velocities [rad/s]."""
-
     ang_vel: NonNegativeFloat = 0.2
     """Noise of the base angular velocity [rad/s]."""
-
     gravity: NonNegativeFloat = 0.05
     """Noise of the gravity direction."""
-
     height_measurements: NonNegativeFloat = 0.1
     """Noise of the height scan [m]."""
 
@@ -386,10 +311,8 @@ class Sim(Config):
 
     dt: Annotated[float, Meta(gt=0, le=0.1)] = 0.005
     """Time step [s]."""
-
     iterations: PositiveInt = 10
     """Largest number of solver iterations."""
-
     ls_iterations: PositiveInt = 10
     """Largest number of line search iterations."""
 
@@ -400,16 +323,12 @@ class Policy(Config):
 
     init_noise_std: PositiveFloat = 1.0
     """Initial standard deviation of the actions."""
-
     actor_hidden_dims: HiddenDims = (128, 128, 128)
     """Widths of the hidden layers of the actor."""
-
     critic_hidden_dims: HiddenDims = (128, 128, 128)
     """Widths of the hidden layers of the critic."""
-
     activation: Activation = "elu"
     """Activation of the hidden layers, as rsl-rl names it."""
-
     obs_normalization: bool = True
     """Whether observations are normalized by their running mean and standard deviation."""
 
@@ -420,40 +339,28 @@ class Algorithm(Config):
 
     value_loss_coef: NonNegativeFloat = 1.0
     """Weight of the value loss."""
-
     clip_param: PositiveFloat = 0.2
     """Clipping of the policy ratio."""
-
     entropy_coef: NonNegativeFloat = 0.005
     """Weight of the entropy bonus."""
-
     num_learning_epochs: PositiveInt = 5
     """Learning epochs per update."""
-
     num_mini_batches: PositiveInt = 4
     """Mini-batches per epoch."""
-
     learning_rate: PositiveFloat = 1e-3
     """Initial learning rate."""
-
     schedule: Literal["adaptive", "fixed"] = "adaptive"
     """Whether the learning rate follows the KL divergence of the updates."""
-
     gamma: Fraction = 0.99
     """Discount factor."""
-
     lam: Fraction = 0.95
     """Lambda of generalized advantage estimation."""
-
     desired_kl: PositiveFloat = 0.02
     """KL divergence that the adaptive schedule aims at."""
-
     max_grad_norm: PositiveFloat = 1.0
     """Largest gradient norm."""
-
     symmetry: Literal["none", "augmentation", "loss"] = "none"
     """Symmetry: add mirrored samples to each batch, or add a mirror loss."""
-
     mirror_loss_coeff: NonNegativeFloat = 0.5
     """Weight of the mirror loss."""
 
@@ -464,16 +371,12 @@ class Runner(Config):
 
     num_steps_per_env: PositiveInt = 24
     """Steps of each environment per iteration."""
-
     max_iterations: PositiveInt = 1500
     """Number of learning iterations."""
-
     save_interval: PositiveInt = 100
     """Iterations between checkpoints."""
-
     seed: Annotated[int, Meta(ge=0, le=2**32 - 1)] = 1
     """Seed of all random numbers."""
-
     logger: Literal["tensorboard", "wandb"] = "tensorboard"
     """Where metrics are logged."""
 
@@ -484,46 +387,32 @@ class Task(Config):
 
     env: Env = field(default_factory=Env)
     """Environments and episodes."""
-
     terrain: Terrain = field(default_factory=Terrain)
     """Terrain, terrain curriculum and height scan."""
-
     init_state: InitState = field(default_factory=InitState)
     """Random initial state of an episode."""
-
     control: Control = field(default_factory=Control)
     """Actions and PD control."""
-
     asset: Asset = field(default_factory=Asset)
     """Parts of the robot that are simulated."""
-
     commands: Commands = field(default_factory=Commands)
     """Ranges from which velocity commands are sampled."""
-
     domain_rand: DomainRand = field(default_factory=DomainRand)
     """Domain randomization."""
-
     rewards: Rewards = field(default_factory=Rewards)
     """Scales and parameters of the rewards."""
-
     termination: Termination = field(default_factory=Termination)
     """Conditions that end an episode as a fall."""
-
     normalization: Normalization = field(default_factory=Normalization)
     """Scales and limits of observations and actions."""
-
     noise: Noise = field(default_factory=Noise)
     """Noise on observations."""
-
     sim: Sim = field(default_factory=Sim)
     """Physics simulation."""
-
     policy: Policy = field(default_factory=Policy)
     """Actor and critic networks."""
-
     algorithm: Algorithm = field(default_factory=Algorithm)
     """PPO."""
-
     runner: Runner = field(default_factory=Runner)
     """Length of training, checkpoints and logging."""
 

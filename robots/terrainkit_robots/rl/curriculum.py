@@ -31,12 +31,10 @@ class TerrainCurriculum:
         self.levels, self.columns = assign_levels(
             num_envs, rows, cols, min(max_init_level, rows - 1), seed
         )
+        # Displacement that the commands of the episode integrate to [m].
         self.commanded = np.zeros((num_envs, 2))
-        """Displacement that the commands of the episode integrate to [m], shape (n, 2)."""
-
+        # Running success rate of each patch, NaN without episodes.
         self.success = np.full((rows, cols), np.nan)
-        """Running success rate of each patch, NaN without episodes, shape (rows, cols)."""
-
         self._terrain, self._seed, self._updates = terrain, seed, 0
 
     @property
@@ -47,13 +45,7 @@ class TerrainCurriculum:
     def accumulate_command(
         self, commands: NDArray[np.float32], yaw: NDArray[np.float32], dt: float
     ) -> None:
-        """Integrate the commanded displacement over a step.
-
-        Args:
-            commands: Velocity commands, shape (n, 3).
-            yaw: Heading of each robot [rad], shape (n,).
-            dt: Length of the step [s].
-        """
+        """Integrate commands (n, 3) and yaw (n,) [rad] over a step of `dt` [s]."""
         c, s = np.cos(yaw), np.sin(yaw)
         x, y = commands[:, 0], commands[:, 1]
         self.commanded[:, 0] += dt * (c * x - s * y)
@@ -70,7 +62,7 @@ class TerrainCurriculum:
         """Record the success of complete episodes, and update the terrain levels.
 
         Args:
-            env_ids: Environments whose episode ended by a fall or a time-out, shape (k,).
+            env_ids: Environments whose episode ended, shape (k,).
             distance: Distance from the start position [m], shape (k,).
             fallen: Whether the episode ended with a fall, shape (k,).
             update_levels: Whether robots change levels.

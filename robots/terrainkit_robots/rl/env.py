@@ -72,7 +72,7 @@ class LeggedEnv(VecEnv):
     def _init_buffers(self) -> None:
         n, joints, task, robot = self.num_envs, self.num_actions, self.cfg, self.robot
         self.episode_length = np.zeros(n, np.int64)  # rsl-rl may set it to random lengths
-        self.steps_since_reset = np.zeros(n, np.int64)
+        self.steps_since_reset = np.zeros_like(self.episode_length)
         self.start_pos = np.zeros((n, 2))  # base position at the last reset
         self.actions = np.zeros((3, n, joints), np.float32)  # of the last three steps
         self.joint_offset = np.zeros((n, joints), np.float32)
@@ -91,8 +91,9 @@ class LeggedEnv(VecEnv):
         default = {"P": spec_scale, "V": robot.velocity, "T": robot.effort}[kind]
         scales = default if scale is None else np.full(joints, scale)
         self.action_scale = scales.astype(np.float32)
-        self.action_offset = np.where(self.is_position_controlled, robot.default_pose, 0)
-        self.action_offset = self.action_offset.astype(np.float32)
+        self.action_offset = np.where(
+            self.is_position_controlled, robot.default_pose, np.float32(0)
+        )
 
     @property
     def episode_length_buf(self) -> torch.Tensor:
@@ -140,13 +141,8 @@ class LeggedEnv(VecEnv):
             state.update(env_ids, self._compute_state(env_ids, after_reset=True))
         np.copyto(state.commands, self.commands)
         self._compute_observations()
-        tensor = torch.from_numpy
-        return (
-            self._observations,
-            tensor(rewards).to(self.device),
-            tensor(done).to(self.device),
-            extras,
-        )
+        rewards_tensor = torch.from_numpy(rewards).to(self.device)
+        return self._observations, rewards_tensor, torch.from_numpy(done).to(self.device), extras
 
     def reset(self) -> None:
         """Reset every environment."""
@@ -227,12 +223,10 @@ class LeggedEnv(VecEnv):
         return total + termination
 
     def _compute_observations(self) -> None:
-        clip = self.cfg.normalization.clip_observations
-        rngs = {"policy": self.rng, "privileged": None}  # noise for the policy only
-        groups = {
-            name: torch.from_numpy(compute_observations(group, self.state, clip, rngs[name]))
-            for name, group in self.obs_groups.items()
-        }
+        clip, groups = self.cfg.normalization.clip_observations, {}
+        for name, terms in self.obs_groups.items():
+            rng = self.rng if name == "policy" else None  # noise for the policy only
+            groups[name] = torch.from_numpy(compute_observations(terms, self.state, clip, rng))
         self._observations = TensorDict(groups, batch_size=[self.num_envs]).to(self.device)
 
     def _yaw(self) -> FloatArray:
@@ -272,13 +266,9 @@ class LeggedEnv(VecEnv):
 
     def _reset_idx(self, env_ids: Ids) -> None:
         """Start new episodes."""
+        env_origins, cfg = self.curriculum.env_origins[env_ids], self.cfg.init_state
         qpos, qvel = sample_reset_state(
-            self.rng,
-            self.curriculum.env_origins[env_ids],
-            self.scene,
-            self.robot,
-            self.terrain,
-            self.cfg.init_state,
+            self.rng, env_origins, self.scene, self.robot, self.terrain, cfg
         )
         self.sim.reset(env_ids, qpos, qvel)
         # Random joint positions may put a foot below the ground: raise the base.
@@ -293,10 +283,8 @@ class LeggedEnv(VecEnv):
         self.actions[:, env_ids] = 0
         self.pushes.reset(self.rng, env_ids)
         self.sensors.reset(env_ids)
-        limit = self.cfg.domain_rand.joint_offset
-        self.joint_offset[env_ids] = self.rng.uniform(
-            -limit, limit, (len(env_ids), self.num_actions)
-        )
+        limit, shape = self.cfg.domain_rand.joint_offset, (len(env_ids), self.num_actions)
+        self.joint_offset[env_ids] = self.rng.uniform(-limit, limit, shape)
         for total in self.episode_sums.values():
             total[env_ids] = 0
         self.velocity_command.resample(self.rng, env_ids)
@@ -328,7 +316,7 @@ class LeggedEnv(VecEnv):
         if required - saved.keys() or vars(self.state).keys() != state["state"].keys():
             raise ConfigError(
                 "the checkpoint was written by another version of terrainkit; with another "
-                "env.num_envs, training continues with its networks and curricula"
+                "env.num_envs, its networks and curricula can be used"
             )
         for name, array in arrays.items():
             if name not in saved or tuple(saved[name].shape) != array.shape:

@@ -25,22 +25,16 @@ class RandomizedParams:
 
     friction: FloatArray
     """Mean contact friction, shape (n, 1)."""
-
     geom_friction: FloatArray
     """Friction of each colliding geom, shape (n, g)."""
-
     added_mass: FloatArray
     """Mass added to the base [kg], shape (n, 1)."""
-
     com_shift: FloatArray
     """Shift of the base's center of mass [m], shape (n, 3)."""
-
     stiffness: FloatArray
     """Factor on the stiffness of each joint, shape (n, j)."""
-
     damping: FloatArray
     """Factor on the damping of each joint, shape (n, j)."""
-
     strength: FloatArray
     """Factor on all torques, shape (n, 1)."""
 
@@ -108,12 +102,9 @@ class Pushes:
     """Velocity pushes at regular intervals; each robot has its own phase."""
 
     def __init__(self, cfg: DomainRand, num_envs: int, dt: float) -> None:
+        # Velocity added in this step, world frame [m/s].
         self.velocity = np.zeros((num_envs, 3), np.float32)
-        """Velocity added in this step, world frame [m/s], shape (n, 3)."""
-
         self.steps_until_push = np.zeros(num_envs, np.int64)
-        """Steps until the next push, shape (n,)."""
-
         self._interval = max(1, round(cfg.push_interval_s / dt))
         self._max_vel = cfg.max_push_vel_xy if cfg.push_interval_s else 0.0
 
@@ -164,9 +155,8 @@ def sample_reset_state(
     qpos[:, 2] = highest + float(robot.spec.spawn_height or 0.0)
     yaw = rng.uniform(-cfg.yaw, cfg.yaw, count)
     qpos[:, 3], qpos[:, 6] = np.cos(yaw / 2), np.sin(yaw / 2)
-    factors = rng.uniform(
-        *(cfg.reset_range or robot.spec.reset_range), (count, len(robot.default_pose))
-    )
+    low, high = cfg.reset_range or robot.spec.reset_range
+    factors = rng.uniform(low, high, (count, len(robot.default_pose)))
     qpos[:, scene.joint_qpos] = np.clip(robot.default_pose * factors, robot.lower, robot.upper)
     qvel = np.zeros((count, scene.model.nv))
     qvel[:, :3] = rng.uniform(-cfg.lin_vel, cfg.lin_vel, (count, 3))

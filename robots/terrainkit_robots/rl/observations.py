@@ -29,16 +29,12 @@ class ObservationTerm:
 
     name: str
     """Name in logs and exports."""
-
     function: Callable[[State], FloatArray]
     """Computes the term, shape (n, width)."""
-
     scale: tuple[float, ...] | float = 1.0
     """Scale factor, or one per number."""
-
     noise: float = 0.0
     """Half range of the uniform noise, added before scaling."""
-
     symmetry: Literal["scalar", "vector", "axial", "command", "joints", "feet", "scan"] = "scalar"
     """How the term transforms when left and right are swapped; see :mod:`.symmetry`."""
 
@@ -126,12 +122,7 @@ def privileged_group(
         ),
         term(name="friction", function=lambda state: state.friction),
         term(name="added_mass", function=lambda state: state.added_mass),
-        term(
-            name="com_shift",
-            function=lambda state: state.com_shift,
-            scale=10.0,
-            symmetry="vector",
-        ),
+        term(name="com_shift", function=lambda state: state.com_shift, scale=10, symmetry="vector"),
         term(name="joint_offset", function=lambda state: state.joint_offset, symmetry="joints"),
         term(name="push_vel", function=push_vel, symmetry="vector"),
         term(name="foot_force", function=foot_force, scale=1 / weight, symmetry="feet"),

@@ -1,7 +1,6 @@
-"""Reward terms: pure functions, each named like its scale in the task's `rewards`.
+"""Reward terms, mostly those of legged_gym (Rudin et al., Learning to Walk in Minutes, 2021).
 
-Each takes the state of n robots and returns n numbers, before the scale and the time step. Most
-terms are those of legged_gym (Rudin et al., Learning to Walk in Minutes, 2021).
+Each takes the state of n robots and returns n numbers, before the scale and the time step.
 """
 
 from collections.abc import Callable

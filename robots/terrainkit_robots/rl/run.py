@@ -20,7 +20,7 @@ import numpy as np
 
 from terrainkit.atomic import atomic_write
 from terrainkit.errors import ConfigError, ExportError, listing
-from terrainkit.toml_text import parse_toml
+from terrainkit.toml_text import parse_toml, read_text
 from terrainkit_robots.mesh.sniff import open_regular
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Task
@@ -46,8 +46,8 @@ CHECKPOINT_KEYS = {
 }
 """Keys of every checkpoint, and their types; a checkpoint of training has more."""
 
-MAX_TEXT_SIZE, MAX_CHECKPOINT_SIZE = 1 << 20, 1 << 32
-"""Limits on the size of files that are read [bytes]."""
+MAX_CHECKPOINT_SIZE = 1 << 32
+"""Largest checkpoint that is read [bytes]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -56,19 +56,14 @@ class Run:
 
     folder: Path
     """Folder of the run."""
-
     task: Task
     """Its task."""
-
     robot: Robot
     """The robot, with the spec it was trained with."""
-
     robot_name: str
     """Name of a registered robot, or the absolute path of its folder."""
-
     terrain: str
     """The terrain, as `load_terrain` takes it: `plane` or a path."""
-
     checkpoint: Path | None
     """The selected checkpoint, by default the last; None if there is none."""
 
@@ -134,12 +129,12 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
         },
         "robot_sha256": _robot_digests(robot_folder),
     }
-    import tomli_w
+    import tomlkit
 
     files = {
-        RUN_FILE: tomli_w.dumps(about),
+        RUN_FILE: tomlkit.dumps(about),
         TASK_FILE: task.to_toml(),
-        SPEC_FILE: _read_text(robot_folder / SPEC_FILE),
+        SPEC_FILE: read_text(robot_folder / SPEC_FILE),
     }
     if (config := _map_config(source)) is not None:
         files[MAP_FILE] = config.to_toml()
@@ -334,6 +329,24 @@ def last_checkpoint(run: Run) -> Path:
     return run.checkpoint
 
 
+def run_folder(
+    folder: Path | None,
+    robot: str | Path,
+    terrain: str | Path,
+    task: Task,
+    continued: Run | None,
+) -> Path:
+    """Return the folder to write: that of the continued run, unless it has later checkpoints."""
+    if folder is None and continued is not None:
+        saved = checkpoints(continued.folder)
+        if saved and saved[max(saved)] == continued.checkpoint:
+            if task != continued.task:
+                rewrite_task(continued, task)
+            return continued.folder
+    folder = folder or default_folder(tasks.get_task(robot).name)
+    return create_run(folder, task, robot, terrain).folder
+
+
 def save_checkpoint(path: Path, state: Mapping[str, Any]) -> None:
     """Write a checkpoint completely, or not at all; see `LeggedRunner.state_dict`.
 
@@ -423,7 +436,7 @@ def _robot_digests(folder: Path) -> dict[str, str]:
 def _sha256(path: Path) -> str:
     try:
         with open_regular(path) as file:
-            return hashlib.sha256(file.read()).hexdigest()
+            return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise ConfigError(f"cannot read {path}: {error.strerror or error}") from error
 
@@ -432,23 +445,11 @@ def _read_about(folder: Path) -> dict[str, Any]:
     path = folder / RUN_FILE
     if not path.is_file():
         raise ConfigError(f"{folder} has no {RUN_FILE}; terrainkit train writes such a folder")
-    about = parse_toml(_read_text(path))
+    about = parse_toml(read_text(path))
     if about.get("format_version") != FORMAT_VERSION:
         got = about.get("format_version", "nothing")
         raise ConfigError(f"{path}: format_version: got {got!r}; expected {FORMAT_VERSION}")
     return dict(about)
-
-
-def _read_text(path: Path) -> str:
-    try:
-        with open_regular(path) as file:
-            data = file.read(MAX_TEXT_SIZE + 1)
-        if len(data) > MAX_TEXT_SIZE:
-            raise ConfigError(f"{path}: over {MAX_TEXT_SIZE} bytes; expected a file of a run")
-        return data.decode()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else None
-        raise ConfigError(f"cannot read {path}: {reason or error}") from error
 
 
 def _map_config(terrain: str) -> "MapConfig | None":

@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -27,6 +27,12 @@ from terrainkit_robots.rl.run import checkpoint_name, read_checkpoint, save_chec
 OBS_GROUPS = {"actor": ["policy"], "critic": ["privileged"]}
 """Observation groups of each network."""
 
+LOGGER_VALUES, LOGGER_BUFFERS = (
+    ("tot_timesteps", "tot_time"),
+    ("cur_reward_sum", "cur_episode_length"),
+)
+"""Attributes of rsl-rl's logger that are part of a checkpoint."""
+
 SIGNAL_INTERVAL = 1.0
 """Signals within this time of the first count as one [s]: torchrun and schedulers repeat them."""
 
@@ -37,37 +43,26 @@ class TrainingProgress:
 
     folder: Path | None
     """Folder of the run."""
-
     iteration: int
     """Completed iterations."""
-
     max_iterations: int
     """Iterations after which training ends."""
-
     steps_per_second: float
     """Environment steps per second, learning included [1/s]."""
-
     learning_fraction: float
     """Fraction of the time spent on learning, 0 to 1."""
-
     eta: float
     """Estimated time until training ends [s]."""
-
     reward: float | None
     """Mean sum of rewards of an episode; None before the first has ended."""
-
     episode_length: float | None
     """Mean episode length [s]; None before the first has ended."""
-
     noise_std: float
     """Mean standard deviation of the actions."""
-
     rewards: Mapping[str, float]
     """Mean reward per second of each term."""
-
     levels: Mapping[str, float]
     """Mean level on each terrain; empty on a plane."""
-
     success: Mapping[str, float]
     """Success rate on each terrain, 0 to 1."""
 
@@ -79,20 +74,18 @@ class MetricsLogger(Logger):
     """rsl-rl's logger without console output; its buffers are part of a checkpoint."""
 
     def __init__(self, runner: "LeggedRunner") -> None:
+        self._runner, env = runner, runner.env
+        self.means: dict[str, float] = {}  # latest mean of each value in the environments' log
         super().__init__(
-            log_dir=None,
-            cfg=runner.cfg,
-            env_cfg=runner.env.cfg,
-            num_envs=runner.env.num_envs,
-            is_distributed=runner.is_distributed,
-            gpu_world_size=runner.gpu_world_size,
-            gpu_global_rank=runner.gpu_global_rank,
-            device=runner.device,
+            None,
+            runner.cfg,
+            env.cfg,
+            env.num_envs,
+            runner.is_distributed,
+            runner.gpu_world_size,
+            runner.gpu_global_rank,
+            runner.device,
         )
-        self.means: dict[str, float] = {}
-        """Latest mean of each value in the environments' log."""
-
-        self._runner = runner
 
     def init_logging_writer(self) -> None:
         """Open the log files.
@@ -145,23 +138,20 @@ class MetricsLogger(Logger):
 
     def state_dict(self) -> dict[str, Any]:
         """Return the buffers, for a checkpoint."""
-        return {
-            "rewards": list(self.rewbuffer),
-            "lengths": list(self.lenbuffer),
-            "reward_sums": self.cur_reward_sum,
-            "episode_lengths": self.cur_episode_length,
-            "total_steps": self.tot_timesteps,
-            "total_time": self.tot_time,
+        return {name: getattr(self, name) for name in (*LOGGER_VALUES, *LOGGER_BUFFERS)} | {
+            "rewbuffer": list(self.rewbuffer),
+            "lenbuffer": list(self.lenbuffer),
         }
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore the buffers; those per environment only if their number is the same."""
-        self.rewbuffer.extend(state["rewards"])
-        self.lenbuffer.extend(state["lengths"])
-        self.tot_timesteps, self.tot_time = state["total_steps"], state["total_time"]
-        if len(state["reward_sums"]) == self.num_envs:
-            self.cur_reward_sum.copy_(state["reward_sums"])
-            self.cur_episode_length.copy_(state["episode_lengths"])
+        self.rewbuffer.extend(state["rewbuffer"])
+        self.lenbuffer.extend(state["lenbuffer"])
+        for name in LOGGER_VALUES:
+            setattr(self, name, state[name])
+        for name in LOGGER_BUFFERS:
+            if len(state[name]) == self.num_envs:
+                getattr(self, name).copy_(state[name])
 
     def _store_code_state(self) -> list[str]:
         return []  # a run.toml records the versions; the user's git repository is not touched
@@ -359,16 +349,16 @@ class LeggedRunner(OnPolicyRunner):
     def _progress(self, collect_time: float, learn_time: float) -> TrainingProgress:
         env, logger, seconds = self.env, self.logger, collect_time + learn_time
         steps = self.cfg["num_steps_per_env"] * env.num_envs * self.gpu_world_size
-        elapsed, done = time.perf_counter() - self._start_time, self._completed - self._first
-        lengths = [env.cfg.dt * length for length in logger.lenbuffer]
+        pace = (time.perf_counter() - self._start_time) / (self._completed - self._first)
+        lengths = [env.cfg.dt * steps for steps in logger.lenbuffer]
         return TrainingProgress(
             folder=self.folder,
             iteration=self._completed,
             max_iterations=self._last,
             steps_per_second=steps / seconds,
             learning_fraction=learn_time / seconds,
-            eta=(self._last - self._completed) * elapsed / done,
-            reward=statistics.mean(logger.rewbuffer) if logger.rewbuffer else None,
+            eta=(self._last - self._completed) * pace,
+            reward=statistics.mean(logger.rewbuffer) if lengths else None,
             episode_length=statistics.mean(lengths) if lengths else None,
             noise_std=self.alg.get_policy().output_std.detach().mean().item(),
             rewards=logger.latest("Episode/rew_"),
@@ -396,18 +386,19 @@ class LeggedRunner(OnPolicyRunner):
 def runner_config(task: Task) -> dict[str, Any]:
     """Return the configuration of rsl-rl's runner."""
     policy, runner, algorithm = task.policy, task.runner, dict(vars(task.algorithm))
-    symmetry, mirror_loss_coeff = algorithm.pop("symmetry"), algorithm.pop("mirror_loss_coeff")
-    symmetry_cfg = None
-    if symmetry != "none":
-        from terrainkit_robots.rl.symmetry import augment
-
-        symmetry_cfg = {
-            "data_augmentation_func": augment,
-            "use_data_augmentation": symmetry == "augmentation",
-            "use_mirror_loss": symmetry == "loss",
-            "mirror_loss_coeff": mirror_loss_coeff,
-        }
+    symmetry, coefficient = algorithm.pop("symmetry"), algorithm.pop("mirror_loss_coeff")
+    symmetry_cfg = {
+        "data_augmentation_func": "terrainkit_robots.rl.symmetry:augment",
+        "use_data_augmentation": symmetry == "augmentation",
+        "use_mirror_loss": symmetry == "loss",
+        "mirror_loss_coeff": coefficient,
+    }
     wandb = {"class_name": "WandbLogWriter", "project_name": "terrainkit"}
+    critic = {
+        "hidden_dims": list(policy.critic_hidden_dims),
+        "activation": policy.activation,
+        "obs_normalization": policy.obs_normalization,
+    }
     return {
         "num_steps_per_env": runner.num_steps_per_env,
         "save_interval": runner.save_interval,
@@ -416,17 +407,12 @@ def runner_config(task: Task) -> dict[str, Any]:
         "check_for_nan": False,  # `MetricsLogger` names the rewards that are not finite
         "obs_groups": {name: list(groups) for name, groups in OBS_GROUPS.items()},
         "actor": {"class_name": "MLPModel", **actor_config(task)},
-        "critic": {
-            "class_name": "MLPModel",
-            "hidden_dims": list(policy.critic_hidden_dims),
-            "activation": policy.activation,
-            "obs_normalization": policy.obs_normalization,
-        },
+        "critic": {"class_name": "MLPModel", **critic},
         "algorithm": {
             "class_name": "PPO",
             **algorithm,
             "rnd_cfg": None,
-            "symmetry_cfg": symmetry_cfg,
+            "symmetry_cfg": None if symmetry == "none" else symmetry_cfg,
         },
     }
 
@@ -535,19 +521,32 @@ def single_torch_thread() -> Iterator[None]:
 
 
 def resolve_device(name: str) -> str:
-    """Return the device `name`: `cpu`, `cuda` or `cuda:1`.
+    """Return the device `name`: `cpu`, `cuda` or `cuda:1`; under torchrun, this process's GPU.
 
     Raises:
         ConfigError: If there is no such device.
     """
-    count = torch.cuda.device_count()
-    try:
-        device = torch.device(name)
-    except RuntimeError:
-        device = None
-    if device is not None and device.type == "cpu":
+    gpus = [f"cuda:{k}" for k in range(torch.cuda.device_count())]
+    if name in ("cpu", "cpu:0"):
         return "cpu"
-    if device is not None and device.type == "cuda" and (device.index or 0) < count:
-        return name
-    devices = ["cpu", *(f"cuda:{k}" for k in range(count))]
-    raise ConfigError(f"device: got {name!r}; expected one of: {listing(devices)}")
+    if name not in gpus and not (gpus and name == "cuda"):
+        raise ConfigError(f"device: got {name!r}; expected one of: {listing(['cpu', *gpus])}")
+    return f"cuda:{os.environ['LOCAL_RANK']}" if "LOCAL_RANK" in os.environ else name
+
+
+def process_share(task: Task) -> Task:
+    """Return the task of this process: under torchrun, its share of the environments."""
+    rank, count = int(os.environ.get("RANK", "0")), int(os.environ.get("WORLD_SIZE", "1"))
+    num_envs, local_count = task.env.num_envs, int(os.environ.get("LOCAL_WORLD_SIZE", "1"))
+    if num_envs < count:
+        raise ConfigError(
+            f"env.num_envs: got {num_envs}; expected one for each of {count} processes"
+        )
+    available = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0)
+    threads = task.env.num_threads or max(1, len(available) // local_count)
+    num_envs = num_envs // count + (rank < num_envs % count)
+    return replace(
+        task,
+        env=replace(task.env, num_envs=num_envs, num_threads=threads),
+        runner=replace(task.runner, seed=task.runner.seed + rank),
+    )

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.rl.terrain import Terrain, collides
+from terrainkit_robots.rl.terrain import Terrain
+from terrainkit_robots.simulation.geoms import collides, lowest_point
 from terrainkit_robots.spec.per_joint import match_joints
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
@@ -36,25 +37,18 @@ class Robot:
 
     spec: RobotSpec
     """Its spec."""
-
     mjcf: Path
     """Its MuJoCo model."""
-
     default_pose: FloatArray
     """Default joint positions [rad], shape (j,)."""
-
     wheels: NDArray[np.bool_]
     """Joints with damping but no stiffness, shape (j,)."""
-
     effort: FloatArray
     """Torque limits [N m], shape (j,)."""
-
     velocity: FloatArray
     """Velocity limits [rad/s], shape (j,)."""
-
     lower: FloatArray
     """Lower soft limits [rad], -inf without one, shape (j,)."""
-
     upper: FloatArray
     """Upper soft limits [rad], shape (j,)."""
 
@@ -110,25 +104,18 @@ class Scene:
 
     model: Any
     """The `mujoco.MjModel`."""
-
     joint_qpos: Any
     """qpos index of each joint, in the robot's order, shape (j,)."""
-
     joint_qvel: Any
     """qvel index of each joint, shape (j,)."""
-
     base: int
     """Body id of the base."""
-
     geoms: Any
     """Ids of the robot's colliding geoms, shape (g,)."""
-
     home: Any
     """qpos of the default pose with the base at height 0, shape (nq,)."""
-
     sole_depth: Any
     """Distance from each foot's site down to its lowest point in the default pose [m], (f,)."""
-
     sensors: dict[str, slice]
     """Range in sensordata of `foot_position`, `foot_velocity`, `foot_force`, `penalized_force` and
     `termination_force`, three numbers per body. Forces act on what the robot touches [N]."""
@@ -326,28 +313,3 @@ def _sole_depth(robot: Robot, model: Any, home: Any) -> FloatArray:
         height = data.site(_sole(foot)).xpos[2]
         depths.append(max((height - lowest_point(model, data, int(g)) for g in geoms), default=0.0))
     return np.array(depths, np.float32)
-
-
-def lowest_point(model: Any, data: Any, geom: int) -> float:
-    """Return the height of a geom's lowest point in the world [m]."""
-    import mujoco
-
-    types, size = mujoco.mjtGeom, model.geom_size[geom]
-    axes = data.geom_xmat[geom].reshape(3, 3)[2]  # vertical component of each axis
-    up = np.abs(axes)
-    match model.geom_type[geom]:
-        case types.mjGEOM_SPHERE:
-            extent = size[0]
-        case types.mjGEOM_CAPSULE:
-            extent = size[0] + size[1] * up[2]
-        case types.mjGEOM_CYLINDER:
-            extent = size[0] * np.hypot(up[0], up[1]) + size[1] * up[2]
-        case types.mjGEOM_ELLIPSOID:
-            extent = np.linalg.norm(size * up)
-        case types.mjGEOM_MESH:
-            mesh = model.mesh(int(model.geom_dataid[geom]))
-            start, count = int(mesh.vertadr[0]), int(mesh.vertnum[0])
-            extent = -(model.mesh_vert[start : start + count] @ axes).min()
-        case _:
-            extent = size @ up
-    return float(data.geom_xpos[geom][2] - extent)

@@ -94,25 +94,20 @@ def check_memory(task: Task, robot: Robot, *, scan: bool, ngeom: int) -> None:
         try:
             needed = num_envs * bytes_per_env(task, robot, scan=scan, ngeom=ngeom)
             require_memory(needed, f"training with {num_envs} environments")
+            break
         except CapacityError as error:
             message, num_envs = message or str(error), num_envs // 2
-        else:
-            break
     if message:
-        raise CapacityError(
-            f"{message}; env.num_envs {num_envs} would fit" if num_envs else message
-        )
+        raise CapacityError(f"{message}; env.num_envs {num_envs} would fit")
 
 
 def bytes_per_env(task: Task, robot: Robot, *, scan: bool, ngeom: int) -> int:
     """Estimate the memory that training takes for each environment, within a factor of two."""
-    joints, feet = len(robot.default_pose), len(robot.spec.feet)
+    joints, steps, policy = len(robot.default_pose), task.runner.num_steps_per_env, task.policy
     points = len(task.terrain.measured_points_x) * len(task.terrain.measured_points_y)
-    observations = 29 + 7 * joints + 3 * feet + 2 * scan * points
-    physics = 40 + 45 * joints + 37 * feet + 3 * ngeom
-    steps, algorithm, policy = task.runner.num_steps_per_env, task.algorithm, task.policy
-    samples = steps / algorithm.num_mini_batches * (1 if algorithm.symmetry == "none" else 2)
+    observations = 45 + 7 * joints + 2 * scan * points
     hidden = sum(policy.actor_hidden_dims) + sum(policy.critic_hidden_dims)
+    samples = steps / task.algorithm.num_mini_batches * (1 + (task.algorithm.symmetry != "none"))
     learning = max(3 * steps * observations, samples * (5 * hidden + 2 * observations))
-    storage = steps * (observations + 3 * joints + 7)
-    return round(8 * physics + 4 * (12 * observations + storage + learning))
+    floats = (12 + steps) * observations + 3 * steps * joints + learning
+    return round(4 * floats + 8 * (100 + 60 * joints + 3 * ngeom))

@@ -32,82 +32,56 @@ class State:
 
     base_pos: FloatArray
     """Position of the base, world frame [m], shape (n, 3)."""
-
     base_quat: FloatArray
     """Orientation of the base (w, x, y, z), shape (n, 4)."""
-
     base_lin_vel: FloatArray
     """Linear velocity of the base, base frame [m/s], shape (n, 3)."""
-
     base_ang_vel: FloatArray
     """Angular velocity of the base, base frame [rad/s], shape (n, 3)."""
-
     projected_gravity: FloatArray
     """Direction of gravity, base frame, shape (n, 3); (0, 0, -1) when upright."""
-
     base_height: FloatArray
     """Height of the base above the ground under it [m], shape (n,)."""
-
     dof_pos: FloatArray
     """Joint positions [rad], shape (n, j)."""
-
     dof_vel: FloatArray
     """Joint velocities [rad/s], shape (n, j)."""
-
     dof_acc: FloatArray
     """Joint accelerations, from the last two velocities [rad/s2], shape (n, j)."""
-
     torques: FloatArray
     """Motor torques [N m], shape (n, j)."""
-
     foot_height: FloatArray
     """Height of the feet above the ground under them [m], shape (n, f)."""
-
     foot_vel: FloatArray
     """Velocity of the feet, world frame [m/s], shape (n, f, 3)."""
-
     foot_force: FloatArray
     """Contact force on the feet, world frame [N], shape (n, f, 3)."""
-
     first_contact: BoolArray
     """Feet that touched down in this step, shape (n, f)."""
-
     air_time: FloatArray
     """Time since each foot left the ground, up to this step [s], shape (n, f)."""
-
     penalized_force: FloatArray
     """Magnitude of the force on each penalized body [N], shape (n, p)."""
-
     height_scan: FloatArray
     """Height of the base above each scan point [m], shape (n, k); k = 0 without a scan."""
-
     fallen: BoolArray
     """Robots whose episode ends with a fall, shape (n,)."""
-
     actions: FloatArray
     """Actions of this step, shape (n, j)."""
-
     last_actions: FloatArray
     """Actions of the previous step, shape (n, j)."""
-
     last_last_actions: FloatArray
     """Actions of the step before that, shape (n, j)."""
-
     commands: FloatArray
     """Forward and left velocity [m/s], yaw rate [rad/s], shape (n, 3)."""
-
     push_vel: FloatArray
     """Velocity that a push added in this step, world frame [m/s], shape (n, 3)."""
-
     friction: FloatArray
     """Contact friction, shape (n, 1)."""
-
     added_mass: FloatArray
     """Mass added to the base [kg], shape (n, 1)."""
-
     com_shift: FloatArray
     """Shift of the base's center of mass, base frame [m], shape (n, 3)."""
-
     joint_offset: FloatArray
     """Measured minus true joint position [rad], shape (n, j)."""
 
@@ -122,12 +96,8 @@ class Sensors:
 
     def __init__(self, sim: Simulation, terrain: Terrain, task: Task, *, scan: bool) -> None:
         n, feet, joints = len(sim.qpos), len(sim.scene.sole_depth), len(sim.scene.joint_qvel)
-        self.air_time = np.zeros((n, feet), np.float32)
-        """Time since each foot left the ground, 0 in contact [s], shape (n, f)."""
-
-        self.last_dof_vel = np.zeros((n, joints), np.float32)
-        """Joint velocities of the previous step [rad/s], shape (n, j)."""
-
+        self.air_time = np.zeros((n, feet), np.float32)  # [s], 0 in contact
+        self.last_dof_vel = np.zeros((n, joints), np.float32)  # of the previous step [rad/s]
         self._sim, self._terrain, self._cfg = sim, terrain, task.termination
         self._dt = np.float32(task.dt)
         x, y = task.terrain.measured_points_x, task.terrain.measured_points_y

@@ -35,7 +35,6 @@ class SignedPermutation:
 
     index: NDArray[np.int64]
     """Source of each number, shape (w,)."""
-
     sign: FloatArray
     """+1 or -1, shape (w,)."""
 
@@ -49,7 +48,6 @@ class MirrorMaps(NamedTuple):
 
     groups: dict[str, SignedPermutation]
     """Of each observation group."""
-
     actions: SignedPermutation
     """Of the actions."""
 

@@ -38,10 +38,8 @@ class TaskSpec:
     name: str
     """Name of the task. For a folder it is the name in its robot.toml, which a registered task may
     have too: store the folder to find it again."""
-
     folder: Path
     """Folder with robot.toml."""
-
     task: Task
     """Configuration of training."""
 
@@ -49,8 +47,6 @@ class TaskSpec:
     def trained_run(self) -> Path:
         """Folder of the run with the bundled trained policy; it may not exist."""
         return self.folder / TRAINED_FOLDER / self.name
-
-    shipped = trained_run
 
 
 def register_task(name: str, folder: str | Path, task: Task | None = None) -> TaskSpec:

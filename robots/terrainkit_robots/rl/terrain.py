@@ -2,7 +2,6 @@
 
 import tempfile
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -10,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
+from terrainkit.surface import HeightfieldSurface
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.simulation.geoms import measure_heights
 
 if TYPE_CHECKING:
     from terrainkit.terrain_map import TerrainMap
@@ -18,28 +19,20 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float32]
 Collision = Literal["auto", "hfield", "boxes", "plane"]
 
-MIN_NORMAL_Z = 0.1
-"""Smallest vertical component of a plane's normal that makes it ground, and not a wall."""
-
 
 class Terrain(ABC):
     """A terrain to train on."""
 
     env_origins: FloatArray
     """Spawn origins [m], shape (rows, cols, 3); rows are curriculum levels."""
-
     terrain_names: NDArray[np.str_]
     """Name of each patch's terrain, shape (rows, cols)."""
-
     patch_length: float = 8.0
     """Distance to walk to cross a patch [m]."""
-
     lower: tuple[float, float]
     """Lower corner, x and y [m]."""
-
     upper: tuple[float, float]
     """Upper corner, x and y [m]."""
-
     is_flat: bool = False
     """Whether the ground is level everywhere, so that a height scan carries no information."""
 
@@ -77,49 +70,6 @@ class Plane(Terrain):
         return np.zeros(np.broadcast_shapes(x.shape, y.shape), np.float32)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class HeightGrid:
-    """The surface of a MuJoCo heightfield and of boxes on its samples.
-
-    A look-up takes 3 microseconds for the 187 points of a height scan; ray casting takes 80 on a
-    heightfield and 4000 on boxes. :mod:`terrainkit.surface` has walls, which a heightfield lacks.
-    """
-
-    heights: FloatArray
-    """Heights of the samples [m], shape (nx, ny)."""
-
-    first_sample: tuple[float, float]
-    """Position of `heights[0, 0]` [m]."""
-
-    cell: float
-    """Distance between samples [m]."""
-
-    box_tops: FloatArray | None = None
-    """Top of the box around each sample, -inf without one [m], shape (nx, ny)."""
-
-    def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Return the height at points [m]; the outermost samples extend outwards.
-
-        A cell is two triangles with the diagonal of MuJoCo's heightfield, from (i, j) to
-        (i + 1, j + 1). Bilinear interpolation is off by up to 3.6 cm on stairs.
-        """
-        nx, ny = self.heights.shape
-        u = np.clip((x - np.float32(self.first_sample[0])) / np.float32(self.cell), 0, nx - 1)
-        v = np.clip((y - np.float32(self.first_sample[1])) / np.float32(self.cell), 0, ny - 1)
-        i = np.minimum(u.astype(np.int32), nx - 2)
-        j = np.minimum(v.astype(np.int32), ny - 2)
-        u, v = u - i.astype(np.float32), v - j.astype(np.float32)
-        flat, corner = self.heights.reshape(-1), i * ny + j
-        near, far = flat[corner], flat[corner + (ny + 1)]
-        side = flat[corner + np.where(u > v, ny, 1)]  # the triangle's corner off the diagonal
-        high, low = np.maximum(u, v), np.minimum(u, v)
-        height = near + high * (side - near) + low * (far - side)
-        if self.box_tops is None:
-            return height
-        nearest = (i + (u >= 0.5)) * ny + j + (v >= 0.5)
-        return np.maximum(self.box_tops.reshape(-1)[nearest], height)
-
-
 class MapTerrain(Terrain):
     """A terrainkit map."""
 
@@ -136,7 +86,7 @@ class MapTerrain(Terrain):
         if cover is not None:
             tops = np.where(cover.covered, heights, np.float32(-np.inf))
             heights = without_boxes(heights, cover)
-        self._grid = HeightGrid(
+        self._surface = HeightfieldSurface(
             heights=heights,
             first_sample=terrain_map.first_sample,
             cell=terrain_map.grid.cell,
@@ -157,7 +107,7 @@ class MapTerrain(Terrain):
 
     def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Return the height of the surface that MuJoCo collides with."""
-        return self._grid.height(x, y)
+        return self._surface.height(x, y)
 
 
 class ModelTerrain(Terrain):
@@ -184,13 +134,13 @@ class ModelTerrain(Terrain):
             raise ConfigError(f"{path}: got {model.nv} degrees of freedom; expected a static model")
         n = 2 * round(half_size / cell) + 1
         axis = ((np.arange(n) - n // 2) * cell).astype(np.float32)
-        heights = _cast_rays(model, axis)
+        heights = measure_heights(model, axis)
         center = heights[n // 2, n // 2]
         if np.isnan(center):
             raise ConfigError(f"{path}: no ground at the origin, where robots spawn")
         # Where there is no ground, robots fall: any height far below will do.
         heights = np.where(np.isnan(heights), np.nanmin(heights) - 10, heights)
-        self._grid = HeightGrid(
+        self._surface = HeightfieldSurface(
             heights=heights.astype(np.float32),
             first_sample=(float(axis[0]), float(axis[0])),
             cell=cell,
@@ -206,40 +156,7 @@ class ModelTerrain(Terrain):
 
     def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Return the height, accurate to the size of a cell at edges."""
-        return self._grid.height(x, y)
-
-
-def _cast_rays(model: Any, axis: FloatArray) -> NDArray[np.float64]:
-    """Return the height at each point of a square grid, NaN without ground, shape (n, n)."""
-    import mujoco
-
-    # Rays hit visible geoms; robots touch colliding ones.
-    model.geom_group[:] = np.where(collides(model), 0, 1)
-    model.geom_matid[:], model.geom_rgba[:, 3] = -1, 1
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    top = float((data.geom_xpos[:, 2] + model.geom_rbound).max(initial=0.0)) + 1
-    # A plane has no bounding radius: add its rise within the square.
-    normal = data.geom_xmat.reshape(-1, 3, 3)[:, :, 2]
-    planes = (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE) & (normal[:, 2] > MIN_NORMAL_Z)
-    slope = -normal[planes, :2] / normal[planes, 2:]
-    rise = np.abs(slope).sum(axis=1) * float(axis[-1])
-    top += float((rise - (slope * data.geom_xpos[planes, :2]).sum(axis=1)).max(initial=0.0))
-    down, geom = np.array([0.0, 0.0, -1.0]), np.zeros(1, np.int32)
-    groups = np.array([1, 0, 0, 0, 0, 0], np.uint8)
-    heights = np.full((len(axis), len(axis)), np.nan)
-    for i, x in enumerate(axis):
-        for j, y in enumerate(axis):
-            start = np.array([x, y, top], float)
-            distance = mujoco.mj_ray(model, data, start, down, groups, 1, -1, geom, None)
-            if distance >= 0:
-                heights[i, j] = top - distance
-    return heights
-
-
-def collides(model: Any) -> NDArray[np.bool_]:
-    """Return which geoms of a MuJoCo model collide, shape (ngeom,)."""
-    return np.asarray((model.geom_contype != 0) | (model.geom_conaffinity != 0))
+        return self._surface.height(x, y)
 
 
 def _add_material(spec: Any) -> None:

@@ -1,12 +1,7 @@
-"""Training: from a robot, a terrain and a task to a run with a policy.
-
-The command `terrainkit train` calls `train`, and so can your program::
-
-    result = train("quadruped", "map.npz")
-"""
+"""Training: from a robot, a terrain and a task to a run with a policy."""
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,11 +13,9 @@ from terrainkit_robots.rl.run import (
     Run,
     can_continue,
     checkpoints,
-    create_run,
-    default_folder,
     last_checkpoint,
     parts_to_load,
-    rewrite_task,
+    run_folder,
 )
 from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.terrain import load_terrain
@@ -37,10 +30,8 @@ class TrainResult:
 
     folder: Path | None
     """Folder of the run; None except in the main process."""
-
     iteration: int
     """Completed iterations."""
-
     signal: int
     """The signal that stopped training early, such as SIGINT; 0 for none."""
 
@@ -78,16 +69,19 @@ def train(
     import torch
 
     from terrainkit_robots.rl.env import LeggedEnv
-    from terrainkit_robots.rl.runner import LeggedRunner, resolve_device, stop_on_signal
+    from terrainkit_robots.rl.runner import (
+        LeggedRunner,
+        process_share,
+        resolve_device,
+        stop_on_signal,
+    )
 
     task = tasks.get_task(robot).task if task is None else task
     if task.runner.logger == "wandb" and find_spec("wandb") is None:
         raise ConfigError("runner.logger: wandb is not installed: pip install wandb")
     continued = resume if resume and can_continue(resume, robot, terrain, task) else None
-    share = _process_share(task)
+    share = process_share(task)
     device = resolve_device(device)
-    if device != "cpu" and int(os.environ.get("WORLD_SIZE", "1")) > 1:
-        device = resolve_device(f"cuda:{os.environ.get('LOCAL_RANK', '0')}")
     model = continued.robot if continued else Robot.load(tasks.get_task(robot).folder)
     torch.set_num_threads(share.env.num_threads)
     torch.manual_seed(share.runner.seed)
@@ -107,7 +101,7 @@ def train(
                     "iterations that are completed"
                 )
             if runner.is_main_process:
-                runner.folder = _run_folder(folder, robot, terrain, task, continued)
+                runner.folder = run_folder(folder, robot, terrain, task, continued)
             try:
                 # Resets of a new run would otherwise all time out in the same step.
                 is_new = not env.steps_since_reset.any()
@@ -118,47 +112,8 @@ def train(
             if torch.distributed.is_available() and torch.distributed.is_initialized():
                 torch.distributed.destroy_process_group()
     iteration = runner.current_learning_iteration
-    return TrainResult(
-        folder=runner.folder,
-        iteration=iteration,
-        signal=stop_signal() if iteration < total else 0,
-    )
-
-
-def _process_share(task: Task) -> Task:
-    """Return the task of this process: under torchrun, its share of the environments."""
-    rank, count = int(os.environ.get("RANK", "0")), int(os.environ.get("WORLD_SIZE", "1"))
-    num_envs, local_count = task.env.num_envs, int(os.environ.get("LOCAL_WORLD_SIZE", "1"))
-    if num_envs < count:
-        raise ConfigError(
-            f"env.num_envs: got {num_envs}; expected one for each of {count} processes"
-        )
-    available = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0)
-    threads = task.env.num_threads or max(1, len(available) // local_count)
-    num_envs = num_envs // count + (rank < num_envs % count)
-    return replace(
-        task,
-        env=replace(task.env, num_envs=num_envs, num_threads=threads),
-        runner=replace(task.runner, seed=task.runner.seed + rank),
-    )
-
-
-def _run_folder(
-    folder: Path | None,
-    robot: str | Path,
-    terrain: str | Path,
-    task: Task,
-    continued: Run | None,
-) -> Path:
-    """Return the folder to write: that of the continued run, unless it has later checkpoints."""
-    if folder is None and continued is not None:
-        saved = checkpoints(continued.folder)
-        if saved and saved[max(saved)] == continued.checkpoint:
-            if task != continued.task:
-                rewrite_task(continued, task)
-            return continued.folder
-    folder = folder or default_folder(tasks.get_task(robot).name)
-    return create_run(folder, task, robot, terrain).folder
+    number = stop_signal() if iteration < total else 0
+    return TrainResult(folder=runner.folder, iteration=iteration, signal=number)
 
 
 def _with_last_checkpoint(error: Exception, folder: Path | None) -> TerrainkitError:

@@ -13,16 +13,9 @@ from typing import Annotated, Any, Literal, Self, get_args, get_origin
 
 from msgspec import Meta
 
+from terrainkit.annotations import SORTED, UNIQUE, parse_annotation
 from terrainkit.errors import ConfigError, listing
-from terrainkit.schema import (
-    SORTED,
-    UNIQUE,
-    Config,
-    field_docs,
-    field_types,
-    without_meta,
-    without_none,
-)
+from terrainkit.schema import Config, field_docs, field_types
 from terrainkit.toml_text import LINE_LENGTH, comment_text, line_text
 from terrainkit_robots.spec.per_joint import by_joint
 
@@ -248,15 +241,16 @@ def unit_of(name: str) -> str:
 
 
 def _units(annotation: Any) -> Iterator[str]:
-    kind, metas = without_meta(without_none(annotation))
-    yield from (meta.extra["unit"] for meta in metas if meta.extra and "unit" in meta.extra)
-    for part in get_args(kind):
+    parsed = parse_annotation(annotation)
+    if "unit" in parsed.constraints:
+        yield parsed.constraints["unit"]
+    for part in parsed.args if parsed.origin is not Literal else ():
         yield from _units(part)
 
 
 JOINT_TABLES = tuple(
     name
     for name, annotation in field_types(RobotSpec).items()
-    if get_origin(annotation) is Mapping and without_meta(get_args(annotation)[1])[0] is float
+    if get_origin(annotation) is Mapping and parse_annotation(get_args(annotation)[1]).kind is float
 )
 """Tables that have a value for every joint."""

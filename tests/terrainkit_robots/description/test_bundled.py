@@ -11,7 +11,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.runner import lint
-from terrainkit_robots.onboarding.robot_files import onboard
+from terrainkit_robots.onboarding.robot_files import make_robot_files
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
 every_robot = pytest.mark.parametrize("name", bundled.names())
@@ -328,7 +328,7 @@ def test_check_robot_has_nothing_to_say(name, suffix):
 @every_robot
 def test_the_spec_is_what_onboarding_would_derive_but_for_what_was_edited(name):
     spec = RobotSpec.load(bundled.find(name).with_name("robot.toml"))
-    derived = onboard(facts(name, ".urdf")).spec
+    derived = make_robot_files(facts(name, ".urdf")).spec
     edited = {key for key, told in spec.provenance.items() if told.origin == "given"}
     for each in dataclasses.fields(RobotSpec):
         own, other = getattr(spec, each.name), getattr(derived, each.name)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from terrainkit_robots.description.package_resolver import (
-    Packages,
+    PackageResolver,
     filename_on_disk,
     is_absolute,
     is_package_uri,
@@ -15,11 +15,11 @@ from terrainkit_robots.description.package_resolver import (
 
 
 def resolve(name, file, packages):
-    return Packages(file, packages).resolve(name)
+    return PackageResolver(file, packages).resolve(name)
 
 
 def find_package(name, file, packages):
-    return Packages(file, packages).find(name)
+    return PackageResolver(file, packages).find_package(name)
 
 
 @pytest.fixture(autouse=True)
@@ -238,7 +238,7 @@ class TestMalice:
 class TestPackages:
     def test_a_package_is_searched_for_once(self, place, monkeypatch):
         robot, _ = place("dog/urdf/dog.urdf", "dog/m/foot.stl")
-        packages = Packages(robot, {})
+        packages = PackageResolver(robot, {})
         first = packages.resolve("package://dog/m/foot.stl")
         monkeypatch.setattr(os, "scandir", None)  # what is not asked cannot fail
         assert packages.resolve("package://dog/m/foot.stl") == first
@@ -282,7 +282,7 @@ def test_right_letters_where_case_does_not_count(place, monkeypatch):
     asked = mesh.parents[1] / "Meshes/FOOT.stl"
     listed = {str(mesh.parents[1]): ["meshes"], str(asked.parent): ["foot.stl"]}
     monkeypatch.setattr(
-        "terrainkit_robots.description.package_resolver._entries",
+        "terrainkit_robots.description.package_resolver._list_names",
         lambda folder: listed.get(str(folder), []),
     )
     assert filename_on_disk("Meshes/FOOT.stl", asked) == "meshes/foot.stl"

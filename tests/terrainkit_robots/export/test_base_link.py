@@ -3,7 +3,7 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.export.base_link import with_world_base
-from terrainkit_robots.onboarding.pipeline import Wishes, bring_in
+from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
 MASS = '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/><geom size="0.1" mass="0"/>'
@@ -31,18 +31,18 @@ def facts(tmp_path, text):
     return Facts(load_robot(path))
 
 
-def brought_in(tmp_path, text, **wishes):
+def brought_in(tmp_path, text, **options):
     robot = facts(tmp_path, text)
     folder = tmp_path / "robot"
-    done = bring_in(robot.model.file, Wishes(target=folder, pictures=False, **wishes))
+    done = onboard(robot.model.file, folder, OnboardOptions(render_pictures=False, **options))
     return done, RobotSpec.load(folder / "robot.toml")
 
 
 def test_a_cart_slides_on_the_world(tmp_path):
     done, spec = brought_in(tmp_path, CART)
-    assert [joint.name for joint in done.made.facts.joints] == ["slider", "hinge"]
+    assert [joint.name for joint in done.robot.facts.joints] == ["slider", "hinge"]
     assert (spec.joint_order, spec.floating, spec.base) == (("slider",), False, "cart")
-    assert done.made.notes == (
+    assert done.robot.notes == (
         "left out table, ball: not part of the robot's tree",
         "its base is world_link, which stands for the world; slider is on it",
     )
@@ -51,17 +51,17 @@ def test_a_cart_slides_on_the_world(tmp_path):
 def test_two_arms_are_one_robot(tmp_path):
     done, spec = brought_in(tmp_path, ARMS)
     assert spec.joint_order == ("left_joint", "right_joint")
-    assert len(done.made.facts.links) == 4
+    assert len(done.robot.facts.links) == 4
 
 
 @pytest.mark.parametrize("floating", [None, True])
 def test_a_walker_of_the_plane_keeps_its_joints_unless_it_is_set_free(tmp_path, floating):
     done, spec = brought_in(tmp_path, WALKER, floating=floating)
-    moving = [joint.name for joint in done.made.facts.joints]
+    moving = [joint.name for joint in done.robot.facts.joints]
     assert moving == (["elbow"] if floating else ["z", "x", "turn", "elbow"])
     assert (spec.floating, spec.base) == (bool(floating), "torso")
     told = "left out z, x, turn: " if floating else "its base is world_link, which stands "
-    assert any(note.startswith(told) for note in done.made.notes)
+    assert any(note.startswith(told) for note in done.robot.notes)
 
 
 @pytest.mark.parametrize("joint", ["<freejoint/>", ""])

@@ -10,16 +10,16 @@ from terrainkit_robots.description.fix import Fix
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.runner import Finding, Report, Skipped
 from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
-from terrainkit_robots.onboarding.equivalence import Agreement
-from terrainkit_robots.onboarding.pipeline import BroughtIn
-from terrainkit_robots.onboarding.report_md import report_page
-from terrainkit_robots.onboarding.robot_files import Onboarded
-from terrainkit_robots.onboarding.verify import Proof
+from terrainkit_robots.onboarding.equivalence import Equivalence
+from terrainkit_robots.onboarding.pipeline import OnboardResult
+from terrainkit_robots.onboarding.report_md import report_markdown
+from terrainkit_robots.onboarding.robot_files import RobotFiles
+from terrainkit_robots.onboarding.verify import Verification
 from terrainkit_robots.simulation.pd_gains import Gain
 from terrainkit_robots.simulation.standing import Standing
 
 NASTY = 'a|b`c*_<b>@me\x1b[31m\r\n# title\u202e\udc80"$'
-"""A name with something in it for a table to trip over."""
+"""A name with characters that could break a table or a terminal."""
 
 STOOD = Standing(
     tilt=0.01,
@@ -41,8 +41,8 @@ ARM = """<robot name="arm"><link name="base"/><link name="tip"/>
 <joint name="j" type="continuous"><parent link="base"/><child link="tip"/></joint></robot>"""
 
 
-def agreement(file, *, mass=0.0, distance=1e-6, link="FL_foot"):
-    return Agreement(
+def equivalence(file, *, mass=0.0, distance=1e-6, link="FL_foot"):
+    return Equivalence(
         file=file,
         mass=mass,
         inertia=2e-5,
@@ -50,7 +50,7 @@ def agreement(file, *, mass=0.0, distance=1e-6, link="FL_foot"):
         distance=distance,
         link=link,
         angle=1e-5,
-        turned="RR_foot",
+        rotated_link="RR_foot",
     )
 
 
@@ -59,15 +59,15 @@ def facts_of(text=None):
     return Facts(load_robot(path, contents={} if text is None else {path: text.encode()}))
 
 
-def brought(facts, **changes):
+def make_result(facts, **changes):
     gains = {
         joint.name: Gain(stiffness=20.0, damping=0.5, armature=0.01, reason="so")
         for joint in facts.actuated
     }
     spec = derive_spec(facts, gains=gains, floating=bool(facts.legs))
-    made = Onboarded(facts=facts, spec=spec, files={}, notes=())
-    fields = {"report": Report(facts=facts, findings=()), "folder": Path("out"), "made": made}
-    return BroughtIn(**fields | changes)
+    robot = RobotFiles(facts=facts, spec=spec, files={}, notes=())
+    fields = {"report": Report(facts=facts, findings=()), "folder": Path("out"), "robot": robot}
+    return OnboardResult(**fields | changes)
 
 
 def finding(**changes):
@@ -87,16 +87,16 @@ def finding(**changes):
 
 @pytest.fixture(scope="module")
 def quadruped():
-    return brought(facts_of())
+    return make_result(facts_of())
 
 
 @pytest.fixture(scope="module")
 def arm():
-    return brought(facts_of(ARM))
+    return make_result(facts_of(ARM))
 
 
-def noted(done, *notes):
-    return replace(done, made=replace(done.made, notes=notes))
+def with_notes(result, *notes):
+    return replace(result, robot=replace(result.robot, notes=notes))
 
 
 def headings(text):
@@ -111,16 +111,16 @@ def cells(row):
     return [cell.strip() for cell in re.split(r"(?<!\\)\|", row)[1:-1]]
 
 
-def test_each_section_is_there_once_in_order(quadruped):
-    proof = Proof(
-        agreements=(agreement("robot.urdf"),),
+def test_report_has_all_sections(quadruped):
+    verification = Verification(
+        equivalences=(equivalence("robot.urdf"),),
         standing=STOOD,
     )
-    assert headings(report_page(replace(quadruped, proof=proof))) == [
+    assert headings(report_markdown(replace(quadruped, verification=verification))) == [
         "quadruped",
-        "What was done",
-        "Standing",
-        "The files against their source",
+        "Changes",
+        "Standing test",
+        "Comparison with the source",
         "Joints",
         "Joint order by simulator",
         "Findings",
@@ -128,10 +128,12 @@ def test_each_section_is_there_once_in_order(quadruped):
     ]
 
 
-def test_every_table_has_rows_of_one_width(quadruped):
-    proof = Proof(agreements=(), standing=STOOD)
-    report = Report(facts=quadruped.made.facts, findings=(finding(),))
-    text = report_page(replace(quadruped, proof=proof, report=report, pictures=("report/a.png",)))
+def test_report_tables_have_rows_of_equal_length(quadruped):
+    verification = Verification(equivalences=(), standing=STOOD)
+    report = Report(facts=quadruped.robot.facts, findings=(finding(),))
+    text = report_markdown(
+        replace(quadruped, verification=verification, report=report, pictures=("report/a.png",))
+    )
     tables = re.findall(r"(?:^\|.*\|\n)+", text, re.MULTILINE)
     assert len(tables) == 5
     for table in tables:
@@ -140,165 +142,170 @@ def test_every_table_has_rows_of_one_width(quadruped):
         assert set(rows[1]) == {"---"}
 
 
-def test_the_summary_says_what_it_is_and_how_it_stands(quadruped):
-    text = report_page(quadruped)
+def test_report_overview(quadruped):
+    text = report_markdown(quadruped)
     assert "quadruped weighs 15.02 kg and has 13 rigid bodies and 12 actuated joints. " in text
     assert "It stands on 4 legs, 0.448 m long: FL\\_foot, FR\\_foot, RL\\_foot, RR\\_foot." in text
-    stance = quadruped.made.facts.stance
+    stance = quadruped.robot.facts.stance
     assert f"its base is {stance.height:.3f} m above the ground" in text
 
 
-def test_pictures_or_why_there_are_none(quadruped):
+def test_report_shows_pictures_or_reason(quadruped):
     shots = ("report/front.png", "report/side.png")
-    text = report_page(replace(quadruped, pictures=shots))
+    text = report_markdown(replace(quadruped, pictures=shots))
     assert (
         "| front | side |\n|---|---|\n| ![front](report/front.png) | ![side](report/side.png) |\n"
     ) in text
-    without = report_page(replace(quadruped, no_pictures="MuJoCo cannot draw here"))
-    assert "\nNo pictures: MuJoCo cannot draw here.\n" in without
+    without = report_markdown(replace(quadruped, pictures_error="MuJoCo cannot render here"))
+    assert "\nNo pictures: MuJoCo cannot render here.\n" in without
     assert "![" not in without
 
 
-def test_what_was_repaired_and_what_was_left_out(quadruped):
+def test_report_lists_changes(quadruped):
     fix = Fix(safety="safe", description="make it 1 kg", edits=())
-    done = noted(replace(quadruped, repaired=(finding(fix=fix),)), "the wheel | was left out")
-    text = section(report_page(done), "What was done")
+    result = with_notes(replace(quadruped, fixed=(finding(fix=fix),)), "the wheel | was left out")
+    text = section(report_markdown(result), "Changes")
     assert "- INR002: calf: make it 1 kg\n" in text
     assert "- the wheel \\| was left out\n" in text
-    assert "Nothing had to be" not in text
-    assert "Nothing had to be" in section(report_page(quadruped), "What was done")
+    assert "Nothing was fixed" not in text
+    assert "Nothing was fixed" in section(report_markdown(quadruped), "Changes")
 
 
-def test_how_it_stood(quadruped):
+def test_report_standing_test(quadruped):
     text = section(
-        report_page(replace(quadruped, proof=Proof(agreements=(), standing=STOOD))), "Standing"
+        report_markdown(
+            replace(quadruped, verification=Verification(equivalences=(), standing=STOOD))
+        ),
+        "Standing test",
     )
     assert "**It stands**, at its default pose" in text
     rows = dict(cells(row) for row in text.splitlines() if row.startswith("|"))
     assert rows["tilt"] == "0.57 deg at the end, 1.1 deg at most"
-    assert rows["height of the base"] == "0.312 m at the end, 4.0 mm below the start"
+    assert rows["base height"] == "0.312 m at the end, 4.0 mm below the start"
     assert rows["drift"] == "1.2 mm"
-    assert rows["touched the ground"] == "only the feet"
-    assert rows["largest torque"] == "41% of the effort of FL\\_calf\\_joint"
-    assert rows["farthest joint from its target"] == "0.02 rad"
-    assert rows["simulated"] == "5 s"
+    assert rows["ground contacts"] == "only the feet"
+    assert rows["largest torque"] == "41% of the effort limit of FL\\_calf\\_joint"
+    assert rows["largest joint position error"] == "0.02 rad"
+    assert rows["duration"] == "5 s"
 
 
-def test_that_it_fell(quadruped):
+def test_report_failed_standing_test(quadruped):
     fell = replace(STOOD, tilt=1.5, touching=("base", "FL_hip"), blew_up=True, seconds=0.3)
-    proof = Proof(agreements=(), standing=fell, locked=True)
-    text = section(report_page(replace(quadruped, proof=proof)), "Standing")
-    assert "**It does not stand**, with its joints locked" in text
-    assert "| touched the ground | base, FL\\_hip |" in text
-    assert "| simulated | 0.3 s; then its numbers blew up |" in text
+    verification = Verification(equivalences=(), standing=fell, joints_locked=True)
+    text = section(report_markdown(replace(quadruped, verification=verification)), "Standing test")
+    assert "**It does not stand**, with locked joints" in text
+    assert "| ground contacts | base, FL\\_hip |" in text
+    assert "| duration | 0.3 s; then the simulation became unstable |" in text
     assert "largest torque" not in text
 
 
-def test_that_it_was_not_simulated(quadruped):
-    assert "It was not simulated." in section(report_page(quadruped), "Standing")
+def test_report_without_standing_test(quadruped):
+    assert "It was not simulated." in section(report_markdown(quadruped), "Standing test")
 
 
-def test_how_far_the_files_are_from_their_source(quadruped):
-    off = agreement("robot.urdf", mass=-0.0004, distance=2.5e-5)
-    text = report_page(replace(quadruped, proof=Proof(agreements=(off,))))
+def test_report_comparison_with_source(quadruped):
+    off = equivalence("robot.urdf", mass=-0.0004, distance=2.5e-5)
+    text = report_markdown(replace(quadruped, verification=Verification(equivalences=(off,))))
     assert (
         "| robot.urdf | -0.040% | 0.002% at FL\\_calf\\_joint | 0.025 mm at FL\\_foot "
         "| 0.00057 deg at RR\\_foot |"
     ) in text
 
 
-def test_permutations_are_python_that_is_ready_to_be_pasted(quadruped):
-    text = section(report_page(quadruped), "Joint order by simulator")
+def test_report_permutations_are_valid_python(quadruped):
+    text = section(report_markdown(quadruped), "Joint order by simulator")
     code = re.search(r"```python\n(.*?)```", text, re.DOTALL)[1]
     names: dict[str, list[int]] = {}
     exec(code, names)
-    here = list(quadruped.made.spec.joint_order)
+    here = list(quadruped.robot.spec.joint_order)
     there = [here[i] for i in names["to_isaac_lab"]]
     assert there[:4] == ["FL_hip_joint", "FR_hip_joint", "RL_hip_joint", "RR_hip_joint"]
     assert [there[i] for i in names["from_isaac_lab"]] == here
     assert "to_mujoco" not in names
 
 
-def test_one_order_for_all_is_said(arm):
-    assert "All of them have the actuated joints in the order of robot.toml." in report_page(arm)
+def test_report_same_joint_order(arm):
+    assert "All simulators use the order of robot.toml." in report_markdown(arm)
 
 
-def test_a_spec_with_joints_of_its_own_costs_only_the_permutations(quadruped):
-    made = quadruped.made
-    spec = replace(made.spec, joint_order=("other", *made.spec.joint_order[1:]))
-    text = report_page(replace(quadruped, made=replace(made, spec=spec)))
+def test_report_skips_permutations_of_unknown_joints(quadruped):
+    robot = quadruped.robot
+    spec = replace(robot.spec, joint_order=("other", *robot.spec.joint_order[1:]))
+    text = report_markdown(replace(quadruped, robot=replace(robot, spec=spec)))
     assert "```python" not in text
     assert "| 0 | other |" in text
 
 
-def test_a_robot_without_legs_has_no_leg_parts(arm):
-    text = report_page(arm)
+def test_report_without_legs(arm):
+    text = report_markdown(arm)
     assert "No legs were found" in text
     assert "is fixed to the world" in text
-    assert "Standing" not in headings(text)
-    assert "holds" not in text
+    assert "Standing test" not in headings(text)
+    assert "holding" not in text
 
 
-def test_joints_without_a_motor_are_told(quadruped):
-    made = quadruped.made
-    spec = replace(made.spec, joint_order=made.spec.joint_order[:-1])
-    text = report_page(replace(quadruped, made=replace(made, spec=spec)))
-    assert "Not driven by a motor: RR\\_calf\\_joint." in text
+def test_report_lists_unactuated_joints(quadruped):
+    robot = quadruped.robot
+    spec = replace(robot.spec, joint_order=robot.spec.joint_order[:-1])
+    text = report_markdown(replace(quadruped, robot=replace(robot, spec=spec)))
+    assert "Not actuated: RR\\_calf\\_joint." in text
 
 
-def test_findings_and_what_was_not_asked(quadruped):
+def test_report_lists_findings_and_skipped_rules(quadruped):
     report = Report(
-        facts=quadruped.made.facts,
+        facts=quadruped.robot.facts,
         findings=(finding(severity="warning"),),
         skipped=(
             Skipped(code="SYM001", reason="no legs"),
             Skipped(code="SYM002", reason="no legs"),
         ),
     )
-    text = section(report_page(replace(quadruped, report=report)), "Findings")
+    text = section(report_markdown(replace(quadruped, report=report)), "Findings")
     assert "**1 warning**" in text
     row = next(row for row in text.splitlines() if "INR002" in row)
     assert cells(row)[2:] == ["robot.urdf:12", "the mass is -1 kg", "Weigh it."]
     assert "- SYM001, SYM002: no legs\n" in text
 
 
-def test_configurations_are_listed(quadruped):
-    text = report_page(replace(quadruped, configs=("mjlab_config.py",)))
+def test_report_lists_configurations(quadruped):
+    text = report_markdown(replace(quadruped, configs=("mjlab_config.py",)))
     assert "- mjlab\\_config.py" in section(text, "Next steps")
 
 
-def test_no_name_breaks_a_row_or_becomes_markup(quadruped):
-    made = quadruped.made
+def test_report_escapes_names(quadruped):
+    robot = quadruped.robot
     held = NASTY.replace("\udc80", "")  # which a spec refuses
-    spec = replace(made.spec, name=held, base=held, feet=(held,))
+    spec = replace(robot.spec, name=held, base=held, feet=(held,))
     report = Report(
-        facts=made.facts,
+        facts=robot.facts,
         findings=(finding(subject=NASTY, message=NASTY, hint=NASTY, file=Path(NASTY)),),
         skipped=(Skipped(code="SYM001", reason=NASTY),),
     )
-    proof = Proof(
-        agreements=(agreement(NASTY, link=NASTY),),
+    verification = Verification(
+        equivalences=(equivalence(NASTY, link=NASTY),),
         standing=replace(STOOD, touching=(NASTY,), saturated=NASTY),
     )
-    done = replace(
+    result = replace(
         quadruped,
-        made=replace(made, spec=spec, notes=(NASTY,)),
+        robot=replace(robot, spec=spec, notes=(NASTY,)),
         report=report,
-        proof=proof,
-        repaired=(finding(subject=NASTY, message=NASTY),),
+        verification=verification,
+        fixed=(finding(subject=NASTY, message=NASTY),),
         configs=(NASTY,),
-        no_pictures=NASTY,
+        pictures_error=NASTY,
     )
-    text = report_page(done)
+    text = report_markdown(result)
     for wrong in ("<b>", "@me", "\x1b", "\r", "\u202e", "\n# title"):
         assert wrong not in text
-    without_ours = re.sub(r"```.*?```|\*\*[^*]+\*\*|`there = [^`]*`", "", text, flags=re.DOTALL)
+    without_ours = re.sub(
+        r"```.*?```|\*\*[^*]+\*\*|`simulator_values = [^`]*`", "", text, flags=re.DOTALL
+    )
     assert re.search(r"(?<!\\)[`*]", without_ours) is None
     text.encode()
 
 
-def test_a_name_of_a_file_is_one_word_of_a_command(quadruped):
-    made = quadruped.made
-    spec = replace(made.spec, urdf="a b;c.urdf")
-    text = report_page(replace(quadruped, made=replace(made, spec=spec)))
+def test_report_quotes_file_names(quadruped):
+    robot = quadruped.robot
+    spec = replace(robot.spec, urdf="a b;c.urdf")
+    text = report_markdown(replace(quadruped, robot=replace(robot, spec=spec)))
     assert "terrainkit check-robot 'a b;c.urdf' --spec robot.toml" in text

@@ -29,8 +29,8 @@ def draw(settings: Commands, count: int = _MANY, seed: int = 0) -> tuple[Any, An
     return sample_commands(np.random.default_rng(seed), count, settings, settings.lin_vel_x)
 
 
-class TestDraw:
-    def test_ranges_are_filled_and_kept(self) -> None:
+class TestSampleCommands:
+    def test_values_fill_their_ranges(self) -> None:
         settings = replace(
             _ALL, lin_vel_x=(-0.5, 2), lin_vel_y=(0.25, 0.5), ang_vel_yaw=(-3, -1), heading=(-1, 2)
         )
@@ -44,25 +44,25 @@ class TestDraw:
             found = np.quantile(values, quantile, axis=0)
             np.testing.assert_allclose(found, expected, atol=0.03 * (high - low).max())
 
-    def test_shapes_and_kinds(self) -> None:
+    def test_shapes_and_dtypes(self) -> None:
         for count in (0, 1, 5):
             commands, heading = draw(Commands(), count)
             assert commands.shape == (count, 3)
             assert heading.shape == (count,)
             assert commands.dtype == heading.dtype == np.float32
 
-    def test_range_of_the_time_is_what_counts(self) -> None:
+    def test_current_range_is_used(self) -> None:
         rng = np.random.default_rng(0)
         commands, _ = sample_commands(rng, _MANY, replace(_ALL, lin_vel_x=(-1, 1)), (2.0, 3.0))
         assert commands[:, 0].min() >= 2
         assert commands[:, 0].max() <= 3
 
-    def test_range_without_width_is_a_number(self) -> None:
+    def test_zero_width_range_is_constant(self) -> None:
         settings = replace(_ALL, lin_vel_x=(0.5, 0.5), lin_vel_y=(0, 0), ang_vel_yaw=(0.3, 0.3))
         commands, _ = draw(settings, 3)
         np.testing.assert_allclose(commands, np.tile([0.5, 0, 0.3], (3, 1)), rtol=1e-6)
 
-    def test_small_ones_are_zero(self) -> None:
+    def test_small_commands_become_zero(self) -> None:
         commands, _ = draw(replace(_ALL, lin_vel_y=(-1, 1), min_norm=0.4))
         speed, turn = np.hypot(commands[:, 0], commands[:, 1]), np.abs(commands[:, 2])
         assert (speed[speed > 0] >= 0.4).all()
@@ -74,14 +74,14 @@ class TestDraw:
         assert ((commands[:, 0] != 0) & (np.abs(commands[:, 0]) < 0.1)).any()  # the norm counts
 
     @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
-    def test_share_that_stands(self, share: float) -> None:
+    def test_standing_fraction(self, share: float) -> None:
         commands, heading = draw(replace(_ALL, standing=share))
         stands = (commands == 0).all(axis=1)
         assert stands.mean() == pytest.approx(share, abs=0.015)
         # To stand is not to turn to a heading either.
         np.testing.assert_array_equal(np.isnan(heading), stands)
 
-    def test_seed_decides(self) -> None:
+    def test_same_seed_gives_same_values(self) -> None:
         one, other = draw(Commands(), seed=4), draw(Commands(), seed=4)
         np.testing.assert_array_equal(one[0], other[0])
         np.testing.assert_array_equal(one[1], other[1])
@@ -101,19 +101,19 @@ class TestHeading:
         assert self.turn(0.7, 0.7) == 0
         assert self.turn(1.0, 0.2, heading_stiffness=1.0) == pytest.approx(0.8)
 
-    def test_turns_the_short_way(self) -> None:
+    def test_yaw_rate_takes_the_short_way(self) -> None:
         # From 3 rad to -3 rad it is 0.2832 to the left.
         assert self.turn(-3, 3) == pytest.approx(0.5 * 0.2832, abs=1e-4)
         assert self.turn(3, -3) == pytest.approx(-0.5 * 0.2832, abs=1e-4)
 
-    def test_keeps_the_range(self) -> None:
+    def test_yaw_rate_is_clipped(self) -> None:
         assert self.turn(3, 0, ang_vel_yaw=(-0.5, 0.75)) == 0.75
         assert self.turn(-3, 0, ang_vel_yaw=(-0.5, 0.75)) == -0.5
 
-    def test_none_is_no_turning(self) -> None:
+    def test_nan_heading_gives_zero_yaw_rate(self) -> None:
         assert self.turn(np.nan, 2) == 0
 
-    def test_gets_there(self) -> None:
+    def test_heading_control_converges(self) -> None:
         yaw = np.array([-3.0, 0.1, 2.5], np.float32)
         heading = np.array([3.0, -1.0, 0.0], np.float32)
         command = VelocityCommand(Commands(), 3, 0.02, heading_command=True)
@@ -125,12 +125,12 @@ class TestHeading:
         np.testing.assert_allclose(off, 0, atol=1e-3)
 
 
-class TestHeadingUnlessGiven:
+class TestUsesHeading:
     @pytest.mark.parametrize(
         ("given", "level", "asked"),
         [(None, True, False), (None, False, True), (True, True, True), (False, False, False)],
     )
-    def test_is_asked_on_any_ground_but_a_plane(
+    def test_default_depends_on_flatness(
         self, given: bool | None, *, level: bool, asked: bool
     ) -> None:
         ground = Plane()
@@ -160,7 +160,7 @@ class TestExpandRange:
         assert expanded((-1.0, 1.0), 0.79, settings) == (-1.0, 1.0)
         assert expanded((-1.0, 1.0), 0.81, settings) == pytest.approx((-1.1, 1.1))
 
-    def test_stops_at_the_widest(self) -> None:
+    def test_range_stops_at_max_curriculum(self) -> None:
         settings, span = Commands(curriculum=True, max_curriculum=1.25), (-0.5, 0.75)
         for _ in range(20):
             before, span = span, expanded(span, 0.9, settings)
@@ -168,19 +168,21 @@ class TestExpandRange:
             assert span[1] >= before[1]
         assert span == (-1.25, 1.25)
 
-    def test_never_narrows(self) -> None:
+    def test_range_never_shrinks(self) -> None:
         settings = Commands(curriculum=True, max_curriculum=1.5)
         assert expanded((-2.0, 3.0), 0.9, settings) == (-2.0, 3.0)
 
-    def test_needs_room(self) -> None:
-        with pytest.raises(ConfigError, match="max_curriculum is 1, and lin_vel_x from -1 to 1"):
+    def test_curriculum_needs_a_larger_maximum(self) -> None:
+        with pytest.raises(
+            ConfigError, match="max_curriculum: got 1; expected more than lin_vel_x, -1 to 1"
+        ):
             Commands(curriculum=True)
-        with pytest.raises(ConfigError, match=r"max_curriculum is 0\.3, "):
+        with pytest.raises(ConfigError, match=r"max_curriculum: got 0\.3; "):
             Commands(curriculum=True, lin_vel_x=(-0.4, 0.8), max_curriculum=0.3)
         Commands(curriculum=True, lin_vel_x=(-1.0, 0.5))
         Commands(curriculum=True, lin_vel_x=(0.0, 1.5))
 
-    def test_only_where_asked_for(self) -> None:
+    def test_range_is_fixed_without_curriculum(self) -> None:
         assert expanded((-1.0, 1.0), 1.0, Commands(max_curriculum=5.0)) == (-1.0, 1.0)
 
 
@@ -206,8 +208,8 @@ def run(env: LeggedEnv, steps: int) -> list[Any]:
     return seen
 
 
-class TestEnvironment:
-    def test_new_ones_every_ten_seconds(self) -> None:
+class TestInEnvironment:
+    def test_commands_are_resampled_every_10_s(self) -> None:
         env = make_env(commands=Commands(standing=0))
         first = env.state.commands.copy()
         assert env.cfg.dt == pytest.approx(0.02)
@@ -220,26 +222,26 @@ class TestEnvironment:
         assert (seen[5] != first).any(axis=1).all()
         np.testing.assert_array_equal(seen[6], seen[5])
 
-    def test_time_between_them_is_the_tasks(self) -> None:
+    def test_resampling_time_is_the_tasks(self) -> None:
         env = make_env(commands=Commands(standing=0, resampling_time=0.1))
         seen = [env.state.commands.copy(), *run(env, 12)]
         new = [bool((a != b).any()) for a, b in pairwise(seen)]
         assert [k + 1 for k, is_new in enumerate(new) if is_new] == [5, 10]
 
-    def test_new_ones_with_a_new_episode(self) -> None:
+    def test_commands_are_resampled_at_reset(self) -> None:
         env = make_env(commands=Commands(standing=0, min_norm=0))
         first = env.state.commands.copy()
         env.sim.qpos[1, 3:7] = (0, 1, 0, 0)
         [after] = run(env, 1)
         assert (after != first).any(axis=1).tolist() == [False, True, False, False]
 
-    def test_observed_is_what_is_asked(self) -> None:
+    def test_observation_has_the_commands(self) -> None:
         env = make_env()
         run(env, 3)
         scaled = env.commands * np.array([2, 2, 0.25], np.float32)
         np.testing.assert_allclose(env.get_observations()["policy"][:, :3], scaled)
 
-    def test_rewarded_is_what_was_asked_when_acting(self) -> None:
+    def test_reward_uses_the_commands_of_the_step(self) -> None:
         """Not what has just been drawn for the next step."""
         only = Rewards(**{**dict.fromkeys(REWARDS, 0.0), "tracking_lin_vel": 1.0})
         env = make_env(commands=Commands(standing=0, resampling_time=0.02), rewards=only)
@@ -250,7 +252,7 @@ class TestEnvironment:
             np.testing.assert_allclose(rewards, 0.02 * np.exp(-off / 0.25), rtol=1e-4)
             assert (env.commands != asked).any()
 
-    def test_heading_becomes_turning(self) -> None:
+    def test_yaw_rate_follows_the_heading(self) -> None:
         env = make_env(commands=Commands(heading_command=True, standing=0))
         run(env, 2)
         quat = env.state.base_quat
@@ -258,14 +260,14 @@ class TestEnvironment:
         off = np.angle(np.exp(1j * (env.velocity_command.heading - yaw)))
         np.testing.assert_allclose(env.commands[:, 2], np.clip(0.5 * off, -1, 1), atol=2e-3)
 
-    def test_heading_is_heeded_from_the_start(self) -> None:
+    def test_yaw_rate_follows_heading_at_reset(self) -> None:
         env = make_env(commands=Commands(heading_command=True, standing=0))
         quat = env.state.base_quat
         yaw = 2 * np.arctan2(quat[:, 3], quat[:, 0])
         off = np.angle(np.exp(1j * (env.velocity_command.heading - yaw)))
         np.testing.assert_allclose(env.commands[:, 2], np.clip(0.5 * off, -1, 1), atol=2e-3)
 
-    def test_held_ones_stay(self) -> None:
+    def test_fixed_commands_persist(self) -> None:
         env = make_env(commands=Commands(resampling_time=0.06, heading_command=True))
         held = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]], np.float32)
         env.set_commands(held)
@@ -275,7 +277,7 @@ class TestEnvironment:
         for commands in run(env, 8):
             np.testing.assert_array_equal(commands, held)
 
-    def test_held_ones_stay_when_all_begins_anew(self) -> None:
+    def test_fixed_commands_survive_reset(self) -> None:
         env = make_env(commands=Commands(standing=0))
         held = np.tile(np.array([0.5, 0, 0], np.float32), (4, 1))
         env.set_commands(held)
@@ -283,7 +285,7 @@ class TestEnvironment:
         np.testing.assert_array_equal(env.state.commands, held)
         np.testing.assert_array_equal(env.get_observations()["policy"][:, 0], [1.0] * 4)
 
-    def test_held_ones_can_be_let_go(self) -> None:
+    def test_fixed_commands_can_be_released(self) -> None:
         env = make_env(commands=Commands(standing=0, resampling_time=0.04))
         held = np.tile(np.array([5, 5, 5], np.float32), (4, 1))
         env.set_commands(held)
@@ -292,7 +294,7 @@ class TestEnvironment:
         assert np.abs(env.state.commands).max() <= 1
         assert np.abs(run(env, 3)[-1]).max() <= 1
 
-    def test_range_widens_only_after_as_long_as_an_episode_of_all(self) -> None:
+    def test_range_expands_after_min_seconds(self) -> None:
         """One robot that stood still as it was told to does not make all of them run."""
         env = make_env(
             num_envs=4,
@@ -311,7 +313,7 @@ class TestEnvironment:
         assert spans == sorted(spans)
         assert spans[0] <= 1.1 + 1e-6
 
-    def test_range_does_not_widen_where_commands_are_not_followed(self) -> None:
+    def test_range_stays_when_tracking_is_poor(self) -> None:
         env = make_env(
             env=Env(num_envs=4, num_threads=1, episode_length_s=0.2),
             commands=Commands(curriculum=True, max_curriculum=2.0, standing=0, min_norm=0.9),

@@ -95,7 +95,7 @@ def curriculum() -> TerrainCurriculum:
 class TestConvergence:
     @pytest.mark.parametrize("heading", [False, True])
     @pytest.mark.parametrize("skill", [2, 5, 7])
-    def test_to_the_level_of_skill(self, skill: int, *, heading: bool) -> None:
+    def test_levels_converge_to_skill(self, skill: int, *, heading: bool) -> None:
         curriculum = TerrainCurriculum(Patches(), 100, 5, 1)
         live(
             curriculum, np.full(100, skill + 0.5), 60, Commands(heading_command=heading), noise=0.5
@@ -103,14 +103,14 @@ class TestConvergence:
         assert curriculum.levels.mean() == pytest.approx(skill, abs=0.75)
         assert curriculum.levels.std() < 1.5
 
-    def test_of_each_for_itself(self) -> None:
+    def test_robots_converge_independently(self) -> None:
         curriculum = TerrainCurriculum(Patches(), 200, 5, 1)
         skill = np.repeat([1.5, 6.5], 100)
         live(curriculum, skill, 80, Commands(), noise=0.5)
         assert curriculum.levels[:100].mean() == pytest.approx(1, abs=0.75)
         assert curriculum.levels[100:].mean() == pytest.approx(6, abs=0.75)
 
-    def test_of_the_perfect_to_the_top_three_rows(self) -> None:
+    def test_perfect_robots_stay_in_top_rows(self) -> None:
         curriculum = TerrainCurriculum(Patches(), 100, 5, 1)
         live(curriculum, np.full(100, np.inf), 60, Commands(), noise=0.5)
         assert set(curriculum.levels) == {7, 8, 9}
@@ -119,12 +119,12 @@ class TestConvergence:
         assert curriculum.levels.min() >= 7
         assert (curriculum.levels != before).any()
 
-    def test_of_the_hopeless_to_the_first_row(self) -> None:
+    def test_failing_robots_reach_first_row(self) -> None:
         curriculum = TerrainCurriculum(Patches(), 100, 5, 1)
         live(curriculum, np.full(100, -np.inf), 10, Commands(), noise=0.5)
         assert set(curriculum.levels) == {0}
 
-    def test_of_the_same_seed_is_the_same(self) -> None:
+    def test_same_seed_gives_same_levels(self) -> None:
         levels = []
         for _ in range(2):
             curriculum = TerrainCurriculum(Patches(), 50, 5, 3)
@@ -132,7 +132,7 @@ class TestConvergence:
             levels.append(curriculum.levels)
         np.testing.assert_array_equal(*levels)
 
-    def test_columns_are_kept(self) -> None:
+    def test_columns_never_change(self) -> None:
         curriculum = TerrainCurriculum(Patches(), 10, 5, 1)
         assert curriculum.columns.tolist() == [0] * 5 + [1] * 5
         live(curriculum, np.full(10, 3.0), 10, Commands(), noise=0.5)
@@ -140,7 +140,7 @@ class TestConvergence:
         np.testing.assert_array_equal(curriculum.env_origins[:, 0], 8 * curriculum.levels + 4)
 
 
-class TestOneEpisode:
+class TestOnEpisodeEnd:
     """Half of 8 m is crossed; half of what was asked is enough to stay."""
 
     @pytest.mark.parametrize(
@@ -155,7 +155,7 @@ class TestOneEpisode:
             (10.0, 4.5, True, 5),  # fell after it had crossed
         ],
     )
-    def test_moves(
+    def test_level_change(
         self,
         curriculum: TerrainCurriculum,
         asked: float,
@@ -168,30 +168,30 @@ class TestOneEpisode:
         end_all(curriculum, distance, fallen=fallen)
         assert curriculum.levels.tolist() == [level] * 4
 
-    def test_told_to_stand_is_not_moved(self, curriculum: TerrainCurriculum) -> None:
+    def test_standing_command_keeps_level(self, curriculum: TerrainCurriculum) -> None:
         walk(curriculum, 0.0, 20)
         end_all(curriculum, 0.02)
         assert curriculum.levels.tolist() == [4] * 4
 
-    def test_told_to_stand_and_fallen_moves_down(self, curriculum: TerrainCurriculum) -> None:
+    def test_fall_while_standing_moves_down(self, curriculum: TerrainCurriculum) -> None:
         walk(curriculum, 0.0, 20)
         end_all(curriculum, 0.02, fallen=True)
         assert curriculum.levels.tolist() == [3] * 4
 
-    def test_only_the_time_lived_counts(self, curriculum: TerrainCurriculum) -> None:
+    def test_only_elapsed_time_counts(self, curriculum: TerrainCurriculum) -> None:
         """Asked for 1 m/s during 2 s, not during an episode of 20 s."""
         walk(curriculum, 1.0, 2)
         end_all(curriculum, 1.8)
         assert curriculum.levels.tolist() == [4] * 4
 
-    def test_commands_that_change_count_as_they_were(self, curriculum: TerrainCurriculum) -> None:
+    def test_changing_commands_are_integrated(self, curriculum: TerrainCurriculum) -> None:
         """There and back again: the robot is where it was asked to be."""
         walk(curriculum, 1.0, 10)
         walk(curriculum, -1.0, 10)
         end_all(curriculum, 0.2)
         assert curriculum.levels.tolist() == [4] * 4
 
-    def test_commands_are_in_the_frame_of_the_robot(self, curriculum: TerrainCurriculum) -> None:
+    def test_commands_are_in_the_base_frame(self, curriculum: TerrainCurriculum) -> None:
         yaw = np.array([0, np.pi / 2, np.pi, -np.pi / 2], np.float32)
         curriculum.accumulate_command(
             np.tile(np.array([1, 0.5, 0.3], np.float32), (4, 1)), yaw, 2.0
@@ -199,27 +199,25 @@ class TestOneEpisode:
         expected = [[2, 1], [-1, 2], [-2, -1], [1, -2]]
         np.testing.assert_allclose(curriculum.commanded, expected, atol=1e-6)
 
-    def test_new_episode_is_asked_nothing_yet(self, curriculum: TerrainCurriculum) -> None:
+    def test_reset_clears_displacement(self, curriculum: TerrainCurriculum) -> None:
         walk(curriculum, 1.0, 10)
         curriculum.reset(np.array([1, 3]))
         assert curriculum.commanded[:, 0].tolist() == [10, 0, 10, 0]
 
-    def test_only_those_that_ended_move(self, curriculum: TerrainCurriculum) -> None:
+    def test_only_ended_episodes_change_level(self, curriculum: TerrainCurriculum) -> None:
         curriculum.on_episode_end(
             np.array([2]), np.array([5.0]), np.array([False]), update_levels=True
         )
         assert curriculum.levels.tolist() == [4, 4, 5, 4]
 
-    def test_without_curriculum_nobody_moves_but_all_are_counted(
-        self, curriculum: TerrainCurriculum
-    ) -> None:
+    def test_fixed_levels_still_record_success(self, curriculum: TerrainCurriculum) -> None:
         curriculum.on_episode_end(
             np.array([2]), np.array([5.0]), np.array([False]), update_levels=False
         )
         assert curriculum.levels.tolist() == [4] * 4
         assert curriculum.success[4, 1] == 1
 
-    def test_nobody_ended(self, curriculum: TerrainCurriculum) -> None:
+    def test_no_ended_episodes(self, curriculum: TerrainCurriculum) -> None:
         curriculum.on_episode_end(np.arange(0), np.zeros(0), np.zeros(0, bool), update_levels=True)
         assert curriculum.levels.tolist() == [4] * 4
 
@@ -230,7 +228,7 @@ class TestOneEpisode:
 
 
 class TestSuccess:
-    def test_rates_by_level_and_column(self, curriculum: TerrainCurriculum) -> None:
+    def test_success_by_level_and_column(self, curriculum: TerrainCurriculum) -> None:
         curriculum.levels[:] = [0, 0, 4, 9]
         assert np.isnan(curriculum.success).all()
         fallen = np.array([True, False, False, False])
@@ -242,7 +240,7 @@ class TestSuccess:
         assert curriculum.success[4, 1] == curriculum.success[9, 1] == 1
         assert np.isnan(curriculum.success).sum() == 20 - 3
 
-    def test_rate_is_that_of_late(self, curriculum: TerrainCurriculum) -> None:
+    def test_success_is_a_running_mean(self, curriculum: TerrainCurriculum) -> None:
         rng = np.random.default_rng(0)
         for chance in (0.2, 0.8):
             rates = []
@@ -291,7 +289,7 @@ class TestSuccess:
 
 
 class TestCheckpoint:
-    def test_goes_on_as_if_unbroken(self) -> None:
+    def test_resume_is_exact(self) -> None:
         whole, first = (TerrainCurriculum(Patches(), 20, 5, 1) for _ in range(2))
         skill = np.full(20, np.inf)
         for each in (whole, first):
@@ -306,14 +304,14 @@ class TestCheckpoint:
         np.testing.assert_array_equal(other.commanded, whole.commanded)
         np.testing.assert_array_equal(other.success, whole.success)
 
-    def test_is_a_copy(self, curriculum: TerrainCurriculum) -> None:
+    def test_state_dict_is_a_copy(self, curriculum: TerrainCurriculum) -> None:
         state = curriculum.state_dict()
         live(curriculum, np.full(4, np.inf), 5, Commands(), noise=0.5)
         assert state["levels"].tolist() == [4] * 4
         assert np.isnan(np.asarray(state["success"])).all()
 
     @pytest.mark.parametrize("n", [2, 6, 30])
-    def test_another_number_of_robots_keeps_levels_by_column(self, n: int) -> None:
+    def test_other_num_envs_keeps_levels_by_column(self, n: int) -> None:
         before = TerrainCurriculum(Patches(), 10, 5, 1)
         before.levels[:5], before.levels[5:] = 2, 8
         before.success[3, 1] = 0.5
@@ -324,7 +322,7 @@ class TestCheckpoint:
         assert set(curriculum.levels[curriculum.columns == 1]) == {8}
         assert curriculum.success[3, 1] == 0.5
 
-    def test_mean_level_is_about_kept(self) -> None:
+    def test_other_num_envs_keeps_mean_level(self) -> None:
         before = TerrainCurriculum(Patches(), 100, 5, 1)
         before.levels[:] = np.random.default_rng(0).integers(0, 10, 100)
         curriculum = TerrainCurriculum(Patches(), 200, 5, 1)
@@ -332,14 +330,14 @@ class TestCheckpoint:
         assert curriculum.levels.mean() == pytest.approx(before.levels.mean(), abs=0.01)
 
     @pytest.mark.parametrize("other", [Patches(rows=9), Patches(names=("flat",))])
-    def test_another_map(self, other: Patches) -> None:
+    def test_load_rejects_another_map(self, other: Patches) -> None:
         state = TerrainCurriculum(Patches(), 4, 5, 1).state_dict()
         curriculum = TerrainCurriculum(other, 4, 5, 1)
         with pytest.raises(ConfigError, match="checkpoint's map has 10 x 2 patches; this one has"):
             curriculum.load_state_dict(state)
 
 
-class TestEnvironment:
+class TestInEnvironment:
     """The curriculum of a real environment, whose robots do nothing but stand."""
 
     def make(self, **terrain: Any) -> LeggedEnv:
@@ -362,18 +360,18 @@ class TestEnvironment:
         log: dict[str, float] = extras.get("log", {})
         return log
 
-    def test_start_is_at_the_origin_of_the_level(self) -> None:
+    def test_robots_start_at_their_level(self) -> None:
         env = self.make()
         off = env.state.base_pos[:, :2] - env.curriculum.env_origins[:, :2]
         assert np.abs(off).max() <= 0.5
         assert (env.curriculum.env_origins[:, 0] == 36).all()
 
-    def test_asked_is_what_commands_ask(self) -> None:
+    def test_commanded_displacement_in_env(self) -> None:
         env = self.make()
         self.walk(env, 5)
         np.testing.assert_allclose(env.curriculum.commanded[:, 0], 0.1, atol=0.005)
 
-    def test_idle_robots_move_down_when_their_time_is_over(self) -> None:
+    def test_idle_robots_move_down(self) -> None:
         env = self.make()
         self.walk(env, 9)
         assert env.curriculum.levels.tolist() == [4] * 6
@@ -384,12 +382,12 @@ class TestEnvironment:
         assert (env.curriculum.commanded == 0).all()
         assert np.abs(env.state.base_pos[:, 0] - 28).max() <= 0.55
 
-    def test_first_reset_moves_nobody(self) -> None:
+    def test_first_reset_keeps_levels(self) -> None:
         env = self.make()
         assert np.isnan(env.curriculum.success).all()
         assert env.curriculum.levels.tolist() == [4] * 6
 
-    def test_episodes_cut_by_random_lengths_move_nobody(self) -> None:
+    def test_cut_episodes_keep_levels(self) -> None:
         """As rsl-rl's runner does it with `init_at_random_ep_len`."""
         env = self.make()
         env.episode_length_buf = torch.tensor([0, 1, 2, 3, 5, 9])
@@ -399,13 +397,13 @@ class TestEnvironment:
         self.walk(env, 10)
         assert env.curriculum.levels.tolist() == [2, 3, 3, 3, 3, 3]
 
-    def test_crossing_moves_up(self) -> None:
+    def test_crossing_a_patch_moves_up(self) -> None:
         env = self.make()
         env.sim.qpos[2, 0] += 5
         self.walk(env, 10)
         assert env.curriculum.levels.tolist() == [3, 3, 5, 3, 3, 3]
 
-    def test_leaving_the_map_is_crossing(self) -> None:
+    def test_leaving_the_map_moves_up(self) -> None:
         """A patch may be narrower than it is long: its side is nearer than half its length."""
         env = self.make()
         env.terrain.lower = (-np.inf, 2.0)
@@ -422,12 +420,12 @@ class TestEnvironment:
         self.walk(env, 1)
         assert env.curriculum.levels.tolist() == [4, 3, 4, 4, 4, 4]
 
-    def test_without_curriculum(self) -> None:
+    def test_levels_are_fixed_without_curriculum(self) -> None:
         env = self.make(curriculum=False)
         log = self.walk(env, 10)
         assert env.curriculum.levels.tolist() == [4] * 6
         assert log["Curriculum/success_flat"] == 0
 
-    def test_hardest_first_row(self) -> None:
+    def test_max_init_level_is_respected(self) -> None:
         assert set(TerrainCurriculum(Patches(), 500, 2, 1).levels) == {0, 1, 2}
         assert set(TerrainCurriculum(Patches(rows=3), 500, 5, 1).levels) == {0, 1, 2}

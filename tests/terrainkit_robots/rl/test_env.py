@@ -21,32 +21,32 @@ from terrainkit_robots.rl.terrain import MapTerrain, Plane
 SHORT = Env(num_envs=5, num_threads=1, episode_length_s=0.4)
 
 
-class TestOnAPlane(VecEnvContract):
+class TestEnvOnPlane(VecEnvContract):
     @pytest.fixture
     def env(self, quadruped, lively):
         return LeggedEnv(lively(env=SHORT), quadruped, Plane())
 
 
-class TestOnAMap(VecEnvContract):
+class TestEnvOnMap(VecEnvContract):
     @pytest.fixture
     def env(self, quadruped, lively, map_ground):
         return LeggedEnv(lively(env=SHORT), quadruped, map_ground)
 
 
-class TestTheBiped(VecEnvContract):
+class TestEnvWithBiped(VecEnvContract):
     @pytest.fixture
     def env(self, biped, lively, map_ground):
         return LeggedEnv(lively(env=SHORT), biped, map_ground)
 
 
-class TestACartWithAWheel(VecEnvContract):
+class TestEnvWithWheel(VecEnvContract):
     @pytest.fixture
     def env(self, cart, lively):
         task = lively(env=SHORT, commands=Commands(heading_command=True, resampling_time=0.1))
         return LeggedEnv(task, cart, Plane())
 
 
-class TestTorqueControl(VecEnvContract):
+class TestEnvWithTorqueControl(VecEnvContract):
     @pytest.fixture
     def env(self, quadruped, lively):
         task = lively(env=SHORT, control=Control(control_type="T"))
@@ -84,7 +84,7 @@ class TestObservations:
         joints = len(biped.default_pose)
         assert env.get_observations()["policy"].shape == (4, 9 + 3 * joints)
 
-    def test_a_plane_may_be_scanned_and_a_map_not(self, quadruped, calm, map_ground):
+    def test_height_scan_follows_the_setting(self, quadruped, calm, map_ground):
         seen = calm(terrain=Terrain(measure_heights=True))
         assert LeggedEnv(seen, quadruped, Plane()).get_observations()["policy"].shape == (4, 232)
         unseen = calm(terrain=Terrain(measure_heights=False))
@@ -92,9 +92,7 @@ class TestObservations:
         assert env.get_observations()["policy"].shape == (4, 45)
 
     @pytest.mark.parametrize("on_map", [False, True])
-    def test_forces_on_feet_are_in_units_of_the_robots_weight(
-        self, quadruped, calm, map_ground, on_map
-    ):
+    def test_foot_forces_are_in_units_of_weight(self, quadruped, calm, map_ground, on_map):
         # The ground has a mass too: thousands of tons.
         env = LeggedEnv(calm(), quadruped, map_ground if on_map else Plane())
         env.curriculum.levels[:] = 0
@@ -104,7 +102,7 @@ class TestObservations:
         up = observed["privileged"][:, -12:].reshape(4, 4, 3)[..., 2]
         np.testing.assert_allclose(up.sum(axis=1), 1, atol=0.03)
 
-    def test_commands_are_those_that_the_next_step_is_rewarded_for(self, quadruped, lively):
+    def test_commands_are_those_of_the_next_step(self, quadruped, lively):
         task = lively(commands=Commands(resampling_time=0.06), num_envs=8)
         env = LeggedEnv(task, quadruped, Plane())
         for _ in range(10):
@@ -112,7 +110,7 @@ class TestObservations:
             np.testing.assert_allclose(observed, env.commands, atol=1e-6)
             still(env)
 
-    def test_the_command_of_a_heading_is_observed_from_the_first_step(self, quadruped, lively):
+    def test_heading_command_is_observed_at_reset(self, quadruped, lively):
         commands = Commands(heading_command=True, standing=0.0, resampling_time=100.0)
         env = LeggedEnv(lively(16, commands=commands), quadruped, Plane())
         first = env.commands[:, 2].copy()
@@ -121,8 +119,8 @@ class TestObservations:
         np.testing.assert_allclose(env.commands[:, 2], first, atol=0.05)
 
 
-class TestEndings:
-    def test_twenty_seconds_are_a_time_out_and_no_fall(self, quadruped, calm):
+class TestTermination:
+    def test_time_out_is_not_a_fall(self, quadruped, calm):
         env = LeggedEnv(calm(2), quadruped, Plane())
         assert env.max_episode_length == 1000
         for k in range(999):
@@ -134,7 +132,7 @@ class TestEndings:
         assert extras["log"]["Episode/falls"] == 0
 
     @pytest.mark.parametrize("how", ["back", "side", "outside", "velocity", "position"])
-    def test_falls_end_an_episode_and_only_their_own(self, quadruped, calm, mixed_map, how):
+    def test_fall_resets_only_its_environment(self, quadruped, calm, mixed_map, how):
         env = LeggedEnv(calm(4), quadruped, MapTerrain(mixed_map))
         twin = LeggedEnv(calm(4), quadruped, MapTerrain(mixed_map))
         for each in (env, twin):
@@ -165,9 +163,9 @@ class TestEndings:
             assert torch.isfinite(observed[name]).all()
             assert torch.equal(observed[name][others], expected[name][others])
         assert torch.equal(rewards[others], expected_rewards[others])
-        np.testing.assert_array_equal(env.sim.qpos[others], twin.physics.qpos[others])
+        np.testing.assert_array_equal(env.sim.qpos[others], twin.sim.qpos[others])
 
-    def test_tilt_counts_from_its_limit(self, quadruped, calm):
+    def test_tilt_terminates_beyond_its_limit(self, quadruped, calm):
         env = LeggedEnv(calm(3, termination=Termination(tilt=0.5)), quadruped, Plane())
         for k, tilt in enumerate((0.0, 0.45, 0.55)):
             env.sim.qpos[k, 2] = 2.0
@@ -175,7 +173,7 @@ class TestEndings:
         _, _, dones, _ = still(env)
         assert dones.tolist() == [False, False, True]
 
-    def test_the_base_on_the_ground_is_a_fall(self, quadruped, calm):
+    def test_base_contact_terminates(self, quadruped, calm):
         env = LeggedEnv(calm(2, termination=Termination(tilt=3.1)), quadruped, Plane())
         env.sim.qpos[1, 2:7] = (0.06, 0, 1, 0, 0)
         fell = []
@@ -187,7 +185,7 @@ class TestEndings:
                 break
         assert fell[-1] == [False, True]
 
-    def test_bad_states_are_falls_every_time(self, quadruped, calm):
+    def test_unstable_states_always_terminate(self, quadruped, calm):
         env = LeggedEnv(calm(3), quadruped, Plane())
         for value in (np.nan, 1e12, np.nan, 1e9, np.inf):
             env.sim.qvel[1, 7] = value
@@ -195,7 +193,7 @@ class TestEndings:
             assert dones.tolist() == [False, True, False], value
             assert torch.isfinite(rewards).all()
 
-    def test_a_bad_state_is_paid_for_the_fall_alone(self, quadruped, calm):
+    def test_unstable_state_gets_only_termination_reward(self, quadruped, calm):
         # What is seen of it is the pose of MuJoCo's reset, in which nothing is asked too much.
         env = LeggedEnv(calm(3, rewards=Rewards(termination=-3.0)), quadruped, Plane())
         env.sim.qvel[1, 7] = np.nan
@@ -207,7 +205,7 @@ class TestEndings:
         assert set(paid.values()) == {0}
         assert (rewards[[0, 2]] > 0).all()
 
-    def test_a_bad_state_is_no_progress_in_the_curriculum(self, quadruped, calm, map_ground):
+    def test_unstable_state_is_no_curriculum_success(self, quadruped, calm, map_ground):
         # MuJoCo puts it at the world's origin, far from where the robot was.
         env = LeggedEnv(calm(4), quadruped, map_ground)
         env.curriculum.levels[:] = 1
@@ -218,7 +216,7 @@ class TestEndings:
         assert env.curriculum.levels[2] <= 1
         assert np.nansum(env.curriculum.success) == 0
 
-    def test_a_fall_costs_what_the_task_says(self, quadruped, calm):
+    def test_termination_reward_has_the_tasks_scale(self, quadruped, calm):
         task = calm(2, rewards=Rewards(termination=-100.0, only_positive_rewards=True))
         env = LeggedEnv(task, quadruped, Plane())
         env.sim.qpos[1, 2:7] = (1.0, 0, 1, 0, 0)
@@ -227,7 +225,7 @@ class TestEndings:
         assert rewards[0] >= 0
         assert rewards[1] == pytest.approx(-2.0, abs=0.1)
 
-    def test_who_falls_in_the_last_step_has_fallen(self, quadruped, calm):
+    def test_fall_in_last_step_is_no_time_out(self, quadruped, calm):
         env = LeggedEnv(calm(2), quadruped, Plane())
         env.episode_length_buf = torch.tensor([999, 999])
         env.sim.qpos[1, 2:7] = (1.0, 0, 1, 0, 0)
@@ -237,7 +235,7 @@ class TestEndings:
 
 
 class TestLog:
-    def test_rewards_are_per_second_of_those_that_ended(self, quadruped, calm):
+    def test_logged_rewards_are_per_second(self, quadruped, calm):
         env = LeggedEnv(calm(2), quadruped, Plane())
         total = sum(still(env)[1] for _ in range(9))
         env.episode_length_buf = torch.tensor([0, 999])
@@ -252,40 +250,40 @@ class TestLog:
         log = still(env)[3]["log"]
         assert {f"Episode/rew_{name}" for name in env.rewards} <= set(log)
 
-    def test_terrains_are_logged_on_a_map(self, quadruped, calm, map_ground):
+    def test_log_has_levels_on_a_map(self, quadruped, calm, map_ground):
         env = LeggedEnv(calm(4), quadruped, map_ground)
         env.episode_length_buf = torch.tensor([0, 999, 0, 0])
         log = still(env)[3]["log"]
         assert {"Curriculum/level_stairs", "Curriculum/level_rough_slope"} <= set(log)
 
-    def test_terrains_without_robots_are_left_out(self, quadruped, calm, map_ground):
+    def test_log_omits_terrains_without_robots(self, quadruped, calm, map_ground):
         # One robot on a map with two columns: nobody is on the second.
         env = LeggedEnv(calm(1), quadruped, map_ground)
         env.episode_length_buf = torch.tensor([999])
         log = still(env)[3]["log"]
         assert np.isfinite(list(log.values())).all()
 
-    def test_nothing_is_logged_while_nobody_ends(self, quadruped, calm):
+    def test_no_log_without_resets(self, quadruped, calm):
         assert "log" not in still(LeggedEnv(calm(2), quadruped, Plane()))[3]
 
 
 class TestSeeds:
-    def test_the_same_seed_is_the_same_run(self, quadruped, lively, map_ground):
+    def test_same_seed_gives_same_rollout(self, quadruped, lively, map_ground):
         task = lively(6, runner=Runner(seed=3))
         first, second = (LeggedEnv(task, quadruped, map_ground) for _ in range(2))
         actions = acts(first, 25)
         assert record(first, actions) == record(second, actions)
 
-    def test_another_seed_is_another(self, quadruped, lively, map_ground):
+    def test_other_seed_gives_other_rollout(self, quadruped, lively, map_ground):
         first, second = (
             LeggedEnv(lively(6, runner=Runner(seed=seed)), quadruped, map_ground) for seed in (3, 4)
         )
         assert not torch.equal(
             first.get_observations()["policy"], second.get_observations()["policy"]
         )
-        assert not np.array_equal(first.differences.friction, second.differences.friction)
+        assert not np.array_equal(first.params.friction, second.params.friction)
 
-    def test_neither_numpys_nor_torchs_own_numbers_are_drawn(self, quadruped, lively):
+    def test_global_random_states_are_untouched(self, quadruped, lively):
         np.random.seed(0)  # noqa: NPY002
         torch.manual_seed(0)
         before = np.random.get_state()[1].copy(), torch.get_rng_state().clone()  # noqa: NPY002
@@ -295,9 +293,9 @@ class TestSeeds:
         assert torch.equal(torch.get_rng_state(), before[1])
 
 
-class TestGoingOn:
+class TestStateDict:
     @pytest.mark.parametrize("on_map", [False, True])
-    def test_is_bit_for_bit_as_if_unbroken(self, quadruped, lively, map_ground, on_map):
+    def test_resume_is_bit_identical(self, quadruped, lively, map_ground, on_map):
         ground = map_ground if on_map else Plane()
         domain_rand = DomainRand(push_interval_s=0.3)
         # Short commands and episodes, so that all that is drawn is drawn again.
@@ -320,7 +318,7 @@ class TestGoingOn:
             assert torch.equal(other.get_observations()[name], group), name
         assert record(other, actions[21:]) == expected
 
-    def test_what_is_saved_does_not_change_later(self, quadruped, lively):
+    def test_saved_state_is_a_copy(self, quadruped, lively):
         env = LeggedEnv(lively(3), quadruped, Plane())
         actions = acts(env, 20)
         record(env, actions[:5])
@@ -329,7 +327,7 @@ class TestGoingOn:
         env.load_state_dict(saved)
         assert record(env, actions[5:]) == expected
 
-    def test_goes_through_a_checkpoint(self, quadruped, lively, map_ground, tmp_path):
+    def test_state_survives_a_checkpoint_file(self, quadruped, lively, map_ground, tmp_path):
         env = LeggedEnv(lively(3), quadruped, map_ground)
         actions = acts(env, 10)
         record(env, actions[:5])
@@ -338,7 +336,7 @@ class TestGoingOn:
         env.load_state_dict(torch.load(tmp_path / "model_5.pt", weights_only=True)["env"])
         assert record(env, actions[5:]) == expected
 
-    def test_loading_after_the_runner_replaced_the_lengths(self, quadruped, lively):
+    def test_load_keeps_replaced_episode_lengths(self, quadruped, lively):
         env = LeggedEnv(lively(3), quadruped, Plane())
         env.episode_length_buf = torch.tensor([5, 6, 7])
         still(env)
@@ -347,34 +345,34 @@ class TestGoingOn:
         other.load_state_dict(saved)
         assert other.episode_length_buf.tolist() == [6, 7, 8]
 
-    def test_another_number_of_robots_goes_on_with_the_curriculum(
-        self, quadruped, lively, map_ground
-    ):
+    def test_other_num_envs_keeps_only_curricula(self, quadruped, lively, map_ground):
         env = LeggedEnv(lively(4), quadruped, map_ground)
         env.curriculum.levels[:] = 2
         env.velocity_command.lin_vel_x = (-1.3, 1.3)
         other = LeggedEnv(lively(7), quadruped, map_ground)
         other.load_state_dict(env.state_dict())
-        assert (other.careers.levels == 2).all()
-        assert other.orders.lin_vel_x == (-1.3, 1.3)
+        assert (other.curriculum.levels == 2).all()
+        assert other.velocity_command.lin_vel_x == (-1.3, 1.3)
         assert (other.episode_length_buf == 0).all()
         still(other)
 
-    @pytest.mark.parametrize(("part", "name"), [("arrays", "push_in"), ("state", "push_vel")])
-    def test_a_state_of_another_version_is_refused(self, quadruped, lively, part, name):
+    @pytest.mark.parametrize(
+        ("part", "name"), [("arrays", "steps_until_push"), ("state", "push_vel")]
+    )
+    def test_load_rejects_other_version(self, quadruped, lively, part, name):
         saved = LeggedEnv(lively(3), quadruped, Plane()).state_dict()
         del saved[part][name]
         with pytest.raises(ConfigError, match="written by another version of terrainkit"):
             LeggedEnv(lively(3), quadruped, Plane()).load_state_dict(saved)
         LeggedEnv(lively(4), quadruped, Plane()).load_state_dict(saved)
 
-    def test_a_state_of_other_rewards_is_refused(self, quadruped, lively):
+    def test_load_rejects_other_rewards(self, quadruped, lively):
         saved = LeggedEnv(lively(3), quadruped, Plane()).state_dict()
         task = lively(3, rewards=Rewards(termination=-1.0))
-        with pytest.raises(ConfigError, match="rew_termination is of another robot or task"):
+        with pytest.raises(ConfigError, match="rew_termination belongs to another robot or task"):
             LeggedEnv(task, quadruped, Plane()).load_state_dict(saved)
 
-    def test_a_state_of_another_robot_or_map_is_refused(self, quadruped, biped, lively, map_ground):
+    def test_load_rejects_other_robot_or_map(self, quadruped, biped, lively, map_ground):
         saved = LeggedEnv(lively(3), quadruped, Plane()).state_dict()
         with pytest.raises(ConfigError, match="another robot"):
             LeggedEnv(lively(3), biped, Plane()).load_state_dict(saved)
@@ -382,10 +380,10 @@ class TestGoingOn:
             LeggedEnv(lively(3), quadruped, map_ground).load_state_dict(saved)
 
 
-class TestHeldCommands:
+class TestSetCommands:
     HELD = np.float32([[0.5, -0.3, 0.2]] * 4)
 
-    def test_are_asked_for_all_the_time(self, quadruped, lively):
+    def test_fixed_commands_are_never_resampled(self, quadruped, lively):
         task = lively(commands=Commands(resampling_time=0.04))
         env = LeggedEnv(task, quadruped, Plane())
         env.set_commands(self.HELD)
@@ -395,14 +393,14 @@ class TestHeldCommands:
             still(env)
             np.testing.assert_allclose(env.state.commands, self.HELD)
 
-    def test_also_of_episodes_that_begin(self, quadruped, lively):
+    def test_fixed_commands_survive_a_reset(self, quadruped, lively):
         env = LeggedEnv(lively(), quadruped, Plane())
         env.set_commands(self.HELD)
         env.reset()
         np.testing.assert_allclose(env.commands, self.HELD)
         np.testing.assert_allclose(env.state.commands, self.HELD)
 
-    def test_until_they_are_let_go(self, quadruped, lively):
+    def test_none_returns_to_random_commands(self, quadruped, lively):
         env = LeggedEnv(lively(commands=Commands(standing=0.0)), quadruped, Plane())
         env.set_commands(self.HELD)
         env.set_commands(None)
@@ -416,8 +414,8 @@ class TestHeldCommands:
         np.testing.assert_array_equal(env.commands, drawn)
 
 
-class TestBeginning:
-    def test_everyone_begins_where_they_are_put(self, quadruped, calm, map_ground):
+class TestReset:
+    def test_robots_start_at_their_origins(self, quadruped, calm, map_ground):
         env = LeggedEnv(calm(6), quadruped, map_ground)
         env.curriculum.levels[:] = [0, 1, 2, 0, 1, 2]
         env.curriculum.columns[:] = [0, 0, 0, 1, 1, 1]
@@ -429,10 +427,107 @@ class TestBeginning:
         np.testing.assert_allclose(env.state.base_pos[:, :2], expected[:, :2], atol=1e-5)
         np.testing.assert_allclose(env.state.base_pos[:, 2] - expected[:, 2], 0.346, atol=0.07)
 
-    def test_robots_start_no_higher_than_they_may(self, quadruped, calm, map_ground):
+    def test_initial_levels_fit_the_map(self, quadruped, calm, map_ground):
         env = LeggedEnv(calm(50), quadruped, map_ground)
         assert env.curriculum.levels.max() <= 2
 
-    def test_the_first_level_is_the_tasks(self, quadruped, calm, map_ground):
+    def test_initial_levels_respect_max_init_level(self, quadruped, calm, map_ground):
         env = LeggedEnv(calm(50, terrain=Terrain(max_init_level=0)), quadruped, map_ground)
         assert (env.curriculum.levels == 0).all()
+
+
+# Joints of the cart: wheel_axle, rear_hinge, front_hinge.
+Q = np.array([0.4, -0.3, 0.5])
+DQ = np.array([2.0, -1.0, 0.5])
+
+
+@pytest.fixture
+def torques(cart, calm):
+    """Return the torques of an action in one physics step, from `Q` and `DQ` high in the air."""
+
+    def act(action, offset=(0.0, 0.0, 0.0), **settings):
+        env = LeggedEnv(calm(1, control=Control(**settings)), cart, Plane())
+        sim, scene = env.sim, env.scene
+        sim.qpos[0] = scene.home
+        sim.qpos[0, 2] = 5.0
+        sim.qpos[0, scene.joint_qpos] = Q
+        sim.qvel[0] = 0
+        sim.qvel[0, scene.joint_qvel] = DQ
+        env.joint_offset[:] = offset
+        sim.ctrl[:] = env.to_ctrl(np.float32([action]))
+        sim.step(1)
+        return sim.torque[0].copy()
+
+    return act
+
+
+class TestPositionControl:
+    def test_torques_of_the_specs_gains(self, torques):
+        # Hinges: kp (default + scale a - q) - kd dq; the wheel, without stiffness: kd (12 a - dq).
+        expected = [
+            0.4 * (12 * 0.2 - 2.0),
+            20 * (-0.2 + 0.25 * 0.4 - -0.3) - 1.5 * -1.0,
+            20 * (0.3 + 0.5 * 0.1 - 0.5) - 1.5 * 0.5,
+        ]
+        expected[1] = min(expected[1], 5.0)
+        np.testing.assert_allclose(torques((0.2, 0.4, 0.1)), expected, rtol=1e-5)
+
+    def test_torques_are_clipped_at_effort(self, torques):
+        np.testing.assert_allclose(torques((9, 9, 9)), [3, 5, 6])
+        np.testing.assert_allclose(torques((-9, -9, -9)), [-3, -5, -6])
+
+    def test_joint_offset_shifts_the_target(self, torques):
+        # A motor that measures 0.05 too much goes to 0.05 too little.
+        plain = torques((0.2, 0.0, 0.1))
+        shifted = torques((0.2, 0.0, 0.1), offset=(0.05, 0.05, 0.05))
+        np.testing.assert_allclose(shifted - plain, [0, -20 * 0.05, -20 * 0.05], atol=1e-5)
+
+    def test_task_overrides_gains_and_scale(self, torques):
+        found = torques((0.5, 0.2, 0.1), stiffness=10.0, damping=0.2, action_scale=1.0)
+        expected = [
+            0.2 * (0.5 - 2.0),
+            10 * (-0.2 + 0.2 - -0.3) - 0.2 * -1.0,
+            10 * (0.3 + 0.1 - 0.5) - 0.2 * 0.5,
+        ]
+        np.testing.assert_allclose(found, expected, rtol=1e-5)
+
+    def test_zero_stiffness_controls_velocity(self, torques):
+        # Without stiffness every joint is as a wheel: its target is a speed, around 0.
+        found = torques((0.5, 0.2, 0.1), stiffness=0.0)
+        expected = [0.4 * (6 - 2.0), 1.5 * (0.25 * 0.2 - -1.0), 1.5 * (0.5 * 0.1 - 0.5)]
+        np.testing.assert_allclose(found, expected, rtol=1e-5)
+
+
+class TestVelocityControl:
+    def test_torques_follow_velocity_targets(self, torques):
+        # An action of 1 is the joint's largest speed.
+        found = torques((0.1, 0.1, -0.1), control_type="V")
+        expected = [0.4 * (3.0 - 2.0), 1.5 * (1.0 - -1.0), 1.5 * (-1.0 - 0.5)]
+        np.testing.assert_allclose(found, expected, rtol=1e-5)
+
+    def test_torques_are_clipped_at_effort(self, torques):
+        np.testing.assert_allclose(torques((9, 9, -9), control_type="V"), [3, 5, -6])
+
+    def test_joint_offset_has_no_effect(self, torques):
+        plain = torques((0.1, 0.1, -0.1), control_type="V")
+        found = torques((0.1, 0.1, -0.1), offset=(0.1, 0.1, 0.1), control_type="V")
+        np.testing.assert_array_equal(found, plain)
+
+
+class TestTorqueControl:
+    def test_unit_action_is_the_effort(self, torques):
+        found = torques((0.5, -0.2, 1.0), control_type="T")
+        np.testing.assert_allclose(found, [1.5, -1.0, 6.0], rtol=1e-6)
+
+    def test_task_scale_is_a_torque(self, torques):
+        found = torques((0.5, -0.2, 0.1), control_type="T", action_scale=2.0)
+        np.testing.assert_allclose(found, [1.0, -0.4, 0.2], rtol=1e-6)
+
+    def test_torques_are_clipped_at_effort(self, torques):
+        np.testing.assert_allclose(torques((-9, 9, 9), control_type="T"), [-3, 5, 6])
+
+
+def test_zero_action_is_the_default_pose(quadruped, calm):
+    env = LeggedEnv(calm(2), quadruped, Plane())
+    ctrl = env.to_ctrl(np.zeros((2, 12), np.float32))
+    np.testing.assert_allclose(ctrl, np.tile(quadruped.default_pose, (2, 1)))

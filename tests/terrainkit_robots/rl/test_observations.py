@@ -82,7 +82,7 @@ def slices(group: tuple[ObservationTerm, ...], given: State) -> dict[str, slice]
 
 
 class TestByHand:
-    """Each observation has its own test here; `test_every_observation_is_here` sees to that."""
+    """Each observation has its own test here; `test_every_term_is_tested` sees to that."""
 
     def test_commands(self, robot: Robot) -> None:
         given = state(commands=[[0.5, -1, 0.8]])
@@ -158,14 +158,14 @@ class TestByHand:
         seen = observed(privileged_of(robot), "foot_force", given)
         assert seen == pytest.approx(expected, abs=1e-6)
 
-    def test_every_observation_is_here(self, robot: Robot) -> None:
+    def test_every_term_is_tested(self, robot: Robot) -> None:
         here = {name.removeprefix("test_") for name in vars(TestByHand) if name.startswith("test_")}
         names = {each.name for each in privileged_of(robot)}
-        assert names == here - {"every_observation_is_here"}
+        assert names == here - {"every_term_is_tested"}
 
 
 class TestGroups:
-    def test_policy_is_what_the_task_table_says(self, robot: Robot) -> None:
+    def test_policy_group_has_the_documented_terms(self, robot: Robot) -> None:
         group = group_of(robot)
         found = [(each.name, each.function(state()).shape[1]) for each in group]
         assert found == _TASK_TABLE
@@ -174,12 +174,12 @@ class TestGroups:
             policy_group(robot, Task(), scan=False), state(2), 100.0
         ).shape == (2, 45)
 
-    def test_privileged_is_the_policys_and_more(self, robot: Robot) -> None:
+    def test_privileged_group_extends_the_policy_group(self, robot: Robot) -> None:
         group = privileged_of(robot)
         found = [(each.name, each.function(state()).shape[1]) for each in group]
         assert found == _TASK_TABLE + _SECRETS
 
-    def test_scales_of_the_task(self, robot: Robot) -> None:
+    def test_scales_are_the_tasks(self, robot: Robot) -> None:
         scales = ObsScales(lin_vel=3, ang_vel=5, dof_pos=7, dof_vel=11, height_measurements=13)
         task = Task(normalization=Normalization(obs_scales=scales))
         given = state(
@@ -195,13 +195,13 @@ class TestGroups:
         assert seen[here["height_scan"]].tolist() == [13] * 187
         assert seen[here["base_lin_vel"]].tolist() == [3] * 3
 
-    def test_clip(self, robot: Robot) -> None:
+    def test_values_are_clipped(self, robot: Robot) -> None:
         given = state(dof_vel=[[1e6, -1e6, 30, *[0] * 9]])
         seen = compute_observations(group_of(robot), given, 1.25)
         assert seen[0, 21:24].tolist() == [1.25, -1.25, 1.25]
         assert np.abs(seen).max() == 1.25
 
-    def test_state_is_left_as_it_is(self, robot: Robot) -> None:
+    def test_state_is_not_modified(self, robot: Robot) -> None:
         given, twin = state(3, commands=2, height_scan=2), state(3, commands=2, height_scan=2)
         seen = compute_observations(privileged_of(robot), given, 100.0)
         seen += 1
@@ -221,7 +221,7 @@ _NOISE = {
 
 class TestNoise:
     @pytest.mark.parametrize("level", [1.0, 0.5])
-    def test_is_uniform_with_the_half_width_stated(self, robot: Robot, level: float) -> None:
+    def test_noise_is_uniform(self, robot: Robot, level: float) -> None:
         group = group_of(robot, Task(noise=Noise(noise_level=level)))
         given = state(4000, projected_gravity=[0, 0, -1], dof_pos=robot.default_pose)
         given.height_scan[:] = 0.5
@@ -243,7 +243,7 @@ class TestNoise:
             together = np.corrcoef(drawn[:, 0], drawn[:, 1])[0, 1]
             assert abs(together) < 0.1, name
 
-    def test_is_on_every_noisy_number_of_the_task(self, robot: Robot) -> None:
+    def test_noise_levels_are_the_tasks(self, robot: Robot) -> None:
         noise = Noise(dof_pos=1, dof_vel=2, ang_vel=3, gravity=4, height_measurements=5)
         found = {each.name: each.noise for each in group_of(robot, Task(noise=noise))}
         assert found == {
@@ -256,7 +256,7 @@ class TestNoise:
             "height_scan": 5,
         }
 
-    def test_level_of_zero_is_none(self, robot: Robot) -> None:
+    def test_noise_level_zero_samples_nothing(self, robot: Robot) -> None:
         group = group_of(robot, Task(noise=Noise(noise_level=0)))
         rng = np.random.default_rng(0)
         seen = compute_observations(group, state(5), 100.0, rng)
@@ -264,29 +264,29 @@ class TestNoise:
         # And nothing was drawn in vain.
         assert rng.bit_generator.state == np.random.default_rng(0).bit_generator.state
 
-    def test_privileged_has_none(self, robot: Robot) -> None:
+    def test_privileged_group_has_no_noise(self, robot: Robot) -> None:
         assert {each.noise for each in privileged_of(robot)} == {0.0}
 
-    def test_comes_before_the_clip(self, robot: Robot) -> None:
+    def test_noise_is_added_before_clipping(self, robot: Robot) -> None:
         group = group_of(robot, Task(noise=Noise(dof_vel=1e6)))
         seen = compute_observations(group, state(50), 2.0, np.random.default_rng(0))
         assert np.abs(seen).max() == 2.0
 
 
-class TestEnvironment:
+class TestInEnvironment:
     def make(self, **changes: Any) -> LeggedEnv:
         robot = Robot.load(Path(str(bundled.find("quadruped"))).parent)
         task = replace(Task(env=Env(num_envs=3, num_threads=1)), **changes)
         return LeggedEnv(task, robot, Plane())
 
-    def test_groups_are_those_of_the_table(self) -> None:
+    def test_group_widths(self) -> None:
         obs = self.make().get_observations()
         assert {name: tuple(value.shape) for name, value in obs.items()} == {
             "policy": (3, 45),
             "privileged": (3, 45 + 35),
         }
 
-    def test_scan_where_asked_for(self) -> None:
+    def test_height_scan_on_request(self) -> None:
         env = self.make(terrain=Terrain(measure_heights=True))
         assert env.get_observations()["policy"].shape == (3, 232)
         # On a plane all of it is the height of the base.
@@ -294,7 +294,7 @@ class TestEnvironment:
         height = env.state.base_pos[:, 2:]
         np.testing.assert_allclose(scan, np.tile(5 * (height - 0.5), 187), atol=1e-5)
 
-    def test_policy_is_the_privileged_with_noise(self) -> None:
+    def test_policy_is_privileged_with_noise(self) -> None:
         obs = self.make().get_observations()
         policy, known = obs["policy"], obs["privileged"][:, :45]
         quiet = [*range(3), *range(33, 45)]
@@ -303,7 +303,7 @@ class TestEnvironment:
         assert (policy[:, noisy] != known[:, noisy]).float().mean() > 0.95
         assert (policy - known).abs().max() <= 0.0751
 
-    def test_noise_is_new_at_each_step(self) -> None:
+    def test_noise_changes_every_step(self) -> None:
         env = self.make()
         noises = []
         for _ in range(2):
@@ -312,7 +312,7 @@ class TestEnvironment:
             noises.append(obs["policy"] - obs["privileged"][:, :45])
         assert not torch.equal(*noises)
 
-    def test_known_state_by_hand(self) -> None:
+    def test_observations_of_known_state(self) -> None:
         """Standing upright at the default pose and told 1, 0, 0.5 it sees just this."""
         env = self.make(noise=Noise(noise_level=0.0))
         env.set_commands(np.tile(np.array([1, 0, 0.5], np.float32), (3, 1)))
@@ -322,7 +322,8 @@ class TestEnvironment:
         env.sim.qvel[:] = 0
         env.sim.qvel[:, 6 + 2] = 2.0
         env.actions[0] = 0.25
-        env.state = env._look(np.arange(3), fresh=True)
-        seen = env._observe()["policy"][0]
+        env.state = env._compute_state(np.arange(3), after_reset=True)
+        env._compute_observations()
+        seen = env.get_observations()["policy"][0]
         expected = [2, 0, 0.125, 0, 0, -1, *[0] * 15, 0, 0, 0.1, *[0] * 9, *[0.25] * 12]
         assert seen.tolist() == pytest.approx(expected, abs=1e-6)

@@ -67,7 +67,7 @@ def paid(name: str, robot: Robot, given: State, **settings: Any) -> list[float]:
 
 
 class TestByHand:
-    """Each reward has its own test here; `test_every_reward_is_here` sees to that."""
+    """Each reward has its own test here; `test_every_reward_is_tested` sees to that."""
 
     def test_tracking_lin_vel(self, robot: Robot) -> None:
         given = state(
@@ -175,7 +175,7 @@ class TestByHand:
         longer = paid("feet_air_time", robot, given, air_time_target=0.5)
         assert longer == pytest.approx([0.25, -0.375, 0, 0])
 
-    def test_who_has_almost_reached_a_heading_is_asked_to_stand(self, robot: Robot) -> None:
+    def test_small_yaw_rate_counts_as_standing(self, robot: Robot) -> None:
         given = state(
             4,
             commands=[[0, 0, 0.09], [0, 0, -0.11], [0.05, 0, 0], [0, -0.05, 0.01]],
@@ -232,9 +232,9 @@ class TestByHand:
         less = paid("feet_contact_forces", robot, given, max_contact_force=50)
         assert less == pytest.approx([50, 150 + 100])
 
-    def test_every_reward_is_here(self) -> None:
+    def test_every_reward_is_tested(self) -> None:
         here = {name.removeprefix("test_") for name in vars(TestByHand) if name.startswith("test_")}
-        others = {"every_reward_is_here", "who_has_almost_reached_a_heading_is_asked_to_stand"}
+        others = {"every_reward_is_tested", "small_yaw_rate_counts_as_standing"}
         assert {*REWARDS} == here - others
 
 
@@ -242,15 +242,15 @@ _PENALTIES = sorted({*REWARDS} - {"tracking_lin_vel", "tracking_ang_vel", "feet_
 
 
 @pytest.mark.parametrize("name", sorted(REWARDS))
-class TestEvery:
-    def test_finite_numbers_one_a_robot(self, name: str, robot: Robot) -> None:
+class TestEveryReward:
+    def test_values_are_finite(self, name: str, robot: Robot) -> None:
         for n in (1, 50):
             values = REWARDS[name](random_state(n, seed=n), robot, Rewards())
             assert values.shape == (n,)
             assert np.isfinite(values).all()
             assert values.dtype == np.float32  # or every step pays for conversions
 
-    def test_leaves_the_state_as_it_is(self, name: str, robot: Robot) -> None:
+    def test_state_is_not_modified(self, name: str, robot: Robot) -> None:
         given, twin = random_state(20, seed=2), random_state(20, seed=2)
         first = REWARDS[name](given, robot, Rewards())
         for each in fields(State):
@@ -258,13 +258,13 @@ class TestEvery:
         first += 1  # what is returned is no view of the state either
         np.testing.assert_array_equal(REWARDS[name](given, robot, Rewards()) + 1, first)
 
-    def test_a_robot_is_judged_alone(self, name: str, robot: Robot) -> None:
+    def test_robots_are_independent(self, name: str, robot: Robot) -> None:
         all_of_them = random_state(20, seed=3)
         alone = State(**{f.name: getattr(all_of_them, f.name)[7:8] for f in fields(State)})
         together = REWARDS[name](all_of_them, robot, Rewards())[7]
         assert REWARDS[name](alone, robot, Rewards())[0] == pytest.approx(together, rel=1e-5)
 
-    def test_has_a_scale_and_a_sign_that_fits(self, name: str) -> None:
+    def test_default_scale_has_the_right_sign(self, name: str) -> None:
         scales = {each.name: each.default for each in fields(Rewards)}
         assert isinstance(scales[name], float)
         if name in _PENALTIES:
@@ -272,10 +272,10 @@ class TestEvery:
         else:
             assert scales[name] > 0
 
-    def test_tells_its_unit(self, name: str) -> None:
+    def test_docstring_has_the_unit(self, name: str) -> None:
         """What is no pure number has its unit in brackets at the end of the docstring."""
         told = str(REWARDS[name].__doc__)
-        assert told.startswith("Return ")
+        assert told.startswith(("Reward ", "Penalize ", "Count "))
         assert told.endswith(".")
         pure = {
             "tracking_lin_vel",
@@ -298,7 +298,7 @@ def test_penalties_are_never_negative(name: str, robot: Robot) -> None:
 
 
 @pytest.mark.parametrize("name", ["tracking_lin_vel", "tracking_ang_vel"])
-def test_tracking_is_a_share(name: str, robot: Robot) -> None:
+def test_tracking_is_between_0_and_1(name: str, robot: Robot) -> None:
     values = REWARDS[name](random_state(500, seed=5), robot, Rewards(tracking_sigma=5))
     assert values.min() >= 0
     assert 0.5 < values.max() <= 1
@@ -318,7 +318,7 @@ def test_every_scale_has_a_reward() -> None:
     assert {each.name for each in fields(Rewards)} - settings == {*REWARDS}
 
 
-def test_only_scales_that_are_not_zero_are_chosen() -> None:
+def test_active_rewards_have_nonzero_scales() -> None:
     nothing = dict.fromkeys(REWARDS, 0.0)
     assert active_rewards(Rewards(**nothing)) == {}
     only = active_rewards(Rewards(**(nothing | {"torques": -0.5})))
@@ -337,7 +337,7 @@ _NONE = dict.fromkeys(REWARDS, 0.0)
 _REST = torch.zeros(4, 12)
 
 
-def test_sum_of_scale_times_time_step() -> None:
+def test_reward_is_sum_of_scaled_terms() -> None:
     env = make_env(Rewards(**(_NONE | {"orientation": -3.0, "lin_vel_z": -0.5})))
     before = env.state
     _, rewards, *_ = env.step(_REST)
@@ -358,7 +358,7 @@ def test_zero_scale_is_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "torques" not in env.episode_sums
 
 
-def test_only_positive_rewards_but_for_falls() -> None:
+def test_only_positive_rewards_except_termination() -> None:
     bad = {"orientation": -1e6, "termination": -2.0, "only_positive_rewards": True}
     env = make_env(Rewards(**(_NONE | bad)))
     env.sim.qpos[0, 3:7] = (0, 1, 0, 0)  # on its back
@@ -371,7 +371,7 @@ def test_only_positive_rewards_but_for_falls() -> None:
     assert (rewards < 0).all()
 
 
-def test_sums_are_logged_per_second() -> None:
+def test_episode_sums_are_logged_per_second() -> None:
     env = make_env(
         Rewards(**(_NONE | {"tracking_ang_vel": 2.0, "tracking_sigma": 1e12})),
         episode_length_s=0.2,
@@ -386,7 +386,7 @@ def test_sums_are_logged_per_second() -> None:
     assert env.episode_sums["tracking_ang_vel"].tolist() == [0] * 4
 
 
-def test_sums_are_those_of_an_episode_that_was_short() -> None:
+def test_episode_sums_of_short_episode() -> None:
     env = make_env(Rewards(**(_NONE | {"tracking_ang_vel": 2.0, "tracking_sigma": 1e12})))
     env.step(_REST)
     env.step(_REST)
@@ -417,25 +417,25 @@ def own() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("own")
-class TestOwnReward:
-    def test_is_paid(self) -> None:
+class TestUserReward:
+    def test_user_reward_is_added(self) -> None:
         env = make_env(MyRewards(**(_NONE | {"headway": 10.0})))
         _, rewards, *_ = env.step(_REST)
         np.testing.assert_allclose(rewards, 10 * 0.02 * env.state.base_pos[:, 0], rtol=1e-5)
         assert np.ptp(rewards.numpy()) > 0
         assert list(env.episode_sums) == ["headway"]
 
-    def test_is_logged(self) -> None:
+    def test_user_reward_is_logged(self) -> None:
         env = make_env(MyRewards(headway=1.0), episode_length_s=0.02)
         *_, extras = env.step(_REST)
         assert "Episode/rew_headway" in extras["log"]
 
-    def test_without_its_scale_it_is_not_paid(self) -> None:
+    def test_user_reward_without_scale_is_ignored(self) -> None:
         env = make_env(Rewards())
         assert "headway" not in env.rewards
         assert "headway" not in make_env(MyRewards()).rewards
 
 
-def test_the_kernel_registers_by_name() -> None:
+def test_rewards_are_registered_by_name() -> None:
     for name, function in REWARDS.items():
         assert getattr(module, name) is function

@@ -14,7 +14,7 @@ from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.config import Algorithm, Env, Policy, Rewards, Runner, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import open_run, policy_state, read_checkpoint, save_checkpoint
-from terrainkit_robots.rl.runner import LeggedRunner, runner_config
+from terrainkit_robots.rl.runner import LeggedRunner, resolve_device, runner_config
 from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.terrain import Plane, Terrain
 
@@ -58,7 +58,7 @@ def differences(a: Any, b: Any, path: str = "") -> list[str]:
         assert len(a) == len(b)
         return [d for k in range(len(a)) for d in differences(a[k], b[k], f"{path}[{k}]")]
     same = np.array_equal(a, b, equal_nan=np.asarray(a).dtype.kind == "f")
-    return [] if same or path == ".curves.total_time" else [path]
+    return [] if same or path == ".logger.tot_time" else [path]
 
 
 def test_resuming_continues_exactly(make, tmp_path):
@@ -86,7 +86,7 @@ def test_resuming_continues_exactly_on_a_map(make, task, tmp_path, map_ground):
     assert differences(unbroken.state_dict(), resumed.state_dict()) == []
 
 
-def test_the_same_seed_learns_the_same(make, task):
+def test_same_seed_learns_same_weights(make, task):
     def learned(seed: int) -> dict[str, Any]:
         runner = make(replace(task, runner=replace(task.runner, seed=seed)), folder=None)
         runner.learn(10, init_at_random_ep_len=True)
@@ -97,9 +97,7 @@ def test_the_same_seed_learns_the_same(make, task):
     assert differences(first["actor_state_dict"], learned(2)["actor_state_dict"])
 
 
-def test_another_number_of_environments_keeps_weights_and_curriculum(
-    make, task, tmp_path, map_ground
-):
+def test_load_with_other_num_envs_keeps_curriculum(make, task, tmp_path, map_ground):
     before = make(task, map_ground)
     before.env.curriculum.levels[:] = 2
     before.env.curriculum.success[1, 0] = 0.75
@@ -114,7 +112,7 @@ def test_another_number_of_environments_keeps_weights_and_curriculum(
     more.learn(1)
 
 
-def test_a_policy_alone_lends_its_networks(make, tmp_path):
+def test_load_of_policy_takes_only_networks(make, tmp_path):
     before = make()
     before.learn(1)
     path = tmp_path / "model_1.pt"
@@ -127,7 +125,7 @@ def test_a_policy_alone_lends_its_networks(make, tmp_path):
     )
 
 
-def test_checkpoints_are_written_at_intervals_and_in_the_end(make, task, tmp_path):
+def test_checkpoints_at_intervals_and_at_end(make, task, tmp_path):
     task = replace(task, runner=replace(task.runner, save_interval=2))
     make(task).learn(5)
     assert {path.name for path in tmp_path.glob("*.pt")} == {
@@ -138,7 +136,7 @@ def test_checkpoints_are_written_at_intervals_and_in_the_end(make, task, tmp_pat
     assert len(list(tmp_path.glob("events.out.tfevents.*"))) == 1
 
 
-def test_curves_are_those_of_the_episodes_that_ended(make, tmp_path):
+def test_tensorboard_logs_every_iteration(make, tmp_path):
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
     make().learn(4)
@@ -153,46 +151,48 @@ def test_nothing_is_printed(make, capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def test_whoever_watches_is_told(make, task, map_ground):
+def test_progress_callback_gets_every_iteration(make, task, map_ground):
     seen: list[Any] = []
-    make(task, map_ground, watch=seen.append).learn(4)
+    make(task, map_ground, progress_callback=seen.append).learn(4)
     last = seen[-1]
     assert [progress.iteration for progress in seen] == [1, 2, 3, 4]
-    assert (last.last, last.remaining) == (4, 0)
+    assert (last.max_iterations, last.eta) == (4, 0)
     assert last.reward is not None
     assert 0 < last.episode_length <= 0.3
     assert set(last.levels) == {"stairs", "rough_slope"}
     assert "tracking_lin_vel" in last.rewards
     assert last.steps_per_second > 0
-    assert 0 < last.learning < 1
+    assert 0 < last.learning_fraction < 1
 
 
 def test_stopping_writes_a_checkpoint(make, tmp_path):
     calls = iter([False, False, True])
-    runner = make(stop=lambda: next(calls))
+    runner = make(should_stop=lambda: next(calls))
     runner.learn(100)
     assert runner.current_learning_iteration == 2
     assert [path.name for path in tmp_path.glob("*.pt")] == ["model_2.pt"]
 
 
-def test_networks_that_diverge_are_told_at_once(make, task, tmp_path):
+def test_diverged_networks_raise_at_once(make, task, tmp_path):
     mad = replace(task, algorithm=Algorithm(learning_rate=1e30, schedule="fixed"))
     with pytest.raises(ConfigError, match=r"iteration 1: the networks have diverged"):
         make(mad).learn(5)
     assert list(tmp_path.glob("*.pt")) == []
 
 
-def test_a_checkpoint_of_another_robot_is_told(make, biped, tmp_path):
+def test_load_rejects_another_robot(make, biped, tmp_path):
     make().save()
-    with pytest.raises(ConfigError, match=r"is of another robot, quadruped, whose joints are: .*_"):
+    with pytest.raises(
+        ConfigError, match=r"belongs to another robot, quadruped: got the joints .*_"
+    ):
         make(robot=biped).load(tmp_path / "model_0.pt")
 
 
-def test_a_checkpoint_of_another_task_is_told(make, task, tmp_path, map_ground):
+def test_load_rejects_another_task(make, task, tmp_path, map_ground):
     make().save()
     path = tmp_path / "model_0.pt"
     with pytest.raises(
-        ConfigError, match=r"is of another task: its observations policy are 45 numb"
+        ConfigError, match=r"belongs to another task: got 45 policy observations; exp"
     ):
         make(ground=map_ground).load(path)
     wide = replace(task, policy=replace(task.policy, actor_hidden_dims=(32,)))
@@ -202,7 +202,7 @@ def test_a_checkpoint_of_another_task_is_told(make, task, tmp_path, map_ground):
         make(wide).load(path)
 
 
-def test_a_checkpoint_of_another_map_is_told(make, task, tmp_path, map_ground):
+def test_load_rejects_another_map(make, task, tmp_path, map_ground):
     blind = replace(task, terrain=replace(task.terrain, measure_heights=False))
     make(blind).save()
     with pytest.raises(
@@ -211,7 +211,7 @@ def test_a_checkpoint_of_another_map_is_told(make, task, tmp_path, map_ground):
         make(blind, map_ground).load(tmp_path / "model_0.pt")
 
 
-def test_a_checkpoint_with_parts_that_are_no_state_is_told(make, tmp_path):
+def test_load_rejects_malformed_parts(make, tmp_path):
     runner = make()
     runner.save()
     path = tmp_path / "model_0.pt"
@@ -220,7 +220,7 @@ def test_a_checkpoint_with_parts_that_are_no_state_is_told(make, tmp_path):
         {"optimizer_state_dict": {}},
         {"processes": []},
         {"processes": [{"env": 3}]},
-        {"curves": {}},
+        {"logger": {}},
     ):
         save_checkpoint(tmp_path / "changed.pt", read_checkpoint(path) | change)
         with pytest.raises(ConfigError, match=r"changed\.pt does not fit"):
@@ -228,14 +228,14 @@ def test_a_checkpoint_with_parts_that_are_no_state_is_told(make, tmp_path):
 
 
 @pytest.mark.parametrize("symmetry", ["augmentation", "loss"])
-def test_symmetry_is_learned_with(make, task, symmetry):
+def test_symmetry_setting_reaches_rsl_rl(make, task, symmetry):
     runner = make(replace(task, algorithm=Algorithm(symmetry=symmetry)), folder=None)
     runner.learn(1)
     assert runner.alg.symmetry.use_data_augmentation == (symmetry == "augmentation")
     assert runner.alg.symmetry.use_mirror_loss == (symmetry == "loss")
 
 
-def test_every_value_of_the_task_reaches_rsl_rl():
+def test_runner_config_has_the_tasks_values():
     task = Task(
         policy=Policy(actor_hidden_dims=(7,), critic_hidden_dims=(5, 6), activation="relu"),
         algorithm=Algorithm(gamma=0.5, entropy_coef=0.125, num_mini_batches=2),
@@ -284,7 +284,7 @@ torch.save(
 """
 
 
-def test_two_processes_learn_the_same_weights_from_robots_of_their_own(tmp_path):
+def test_two_processes_learn_the_same_weights(tmp_path):
     (tmp_path / "two.py").write_text(TWO_PROCESSES)
     launch = ["torch.distributed.run", "--nproc-per-node", "2", "--standalone"]
     run = subprocess.run(
@@ -303,6 +303,27 @@ def test_two_processes_learn_the_same_weights_from_robots_of_their_own(tmp_path)
     assert differences(first["qpos"], second["qpos"])
     assert (first["folder"], second["folder"]) == (str(tmp_path / "run"), "None")
     state = read_checkpoint(tmp_path / "run" / "model_2.pt")
-    assert [len(each["env"]["observed"]["policy"]) for each in state["processes"]] == [3, 2]
+    assert [len(each["env"]["observations"]["policy"]) for each in state["processes"]] == [3, 2]
     assert len(list((tmp_path / "run").glob("events.*"))) == 1
     assert open_run(tmp_path / "run").task.env.num_envs == 5
+
+
+@pytest.mark.parametrize("name", ["cpu", "cpu:0"])
+def test_resolve_device_accepts_cpu(name):
+    assert resolve_device(name) == "cpu"
+
+
+@pytest.mark.parametrize("name", ["gpu", "abacus", "", "meta", "cuda:99", "cuda:-1"])
+def test_resolve_device_lists_devices(name):
+    with pytest.raises(ConfigError, match=f"device: got '{name}'; expected one of: cpu"):
+        resolve_device(name)
+
+
+@pytest.mark.parametrize(("name", "there"), [("cuda", True), ("cuda:1", True), ("cuda:2", False)])
+def test_resolve_device_counts_gpus(monkeypatch, name, there):
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 2)
+    if there:
+        assert resolve_device(name) == name
+    else:
+        with pytest.raises(ConfigError, match="'cuda:2'; expected one of: cpu, cuda:0, cuda:1"):
+            resolve_device(name)

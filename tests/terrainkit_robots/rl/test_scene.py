@@ -31,7 +31,7 @@ def contacts(model, qpos):
     return {frozenset(model.geom(g).name for g in contact.geom) for contact in data.contact}
 
 
-class TestMotors:
+class TestActuators:
     def test_are_in_the_order_of_the_spec(self, scene, cart):
         model = scene.model
         assert model.nu == 3
@@ -40,7 +40,7 @@ class TestMotors:
         # The MJCF has them in another order, or this would prove nothing.
         assert list(scene.joint_qpos) != sorted(scene.joint_qpos)
 
-    def test_have_the_gains_and_limits_of_the_spec(self, scene):
+    def test_gains_and_limits_are_the_specs(self, scene):
         model = scene.model
         np.testing.assert_allclose(model.actuator_gainprm[:, 0], [0.4, 20, 20])
         np.testing.assert_allclose(
@@ -49,69 +49,69 @@ class TestMotors:
         np.testing.assert_allclose(model.actuator_forcerange, [[-3, 3], [-5, 5], [-6, 6]])
         assert model.actuator_forcelimited.all()
 
-    def test_take_nothing_over_from_the_file(self, scene):
+    def test_defaults_of_the_file_are_ignored(self, scene):
         # Its default for motors has a gear of 7 and a narrow range of controls.
         np.testing.assert_allclose(scene.model.actuator_gear[:, 0], 1)
         assert not scene.model.actuator_ctrllimited.any()
 
-    def test_nor_from_its_joints(self, scene):
+    def test_torque_limits_of_the_file_are_ignored(self, scene):
         # A joint of the file passes on 1 N m: the spec's effort is 6, and torques would say so.
         assert not scene.model.jnt_actfrclimited.any()
 
-    def test_joints_have_the_armature_of_the_spec_and_no_dry_friction(self, scene):
+    def test_armature_is_the_specs_without_friction(self, scene):
         np.testing.assert_allclose(scene.model.dof_armature[scene.joint_qvel], [0.001, 0.01, 0.02])
         assert (scene.model.dof_frictionloss == 0).all()
         assert (scene.model.dof_armature[:6] == 0).all()
 
-    def test_dry_friction_may_be_kept(self, cart, calm):
+    def test_joint_friction_can_be_kept(self, cart, calm):
         scene = build_scene(cart, Plane(), calm(asset=Asset(joint_friction=True)))
         np.testing.assert_allclose(scene.model.dof_frictionloss[scene.joint_qvel], 0.3)
 
-    def test_torque_control_has_plain_motors(self, cart, calm):
+    def test_torque_control_adds_plain_motors(self, cart, calm):
         model = build_scene(cart, Plane(), calm(control=Control(control_type="T"))).model
         np.testing.assert_allclose(model.actuator_gainprm[:, 0], 1)
         assert (model.actuator_biasprm == 0).all()
 
 
-class TestPlaces:
+class TestIndices:
     def test_home_is_the_default_pose(self, scene, cart):
         for name, position in zip(cart.spec.joint_order, cart.default_pose, strict=True):
             address = scene.model.joint(name).qposadr[0]
             assert scene.home[address] == pytest.approx(position)
         np.testing.assert_array_equal(scene.home[:7], [0, 0, 0, 1, 0, 0, 0])
 
-    def test_speeds_are_those_of_the_same_joints(self, scene, cart):
+    def test_joint_qvel_matches_joint_order(self, scene, cart):
         for k, name in enumerate(cart.spec.joint_order):
             assert scene.joint_qvel[k] == scene.model.joint(name).dofadr[0]
 
-    def test_base_and_touching_geoms(self, scene):
+    def test_base_and_colliding_geoms(self, scene):
         assert scene.model.body(scene.base).name == "trunk"
         names = {scene.model.geom(g).name for g in scene.geoms}
         assert names == {"hull", "front_leg", "front_ball", "rear_leg", "tire"}
 
-    def test_nothing_is_left_of_the_files_own_sensors_and_keyframes(self, scene):
+    def test_sensors_and_keyframes_of_file_are_removed(self, scene):
         assert scene.model.nkey == 0
         assert all(scene.model.sensor(k).name != "old" for k in range(scene.model.nsensor))
 
-    def test_blocks_cover_all_sensors(self, scene):
+    def test_sensor_ranges_cover_all_sensors(self, scene):
         last = 0
         for block in scene.sensors.values():
             assert block.start == last
             last = block.stop
         assert last == scene.model.nsensordata
 
-    def test_sensors_of_the_ground_do_not_shift_those_of_the_robot(self, cart, calm, tmp_path):
+    def test_sensors_of_terrain_do_not_shift_ranges(self, cart, calm, tmp_path):
         path = tmp_path / "ground.xml"
         path.write_text(
             '<mujoco><worldbody><geom type="plane" size="5 5 0.1"/></worldbody>'
             "<sensor><clock/></sensor></mujoco>"
         )
-        ground = ModelTerrain(path, cell=0.1, reach=1.0)
+        ground = ModelTerrain(path, cell=0.1, half_size=1.0)
         scene = build_scene(cart, ground, calm())
         foot = scene.model.sensor("foot_position_sole of wheel")
         assert foot.adr[0] == scene.sensors["foot_position"].start
 
-    def test_physics_are_those_of_the_task(self, cart, calm):
+    def test_options_are_the_tasks(self, cart, calm):
         task = calm(sim=Sim(dt=0.002, iterations=7, ls_iterations=9))
         option = build_scene(cart, Plane(), task).model.opt
         assert option.timestep == 0.002
@@ -129,16 +129,16 @@ class TestCollisions:
             qpos[scene.model.joint(name).qposadr[0]] = turn
         return qpos
 
-    def test_the_robot_does_not_touch_itself(self, scene):
+    def test_no_self_collisions_by_default(self, scene):
         assert contacts(scene.model, self.folded(scene)) == set()
 
-    def test_unless_asked_to(self, cart, calm):
+    def test_self_collisions_can_be_enabled(self, cart, calm):
         scene = build_scene(cart, Plane(), calm(asset=Asset(self_collisions=True)))
         touching = contacts(scene.model, self.folded(scene))
         assert any("ground" not in "".join(pair) for pair in touching)
 
     @pytest.mark.parametrize("self_collisions", [False, True])
-    def test_all_that_is_solid_touches_the_ground(self, cart, calm, self_collisions):
+    def test_all_solid_geoms_touch_the_ground(self, cart, calm, self_collisions):
         scene = build_scene(cart, Plane(), calm(asset=Asset(self_collisions=self_collisions)))
         qpos = scene.home.copy()
         qpos[2] = -0.5
@@ -151,7 +151,7 @@ class TestCollisions:
         assert {"hull", "front_leg", "front_ball", "rear_leg", "tire"} <= touching
         assert "paint" not in touching
 
-    def test_only_feet_and_what_ends_an_episode_may(self, cart, calm):
+    def test_collisions_of_feet_and_termination_bodies_only(self, cart, calm):
         touching = []
         for collisions in ("all", "feet_and_termination"):
             task = calm(asset=Asset(collisions=collisions), rewards=Rewards(collision=0.0))
@@ -161,24 +161,24 @@ class TestCollisions:
         assert touching == [{"trunk", "front", "rear", "wheel"}, {"trunk", "front", "wheel"}]
 
     @pytest.mark.parametrize("affinity", [(1, 1), (0, 1), (1, 0), (2, 4), (8, 0)])
-    def test_whatever_bits_the_ground_has(self, cart, calm, tmp_path, affinity):
+    def test_contact_with_any_terrain_bits(self, cart, calm, tmp_path, affinity):
         path = tmp_path / "ground.xml"
         path.write_text(
             '<mujoco><worldbody><geom name="floor" type="plane" size="5 5 0.1" '
             f'contype="{affinity[0]}" conaffinity="{affinity[1]}"/></worldbody></mujoco>'
         )
-        scene = build_scene(cart, ModelTerrain(path, cell=0.1, reach=1.0), calm())
+        scene = build_scene(cart, ModelTerrain(path, cell=0.1, half_size=1.0), calm())
         qpos = scene.home.copy()
         qpos[2] = 0.15
         assert any("ground/floor" in pair for pair in contacts(scene.model, qpos))
 
-    def test_friction_is_the_robots_own(self, scene):
+    def test_contact_friction_is_the_robots(self, scene):
         assert (scene.model.geom_priority[scene.geoms] == 1).all()
         assert (scene.model.geom_condim[scene.geoms] == 3).all()
 
 
 class TestForces:
-    def test_a_standing_robot_is_borne_by_its_feet(self, standing):
+    def test_feet_carry_a_standing_robot(self, standing):
         weight = weight_of(standing.scene)
         total = standing.state.foot_force.sum(axis=1)
         np.testing.assert_allclose(total[:, 2], weight, rtol=0.01)
@@ -187,7 +187,7 @@ class TestForces:
         assert (standing.state.penalized_force == 0).all()
 
     @pytest.mark.parametrize("collision", ["hfield", "boxes"])
-    def test_and_so_on_a_map(self, quadruped, calm, mixed_map, collision):
+    def test_feet_carry_the_robot_on_a_map(self, quadruped, calm, mixed_map, collision):
         # Which of two geoms is the first differs with their kind; the force must not.
         env = LeggedEnv(calm(6), quadruped, MapTerrain(mixed_map, collision))
         env.curriculum.levels[:] = 0
@@ -198,7 +198,7 @@ class TestForces:
             env.state.foot_force.sum(axis=1)[:, 2], weight_of(env.scene), rtol=0.02
         )
 
-    def test_a_robot_on_its_back_is_borne_by_its_trunk(self, cart, calm):
+    def test_trunk_carries_a_robot_on_its_back(self, cart, calm):
         scene = build_scene(cart, Plane(), calm(1))
         sim = Simulation(scene, 1, 1)
         sim.qpos[0] = scene.home
@@ -210,25 +210,25 @@ class TestForces:
         assert (sim.sensor("foot_force") == 0).all()
 
 
-class TestRefused:
+class TestBuildSceneErrors:
     @pytest.mark.parametrize(
         ("changes", "message"),
         [
             ({"base": "torso"}, "has no body 'torso', the base of its spec"),
-            ({"base": "front"}, "front is not free to move; wanted a freejoint"),
-            ({"feet": ("hoof",)}, "feet of cart has 'hoof'; the bodies of cart.xml are: "),
-            ({"termination_contacts": ("x",)}, "termination_contacts of cart has 'x'"),
-            ({"penalized_contacts": ("x",)}, "penalized_contacts of cart has 'x'"),
-            ({"mjcf": "gone.xml"}, "MuJoCo does not read .*gone.xml"),
+            ({"base": "front"}, "front has no freejoint of its own"),
+            ({"feet": ("hoof",)}, "feet of cart: got 'hoof'; the bodies of cart.xml are: "),
+            ({"termination_contacts": ("x",)}, "termination_contacts of cart: got 'x'"),
+            ({"penalized_contacts": ("x",)}, "penalized_contacts of cart: got 'x'"),
+            ({"mjcf": "gone.xml"}, "MuJoCo cannot read .*gone.xml"),
         ],
     )
-    def test_a_spec_of_another_robot(self, cart, calm, changes, message):
+    def test_build_scene_rejects_mismatched_spec(self, cart, calm, changes, message):
         other = Robot.from_spec(replace(cart.spec, **changes), cart.mjcf.parent)
         with pytest.raises(ConfigError, match=message) as caught:
             build_scene(other, Plane(), calm())
         assert "\n" not in str(caught.value)
 
-    def test_a_joint_that_is_not_there(self, cart, calm):
+    def test_build_scene_rejects_unknown_joint(self, cart, calm):
         tables = {
             name: {".*": 0.5}
             for name in (
@@ -241,7 +241,7 @@ class TestRefused:
         with pytest.raises(ConfigError, match=r"joint 'fore_hinge'; cart\.xml has: "):
             build_scene(Robot.from_spec(spec, cart.mjcf.parent), Plane(), calm())
 
-    def test_something_else_that_moves_before_the_robot(self, cart, calm, tmp_path):
+    def test_build_scene_rejects_other_moving_bodies(self, cart, calm, tmp_path):
         # Positions begin with those of the base.
         text = cart.mjcf.read_text().replace(
             '<body name="trunk"',
@@ -252,8 +252,67 @@ class TestRefused:
             build_scene(Robot.from_spec(cart.spec, tmp_path), Plane(), calm())
         assert "\n" not in str(caught.value)
 
-    def test_a_file_that_is_no_robot(self, cart, calm, tmp_path):
+    def test_build_scene_rejects_malformed_mjcf(self, cart, calm, tmp_path):
         (tmp_path / "cart.xml").write_text("<mujoco><worldbody>")
-        with pytest.raises(ConfigError, match="MuJoCo does not read"):
+        with pytest.raises(ConfigError, match="MuJoCo cannot read"):
             build_scene(Robot.from_spec(cart.spec, tmp_path), Plane(), calm())
         assert not (tmp_path / "MUJOCO_LOG.TXT").exists()
+
+
+class TestRobot:
+    def test_are_in_the_order_of_the_spec(self, cart):
+        np.testing.assert_allclose(cart.default_pose, [0.0, -0.2, 0.3], rtol=1e-6)
+        np.testing.assert_allclose(cart.effort, [3.0, 5.0, 6.0])
+        np.testing.assert_allclose(cart.velocity, [30.0, 10.0, 10.0])
+        assert cart.default_pose.dtype == np.float32
+
+    def test_joint_without_limits_is_unbounded(self, cart):
+        np.testing.assert_allclose(cart.lower, [-np.inf, -0.9, -0.9], rtol=1e-6)
+        np.testing.assert_allclose(cart.upper, [np.inf, 0.9, 0.9], rtol=1e-6)
+
+    @pytest.mark.parametrize(
+        ("stiffness", "damping", "wheel"), [(0.0, 1.0, True), (0.0, 0.0, False), (5.0, 1.0, False)]
+    )
+    def test_wheels_have_damping_and_no_stiffness(
+        self, cart_spec, tmp_path, stiffness, damping, wheel
+    ):
+        spec = replace(cart_spec, stiffness={".*": stiffness}, damping={".*": damping})
+        assert Robot.from_spec(spec, tmp_path).wheels.tolist() == [wheel] * len(spec.joint_order)
+
+    def test_mjcf_is_beside_the_spec(self, cart):
+        assert cart.mjcf.name == "cart.xml"
+        assert cart.mjcf.is_file()
+
+    @pytest.mark.parametrize("name", ["quadruped", "biped"])
+    def test_bundled_robots_have_valid_arrays(self, name, request):
+        robot = request.getfixturevalue(name)
+        assert len(robot.default_pose) == len(robot.spec.joint_order)
+        assert (robot.lower < robot.default_pose).all()
+        assert (robot.default_pose < robot.upper).all()
+        assert (robot.effort > 0).all()
+
+
+class TestRobotErrors:
+    @pytest.mark.parametrize(
+        ("changes", "message"),
+        [
+            ({"floating": False}, "base of cart: got a fixed base"),
+            ({"feet": ()}, "feet of cart: got none"),
+            ({"spawn_height": None}, "lacks spawn_height or base_height_target"),
+            ({"base_height_target": None}, "lacks spawn_height or base_height_target"),
+            ({"effort": {"wheel_axle": 3.0}}, "effort"),
+            ({"default_pose": {".*": 0.0, "ghost": 1.0}}, "ghost"),
+        ],
+    )
+    def test_from_spec_rejects_incomplete_spec(self, cart_spec, tmp_path, changes, message):
+        with pytest.raises(ConfigError, match=message) as caught:
+            Robot.from_spec(replace(cart_spec, **changes), tmp_path)
+        assert "\n" not in str(caught.value)
+
+    def test_load_rejects_folder_without_spec(self, tmp_path):
+        with pytest.raises(ConfigError, match=r"got no robot\.toml; expected an onboarded"):
+            Robot.load(tmp_path)
+
+    def test_load_rejects_missing_folder(self, tmp_path):
+        with pytest.raises(ConfigError, match=r"got no robot\.toml"):
+            Robot.load(tmp_path / "nowhere")

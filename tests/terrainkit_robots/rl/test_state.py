@@ -42,7 +42,7 @@ def sensed(cart, moving):
             )  # fmt: skip
         model = spec.compile()
     found = []
-    for qpos, qvel in zip(moving.physics.qpos, moving.physics.qvel, strict=True):
+    for qpos, qvel in zip(moving.sim.qpos, moving.sim.qvel, strict=True):
         data = mujoco.MjData(model)
         data.qpos[:], data.qvel[:] = qpos, qvel
         mujoco.mj_forward(model, data)
@@ -53,33 +53,33 @@ def sensed(cart, moving):
     return found
 
 
-class TestAgainstSensors:
-    def test_velocity_of_the_base_is_that_of_a_velocimeter(self, moving, sensed):
+class TestStateAgainstMujoco:
+    def test_base_lin_vel_matches_velocimeter(self, moving, sensed):
         expected = [each["velocity"] for each in sensed]
         np.testing.assert_allclose(moving.state.base_lin_vel, expected, atol=1e-5)
         assert np.abs(expected).max() > 0.5
 
-    def test_angular_velocity_is_that_of_a_gyro(self, moving, sensed):
+    def test_base_ang_vel_matches_gyro(self, moving, sensed):
         expected = [each["turn"] for each in sensed]
         np.testing.assert_allclose(moving.state.base_ang_vel, expected, atol=1e-5)
 
-    def test_gravity_is_against_the_worlds_up(self, moving, sensed):
+    def test_projected_gravity_matches_frame_axis(self, moving, sensed):
         expected = [-each["up"] for each in sensed]
         np.testing.assert_allclose(moving.state.projected_gravity, expected, atol=1e-5)
 
-    def test_speeds_of_joints_are_in_the_order_of_the_spec(self, moving, sensed):
+    def test_dof_vel_is_in_spec_order(self, moving, sensed):
         joints = ("wheel_axle", "rear_hinge", "front_hinge")
         expected = [[each[name][0] for name in joints] for each in sensed]
         np.testing.assert_allclose(moving.state.dof_vel, expected, atol=1e-5)
 
-    def test_feet_are_where_they_touch(self, moving, sensed):
+    def test_foot_height_is_at_the_sole(self, moving, sensed):
         # A foot's own radius is taken off; the sole of the leg is between its two shapes.
         expected = [each["wheel"][2] - 0.03 for each in sensed]
         np.testing.assert_allclose(moving.state.foot_height[:, 0], expected, atol=1e-5)
 
 
 class TestByHand:
-    def test_a_cart_that_has_not_moved(self, cart, calm):
+    def test_state_at_rest(self, cart, calm):
         state = LeggedEnv(calm(2), cart, Plane()).state
         np.testing.assert_allclose(state.base_pos, [[0, 0, 0.24]] * 2, atol=1e-6)
         np.testing.assert_allclose(state.base_height, [0.24] * 2, atol=1e-6)
@@ -92,7 +92,7 @@ class TestByHand:
         wheel = 0.24 - 0.2 * np.cos(0.2) - 0.03
         np.testing.assert_allclose(state.foot_height[:, 0], wheel, atol=1e-5)
 
-    def test_acceleration_is_the_change_of_speed(self, cart, calm):
+    def test_dof_acc_is_finite_difference(self, cart, calm):
         env = LeggedEnv(calm(2), cart, Plane())
         before = env.state.dof_vel.copy()
         for _ in range(3):
@@ -101,7 +101,7 @@ class TestByHand:
             np.testing.assert_allclose(env.state.dof_acc, expected, rtol=1e-4, atol=1e-4)
             before = env.state.dof_vel.copy()
 
-    def test_actions_are_remembered_for_two_steps(self, cart, calm):
+    def test_last_actions_are_kept(self, cart, calm):
         env = LeggedEnv(calm(2), cart, Plane())
         for value in (0.1, 0.2, 0.3):
             env.step(torch.full((2, 3), value))
@@ -109,14 +109,14 @@ class TestByHand:
         np.testing.assert_allclose(env.state.last_actions, 0.2)
         np.testing.assert_allclose(env.state.last_last_actions, 0.1)
 
-    def test_torques_are_in_the_order_of_the_spec(self, cart, calm):
+    def test_torques_are_in_spec_order(self, cart, calm):
         env = LeggedEnv(calm(1), cart, Plane())
         env.sim.qpos[:, 2] = 2.0
         env.step(torch.tensor([[50.0, 0.0, 0.0]]))  # the wheel only
         assert env.state.torques[0, 0] == pytest.approx(3.0)
         assert np.abs(env.state.torques[0, 1:]).max() < 1.0
 
-    def test_air_time_counts_from_the_start_and_from_each_lift(self, quadruped, calm):
+    def test_air_time_counts_until_contact(self, quadruped, calm):
         env = LeggedEnv(calm(1), quadruped, Plane())
         env.sim.qpos[:, 2] = 0.6
         flown = 0
@@ -131,12 +131,12 @@ class TestByHand:
         assert not (env.state.first_contact[0] & came).any()
         np.testing.assert_allclose(env.air_time[0, came & (env.state.foot_force[0, :, 2] > 1)], 0)
 
-    def test_a_foot_that_has_stood_since_it_came_down_comes_down_no_more(self, standing):
+    def test_standing_feet_have_no_first_contact(self, standing):
         for _ in range(5):
             standing.step(torch.zeros(4, 12))
             assert not standing.state.first_contact.any()
 
-    def test_a_push_changes_the_velocity_in_the_world(self, cart, calm):
+    def test_push_adds_to_world_velocity(self, cart, calm):
         task = calm(
             64,
             domain_rand=DomainRand(
@@ -159,7 +159,7 @@ class TestByHand:
         np.testing.assert_array_equal(seen[0], ~seen[1])
         np.testing.assert_array_equal(seen[2:], seen[:2])
 
-    def test_the_error_of_a_joints_zero_is_observed_and_told(self, cart, calm):
+    def test_joint_offset_is_observed(self, cart, calm):
         task = calm(
             2,
             domain_rand=DomainRand(
@@ -175,8 +175,8 @@ class TestByHand:
         assert cart.wheels.tolist() == [True, False, False]
 
 
-class TestCopies:
-    def test_arrays_stay_when_the_physics_goes_on(self, quadruped, lively):
+class TestStateCopies:
+    def test_state_is_unchanged_by_later_steps(self, quadruped, lively):
         env = LeggedEnv(lively(3), quadruped, Plane())
         env.step(torch.zeros(3, 12))
         kept = env.state
@@ -186,7 +186,7 @@ class TestCopies:
         for name, value in before.items():
             np.testing.assert_array_equal(getattr(kept, name), value, err_msg=name)
 
-    def test_nothing_in_it_is_the_environments_own(self, quadruped, lively):
+    def test_state_shares_no_memory(self, quadruped, lively):
         # A reward that writes into the state must not change the robots.
         env = LeggedEnv(lively(3), quadruped, Plane())
         env.step(torch.zeros(3, 12))
@@ -196,22 +196,22 @@ class TestCopies:
             value = getattr(env.state, field.name)
             assert not any(np.shares_memory(value, other) for other in own), field.name
 
-    def test_numbers_are_single(self, quadruped, calm, map_ground):
+    def test_state_is_single_precision(self, quadruped, calm, map_ground):
         env = LeggedEnv(calm(3), quadruped, map_ground)
         env.step(torch.zeros(3, 12))
         for field in fields(State):
             value = getattr(env.state, field.name)
             assert value.dtype in (np.float32, np.bool_), field.name
 
-    def test_put_takes_over_some_robots(self, quadruped, lively):
+    def test_update_replaces_some_rows(self, quadruped, lively):
         first = LeggedEnv(lively(4), quadruped, Plane()).state
         before = first.base_pos.copy()
         other = LeggedEnv(lively(2, init_state=InitState(position=3.0)), quadruped, Plane()).state
-        first.put(np.array([1, 3]), other)
+        first.update(np.array([1, 3]), other)
         np.testing.assert_array_equal(first.base_pos[[1, 3]], other.base_pos)
         np.testing.assert_array_equal(first.base_pos[[0, 2]], before[[0, 2]])
 
-    def test_a_robot_that_has_just_begun_shows_nothing_of_the_one_before(self, quadruped, calm):
+    def test_state_after_reset_is_fresh(self, quadruped, calm):
         env = LeggedEnv(calm(3), quadruped, Plane())
         for _ in range(30):
             env.step(torch.full((3, 12), 0.5))

@@ -114,7 +114,7 @@ def assert_images(env: LeggedEnv, mirror: MirrorMaps, tolerance: float) -> None:
 
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
 class TestRobot:
-    def test_image_of_image(self, name: str) -> None:
+    def test_maps_are_involutions(self, name: str) -> None:
         env = make_env(name, Valley())
         mirror = mirror_maps(env)
         for image in (*mirror.groups.values(), mirror.actions):
@@ -163,7 +163,7 @@ class TestRobot:
         rewards = env._compute_rewards(env.state, np.zeros(env.num_envs, bool))
         np.testing.assert_allclose(rewards[:_PAIRS], rewards[_PAIRS:], atol=1e-4)
 
-    def test_wrong_sign_is_seen(self, name: str) -> None:
+    def test_wrong_sign_is_detected(self, name: str) -> None:
         """Proves that the tests above can fail."""
         env = make_env(name)
         mirror = mirror_maps(env)
@@ -175,8 +175,8 @@ class TestRobot:
             assert_images(env, mirror, 3e-5)
 
 
-class TestMirrored:
-    def test_originals_then_images(self) -> None:
+class TestAugment:
+    def test_originals_precede_images(self) -> None:
         env = make_env("quadruped")
         mirror, obs = mirror_maps(env), env.get_observations()
         actions = torch.randn(8, 12)
@@ -191,7 +191,7 @@ class TestMirrored:
         np.testing.assert_array_equal(acted[:8], actions)
         np.testing.assert_array_equal(acted[8:], mirror.actions(actions.numpy()))
 
-    def test_either_may_be_none(self) -> None:
+    def test_obs_or_actions_may_be_none(self) -> None:
         env = make_env("quadruped")
         both, acted = augment(env, None, torch.zeros(2, 12))
         assert both is None
@@ -202,7 +202,7 @@ class TestMirrored:
         assert both is not None
         assert both["policy"].shape == (6, 45)
 
-    def test_gradients_pass(self) -> None:
+    def test_gradients_flow(self) -> None:
         env = make_env("quadruped")
         actions = torch.zeros(1, 12, requires_grad=True)
         _, acted = augment(env, None, actions)
@@ -212,7 +212,7 @@ class TestMirrored:
         # Of a quadruped's joints only the hips turn the other way: 1 + 1 or 1 - 1.
         assert sorted(actions.grad[0].tolist()) == [0] * 4 + [2] * 8
 
-    def test_rsl_rl_takes_it(self) -> None:
+    def test_rsl_rl_accepts_augment(self) -> None:
         from rsl_rl.extensions.symmetry import Symmetry
         from rsl_rl.storage import RolloutStorage
 
@@ -227,7 +227,7 @@ class TestMirrored:
         assert batch.actions.shape == (16, 12)
         assert batch.values[:, 0].tolist() == 2 * list(range(8))
 
-    def test_group_unknown_here(self) -> None:
+    def test_unknown_group_is_rejected(self) -> None:
         env = make_env("quadruped")
         with pytest.raises(
             ConfigError, match="group: got 'camera'; expected one of: policy, privileged"
@@ -246,7 +246,7 @@ class TestNames:
             assert names[index] == names[k][0] + swapped + names[k][2:]
             assert sign == (-1 if "hip" in names[k] else 1)
 
-    def test_commands_vectors_turns(self) -> None:
+    def test_signs_of_commands_and_vectors(self) -> None:
         image = mirror_maps(make_env("quadruped")).groups["policy"]
         np.testing.assert_array_equal(image.index[:9], range(9))
         np.testing.assert_array_equal(image.sign[:9], [1, -1, -1, 1, -1, 1, -1, 1, -1])
@@ -271,14 +271,14 @@ class TestNames:
 
 
 class TestErrors:
-    def test_joint_without_twin(self) -> None:
+    def test_joint_without_pair_is_rejected(self) -> None:
         robot = robot_named("quadruped")
         mirror = {k: v for k, v in robot.spec.mirror.items() if k != "FL_hip_joint"}
         env = make_env("", robot=replace(robot, spec=replace(robot.spec, mirror=mirror)))
         with pytest.raises(ConfigError, match=r"needs a pair for each joint.*FL_hip_joint"):
             mirror_maps(env)
 
-    def test_twin_that_is_not_one(self) -> None:
+    def test_inconsistent_pair_is_rejected(self) -> None:
         robot = robot_named("quadruped")
         mirror = dict(robot.spec.mirror) | {
             "FL_hip_joint": MirrorJoint(joint="RR_hip_joint", sign=-1)
@@ -287,7 +287,7 @@ class TestErrors:
         with pytest.raises(ConfigError, match="FL_hip_joint is paired with 'RR_hip_joint'"):
             mirror_maps(env)
 
-    def test_default_pose_differs(self) -> None:
+    def test_asymmetric_default_pose_is_rejected(self) -> None:
         robot = robot_named("quadruped")
         pose = robot.default_pose.copy()
         pose[1] += 0.1
@@ -295,7 +295,7 @@ class TestErrors:
             mirror_maps(make_env("", robot=replace(robot, default_pose=pose)))
 
     @pytest.mark.parametrize("table", ["stiffness", "damping", "effort"])
-    def test_control_differs(self, table: str) -> None:
+    def test_asymmetric_control_is_rejected(self, table: str) -> None:
         robot = robot_named("quadruped")
         values = robot.spec.per_joint(table)
         other = {**values, "RR_hip_joint": 1.1 * values["RR_hip_joint"]}
@@ -303,14 +303,14 @@ class TestErrors:
         with pytest.raises(ConfigError, match=f"{table} differs between left and right: RL_hip"):
             mirror_maps(make_env("", robot=robot))
 
-    def test_scan_that_leans(self) -> None:
+    def test_asymmetric_scan_is_rejected(self) -> None:
         env = make_env("quadruped", Valley())
         terrain = sections.Terrain(measured_points_y=(-0.5, 0.0, 0.4))
         leaning = LeggedEnv(replace(env.cfg, terrain=terrain), env.robot, Valley())
         with pytest.raises(ConfigError, match=r"measured_points_y: got -0\.5 without 0\.5"):
             mirror_maps(leaning)
 
-    def test_observation_of_another_width(self) -> None:
+    def test_wrong_term_width_is_rejected(self) -> None:
         env = make_env("quadruped")
         first, *others = env.obs_groups["policy"]
         env.obs_groups["policy"] = (replace(first, symmetry="joints"), *others)

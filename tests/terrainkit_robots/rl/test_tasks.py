@@ -95,7 +95,7 @@ def test_unknown_task_lists_known_ones(tmp_path):
     with pytest.raises(ConfigError, match=r"has no robot\.toml; expected a folder of terrainkit"):
         get_task(tmp_path)
     (tmp_path / "robot.toml").write_text("x = 1")
-    with pytest.raises(ConfigError, match=r"robot\.toml: format_version is missing"):
+    with pytest.raises(ConfigError, match=r"robot\.toml: format_version: got nothing"):
         get_task(tmp_path)
 
 

@@ -28,7 +28,7 @@ class Field(Plane):
     lower, upper = (-5.0, -1.0), (5.0, 3.0)
 
 
-class TestTouched:
+class TestIllegalContact:
     def test_by_hand(self) -> None:
         force = np.zeros((5, 2, 3), np.float32)
         force[1, 0] = (0.6, 0, 0.79)  # just under 1 N
@@ -39,15 +39,15 @@ class TestTouched:
         harder = illegal_contact(force, Termination(contact_force=300.5))
         assert harder.tolist() == [False] * 5
 
-    def test_without_termination_bodies(self) -> None:
+    def test_no_termination_bodies(self) -> None:
         assert (
             illegal_contact(np.zeros((3, 0, 3), np.float32), Termination()).tolist() == [False] * 3
         )
 
 
-class TestTilted:
+class TestBadOrientation:
     @pytest.mark.parametrize("around", [1, 2])
-    def test_by_angle(self, around: int) -> None:
+    def test_tilt_limit(self, around: int) -> None:
         """Rolled or pitched by an angle, it is that angle that counts."""
         angles = np.array([0, 0.5, 1.29, 1.31, 2, np.pi, -1.29, -1.31], np.float32)
         quat = np.zeros((len(angles), 4), np.float32)
@@ -57,20 +57,20 @@ class TestTilted:
         less = bad_orientation(projected_gravity(quat), Termination(tilt=0.4))
         assert less.tolist() == [False] + [True] * 7
 
-    def test_turning_is_no_tilt(self) -> None:
+    def test_yaw_is_no_tilt(self) -> None:
         yaw = np.linspace(-3, 3, 9, dtype=np.float32)
         quat = np.zeros((9, 4), np.float32)
         quat[:, 0], quat[:, 3] = np.cos(yaw / 2), np.sin(yaw / 2)
         assert not bad_orientation(projected_gravity(quat), Termination(tilt=0.01)).any()
 
 
-class TestOutside:
+class TestTerrainOutOfBounds:
     def test_by_hand(self) -> None:
         places = [[0, 0, 9], [4.9, 2.9, 0], [5.1, 0, 0], [-5.1, 0, 0], [0, 3.1, 0], [0, -1.1, 0]]
         found = terrain_out_of_bounds(np.array(places, np.float32), Field())
         assert found.tolist() == [False, False, True, True, True, True]
 
-    def test_plane_has_no_end(self) -> None:
+    def test_plane_is_unbounded(self) -> None:
         assert not terrain_out_of_bounds(np.array([[1e6, -1e6, 0]], np.float32), Plane()).any()
 
 
@@ -91,19 +91,19 @@ def step(env: LeggedEnv) -> tuple[list[bool], list[bool]]:
     return dones.tolist(), extras["time_outs"].tolist()
 
 
-class TestEnvironment:
-    def test_upright_robots_live_until_their_time_is_out(self) -> None:
+class TestInEnvironment:
+    def test_upright_robots_time_out(self) -> None:
         env = make_env()
         for _ in range(9):
             assert step(env) == ([False] * 4, [False] * 4)
         assert step(env) == ([True] * 4, [True] * 4)
 
-    def test_on_its_back(self) -> None:
+    def test_robot_on_its_back_terminates(self) -> None:
         env = make_env()
         env.sim.qpos[2, 3:7] = (0, 1, 0, 0)
         assert step(env) == ([False, False, True, False], [False] * 4)
 
-    def test_trunk_on_the_ground(self) -> None:
+    def test_trunk_contact_terminates(self) -> None:
         env = make_env()
         env.sim.qpos[1, 2] = 0.05
         env.sim.qpos[1, env.scene.joint_qpos] = [0, 1.5, -2.5] * 4
@@ -111,19 +111,19 @@ class TestEnvironment:
         assert dones == [False, True, False, False]
         assert time_outs == [False] * 4
 
-    def test_trunk_may_touch_where_nothing_says_it_ends(self) -> None:
+    def test_high_contact_limit_never_terminates(self) -> None:
         env = make_env(termination=Termination(contact_force=1e9))
         env.sim.qpos[1, 2] = 0.05
         env.sim.qpos[1, env.scene.joint_qpos] = [0, 1.5, -2.5] * 4
         assert step(env)[0] == [False] * 4
 
-    def test_out_of_the_map(self) -> None:
+    def test_leaving_the_map_terminates(self) -> None:
         env = make_env(Field())
         env.sim.qpos[3, 1] = -1.2
         assert step(env) == ([False, False, False, True], [False] * 4)
         assert env.state.base_pos[3, 1] > -1  # begun anew
 
-    def test_physics_that_blow_up(self) -> None:
+    def test_unstable_physics_terminates(self) -> None:
         env = make_env()
         env.sim.qvel[0, 6] = 1e12
         dones, time_outs = step(env)
@@ -133,7 +133,7 @@ class TestEnvironment:
             assert torch.isfinite(value).all()
         assert step(env)[0] == [False] * 4
 
-    def test_fall_at_the_last_moment_is_a_fall(self) -> None:
+    def test_fall_precedes_time_out(self) -> None:
         env = make_env()
         for _ in range(9):
             step(env)

@@ -27,7 +27,7 @@ class VecEnvContract:
     def run(self, env: VecEnv, steps: int = _STEPS) -> list[Any]:
         return [env.step(self.actions(env, k)) for k in range(steps)]
 
-    def test_is_a_vec_env_with_all_attributes(self, env: VecEnv) -> None:
+    def test_env_has_all_attributes(self, env: VecEnv) -> None:
         assert isinstance(env, VecEnv)
         assert isinstance(env.num_envs, int)
         assert env.num_envs > 0
@@ -37,12 +37,12 @@ class VecEnvContract:
         assert env.cfg is not None
         assert torch.device(env.device).type == "cpu"
 
-    def test_episode_lengths_are_whole_numbers_one_for_each(self, env: VecEnv) -> None:
+    def test_episode_lengths_are_integers(self, env: VecEnv) -> None:
         assert env.episode_length_buf.shape == (env.num_envs,)
         assert env.episode_length_buf.dtype == torch.long
         assert (env.episode_length_buf == 0).all()
 
-    def test_observations_are_groups_of_finite_floats(self, env: VecEnv) -> None:
+    def test_observations_are_finite_float_groups(self, env: VecEnv) -> None:
         for observed in (env.get_observations(), *(step[0] for step in self.run(env))):
             assert isinstance(observed, TensorDict)
             assert observed.batch_size == (env.num_envs,)
@@ -54,12 +54,12 @@ class VecEnvContract:
                 assert group.device == torch.device(env.device)
                 assert torch.isfinite(group).all()
 
-    def test_shapes_of_observations_never_change(self, env: VecEnv) -> None:
+    def test_observation_shapes_are_constant(self, env: VecEnv) -> None:
         before = {name: group.shape for name, group in env.get_observations().items()}
         for observed, *_ in self.run(env):
             assert {name: group.shape for name, group in observed.items()} == before
 
-    def test_rewards_and_dones_are_one_number_for_each(self, env: VecEnv) -> None:
+    def test_rewards_and_dones_have_shape_num_envs(self, env: VecEnv) -> None:
         for _, rewards, dones, _ in self.run(env):
             assert rewards.shape == dones.shape == (env.num_envs,)
             assert rewards.dtype == torch.float32
@@ -67,7 +67,7 @@ class VecEnvContract:
             assert torch.isfinite(rewards).all()
             assert rewards.device == dones.device == torch.device(env.device)
 
-    def test_nothing_returned_changes_with_later_steps(self, env: VecEnv) -> None:
+    def test_returned_tensors_never_change(self, env: VecEnv) -> None:
         # A view of a live array would hold the next observation in place of this one.
         kept, copies = [], []
         first = env.get_observations()
@@ -81,29 +81,29 @@ class VecEnvContract:
             for name in before:
                 assert torch.equal(before[name], after[name]), name
 
-    def test_no_two_observations_share_memory(self, env: VecEnv) -> None:
+    def test_observations_share_no_memory(self, env: VecEnv) -> None:
         steps = [step[0] for step in self.run(env)]
         places = {group.data_ptr() for observed in steps for group in observed.values()}
         assert len(places) == sum(len(list(observed.keys())) for observed in steps)
 
-    def test_get_observations_is_what_step_returned(self, env: VecEnv) -> None:
+    def test_get_observations_matches_step(self, env: VecEnv) -> None:
         for k in range(_STEPS):
             observed, *_ = env.step(self.actions(env, k))
             again = env.get_observations()
             for name, group in observed.items():
                 assert torch.equal(group, again[name]), name
 
-    def test_asking_twice_draws_nothing(self, env: VecEnv) -> None:
+    def test_get_observations_is_repeatable(self, env: VecEnv) -> None:
         once, twice = env.get_observations(), env.get_observations()
         for name, group in once.items():
             assert torch.equal(group, twice[name])
 
-    def test_time_outs_come_with_every_step(self, env: VecEnv) -> None:
+    def test_every_step_has_time_outs(self, env: VecEnv) -> None:
         for *_, extras in self.run(env):
             assert extras["time_outs"].shape == (env.num_envs,)
             assert extras["time_outs"].device == torch.device(env.device)
 
-    def test_a_time_out_is_done_and_comes_at_the_longest_episode(self, env: VecEnv) -> None:
+    def test_time_out_at_max_episode_length(self, env: VecEnv) -> None:
         longest, seen = int(env.max_episode_length), 0
         for k in range(longest + 3):
             lengths = env.episode_length_buf.clone()
@@ -116,14 +116,14 @@ class VecEnvContract:
             seen += int(out.sum())
         assert seen > 0
 
-    def test_episodes_that_are_done_begin_anew(self, env: VecEnv) -> None:
+    def test_done_episodes_are_reset(self, env: VecEnv) -> None:
         for k in range(int(env.max_episode_length) + 3):
             lengths = env.episode_length_buf.clone()
             _, _, dones, _ = env.step(self.actions(env, k))
             expected = torch.where(dones.bool(), torch.zeros_like(lengths), lengths + 1)
             assert torch.equal(env.episode_length_buf, expected)
 
-    def test_the_runner_may_replace_the_episode_lengths(self, env: VecEnv) -> None:
+    def test_episode_lengths_can_be_replaced(self, env: VecEnv) -> None:
         longest = int(env.max_episode_length)
         ages = torch.arange(env.num_envs) % longest
         ages[0] = longest - 1
@@ -135,7 +135,7 @@ class VecEnvContract:
         alive = ~dones.bool()
         assert torch.equal(env.episode_length_buf[alive], ages[alive] + 1)
 
-    def test_the_log_is_scalars_with_a_section(self, env: VecEnv) -> None:
+    def test_log_has_scalars_with_sections(self, env: VecEnv) -> None:
         logs = [s[3]["log"] for s in self.run(env, int(env.max_episode_length)) if "log" in s[3]]
         assert logs
         for name, value in (item for log in logs for item in log.items()):
@@ -143,7 +143,7 @@ class VecEnvContract:
             assert np.ndim(value) == 0
             assert np.isfinite(float(value)), name
 
-    def test_actions_need_no_gradient_and_stay_as_they_are(self, env: VecEnv) -> None:
+    def test_step_leaves_actions_unchanged(self, env: VecEnv) -> None:
         actions = self.actions(env).requires_grad_()
         before = actions.detach().clone()
         observed, rewards, *_ = env.step(actions)
@@ -151,7 +151,7 @@ class VecEnvContract:
         assert not rewards.requires_grad
         assert not any(group.requires_grad for group in observed.values())
 
-    def test_large_actions_give_finite_numbers(self, env: VecEnv) -> None:
+    def test_large_actions_stay_finite(self, env: VecEnv) -> None:
         for sign in (1, -1, 1):
             actions = torch.full((env.num_envs, env.num_actions), sign * 1e30)
             observed, rewards, *_ = env.step(actions)
@@ -159,7 +159,7 @@ class VecEnvContract:
             assert all(torch.isfinite(group).all() for group in observed.values())
 
     @pytest.mark.parametrize("strange", [np.nan, np.inf, -np.inf])
-    def test_actions_that_are_no_numbers_are_refused(self, env: VecEnv, strange: float) -> None:
+    def test_step_rejects_nonfinite_actions(self, env: VecEnv, strange: float) -> None:
         actions = self.actions(env)
         actions[-1, 1] = strange
         before = env.episode_length_buf.clone()
@@ -169,13 +169,13 @@ class VecEnvContract:
         env.step(self.actions(env))
 
     @pytest.mark.parametrize(("more_envs", "more_actions"), [(1, 0), (0, 1), (0, -1)])
-    def test_actions_of_another_shape_are_refused(
+    def test_step_rejects_wrong_action_shape(
         self, env: VecEnv, more_envs: int, more_actions: int
     ) -> None:
         wrong = torch.zeros(env.num_envs + more_envs, env.num_actions + more_actions)
-        with pytest.raises(ConfigError, match="actions have shape"):
+        with pytest.raises(ConfigError, match="shape of the actions"):
             env.step(wrong)
 
-    def test_a_single_row_of_actions_is_not_spread(self, env: VecEnv) -> None:
-        with pytest.raises(ConfigError, match="actions have shape"):
+    def test_step_rejects_single_row_of_actions(self, env: VecEnv) -> None:
+        with pytest.raises(ConfigError, match="shape of the actions"):
             env.step(torch.zeros(env.num_actions))

@@ -1,4 +1,4 @@
-"""Robots that come with the package: healthy, of primitives only, to learn from and to copy."""
+"""Robots that are bundled with the package; all their geometry is primitive."""
 
 from pathlib import Path
 
@@ -12,5 +12,8 @@ def names() -> tuple[str, ...]:
 
 
 def find(name: str) -> Path | None:
-    """Return the URDF of the bundled robot `name`, beside its MJCF; None if there is none."""
+    """Return the URDF of a bundled robot, or None if there is no such robot.
+
+    The robot's MJCF is in the same folder.
+    """
     return _FOLDER / name / f"{name}.urdf" if name in _NAMES else None

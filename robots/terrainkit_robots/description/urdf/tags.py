@@ -1,4 +1,4 @@
-"""The words of URDF: which elements and attributes there are, and which look like misspelt ones."""
+"""Elements and attributes of URDF, and names that look like misspellings of them."""
 
 from collections.abc import Iterator, Mapping
 
@@ -31,7 +31,7 @@ _ATTRIBUTES: Mapping[str, frozenset[str]] = {
         "texture": "filename",
     }.items()
 }
-"""Attributes of the elements that others do not extend."""
+"""Attributes of elements that tools do not extend."""
 
 _CHILDREN: Mapping[str, frozenset[str]] = {
     tag: frozenset(names.split())
@@ -45,53 +45,56 @@ _CHILDREN: Mapping[str, frozenset[str]] = {
         "joint": "origin parent child axis calibration dynamics limit mimic safety_controller",
     }.items()
 }
-"""Elements that have a place in others; more may be there, each reader has its own."""
+"""Known children of elements; tools may add others."""
 
 
-_NEAR_ATTRIBUTE, _NEAR_TAG = 0.6, 0.75
-"""How alike a word has to be, by difflib's ratio: elements have the attributes that they have, but
-many tools have tags of their own."""
+_MIN_ATTRIBUTE_SIMILARITY, _MIN_TAG_SIMILARITY = 0.6, 0.75
+"""Minimum difflib ratio of a misspelled name. Tools add elements of their own, so elements have to
+be more similar than attributes."""
+
+_MAX_UNKNOWN = 10
+"""Maximum number of unknown attributes of an element that are checked."""
 
 
-_MOST_OTHERS = 10
-"""So many unknown attributes of one element are looked at."""
-
-
-def unexpanded(root: "etree._Element") -> Iterator[tuple["etree._Element", str]]:
-    """Yield the first element that is xacro, and what of it is."""
+def unexpanded_xacro(root: "etree._Element") -> Iterator[tuple["etree._Element", str]]:
+    """Yield the first element that contains unexpanded xacro, and the part that does."""
     for element in root.iter(etree.Element):
         if "xacro" in element.tag.partition("}")[0] or element.tag.startswith("xacro:"):
             yield element, f"<{element.tag.rpartition('}')[2]}>"
             return
-        left = next((value for value in element.values() if has_variable(value)), None)
-        if left is not None:
-            yield element, repr(left)
+        unexpanded = next((value for value in element.values() if has_variable(value)), None)
+        if unexpanded is not None:
+            yield element, repr(unexpanded)
             return
 
 
 def has_variable(text: str) -> bool:
-    """Return whether a value is left for xacro to fill in."""
+    """Return whether a value contains a xacro expression."""
     return "${" in text or "$(arg" in text
 
 
-def misspelt(root: "etree._Element") -> Iterator[tuple["etree._Element", str, str]]:
-    """Yield elements with a word that looks misspelt: the attribute, or nothing for the tag itself.
+def misspelled_names(root: "etree._Element") -> Iterator[tuple["etree._Element", str, str]]:
+    """Yield elements with a name that looks like a misspelling.
 
-    The last of the three is the word that it looks like.
+    Yields:
+        The element, the name of the attribute (empty for the element itself), and the similar known
+        name.
     """
     stack = [root]
     while stack:
         element = stack.pop()
         known = _ATTRIBUTES.get(element.tag, frozenset())
-        others = sorted(set(element.keys()) - known)[:_MOST_OTHERS] if known else ()
+        others = sorted(set(element.keys()) - known)[:_MAX_UNKNOWN] if known else ()
         for name in others:
-            alike = closest(name, known - set(element.keys()), _NEAR_ATTRIBUTE)
-            if alike:
-                yield element, name, alike
-        places = _CHILDREN.get(element.tag, frozenset())
-        for child in element.iterchildren(etree.Element) if places else ():
-            alike = "" if child.tag in places else closest(child.tag, places, _NEAR_TAG)
-            if alike:
-                yield child, "", alike
-            elif child.tag in places:
+            similar = closest(name, known - set(element.keys()), _MIN_ATTRIBUTE_SIMILARITY)
+            if similar:
+                yield element, name, similar
+        allowed = _CHILDREN.get(element.tag, frozenset())
+        for child in element.iterchildren(etree.Element) if allowed else ():
+            similar = (
+                "" if child.tag in allowed else closest(child.tag, allowed, _MIN_TAG_SIMILARITY)
+            )
+            if similar:
+                yield child, "", similar
+            elif child.tag in allowed:
                 stack.append(child)

@@ -1,8 +1,7 @@
-"""Xacro: expanded by the xacro package, in a process of its own.
+"""Expand xacro files with the xacro package in a child process.
 
-Xacro evaluates Python expressions, and macros may call themselves. So it runs apart (see
-`process`), with limits on time and memory, and gives back text. ROS is not needed: packages
-are found by `Packages`.
+Xacro evaluates Python expressions, and macros may recurse. The child process (see `process`) has
+limits on time and memory and returns text. ROS is not required: `PackageResolver` finds packages.
 """
 
 import json
@@ -19,34 +18,34 @@ from typing import Any
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots.description.xacro.process import ORIGIN
 
-SECONDS = 8.0
-"""How long an expansion may take [s]; large robots take half a second."""
+MAX_SECONDS = 8.0
+"""Time limit of an expansion [s]; large robots need half a second."""
 
-_BYTES = 2**30
-"""How much memory it may take."""
+_MAX_BYTES = 2**30
+"""Memory limit of an expansion."""
 
-_SECRET = re.compile(r"TOKEN|SECRET|PASSW|CREDENTIAL|KEY|AUTH|COOKIE", re.IGNORECASE)
-"""Environment variables called so are not for `$(env)` in a file that somebody else wrote."""
+_SECRET_NAME = re.compile(r"TOKEN|SECRET|PASSW|CREDENTIAL|KEY|AUTH|COOKIE", re.IGNORECASE)
+"""Environment variables with such names are hidden from `$(env)`."""
 
 
 class XacroError(TerrainkitError):
-    """A file that cannot be expanded; says what is missing, and how to give it."""
+    """A xacro file that cannot be expanded."""
 
-    def __init__(self, message: str, place: tuple[Path, int] | None = None) -> None:
+    def __init__(self, message: str, location: tuple[Path, int] | None = None) -> None:
         super().__init__(message)
-        self.place = place
-        """File and line of the element at which it failed, if that is known."""
+        self.location = location
+        """File and line of the element that failed, if known."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Expansion:
-    """An expanded file."""
+    """An expanded xacro file."""
 
     data: bytes
     """The URDF; each element has its origin, for `pop_origin`."""
 
     files: tuple[Path, ...]
-    """The file and all that it includes."""
+    """The xacro file and all files that it includes."""
 
 
 def expand_xacro(
@@ -54,49 +53,48 @@ def expand_xacro(
     arguments: Mapping[str, str],
     packages: Mapping[str, Path],
     *,
-    seconds: float = SECONDS,
-    memory: int = _BYTES,
+    timeout: float = MAX_SECONDS,
+    max_memory: int = _MAX_BYTES,
 ) -> Expansion:
-    """Return what a xacro file expands to.
+    """Expand a xacro file.
 
     Args:
-        file: The file.
-        arguments: Value of each xacro argument.
-        packages: Folder of each ROS package, where a search would not find it.
-        seconds: How long it may take.
-        memory: How many bytes of memory it may take, where the system can tell.
+        file: The xacro file.
+        arguments: Values of xacro arguments by name.
+        packages: Folders of ROS packages by name.
+        timeout: Time limit [s].
+        max_memory: Memory limit [bytes], where the operating system supports it.
 
     Raises:
-        XacroError: if it cannot be expanded, or not within the limits.
+        XacroError: If the file cannot be expanded within the limits.
     """
-    wanted = {
+    request = {
         "file": str(file.absolute()),
         "arguments": dict(arguments),
         "packages": {name: str(folder.absolute()) for name, folder in packages.items()},
-        "seconds": seconds,
-        "memory": memory,
+        "timeout": timeout,
+        "max_memory": max_memory,
     }
-    output = _run(json.dumps(wanted).encode(), seconds)
     try:
-        answer = json.loads(output)
+        reply = json.loads(_run(json.dumps(request).encode(), timeout))
     except ValueError:
         raise XacroError(
-            f"the xacro file could not be expanded: it needs more than {memory / 2**30:g} GiB of "
-            "memory, or made the xacro package crash"
+            f"xacro: the expansion needs more than {max_memory / 2**30:g} GiB of memory, or the "
+            "xacro package crashed"
         ) from None
-    if "error" in answer:
-        place = answer["place"]
-        raise XacroError(answer["error"], place and (Path(place[0]), int(place[1])))
-    return Expansion(data=answer["xml"].encode(), files=tuple(map(Path, answer["files"])))
+    if "error" in reply:
+        location = reply["location"]
+        raise XacroError(reply["error"], location and (Path(location[0]), int(location[1])))
+    return Expansion(data=reply["xml"].encode(), files=tuple(map(Path, reply["files"])))
 
 
-def _run(request: bytes, seconds: float) -> bytes:
-    """Return what the other process answers.
+def _run(request: bytes, timeout: float) -> bytes:
+    """Return the output of the child process.
 
-    It inherits no open file, and finds modules where this one does: without the current folder,
-    which may well be that of the robot.
+    It inherits no open file and imports from the same folders as this process, without the current
+    folder, which may contain the robot.
     """
-    environment = {name: text for name, text in os.environ.items() if not _SECRET.search(name)}
+    environment = {k: value for k, value in os.environ.items() if not _SECRET_NAME.search(k)}
     environment["PYTHONPATH"] = os.pathsep.join(
         str(Path(entry).absolute()) for entry in sys.path if entry
     )
@@ -109,27 +107,26 @@ def _run(request: bytes, seconds: float) -> bytes:
         start_new_session=True,
     ) as process:
         try:
-            return process.communicate(request, timeout=seconds)[0]
-        except subprocess.TimeoutExpired:
-            _kill(process)
-            raise XacroError(
-                f"the xacro file did not expand within {seconds:g} s; a macro or an expression "
-                "takes too long"
-            ) from None
-        except BaseException:
-            _kill(process)
+            return process.communicate(request, timeout=timeout)[0]
+        except BaseException as error:
+            if hasattr(os, "killpg"):
+                os.killpg(process.pid, signal.SIGKILL)  # and processes that it started
+            else:
+                process.kill()
+            if isinstance(error, subprocess.TimeoutExpired):
+                raise XacroError(
+                    f"xacro: the expansion takes longer than {timeout:g} s; check macros and "
+                    "expressions for endless recursion"
+                ) from None
             raise
 
 
-def _kill(process: "subprocess.Popen[bytes]") -> None:
-    if hasattr(os, "killpg"):
-        os.killpg(process.pid, signal.SIGKILL)  # and whatever it may have started
-    else:
-        process.kill()
-
-
 def pop_origin(element: Any, files: tuple[Path, ...]) -> tuple[Path, int] | None:
-    """Take the origin off an element of an expanded document: file and line, if it has one."""
+    """Remove the origin attribute of an expanded element.
+
+    Returns:
+        File and line of the element in the xacro files, or None.
+    """
     words = element.attrib.pop(ORIGIN, "").split(":")
     if len(words) != 2 or not all(word.isdecimal() for word in words):
         return None

@@ -1,8 +1,8 @@
-"""The process in which xacro runs: a request comes in on stdin, an answer goes out on stdout.
+"""Expand a xacro file in a restricted process: a request on stdin, a reply on stdout.
 
-The files are not to be trusted. Xacro shuts out Python's builtins, but not the ways around that:
-so names that lead to them are refused, and what a robot has no use for (writing, sockets, other
-programs) is forbidden to the whole process before the first file is read.
+The file is not trusted. Xacro removes Python's builtins from expressions, but there are ways around
+that, so names that lead to the interpreter are rejected. Writing, sockets and child processes are
+blocked in the whole process before the first file is read.
 """
 
 import ast
@@ -17,49 +17,58 @@ from typing import Any
 from xml.dom import expatbuilder
 from xml.parsers import expat
 
-from terrainkit_robots.description.package_resolver import Packages
+from terrainkit_robots.description.package_resolver import PackageResolver
 from terrainkit_robots.text import short
 
 ORIGIN = "terrainkit-origin"
-"""Attribute that carries the file and line of an element through the expansion."""
+"""Attribute that stores the file and line of an element during the expansion."""
 
-_MOST_BYTES = 2**26
-"""More text is not given back; no robot is described in so much."""
+_MAX_BYTES = 2**26
+"""Maximum size of the expanded file."""
 
-_WORDS = 200
-"""So many characters of xacro's messages are passed on."""
+_MAX_MESSAGE = 200
+"""Maximum length of an error message of xacro."""
 
-_INSIDES = ("_", "gi_", "cr_", "ag_", "f_", "tb_", "co_", "func_", "mro")
-"""Attributes that begin so lead from a value to the interpreter."""
+_BLOCKED_PREFIXES = ("_", "gi_", "cr_", "ag_", "f_", "tb_", "co_", "func_", "mro")
+"""Prefixes of attributes that lead from a value to the interpreter."""
 
-_EVENTS = ("os.", "shutil.", "subprocess.", "socket.", "ctypes.", "pty.", "tempfile.", "webbrowser")
-"""What the process must not do, as the interpreter calls it; see its table of audit events."""
+_BLOCKED_EVENTS = (
+    "os.",
+    "shutil.",
+    "subprocess.",
+    "socket.",
+    "ctypes.",
+    "pty.",
+    "tempfile.",
+    "webbrowser",
+)
+"""Prefixes of blocked audit events; see Python's table of audit events."""
 
-_HARMLESS = frozenset({"os.listdir", "os.scandir", "os.walk", "os.fwalk"})
-"""Events of these that only look around."""
+_ALLOWED_EVENTS = frozenset({"os.listdir", "os.scandir", "os.walk", "os.fwalk"})
+"""Exceptions to those, which only list folders."""
 
 
-class _RefusedError(Exception):
-    """Something that a xacro file must not do."""
+class _RejectedError(Exception):
+    """Something that a xacro file is not allowed to do."""
 
 
 def main() -> None:
-    """Answer one request."""
+    """Handle one request."""
     request = json.load(sys.stdin)
-    _limit(request["seconds"], request["memory"])
+    _limit_resources(request["timeout"], request["max_memory"])
     try:
-        answer = _expand(request)
-    except BaseException as error:  # whatever the file's expressions raise is the file's
-        answer = {"error": _told(error, request), "place": _place(error)}
-    sys.stdout.write(json.dumps(answer))
+        reply = _expand(request)
+    except BaseException as error:  # expressions of the file may raise anything
+        reply = {"error": _error_message(error, request), "location": _error_location(error)}
+    sys.stdout.write(json.dumps(reply))
     sys.stdout.flush()
-    os._exit(0)  # what is left of a huge document needs no tidying up
+    os._exit(0)  # skips the cleanup of a huge document
 
 
-def _limit(seconds: float, memory: int) -> None:
+def _limit_resources(seconds: float, memory: int) -> None:
     try:
         import resource
-    except ImportError:  # Windows has no such limits; the caller's on time holds there, too
+    except ImportError:  # Windows; the time limit of the caller applies
         return
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, int(seconds) + 2))
@@ -68,76 +77,76 @@ def _limit(seconds: float, memory: int) -> None:
 
 
 def _expand(request: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the expanded file and the files that it is made of."""
+    """Return the expanded file and the list of files that it includes."""
     try:
         import xacro
         from xacro import substitution_args
     except ImportError as error:
-        raise _RefusedError(
-            f"the xacro package is not there ({error}); pip install xacro"
+        raise _RejectedError(
+            f"the package xacro is not installed ({error}); run: pip install xacro"
         ) from None
     file = Path(request["file"])
     packages = {name: Path(folder) for name, folder in request["packages"].items()}
     files: list[str] = []
-    _guard_expressions(xacro, substitution_args)
-    _find_packages(xacro, substitution_args, file, packages)
-    xacro.parse = _remembering(xacro, files)
+    _install_expression_checks(xacro, substitution_args)
+    _install_find(xacro, substitution_args, file, packages)
+    xacro.parse = _parse_with_origins(xacro, files)
     os.chdir(file.parent)
-    sys.addaudithook(_forbid)
+    sys.addaudithook(_audit_hook)
     document = xacro.process_file(str(file), mappings=dict(request["arguments"]), verbosity=0)
     text = document.documentElement.toxml()
-    if len(text) > _MOST_BYTES:
-        raise _RefusedError(f"it expands to more than {_MOST_BYTES // 2**20} MiB")
+    if len(text) > _MAX_BYTES:
+        raise _RejectedError(f"size of the expansion: more than {_MAX_BYTES // 2**20} MiB")
     read = [str(Path(name).absolute()) for name in xacro.all_includes]
     return {"xml": text, "files": [*files, *(name for name in read if name not in files)]}
 
 
-# What a file must not do
+# Restrictions
 
 
-def _forbid(event: str, arguments: tuple[Any, ...]) -> None:
-    """Refuse what the process must not do; the interpreter asks before each step of the kind."""
+def _audit_hook(event: str, arguments: tuple[Any, ...]) -> None:
+    """Raise an error for blocked audit events."""
     if event == "open":
         _check_open(*arguments)
-    elif event.startswith(_EVENTS) and event not in _HARMLESS:
-        raise _RefusedError(f"it tried {event}, which is not allowed here")
+    elif event.startswith(_BLOCKED_EVENTS) and event not in _ALLOWED_EVENTS:
+        raise _RejectedError(f"the file uses {event}, which is not allowed")
 
 
 def _check_open(path: Any, _: Any, flags: Any) -> None:
     writes = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
     if isinstance(flags, int) and flags & writes:
-        raise _RefusedError(f"it tried to write {path}, which is not allowed here")
+        raise _RejectedError(f"the file writes {path}, which is not allowed")
     if isinstance(path, int) or path is None:
         return
     try:
         kind = os.stat(path).st_mode  # noqa: PTH116
     except (OSError, ValueError):
-        return  # nothing there; what opens it will tell
+        return  # opening it raises the error
     if not stat.S_ISREG(kind) and not stat.S_ISDIR(kind):
-        raise OSError(None, "not a plain file", str(path))
+        raise OSError(None, "not a regular file", str(path))
 
 
-def _guard_expressions(xacro: Any, substitution_args: Any) -> None:
-    """Have each expression looked at before it is evaluated."""
+def _install_expression_checks(xacro: Any, substitution_args: Any) -> None:
+    """Check each expression before xacro evaluates it."""
     evaluate, substitute = xacro.safe_eval, substitution_args._eval
 
     def safe_eval(text: str, *scope: Any) -> Any:
         _check_expression(text)
         return evaluate(text, *scope)
 
-    def safe_substitute(text: str, context: Any) -> Any:
+    def checked_eval(text: str, context: Any) -> Any:
         _check_expression(text)
         return substitute(text, context)
 
     xacro.safe_eval = safe_eval
-    substitution_args._eval = safe_substitute
-    dict.pop(xacro._global_symbols["python"], "vars", None)  # every attribute of a type, by name
+    substitution_args._eval = checked_eval
+    dict.pop(xacro._global_symbols["python"], "vars", None)  # gives access to every attribute
 
     def argument(name: str) -> Any:
-        given = xacro.substitution_args_context["arg"]
-        if name not in given:
+        arguments = xacro.substitution_args_context["arg"]
+        if name not in arguments:
             raise substitution_args.ArgException(name)
-        return given[name]
+        return arguments[name]
 
     dict.__setitem__(xacro._global_symbols["xacro"], "arg", argument)
 
@@ -147,53 +156,56 @@ def _check_expression(text: str) -> None:
         name = node.attr if isinstance(node, ast.Attribute) else ""
         if isinstance(node, ast.Name) and node.id.startswith("__"):
             name = node.id
-        if name.startswith(_INSIDES):
-            raise _RefusedError(
-                f"the expression {short(text, 60)} uses {name}, which is not allowed here"
+        if name.startswith(_BLOCKED_PREFIXES):
+            raise _RejectedError(
+                f"the expression {short(text, 60)} uses {name}, which is not allowed"
             )
 
 
-# Packages
+# PackageResolver
 
 
-def _find_packages(
+def _install_find(
     xacro: Any, substitution_args: Any, file: Path, packages: Mapping[str, Path]
 ) -> None:
-    """Have `$(find ...)` answered without ROS."""
-    searches = {str(file): Packages(file, packages)}
+    """Resolve `$(find ...)` without ROS."""
+    searches = {str(file): PackageResolver(file, packages)}
 
     def find(name: str) -> str:
         at = str((xacro.filestack or [None])[-1] or file)
-        for start in dict.fromkeys((str(file), at)):  # a part may lie in a package of its own
-            search = searches.setdefault(start, Packages(Path(start), packages))
-            folder = search.find(name)
+        for start in dict.fromkeys(
+            (str(file), at)
+        ):  # an included file may belong to another package
+            search = searches.setdefault(start, PackageResolver(Path(start), packages))
+            folder = search.find_package(name)
             if folder is not None:
                 return str(folder)
-        raise _RefusedError(
-            f"there is no package {name}; give its folder with --package {name}=FOLDER"
+        raise _RejectedError(
+            f"package {name}: not found; pass its folder with --package {name}=FOLDER"
         )
 
     substitution_args._eval_find = find
     substitution_args._eval_dict["find"] = find  # for $(eval ...)
 
 
-# Where elements come from
+# Locations of elements
 
 
 class _Origins:
-    """Copies the origin of an element to its copies; minidom calls it for each."""
+    """Copy the origin of an element to its copies; minidom calls `handle` for each copy."""
 
     def handle(self, operation: int, key: str, data: Any, source: Any, target: Any) -> None:
-        """Give `target` what `source` has."""
+        """Copy the data of `source` to `target`."""
         del operation, source
         if target is not None:
             target.setUserData(key, data, self)
 
 
-def _remembering(xacro: Any, files: list[str]) -> Any:
-    """Return another `parse` for xacro, by which each element knows its file and line.
+def _parse_with_origins(xacro: Any, files: list[str]) -> Any:
+    """Return a replacement of `xacro.parse` that records the file and line of each element.
 
-    All elements know it on the way, for errors; those that are not xacro carry it into the text.
+    All elements store their origin for error messages. Elements that are not xacro also store it as
+    an attribute, which remains in the expanded text.
     """
     origins = _Origins()
 
@@ -216,7 +228,7 @@ def _remembering(xacro: Any, files: list[str]) -> Any:
             raise xacro.XacroException(f"{error.strerror}: {filename}", exc=error) from error
         files.append(str(Path(filename).absolute()))
         if b"<!ENTITY" in data:
-            raise _RefusedError(f"{filename} declares entities, which are not resolved")
+            raise _RejectedError(f"{filename} declares entities, which are not supported")
         try:
             return Builder().parseString(data)
         except expat.ExpatError as error:
@@ -226,64 +238,67 @@ def _remembering(xacro: Any, files: list[str]) -> Any:
     return parse
 
 
-def _place(error: BaseException) -> tuple[str, int] | None:
-    """Return file and line of the innermost element that was being worked on."""
-    for each in _chain(error):
-        notes = getattr(each, "__notes__", ())
-        if isinstance(each, expat.ExpatError) and notes:
-            return notes[0], each.lineno
-    places = [place for each in _chain(error) for place in _places(each.__traceback__)]
+def _error_location(error: BaseException) -> tuple[str, int] | None:
+    """Return the file and line of the innermost element that was being expanded."""
+    for cause in _chain(error):
+        notes = getattr(cause, "__notes__", ())
+        if isinstance(cause, expat.ExpatError) and notes:
+            return notes[0], cause.lineno
+    places = [location for cause in _chain(error) for location in _locations(cause.__traceback__)]
     return places[-1] if places else None
 
 
-def _places(traceback: TracebackType | None) -> Iterator[tuple[str, int]]:
+def _locations(traceback: TracebackType | None) -> Iterator[tuple[str, int]]:
     while traceback is not None:
         local = traceback.tb_frame.f_locals
         for name in ("node", "elt"):
             element: Any = local.get(name)
-            place = element.getUserData(ORIGIN) if hasattr(element, "getUserData") else None
-            if place is not None:
-                yield place
+            location = element.getUserData(ORIGIN) if hasattr(element, "getUserData") else None
+            if location is not None:
+                yield location
         traceback = traceback.tb_next
 
 
-# What is told
+# Error messages
 
 
-def _told(error: BaseException, request: Mapping[str, Any]) -> str:
-    """Return one line that says what is wrong, and what to do where that is known."""
+def _error_message(error: BaseException, request: Mapping[str, Any]) -> str:
+    """Return a one-line message that says what is wrong and how to fix it."""
     causes = list(_chain(error))
-    if any(isinstance(each, MemoryError) for each in causes):
-        return f"the xacro file needs more than {request['memory'] / 2**30:g} GiB of memory"
-    if any(isinstance(each, RecursionError) for each in causes):
-        return "xacro: a macro or an include calls itself without end, or is nested too deep"
-    for each in causes:
-        match type(each).__name__:
+    if any(isinstance(cause, MemoryError) for cause in causes):
+        return (
+            f"xacro: the expansion needs more than {request['max_memory'] / 2**30:g} GiB of memory"
+        )
+    if any(isinstance(cause, RecursionError) for cause in causes):
+        return "xacro: a macro or an include recurses without end, or is nested too deeply"
+    for cause in causes:
+        match type(cause).__name__:
             case "ArgException":
                 return (
-                    f"the xacro argument {each} has no value; give it with "
-                    f"--xacro-arg {each}:=VALUE"
+                    f"xacro: argument {cause} has no value; pass it with --xacro-arg {cause}:=VALUE"
                 )
-            case "_RefusedError" | "SubstitutionException":
-                return f"xacro: {each}"
+            case "_RejectedError" | "SubstitutionException":
+                return f"xacro: {cause}"
             case "ExpatError":
-                return f"xacro: malformed XML: {each}"
-        if isinstance(each, SyntaxError):
-            return f"xacro: invalid expression {short((each.text or '').strip(), 60)!r}: {each.msg}"
-        if isinstance(each, OSError):
-            return f"xacro: cannot read {each.filename}: {each.strerror}"
+                return f"xacro: malformed XML: {cause}"
+        if isinstance(cause, SyntaxError):
+            return (
+                f"xacro: invalid expression {short((cause.text or '').strip(), 60)!r}: {cause.msg}"
+            )
+        if isinstance(cause, OSError):
+            return f"xacro: cannot read {cause.filename}: {cause.strerror}"
     macro = next(iter(getattr(error, "macros", ())), None)
-    words = f"{error}{_of(macro)}" or type(error).__name__
-    return f"xacro: {short(' '.join(words.split()), _WORDS)}"
+    words = f"{error}{_in_macro(macro)}" or type(error).__name__
+    return f"xacro: {short(' '.join(words.split()), _MAX_MESSAGE)}"
 
 
-def _of(macro: Any) -> str:
+def _in_macro(macro: Any) -> str:
     name = macro.body.getAttribute("name") if macro is not None else ""
     return f" of macro {name}" if name else ""
 
 
 def _chain(error: BaseException | None) -> Iterator[BaseException]:
-    """Yield an error and what caused it; xacro's own keep their cause in `exc`."""
+    """Yield an error and its causes; xacro's errors store their cause in `exc`."""
     seen: set[int] = set()
     while error is not None and id(error) not in seen:
         seen.add(id(error))

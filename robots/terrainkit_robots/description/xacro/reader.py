@@ -1,4 +1,4 @@
-"""Xacro files: expanded, and read as the URDF they become, with the places they came from."""
+"""Read the robot of a xacro file, with the locations of its elements in the xacro files."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -15,34 +15,40 @@ from terrainkit_robots.description.xml.document import XmlDocument, parse_xml
 def read_xacro(
     document: XmlDocument, *, arguments: Mapping[str, str], packages: Mapping[str, Path]
 ) -> RobotModel:
-    """Return the robot that a xacro file expands to; why it does not is one of its problems.
+    """Return the robot of a xacro file.
+
+    An error of the expansion is recorded as a problem of the model.
 
     Args:
-        document: The file, as it is.
-        arguments: Value of each xacro argument.
-        packages: Folder of each ROS package, where a search would not find it.
+        document: The xacro file, parsed as XML.
+        arguments: Values of xacro arguments by name.
+        packages: Folders of ROS packages by name.
     """
-    whole = Source(file=document.file, line=0)
-    nothing = RobotModel(
-        name="", kind="xacro", file=document.file, source=whole, sources=(document.file,)
+    file_source = Source(file=document.file, line=0)
+    model = RobotModel(
+        name="", kind="xacro", file=document.file, source=file_source, sources=(document.file,)
     )
-    if document.problems:  # broken already; expanding it would only say so in other words
-        return dataclasses.replace(nothing, problems=document.problems)
+    if document.problems:  # the expansion would only repeat them
+        return dataclasses.replace(model, problems=document.problems)
     try:
         expansion = expand_xacro(document.file, arguments, packages)
     except XacroError as error:
-        problem = Problem(code="XML005", message=str(error), source=_source(document, error))
-        return dataclasses.replace(nothing, problems=(problem,))
+        source = file_source
+        if error.location is not None:
+            file, line = error.location
+            source = Source(file=_as_given(file, document.file), line=line)
+        problem = Problem(code="XML005", message=str(error), source=source)
+        return dataclasses.replace(model, problems=(problem,))
     expanded = parse_xml(document.file, expansion.data)
     if expanded.root is None:
-        return dataclasses.replace(nothing, problems=expanded.problems)
+        return dataclasses.replace(model, problems=expanded.problems)
     sources = {}
-    at = whole
+    source = file_source
     for element in expanded.root.iter(etree.Element):
         origin = pop_origin(element, expansion.files)
-        if origin is not None:  # else it is where the one before it is
-            at = Source(file=_as_given(origin[0], document.file), line=origin[1])
-        sources[element] = at
+        if origin is not None:  # otherwise, the location of the previous element
+            source = Source(file=_as_given(origin[0], document.file), line=origin[1])
+        sources[element] = source
     model = read_urdf(dataclasses.replace(expanded, sources=sources), packages=packages)
     files = tuple(_as_given(file, document.file) for file in expansion.files)
     return dataclasses.replace(model, kind="xacro", sources=files)
@@ -50,10 +56,3 @@ def read_xacro(
 
 def _as_given(file: Path, main: Path) -> Path:
     return main if file == main.absolute() else file
-
-
-def _source(document: XmlDocument, error: XacroError) -> Source:
-    if error.place is None:
-        return Source(file=document.file, line=0)
-    file, line = error.place
-    return Source(file=_as_given(file, document.file), line=line)

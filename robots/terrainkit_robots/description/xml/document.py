@@ -1,7 +1,7 @@
-"""XML documents: read without trust, and with the line on which each element starts.
+"""Parse untrusted XML and record the line on which each element starts.
 
-libxml2 recovers what it can of a broken document, but knows an element by the line on which its
-start tag ends. expat knows where the tag begins; for a well-formed document it is asked as well.
+libxml2 recovers broken documents, but reports the line on which a start tag ends. expat reports
+where a tag starts, so it parses well-formed documents a second time.
 """
 
 import itertools
@@ -19,34 +19,34 @@ from terrainkit_robots.description.fix import Fix, ReplaceBytes
 from terrainkit_robots.description.model import Problem, Source
 
 MAX_BYTES = 32 * 2**20
-"""Of a file larger than this nothing is read; no robot is described in 32 MiB of text."""
+"""Maximum size of a robot file."""
 
 MAX_ELEMENTS = 50_000
-"""A document with more elements is not looked at; the largest humanoids have a few thousand."""
+"""Maximum number of elements of a document; the largest humanoids have a few thousand."""
 
-_MOST_ATTRIBUTES = 1000
-"""Of an element with more, libxml2 takes a time that grows with their square."""
+_MAX_ATTRIBUTES = 1000
+"""Maximum number of attributes of an element; libxml2 needs quadratic time in their number."""
 
-_MOST_MISTAKES = 20
-"""So many syntax errors of one file are told."""
+_MAX_ERRORS = 20
+"""Maximum number of syntax errors that are reported for a file."""
 
 
 class RobotFileError(TerrainkitError):
-    """A file that cannot be opened, or is not one."""
+    """A robot file that cannot be read or written."""
 
 
 def read_bytes(path: Path) -> bytes:
-    """Return the content of a plain file, of which one byte more than MAX_BYTES is read at most.
+    """Return the content of a regular file, at most MAX_BYTES + 1 bytes.
 
     Raises:
-        RobotFileError: if there is none, it is a folder or a device, or not readable.
+        RobotFileError: If the file does not exist, is not a regular file, or cannot be read.
     """
     try:
         status = path.stat()
         if stat.S_ISDIR(status.st_mode):
-            raise RobotFileError(f"{path} is a folder; wanted a URDF, xacro or MJCF file")
+            raise RobotFileError(f"cannot read {path}: got a folder; expected a robot file")
         if not stat.S_ISREG(status.st_mode):
-            raise RobotFileError(f"{path} is not a plain file; wanted a URDF, xacro or MJCF file")
+            raise RobotFileError(f"cannot read {path}: not a regular file")
         with path.open("rb") as file:
             return file.read(MAX_BYTES + 1)
     except FileNotFoundError:
@@ -58,40 +58,39 @@ def read_bytes(path: Path) -> bytes:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class XmlDocument:
-    """A document and where everything in it is."""
+    """An XML document and the location of each element."""
 
     file: Path
     data: bytes
     root: "etree._Element | None"
-    """The root element; None if nothing could be read."""
+    """The root element; None if nothing could be parsed."""
 
     sources: Mapping["etree._Element", Source]
-    """Where each element is written."""
+    """Location of each element."""
 
     problems: tuple[Problem, ...] = ()
 
     def source(self, element: "etree._Element") -> Source:
-        """Return where an element is written."""
+        """Return the location of an element."""
         return self.sources[element]
 
 
 def parse_xml(file: Path, data: bytes) -> XmlDocument:
-    """Return the document in `data`, as far as it can be read.
+    """Parse an XML document, as far as it is well-formed.
 
-    Entities are not resolved, nothing is fetched, and depth and size are limited by libxml2.
+    Entities are not resolved, nothing is downloaded, and libxml2 limits depth and size.
     """
-    whole = Source(file=file, line=0)
     problems: list[Problem] = []
     if len(data) > MAX_BYTES:
-        message = f"the file has more than {MAX_BYTES // 2**20} MiB; no robot description has"
-        return _unreadable(file, data, Problem(code="XML001", message=message, source=whole))
-    text = _without_mark(file, data, problems)
+        return _rejected(
+            file, data, f"the file has more than {MAX_BYTES // 2**20} MiB; it is not parsed"
+        )
+    text = _skip_leading_bytes(file, data, problems)
     if not text.strip():
-        message = "the file is empty; wanted a <robot> or <mujoco> element"
-        return _unreadable(file, data, Problem(code="XML001", message=message, source=whole))
+        return _rejected(file, data, "the file is empty; expected a <robot> or <mujoco> element")
     if b"<!ENTITY" in text or (b"<!DOCTYPE" in text and b"SYSTEM" in text):
         line = text[: text.find(b"<!")].count(b"\n") + 1
-        message = "the file declares entities, which are not resolved; wanted plain XML"
+        message = "the file declares entities, which are not resolved; expected plain XML"
         problems.append(
             Problem(
                 code="XML010",
@@ -107,60 +106,70 @@ def parse_xml(file: Path, data: bytes) -> XmlDocument:
         root = etree.fromstring(text, parser)
     except (etree.XMLSyntaxError, ValueError):
         root = None
-    problems += _mistakes(file, parser)
+    problems += _syntax_errors(file, parser)
     if root is None:
         if not any(p.code == "XML001" for p in problems):
-            message = "this is not XML; wanted a <robot> or <mujoco> element"
-            problems.append(Problem(code="XML001", message=message, source=whole))
-        return _unreadable(file, data, *problems)
+            message = "not an XML file; expected a <robot> or <mujoco> element"
+            return _rejected(file, data, message, problems)
+        return _unparsed(file, data, problems)
     elements = list(itertools.islice(root.iter(etree.Element), MAX_ELEMENTS + 1))
     if len(elements) > MAX_ELEMENTS:
-        message = f"the file has more than {MAX_ELEMENTS} elements; no robot description has"
-        return _unreadable(file, data, Problem(code="XML001", message=message, source=whole))
-    if any(len(element.attrib) > _MOST_ATTRIBUTES for element in elements):
-        message = f"an element has more than {_MOST_ATTRIBUTES} attributes; none of a robot has"
-        return _unreadable(file, data, Problem(code="XML001", message=message, source=whole))
-    above = data[: len(data) - len(text)].count(b"\n")
-    sources = _sources(file, text, elements, above)
+        return _rejected(
+            file, data, f"the file has more than {MAX_ELEMENTS} elements; it is not parsed"
+        )
+    if any(len(element.attrib) > _MAX_ATTRIBUTES for element in elements):
+        return _rejected(
+            file,
+            data,
+            f"an element has more than {_MAX_ATTRIBUTES} attributes; the file is not parsed",
+        )
+    line_offset = data[: len(data) - len(text)].count(b"\n")
+    sources = _sources(file, text, elements, line_offset)
     return XmlDocument(file=file, data=data, root=root, sources=sources, problems=tuple(problems))
 
 
-def _unreadable(file: Path, data: bytes, *problems: Problem) -> XmlDocument:
-    return XmlDocument(file=file, data=data, root=None, sources={}, problems=problems)
+def _rejected(
+    file: Path, data: bytes, message: str, problems: Sequence[Problem] = ()
+) -> XmlDocument:
+    problem = Problem(code="XML001", message=message, source=Source(file=file, line=0))
+    return _unparsed(file, data, [*problems, problem])
 
 
-def _without_mark(file: Path, data: bytes, problems: list[Problem]) -> bytes:
-    """Return `data` from where the XML begins, and tell of what stands before it."""
-    mark = b"\xef\xbb\xbf"
-    ahead = re.match(rb"(?:\xef\xbb\xbf|\s)*", data)
-    assert ahead is not None
-    skipped = ahead.group()
-    declared = data[ahead.end() :].startswith(b"<?xml")
-    if mark not in skipped and not (declared and skipped):
+def _unparsed(file: Path, data: bytes, problems: Sequence[Problem]) -> XmlDocument:
+    return XmlDocument(file=file, data=data, root=None, sources={}, problems=tuple(problems))
+
+
+def _skip_leading_bytes(file: Path, data: bytes, problems: list[Problem]) -> bytes:
+    """Return `data` from the XML on, and report a byte order mark or white space before it."""
+    leading = re.match(rb"(?:\xef\xbb\xbf|\s)*", data)
+    assert leading is not None
+    skipped = leading.group()
+    has_bom = b"\xef\xbb\xbf" in skipped
+    if not has_bom and not (skipped and data[leading.end() :].startswith(b"<?xml")):
         return data
-    what = "a byte order mark" if mark in skipped else "white space before the XML declaration"
+    what = "a byte order mark" if has_bom else "white space before the XML declaration"
     problems.append(
         Problem(
             code="XML009",
-            message=f"the file starts with {what}; some readers refuse that",
+            message=f"the file starts with {what}, which some parsers reject",
             source=Source(file=file, line=1),
             subject=file.name,
             details={"bytes": str(len(skipped))},
         )
     )
-    return data[ahead.end() :]
+    return data[leading.end() :]
 
 
-def without_mark(problem: Problem) -> Fix:
-    """Return the fix of what `_without_mark` found."""
+def leading_bytes_fix(problem: Problem) -> Fix:
+    """Return the fix that removes the bytes reported by `_skip_leading_bytes`."""
     edit = ReplaceBytes(
         source=problem.source, start=0, end=int(problem.details["bytes"]), replacement=b""
     )
-    return Fix(safety="safe", description="Take it away.", edits=(edit,))
+    return Fix(safety="safe", description="Remove the leading bytes.", edits=(edit,))
 
 
-def _mistakes(file: Path, parser: etree.XMLParser) -> list[Problem]:
-    """Return the syntax errors, one for each line."""
+def _syntax_errors(file: Path, parser: etree.XMLParser) -> list[Problem]:
+    """Return the syntax errors, one per line."""
     seen: dict[int, str] = {}
     for entry in parser.error_log:
         if entry.level >= etree.ErrorLevels.ERROR and "namespace" not in entry.message.lower():
@@ -172,24 +181,24 @@ def _mistakes(file: Path, parser: etree.XMLParser) -> list[Problem]:
             source=Source(file=file, line=line),
             subject=file.name,
         )
-        for line, message in list(seen.items())[:_MOST_MISTAKES]
+        for line, message in list(seen.items())[:_MAX_ERRORS]
     ]
 
 
 def _sources(
-    file: Path, text: bytes, elements: Sequence["etree._Element"], above: int
+    file: Path, text: bytes, elements: Sequence["etree._Element"], line_offset: int
 ) -> dict["etree._Element", Source]:
     lines = _start_lines(text)
-    if len(lines) != len(elements):  # not well-formed: libxml2's lines are the best there is
-        return {e: Source(file=file, line=above + (e.sourceline or 0)) for e in elements}
+    if len(lines) != len(elements):  # malformed: libxml2's line numbers are less accurate
+        return {e: Source(file=file, line=line_offset + (e.sourceline or 0)) for e in elements}
     return {
-        element: Source(file=file, line=above + line, element=index)
+        element: Source(file=file, line=line_offset + line, element=index)
         for index, (element, line) in enumerate(zip(elements, lines, strict=True))
     }
 
 
 def _start_lines(text: bytes) -> Sequence[int]:
-    """Return the line on which each element starts; of a document that is not well-formed, none."""
+    """Return the line on which each element starts; empty if the document is malformed."""
     lines: list[int] = []
     parser = expat.ParserCreate()
     parser.StartElementHandler = lambda *_: lines.append(parser.CurrentLineNumber)

@@ -1,4 +1,4 @@
-"""Numbers in attributes: what counts as one, and what was meant where commas are in the way."""
+"""Parse numbers in attributes."""
 
 import re
 
@@ -9,14 +9,14 @@ from terrainkit_robots.transforms import Matrix
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 _SPACES = re.compile(r"[ \t\r\n]+")
-"""What XML counts as white space; Python's `split` takes more."""
+"""White space in XML; `str.split` accepts more characters."""
 
 _LARGEST = 1e30
-"""A larger number is told as one that cannot be meant, and would overflow in the first square."""
+"""Larger numbers are rejected; their squares may overflow."""
 
 
 def parse_numbers(text: str, count: int) -> Matrix | None:
-    """Return the numbers in `text`, shape (count,); None if there are others, or not that many."""
+    """Return the numbers in `text`, shape (count,); None if the text is not `count` numbers."""
     words = [word for word in re.split(_SPACES, text) if word]
     if len(words) != count or not all(_NUMBER.fullmatch(word) for word in words):
         return None
@@ -25,7 +25,10 @@ def parse_numbers(text: str, count: int) -> Matrix | None:
 
 
 def replace_commas(text: str, count: int) -> str:
-    """Return the text as it was meant, where commas are all that is wrong; else nothing."""
+    """Return the text with commas replaced by points or spaces, if that yields `count` numbers.
+
+    Returns an empty string otherwise.
+    """
     between = re.search(r",\s|\s,", text) is not None
     for other in (" ", ".") if between else (".", " "):
         meant = " ".join(text.replace(",", other).split())

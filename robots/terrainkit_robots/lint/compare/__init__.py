@@ -1,1 +1,1 @@
-"""Compare two descriptions of one robot."""
+"""Compare two descriptions of a robot."""

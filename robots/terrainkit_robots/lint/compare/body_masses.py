@@ -1,4 +1,4 @@
-"""Body masses: how the mass of two descriptions of a robot is spread over their bodies."""
+"""Compare the mass and inertia of the bodies of two descriptions of a robot."""
 
 from dataclasses import dataclass
 
@@ -7,60 +7,57 @@ import numpy as np
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.xml.document import RobotFileError, parse_xml, read_bytes
-from terrainkit_robots.lint.compare.pairing import Pairing, from_link
+from terrainkit_robots.lint.compare.robot_pairs import RobotPairs, trunk_pose_in_link
 from terrainkit_robots.transforms import Matrix
 
 
 @dataclass(frozen=True, kw_only=True)
-class BodyGap:
-    """What two bodies that belong together differ in."""
-
-    ours: Body
-    theirs: Body
+class BodyDifference:
+    """The difference of two corresponding bodies."""
 
     mass: float
-    """Difference of the masses over the larger one."""
+    """Difference of the masses, relative to the larger one."""
 
     center: float
-    """Distance between the centres of mass [m]."""
+    """Distance between the centers of mass [m]."""
 
     inertia: float
-    """Largest difference of the inertias' elements over the largest element."""
+    """Maximum difference of the inertia elements, relative to the largest element."""
 
 
-def body_gap(one: Facts, other: Facts, pairing: Pairing, ours: Body, theirs: Body) -> BodyGap:
-    """Return the difference of two bodies.
+def body_difference(
+    robot: Facts, other: Facts, pairs: RobotPairs, body: Body, other_body: Body
+) -> BodyDifference:
+    """Return the difference of two corresponding bodies.
 
-    Where the frames of the bodies are turned against each other, they are seen from the base; what
-    is closer counts.
+    The bodies are compared in their own frames and in the frame of the base, because their own
+    frames may be rotated relative to each other. The smaller difference is returned.
     """
-    frames = [
-        from_link(robot, base) @ robot.at_zero[body.index]
-        for robot, base, body in zip((one, other), pairing.base, (ours, theirs), strict=True)
+    base_frames = [
+        trunk_pose_in_link(facts, base) @ facts.at_zero[each.index]
+        for facts, base, each in zip((robot, other), pairs.base, (body, other_body), strict=True)
     ]
-    own = [np.eye(4), np.eye(4)]
-    if ours.parent is None:  # whose frame may be that of another link
-        own = frames
+    own_frames = [np.eye(4), np.eye(4)]
+    if body.parent is None:  # the frames of the trunks may belong to different links
+        own_frames = base_frames
     centers, inertias = [], []
     with np.errstate(all="ignore"):
-        for a, b in (own, frames):
-            centers.append(np.linalg.norm(_center(ours, a) - _center(theirs, b)))
-            left, right = _inertia(ours, a), _inertia(theirs, b)
-            largest = max(np.abs(left).max(), np.abs(right).max())
-            inertias.append(np.abs(left - right).max() / largest if largest > 0 else 0.0)
-    return BodyGap(
-        ours=ours,
-        theirs=theirs,
-        mass=share(ours.mass, theirs.mass),
+        for a, b in (own_frames, base_frames):
+            centers.append(np.linalg.norm(_center(body, a) - _center(other_body, b)))
+            inertia, other_inertia = _inertia(body, a), _inertia(other_body, b)
+            largest = max(np.abs(inertia).max(), np.abs(other_inertia).max())
+            inertias.append(np.abs(inertia - other_inertia).max() / largest if largest > 0 else 0.0)
+    return BodyDifference(
+        mass=relative_difference(body.mass, other_body.mass),
         center=float(min(centers)),
         inertia=float(min(inertias)),
     )
 
 
-def is_known(body: Body) -> bool:
-    """Return whether the masses and inertias of a body are all written, and none hangs on a mesh.
+def has_valid_inertial(body: Body) -> bool:
+    """Return whether all masses and inertias of a body are explicit and finite, with mass >= 0.
 
-    What is missing or negative is told by INR.
+    The INR rules report missing and negative ones.
     """
     inertials = [link.inertial for link in body.links if link.inertial is not None]
     return bool(inertials) and all(
@@ -72,28 +69,28 @@ def is_known(body: Body) -> bool:
     )
 
 
-def share(a: float, b: float) -> float:
-    """Return how far apart two numbers are, over the larger of them; 0 for two zeros."""
+def relative_difference(a: float, b: float) -> float:
+    """Return the difference of two numbers relative to the larger one, or 0 for two zeros."""
     largest = max(abs(a), abs(b))
     return abs(a - b) / largest if largest != 0 else 0.0
 
 
 def dropped_mass(robot: Facts) -> float:
-    """Return the mass that MuJoCo drops when it loads a URDF as it stands [kg].
+    """Return the mass that MuJoCo drops when it loads an unmodified URDF [kg].
 
-    That of the trunk, which it welds to the world, unless the file has a floating joint above it or
-    tells MuJoCo to keep static bodies.
+    MuJoCo welds the trunk to the world and drops its mass, unless the file has a floating joint
+    above it or sets `fusestatic="false"`.
     """
-    floats = any(joint.kind == "floating" for joint in robot.model.joints)
-    if robot.model.kind != "urdf" or floats or not robot.bodies:
+    is_floating = any(joint.kind == "floating" for joint in robot.model.joints)
+    if robot.model.kind != "urdf" or is_floating or not robot.bodies:
         return 0.0
     try:
         root = parse_xml(robot.model.file, read_bytes(robot.model.file)).root
     except RobotFileError:
         return 0.0
     compiler = None if root is None else root.find("mujoco/compiler")
-    kept = compiler is not None and compiler.get("fusestatic") == "false"
-    return 0.0 if kept else robot.bodies[0].mass
+    is_kept = compiler is not None and compiler.get("fusestatic") == "false"
+    return 0.0 if is_kept else robot.bodies[0].mass
 
 
 def _center(body: Body, frame: Matrix) -> Matrix:

@@ -1,7 +1,7 @@
-"""Poses of a MJCF's bodies by MuJoCo.
+"""Compute the body poses of an MJCF with MuJoCo.
 
-MuJoCo is given the bodies and joints of the file and nothing else, with a dummy mass on each body:
-kinematics needs no shapes, and so no mesh is opened, and none that is missing is in the way.
+MuJoCo gets only the bodies and joints of the file, with a dummy mass on each body. Kinematics needs
+no shapes, so meshes are not opened and may be missing.
 """
 
 from collections.abc import Mapping
@@ -21,37 +21,37 @@ if TYPE_CHECKING:
     import mujoco
 
 _SECTIONS = frozenset({"compiler", "default", "worldbody", "asset"})
-"""Parts of a model that kinematics hangs on; of the assets, only models that are attached."""
+"""Sections that affect kinematics. Of the assets, only attached models do."""
 
 _SHAPES = frozenset({"geom", "site", "camera", "light", "inertial"})
-"""Elements of a body that kinematics does not hang on."""
+"""Elements of a body that do not affect kinematics."""
 
 
 def mjcf_poses(robot: Facts, positions: Mapping[str, Matrix]) -> dict[str, Matrix]:
-    """Return the pose of each body in the world's frame, shape (n, 4, 4) [m], by its link's name.
+    """Return the pose of each body in the world frame, shape (n, 4, 4) [m], by the link's name.
 
     Args:
         robot: A robot that was read from MJCF.
-        positions: Positions of joints [rad] or [m], shape (n,) each; others are at 0, whatever
-            their `ref`. Free and ball joints are where the file has them.
+        positions: Joint positions [rad] or [m], shape (n,) each. Other joints are at 0, regardless
+            of their `ref`. Free and ball joints stay at their initial position.
 
     Raises:
-        CannotCheckError: if MuJoCo cannot tell.
+        CannotCheckError: if MuJoCo cannot load the robot, or the file has changed.
     """
     import mujoco
 
-    model = _compiled(robot)
-    places = _places(robot, model)
+    model = _compile(robot)
+    addresses = _qpos_addresses(robot, model)
     bodies = [link.name for link in robot.model.links if not link.virtual]
     if len(bodies) != model.nbody - 1:
-        raise _changed(robot)
+        raise _changed_file(robot)
     count = len(next(iter(positions.values()))) if positions else 1
     poses = {name: np.tile(np.eye(4), (count, 1, 1)) for name in bodies}
     data = mujoco.MjData(model)
-    data.qpos[[places[joint.name] for joint in robot.model.joints if joint.moves]] = 0.0
+    data.qpos[[addresses[joint.name] for joint in robot.model.joints if joint.moves]] = 0.0
     for k in range(count):
         for name, values in positions.items():
-            data.qpos[places[name]] = values[k]
+            data.qpos[addresses[name]] = values[k]
         mujoco.mj_kinematics(model, data)
         for index, name in enumerate(bodies, 1):
             poses[name][k, :3, :3] = data.xmat[index].reshape(3, 3)
@@ -59,22 +59,22 @@ def mjcf_poses(robot: Facts, positions: Mapping[str, Matrix]) -> dict[str, Matri
     return poses
 
 
-def _places(robot: Facts, model: Any) -> dict[str, int]:
-    """Return where in qpos each joint is; the order is that of the file in both."""
+def _qpos_addresses(robot: Facts, model: Any) -> dict[str, int]:
+    """Return the index of each joint in qpos. Both use the order of the file."""
     joints = [joint for joint in robot.model.joints if joint.kind != "fixed"]
     if len(joints) != model.njnt or any(
         model.joint(k).name not in ("", joint.name) for k, joint in enumerate(joints)
     ):
-        raise _changed(robot)
+        raise _changed_file(robot)
     return {joint.name: int(model.jnt_qposadr[k]) for k, joint in enumerate(joints)}
 
 
-def _changed(robot: Facts) -> CannotCheckError:
+def _changed_file(robot: Facts) -> CannotCheckError:
     return CannotCheckError(f"{robot.model.file.name} has changed since it was read")
 
 
-def _compiled(robot: Facts) -> "mujoco.MjModel":
-    """Return MuJoCo's model of the bodies and joints alone."""
+def _compile(robot: Facts) -> "mujoco.MjModel":
+    """Return a MuJoCo model of the bodies and joints only."""
     import mujoco
 
     file = robot.model.file
@@ -83,33 +83,33 @@ def _compiled(robot: Facts) -> "mujoco.MjModel":
     except RobotFileError as error:
         raise CannotCheckError(str(error)) from error
     if document.root is None:
-        raise _changed(robot)
+        raise _changed_file(robot)
     tree = read_document(document, {})
-    _bare(tree)
+    _remove_other_elements(tree)
     spec, _ = parse_mjcf(tree)
     if spec is None:
-        raise CannotCheckError(f"MuJoCo does not read {file.name}")
-    _settle(spec)
+        raise CannotCheckError(f"MuJoCo cannot parse {file.name}")
+    _set_dummy_masses(spec)
     try:
         with quiet_mujoco():
             return spec.compile()
     except (ValueError, RuntimeError, mujoco.FatalError, mujoco.UnexpectedError) as error:
         why = " ".join(str(error).split())
-        raise CannotCheckError(f"MuJoCo does not compile {file.name}: {why}") from error
+        raise CannotCheckError(f"MuJoCo cannot compile {file.name}: {why}") from error
 
 
-def _bare(tree: MjcfDocument) -> None:
-    """Take out of a document all that kinematics does not hang on."""
+def _remove_other_elements(tree: MjcfDocument) -> None:
+    """Remove all elements that do not affect kinematics."""
     for root in tree.roots():
         root.children[:] = [section for section in root.children if section.tag in _SECTIONS]
         for section in root.children:
             if section.tag == "asset":
                 section.children[:] = [node for node in section.children if node.tag == "model"]
             elif section.tag == "worldbody":
-                _without_shapes(section)
+                _remove_shapes(section)
 
 
-def _without_shapes(body: Node) -> None:
+def _remove_shapes(body: Node) -> None:
     stack = [body]
     while stack:
         node = stack.pop()
@@ -117,8 +117,8 @@ def _without_shapes(body: Node) -> None:
         stack += [child for child in node.children if child.tag != "composite"]
 
 
-def _settle(spec: "mujoco.MjSpec") -> None:
-    """Give each body a mass, and take the joints' limits away: only their motion is asked for."""
+def _set_dummy_masses(spec: "mujoco.MjSpec") -> None:
+    """Give each body a mass and remove joint limits, which do not affect kinematics."""
     import mujoco
 
     compiler, free = spec.compiler, mujoco.mjtLimited.mjLIMITED_FALSE

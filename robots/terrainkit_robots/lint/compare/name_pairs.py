@@ -1,7 +1,7 @@
-"""Pairs of names: which joint or link of one file is which of another.
+"""Match the names of joints or links between two files.
 
-Equal names belong together. Of the rest those do that differ only in capitals or in a suffix that
-says what they are, as `FL_hip_joint` and `FL_hip`, where no third name would fit as well.
+Equal names match. Other names match if they differ only in case or in a suffix such as `_joint`,
+and the match is unique: `FL_hip_joint` matches `FL_hip`.
 """
 
 from collections import Counter
@@ -9,48 +9,48 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 _SUFFIXES = ("_joint", "_link")
-"""What a name may end with in one file and not in the other."""
+"""Suffixes that a name may have in one file only."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class NamePairs:
-    """Two lists of names, side by side."""
+    """The matches of two lists of names."""
 
     pairs: tuple[tuple[str, str], ...]
-    """Ours and theirs, in our order."""
+    """Names of the first and the second list, in the order of the first."""
 
-    only_ours: tuple[str, ...]
-    only_theirs: tuple[str, ...]
+    only_first: tuple[str, ...]
+    only_second: tuple[str, ...]
 
     @property
     def renamed(self) -> tuple[tuple[str, str], ...]:
-        """The pairs whose names are not equal."""
-        return tuple((ours, theirs) for ours, theirs in self.pairs if ours != theirs)
+        """The pairs of different names."""
+        return tuple((a, b) for a, b in self.pairs if a != b)
 
 
-def pair_names(ours: Sequence[str], theirs: Sequence[str]) -> NamePairs:
-    """Return which names belong together; of a name that repeats only the first counts."""
-    ours, theirs = tuple(dict.fromkeys(ours)), tuple(dict.fromkeys(theirs))
-    partner = {name: name for name in set(ours) & set(theirs)}
-    left = _by_stem([name for name in ours if name not in partner])
-    right = _by_stem([name for name in theirs if name not in partner])
-    partner |= {left[stem]: right[stem] for stem in left.keys() & right.keys()}
-    taken = set(partner.values())
+def pair_names(first: Sequence[str], second: Sequence[str]) -> NamePairs:
+    """Return the matches of two lists of names. Repetitions of a name are ignored."""
+    first, second = tuple(dict.fromkeys(first)), tuple(dict.fromkeys(second))
+    matches = {name: name for name in set(first) & set(second)}
+    left = _by_root([name for name in first if name not in matches])
+    right = _by_root([name for name in second if name not in matches])
+    matches |= {left[root]: right[root] for root in left.keys() & right.keys()}
+    matched = set(matches.values())
     return NamePairs(
-        pairs=tuple((name, partner[name]) for name in ours if name in partner),
-        only_ours=tuple(name for name in ours if name not in partner),
-        only_theirs=tuple(name for name in theirs if name not in taken),
+        pairs=tuple((name, matches[name]) for name in first if name in matches),
+        only_first=tuple(name for name in first if name not in matches),
+        only_second=tuple(name for name in second if name not in matched),
     )
 
 
-def _by_stem(names: Sequence[str]) -> dict[str, str]:
-    """Return the names by what is left of them, but for those of which the same is left."""
-    stems = {name: _stem(name) for name in names}
-    counts = Counter(stems.values())
-    return {stem: name for name, stem in stems.items() if stem and counts[stem] == 1}
+def _by_root(names: Sequence[str]) -> dict[str, str]:
+    """Return the names by their lower-case root without suffix, if it is unique."""
+    roots = {name: _root(name) for name in names}
+    counts = Counter(roots.values())
+    return {root: name for name, root in roots.items() if root and counts[root] == 1}
 
 
-def _stem(name: str) -> str:
+def _root(name: str) -> str:
     lower = name.lower()
     for suffix in _SUFFIXES:
         lower = lower.removesuffix(suffix)

@@ -1,7 +1,7 @@
-"""Poses of a URDF's links by yourdfpy, which knows nothing of this project.
+"""Compute the link poses of a URDF with yourdfpy.
 
-yourdfpy is given a document with the frames and axes as the file writes them, and nothing else: no
-mesh is opened, and what it would refuse is gone.
+yourdfpy gets a document with the origins and axes of the file only. Meshes are not opened, and
+elements that it would reject are left out.
 """
 
 import io
@@ -23,29 +23,29 @@ from terrainkit_robots.transforms import Matrix, matrix_to_rpy
 if TYPE_CHECKING:
     import yourdfpy
 
-_MOST_JOINTS, _MOST_TURNS = 500, 20_000
-"""So many joints, and so many times all poses, are asked of yourdfpy: some seconds of work. It
-takes the square of the joints; a humanoid has 30."""
+_MAX_JOINTS, _MAX_JOINT_POSES = 500, 20_000
+"""Maximum number of joints, and of joints times poses, for yourdfpy: a few seconds of work. The
+time grows with the square of the joints."""
 
 
 def urdf_poses(robot: Facts, positions: Mapping[str, Matrix]) -> dict[str, Matrix]:
-    """Return the pose of each link in the root's frame, shape (n, 4, 4) [m], by the link's name.
+    """Return the pose of each link in the root frame, shape (n, 4, 4) [m], by the link's name.
 
     Args:
         robot: A robot that was read from URDF or xacro.
-        positions: Positions of joints [rad] or [m], shape (n,) each; others are at 0.
+        positions: Joint positions [rad] or [m], shape (n,) each. Other joints are at 0.
 
     Raises:
-        CannotCheckError: if yourdfpy cannot tell.
+        CannotCheckError: if yourdfpy cannot load the robot, or the file has changed.
     """
     joints = [robot.tree.above[name] for name in robot.tree.order[1:]]
     if not joints:
-        raise CannotCheckError(f"{robot.model.file.name} has one link, which does not move")
+        raise CannotCheckError(f"{robot.model.file.name} has no joints")
     count = len(next(iter(positions.values()))) if positions else 1
-    _check(robot, joints, count)
-    document = _document(robot, joints)
+    _check_size(robot, joints, count)
+    document = _make_document(robot, joints)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of what yourdfpy imports, and of what it divides by
+        warnings.simplefilter("ignore")  # from imports of yourdfpy, and divisions by zero
         import yourdfpy
 
         try:
@@ -62,56 +62,58 @@ def _poses(
     positions: Mapping[str, Matrix],
     count: int,
 ) -> dict[str, Matrix]:
-    """Return the pose of each link: that of its parent times what yourdfpy says of the joint."""
+    """Return the pose of each link: its parent's pose times the joint transform of yourdfpy."""
     moved = [joint for joint in joints if joint.moves and joint.name in positions]
-    steps = {
+    transforms = {
         joint.child: np.tile(model.get_transform(joint.child, joint.parent), (count, 1, 1))
         for joint in joints
     }
     for k in range(count):
         model.update_cfg({joint.name: float(positions[joint.name][k]) for joint in moved})
         for joint in moved:
-            steps[joint.child][k] = model.get_transform(joint.child, joint.parent)
+            transforms[joint.child][k] = model.get_transform(joint.child, joint.parent)
     poses = {joints[0].parent: np.tile(np.eye(4), (count, 1, 1))}
     for joint in joints:
-        poses[joint.child] = poses[joint.parent] @ steps[joint.child]
+        poses[joint.child] = poses[joint.parent] @ transforms[joint.child]
     return poses
 
 
-def _check(robot: Facts, joints: Sequence[Joint], poses: int) -> None:
-    """Raise if yourdfpy cannot be asked."""
+def _check_size(robot: Facts, joints: Sequence[Joint], poses: int) -> None:
+    """Raise an error if joint names repeat or yourdfpy would take too long."""
     file = robot.model.file.name
     for a, b in pairwise(sorted(joint.name for joint in joints)):
         if a == b:
-            raise CannotCheckError(f"joint {a} of {file} is there twice, so it has no position")
-    if len(joints) > _MOST_JOINTS or len(joints) * poses > _MOST_TURNS:
-        raise CannotCheckError(f"{file} has {len(joints)} joints; yourdfpy takes too long for that")
+            raise CannotCheckError(f"{file} has two joints called {a}")
+    if len(joints) > _MAX_JOINTS or len(joints) * poses > _MAX_JOINT_POSES:
+        raise CannotCheckError(
+            f"{file} has {len(joints)} joints, which would take yourdfpy too long"
+        )
 
 
-def _document(robot: Facts, joints: Sequence[Joint]) -> bytes:
-    """Return a URDF of the links and joints of the main tree, with their frames and axes."""
+def _make_document(robot: Facts, joints: Sequence[Joint]) -> bytes:
+    """Return a URDF with the links and joints of the main tree, with origins and axes only."""
     root = etree.Element("robot", name="robot")
     for link in robot.tree.order:
         etree.SubElement(root, "link", name=link)
-    written = _written(robot)
+    elements = _joint_elements(robot)
     for joint in joints:
         kind = joint.kind if joint.moves else "fixed"
         element = etree.SubElement(root, "joint", name=joint.name, type=kind)
         etree.SubElement(element, "parent", link=joint.parent)
         etree.SubElement(element, "child", link=joint.child)
-        etree.SubElement(element, "origin", dict(_origin(joint, written.get(joint))))
-        axis = _axis(joint, written.get(joint))
+        etree.SubElement(element, "origin", dict(_origin(joint, elements.get(joint))))
+        axis = _axis(joint, elements.get(joint))
         if axis:
             etree.SubElement(element, "axis", xyz=axis)
     document: bytes = etree.tostring(root)
     return document
 
 
-def _written(robot: Facts) -> dict[Joint, "etree._Element"]:
-    """Return the element of each joint, as it is in the file; none of what was made from xacro.
+def _joint_elements(robot: Facts) -> dict[Joint, "etree._Element"]:
+    """Return the XML element of each joint. Empty for xacro.
 
     Raises:
-        CannotCheckError: if the file is not the one that was read.
+        CannotCheckError: if the file has changed.
     """
     model = robot.model
     if model.kind != "urdf":
@@ -126,13 +128,13 @@ def _written(robot: Facts) -> dict[Joint, "etree._Element"]:
     return dict(zip(model.joints, elements, strict=True))
 
 
-def _origin(joint: Joint, written: "etree._Element | None") -> Iterator[tuple[str, str]]:
-    """Yield xyz and rpy, as far as they are numbers; yourdfpy knows no quaternions."""
-    if written is None:
+def _origin(joint: Joint, element: "etree._Element | None") -> Iterator[tuple[str, str]]:
+    """Yield valid xyz and rpy attributes. Quaternions are converted, as yourdfpy ignores them."""
+    if element is None:
         yield "xyz", _text(joint.origin[:3, 3])
         yield "rpy", _text(matrix_to_rpy(joint.origin[:3, :3]))
         return
-    origin = written.find("origin")
+    origin = element.find("origin")
     for name in ("xyz", "rpy"):
         text = "" if origin is None else origin.get(name, "")
         if parse_numbers(text, 3) is None:
@@ -143,9 +145,9 @@ def _origin(joint: Joint, written: "etree._Element | None") -> Iterator[tuple[st
             yield name, _text(matrix_to_rpy(joint.origin[:3, :3]))
 
 
-def _axis(joint: Joint, written: "etree._Element | None") -> str:
-    """Return the axis; of unit length where yourdfpy would take its length for a factor."""
-    axis = None if written is None else written.find("axis")
+def _axis(joint: Joint, element: "etree._Element | None") -> str:
+    """Return the axis. It is normalized where yourdfpy would use its length as a factor."""
+    axis = None if element is None else element.find("axis")
     text = "" if axis is None else axis.get("xyz", "")
     numbers = parse_numbers(text, 3)
     if numbers is None or joint.kind == "prismatic" or not 0.1 < np.linalg.norm(numbers) < 10:

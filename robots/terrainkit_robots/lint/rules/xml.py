@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.fix import Fix, RemoveAttribute, RemoveElement, SetAttribute
 from terrainkit_robots.description.model import Problem
-from terrainkit_robots.description.xml.document import without_mark
+from terrainkit_robots.description.xml.document import leading_bytes_fix
 from terrainkit_robots.lint.rule import Severity, Violation, rule
 
 
@@ -194,7 +194,7 @@ def byte_order_mark(robot: Facts) -> Iterator[Violation]:
         that start with a byte order mark.
     """
     for problem in _problems(robot, "XML009"):
-        yield _violation(robot, problem, without_mark(problem))
+        yield _violation(robot, problem, leading_bytes_fix(problem))
 
 
 @rule("XML010", "entity-declarations", "error")

@@ -18,14 +18,19 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.effort import effort_of
 from terrainkit_robots.description.model import Joint, Mimic, Source
-from terrainkit_robots.lint.compare.body_masses import body_gap, dropped_mass, is_known, share
+from terrainkit_robots.lint.compare.body_masses import (
+    body_difference,
+    dropped_mass,
+    has_valid_inertial,
+    relative_difference,
+)
 from terrainkit_robots.lint.rule import Severity, Violation, rule
 from terrainkit_robots.text import count, names, short
 from terrainkit_robots.transforms import Matrix
 
 if TYPE_CHECKING:
-    from terrainkit_robots.lint.compare.kinematics import KinematicDifference
-    from terrainkit_robots.lint.compare.pairing import Pairing
+    from terrainkit_robots.lint.compare.link_poses import LinkPoseDifference
+    from terrainkit_robots.lint.compare.robot_pairs import RobotPairs
 
 _MAX_AXIS_ANGLE = 0.01
 """Allowed angle between axes [rad]: axes with two digits, such as 0.71 0.71 0."""
@@ -56,18 +61,18 @@ _JointPair = tuple[Joint, Joint]
 
 
 @per_robot
-def _pair_robots(robot: Facts) -> "Pairing | None":
-    from terrainkit_robots.lint.compare.pairing import pair_robots
+def _pair_robots(robot: Facts) -> "RobotPairs | None":
+    from terrainkit_robots.lint.compare.robot_pairs import pair_robots
 
     return pair_robots(robot, _other(robot))
 
 
-def _pairing(robot: Facts) -> "Pairing":
-    pairing = _pair_robots(robot)
-    if pairing is None:
+def _robot_pairs(robot: Facts) -> "RobotPairs":
+    pairs = _pair_robots(robot)
+    if pairs is None:
         empty = robot if not robot.links else _other(robot)
         raise CannotCheckError(f"{short(empty.model.file.name)} has no links")
-    return pairing
+    return pairs
 
 
 def _joint_pairs(robot: Facts) -> tuple[_JointPair, ...]:
@@ -76,12 +81,12 @@ def _joint_pairs(robot: Facts) -> tuple[_JointPair, ...]:
     Raises:
         CannotCheckError: If there is none.
     """
-    pairing = _pairing(robot)
+    pairs = _robot_pairs(robot)
     if not robot.joints or not _other(robot).joints:
         raise CannotCheckError("one of the two has no joints with one degree of freedom")
-    if not pairing.joints:
+    if not pairs.joints:
         raise CannotCheckError(f"no joint of {_other_name(robot)} has the name of a joint here")
-    return pairing.joints
+    return pairs.joints
 
 
 def _other(robot: Facts) -> Facts:
@@ -115,10 +120,10 @@ def compare_joint_sets(robot: Facts) -> Iterator[Violation]:
         Joints with one degree of freedom are matched by name; case and a suffix such as _joint are
         ignored.
     """
-    pairing, other, there = _pairing(robot), _other(robot), _other_name(robot)
-    joint_names = pairing.joint_names
-    ours = [joint for joint in robot.joints if joint.name in joint_names.only_ours]
-    theirs = [joint for joint in other.joints if joint.name in joint_names.only_theirs]
+    pairs, other, there = _robot_pairs(robot), _other(robot), _other_name(robot)
+    joint_names = pairs.joint_names
+    ours = [joint for joint in robot.joints if joint.name in joint_names.only_first]
+    theirs = [joint for joint in other.joints if joint.name in joint_names.only_second]
     counts = {"here": len(robot.joints), "there": len(other.joints)}
     for joints, side, fixed, missing in (
         (ours, other, f"that move here but are fixed in {there}", f"missing in {there}"),
@@ -205,9 +210,9 @@ def _mimic_difference(robot: Facts, one: Joint, other: Joint) -> tuple[str, str,
     if ours is None or theirs is None:
         texts = [f"a mimic of {short(m.joint)}" if m else "none" for m in (ours, theirs)]
         return "mimic", f"{texts[0]} here and {texts[1]} there; expected the same", "warning"
-    partner = dict(_pairing(robot).joint_names.pairs)
+    partner = dict(_robot_pairs(robot).joint_names.pairs)
     same = partner.get(ours.joint, ours.joint) == theirs.joint
-    close = share(ours.multiplier, theirs.multiplier) <= _MAX_EFFORT_DIFFERENCE
+    close = relative_difference(ours.multiplier, theirs.multiplier) <= _MAX_EFFORT_DIFFERENCE
     if same and close and abs(ours.offset - theirs.offset) <= _limit_tolerance(one):
         return "", "", None
     text = f"{_format_mimic(ours)} here and {_format_mimic(theirs)} there; expected the same"
@@ -223,16 +228,16 @@ def _axis_angle(robot: Facts, one: Joint, other: Joint) -> float:
     own = _angle(one.direction, other.direction)
     if own <= _MAX_AXIS_ANGLE:
         return own
-    base = _pairing(robot).base
+    base = _robot_pairs(robot).base
     ours = _axis_in_link(base[0], robot, one)
     return min(own, _angle(ours, _axis_in_link(base[1], _other(robot), other)))
 
 
 def _axis_in_link(link: str, robot: Facts, joint: Joint) -> Matrix:
     """Return the axis of a joint in the frame of a link, all joints at 0."""
-    from terrainkit_robots.lint.compare.pairing import from_link
+    from terrainkit_robots.lint.compare.robot_pairs import trunk_pose_in_link
 
-    pose = from_link(robot, link) @ robot.at_zero[robot.body_of[joint.child].index]
+    pose = trunk_pose_in_link(robot, link) @ robot.at_zero[robot.body_of[joint.child].index]
     return pose[:3, :3] @ joint.direction
 
 
@@ -302,7 +307,7 @@ def _velocity_difference(one: Joint, other: Joint) -> tuple[object, ...] | None:
     """Return the velocities of two joints if both are given and they differ."""
     a = one.limit.velocity if one.limit else None
     b = other.limit.velocity if other.limit else None
-    if not a or not b or share(a, b) <= _MAX_EFFORT_DIFFERENCE:
+    if not a or not b or relative_difference(a, b) <= _MAX_EFFORT_DIFFERENCE:
         return None
     return one.kind == "prismatic", a, b
 
@@ -397,7 +402,7 @@ def compare_actuator_order(robot: Facts) -> Iterator[Violation]:
         Go2 the right legs come first in the actuators and last in the joints.
     """
     other, there = _other(robot), _other_name(robot)
-    partner = dict(_pairing(robot).joint_names.pairs)
+    partner = dict(_robot_pairs(robot).joint_names.pairs)
     ours = [partner[name] for name in actuator_order(robot) if name in partner]
     theirs = actuator_order(other)
     common = [name for name in theirs if name in ours]
@@ -459,7 +464,7 @@ def compare_effort(robot: Facts) -> Iterator[Violation]:
 
     def difference(one: Joint, _: Joint) -> tuple[object, ...] | None:
         a, b = efforts[one.name]
-        if not a or not b or share(a, b) <= _MAX_EFFORT_DIFFERENCE:
+        if not a or not b or relative_difference(a, b) <= _MAX_EFFORT_DIFFERENCE:
             return None
         return one.kind == "prismatic", a, b
 
@@ -473,8 +478,8 @@ def compare_effort(robot: Facts) -> Iterator[Violation]:
         yield _report_group(
             group,
             "effort limit",
-            f"{a:.5g} {unit} here and {b:.5g} {unit} in {there}, {share(a, b):.1%} apart; "
-            f"expected at most {_MAX_EFFORT_DIFFERENCE:.0%}",
+            f"{a:.5g} {unit} here and {b:.5g} {unit} in {there}, "
+            f"{relative_difference(a, b):.1%} apart; expected at most {_MAX_EFFORT_DIFFERENCE:.0%}",
         )
     for group in _grouped(pairs, missing):
         limited = bool(efforts[group[0][0].name][0])
@@ -505,19 +510,19 @@ def compare_total_mass(robot: Facts) -> Iterator[Violation]:
         Declared masses; in MJCF also those that MuJoCo computes from shapes. MuJoCo 4.0 drops the
         mass of the trunk of a URDF without a floating joint, since it welds the trunk to the world.
     """
-    pairing, other, there = _pairing(robot), _other(robot), _other_name(robot)
+    pairs, other, there = _robot_pairs(robot), _other(robot), _other_name(robot)
     a, b = robot.total_mass, other.total_mass
     for each, mass in ((robot, a), (other, b)):
         if math.isnan(mass):
             file = short(each.model.file.name)
             raise CannotCheckError(f"masses of {file} are computed from mesh files")
-    difference = share(a, b)
+    difference = relative_difference(a, b)
     if difference > _MAX_MASS_DIFFERENCE:
-        bodies = sorted(pairing.bodies, key=lambda pair: -abs(pair[0].mass - pair[1].mass))
+        bodies = sorted(pairs.bodies, key=lambda pair: -abs(pair[0].mass - pair[1].mass))
         causes = [
             f"{short(one.name)} {one.mass:.4g} and {two.mass:.4g} kg"
             for one, two in bodies[:_MAX_LISTED_BODIES]
-            if share(one.mass, two.mass) > _MAX_MASS_DIFFERENCE
+            if relative_difference(one.mass, two.mass) > _MAX_MASS_DIFFERENCE
         ]
         yield Violation(
             subject=robot.model.title,
@@ -565,17 +570,17 @@ def compare_kinematics(robot: Facts) -> Iterator[Violation]:
         Both robots are compared in 20 random poses. The link poses of a URDF are computed by
         yourdfpy and those of an MJCF by MuJoCo, two independent implementations.
     """
-    from terrainkit_robots.lint.compare.kinematics import largest_difference
+    from terrainkit_robots.lint.compare.link_poses import compare_link_poses
 
     held = [a.name for a, b in _joint_pairs(robot) if _difference(robot, a, b)[2] == "error"]
-    gap = largest_difference(robot, _other(robot), held=held)
-    if gap.agrees:
+    gap = compare_link_poses(robot, _other(robot), locked=held)
+    if gap.is_within_tolerance:
         return
-    severity: Severity | None = "warning" if gap.turned_only else None
-    if gap.base_only and gap.base[0] != gap.base[1]:
+    severity: Severity | None = "warning" if gap.is_rotation_only else None
+    if gap.is_base_offset and gap.base[0] != gap.base[1]:
         severity = "info"
     links = {link.name: link for link in robot.links}
-    subject = gap.base[0] if gap.base_only else gap.first
+    subject = gap.base[0] if gap.is_base_offset else gap.first
     yield Violation(
         subject=subject,
         source=links[subject].source,
@@ -592,20 +597,20 @@ def compare_kinematics(robot: Facts) -> Iterator[Violation]:
     )
 
 
-def _kinematics_message(gap: "KinematicDifference", other: str) -> str:
-    from terrainkit_robots.lint.compare.kinematics import ANGLE, DISTANCE
+def _kinematics_message(gap: "LinkPoseDifference", other: str) -> str:
+    from terrainkit_robots.lint.compare.link_poses import MAX_ANGLE, MAX_DISTANCE
 
     ours, theirs = gap.base
     base = ours if ours == theirs else f"{ours} ({theirs} there)"
     angle = f"{math.degrees(gap.angle):.3g} deg"
-    expected = f"expected at most {1000 * DISTANCE:g} mm and {math.degrees(ANGLE):.1g} deg"
-    if gap.base_only:
+    expected = f"expected at most {1000 * MAX_DISTANCE:g} mm and {math.degrees(MAX_ANGLE):.1g} deg"
+    if gap.is_base_offset:
         return (
             f"frame of {base} on the trunk: got a difference to {other} of "
             f"{1000 * gap.distance:.4g} mm and {angle}, the same for all {gap.links} links; "
             f"{expected}"
         )
-    if gap.turned_only:
+    if gap.is_rotation_only:
         return (
             f"rotation of link frames against those of {other}: got up to {angle} at {gap.link}, "
             f"the same in every pose, first at {gap.first}; {expected}; all origins agree to "
@@ -633,12 +638,14 @@ def compare_inertia(robot: Facts) -> Iterator[Violation]:
         Links that are connected by fixed joints count as one body, as simulators merge them. Only
         bodies with the same joints in both files are compared.
     """
-    pairing, other, there = _pairing(robot), _other(robot), _other_name(robot)
-    total_differs = share(robot.total_mass, other.total_mass) > _MAX_MASS_DIFFERENCE
-    for one, two in pairing.bodies:
-        if min(one.mass, two.mass) < _MIN_MASS or not (is_known(one) and is_known(two)):
+    pairs, other, there = _robot_pairs(robot), _other(robot), _other_name(robot)
+    total_differs = relative_difference(robot.total_mass, other.total_mass) > _MAX_MASS_DIFFERENCE
+    for one, two in pairs.bodies:
+        if min(one.mass, two.mass) < _MIN_MASS:
             continue
-        gap, body, message = body_gap(robot, other, pairing, one, two), short(one.name), ""
+        if not (has_valid_inertial(one) and has_valid_inertial(two)):
+            continue
+        gap, body, message = body_difference(robot, other, pairs, one, two), short(one.name), ""
         if gap.mass > _MAX_MASS_DIFFERENCE:
             if not total_differs:  # else reported by XRF007
                 message = (

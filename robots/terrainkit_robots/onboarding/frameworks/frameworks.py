@@ -1,7 +1,6 @@
-"""Frameworks: which there are, and the configuration of a robot for each.
+"""The training frameworks for which a configuration can be written.
 
-A framework is a module of this package that says what it takes, `LEGGED_ONLY`, and writes the file,
-`config_text`.
+Each framework is a module of this package with a flag `LEGGED_ONLY` and a function `config_text`.
 """
 
 import importlib
@@ -14,8 +13,8 @@ from typing import TYPE_CHECKING
 from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.onboarding import frameworks
 from terrainkit_robots.onboarding.derive_spec.named_bodies import body_name
+from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.legged_robot import check_legs
-from terrainkit_robots.onboarding.frameworks.robot import ConfiguredRobot
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
 if TYPE_CHECKING:
@@ -23,16 +22,21 @@ if TYPE_CHECKING:
 
 
 @cache
-def names() -> tuple[str, ...]:
-    """Return what `--config` takes, by the alphabet."""
-    found = [module.name for module in pkgutil.iter_modules(frameworks.__path__)]
-    return tuple(sorted(name for name in found if hasattr(_module(name), "LEGGED_ONLY")))
+def framework_names() -> tuple[str, ...]:
+    """Return the names of the frameworks in alphabetical order."""
+    modules = [module.name for module in pkgutil.iter_modules(frameworks.__path__)]
+    return tuple(sorted(name for name in modules if hasattr(_get_module(name), "LEGGED_ONLY")))
 
 
-def file_name(framework: str) -> str:
-    """Return what to call the file; not as the framework, which it would hide from Python."""
-    _check(framework)
-    return f"{framework}_config.py"
+def config_file_name(framework: str) -> str:
+    """Return the file name of a configuration.
+
+    Raises:
+        ConfigError: if the framework is unknown.
+    """
+    if framework not in framework_names():
+        raise ConfigError(f"framework: got {framework!r}; expected {listing(framework_names())}")
+    return f"{framework}_config.py"  # a file with the name of the framework would shadow it
 
 
 def config_text(
@@ -40,55 +44,53 @@ def config_text(
     spec: RobotSpec,
     *,
     bodies: Sequence[str] = (),
-    ranges: Mapping[str, tuple[float, float]] | None = None,
-    undriven: Sequence[str] = (),
+    limits: Mapping[str, tuple[float, float]] | None = None,
+    unactuated: Sequence[str] = (),
 ) -> str:
-    """Return the configuration of a robot, a Python file that lies beside its `robot.toml`.
+    """Return the configuration of a robot, a Python file for the folder of its robot.toml.
 
     Args:
-        framework: One of `names()`.
-        spec: The robot.
-        bodies: Every body there is once fixed joints are merged; legged_gym finds bodies by
-            substrings, which must not hit others. If empty, those that the spec names.
-        ranges: Lower and upper limit of each joint, as the URDF has them; without them the
-            share that soft limits leave is the usual one.
-        undriven: Joints of the URDF that move and have no motor.
+        framework: The name of a framework.
+        spec: The spec of the robot.
+        bodies: Names of all bodies after fixed joints are merged, by default those in the spec.
+            legged_gym finds bodies by substrings, which must not match other bodies.
+        limits: Lower and upper limit of each joint in the URDF. Without limits, the default
+            factor of the soft limits is used.
+        unactuated: Movable joints of the URDF without an actuator.
 
     Raises:
-        ConfigError: if there is no such framework, or it cannot have such a robot.
+        ConfigError: if the framework is unknown, or does not support the robot.
     """
-    _check(framework)
-    robot = ConfiguredRobot(spec=spec, bodies=bodies, ranges=ranges, undriven=undriven)
-    module = _module(framework)
+    config_file_name(framework)
+    robot = ConfigRobot(spec=spec, bodies=bodies, limits=limits, unactuated=unactuated)
+    module = _get_module(framework)
     if module.LEGGED_ONLY:
-        others = [name for name in names() if not _module(name).LEGGED_ONLY]
+        others = [name for name in framework_names() if not _get_module(name).LEGGED_ONLY]
         check_legs(robot, framework, others)
-    write: Callable[[ConfiguredRobot], str] = module.config_text
-    return write(robot)
+    make_text: Callable[[ConfigRobot], str] = module.config_text
+    return make_text(robot)
 
 
-def config_of(framework: str, facts: "Facts", spec: RobotSpec) -> str:
-    """Return the configuration of a robot of which the facts are at hand, too.
+def robot_config_text(framework: str, facts: "Facts", spec: RobotSpec) -> str:
+    """Return the configuration of a robot whose facts are known.
 
     Args:
-        framework: One of `names()`.
-        facts: The robot as its `robot.urdf` is written.
-        spec: The robot.
+        framework: The name of a framework.
+        facts: Facts of the robot in robot.urdf.
+        spec: The spec of the robot.
 
     Raises:
-        ConfigError: if there is no such framework, or it cannot have such a robot.
+        ConfigError: if the framework is unknown, or does not support the robot.
     """
-    bodies = (*(body_name(body) for body in facts.bodies), *spec.feet)
-    ranges = {joint.name: joint.range for joint in facts.model.joints if joint.range is not None}
-    moving = [joint.name for joint in facts.model.joints if joint.moves]
-    undriven = [name for name in moving if name not in spec.joint_order]
-    return config_text(framework, spec, bodies=bodies, ranges=ranges, undriven=undriven)
+    joints = facts.model.joints
+    return config_text(
+        framework,
+        spec,
+        bodies=(*(body_name(body) for body in facts.bodies), *spec.feet),
+        limits={joint.name: joint.range for joint in joints if joint.range is not None},
+        unactuated=[j.name for j in joints if j.moves and j.name not in spec.joint_order],
+    )
 
 
-def _check(framework: str) -> None:
-    if framework not in names():
-        raise ConfigError(f"no framework {framework!r}; there are: {listing(names())}")
-
-
-def _module(name: str) -> ModuleType:
+def _get_module(name: str) -> ModuleType:
     return importlib.import_module(f"{frameworks.__name__}.{name}")

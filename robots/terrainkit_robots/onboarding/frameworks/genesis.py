@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
+from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.naming import package_name
-from terrainkit_robots.onboarding.frameworks.robot import ConfiguredRobot
 from terrainkit_robots.onboarding.frameworks.source import (
     HERE,
     WRITTEN,
@@ -83,7 +83,7 @@ def configure(robot):
 '''
 
 
-def config_text(robot: ConfiguredRobot) -> str:
+def config_text(robot: ConfigRobot) -> str:
     """Return the file `genesis_config.py` of a robot."""
     spec = robot.spec
     height = number(spec.spawn_height or 0.0)
@@ -105,7 +105,7 @@ def config_text(robot: ConfiguredRobot) -> str:
     )
 
 
-def _about(robot: ConfiguredRobot) -> list[str]:
+def _about(robot: ConfigRobot) -> list[str]:
     package = package_name(robot.spec.name)
     return [
         f"{robot.title} for Genesis: its entity, gains and pose.",
@@ -127,7 +127,7 @@ def _about(robot: ConfiguredRobot) -> list[str]:
     ]
 
 
-def _bodies(robot: ConfiguredRobot) -> list[str]:
+def _bodies(robot: ConfigRobot) -> list[str]:
     spec = robot.spec
     contacts = (*spec.penalized_contacts, *spec.termination_contacts)
     kept = dict.fromkeys([*spec.feet, *contacts])
@@ -142,22 +142,22 @@ def _bodies(robot: ConfiguredRobot) -> list[str]:
     ]
 
 
-def _table(robot: ConfiguredRobot, name: str, field: str) -> list[str]:
+def _table(robot: ConfigRobot, name: str, field: str) -> list[str]:
     values = robot.of_every_joint(field) if field in _REQUIRED else robot.by_joint(field)
     return [*robot.origin(field), *spread(f"{name} = ", table(values), "{}")]
 
 
-def _scales(robot: ConfiguredRobot) -> Iterator[list[str]]:
+def _scales(robot: ConfigRobot) -> Iterator[list[str]]:
     """Yield what an action of 1 changes: a position, or the speed of what has no stiffness."""
     for name, joints, told, origin in (
-        ("ACTION_SCALE", robot.placed, "position", robot.origin("action_scale")),
-        ("SPEED_SCALE", robot.wheels, "speed", robot.speed_origin()),
+        ("ACTION_SCALE", robot.position_joints, "position", robot.origin("action_scale")),
+        ("SPEED_SCALE", robot.velocity_joints, "speed", robot.speed_origin()),
     ):
         yield ["", f"# Change of the {told} that a joint is told, for an action of 1.", *origin]
         yield spread(f"{name} = ", table(robot.scales(joints)), "{}")
 
 
-def _functions(robot: ConfiguredRobot) -> str:
+def _functions(robot: ConfigRobot) -> str:
     if robot.spec.joint_order:
         return _FUNCTIONS
     start = _FUNCTIONS.index("\ndef dofs(")

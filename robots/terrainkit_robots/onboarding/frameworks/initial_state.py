@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping
 
-from terrainkit_robots.onboarding.frameworks.robot import ConfiguredRobot
+from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.source import number, spread, table
 
 
-def initial_state(robot: ConfiguredRobot, patterns: Mapping[str, str], *, depth: int) -> list[str]:
+def initial_state(robot: ConfigRobot, patterns: Mapping[str, str], *, depth: int) -> list[str]:
     """Return the fields of an InitialStateCfg.
 
     Args:

@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 
 from terrainkit.errors import ConfigError
+from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.initial_state import initial_state
 from terrainkit_robots.onboarding.frameworks.naming import class_name, constant_name, package_name
 from terrainkit_robots.onboarding.frameworks.patterns import usd_patterns
-from terrainkit_robots.onboarding.frameworks.robot import ConfiguredRobot
 from terrainkit_robots.onboarding.frameworks.source import (
     HERE,
     WRITTEN,
@@ -36,7 +36,7 @@ _LIMITS = {
 """Fields of ImplicitActuatorCfg, and those of the spec that they hold."""
 
 
-def config_text(robot: ConfiguredRobot) -> str:
+def config_text(robot: ConfigRobot) -> str:
     """Return the file `isaaclab_config.py` of a robot.
 
     Raises:
@@ -60,7 +60,7 @@ def config_text(robot: ConfiguredRobot) -> str:
     )
 
 
-def _about(robot: ConfiguredRobot, name: str, walks: bool) -> list[str]:
+def _about(robot: ConfigRobot, name: str, walks: bool) -> list[str]:
     package = package_name(robot.spec.name)
     paragraphs = [
         f"{robot.title} for Isaac Lab 2: its articulation"
@@ -87,7 +87,7 @@ def _about(robot: ConfiguredRobot, name: str, walks: bool) -> list[str]:
                 ]
             ),
         ]
-    if robot.wheels:
+    if robot.velocity_joints:
         paragraphs.append(
             "What has no stiffness is told a speed: it wants a JointVelocityActionCfg of WHEELS "
             "and SPEED_SCALE."
@@ -98,7 +98,7 @@ def _about(robot: ConfiguredRobot, name: str, walks: bool) -> list[str]:
     ]
 
 
-def _articulation(robot: ConfiguredRobot, name: str) -> list[str]:
+def _articulation(robot: ConfigRobot, name: str) -> list[str]:
     lines = [
         "spawn=sim_utils.UrdfFileCfg(",
         *indented(_spawn(robot)),
@@ -109,14 +109,14 @@ def _articulation(robot: ConfiguredRobot, name: str) -> list[str]:
         *robot.soft_limits(depth=1),
         f"soft_joint_pos_limit_factor={number(robot.soft_factor)},",
         "actuators={",
-        *indented(_actuator(robot, "joints", robot.placed)),
-        *indented(_actuator(robot, "wheels", robot.wheels)),
+        *indented(_actuator(robot, "joints", robot.position_joints)),
+        *indented(_actuator(robot, "wheels", robot.velocity_joints)),
         "},",
     ]
     return [f"{name} = ArticulationCfg(", *indented(lines), ")"]
 
 
-def _spawn(robot: ConfiguredRobot) -> list[str]:
+def _spawn(robot: ConfigRobot) -> list[str]:
     spec = robot.spec
     return [
         "asset_path=str(ROBOT_URDF),",
@@ -145,7 +145,7 @@ def _spawn(robot: ConfiguredRobot) -> list[str]:
     ]
 
 
-def _actuator(robot: ConfiguredRobot, name: str, joints: Sequence[str]) -> list[str]:
+def _actuator(robot: ConfigRobot, name: str, joints: Sequence[str]) -> list[str]:
     """Return the entry of an actuator of these joints; nothing without joints."""
     if not joints:
         return []
@@ -163,19 +163,19 @@ def _actuator(robot: ConfiguredRobot, name: str, joints: Sequence[str]) -> list[
     return [f'"{name}": ImplicitActuatorCfg(', *indented(lines), "),"]
 
 
-def _scales(robot: ConfiguredRobot) -> list[str]:
+def _scales(robot: ConfigRobot) -> list[str]:
     """Return what an action of 1 changes: a position, or a wheel's speed."""
     patterns = usd_patterns(robot.spec.joint_order)
     lines = []
-    if robot.placed:
+    if robot.position_joints:
         lines += ["", *robot.origin("action_scale")]
-        lines += _value("ACTION_SCALE = ", robot.scales(robot.placed), patterns)
-    if robot.wheels:
+        lines += _value("ACTION_SCALE = ", robot.scales(robot.position_joints), patterns)
+    if robot.velocity_joints:
         lines += ["", *robot.speed_origin()]
-        lines += _value("SPEED_SCALE = ", robot.scales(robot.wheels), patterns)
-        lines += spread("WHEELS = ", strings(patterns[joint] for joint in robot.wheels))
-    if robot.placed and (robot.wheels or robot.undriven):
-        lines += spread("JOINTS = ", strings(patterns[joint] for joint in robot.placed))
+        lines += _value("SPEED_SCALE = ", robot.scales(robot.velocity_joints), patterns)
+        lines += spread("WHEELS = ", strings(patterns[joint] for joint in robot.velocity_joints))
+    if robot.position_joints and (robot.velocity_joints or robot.unactuated):
+        lines += spread("JOINTS = ", strings(patterns[joint] for joint in robot.position_joints))
     return lines
 
 
@@ -196,7 +196,7 @@ def _value(
     return spread(head, entries, "{}", depth=depth, tail=tail)
 
 
-def _task(robot: ConfiguredRobot, name: str) -> list[str]:
+def _task(robot: ConfigRobot, name: str) -> list[str]:
     """Return the bodies by name, and a function that puts the robot into the velocity task."""
     low, high = numbers(robot.spec.reset_range)
     return [
@@ -207,7 +207,7 @@ def _task(robot: ConfiguredRobot, name: str) -> list[str]:
         "",
         "def rough_env_cfg():",
         '    """Return Isaac Lab\'s velocity task on rough ground, with this robot in it."""',
-        *["    from isaaclab.envs.mdp import JointVelocityActionCfg"] * bool(robot.wheels),
+        *["    from isaaclab.envs.mdp import JointVelocityActionCfg"] * bool(robot.velocity_joints),
         "    from isaaclab_tasks.manager_based.locomotion.velocity.velocity_env_cfg import (",
         "        LocomotionVelocityRoughEnvCfg,",
         "    )",
@@ -233,16 +233,16 @@ def _task(robot: ConfiguredRobot, name: str) -> list[str]:
     ]
 
 
-def _actions(robot: ConfiguredRobot) -> list[str]:
+def _actions(robot: ConfigRobot) -> list[str]:
     """Return what tells each joint a position, or a speed."""
-    lines = ["cfg.actions.joint_pos.scale = ACTION_SCALE"] if robot.placed else []
-    if robot.wheels or robot.undriven:
+    lines = ["cfg.actions.joint_pos.scale = ACTION_SCALE"] if robot.position_joints else []
+    if robot.velocity_joints or robot.unactuated:
         lines += [
             "cfg.actions.joint_pos.joint_names = JOINTS"
-            if robot.placed
+            if robot.position_joints
             else "cfg.actions.joint_pos = None"
         ]
-    if robot.wheels:
+    if robot.velocity_joints:
         lines += [
             "cfg.actions.joint_vel = JointVelocityActionCfg(",
             '    asset_name="robot",',
@@ -259,7 +259,7 @@ def _contact_term(term: str, name: str, bodies: Sequence[str]) -> list[str]:
     return [f'    cfg.{term}.params["sensor_cfg"].body_names = {name}']
 
 
-def _bodies(robot: ConfiguredRobot) -> list[str]:
+def _bodies(robot: ConfigRobot) -> list[str]:
     spec = robot.spec
     patterns = usd_patterns(robot.all_bodies)
     lines = assign("BASE", literal(patterns[robot.known([spec.base], "base")[0]]))

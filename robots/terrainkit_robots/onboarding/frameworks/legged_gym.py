@@ -1,8 +1,8 @@
 """legged_gym: the configuration class of a robot on rough terrain in Isaac Gym."""
 
 from terrainkit_robots.onboarding.frameworks import legged_robot
+from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.naming import class_name, package_name
-from terrainkit_robots.onboarding.frameworks.robot import ConfiguredRobot
 from terrainkit_robots.onboarding.frameworks.source import (
     WRITTEN,
     docstring,
@@ -21,7 +21,7 @@ LEGGED_ONLY = True
 """Whether it takes robots with legs only."""
 
 
-def config_text(robot: ConfiguredRobot) -> str:
+def config_text(robot: ConfigRobot) -> str:
     """Return the file `legged_gym_config.py` of a robot.
 
     Raises:
@@ -54,7 +54,7 @@ def config_text(robot: ConfiguredRobot) -> str:
     )
 
 
-def _about(robot: ConfiguredRobot, name: str) -> list[str]:
+def _about(robot: ConfigRobot, name: str) -> list[str]:
     package = package_name(robot.spec.name)
     paragraphs = [
         f"{robot.title} for legged_gym: its configuration on rough terrain.",
@@ -84,7 +84,7 @@ def _about(robot: ConfiguredRobot, name: str) -> list[str]:
     return paragraphs
 
 
-def _env(robot: ConfiguredRobot) -> list[str]:
+def _env(robot: ConfigRobot) -> list[str]:
     count = len(robot.spec.joint_order)
     return [
         "# 3 linear velocity, 3 angular velocity, 3 gravity, 3 commands; position, velocity",
@@ -94,11 +94,11 @@ def _env(robot: ConfiguredRobot) -> list[str]:
     ]
 
 
-def _control(robot: ConfiguredRobot) -> list[str]:
+def _control(robot: ConfigRobot) -> list[str]:
     return legged_robot.gains(robot, "the last key that fits counts, so the order matters.")
 
 
-def _asset(robot: ConfiguredRobot) -> list[str]:
+def _asset(robot: ConfigRobot) -> list[str]:
     # Too little shakes light joints; more than they need makes the others but a bit slower.
     known = robot.by_joint("armature").values()
     armature, differ = robot.one_for_all(known, "largest", depth=2)
@@ -113,7 +113,7 @@ def _asset(robot: ConfiguredRobot) -> list[str]:
     ]
 
 
-def _runner(robot: ConfiguredRobot) -> list[str]:
+def _runner(robot: ConfigRobot) -> list[str]:
     return [
         'run_name = ""',
         f"experiment_name = {literal(f'rough_{package_name(robot.spec.name)}')}",

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 from terrainkit.errors import ConfigError, listing
+from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.naming import package_name
-from terrainkit_robots.onboarding.frameworks.robot import ConfiguredRobot
 from terrainkit_robots.onboarding.frameworks.source import (
     assign,
     assign_sum,
@@ -29,7 +29,7 @@ HERE = [
 """How a configuration finds the robot that lies beside it."""
 
 
-def check_legs(robot: ConfiguredRobot, framework: str, others: Sequence[str]) -> None:
+def check_legs(robot: ConfigRobot, framework: str, others: Sequence[str]) -> None:
     """Refuse a robot that cannot walk.
 
     Raises:
@@ -42,9 +42,9 @@ def check_legs(robot: ConfiguredRobot, framework: str, others: Sequence[str]) ->
             f"{robot.title} has no legs; {framework} trains legged robots; "
             f"for others there are: {listing(others)}"
         )
-    if robot.undriven:
+    if robot.unactuated:
         raise ConfigError(
-            f"no motor drives {names(robot.undriven)} of {robot.title}; {framework} drives "
+            f"no motor drives {names(robot.unactuated)} of {robot.title}; {framework} drives "
             f"every joint; for others there are: {listing(others)}"
         )
     if not spec.floating:
@@ -60,7 +60,7 @@ def class_of(name: str, base: str, body: list[str]) -> list[str]:
     return indented(["", f"class {name}({base}.{name}):", *indented(body)])
 
 
-def init_state(robot: ConfiguredRobot) -> list[str]:
+def init_state(robot: ConfigRobot) -> list[str]:
     """Return where the robot starts, and the pose that actions are added to."""
     height = number(robot.spec.spawn_height or 0.0)
     angles = robot.of_every_joint("default_pose")
@@ -73,16 +73,18 @@ def init_state(robot: ConfiguredRobot) -> list[str]:
     ]
 
 
-def gains(robot: ConfiguredRobot, if_clashing: str) -> list[str]:
+def gains(robot: ConfigRobot, if_clashing: str) -> list[str]:
     """Return stiffness and damping by names of joints, and the scale of actions."""
     stiffness, damping = robot.of_every_joint("stiffness"), robot.of_every_joint("damping")
     pairs = {joint: (stiffness[joint], damping[joint]) for joint in robot.spec.joint_order}
     found = gain_keys(robot.spec.joint_order, pairs)
-    scale, differ = robot.one_for_all(robot.scales(robot.placed).values(), "median", depth=2)
+    scale, differ = robot.one_for_all(
+        robot.scales(robot.position_joints).values(), "median", depth=2
+    )
     undriven = ""
-    if robot.wheels:
+    if robot.velocity_joints:
         wants = "wants a speed, which P does not tell it"
-        undriven = f"What has no stiffness {wants}: {listing(robot.wheels)}."
+        undriven = f"What has no stiffness {wants}: {listing(robot.velocity_joints)}."
     warning = ""
     if found.clashes:
         key, joint = found.clashes[0]
@@ -105,7 +107,7 @@ def gains(robot: ConfiguredRobot, if_clashing: str) -> list[str]:
     ]
 
 
-def contacts(robot: ConfiguredRobot) -> list[str]:
+def contacts(robot: ConfigRobot) -> list[str]:
     """Return what the feet are called, and whose contacts cost reward or end an episode.
 
     Raises:
@@ -140,7 +142,7 @@ def shapes() -> list[str]:
     ]
 
 
-def rewards(robot: ConfiguredRobot) -> list[str]:
+def rewards(robot: ConfigRobot) -> list[str]:
     """Return what rewards compare with."""
     return [
         *robot.soft_limits(depth=2),
@@ -150,7 +152,7 @@ def rewards(robot: ConfiguredRobot) -> list[str]:
     ]
 
 
-def asset_name(robot: ConfiguredRobot) -> str:
+def asset_name(robot: ConfigRobot) -> str:
     """Return the statement that names the actor."""
     return f"name = {literal(package_name(robot.spec.name))}"
 
@@ -166,7 +168,7 @@ def _table(name: str, values: dict[str, float], keys: tuple[str, ...]) -> list[s
     return spread(f"{name} = ", entries, "{}", depth=2)
 
 
-def _listed(robot: ConfiguredRobot, field: str, attribute: str) -> list[str]:
+def _listed(robot: ConfigRobot, field: str, attribute: str) -> list[str]:
     names = robot.known(getattr(robot.spec, field), field)
     found = keys_for(names, robot.all_bodies)
     lines = []

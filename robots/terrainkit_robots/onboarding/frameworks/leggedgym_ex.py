@@ -1,8 +1,8 @@
 """LeggedGym-Ex: the configuration class of a robot, for Isaac Gym, Genesis and Isaac Lab."""
 
 from terrainkit_robots.onboarding.frameworks import legged_robot
+from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.naming import class_name, package_name
-from terrainkit_robots.onboarding.frameworks.robot import ConfiguredRobot
 from terrainkit_robots.onboarding.frameworks.source import (
     WRITTEN,
     assign,
@@ -35,7 +35,7 @@ _SCALES = {
 LeggedGym-Ex all are zero, and a robot that is told nothing learns nothing."""
 
 
-def config_text(robot: ConfiguredRobot) -> str:
+def config_text(robot: ConfigRobot) -> str:
     """Return the file `leggedgym_ex_config.py` of a robot.
 
     Raises:
@@ -66,7 +66,7 @@ def config_text(robot: ConfiguredRobot) -> str:
     )
 
 
-def _about(robot: ConfiguredRobot, name: str) -> list[str]:
+def _about(robot: ConfigRobot, name: str) -> list[str]:
     package = package_name(robot.spec.name)
     return [
         f"{robot.title} for LeggedGym-Ex: its configuration on flat ground.",
@@ -93,7 +93,7 @@ def _about(robot: ConfiguredRobot, name: str) -> list[str]:
     ]
 
 
-def _env(robot: ConfiguredRobot) -> list[str]:
+def _env(robot: ConfigRobot) -> list[str]:
     count = len(robot.spec.joint_order)
     return [
         "# What LeggedRobot observes: 3 linear velocity, 3 gravity, 3 angular velocity,",
@@ -103,7 +103,7 @@ def _env(robot: ConfiguredRobot) -> list[str]:
     ]
 
 
-def _control(robot: ConfiguredRobot) -> list[str]:
+def _control(robot: ConfigRobot) -> list[str]:
     return [
         *legged_robot.gains(
             robot,
@@ -115,7 +115,7 @@ def _control(robot: ConfiguredRobot) -> list[str]:
     ]
 
 
-def _asset(robot: ConfiguredRobot) -> list[str]:
+def _asset(robot: ConfigRobot) -> list[str]:
     spec = robot.spec
     armature, speeds = robot.by_joint("armature"), robot.by_joint("velocity")
     armatures = [number(armature.get(joint, 0.0)) for joint in spec.joint_order]
@@ -141,7 +141,7 @@ def _asset(robot: ConfiguredRobot) -> list[str]:
     ]
 
 
-def _rewards(robot: ConfiguredRobot) -> list[str]:
+def _rewards(robot: ConfigRobot) -> list[str]:
     return [
         *legged_robot.rewards(robot),
         "",
@@ -151,7 +151,7 @@ def _rewards(robot: ConfiguredRobot) -> list[str]:
     ]
 
 
-def _runner(robot: ConfiguredRobot) -> list[str]:
+def _runner(robot: ConfigRobot) -> list[str]:
     return [
         "run_name = SIMULATOR",
         f"experiment_name = {literal(package_name(robot.spec.name))}",

@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 
+from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.initial_state import initial_state
 from terrainkit_robots.onboarding.frameworks.naming import constant_name, package_name
 from terrainkit_robots.onboarding.frameworks.patterns import mjlab_patterns
-from terrainkit_robots.onboarding.frameworks.robot import ConfiguredRobot
 from terrainkit_robots.onboarding.frameworks.source import (
     HERE,
     WRITTEN,
@@ -35,7 +35,7 @@ BuiltinVelocityActuatorCfg are the same, but for the stiffness."""
 _POSITION, _VELOCITY = "BuiltinPositionActuatorCfg", "BuiltinVelocityActuatorCfg"
 
 
-def config_text(robot: ConfiguredRobot) -> str:
+def config_text(robot: ConfigRobot) -> str:
     """Return the file `mjlab_config.py` of a robot.
 
     Raises:
@@ -43,7 +43,7 @@ def config_text(robot: ConfiguredRobot) -> str:
     """
     name = constant_name(robot.spec.name)
     patterns = mjlab_patterns(robot.spec.joint_order)
-    kinds = [_POSITION] * bool(robot.placed) + [_VELOCITY] * bool(robot.wheels)
+    kinds = [_POSITION] * bool(robot.position_joints) + [_VELOCITY] * bool(robot.velocity_joints)
     return module(
         [
             docstring(_about(robot, name)),
@@ -61,7 +61,7 @@ def config_text(robot: ConfiguredRobot) -> str:
     )
 
 
-def _about(robot: ConfiguredRobot, name: str) -> list[str]:
+def _about(robot: ConfigRobot, name: str) -> list[str]:
     package = package_name(robot.spec.name)
     paragraphs = [
         f"{robot.title} for mjlab: its entity.",
@@ -72,7 +72,7 @@ def _about(robot: ConfiguredRobot, name: str) -> list[str]:
         "mjlab orders actions by the joints of robot.xml. Its position actuators know no limit of "
         "speed; those are in robot.toml.",
     ]
-    if robot.wheels:
+    if robot.velocity_joints:
         paragraphs.append(
             "What has no stiffness is told a speed: it wants a JointVelocityActionCfg with "
             f"actuator_names=tuple({name}_SPEED_SCALE), and the JointPositionActionCfg those of "
@@ -97,7 +97,7 @@ def _get_spec() -> list[str]:
     ]
 
 
-def _articulation(robot: ConfiguredRobot, name: str, patterns: Mapping[str, str]) -> list[str]:
+def _articulation(robot: ConfigRobot, name: str, patterns: Mapping[str, str]) -> list[str]:
     """Return the actuators: joints that have the same numbers share one."""
     tables = {
         field: robot.by_joint(source)
@@ -107,7 +107,7 @@ def _articulation(robot: ConfiguredRobot, name: str, patterns: Mapping[str, str]
     }
     groups: dict[tuple[str, ...], list[str]] = {}
     for joint in robot.spec.joint_order:
-        rolls = joint in robot.wheels
+        rolls = joint in robot.velocity_joints
         arguments = [
             f"{field}={number(values[joint])},"
             for field, values in tables.items()
@@ -136,19 +136,19 @@ def _articulation(robot: ConfiguredRobot, name: str, patterns: Mapping[str, str]
     ]
 
 
-def _scales(robot: ConfiguredRobot, name: str, patterns: Mapping[str, str]) -> list[str]:
+def _scales(robot: ConfigRobot, name: str, patterns: Mapping[str, str]) -> list[str]:
     """Return what an action of 1 changes: a position, or a wheel's speed."""
 
     def entries(joints: Sequence[str]) -> list[str]:
         return table({patterns[joint]: scale for joint, scale in robot.scales(joints).items()})
 
     lines = []
-    if robot.placed or not robot.wheels:
+    if robot.position_joints or not robot.velocity_joints:
         lines += ["", "# For JointPositionActionCfg.scale.", *robot.origin("action_scale")]
-        lines += spread(f"{name}_ACTION_SCALE = ", entries(robot.placed), "{}")
-    if robot.wheels:
+        lines += spread(f"{name}_ACTION_SCALE = ", entries(robot.position_joints), "{}")
+    if robot.velocity_joints:
         lines += ["", "# For JointVelocityActionCfg.scale.", *robot.speed_origin()]
-        lines += spread(f"{name}_SPEED_SCALE = ", entries(robot.wheels), "{}")
+        lines += spread(f"{name}_SPEED_SCALE = ", entries(robot.velocity_joints), "{}")
     return lines
 
 

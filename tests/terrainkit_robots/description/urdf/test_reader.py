@@ -96,9 +96,12 @@ def test_a_quaternion_that_turns_nothing_is_no_matter():
 @pytest.mark.parametrize(
     ("written", "said"),
     [
-        ('quat_xyzw="0 0 0 0"', "quat_xyzw of <origin> is '0 0 0 0', no rotation"),
-        ('quat_xyzw="0 0 1"', "quat_xyzw of <origin> is '0 0 1'; wanted 4 numbers"),
-        ('quat_xyzw="0 0 1 0" rpy="1 0 0"', "quat_xyzw of <origin> stands beside its rpy"),
+        (
+            'quat_xyzw="0 0 0 0"',
+            "quat_xyzw of <origin>: got '0 0 0 0'; expected a nonzero quaternion",
+        ),
+        ('quat_xyzw="0 0 1"', "quat_xyzw of <origin>: got '0 0 1'; expected 4 numbers"),
+        ('quat_xyzw="0 0 1 0" rpy="1 0 0"', "<origin> has quat_xyzw and rpy"),
     ],
 )
 def test_a_quaternion_that_says_nothing_is_told(written, said):
@@ -324,7 +327,7 @@ def test_a_bad_number_is_told_and_read_around(text):
     (problem,) = problems
     assert (problem.code, problem.subject) == ("XML006", "j")
     assert problem.details == {"attribute": "xyz", "repaired": ""}
-    assert "wanted 3 numbers" in problem.message
+    assert "expected 3 numbers" in problem.message
 
 
 @pytest.mark.parametrize(

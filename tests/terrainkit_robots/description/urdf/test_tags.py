@@ -1,13 +1,13 @@
 import pytest
 from lxml import etree
 
-from terrainkit_robots.description.urdf.tags import has_variable, misspelt, unexpanded
+from terrainkit_robots.description.urdf.tags import has_variable, misspelled_names, unexpanded_xacro
 
 
 def found(text):
-    """Return tag, attribute and the known word of each that looks misspelt."""
+    """Return tag, attribute and the known word of each that looks misspelled_names."""
     root = etree.fromstring(text)
-    return [(element.tag, attribute, known) for element, attribute, known in misspelt(root)]
+    return [(element.tag, attribute, known) for element, attribute, known in misspelled_names(root)]
 
 
 def in_joint(inner):
@@ -133,21 +133,21 @@ def test_a_value_of_its_own(text):
     ],
 )
 def test_xacro_that_nobody_expanded(text, what):
-    assert [word for _, word in unexpanded(etree.fromstring(text))] == [what]
+    assert [word for _, word in unexpanded_xacro(etree.fromstring(text))] == [what]
 
 
 def test_a_prefix_without_namespace_is_xacro_too():
     parser = etree.XMLParser(recover=True)
     root = etree.fromstring('<robot name="r"><xacro:include filename="a"/></robot>', parser)
-    assert [word for _, word in unexpanded(root)] == ["<xacro:include>"]
+    assert [word for _, word in unexpanded_xacro(root)] == ["<xacro:include>"]
 
 
 def test_of_a_whole_file_of_xacro_the_first_is_told():
     text = '<robot name="r"><link name="${a}"/><link name="${b}"/></robot>'
-    (told,) = unexpanded(etree.fromstring(text))
+    (told,) = unexpanded_xacro(etree.fromstring(text))
     assert told[0].get("name") == "${a}"
 
 
 def test_a_robot_without_xacro():
     text = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r"><link name="l"/></robot>'
-    assert list(unexpanded(etree.fromstring(text))) == []
+    assert list(unexpanded_xacro(etree.fromstring(text))) == []

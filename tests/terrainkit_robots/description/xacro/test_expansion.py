@@ -9,7 +9,7 @@ import pytest
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import Problem, RobotModel
 from terrainkit_robots.description.xacro.expansion import XacroError, expand_xacro
-from terrainkit_robots.description.xacro.process import _check_expression, _RefusedError
+from terrainkit_robots.description.xacro.process import _check_expression, _RejectedError
 
 NAMESPACE = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
 
@@ -42,7 +42,7 @@ def failure(file: Path, **limits: float) -> XacroError:
 
 
 def told_at(error: XacroError) -> tuple[str, int] | None:
-    return error.place and (error.place[0].name, error.place[1])
+    return error.location and (error.location[0].name, error.location[1])
 
 
 def test_everything_that_robots_use_is_expanded(tmp_path: Path) -> None:
@@ -119,14 +119,14 @@ def test_packages_are_found_by_their_package_xml(tmp_path: Path) -> None:
         ("\n<link name=\"${xacro.arg('side')}\"/>", "--xacro-arg side:=", ("robot.xacro", 3)),
         (
             '\n\n<xacro:include filename="$(find gone)/x.xacro"/>',
-            "no package gone; give its folder with --package gone=FOLDER",
+            "package gone: not found; pass its folder with --package gone=FOLDER",
             ("robot.xacro", 4),
         ),
         ('\n<xacro:include filename="gone.xacro"/>', "gone.xacro: No such", ("robot.xacro", 3)),
         ('\n<xacro:include filename="bad.xacro"/>', "malformed XML", ("bad.xacro", 3)),
         ('<xacro:include filename="part.xacro"/>', "name 'q' is not", ("part.xacro", 4)),
         ('<xacro:include filename="entity.xacro"/>', "entities", ("robot.xacro", 2)),
-        ('<xacro:include filename="/dev/zero"/>', "not a plain file", ("robot.xacro", 2)),
+        ('<xacro:include filename="/dev/zero"/>', "not a regular file", ("robot.xacro", 2)),
         ('\n<link name="${1 +}"/>', "invalid expression '1 +'", ("robot.xacro", 3)),
         ("\n<xacro:leg/>", "unknown macro name: xacro:leg", ("robot.xacro", 3)),
         (
@@ -138,7 +138,7 @@ def test_packages_are_found_by_their_package_xml(tmp_path: Path) -> None:
         ('<link name="$(env NO_SUCH_VARIABLE)"/>', "NO_SUCH_VARIABLE", ("robot.xacro", 2)),
         (
             '<xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/>',
-            "calls itself",
+            "recurses",
             ("robot.xacro", 2),
         ),
     ],
@@ -177,13 +177,13 @@ def test_a_robot_that_cannot_be_expanded_has_one_problem(tmp_path: Path) -> None
 
 def test_an_expansion_ends_in_time(tmp_path: Path) -> None:
     file = write(tmp_path, '<link name="${len(list(map(float, range(10**9))))}${10**10**10}"/>')
-    error = failure(file, seconds=0.6)
-    assert "within 0.6 s" in str(error) or "memory" in str(error)
+    error = failure(file, timeout=0.6)
+    assert "longer than 0.6 s" in str(error) or "memory" in str(error)
 
 
 def test_an_expansion_that_needs_too_much_memory_is_stopped(tmp_path: Path) -> None:
     pytest.importorskip("resource")
-    error = failure(write(tmp_path, "<link name=\"${len('a' * 10**9)}\"/>"), memory=2**28)
+    error = failure(write(tmp_path, "<link name=\"${len('a' * 10**9)}\"/>"), max_memory=2**28)
     assert "more than 0.25 GiB of memory" in str(error)
 
 
@@ -201,7 +201,7 @@ def test_an_expansion_that_needs_too_much_memory_is_stopped(tmp_path: Path) -> N
     ],
 )
 def test_expressions_that_lead_to_the_interpreter_are_refused(expression: str) -> None:
-    with pytest.raises(_RefusedError, match="not allowed"):
+    with pytest.raises(_RejectedError, match="not allowed"):
         _check_expression(expression)
 
 
@@ -255,7 +255,7 @@ def test_a_fifo_does_not_hold_it_up(tmp_path: Path) -> None:
         pytest.skip("this system has no FIFOs")
     file = write(tmp_path, '<xacro:include filename="pipe.xacro"/>')
     os.mkfifo(file.parent / "pipe.xacro")
-    assert "not a plain file" in str(failure(file))
+    assert "not a regular file" in str(failure(file))
 
 
 def test_a_relative_path_stays_as_it_was_given(

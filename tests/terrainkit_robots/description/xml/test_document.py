@@ -8,9 +8,9 @@ from lxml import etree
 from terrainkit_robots.description.xml import document as xml_document
 from terrainkit_robots.description.xml.document import (
     RobotFileError,
+    leading_bytes_fix,
     parse_xml,
     read_bytes,
-    without_mark,
 )
 
 
@@ -142,7 +142,7 @@ def test_space_before_a_document_without_declaration_is_fine(file):
 def test_what_stands_before_can_be_taken_away(file, ahead):
     text = b'<?xml version="1.0"?>\n<robot/>'
     problem = parse(file, ahead + text).problems[0]
-    (edit,) = without_mark(problem).edits
+    (edit,) = leading_bytes_fix(problem).edits
     assert (ahead + text)[: edit.start] + edit.replacement + (ahead + text)[edit.end :] == text
     assert parse(file, text).problems == ()
 
@@ -329,19 +329,19 @@ def test_a_file_that_is_not_there(file):
 
 
 def test_a_folder_is_no_robot(tmp_path):
-    with pytest.raises(RobotFileError, match="is a folder"):
+    with pytest.raises(RobotFileError, match="got a folder"):
         read_bytes(tmp_path)
 
 
 def test_a_pipe_is_not_waited_for(file):
     os.mkfifo(file)
-    with pytest.raises(RobotFileError, match="not a plain file"):
+    with pytest.raises(RobotFileError, match="not a regular file"):
         read_bytes(file)
 
 
 def test_a_device_is_no_robot(file):
     file.symlink_to("/dev/zero")
-    with pytest.raises(RobotFileError, match="not a plain file"):
+    with pytest.raises(RobotFileError, match="not a regular file"):
         read_bytes(file)
 
 

@@ -1,4 +1,4 @@
-"""Robots for comparisons: the bundled ones, edited, and small ones written out."""
+"""Robots for comparisons: edited bundled robots, and small ones."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ BUNDLED = Path(terrainkit_robots.__file__).parent / "description/bundled"
 
 @pytest.fixture
 def robot_of(tmp_path):
-    """Return a robot from its text, or from that of a bundled robot with some edits."""
+    """Return a function that makes a robot from XML, or from an edited bundled robot."""
     count = 0
 
     def make(text, *edits):

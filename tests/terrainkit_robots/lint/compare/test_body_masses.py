@@ -1,17 +1,22 @@
 import numpy as np
 import pytest
 
-from terrainkit_robots.lint.compare.body_masses import body_gap, dropped_mass, is_known, share
-from terrainkit_robots.lint.compare.pairing import pair_robots
+from terrainkit_robots.lint.compare.body_masses import (
+    body_difference,
+    dropped_mass,
+    has_valid_inertial,
+    relative_difference,
+)
+from terrainkit_robots.lint.compare.robot_pairs import pair_robots
 
 
 def gaps(one, other):
-    pairing = pair_robots(one, other)
-    return {a.name: body_gap(one, other, pairing, a, b) for a, b in pairing.bodies}
+    pairs = pair_robots(one, other)
+    return {a.name: body_difference(one, other, pairs, a, b) for a, b in pairs.bodies}
 
 
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
-def test_a_urdf_and_its_mjcf_weigh_the_same_everywhere(robot_of, name):
+def test_bundled_urdf_and_mjcf_have_equal_bodies(robot_of, name):
     found = gaps(robot_of(f"{name}.urdf"), robot_of(f"{name}.xml"))
     assert len(found) == 13
     for gap in found.values():
@@ -20,7 +25,7 @@ def test_a_urdf_and_its_mjcf_weigh_the_same_everywhere(robot_of, name):
         assert gap.inertia < 1e-4
 
 
-def test_a_difference_is_measured_and_is_that_of_one_body(robot_of):
+def test_difference_of_one_body_is_measured(robot_of):
     thigh = (
         '<inertial pos="-0.00374 -0.0223 -0.0327" mass="1.152"',
         '<inertial pos="-0.00374 -0.0223 -0.0227" mass="1.28"',
@@ -31,7 +36,7 @@ def test_a_difference_is_measured_and_is_that_of_one_body(robot_of):
     assert found["FL_calf"].mass == pytest.approx(0.0)
 
 
-def test_the_trunk_is_seen_from_the_same_link(robot_of):
+def test_trunks_are_compared_in_the_same_link(robot_of):
     moments = 'ixx="1" iyy="2" izz="2.5" ixy="0" ixz="0" iyz="0"'
     inertial = f'<inertial><mass value="2"/><inertia {moments}/></inertial>'
     plain = f'<robot name="r"><link name="base">{inertial}</link></robot>'
@@ -45,29 +50,29 @@ def test_the_trunk_is_seen_from_the_same_link(robot_of):
     assert gap.inertia < 1e-12
 
 
-def test_share():
-    assert share(1.0, 1.0) == share(0.0, 0.0) == 0.0
-    assert share(1.0, 2.0) == share(2.0, 1.0) == 0.5
-    assert np.isnan(share(np.nan, 1.0))
+def test_relative_difference():
+    assert relative_difference(1.0, 1.0) == relative_difference(0.0, 0.0) == 0.0
+    assert relative_difference(1.0, 2.0) == relative_difference(2.0, 1.0) == 0.5
+    assert np.isnan(relative_difference(np.nan, 1.0))
 
 
-def test_what_is_missing_or_hangs_on_a_mesh_is_not_known(robot_of):
-    assert all(is_known(body) for body in robot_of("quadruped.urdf").bodies)
+def test_has_valid_inertial_needs_explicit_values(robot_of):
+    assert all(has_valid_inertial(body) for body in robot_of("quadruped.urdf").bodies)
     bare = robot_of(
         '<robot name="r"><link name="a"><inertial><mass value="1"/></inertial></link></robot>'
     )
-    assert not is_known(bare.bodies[0])
+    assert not has_valid_inertial(bare.bodies[0])
     meshed = robot_of(
         '<mujoco><asset><mesh name="m" file="m.stl"/></asset><worldbody>'
         '<body name="a"><geom type="mesh" mesh="m"/></body></worldbody></mujoco>'
     )
-    assert not is_known(meshed.bodies[0])
+    assert not has_valid_inertial(meshed.bodies[0])
 
 
 FUSED = ('<compiler discardvisual="false" fusestatic="false"/>', "")
 
 
-def test_what_mujoco_drops_of_a_urdf(robot_of):
+def test_dropped_mass_matches_mujoco(robot_of):
     import mujoco
 
     from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -81,7 +86,7 @@ def test_what_mujoco_drops_of_a_urdf(robot_of):
     assert dropped_mass(robot_of("quadruped.xml")) == 0.0
 
 
-def test_a_floating_joint_keeps_the_mass(robot_of):
+def test_floating_joint_keeps_the_mass(robot_of):
     floating = (
         "<!-- Trunk and head.",
         '<link name="world"/><joint name="root" type="floating"><parent link="world"/>'

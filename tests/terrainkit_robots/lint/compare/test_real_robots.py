@@ -1,4 +1,4 @@
-"""What XRF says of real robots in two formats, and what it costs those who do not ask."""
+"""XRF rules on real robots in two formats."""
 
 import re
 import subprocess
@@ -42,8 +42,8 @@ def test_go2(robot_file):
     assert "FL_calf 0.194 and 0.2414 kg" in mass.message
 
 
-def test_the_permutation_can_be_pasted(robot_file):
-    """The list in the message brings values in the joints' order into that of the actuators."""
+def test_permutation_in_message_is_correct(robot_file):
+    """The list in the message reorders values from joint order to actuator order."""
     report = compared(robot_file("go2_mjcf/go2.xml"), robot_file("go2/urdf/go2.urdf"))
     (finding,) = [f for f in report.findings if f.code == "XRF005"]
     pasted = re.search(r"ctrl = joints\[\[([\d, ]+)\]\]", finding.message)[1]
@@ -79,11 +79,11 @@ def test_g1_agrees(robot_file):
         "g1/g1_29dof.urdf",
     ],
 )
-def test_a_robot_agrees_with_itself(robot_file, name):
+def test_robot_agrees_with_itself(robot_file, name):
     assert compared(robot_file(name), robot_file(name)).findings == ()
 
 
-def test_two_robots_do_not_agree(robot_file):
+def test_different_robots_differ(robot_file):
     report = compared(robot_file("a1/urdf/a1.urdf"), robot_file("go2/urdf/go2.urdf"))
     codes = {f.code for f in report.findings}
     assert {"XRF003", "XRF004", "XRF006", "XRF007", "XRF008"} <= codes
@@ -100,7 +100,7 @@ def test_bundled_robots_agree(robot_of, name, suffixes):
     assert report.skipped == ()
 
 
-def test_what_has_no_links_is_not_compared(robot_of):
+def test_robot_without_links_is_skipped(robot_of):
     empty = robot_of('<robot name="nothing"/>')
     report = lint(Facts(robot_of("quadruped.urdf").model, against=empty), XRF)
     assert report.findings == ()
@@ -109,7 +109,7 @@ def test_what_has_no_links_is_not_compared(robot_of):
     assert "has no links" in report.skipped[0].reason
 
 
-def test_who_compares_nothing_does_not_import_yourdfpy(robot_of):
+def test_no_comparison_does_not_import_yourdfpy(robot_of):
     file = robot_of("quadruped.urdf").model.file
     code = (
         "import sys; from pathlib import Path; from terrainkit_robots.analysis.facts import Facts; "

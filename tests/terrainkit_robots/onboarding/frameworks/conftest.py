@@ -8,7 +8,7 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 
-from terrainkit_robots.onboarding.frameworks.frameworks import config_text, file_name
+from terrainkit_robots.onboarding.frameworks.frameworks import config_file_name, config_text
 from terrainkit_robots.spec.robot_spec import Provenance, RobotSpec
 
 LEGS = ("FL", "FR", "RL", "RR")
@@ -190,7 +190,7 @@ def load(tmp_path, monkeypatch):
     def run(framework, spec, stand_ins, **known):
         for name, stand_in in stand_ins.items():
             monkeypatch.setitem(sys.modules, name, stand_in)
-        path = tmp_path / file_name(framework)
+        path = tmp_path / config_file_name(framework)
         path.write_text(config_text(framework, spec, **known), encoding="utf-8")
         located = importlib.util.spec_from_file_location("loaded_config", path)
         loaded = importlib.util.module_from_spec(located)

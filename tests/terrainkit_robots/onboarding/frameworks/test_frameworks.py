@@ -12,38 +12,38 @@ from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.onboarding import frameworks as package
 from terrainkit_robots.onboarding.frameworks import frameworks
 from terrainkit_robots.onboarding.frameworks.frameworks import (
-    config_of,
+    config_file_name,
     config_text,
-    file_name,
-    names,
+    framework_names,
+    robot_config_text,
 )
 
 LEGGED = ("legged_gym", "leggedgym_ex")
 
 
-def test_a_module_that_is_added_is_a_framework(tmp_path, monkeypatch, robots):
+def test_framework_names_include_added_module(tmp_path, monkeypatch, robots):
     (tmp_path / "brand_new.py").write_text(
         "LEGGED_ONLY = False\ndef config_text(robot):\n    return f'# {robot.title}'\n"
     )
-    (tmp_path / "mere_help.py").write_text("def config_text(robot):\n    return ''\n")
+    (tmp_path / "not_a_framework.py").write_text("def config_text(robot):\n    return ''\n")
     monkeypatch.setattr(package, "__path__", [*package.__path__, str(tmp_path)])
-    frameworks.names.cache_clear()
+    frameworks.framework_names.cache_clear()
     try:
-        assert set(names()) - {"brand_new"} == {*LEGGED, "isaaclab", "mjlab", "genesis"}
+        assert set(framework_names()) - {"brand_new"} == {*LEGGED, "isaaclab", "mjlab", "genesis"}
         assert config_text("brand_new", robots.quadruped()) == "# quad 4"
         with pytest.raises(ConfigError, match="for others there are: brand_new, genesis"):
             config_text("legged_gym", robots.plain(()))
     finally:
-        frameworks.names.cache_clear()
+        frameworks.framework_names.cache_clear()
 
 
-def test_the_names_are_those_of_the_modules_in_their_order():
-    assert names() == ("genesis", "isaaclab", "legged_gym", "leggedgym_ex", "mjlab")
-    assert file_name("mjlab") == "mjlab_config.py"
-    with pytest.raises(ConfigError, match="no framework 'gazebo'; there are: genesis, isaaclab, "):
+def test_framework_names_are_sorted():
+    assert framework_names() == ("genesis", "isaaclab", "legged_gym", "leggedgym_ex", "mjlab")
+    assert config_file_name("mjlab") == "mjlab_config.py"
+    with pytest.raises(ConfigError, match="got 'gazebo'; expected genesis, isaaclab, "):
         config_text("gazebo", None)
-    with pytest.raises(ConfigError, match="no framework"):
-        file_name("../../evil")
+    with pytest.raises(ConfigError, match="framework: got"):
+        config_file_name("../../evil")
 
 
 @pytest.mark.parametrize("framework", LEGGED)
@@ -62,20 +62,20 @@ def test_the_names_are_those_of_the_modules_in_their_order():
         ({"feet": ("FL_hip", "RR_calf")}, "none is in all of 'FL_hip', 'RR_calf'"),
     ],
 )
-def test_what_cannot_be_configured_is_told_in_a_line(robots, framework, changes, message):
+def test_config_text_rejects_robot_in_one_line(robots, framework, changes, message):
     with pytest.raises(ConfigError, match=message) as caught:
         config_text(framework, robots.quadruped(**changes), bodies=robots.bodies)
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("framework", ["isaaclab", "mjlab", "genesis"])
-def test_robots_without_legs_have_a_configuration(robots, framework):
+def test_config_text_of_robot_without_legs(robots, framework):
     text = config_text(framework, robots.plain(("shoulder", "elbow")))
     compile(text, "config", "exec")
     assert '"shoulder"' in text
 
 
-def test_robots_without_joints(robots):
+def test_config_text_of_robot_without_joints(robots):
     spec = robots.plain(())
     for framework in ("mjlab", "genesis"):
         compile(config_text(framework, spec), "config", "exec")
@@ -83,9 +83,9 @@ def test_robots_without_joints(robots):
         config_text("isaaclab", spec)
 
 
-@pytest.mark.parametrize("framework", names())
-def test_nothing_is_injected(robots, framework):
-    """Statement by statement, a hostile robot's file is that of a harmless one."""
+@pytest.mark.parametrize("framework", framework_names())
+def test_config_text_prevents_code_injection(robots, framework):
+    """A robot with hostile names yields the same statements as a harmless one."""
     hostile = config_text(framework, robots.hostile())
     harmless = config_text(
         framework,
@@ -110,8 +110,8 @@ def _shape(text):
     ]
 
 
-@pytest.mark.parametrize("framework", names())
-def test_files_are_formatted_and_the_same_every_time(robots, framework, tmp_path):
+@pytest.mark.parametrize("framework", framework_names())
+def test_config_text_is_formatted_and_deterministic(robots, framework, tmp_path):
     long = {"name": "a very long name " * 8, "urdf": "u" * 70 + ".urdf", "mjcf": "m" * 70 + ".xml"}
     one_joint = robots.plain(
         ("j" * 84,),
@@ -145,37 +145,37 @@ def test_files_are_formatted_and_the_same_every_time(robots, framework, tmp_path
         assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_soft_limits_are_a_share_of_the_range(robots):
+def test_config_text_soft_limit_factor(robots):
     ranges = {f"{leg}_calf_joint": (-2.75, -0.75) for leg in ("FL", "FR", "RL", "RR")}
-    text = config_text("mjlab", robots.quadruped(), ranges=ranges)
+    text = config_text("mjlab", robots.quadruped(), limits=ranges)
     assert "soft_joint_pos_limit_factor=0.75," in text
     assert "soft_joint_pos_limit_factor=0.9," in config_text("mjlab", robots.quadruped())
 
 
 @pytest.mark.parametrize("framework", LEGGED)
-def test_joints_without_a_motor_keep_a_robot_from_frameworks_that_drive_all(robots, framework):
+def test_legged_frameworks_reject_unactuated_joints(robots, framework):
     with pytest.raises(ConfigError, match=f"no motor drives tail_joint of .*; {framework} drives"):
-        config_text(framework, robots.quadruped(), undriven=["tail_joint"])
+        config_text(framework, robots.quadruped(), unactuated=["tail_joint"])
 
 
-def test_joints_without_a_motor_are_found(robots, bundled_xml):
+def test_robot_config_text_finds_unactuated_joints(robots, bundled_xml):
     facts = Facts(load_robot(bundled_xml.with_suffix(".urdf")), Meshes())
     spec = robots.quadruped()
     fewer = replace(spec, joint_order=spec.joint_order[:-1])
     with pytest.raises(ConfigError, match=f"no motor drives {spec.joint_order[-1]} of"):
-        config_of("legged_gym", facts, fewer)
+        robot_config_text("legged_gym", facts, fewer)
 
 
-def test_bodies_and_ranges_come_from_the_facts(robots, bundled_xml):
-    """The calves range over 1.88 rad, of which the spec leaves 1.5 free."""
+def test_robot_config_text_uses_bodies_and_limits(robots, bundled_xml):
+    """The range of the calf joints is 1.88 rad; the soft limits of the spec span 1.5 rad."""
     facts = Facts(load_robot(bundled_xml.with_suffix(".urdf")), Meshes())
     spec = robots.quadruped()
-    text = config_of("legged_gym", facts, spec)
+    text = robot_config_text("legged_gym", facts, spec)
     assert "soft_dof_pos_limit = 0.7958" in text
     ranges = {joint.name: joint.range for joint in facts.model.joints if joint.moves}
-    assert text == config_text("legged_gym", spec, bodies=robots.bodies, ranges=ranges)
+    assert text == config_text("legged_gym", spec, bodies=robots.bodies, limits=ranges)
 
 
 @pytest.mark.parametrize("framework", LEGGED)
-def test_isaac_gym_and_its_python_3_8_can_read_them(robots, framework):
+def test_legged_configs_parse_with_python_3_8(robots, framework):
     ast.parse(config_text(framework, robots.hostile()), feature_version=(3, 8))

@@ -203,7 +203,7 @@ def test_wheels_are_told_a_speed(load, modules, robots):
 
 def test_joints_without_a_motor_get_no_action(load, modules, robots):
     spec = robots.quadruped()
-    task = load("isaaclab", spec, modules, undriven=["tail_joint"]).rough_env_cfg()
+    task = load("isaaclab", spec, modules, unactuated=["tail_joint"]).rough_env_cfg()
     assert tuple(task.actions.joint_pos.joint_names) == spec.joint_order
 
 

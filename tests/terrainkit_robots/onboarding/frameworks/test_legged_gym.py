@@ -104,7 +104,7 @@ RANGES = {f"{leg}_calf_joint": (-2.75, -0.75) for leg in ("FL", "FR", "RL", "RR"
 
 def test_a_quadruped_in_legged_gym(load, frameworks, robots, tmp_path):
     spec = robots.quadruped()
-    loaded = load("legged_gym", spec, frameworks({}), bodies=robots.bodies, ranges=RANGES)
+    loaded = load("legged_gym", spec, frameworks({}), bodies=robots.bodies, limits=RANGES)
     config = loaded.Quad4RoughCfg
     check_joints(config, robots, spec)
     check_contacts(config.asset, spec, robots.bodies)
@@ -119,7 +119,7 @@ def test_a_quadruped_in_legged_gym(load, frameworks, robots, tmp_path):
 
 def test_a_quadruped_in_leggedgym_ex(load, frameworks, robots, tmp_path):
     spec = robots.quadruped(velocity={".*_calf_joint": 15.7})
-    loaded = load("leggedgym_ex", spec, frameworks(MORE), bodies=robots.bodies, ranges=RANGES)
+    loaded = load("leggedgym_ex", spec, frameworks(MORE), bodies=robots.bodies, limits=RANGES)
     config = loaded.Quad4Cfg
     check_joints(config, robots, spec)
     check_contacts(config.asset, spec, robots.bodies)

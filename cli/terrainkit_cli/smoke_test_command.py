@@ -1,0 +1,153 @@
+"""The command that checks whether robots can be trained."""
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from terrainkit.errors import ConfigError, TerrainkitError, listing
+from terrainkit_cli import render
+from terrainkit_cli.parse import Command
+from terrainkit_cli.robot_options import (
+    Output,
+    Packages,
+    Text,
+    Words,
+    XacroArguments,
+    packages,
+    reasons,
+    repeated,
+    xacro_arguments,
+)
+from terrainkit_cli.training_extra import require_training
+
+if TYPE_CHECKING:
+    from terrainkit_robots.policy.smoke_test import SmokeTestResult
+
+SCHEMA_VERSION = 2
+"""Version of the JSON; it changes when a key changes its meaning or is removed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SmokeTest(Command):
+    """Check in seconds whether a robot can be trained: it stands, gets rewards, and learns.
+
+    Robot files are onboarded into a temporary folder first. Exit code 0: every robot can be
+    trained. 1: a check failed. 2: a robot cannot be read, or an option is invalid.
+    """
+
+    robots: Annotated[
+        Words,
+        tyro.conf.Positional,
+        tyro.conf.arg(metavar="ROBOT [ROBOT ...]", help_behavior_hint=""),
+    ] = field(default_factory=list)
+    """Names of robots, folders written by terrainkit onboard, or URDF, xacro or MJCF files."""
+
+    format: Literal["text", "json"] = "text"
+    """Format of the report. For several robots, json writes one document per line."""
+
+    output: Output = ""
+    """Write the report to this file; an existing file is replaced."""
+
+    ignore: Annotated[Words, *repeated("CODES=REASON")] = field(default_factory=list)
+    """For robot files: rules to ignore, with the reason."""
+
+    package: Packages = field(default_factory=list)
+    """For robot files: folder of a ROS package, for package:// and $(find ...)."""
+
+    xacro_arg: XacroArguments = field(default_factory=list)
+    """For robot files: value of a xacro argument."""
+
+    spec: Text = ""
+    """For a robot file: a robot.toml whose values override the derived ones."""
+
+    def run(self) -> int:
+        """Test each robot, and report."""
+        self._check_options()
+        require_training()
+        results: dict[str, SmokeTestResult] = {}
+        with render.steps() as steps:
+            for name in self.robots:
+                steps.say(f"smoke test of {name}")
+                try:
+                    results[name] = self._smoke_test(name)
+                except TerrainkitError as error:
+                    render.error(str(error))
+                except OSError as error:
+                    render.error(f"{name}: {error.strerror or error}")
+        text = as_json(results) if self.format == "json" else as_text(results)
+        if self.output:
+            from terrainkit.atomic import atomic_write
+
+            with atomic_write(Path(self.output), overwrite=True) as path:
+                path.write_text(text, encoding="utf-8")
+            render.result(f"wrote {self.output}: {', '.join(map(summary, results.values()))}")
+        else:
+            render.report(text)
+        if len(results) < len(set(self.robots)):
+            return 2
+        return int(not all(result.passed for result in results.values()))
+
+    def _check_options(self) -> None:
+        if not self.robots:
+            raise ConfigError("ROBOT is missing; expected a name, a folder, or a robot file")
+        if self.spec and len(self.robots) > 1:
+            raise ConfigError(f"--spec: got {len(self.robots)} robots; expected one")
+        names = "package", "xacro-arg", "ignore", "spec"
+        given = [name for name in names if getattr(self, name.replace("-", "_"))]
+        if given and not any(Path(name).is_file() for name in self.robots):
+            robots = listing(self.robots)
+            raise ConfigError(f"--{given[0]}: got no robot file among {robots}; expected one")
+        if self.output:
+            from terrainkit.atomic import check_target
+
+            check_target(Path(self.output), overwrite=True)  # before the tests
+
+    def _smoke_test(self, name: str) -> "SmokeTestResult":
+        from terrainkit_robots.lint.settings import Settings
+        from terrainkit_robots.policy.smoke_test import smoke_test
+
+        settings = Settings(
+            ignore=reasons(self.ignore),
+            packages=packages(self.package),
+            xacro_arguments=xacro_arguments(self.xacro_arg),
+        )
+        return smoke_test(name, settings=settings, spec=Path(self.spec) if self.spec else None)
+
+
+def summary(result: "SmokeTestResult") -> str:
+    """Return a result as one line."""
+    failed = sum(not check.passed for check in result.checks)
+    if not failed:
+        return f"{result.robot} can be trained"
+    return f"{result.robot}: {failed} of {len(result.checks)} checks failed"
+
+
+def as_text(results: "dict[str, SmokeTestResult]") -> str:
+    """Return a table of checks for each robot, with the expectation of failed ones."""
+    blocks = []
+    for name, result in results.items():
+        width = max(len(check.name) for check in result.checks)
+        lines = [f"robot     {result.robot} ({name})", ""]
+        for check in result.checks:
+            word = "ok  " if check.passed else "FAIL"
+            lines.append(f"{word}  {check.name.ljust(width)}  {check.measured}")
+            if not check.passed:
+                lines.append(f"{'':4}  {'':{width}}  expected: {check.expected}")
+        blocks.append("\n".join([*lines, "", f"{summary(result)}\n"]))
+    return "\n".join(blocks)
+
+
+def as_json(results: "dict[str, SmokeTestResult]") -> str:
+    """Return one indented document; for several robots, one document per line."""
+    from terrainkit import __version__
+
+    head = {
+        "schema_version": SCHEMA_VERSION,
+        "tool": {"name": "terrainkit", "version": __version__},
+    }
+    documents = [{**head, "file": name, **result.as_dict()} for name, result in results.items()]
+    indent = 2 if len(documents) == 1 else None
+    return "".join(f"{json.dumps(document, indent=indent)}\n" for document in documents)

@@ -1,0 +1,193 @@
+"""Compare the link poses of two descriptions of a robot.
+
+Both robots are set to the same random joint positions. The link poses of a URDF are computed by
+yourdfpy and those of an MJCF by MuJoCo, which are independent of each other and of terrainkit.
+"""
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from terrainkit_robots.analysis.bodies.mimic_joints import follower_positions
+from terrainkit_robots.analysis.cannot_check import CannotCheckError
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.model import Joint
+from terrainkit_robots.lint.compare.mjcf_poses import mjcf_poses
+from terrainkit_robots.lint.compare.robot_pairs import RobotPairs, pair_robots
+from terrainkit_robots.lint.compare.urdf_poses import urdf_poses
+from terrainkit_robots.transforms import Matrix, invert_poses, pose_error
+
+MAX_DISTANCE, MAX_ANGLE = 1e-3, math.radians(0.1)
+"""Tolerances for equal poses [m], [rad]. Files round lengths to 0.1 mm, and angles to three
+decimals."""
+
+_MAX_ROTATION, _MAX_TRANSLATION = math.pi, 0.2
+"""Largest positions of joints in both directions [rad], [m], within the limits of the joint."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LinkPoseDifference:
+    """The largest difference of link poses between two descriptions, relative to the base."""
+
+    distance: float
+    """Largest distance between the origins of corresponding links [m]."""
+
+    angle: float
+    """Largest angle between their frames [rad]."""
+
+    link: str
+    """Link of the first robot with the largest distance, or with the largest angle if all distances
+    are below `MAX_DISTANCE`."""
+
+    first: str
+    """First link of the tree with a difference, or empty if there is none."""
+
+    pose: int
+    """Index of the pose in which `link` differs most."""
+
+    poses: int
+    """Number of poses."""
+
+    seed: int
+    """Seed of the poses."""
+
+    links: int
+    """Number of compared links."""
+
+    base: tuple[str, str]
+    """Base link of each robot."""
+
+    is_base_offset: bool
+    """Whether all links have the same difference, because the frames of the base differ."""
+
+    is_rotation_only: bool
+    """Whether all origins agree, and the rotation of each frame is the same in every pose."""
+
+    @property
+    def is_within_tolerance(self) -> bool:
+        """Whether no distance or angle exceeds the tolerances."""
+        return self.distance <= MAX_DISTANCE and self.angle <= MAX_ANGLE
+
+
+def compare_link_poses(
+    robot: Facts,
+    other: Facts,
+    *,
+    poses: int = 20,
+    seed: int = 0,
+    locked: Collection[str] = (),
+) -> LinkPoseDifference:
+    """Return the largest difference of link poses, over random poses within the joint limits.
+
+    Links are compared if they have the same name, or are below matching joints. Joints that only
+    one of the robots has are at 0.
+
+    Args:
+        robot: A robot whose file still exists.
+        other: Another description of the robot.
+        poses: Number of poses.
+        seed: Seed of the poses.
+        locked: Names of joints of `robot` that stay at 0.
+
+    Raises:
+        CannotCheckError: if no links match, or the poses of a robot cannot be computed.
+    """
+    pairs = pair_robots(robot, other)
+    if pairs is None or len(pairs.links) < 2:
+        raise CannotCheckError("the two robots have no links in common")
+    positions, other_positions = sample_positions(pairs, poses=poses, seed=seed, locked=locked)
+    link_poses = _relative_to_base(_link_poses(robot, positions), pairs.base[0], poses)
+    other_poses = _relative_to_base(_link_poses(other, other_positions), pairs.base[1], poses)
+    a = np.array([link_poses[name] for name, _ in pairs.links])
+    b = np.array([other_poses[name] for _, name in pairs.links])
+    with np.errstate(all="ignore"):
+        return _difference(a, b, pairs, seed)
+
+
+def sample_positions(
+    pairs: RobotPairs, *, poses: int, seed: int, locked: Collection[str] = ()
+) -> tuple[dict[str, Matrix], dict[str, Matrix]]:
+    """Return random positions within the limits of both robots, shape (poses,) each.
+
+    Returns:
+        The positions by the joint names of the first and of the second robot.
+    """
+    generator = np.random.default_rng(seed)
+    positions: dict[str, Matrix] = {}
+    for joint, other in pairs.joints:
+        sampled = generator.uniform(*_bounds(joint, other), poses)
+        positions[joint.name] = np.zeros(poses) if joint.name in locked else sampled
+    joints = [replace(j, mimic=None) if j.name in locked else j for j, _ in pairs.joints]
+    positions |= follower_positions(joints, positions)
+    return positions, {other.name: positions[joint.name] for joint, other in pairs.joints}
+
+
+def _bounds(joint: Joint, other: Joint) -> tuple[float, float]:
+    """Return the range of positions of both joints."""
+    most = _MAX_TRANSLATION if joint.kind == "prismatic" else _MAX_ROTATION
+    limits = joint.range or other.range or (-most, most)
+    other_limits = other.range or limits
+    lower, upper = max(limits[0], other_limits[0]), min(limits[1], other_limits[1])
+    if lower > upper:  # the ranges do not overlap
+        lower, upper = limits
+    lower, upper = (min(max(end, -most), most) for end in (lower, upper))
+    return lower, upper
+
+
+def _link_poses(robot: Facts, positions: Mapping[str, Matrix]) -> dict[str, Matrix]:
+    compute = mjcf_poses if robot.model.kind == "mjcf" else urdf_poses
+    return compute(robot, positions)
+
+
+def _relative_to_base(poses: Mapping[str, Matrix], base: str, count: int) -> dict[str, Matrix]:
+    """Return poses in the frame of the base, shape (count, 4, 4) each."""
+    with np.errstate(all="ignore"):
+        inverse = invert_poses(poses[base])
+        return {name: np.broadcast_to(inverse @ p, (count, 4, 4)) for name, p in poses.items()}
+
+
+def _difference(a: Matrix, b: Matrix, pairs: RobotPairs, seed: int) -> LinkPoseDifference:
+    """Return the difference of poses, shape (links, poses, 4, 4) each."""
+    distance, angle = pose_error(a, b)
+    if not (np.isfinite(distance).all() and np.isfinite(angle).all()):
+        raise CannotCheckError("link poses are not finite")
+    worst = np.unravel_index(
+        (distance if distance.max() > MAX_DISTANCE else angle).argmax(), distance.shape
+    )
+    differs = ((distance > MAX_DISTANCE) | (angle > MAX_ANGLE)).any(axis=1)
+    has_difference = bool(differs.any())
+    names = [name for name, _ in pairs.links]
+    return LinkPoseDifference(
+        distance=float(distance.max()),
+        angle=float(angle.max()),
+        link=names[int(worst[0])],
+        first=names[int(differs.argmax())] if has_difference else "",
+        pose=int(worst[1]),
+        poses=a.shape[1],
+        seed=seed,
+        links=len(names),
+        base=pairs.base,
+        is_base_offset=has_difference and _is_base_offset(a, b, pairs),
+        is_rotation_only=has_difference
+        and bool(distance.max() <= MAX_DISTANCE)
+        and _is_constant_rotation(a, b),
+    )
+
+
+def _is_base_offset(a: Matrix, b: Matrix, pairs: RobotPairs) -> bool:
+    """Return whether one transform of the base makes all other links agree."""
+    others = [k for k, pair in enumerate(pairs.links) if pair != pairs.base]
+    if len(others) < 2:
+        return False
+    offset = b[others[0], 0] @ invert_poses(a[others[0], 0])
+    distance, angle = pose_error(offset @ a[others], b[others])
+    return bool(distance.max() <= MAX_DISTANCE and angle.max() <= MAX_ANGLE)
+
+
+def _is_constant_rotation(a: Matrix, b: Matrix) -> bool:
+    """Return whether the relative rotation of each pair of links is the same in every pose."""
+    relative = invert_poses(a) @ b
+    _, angle = pose_error(np.broadcast_to(relative[:, :1], relative.shape), relative)
+    return bool(angle.max() <= MAX_ANGLE)

@@ -1,0 +1,94 @@
+"""The joint table of report.md: limits, gains and torques of each actuated joint."""
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from terrainkit_robots.spec.per_joint import match_joints
+
+if TYPE_CHECKING:
+    from terrainkit_robots.analysis.facts import Facts
+    from terrainkit_robots.spec.robot_spec import RobotSpec
+
+_COLUMNS: Mapping[str, tuple[str, str, str]] = {
+    "default_pose": ("default", "rad", "m"),
+    "stiffness": ("kp", "N m/rad", "N/m"),
+    "damping": ("kd", "N m s/rad", "N s/m"),
+    "armature": ("armature", "kg m2", "kg"),
+    "effort": ("effort", "N m", "N"),
+    "velocity": ("velocity", "rad/s", "m/s"),
+}
+"""Fields of the spec in the table: title, unit of a revolute and of a prismatic joint."""
+
+_MIN_TORQUE = 1e-9
+"""Smaller torques are rounding errors [N m]."""
+
+_MIN_DECIMAL, _MAX_DECIMAL = 1e-4, 1e4
+"""Numbers beyond these limits are written in scientific notation."""
+
+
+def joint_table(facts: "Facts", spec: "RobotSpec") -> list[tuple[str, ...]]:
+    """Return the rows of the table: a header with units, and one row per joint of the spec.
+
+    The holding torque is the torque at the default pose, and its share of the effort.
+    """
+    joints = {joint.name: joint for joint in facts.joints}
+    order = spec.joint_order
+    kinds = {joints[name].kind for name in order if name in joints}
+    values = {name: match_joints(getattr(spec, name), order).values for name in _COLUMNS}
+    roles = {
+        joint.name: role
+        for leg in facts.legs
+        for joint, role in zip(leg.joints, leg.roles, strict=True)
+    }
+    torques = {} if facts.stance is None else facts.stance.torques
+    rows = [_header(kinds, has_legs=bool(facts.legs))]
+    for index, name in enumerate(order):
+        joint = joints.get(name)
+        cells = [str(index), name]
+        if facts.legs:
+            cells.append(roles.get(name, ""))
+        cells.append("" if joint is None else _format_limits(joint.range))
+        cells += [format_number(values[column].get(name)) for column in _COLUMNS]
+        if facts.legs:
+            cells.append(_format_torque(torques.get(name), values["effort"].get(name)))
+        rows.append(tuple(cells))
+    return rows
+
+
+def _header(kinds: set[str], *, has_legs: bool) -> tuple[str, ...]:
+    def with_unit(title: str, revolute_unit: str, prismatic_unit: str) -> str:
+        units = [revolute_unit] * bool(kinds - {"prismatic"})
+        units += [prismatic_unit] * ("prismatic" in kinds)
+        return f"{title} [{' or '.join(units)}]" if units else title
+
+    titles = ["#", "joint", *["role"] * has_legs, with_unit("limits", "rad", "m")]
+    titles += [with_unit(*column) for column in _COLUMNS.values()]
+    titles += [with_unit("holding torque", "N m", "N")] * has_legs
+    return tuple(titles)
+
+
+def _format_limits(limits: tuple[float, float] | None) -> str:
+    return "none" if limits is None else " to ".join(map(format_number, limits))
+
+
+def _format_torque(torque: float | None, effort: float | None) -> str:
+    if torque is None or not math.isfinite(torque):
+        return ""
+    size = abs(torque) if abs(torque) > _MIN_TORQUE else 0.0
+    if effort is None or not 0 < effort < math.inf:
+        return format_number(size, 2)
+    return f"{format_number(size, 2)} ({min(size / effort, 99):.0%})"
+
+
+def format_number(value: float | None, digits: int = 3) -> str:
+    """Return a number with a number of significant digits; an empty string for None and NaN."""
+    if value is None or math.isnan(value):
+        return ""
+    if math.isinf(value):
+        return "unlimited"
+    if value == 0 or not _MIN_DECIMAL <= abs(value) < _MAX_DECIMAL:
+        return f"{value + 0.0:.{digits}g}"
+    decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    text = f"{value:.{decimals}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text

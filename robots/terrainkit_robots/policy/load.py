@@ -1,0 +1,40 @@
+"""Load the policy of a run."""
+
+import warnings
+
+from rsl_rl.models import MLPModel
+
+from terrainkit.errors import ConfigError, TerrainkitWarning
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.run import Run, changed_robot_files, read_checkpoint
+from terrainkit_robots.rl.runner import OBS_GROUPS, actor_config, check_checkpoint, network_errors
+from terrainkit_robots.rl.scene import SPEC_FILE
+
+
+def load_policy(run: Run, env: LeggedEnv) -> MLPModel:
+    """Return the actor network of a run: a deterministic policy in evaluation mode.
+
+    Args:
+        run: A run with a checkpoint.
+        env: The environment that the policy acts in.
+
+    Warns:
+        TerrainkitWarning: if the robot's model changed after training.
+
+    Raises:
+        ConfigError: if the run has no checkpoint, or one of another robot or task.
+    """
+    if run.checkpoint is None:
+        raise ConfigError(f"run {run.folder}: got no checkpoint; expected a trained run")
+    # The run has its own copy of the spec, so only a change of the model matters.
+    if files := [name for name in changed_robot_files(run) if name != SPEC_FILE]:
+        changed = f"{' and '.join(files)} of {run.robot_name} changed"
+        message = f"{changed} after the run {run.folder} was trained"
+        warnings.warn(message, TerrainkitWarning, stacklevel=2)
+    state = read_checkpoint(run.checkpoint)
+    check_checkpoint(run.checkpoint, state, env, OBS_GROUPS["actor"])
+    with network_errors(run.checkpoint):
+        obs, config = env.get_observations(), actor_config(run.task)
+        actor = MLPModel(obs, OBS_GROUPS, "actor", env.num_actions, **config)
+        actor.load_state_dict(state["actor_state_dict"])
+    return actor.to(env.device).eval()

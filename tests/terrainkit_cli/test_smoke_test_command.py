@@ -1,0 +1,171 @@
+import json
+import shutil
+
+import pytest
+
+pytest.importorskip("torch", reason="the extra `train` is not installed")
+
+from terrainkit.errors import ConfigError
+from terrainkit_cli import training_extra
+from terrainkit_robots.policy import smoke_test as module
+from terrainkit_robots.policy.smoke_test import Check, SmokeTestResult
+from terrainkit_robots.rl.tasks import get_task
+
+GOOD = Check("spawn height", True, "1.0 cm", "within 2.0 cm")
+BAD = Check("observation policy", False, "44 numbers", "45 numbers")
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch, called):
+    """Run `terrainkit smoke-test` in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return lambda *words: called("smoke-test", *words)
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    """Derive the result of a robot from its name, and return the calls."""
+    calls = []
+
+    def smoke_test(name, **options):
+        calls.append((name, options))
+        if name.startswith("none"):
+            raise ConfigError(f"there is no {name}")
+        checks = (GOOD, BAD) if name.startswith("bad") else (GOOD,)
+        return SmokeTestResult(name.upper(), checks)
+
+    monkeypatch.setattr(module, "smoke_test", smoke_test)
+    return calls
+
+
+def test_failed_check_is_shown_with_its_expectation(here, tmp_path):
+    shutil.copytree(get_task("quadruped").folder, tmp_path / "mine")
+    spec = tmp_path / "mine" / "robot.toml"
+    text = spec.read_text()
+    spec.write_text(text.replace("spawn_height = 0.34626", "spawn_height = 0.64626"))
+    run = here("mine")
+    assert run.returncode == 1, run.stderr
+    assert run.stderr == ""
+    lines = run.stdout.splitlines()
+    assert lines[0] == "robot     quadruped (mine)"
+    (failed,) = (k for k, line in enumerate(lines) if line.startswith("FAIL"))
+    assert lines[failed].split()[1:4] == ["spawn", "height", "31.0"]
+    expected = "expected: every foot within 2.0 cm of the ground, none below"
+    assert lines[failed + 1].strip() == expected
+    assert sum(line.startswith("ok  ") for line in lines) >= 15
+    assert lines[-1].startswith("quadruped: 1 of ")
+
+
+def test_exit_code_is_the_worst_result(here, calls):
+    for words, code in (
+        (("good",), 0),
+        (("bad",), 1),
+        (("good", "bad"), 1),
+        (("none", "good"), 2),
+        (("bad", "none"), 2),
+        (("good", "good"), 0),
+    ):
+        run = here(*words)
+        assert run.returncode == code, words
+        assert run.stderr.count("\n") == sum(word == "none" for word in words)
+    assert [name for name, _ in calls[:2]] == ["good", "bad"]
+
+
+@pytest.mark.usefixtures("calls")
+def test_text_report_lists_the_checks(here):
+    assert here("good", "bad").stdout == (
+        "robot     GOOD (good)\n"
+        "\n"
+        "ok    spawn height  1.0 cm\n"
+        "\n"
+        "GOOD can be trained\n"
+        "\n"
+        "robot     BAD (bad)\n"
+        "\n"
+        "ok    spawn height        1.0 cm\n"
+        "FAIL  observation policy  44 numbers\n"
+        "                          expected: 45 numbers\n"
+        "\n"
+        "BAD: 1 of 2 checks failed\n"
+    )
+
+
+@pytest.mark.usefixtures("calls")
+def test_json_report_is_a_document_per_robot(here):
+    run = here("bad", "--format", "json")
+    assert run.returncode == 1
+    document = json.loads(run.stdout)
+    assert document["schema_version"] == 2
+    assert document["tool"]["name"] == "terrainkit"
+    assert (document["file"], document["robot"], document["verdict"]) == ("bad", "BAD", "fail")
+    assert document["checks"][1] == {
+        "name": "observation policy",
+        "passed": False,
+        "measured": "44 numbers",
+        "expected": "45 numbers",
+    }
+    lines = here("good", "bad", "--format", "json").stdout.splitlines()
+    assert [json.loads(line)["verdict"] for line in lines] == ["pass", "fail"]
+
+
+@pytest.mark.usefixtures("calls")
+def test_report_is_written_to_a_file(here, tmp_path):
+    run = here("good", "bad", "--format", "json", "-o", "report.json")
+    assert run.returncode == 1
+    assert run.stdout == "wrote report.json: GOOD can be trained, BAD: 1 of 2 checks failed\n"
+    lines = (tmp_path / "report.json").read_text().splitlines()
+    assert [json.loads(line)["file"] for line in lines] == ["good", "bad"]
+
+
+def test_file_options_are_passed_on(here, calls, tmp_path):
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "a").touch()
+    words = ("--package", "my=meshes", "--xacro-arg", "arm:=false", "--ignore", "MSH=no meshes")
+    assert here("a", *words, "--spec", "a.toml").returncode == 0
+    (_, options) = calls[0]
+    assert str(options["spec"]) == "a.toml"
+    assert options["settings"].packages["my"].name == "meshes"
+    assert options["settings"].xacro_arguments == {"arm": "false"}
+    assert options["settings"].ignore == {"MSH": "no meshes"}
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("a", "--format", "sarif"), "sarif"),
+        (("a", "b", "--spec", "c.toml"), "--spec: got 2 robots; expected one"),
+        ((), "ROBOT is missing"),
+        (("a", "--package", "my=."), "--package: got no robot file among a"),
+        (("a", "b", "--xacro-arg", "arm:=false"), "--xacro-arg: got no robot file among a, b"),
+        (("a", "--ignore", "MSH=no meshes"), "--ignore: got no robot file"),
+        (("a", "--spec", "a.toml"), "--spec: got no robot file"),
+        (("a", "-o", "nowhere/a.txt"), "there is no folder nowhere"),
+        (("a", "-o", "."), "it is a folder"),
+    ],
+)
+def test_invalid_options_are_rejected_before_the_test(here, calls, words, message):
+    run = here(*words)
+    assert run.returncode == 2
+    assert run.stdout == ""
+    assert run.stderr.count("\n") == 1
+    assert message in run.stderr
+    assert calls == []
+
+
+def test_unknown_robot_is_one_line(here):
+    run = here("unicorn")
+    assert run.returncode == 2
+    assert run.stdout == ""
+    assert run.stderr.count("\n") == 1
+    assert "biped, quadruped" in run.stderr
+
+
+def test_missing_extra_is_named(here, monkeypatch):
+    monkeypatch.setattr(training_extra, "_PACKAGES", ("no_such_package",))
+    run = here("quadruped")
+    assert run.returncode == 2
+    assert "no_such_package, which is not installed: pip install 'terrainkit[train]'" in run.stderr
+
+
+def test_check_robot_has_no_train_smoke_option(called):
+    assert called("check-robot", "quadruped", "--train-smoke").returncode == 2

@@ -1,0 +1,47 @@
+import pytest
+
+from terrainkit.errors import ConfigError
+from terrainkit_robots.description import bundled
+from terrainkit_robots.lint.check import check_robot
+from terrainkit_robots.lint.settings import Settings
+
+QUADRUPED = bundled.find("quadruped")
+ROBOT = (
+    '<robot name="box"><link name="trunk"><inertial><mass value="{}"/></inertial></link></robot>'
+)
+
+
+def test_check_robot_reads_settings_above_file(tmp_path):
+    (tmp_path / "box.urdf").write_text(ROBOT.format(-1))
+    (tmp_path / "terrainkit.toml").write_text('[check-robot]\nselect = ["NAM"]\n')
+    assert not check_robot(tmp_path / "box.urdf").findings
+    codes = {finding.code for finding in check_robot(tmp_path / "box.urdf", Settings()).findings}
+    assert "INR002" in codes
+
+
+def test_check_robot_reads_contents_instead_of_file(tmp_path):
+    file = tmp_path / "box.urdf"
+    file.write_text(ROBOT.format(1))
+    settings = Settings(select=("INR002",))
+    assert not check_robot(file, settings).findings
+    report = check_robot(file, settings, contents={file: ROBOT.format(-1).encode()})
+    assert [finding.code for finding in report.findings] == ["INR002"]
+
+
+def test_check_robot_compares_with_other_file():
+    settings = Settings(select=("XRF",), simulate=False)
+    report = check_robot(QUADRUPED, settings, against=QUADRUPED.with_suffix(".xml"))
+    assert report.facts.against is not None
+    assert report.verdict == "pass"
+
+
+def test_check_robot_compares_with_spec():
+    spec = QUADRUPED.parent / "robot.toml"
+    report = check_robot(QUADRUPED, Settings(select=("XRF",), simulate=False), spec=spec)
+    assert report.facts.spec.name == "quadruped"
+
+
+def test_check_robot_rejects_other_file_without_robot(tmp_path):
+    (tmp_path / "empty.urdf").write_text("")
+    with pytest.raises(ConfigError, match=r"empty\.urdf does not describe a robot: "):
+        check_robot(QUADRUPED, Settings(), against=tmp_path / "empty.urdf")

@@ -1,0 +1,127 @@
+"""A quadruped, runs without a checkpoint, one trained run, and environments for rollouts."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("torch", reason="the extra `train` is not installed")
+
+import numpy as np
+import torch
+
+from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
+from terrainkit_robots.policy.evaluate import evaluation_task
+from terrainkit_robots.rl.config import Control, Env, Normalization, Policy, Runner, Sim, Task
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.run import Run, create_run, open_run
+from terrainkit_robots.rl.runner import LeggedRunner
+from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.tasks import get_task
+from terrainkit_robots.rl.terrain import MapTerrain, Plane, Terrain
+
+torch.set_num_threads(1)
+
+SMALL = Task(
+    env=Env(num_envs=4, num_threads=1),
+    policy=Policy(actor_hidden_dims=(16, 16), critic_hidden_dims=(16, 16)),
+    normalization=Normalization(clip_actions=0.3),  # small enough to clip
+    runner=Runner(num_steps_per_env=4, save_interval=1),
+)
+
+
+@pytest.fixture(scope="session")
+def quadruped() -> Robot:
+    return Robot.load(get_task("quadruped").folder)
+
+
+@pytest.fixture(scope="session")
+def biped() -> Robot:
+    return Robot.load(get_task("biped").folder)
+
+
+@pytest.fixture(scope="session")
+def small_map() -> TerrainMap:
+    """A map of 3 levels and 2 terrains, whose patches are 6 m long."""
+    terrains = (SubTerrain(terrain="stairs"), SubTerrain(terrain="rough_slope"))
+    size = (6.0, 4.0)
+    return generate(MapConfig(rows=3, cols=2, patch_size=size, border=1.2, terrains=terrains))
+
+
+@pytest.fixture(scope="session")
+def map_terrain(small_map: TerrainMap) -> Terrain:
+    return MapTerrain(small_map)
+
+
+@pytest.fixture
+def map_file(small_map: TerrainMap, tmp_path: Path) -> Path:
+    return small_map.save(tmp_path / "map.npz")
+
+
+@pytest.fixture(scope="session")
+def trained_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run on a plane with two checkpoints; not to be changed."""
+    run = create_run(tmp_path_factory.mktemp("runs") / "run", SMALL, "quadruped", "plane")
+    torch.manual_seed(1)
+    LeggedRunner(LeggedEnv(run.task, run.robot, Plane()), run.folder).learn(2)
+    return run.folder
+
+
+@pytest.fixture
+def trained(trained_folder: Path) -> Run:
+    return open_run(trained_folder)
+
+
+@pytest.fixture
+def make_run(tmp_path: Path) -> Callable[..., Run]:
+    """Make runs without a checkpoint; keywords replace parts of the task."""
+    numbers = count()
+
+    def make(source: str | Path = "plane", **parts: Any) -> Run:
+        folder = tmp_path / "runs" / str(next(numbers))
+        return create_run(folder, replace(SMALL, **parts), "quadruped", source)
+
+    return make
+
+
+class SlidingEnv(LeggedEnv):
+    """Robots whose bases move with given velocities, and fall at given times."""
+
+    velocities: Any = np.zeros((1, 3), np.float32)
+    """Forward, left and yaw velocity of each robot, shape (n, 3)."""
+
+    fall_times: Any = np.zeros(1)
+    """Time of each robot's fall [s]; 0: never. Shape (n,)."""
+
+    num_steps = 0
+
+    def step(self, actions: torch.Tensor) -> Any:
+        obs, rewards, _, _ = super().step(actions)
+        self.num_steps += 1
+        time, state = self.num_steps * self.cfg.dt, self.state
+        state.base_lin_vel[:, :2] = self.velocities[:, :2]
+        state.base_ang_vel[:, 2] = self.velocities[:, 2]
+        distance = self.velocities[:, 0] * np.float32(time)
+        state.base_pos[:, :2] = self.start_pos + np.column_stack(
+            [distance, np.zeros(self.num_envs)]
+        )
+        dones = torch.from_numpy(np.isclose(self.fall_times, time))
+        return obs, rewards, dones, {"time_outs": torch.zeros_like(dones)}
+
+
+@pytest.fixture
+def make_sliding(quadruped: Robot) -> Callable[..., SlidingEnv]:
+    def make(
+        velocities: Any, fall_times: Any = None, terrain: Terrain | None = None, **parts: Any
+    ) -> SlidingEnv:
+        # One physics step per policy step, since the physics does not matter.
+        task = replace(SMALL, sim=Sim(dt=0.02), control=Control(decimation=1), **parts)
+        env = SlidingEnv(evaluation_task(task, len(velocities)), quadruped, terrain or Plane())
+        env.velocities = np.array(velocities, np.float32)
+        env.fall_times = np.zeros(len(velocities)) if fall_times is None else np.array(fall_times)
+        return env
+
+    return make

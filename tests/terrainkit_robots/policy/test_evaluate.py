@@ -1,0 +1,225 @@
+import json
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+import torch
+
+from terrainkit import MapConfig, SubTerrain, generate
+from terrainkit.errors import ConfigError
+from terrainkit_robots.policy.evaluate import (
+    EvaluationConfig,
+    command_grid,
+    evaluate,
+    evaluation_task,
+    make_evaluation_env,
+    summarize,
+)
+from terrainkit_robots.policy.rollout import EvaluationRollout
+from terrainkit_robots.rl.config import Commands, DomainRand, Task, Terrain
+from terrainkit_robots.rl.run import open_run
+
+
+def run_still(run, config, seconds=0.1, **options):
+    """Evaluate a policy without motion."""
+    env, commands = make_evaluation_env(run, config, **options)
+    rollout = EvaluationRollout(env)
+    rollout.run(lambda _: torch.zeros(env.num_envs, env.num_actions), seconds, commands)
+    return rollout, commands
+
+
+def test_evaluation_task_keeps_custom_configs():
+    @dataclass(frozen=True, kw_only=True)
+    class Jumping(Commands):
+        height: float = 0.3
+
+    task = Task(commands=Jumping(height=0.4, lin_vel_x=(0, 2)))
+    assert evaluation_task(task, 1).commands == task.commands
+
+
+def test_evaluation_env_is_not_randomized(make_run):
+    run = make_run(domain_rand=DomainRand(joint_offset=0.1))
+    env, _ = make_evaluation_env(run, EvaluationConfig(num_envs=3, seconds=30, seed=5))
+    assert env.cfg.env.episode_length_s > 30
+    assert env.cfg.runner.seed == 5
+    assert not env.params.added_mass.any()
+    assert (env.params.strength == 1).all()
+    assert not env.joint_offset.any()
+    default_pose = np.tile(env.robot.default_pose, (3, 1))
+    np.testing.assert_allclose(env.state.dof_pos, default_pose, atol=1e-6)
+    obs = env.get_observations()
+    torch.testing.assert_close(obs["policy"], obs["privileged"][:, :45])
+
+
+def test_command_grid_covers_the_ranges():
+    commands = Commands(lin_vel_x=(-1, 1), lin_vel_y=(-0.5, 0.5), ang_vel_yaw=(-1, 1))
+    grid = command_grid(commands)
+    assert grid.shape == (75, 3)
+    assert np.unique(grid[:, 0]).tolist() == [-1, -0.5, 0, 0.5, 1]
+    assert np.unique(grid[:, 1]).tolist() == [-0.5, 0, 0.5]
+    assert np.unique(grid[:, 2]).tolist() == [-1, -0.5, 0, 0.5, 1]
+
+
+def test_command_grid_respects_one_sided_ranges_and_min_norm():
+    ranges = {"lin_vel_x": (0.4, 1), "lin_vel_y": (0, 0), "ang_vel_yaw": (-0.3, 0.3)}
+    grid = command_grid(Commands(**ranges, min_norm=0.2))
+    assert {round(float(v), 3) for v in grid[:, 0]} == {0.4, 0.5, 1}
+    assert set(grid[:, 1].tolist()) == {0}
+    assert {round(float(v), 3) for v in grid[:, 2]} == {-0.3, 0, 0.3}
+    assert len(np.unique(grid, axis=0)) == len(grid) == 9
+
+
+def test_plane_has_one_robot_per_command(make_run):
+    env, commands = make_evaluation_env(make_run(), EvaluationConfig())
+    assert env.num_envs == len(commands) == len(np.unique(commands, axis=0)) == 75
+
+
+@pytest.mark.parametrize(
+    ("num_envs", "max_patch_envs", "per_patch"), [(12, 512, 2), (None, 3, 3), (4, 512, 1)]
+)
+def test_map_patches_get_equal_numbers_of_robots(
+    make_run, map_file, num_envs, max_patch_envs, per_patch
+):
+    config = EvaluationConfig(num_envs=num_envs)
+    env, commands = make_evaluation_env(make_run(map_file), config, max_patch_envs=max_patch_envs)
+    patches = zip(env.curriculum.levels.tolist(), env.curriculum.columns.tolist(), strict=True)
+    counts = np.unique(list(patches), axis=0, return_counts=True)[1]
+    assert (counts == per_patch).all()
+    assert len(counts) == min(6, env.num_envs)
+    assert (commands == np.float32([0.75 * env.cfg.commands.lin_vel_x[1], 0, 0])).all()
+    origins = env.terrain.env_origins[env.curriculum.levels, env.curriculum.columns]
+    distance = np.abs(env.state.base_pos - origins)[:, :2].max()
+    assert distance <= env.cfg.init_state.position + 1e-5
+
+
+def test_policy_keeps_its_observations_on_another_terrain(make_run, map_file):
+    cases = [
+        (make_run("plane"), str(map_file), 45),
+        (make_run(map_file), "plane", 45 + 187),
+        (make_run(map_file, terrain=Terrain(collision="plane")), str(map_file), 45),
+        (make_run("plane", terrain=Terrain(measure_heights=True)), None, 45 + 187),
+    ]
+    for run, terrain, width in cases:
+        env, _ = make_evaluation_env(run, EvaluationConfig(num_envs=1, terrain=terrain))
+        assert env.get_observations()["policy"].shape == (1, width)
+        assert env.terrain.is_flat == (terrain in ("plane", None))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"seconds": 0.0}, "seconds: got 0"),
+        ({"seconds": float("nan")}, "seconds: got nan"),
+        ({"seconds": 1e9}, "at most 3600"),
+        ({"num_envs": 0}, "num_envs: got 0"),
+        ({"seed": -1}, "seed: got -1"),
+        ({"command": (1.0, float("inf"), 0.0)}, "expected three finite numbers"),
+        ({"command": (1.0, 0.0, 0.0), "random_commands": True}, "expected one of them"),
+    ],
+)
+def test_evaluation_config_rejects_invalid_values(options, message):
+    with pytest.raises(ConfigError, match=message):
+        EvaluationConfig(**options)
+
+
+def test_evaluation_env_rejects_an_unknown_device(make_run):
+    with pytest.raises(ConfigError, match="abacus"):
+        make_evaluation_env(make_run(), EvaluationConfig(device="abacus"))
+
+
+def test_evaluation_env_rejects_a_changed_map(make_run, small_map, map_file):
+    run = make_run(map_file)
+    generate(replace(small_map.config, seed=9)).save(map_file, overwrite=True)
+    with pytest.raises(ConfigError, match=r"map\.npz changed after .* expected --terrain"):
+        make_evaluation_env(run, EvaluationConfig(num_envs=1))
+    for terrain in (map_file, run.folder / "map.toml"):
+        make_evaluation_env(run, EvaluationConfig(num_envs=1, terrain=str(terrain)))
+
+
+def test_evaluation_env_ignores_the_map_of_a_flat_run(make_run, map_file):
+    run = make_run(map_file, terrain=Terrain(collision="plane"))
+    (run.folder / "map.toml").unlink()
+    map_file.write_text("gone")
+    env, _ = make_evaluation_env(run, EvaluationConfig(num_envs=1))
+    assert env.terrain.is_flat
+
+
+def test_evaluate_requires_a_checkpoint(make_run):
+    with pytest.raises(ConfigError, match="got no checkpoint"):
+        evaluate(make_run(), EvaluationConfig(num_envs=1, seconds=0.1))
+
+
+@pytest.mark.parametrize("on_map", [False, True])
+def test_evaluation_is_reproducible(make_run, map_file, on_map):
+    run = make_run(map_file if on_map else "plane")
+
+    def result(seed):
+        config = EvaluationConfig(num_envs=3, seed=seed, random_commands=True)
+        rollout, _ = run_still(run, config, seconds=2.1)
+        assert rollout.error_counts[0].all()
+        return summarize(run, config, rollout).as_json()
+
+    assert result(3) == result(3)
+    assert result(3) != result(4)
+
+
+def test_summary_groups_by_command(make_run):
+    ranges = {"lin_vel_x": (-1, 1), "lin_vel_y": (-0.5, 0.5), "ang_vel_yaw": (-1, 1)}
+    run, config = make_run(commands=Commands(**ranges)), EvaluationConfig()
+    document = json.loads(summarize(run, config, *run_still(run, config)).as_json())
+    assert document["all"]["robots"] == 75
+    assert document["all"]["success"] is None
+    assert document["all"]["lin_vel_error"] is None  # nothing is measured before settling
+    assert len(document["by_command"]) == 75
+    assert document["by_command"][0]["command"] == [-1.0, -0.5, -1.0]
+    assert "by_terrain" not in document
+
+
+def test_summary_groups_by_terrain_and_level(make_run, map_file):
+    run, config = make_run(map_file), EvaluationConfig(num_envs=12)
+    rollout, _ = run_still(run, config)
+    document = json.loads(summarize(run, config, rollout).as_json())
+    assert [group["terrain"] for group in document["by_terrain"]] == ["stairs", "rough_slope"]
+    assert [group["level"] for group in document["by_level"]] == [0, 1, 2]
+    groups = [
+        (group["terrain"], group["level"], group["robots"])
+        for group in document["by_terrain_and_level"]
+    ]
+    assert groups == [(name, k, 2) for name in ("stairs", "rough_slope") for k in range(3)]
+    assert "by_command" not in document
+
+
+def test_summary_counts_terrains_of_a_randomized_map(make_run, tmp_path):
+    terrains = tuple(SubTerrain(terrain=name) for name in ("flat", "pyramid_slope"))
+    size = {"rows": 3, "cols": 3, "patch_size": (4, 4), "border": 0.5}
+    path = generate(MapConfig(mode="randomized", terrains=terrains, **size)).save(
+        tmp_path / "map.npz"
+    )
+    run, config = make_run(path), EvaluationConfig(num_envs=9)
+    rollout, _ = run_still(run, config)
+    groups, names = summarize(run, config, rollout).groups, rollout.env.terrain.terrain_names
+    assert len({tuple(row) for row in names}) > 1
+    for group in groups["by_terrain"]:
+        assert group.robots == (names == group.terrain).sum()
+    for group in groups["by_terrain_and_level"]:
+        assert group.robots == (names[group.level] == group.terrain).sum()
+
+
+def test_bundled_quadruped_follows_commands():
+    result = evaluate(open_run("quadruped"), EvaluationConfig(seconds=8.0, num_envs=8))
+    assert result.metrics.robots == len(result.groups["by_command"]) == 8
+    assert result.metrics.falls == 0
+    assert result.metrics.lin_vel_error < 0.25
+    assert result.metrics.ang_vel_error < 0.25
+
+
+def test_evaluate_uses_single_torch_thread():
+    before, during = torch.get_num_threads(), []
+    torch.set_num_threads(2)
+    try:
+        config = EvaluationConfig(seconds=0.04, num_envs=1)
+        evaluate(open_run("quadruped"), config, lambda _: during.append(torch.get_num_threads()))
+        assert torch.get_num_threads() == 2
+    finally:
+        torch.set_num_threads(before)
+    assert during == [1, 1]

@@ -1,0 +1,261 @@
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import onnx
+import onnxruntime
+import pytest
+import torch
+from tensordict import TensorDict
+
+from terrainkit.errors import ConfigError, ExportError
+from terrainkit_robots.policy import export as module
+from terrainkit_robots.policy.evaluate import evaluation_task
+from terrainkit_robots.policy.export import METADATA_KEY, describe_policy, export_policy
+from terrainkit_robots.policy.load import load_policy
+from terrainkit_robots.policy.rollout import rollout
+from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.rl.config import Control, DomainRand, Env, Noise, Task
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.run import open_run
+from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.tasks import get_task
+from terrainkit_robots.rl.terrain import Plane
+
+DOCS = Path(__file__).parents[3] / "docs" / "exported_policy.md"
+FILES = ["policy.json", "policy.onnx", "policy.pt"]
+SMALL = Task(env=Env(num_envs=4, num_threads=1))
+
+
+@pytest.fixture(scope="module")
+def exported(trained_folder, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("exports") / "policy"
+    result = export_policy(open_run(trained_folder), folder)
+    assert max(result.errors) <= 1e-5
+    return folder
+
+
+@pytest.fixture(scope="module")
+def samples(trained_folder):
+    """Observations of a rollout and random ones, and the clipped actions of the checkpoint."""
+    run = open_run(trained_folder)
+    env = LeggedEnv(replace(run.task, env=Env(num_envs=20, num_threads=1)), run.robot, Plane())
+    policy = load_policy(run, env)
+    visited = torch.cat([obs["policy"] for obs, _, _ in rollout(env, policy, [None] * 20)])
+    random = 3 * torch.randn(visited.shape, generator=torch.Generator().manual_seed(3))
+    obs = torch.cat([visited, random])
+    with torch.inference_mode():
+        actions = policy(TensorDict({"policy": obs}, [len(obs)])).clamp(-0.3, 0.3)
+    return obs.numpy(), actions.numpy()
+
+
+@pytest.mark.parametrize("batch", [1, 7, 800])
+@pytest.mark.parametrize("name", ["policy.onnx", "policy.pt"])
+def test_exported_policy_acts_as_the_checkpoint(exported, samples, name, batch):
+    if name == "policy.onnx":
+        session = onnxruntime.InferenceSession(exported / name, providers=["CPUExecutionProvider"])
+
+        def policy(obs):
+            return session.run(None, {"obs": obs})[0]
+    else:
+        with pytest.warns(match="deprecated"):
+            script = torch.jit.load(exported / name)
+
+        def policy(obs):
+            return script(torch.from_numpy(obs)).detach().numpy()
+
+    obs, actions = samples
+    for start in range(0, len(obs), max(batch, len(obs) // 8)):
+        part = slice(start, start + batch)
+        np.testing.assert_allclose(policy(obs[part]), actions[part], atol=1e-5, rtol=0)
+
+
+def test_onnx_file_is_valid_and_holds_the_json(exported):
+    model = onnx.load(exported / "policy.onnx")
+    onnx.checker.check_model(model, full_check=True)
+    metadata = {each.key: each.value for each in model.metadata_props}
+    assert metadata[METADATA_KEY] == (exported / "policy.json").read_text()
+
+
+def test_json_describes_the_policy(exported):
+    config = json.loads((exported / "policy.json").read_text())
+    assert config["format_version"] == 1
+    assert config["robot"]["name"] == "quadruped"
+    assert config["iteration"] == 2
+    assert config["timing"] == {"physics_dt": 0.005, "decimation": 4, "policy_dt": 0.02}
+    assert config["action"] == {"size": 12, "clip": 0.3}
+    parts = config["observation"]["parts"]
+    names = "commands", "projected_gravity", "base_ang_vel", "dof_pos", "dof_vel", "actions"
+    assert tuple(part["name"] for part in parts) == names
+    assert parts[0]["scale"] == [2, 2, 0.25]
+    assert parts[4]["unit"] == ["rad/s"] * 12
+    assert parts[-1]["stop"] == config["observation"]["size"] == 45
+    assert config["height_scan"] is None
+
+
+def measure_terms(env, config):
+    """Return the raw observation terms of each robot from the state of the physics alone."""
+    qpos, qvel = np.array(env.sim.qpos), np.array(env.sim.qvel)
+    rotations = np.zeros((len(qpos), 9))
+    for rotation, pose in zip(rotations, qpos, strict=True):
+        mujoco.mju_quat2Mat(rotation, pose[3:7])
+    rotations = rotations.reshape(-1, 3, 3)
+    terms = {
+        "commands": env.commands,
+        "projected_gravity": -rotations[:, 2],
+        "base_ang_vel": qvel[:, 3:6],
+        "dof_pos": qpos[:, env.scene.joint_qpos],
+        "dof_vel": qvel[:, env.scene.joint_qvel],
+        "actions": env.actions[0],
+    }
+    if config["height_scan"]:
+        yaw = np.arctan2(rotations[:, 1, 0], rotations[:, 0, 0])[:, None]
+        x, y = np.array(config["height_scan"]["points"]).T
+        world_x = qpos[:, :1] + np.cos(yaw) * x - np.sin(yaw) * y
+        world_y = qpos[:, 1:2] + np.sin(yaw) * x + np.cos(yaw) * y
+        ground = env.terrain.height(world_x.astype(np.float32), world_y.astype(np.float32))
+        terms["height_scan"] = qpos[:, 2:3] - ground
+    return terms
+
+
+@pytest.mark.parametrize(("on_map", "size"), [(False, 45), (True, 232)])
+def test_json_reproduces_the_observations(quadruped, map_terrain, on_map, size):
+    task = replace(SMALL, noise=Noise(noise_level=0.0), domain_rand=DomainRand(joint_offset=0.0))
+    env = LeggedEnv(task, quadruped, map_terrain if on_map else Plane())
+    config = json.loads(json.dumps(describe_policy(env)))
+    assert config["observation"]["size"] == size
+    clip = config["observation"]["clip"]
+    generator = torch.Generator().manual_seed(0)
+    for _ in range(30):
+        env.step(torch.randn(4, 12, generator=generator))
+        terms, scaled = measure_terms(env, config), []
+        for part in config["observation"]["parts"]:
+            value = terms[part["name"]] - part["offset"]
+            scaled.append(np.clip(value, *part.get("clip", (-np.inf, np.inf))) * part["scale"])
+            assert scaled[-1].shape[1] == part["stop"] - part["start"]
+        obs = np.clip(np.concatenate(scaled, axis=1), -clip, clip)
+        np.testing.assert_allclose(obs, env.get_observations()["policy"], atol=1e-4)
+
+
+@pytest.mark.parametrize("wheels", [False, True])
+@pytest.mark.parametrize(
+    ("control_type", "drive"), [("P", "position"), ("V", "velocity"), ("T", "torque")]
+)
+def test_json_reproduces_the_torques(quadruped, wheels, control_type, drive):
+    robot = quadruped
+    if wheels:  # a joint without stiffness is driven by velocity
+        stiffness = robot.spec.per_joint("stiffness") | {robot.spec.joint_order[0]: 0.0}
+        robot = Robot.from_spec(replace(robot.spec, stiffness=stiffness), robot.mjcf.parent)
+    control = Control(control_type=control_type, damping=1.5)
+    env = LeggedEnv(evaluation_task(replace(SMALL, control=control), 1), robot, Plane())
+    config = describe_policy(env)
+    joints = {name: np.array(value) for name, value in config["joints"].items()}
+    assert config["control_type"] == control_type
+    first = "velocity" if wheels and control_type == "P" else drive
+    assert joints["drive"].tolist() == [first] + [drive] * 11
+    scene, model, data = env.scene, env.scene.model, mujoco.MjData(env.scene.model)
+    assert [model.actuator(k).name for k in range(model.nu)] == joints["name"].tolist()
+    rng, num_clipped = np.random.default_rng(1), 0
+    for _ in range(10):
+        action = rng.normal(0, 2, 12).astype(np.float32)
+        data.qpos[scene.joint_qpos] = rng.normal(0, 0.5, 12)
+        data.qvel[scene.joint_qvel] = rng.normal(0, 5, 12)
+        data.ctrl[:] = env.to_ctrl(action[None])[0]
+        with quiet_mujoco():
+            mujoco.mj_forward(model, data)
+        target = joints["action_offset"] + joints["action_scale"] * action
+        torque = joints["gain"] * target
+        torque -= joints["stiffness"] * data.qpos[scene.joint_qpos]
+        torque -= joints["damping"] * data.qvel[scene.joint_qvel]
+        clipped = np.clip(torque, -joints["effort"], joints["effort"])
+        np.testing.assert_allclose(data.actuator_force, clipped, rtol=1e-5, atol=1e-4)
+        num_clipped += (clipped != torque).sum()
+    assert num_clipped > 0
+
+
+def run_example(folder, robot, tmp_path, monkeypatch):
+    """Run the program of the docs for 5 s, and return its data."""
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+    shutil.copy(robot.mjcf, tmp_path / "robot.xml")
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    with quiet_mujoco():
+        exec(DOCS.read_text().partition("```python\n")[2].partition("```")[0], names)
+    data = names["data"]
+    assert data.qpos[2] > 0.7 * robot.spec.base_height_target
+    assert names["rotation"].reshape(3, 3)[2, 2] > 0.9
+    assert data.time == pytest.approx(5)
+    return data
+
+
+def test_docs_example_runs_a_policy(exported, quadruped, tmp_path, monkeypatch):
+    run_example(exported, quadruped, tmp_path, monkeypatch)
+
+
+@pytest.mark.parametrize("name", ["quadruped", "biped"])
+def test_docs_example_walks_with_bundled_policies(name, tmp_path, monkeypatch):
+    if not get_task(name).trained_run.is_dir():
+        pytest.skip(f"no bundled policy of {name}")
+    run = open_run(name)
+    export_policy(run, tmp_path / "exported")
+    data = run_example(tmp_path / "exported", run.robot, tmp_path, monkeypatch)
+    assert data.qpos[0] > 1.5  # of 2.5 m at 0.5 m/s
+
+
+def test_export_policy_of_a_large_task(trained, tmp_path):
+    task = replace(
+        trained.task,
+        env=replace(trained.task.env, num_envs=4096),
+        algorithm=replace(trained.task.algorithm, num_mini_batches=512),
+    )
+    result = export_policy(replace(trained, task=task), tmp_path / "policy")
+    assert (result.num_observations, result.num_actions) == (45, 12)
+
+
+def test_export_policy_overwrites_only_if_told(trained, exported, tmp_path):
+    folder = tmp_path / "policy"
+    shutil.copytree(exported, folder)
+    (folder / "policy.pt").unlink()
+    (folder / "notes.txt").write_text("mine")
+    (folder / "policy.onnx").write_bytes(b"before")
+    with pytest.raises(ExportError, match=r"policy\.onnx exists"):
+        export_policy(trained, folder)
+    assert (folder / "policy.onnx").read_bytes() == b"before"
+    assert not (folder / "policy.pt").exists()
+    export_policy(trained, folder, overwrite=True)
+    assert (folder / "policy.json").read_bytes() == (exported / "policy.json").read_bytes()
+    assert sorted(path.name for path in folder.iterdir()) == ["notes.txt", *FILES]
+
+
+@pytest.mark.parametrize("name", ["export_onnx", "export_torchscript"])
+def test_export_policy_rejects_other_actions(trained, tmp_path, monkeypatch, name):
+    export = getattr(module, name)
+
+    def export_wrong(policy, *rest):
+        with torch.no_grad():
+            policy[1].mlp[-1].bias += 1e-3
+        data = export(policy, *rest)
+        with torch.no_grad():
+            policy[1].mlp[-1].bias -= 1e-3
+        return data
+
+    monkeypatch.setattr(module, name, export_wrong)
+    with pytest.raises(ExportError, match=r"differ from the live policy by 0\.001"):
+        export_policy(trained, tmp_path / "policy")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_export_policy_requires_a_checkpoint(make_run, tmp_path):
+    with pytest.raises(ConfigError, match="no checkpoint"):
+        export_policy(make_run(), tmp_path / "policy")
+    assert not (tmp_path / "policy").exists()
+
+
+def test_export_policy_rejects_invalid_folders(trained, tmp_path):
+    (tmp_path / "file").write_text("")
+    for folder, message in ((tmp_path / "file", "exists"), (tmp_path / "a" / "b", "no folder")):
+        with pytest.raises(ExportError, match=message):
+            export_policy(trained, folder)

@@ -1,0 +1,66 @@
+import shutil
+
+import pytest
+import torch
+
+from terrainkit.errors import ConfigError, TerrainkitWarning
+from terrainkit_robots.policy.load import load_policy
+from terrainkit_robots.rl.config import Env, Task
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.run import create_run, open_run
+from terrainkit_robots.rl.runner import LeggedRunner
+from terrainkit_robots.rl.tasks import get_task
+from terrainkit_robots.rl.terrain import Plane
+
+
+@pytest.fixture
+def env(trained):
+    return LeggedEnv(trained.task, trained.robot, Plane())
+
+
+def test_load_policy_acts_as_the_runner(trained, env):
+    runner = LeggedRunner(env)
+    runner.load(trained.checkpoint)
+    obs = env.get_observations()
+    policy = load_policy(trained, env)
+    assert not policy.training
+    assert torch.equal(policy(obs), runner.alg.get_policy()(obs))
+    assert torch.equal(policy(obs), policy(obs))
+
+
+def test_load_policy_uses_the_given_checkpoint(trained_folder, env):
+    obs = env.get_observations()
+    first, second = (load_policy(open_run(trained_folder, k), env)(obs) for k in (1, 2))
+    assert not torch.equal(first, second)
+
+
+def test_load_policy_requires_a_checkpoint(make_run, env):
+    with pytest.raises(ConfigError, match="got no checkpoint; expected a trained run"):
+        load_policy(make_run(), env)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(("name", "warns"), [("quadruped.xml", True), ("robot.toml", False)])
+def test_load_policy_warns_about_a_changed_model(trained, env, tmp_path, name, warns):
+    robot = tmp_path / "robot"
+    shutil.copytree(get_task("quadruped").folder, robot)
+    folder = create_run(tmp_path / "run", trained.task, robot, "plane").folder
+    shutil.copy(trained.checkpoint, folder)
+    (robot / name).write_text((robot / name).read_text() + "\n")
+    if warns:
+        with pytest.warns(TerrainkitWarning, match=rf"quadruped\.xml of {robot} changed"):
+            load_policy(open_run(folder), env)
+    else:
+        load_policy(open_run(folder), env)
+
+
+def test_load_policy_rejects_another_robot(trained, biped):
+    env = LeggedEnv(Task(env=Env(num_envs=1, num_threads=1)), biped, Plane())
+    with pytest.raises(ConfigError, match="another robot, quadruped"):
+        load_policy(trained, env)
+
+
+def test_load_policy_rejects_other_observations(trained, quadruped, map_terrain):
+    env = LeggedEnv(Task(env=Env(num_envs=1, num_threads=1)), quadruped, map_terrain)
+    with pytest.raises(ConfigError, match=r"45 .* 232"):
+        load_policy(trained, env)

@@ -1,0 +1,159 @@
+from contextlib import nullcontext
+from types import SimpleNamespace
+
+import mujoco
+import numpy as np
+import pytest
+import torch
+
+from terrainkit.errors import ConfigError
+from terrainkit_robots.policy import play as module
+from terrainkit_robots.policy.evaluate import EvaluationConfig, make_evaluation_env
+from terrainkit_robots.policy.play import (
+    PoseRecorder,
+    demo_commands,
+    play,
+    select_tracked_robots,
+    view,
+)
+from terrainkit_robots.rl.config import Commands, Env, Terrain
+
+
+@pytest.fixture(autouse=True)
+def still(monkeypatch):
+    """Load policies that do not move."""
+    monkeypatch.setattr(
+        module, "load_policy", lambda _, env: lambda _: torch.zeros(env.num_envs, env.num_actions)
+    )
+
+
+def test_demo_commands_respect_the_limits():
+    commands = Commands(lin_vel_x=(0, 2), lin_vel_y=(0, 0), ang_vel_yaw=(-1, 1))
+    expected = [[1.5, 0, 0], [1.5, 0, 0.75], [0, 0, 0], [0, 0, -0.75]]
+    np.testing.assert_allclose(demo_commands(commands), expected)
+
+
+@pytest.mark.parametrize("flat_map", [False, True])
+def test_play_on_a_plane_shows_demo_commands(make_run, map_file, flat_map):
+    fractions = []
+    run = make_run(map_file, terrain=Terrain(collision="plane")) if flat_map else make_run()
+    result = play(run, EvaluationConfig(seconds=0.8), progress=fractions.append)
+    assert len(fractions) == 40
+    assert fractions[-1] == 1
+    assert result.evaluation.metrics.robots == 9
+    video = result.video
+    assert video.poses.shape == (20, 9, 19)
+    assert video.fps == 25
+    (shot,) = video.shots
+    assert (shot.robot, shot.start, shot.stop) == (4, 0, 20)
+    captions = list(dict.fromkeys(shot.captions))
+    assert captions[0] == "forward 0.75 m/s"
+    assert captions[1] == "forward 0.75 m/s, turning left 0.75 rad/s"
+    assert len(captions) == 4
+
+
+def test_play_arranges_robots_in_a_formation(make_run):
+    poses = play(make_run(), EvaluationConfig(seconds=0.02, num_envs=4)).video.poses[0]
+    x, y = poses[:, 0].reshape(2, 2), poses[:, 1].reshape(2, 2)
+    assert np.ptp(x, axis=1).max() < 0.01
+    assert np.ptp(y, axis=0).max() < 0.01
+    assert x[0, 0] - x[1, 0] == pytest.approx(y[0, 1] - y[0, 0], abs=0.01)
+    assert x[0, 0] - x[1, 0] > 0.5
+    np.testing.assert_allclose(poses[:, 6], 0, atol=0.01)  # they face along x
+
+
+@pytest.mark.parametrize(
+    ("command", "caption"),
+    [((-0.5, -0.25, 0), "backward 0.5 m/s, right 0.25 m/s"), ((0, 0, 0), "standing")],
+)
+def test_play_uses_a_given_command(make_run, command, caption):
+    config = EvaluationConfig(seconds=0.04, num_envs=1, command=command)
+    assert play(make_run(), config).video.shots[0].captions == (caption,)
+
+
+def test_play_on_a_map_follows_robots_on_each_terrain(make_run, map_file):
+    run, config = make_run(map_file), EvaluationConfig(seconds=0.8)
+    result = play(run, config, robots=2, size=(128, 72))
+    assert result.evaluation.metrics.robots == 6  # one per patch
+    video = result.video
+    assert video.poses.shape[:2] == (20, 6)
+    assert video.size == (128, 72)
+    captions = [shot.captions[0] for shot in video.shots]
+    assert captions == ["stairs, level 1 of 2", "rough_slope, level 1 of 2"]
+    assert [(shot.start, shot.stop) for shot in video.shots] == [(0, 10), (0, 10)]
+
+
+def test_shot_ends_at_the_first_fall(make_run, map_file):
+    env, _ = make_evaluation_env(make_run(map_file), EvaluationConfig(num_envs=2))
+    recorder = PoseRecorder(env)
+    for step in range(20):
+        env.step(torch.zeros(2, 12))
+        if step in (11, 15):
+            env.steps_since_reset[1] = 0  # as after a fall
+        recorder.record()
+    stops = {shot.robot: shot.stop for shot in recorder.make_video(1, (128, 72)).shots}
+    assert stops in ({0: 10}, {1: 6})
+    assert recorder._make_shot(0, 10).stop == 10
+    assert recorder._make_shot(1, 10).stop == 6
+
+
+def test_tracked_robots_cover_all_terrains_first(make_run, map_file):
+    env, _ = make_evaluation_env(make_run(map_file), EvaluationConfig(num_envs=12))
+    robots = select_tracked_robots(env, 3)
+    assert env.curriculum.columns[robots].tolist() == [0, 1, 0]
+    assert env.curriculum.levels[robots].tolist() == [1, 1, 1]
+    assert select_tracked_robots(env, 1) == robots[:1]
+    assert sorted(select_tracked_robots(env, 100)) == list(range(12))
+
+
+def test_play_without_video_records_nothing(make_run):
+    result = play(make_run(), EvaluationConfig(seconds=0.04, num_envs=1), video=False)
+    assert result.video is None
+    assert result.evaluation.metrics.falls == 0
+
+
+def test_play_rejects_zero_robots(make_run):
+    with pytest.raises(ConfigError, match="robots: got 0; expected 1 or more"):
+        play(make_run(), robots=0)
+
+
+def test_view_requires_a_display(make_run, monkeypatch):
+    monkeypatch.setattr(module.sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(ConfigError, match="expected a display"):
+        view(make_run())
+
+
+def test_view_shows_the_robot_until_closed(make_run, monkeypatch):
+    shown = []
+
+    class Viewer:
+        cam = SimpleNamespace(type=None, trackbodyid=None)
+
+        def __init__(self, _, data):
+            self.data = data
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            return None
+
+        def lock(self):
+            return nullcontext()
+
+        def is_running(self):
+            return len(shown) < 3
+
+        def sync(self):
+            shown.append(self.data.qpos.copy())
+
+    monkeypatch.setenv("DISPLAY", ":0")
+    viewer = SimpleNamespace(launch_passive=Viewer)
+    monkeypatch.setitem(module.sys.modules, "mujoco.viewer", viewer)
+    monkeypatch.setattr(mujoco, "viewer", viewer, raising=False)
+    view(make_run(env=Env(num_threads=1)), EvaluationConfig(seconds=0.04))
+    assert len(shown) == 3
+    assert not np.array_equal(shown[0], shown[2])
+    assert Viewer.cam.trackbodyid == 1

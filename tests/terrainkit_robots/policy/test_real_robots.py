@@ -1,0 +1,45 @@
+import numpy as np
+import pytest
+import torch
+
+from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
+from terrainkit_robots.policy.export import export_policy
+from terrainkit_robots.rl.config import Env, Runner, Task
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.run import create_run, open_run
+from terrainkit_robots.rl.runner import LeggedRunner
+from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.terrain import Plane
+
+TASK = Task(
+    env=Env(num_envs=16, num_threads=1), runner=Runner(num_steps_per_env=12, save_interval=100)
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "joints", "observed"), [("go2/urdf/go2.urdf", 12, 45), ("h1/urdf/h1.urdf", 10, 39)]
+)
+def test_real_robot_is_onboarded_and_trained(robot_file, tmp_path, name, joints, observed):
+    """Twenty updates show no walking: that nothing breaks, and that all numbers stay numbers."""
+    folder = tmp_path / "robot"
+    done = onboard(robot_file(name), folder, OnboardOptions(render_pictures=False))
+    assert done.folder == folder
+    robot = Robot.load(folder)
+    assert len(robot.spec.joint_order) == joints
+    run = create_run(tmp_path / "run", TASK, folder, "plane")
+    torch.manual_seed(1)
+    env = LeggedEnv(TASK, robot, Plane())
+    assert env.get_observations()["policy"].shape == (16, observed)
+    runner = LeggedRunner(env, run.folder)
+    update, losses = runner.alg.update, []
+    runner.alg.update = lambda: losses.append(update()) or losses[-1]
+    before = [weight.detach().clone() for weight in runner.alg.actor.mlp.parameters()]
+    runner.learn(20)
+    assert len(losses) == 20
+    assert all(np.isfinite(list(each.values())).all() for each in losses)
+    after = list(runner.alg.actor.mlp.parameters())
+    assert all(not torch.equal(a, b) for a, b in zip(before, after, strict=True))
+    assert np.isfinite(env.sim.qpos).all()
+    exported = export_policy(open_run(run.folder), tmp_path / "policy")
+    assert exported.num_observations == observed
+    assert max(exported.errors) <= 1e-5

@@ -1,0 +1,153 @@
+from itertools import repeat
+
+import numpy as np
+import pytest
+import torch
+
+from terrainkit_robots.policy.evaluate import evaluation_task, mean_metrics
+from terrainkit_robots.policy.rollout import (
+    SETTLING_TIME,
+    EvaluationRollout,
+    command_schedule,
+    rollout,
+)
+from terrainkit_robots.rl.config import Commands, Env, Task
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.terrain import Plane
+
+FORWARD = np.array([[1, 0, 0]], np.float32)
+
+
+@pytest.fixture
+def env(quadruped):
+    task = Task(env=Env(num_envs=2, num_threads=1))
+    return LeggedEnv(evaluation_task(task, 2), quadruped, Plane())
+
+
+def still(obs):
+    return torch.zeros(len(obs["policy"]), 12)
+
+
+def run(env, seconds, commands, **options):
+    measured = EvaluationRollout(env)
+    measured.run(still, seconds, commands, **options)
+    return measured
+
+
+def select(*mask):
+    return np.array(mask, bool)
+
+
+def test_rollout_applies_the_schedule(env):
+    forward, left = np.zeros((2, 2, 3), np.float32)
+    forward[:, 0], left[:, 1] = 0.5, 0.25
+    steps = list(rollout(env, still, [forward, forward, left]))
+    commands = [commands[0].tolist() for _, commands, _ in steps]
+    assert commands == [[0.5, 0, 0], [0.5, 0, 0], [0, 0.25, 0]]
+    observed = [obs["policy"][0, :3].tolist() for obs, _, _ in steps]
+    assert observed == [[1.0, 0, 0], [1.0, 0, 0], [0, 0.5, 0]]  # scaled by 2
+
+
+def test_rollout_is_lazy(env):
+    steps = rollout(env, still, repeat(None))
+    assert env.steps_since_reset.tolist() == [0, 0]
+    next(steps)
+    assert env.steps_since_reset.tolist() == [1, 1]
+
+
+def test_rollout_yields_falls_but_not_timeouts(env):
+    def collapse(obs):
+        actions = still(obs)
+        actions[0] = 100.0
+        return actions
+
+    falls = [falls for _, _, falls in rollout(env, collapse, repeat(None, 50))]
+    assert np.any(falls, axis=0).tolist() == [True, False]
+    env.reset()
+    env.episode_length_buf[:] = env.max_episode_length - 1
+    ((_, _, falls),) = rollout(env, still, [None])
+    assert env.steps_since_reset.tolist() == [0, 0]
+    assert falls.tolist() == [False, False]
+
+
+def test_command_schedule_splits_the_time_equally():
+    commands = np.arange(12, dtype=np.float32).reshape(2, 2, 3)
+    schedule = command_schedule(commands, 5)
+    assert [int(each[0, 0]) for each in schedule] == [0, 0, 0, 6, 6]
+    assert schedule[0] is schedule[2]
+    assert command_schedule(None, 3) == [None] * 3
+
+
+def test_errors_are_measured_after_settling(make_sliding):
+    env = make_sliding([[0.6, 0.3, 0.5], [1, 0, 0]])
+    measured = run(env, 4.0, np.array([[1, 0, 0.3], [1, 0, 0]], np.float32))
+    first = mean_metrics(measured, select(1, 0))
+    assert first.lin_vel_error == pytest.approx(0.5)
+    assert first.lin_vel_error_1s == pytest.approx(0.5)
+    assert first.ang_vel_error == pytest.approx(0.2)
+    assert first.success is None
+    assert mean_metrics(measured, select(1, 1)).lin_vel_error == pytest.approx(0.25)
+    steps = round((4.0 - SETTLING_TIME) / env.cfg.dt)
+    assert measured.error_counts.tolist() == [[steps] * 2, [steps - 49] * 2] * 2
+
+
+def test_averaged_errors_ignore_sway(make_sliding):
+    env = make_sliding([[1, 0, 0]])
+    step = env.step
+
+    def sway(actions):
+        env.velocities = np.array([[1, 0.4 * (-1) ** env.num_steps, 0]], np.float32)
+        return step(actions)
+
+    env.step = sway
+    metrics = mean_metrics(run(env, 4.0, FORWARD), select(1))
+    assert metrics.lin_vel_error == pytest.approx(0.4)
+    assert metrics.lin_vel_error_1s == pytest.approx(0, abs=1e-6)
+
+
+@pytest.mark.parametrize("headings", [False, True])
+def test_each_new_command_settles(make_sliding, headings):
+    env = make_sliding([[1, 0, 0]], commands=Commands(heading_command=headings))
+    measured = run(env, 6.0, np.array([[[1, 0, 0]], [[1, 0, 0.5]]], np.float32))
+    assert measured.error_counts[0, 0] == 2 * round((3 - SETTLING_TIME) / env.cfg.dt)
+    mean_error = measured.error_sums[2, 0] / measured.error_counts[2, 0]
+    assert mean_error == pytest.approx(0.25)
+
+
+def test_heading_command_is_one_command(make_sliding):
+    commands = Commands(heading_command=True, ang_vel_yaw=(-9, 9), min_norm=0.0, standing=0.0)
+    env = make_sliding([[1, 0, 0]], commands=commands)
+    yaw_rates = []
+    measured = run(env, 3.0, None, progress=lambda _: yaw_rates.append(float(env.commands[0, 2])))
+    assert len(set(yaw_rates)) > 1
+    assert measured.error_counts[0, 0] == round((3 - SETTLING_TIME) / env.cfg.dt)
+
+
+def test_fall_ends_the_measurement(make_sliding):
+    env = make_sliding([[0, 0, 0]] * 3, fall_times=[0, 3.0, 1.0])
+    measured = run(env, 4.0, np.tile(FORWARD, (3, 1)))
+    assert measured.falls.tolist() == [False, True, True]
+    assert measured.error_counts[0].tolist() == [100, 49, 0]
+    metrics = mean_metrics(measured, select(0, 0, 1))
+    assert (metrics.falls, metrics.robots, metrics.lin_vel_error) == (1, 1, None)
+
+
+def test_success_is_half_a_patch_or_half_the_distance(make_sliding, map_terrain):
+    # Patches are 6 m long: half is crossed after 2.7 s at 1.1 m/s.
+    velocities = [[1.1, 0, 0], [1.1, 0, 0], [0.3, 0, 0], [0.7, 0, 0], [1, 0, 0]]
+    env = make_sliding(velocities, fall_times=[0, 3.5, 0, 0, 2.0], terrain=map_terrain)
+    measured = run(env, 4.0, np.tile(FORWARD, (5, 1)))
+    assert measured.falls.tolist() == [False, False, False, False, True]
+    assert measured.success.tolist() == [True, True, False, True, False]
+    assert measured.error_counts[0, 1] == measured.error_counts[0, 0] < 100
+    metrics = mean_metrics(measured, np.ones(5, bool))
+    assert (metrics.success, metrics.falls) == (0.6, 1)
+
+
+@pytest.mark.parametrize(("stop_early", "steps"), [(True, 5), (False, 20)])
+def test_rollout_stops_when_all_robots_have_fallen(make_sliding, stop_early, steps):
+    fractions = []
+    env = make_sliding([[0, 0, 0]], fall_times=[0.1])
+    run(env, 0.4, 0 * FORWARD, progress=fractions.append, stop_early=stop_early)
+    assert len(fractions) == steps
+    assert fractions[-1] == pytest.approx(steps / 20)

@@ -1,0 +1,260 @@
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from terrainkit.errors import ConfigError
+from terrainkit_robots.description import bundled
+from terrainkit_robots.policy import smoke_test as module
+from terrainkit_robots.policy.evaluate import evaluation_task
+from terrainkit_robots.policy.smoke_test import (
+    SmokeTestResult,
+    check_memory,
+    check_observations,
+    check_rewards,
+    check_spawn_height,
+    check_stand,
+    check_training,
+    random_state,
+    run_checks,
+    smoke_test,
+)
+from terrainkit_robots.rl.config import Control, Env, Rewards, Task
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.rewards import REWARDS
+from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.tasks import get_task
+from terrainkit_robots.rl.terrain import Plane
+
+TASK = Task(env=Env(num_envs=16, num_threads=1))
+
+
+def failed(result):
+    return {check.name for check in result.checks if not check.passed}
+
+
+def replace_spec(robot, **values):
+    return Robot.from_spec(replace(robot.spec, **values), robot.mjcf.parent)
+
+
+def still_env(robot, **parts):
+    return LeggedEnv(evaluation_task(replace(TASK, **parts), 4), robot, Plane())
+
+
+@pytest.fixture
+def env(quadruped):
+    return LeggedEnv(TASK, quadruped, Plane())
+
+
+def test_bundled_robot_can_be_trained(biped):
+    result = run_checks(biped, Task())
+    assert result.passed, failed(result)
+    assert result.robot == "biped"
+    names = [check.name for check in result.checks]
+    assert names[:5] == [
+        "environment initializes",
+        "spawn height",
+        "observation policy",
+        "observation privileged",
+        "stands for 1 s with zero action",
+    ]
+    assert names[-2:] == ["memory is bounded", "trains for 3 iterations"]
+    assert {f"reward {name}" for name in ("torques", "collision", "stand_still")} < set(names)
+    assert len(set(names)) == len(names)
+
+
+def test_invalid_spec_fails_the_first_check(quadruped):
+    result = run_checks(replace_spec(quadruped, penalized_contacts=("tail",)), Task())
+    (check,) = result.checks
+    assert not result.passed
+    assert check.name == "environment initializes"
+    assert "'tail'" in check.measured
+
+
+@pytest.mark.parametrize(
+    ("offset", "passed", "height"),
+    [
+        (0.0, True, "1.0 cm"),
+        (0.009, True, "1.9 cm"),
+        (0.3, False, "31.0 cm"),
+        (-0.0105, True, "0.0 cm"),
+        (-0.05, False, "-4.0 cm"),
+    ],
+)
+def test_spawn_height_is_that_of_the_feet(quadruped, offset, passed, height):
+    robot = replace_spec(quadruped, spawn_height=quadruped.spec.spawn_height + offset)
+    check = check_spawn_height(still_env(robot))
+    assert check.passed is passed
+    assert height in check.measured
+    assert f"spawn_height {robot.spec.spawn_height:.4g} m" in check.measured
+
+
+def test_spawn_height_is_measured_at_the_lowest_corner(biped):
+    assert check_spawn_height(still_env(biped)).passed
+    pose = biped.spec.per_joint("default_pose")
+    pose["left_ankle_pitch_joint"] += 0.2
+    check = check_spawn_height(still_env(replace_spec(biped, default_pose=pose)))
+    assert not check.passed
+    assert "-" in check.measured.split("(left_ankle")[0]
+
+
+def test_spawn_height_names_the_raised_foot(quadruped):
+    pose = quadruped.spec.per_joint("default_pose")
+    pose["FL_calf_joint"] -= 0.4
+    check = check_spawn_height(still_env(replace_spec(quadruped, default_pose=pose)))
+    assert not check.passed
+    assert "(FL_foot)" in check.measured.split(" to ")[1]
+
+
+def test_spawn_height_names_feet_without_shapes(quadruped):
+    env = still_env(quadruped)
+    foot = env.scene.model.body("FL_foot").id
+    geoms = env.scene.geoms[env.scene.model.geom_bodyid[env.scene.geoms] != foot]
+    env.scene = replace(env.scene, geoms=geoms)
+    check = check_spawn_height(env)
+    assert not check.passed
+    assert check.measured.endswith("no collision shape: FL_foot")
+
+
+def test_observations_must_be_finite(env):
+    assert all(check.passed for check in check_observations(env))
+    env.get_observations()["policy"][3, 4] = torch.nan
+    policy, privileged = check_observations(env)
+    assert privileged.passed
+    assert not policy.passed
+    assert policy.measured == "45 numbers, some not finite"
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "measured"), [(60.0, "% of its height"), (0.1, "fell after 0.")]
+)
+def test_weak_gains_do_not_stand(quadruped, stiffness, measured):
+    control = Control(stiffness=stiffness, damping=min(stiffness, 2.0))
+    check = check_stand(still_env(quadruped, control=control))
+    assert check.passed is (stiffness > 10)
+    assert measured in check.measured
+
+
+def test_sunken_robot_does_not_stand(quadruped):
+    robot = replace_spec(quadruped, termination_contacts=())
+    check = check_stand(still_env(robot, control=Control(stiffness=1.0)))
+    assert not check.passed
+    assert "% of its height" in check.measured
+
+
+def test_each_reward_is_checked(env):
+    checks = list(check_rewards(env))
+    assert [check.name for check in checks] == [f"reward {name}" for name in env.rewards]
+    assert all(check.passed for check in checks)
+
+
+@pytest.mark.parametrize(
+    ("reward", "passed", "measured"),
+    [
+        (lambda state: 0 * state.base_pos[:, 0], False, "0 in every state"),
+        (lambda state: np.nan * state.base_pos[:, 0], False, "not finite"),
+        (lambda state: np.full(len(state.base_pos), np.inf), False, "not finite"),
+        (lambda state: state.base_pos[:, 0] > 10, True, "0: the rewarded event did not happen"),
+    ],
+)
+def test_constant_rewards_fail(env, reward, passed, measured):
+    env.rewards["torques"] = (lambda state, *_: reward(state), -0.1)
+    (check,) = (check for check in check_rewards(env) if check.name == "reward torques")
+    assert (check.passed, check.measured) == (passed, measured)
+
+
+def test_unreachable_reward_fails(quadruped):
+    env = still_env(replace_spec(quadruped, penalized_contacts=()))
+    (check,) = (check for check in check_rewards(env) if check.name == "reward collision")
+    assert not check.passed
+    assert check.measured == "0 in every state"
+    assert "rewards.collision 0" in check.expected
+
+
+def test_random_state_triggers_every_reward(quadruped):
+    env = still_env(quadruped, rewards=Rewards(**dict.fromkeys(REWARDS, 1.0)))
+    state = random_state(env.state, seed=1)
+    for name, reward in REWARDS.items():
+        assert reward(state, quadruped, env.cfg.rewards).any(), name
+
+
+def test_kept_states_fail_the_memory_check(env):
+    kept, step = [], env.step
+
+    def keep(actions):
+        kept.append((env.state, env.get_observations()))
+        return step(actions)
+
+    assert check_memory(env).passed
+    env.step = keep
+    check = check_memory(env)
+    assert not check.passed
+    assert 0.5 < float(check.measured.split()[0]) < 5
+
+
+def test_training_fails_with_the_reason(env):
+    env.rewards["torques"] = (lambda state, *_: np.nan * state.base_pos[:, 0], -1.0)
+    check = check_training(env)
+    assert not check.passed
+    assert "torques" in check.measured
+
+
+def test_training_keeps_the_random_state(env):
+    torch.manual_seed(5)
+    before = torch.get_rng_state()
+    assert check_training(env).passed
+    assert torch.equal(torch.get_rng_state(), before)
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Run one check instead of all."""
+
+    def check(robot, _):
+        return SmokeTestResult(robot.spec.name, (check_spawn_height(still_env(robot)),))
+
+    monkeypatch.setattr(module, "run_checks", check)
+
+
+@pytest.mark.usefixtures("quick")
+def test_smoke_test_onboards_a_file(tmp_path):
+    urdf = tmp_path / "quadruped.urdf"
+    shutil.copy(bundled.find("quadruped"), urdf)
+    before = urdf.read_bytes()
+    result = smoke_test(str(urdf))
+    assert result.passed, failed(result)
+    assert [check.name for check in result.checks] == ["can be onboarded", "spawn height"]
+    assert [path.name for path in tmp_path.iterdir()] == ["quadruped.urdf"]
+    assert urdf.read_bytes() == before
+
+
+@pytest.mark.usefixtures("quick")
+def test_smoke_test_rejects_a_file_with_errors(tmp_path):
+    urdf = tmp_path / "bad.urdf"
+    text = bundled.find("quadruped").read_text()
+    urdf.write_text(text.replace('<mass value="', '<mass value="-', 1))
+    (check,) = smoke_test(str(urdf)).checks
+    assert (check.name, check.passed) == ("can be onboarded", False)
+    assert "INR" in check.measured
+
+
+@pytest.mark.usefixtures("quick")
+def test_smoke_test_of_a_folder_uses_its_spec(tmp_path):
+    folder = tmp_path / "robot"
+    shutil.copytree(get_task("quadruped").folder, folder)
+    text = (folder / "robot.toml").read_text()
+    edited = text.replace("spawn_height = 0.34626", "spawn_height = 0.64626")
+    assert edited != text
+    (folder / "robot.toml").write_text(edited)
+    document = smoke_test(str(folder)).as_dict()
+    assert document["verdict"] == "fail"
+    assert document["checks"][0]["measured"].startswith("31.0 cm")
+
+
+def test_smoke_test_rejects_unknown_names_and_unused_specs(tmp_path):
+    with pytest.raises(ConfigError, match="biped, quadruped"):
+        smoke_test("unicorn")
+    with pytest.raises(ConfigError, match=r"has its own robot\.toml"):
+        smoke_test("quadruped", spec=tmp_path / "robot.toml")

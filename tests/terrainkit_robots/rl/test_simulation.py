@@ -1,0 +1,303 @@
+import subprocess
+import sys
+from dataclasses import fields
+
+import mujoco
+import numpy as np
+import pytest
+import torch
+
+from terrainkit.errors import CapacityError, ConfigError
+from terrainkit_robots.rl.config import DomainRand, Env, Runner, Task
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.events import RandomizedParams
+from terrainkit_robots.rl.scene import build_scene
+from terrainkit_robots.rl.simulation import Simulation, bytes_per_env, check_memory
+from terrainkit_robots.rl.terrain import MapTerrain, Plane
+
+
+@pytest.fixture
+def sim(cart, calm):
+    scene = build_scene(cart, Plane(), calm())
+    sim = Simulation(scene, 3, 1)
+    start = np.tile(scene.home, (3, 1))
+    start[:, 2] = [0.3, 0.5, 0.7]
+    sim.reset(np.arange(3), start, np.zeros((3, scene.model.nv)))
+    return sim
+
+
+class TestSimulation:
+    def test_step_matches_mj_step(self, sim):
+        model = sim.scene.model
+        data = mujoco.MjData(model)
+        data.qpos[:] = sim.qpos[1]
+        for _ in range(5):
+            sim.ctrl[:] = 0.1
+            sim.step(4)
+            data.ctrl[:] = 0.1
+            for _ in range(4):
+                mujoco.mj_step(model, data)
+        np.testing.assert_array_equal(sim.qpos[1], data.qpos)
+        np.testing.assert_array_equal(sim.qvel[1], data.qvel)
+
+    def test_sensors_match_the_current_state(self, sim):
+        sim.step(4)
+        data = mujoco.MjData(sim.scene.model)
+        data.qpos[:], data.qvel[:] = sim.qpos[2], sim.qvel[2]
+        mujoco.mj_forward(sim.scene.model, data)
+        for name in ("foot_position", "foot_velocity"):
+            where = sim.scene.sensors[name]
+            found = sim.sensor(name)[2].ravel()
+            np.testing.assert_allclose(found, data.sensordata[where], atol=1e-5)
+
+    def test_simulations_are_independent(self, sim):
+        sim.step(10)
+        heights = sim.qpos[:, 2].copy()
+        assert heights[0] < heights[1] < heights[2]
+
+    def test_sensor_returns_copies(self, sim):
+        before = sim.sensor("foot_position")
+        kept = before.copy()
+        sim.step(10)
+        np.testing.assert_array_equal(before, kept)
+        assert not np.allclose(sim.sensor("foot_position"), kept)
+
+    def test_reset_of_some_simulations(self, sim):
+        sim.step(10)
+        untouched = sim.qpos[[0, 2]].copy()
+        start = sim.scene.home.copy()
+        start[:3] = (1, 2, 3)
+        sim.ctrl[:] = 0.3
+        sim.reset(np.array([1]), start[None], np.full((1, sim.scene.model.nv), 0.1))
+        np.testing.assert_array_equal(sim.qpos[1], start)
+        np.testing.assert_array_equal(sim.qvel[1], 0.1)
+        np.testing.assert_array_equal(sim.ctrl[1], 0)
+        np.testing.assert_array_equal(sim.qpos[[0, 2]], untouched)
+
+
+class TestUnstable:
+    @pytest.mark.parametrize("value", [np.nan, np.inf, 1e12, -1e12])
+    @pytest.mark.parametrize("field", ["qvel", "qpos"])
+    def test_bad_values_are_reported(self, sim, field, value):
+        getattr(sim, field)[1, 7] = value
+        assert sim.step(4).tolist() == [False, True, False]
+        assert np.isfinite(sim.qpos).all()
+
+    def test_nonfinite_controls_are_reported(self, sim):
+        sim.ctrl[2, 0] = np.nan
+        assert sim.step(4).tolist() == [False, False, True]
+
+    def test_reported_every_time(self, sim):
+        for _ in range(3):
+            sim.qvel[1, 7] = np.nan
+            assert sim.step(4).tolist() == [False, True, False]
+            assert not sim.step(4).any()
+
+    def test_reported_after_a_reset(self, sim):
+        # A reset sets the counts of warnings back too.
+        for _ in range(3):
+            sim.qvel[1, 7] = np.nan
+            assert sim.step(4).tolist() == [False, True, False]
+            ids = np.array([1])
+            sim.reset(ids, sim.scene.home[None], np.zeros((1, sim.scene.model.nv)))
+
+    def test_other_simulations_are_unaffected(self, cart, calm):
+        def run(bad):
+            scene = build_scene(cart, Plane(), calm())
+            sim = Simulation(scene, 3, 1)
+            sim.qpos[:] = scene.home + 0.3
+            if bad:
+                sim.qvel[1, 7] = np.nan
+            sim.step(8)
+            return sim.qpos[[0, 2]].copy()
+
+        np.testing.assert_array_equal(run(bad=True), run(bad=False))
+
+    def test_no_mujoco_log_file(self, sim, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        sim.qvel[1, 7] = np.nan
+        sim.step(4)
+        assert list(tmp_path.iterdir()) == []
+
+
+def test_num_threads_does_not_change_results(quadruped, lively, mixed_map):
+    def run(threads):
+        env = LeggedEnv(lively(9, num_threads=threads), quadruped, MapTerrain(mixed_map))
+        made = torch.Generator().manual_seed(0)
+        return [
+            (observed["privileged"].numpy().tobytes(), rewards.numpy().tobytes())
+            for observed, rewards, _, _ in (
+                env.step(torch.randn(9, 12, generator=made)) for _ in range(15)
+            )
+        ]
+
+    assert run(1) == run(2)
+
+
+class TestApplyParamsToEnv:
+    @pytest.fixture
+    def varied(self, cart, calm):
+        return LeggedEnv(
+            calm(
+                5,
+                domain_rand=DomainRand(
+                    friction=(0.2, 1.5),
+                    added_mass=(-1.0, 2.0),
+                    com_shift=0.05,
+                    gains=(0.5, 1.5),
+                    motor_strength=(0.7, 1.3),
+                ),
+            ),
+            cart,
+            Plane(),
+        )
+
+    def test_params_are_within_their_ranges(self, varied):
+        found = varied.params
+        assert found.friction.shape == found.added_mass.shape == found.strength.shape == (5, 1)
+        assert found.stiffness.shape == found.damping.shape == found.com_shift.shape == (5, 3)
+        for values, low, high in (
+            (found.friction, 0.2, 1.5),
+            (found.added_mass, -1.0, 2.0),
+            (found.com_shift, -0.05, 0.05),
+            (found.stiffness, 0.5, 1.5),
+            (found.damping, 0.5, 1.5),
+            (found.strength, 0.7, 1.3),
+        ):
+            assert (low <= values).all()
+            assert (values <= high).all()
+            assert np.ptp(values) > 0.1 * (high - low)
+
+    def test_params_reach_every_simulation(self, varied):
+        scene, found = varied.scene, varied.params
+        nominal, base, hinge, wheel = scene.model, scene.base, 1, 0
+        for k in range(5):
+            model = varied.sim.batch.get_model(k)
+            mass = nominal.body_mass[base] + found.added_mass[k, 0]
+            assert model.body_mass[base] == pytest.approx(mass)
+            np.testing.assert_allclose(
+                model.body_inertia[base],
+                nominal.body_inertia[base] * mass / nominal.body_mass[base],
+            )
+            np.testing.assert_allclose(
+                model.body_ipos[base], nominal.body_ipos[base] + found.com_shift[k]
+            )
+            np.testing.assert_allclose(model.geom_friction[scene.geoms, 0], found.friction[k, 0])
+            kp = 20 * found.stiffness[k, hinge] * found.strength[k, 0]
+            kd = 1.5 * found.damping[k, hinge] * found.strength[k, 0]
+            np.testing.assert_allclose(model.actuator_gainprm[hinge, 0], kp, rtol=1e-6)
+            np.testing.assert_allclose(model.actuator_biasprm[hinge, :3], [0, -kp, -kd], rtol=1e-6)
+            kd = 0.4 * found.damping[k, wheel] * found.strength[k, 0]
+            np.testing.assert_allclose(model.actuator_gainprm[wheel, 0], kd, rtol=1e-6)
+            np.testing.assert_allclose(model.actuator_biasprm[wheel, :3], [0, 0, -kd], rtol=1e-6)
+
+    def test_derived_constants_are_updated(self, varied):
+        base = varied.scene.base
+        nominal = varied.scene.model.body_subtreemass[base]
+        for k, (added,) in enumerate(varied.params.added_mass):
+            model = varied.sim.batch.get_model(k)
+            assert model.body_subtreemass[base] == pytest.approx(nominal + added)
+
+    def test_other_parameters_are_unchanged(self, varied):
+        nominal, base = varied.scene.model, varied.scene.base
+        others = np.arange(nominal.nbody) != base
+        model = varied.sim.batch.get_model(3)
+        np.testing.assert_array_equal(model.body_mass[others], nominal.body_mass[others])
+        ground = ~np.isin(np.arange(nominal.ngeom), varied.scene.geoms)
+        np.testing.assert_array_equal(model.geom_friction[ground], nominal.geom_friction[ground])
+        np.testing.assert_array_equal(model.geom_friction[:, 1:], nominal.geom_friction[:, 1:])
+
+    def test_no_randomization_keeps_the_model(self, cart, calm):
+        env = LeggedEnv(calm(2), cart, Plane())
+        model = env.sim.batch.get_model(1)
+        for name in (
+            "body_mass",
+            "body_inertia",
+            "body_ipos",
+            "geom_friction",  # the hull is smoother than the legs
+            "actuator_gainprm",
+            "actuator_biasprm",
+        ):
+            np.testing.assert_allclose(
+                getattr(model, name), getattr(env.scene.model, name), rtol=1e-6, err_msg=name
+            )
+
+    def test_negative_base_mass_is_rejected(self, cart, calm, tmp_path, monkeypatch):
+        # It weighs 4 kg.
+        monkeypatch.chdir(tmp_path)
+        with pytest.raises(ConfigError, match="added_mass") as caught:
+            LeggedEnv(calm(2, domain_rand=DomainRand(added_mass=(-6.0, -5.0))), cart, Plane())
+        assert "\n" not in str(caught.value)
+        assert list(tmp_path.iterdir()) == []
+
+    def test_added_mass_changes_contact_forces(self, quadruped, calm):
+        task = calm(3, domain_rand=DomainRand(
+            friction=None, added_mass=(-2.0, 3.0), com_shift=0.0, gains=None,
+            motor_strength=None, joint_offset=0.0, push_interval_s=0.0,
+        ))  # fmt: skip
+        env = LeggedEnv(task, quadruped, Plane())
+        for _ in range(60):
+            env.step(torch.zeros(3, 12))
+        robot = env.scene.model.body_subtreemass[env.scene.base]
+        weight = (robot + env.params.added_mass[:, 0]) * 9.81
+        np.testing.assert_allclose(env.state.foot_force.sum(axis=1)[:, 2], weight, rtol=0.02)
+        assert np.ptp(weight) > 1
+
+    def test_every_param_has_num_envs_rows(self, varied):
+        for field in fields(RandomizedParams):
+            assert len(getattr(varied.params, field.name)) == 5
+
+
+MEASURED = """
+import re, sys
+from pathlib import Path
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.rl.tasks import get_task
+from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.rl.runner import LeggedRunner
+from terrainkit_robots.rl.config import Algorithm, Env, Runner, Task, Terrain
+
+def peak():
+    status = Path("/proc/self/status").read_text()  # ru_maxrss counts who started it, too
+    return 1024 * int(re.search(r"VmHWM:\\s*(\\d+) kB", status)[1])
+
+robot, few, many = Robot.load(get_task("quadruped").folder), 64, 1024
+terrain = Terrain(measure_heights=sys.argv[1] == "True")
+peaks = []
+for count in (few, many):
+    task = Task(
+        env=Env(num_envs=count, num_threads=1),
+        terrain=terrain,
+        algorithm=Algorithm(num_learning_epochs=1),
+        runner=Runner(num_steps_per_env=12),
+    )
+    LeggedRunner(LeggedEnv(task, robot, Plane())).learn(1)
+    peaks.append(peak())
+print((peaks[1] - peaks[0]) / (many - few))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Linux tells the peak of a process")
+@pytest.mark.parametrize("scan", [False, True])
+def test_memory_estimate_matches_measurement(quadruped, scan):
+    run = subprocess.run(
+        [sys.executable, "-c", MEASURED, str(scan)],
+        env={"PYTHONPATH": ":".join(filter(None, sys.path)), "OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    measured, task = float(run.stdout), Task(runner=Runner(num_steps_per_env=12))
+    assert 0.7 < bytes_per_env(task, quadruped, scan=scan, ngeom=50) / measured < 2.0
+
+
+def test_check_memory_names_what_fits(quadruped, monkeypatch):
+    monkeypatch.setattr("terrainkit.capacity._free_memory", lambda: 1 << 30)
+    task = Task(env=Env(num_envs=40_000))
+    with pytest.raises(
+        CapacityError, match=r"with 40000 environments needs .*; env\.num_envs 5000 would fit"
+    ):
+        check_memory(task, quadruped, scan=False, ngeom=50)
+    check_memory(Task(env=Env(num_envs=5000)), quadruped, scan=False, ngeom=50)

@@ -1,0 +1,365 @@
+import mujoco
+import numpy as np
+import pytest
+
+from terrainkit import MapConfig, SubTerrain, generate
+from terrainkit.errors import ConfigError, TerrainkitError
+from terrainkit.surface import HeightfieldSurface
+from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.rl.config import InitState
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.terrain import MapTerrain, ModelTerrain, Plane, load_terrain
+
+EXACT = 1e-3
+
+
+def rays(model, xy, group=None):
+    """Return the height of a model under points, by MuJoCo's own rays."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    hit, heights = np.zeros(1, np.int32), np.full(len(xy), np.nan)
+    for k, (x, y) in enumerate(xy):
+        start, down = np.array([x, y, 30.0]), np.array([0.0, 0.0, -1.0])
+        far = mujoco.mj_ray(model, data, start, down, group, 1, -1, hit, None)
+        if far >= 0:
+            heights[k] = 30.0 - far
+    return heights
+
+
+def compiled(ground):
+    with quiet_mujoco():
+        return ground.spec().compile()
+
+
+def anywhere(ground, count, seed=0):
+    low, high = np.array(ground.lower), np.array(ground.upper)
+    return (low + (high - low) * np.random.default_rng(seed).random((count, 2))).astype(np.float32)
+
+
+@pytest.fixture(scope="module")
+def scanned(tmp_path_factory):
+    """Return a level floor with a step and a slope, that is nowhere symmetric."""
+    path = tmp_path_factory.mktemp("scanned") / "ground.xml"
+    path.write_text("""
+        <mujoco>
+          <worldbody>
+            <geom type="plane" size="9 9 0.1" pos="0 0 -0.2"/>
+            <geom type="box" size="0.5 0.25 0.15" pos="0.5 0.25 -0.15"/>
+            <geom type="box" size="0.6 0.4 0.05" pos="-0.7 -0.5 -0.1" euler="0 10 0"/>
+          </worldbody>
+        </mujoco>
+    """)
+    return ModelTerrain(path, cell=0.02, half_size=1.5)
+
+
+class TestHeightfieldSurface:
+    def test_height_on_both_triangles(self):
+        # The diagonal goes from (0, 0) to (1, 1): the far corner at (0, 1) is on the upper side.
+        grid = HeightfieldSurface(
+            heights=np.array([[0.0, 1.0], [2.0, 4.0]], np.float32),
+            first_sample=(10.0, 20.0),
+            cell=0.5,
+        )
+        x = np.array([10.0, 10.5, 10.0, 10.5, 10.25, 10.375, 10.125], np.float32)
+        y = np.array([20.0, 20.0, 20.5, 20.5, 20.25, 20.125, 20.375], np.float32)
+        # (0.75, 0.25): 0 + 0.75 * 2 + 0.25 * (4 - 2); (0.25, 0.75): 0 + 0.75 * 1 + 0.25 * (4 - 1)
+        np.testing.assert_allclose(grid.height(x, y), [0, 2, 1, 4, 2, 2.0, 1.5], atol=1e-6)
+
+    def test_height_is_constant_outside(self):
+        grid = HeightfieldSurface(
+            heights=np.array([[0.0, 1.0], [2.0, 4.0]], np.float32),
+            first_sample=(0.0, 0.0),
+            cell=1.0,
+        )
+        x, y = np.float32([-5, 9, -5, 0.5]), np.float32([-5, 9, 9, 1e6])
+        np.testing.assert_allclose(grid.height(x, y), [0, 4, 1, 2.5])
+
+    def test_height_is_single_precision(self):
+        # Twice the width would cost twice the time.
+        grid = HeightfieldSurface(
+            heights=np.zeros((4, 5), np.float32), first_sample=(0.0, 0.0), cell=1.0
+        )
+        assert (
+            grid.height(np.ones((2, 3), np.float32), np.ones((2, 3), np.float32)).dtype
+            == np.float32
+        )
+
+
+class TestPlane:
+    def test_plane_is_flat_and_infinite(self):
+        xy = np.float32([[0, 0], [1e4, -1e4]])
+        assert (Plane().height(xy[:, 0], xy[:, 1]) == 0).all()
+        assert Plane().is_flat
+        np.testing.assert_allclose(rays(compiled(Plane()), xy[:1]), [0], atol=1e-9)
+
+    def test_plane_has_one_origin(self):
+        assert Plane().env_origins.shape == (1, 1, 3)
+
+
+class TestMapTerrain:
+    @pytest.mark.parametrize("collision", ["hfield", "boxes", "auto"])
+    def test_height_matches_rays(self, terrain_map, collision):
+        # Two of its patches are stairs and obstacles, one is rough: boxes beside a heightfield.
+        ground = MapTerrain(terrain_map, collision)
+        xy = anywhere(ground, 4000)
+        found = ground.height(xy[:, 0], xy[:, 1])
+        off = np.abs(found - rays(compiled(ground), xy))
+        # A point on a wall is on either side of it, by rounding.
+        assert np.mean(off > EXACT) < 0.0005, xy[off > EXACT][:5]
+
+    @pytest.mark.parametrize("collision", ["hfield", "boxes", "auto"])
+    def test_height_matches_rays_on_level_map(self, level_map, collision):
+        ground = MapTerrain(level_map, collision)
+        xy = anywhere(ground, 2000, seed=1)
+        found = ground.height(xy[:, 0], xy[:, 1])
+        off = np.abs(found - rays(compiled(ground), xy))
+        assert np.mean(off > EXACT) < 0.001, xy[off > EXACT][:5]
+
+    def test_boxes_are_level_up_to_walls(self, level_map):
+        # All ground is level, so each point is as high as the sample that it is nearest to.
+        ground = MapTerrain(level_map, "boxes")
+        xy = anywhere(ground, 2000, seed=2)
+        cell, (x, y) = level_map.grid.cell, level_map.first_sample
+        nearest = np.rint((xy - (x, y)) / cell).astype(int)
+        nearest = np.clip(nearest, 0, np.array(level_map.heights.shape) - 1)
+        found = ground.height(xy[:, 0], xy[:, 1])
+        np.testing.assert_array_equal(found, level_map.heights[nearest[:, 0], nearest[:, 1]])
+
+    def test_height_accepts_any_shape(self, map_ground):
+        x = np.linspace(0, 5, 12, dtype=np.float32).reshape(3, 4)
+        assert map_ground.height(x, x).shape == (3, 4)
+        np.testing.assert_array_equal(
+            map_ground.height(x, x).ravel(), map_ground.height(x.ravel(), x.ravel())
+        )
+
+    def test_attributes_match_the_map(self, mixed_map):
+        ground = MapTerrain(mixed_map)
+        assert ground.env_origins.shape == (3, 2, 3)
+        assert ground.terrain_names.tolist() == [["stairs", "rough_slope"]] * 3
+        assert ground.patch_length == 6.0
+        np.testing.assert_allclose(ground.lower, (-1.2, -1.2))
+        np.testing.assert_allclose(ground.upper, (3 * 6 + 1.2, 2 * 4 + 1.2))
+        assert not ground.is_flat
+
+    def test_terrain_names_of_randomized_map(self):
+        choices = tuple(SubTerrain(terrain=name) for name in ("flat", "stairs"))
+        config = MapConfig(
+            mode="randomized", rows=4, cols=3, patch_size=(4, 4), border=0.5, terrains=choices
+        )
+        terrain_map = generate(config)
+        ground = MapTerrain(terrain_map)
+        assert ground.terrain_names.shape == (4, 3)
+        assert len({tuple(row) for row in ground.terrain_names}) > 1  # or nothing is told apart
+        for row in range(4):
+            for col in range(3):
+                x, y, _ = ground.env_origins[row, col]
+                near = np.linspace(-1.5, 1.5, 31, dtype=np.float32)
+                level = np.ptp(ground.height(x + near, np.full(31, y))) == 0
+                assert ground.terrain_names[row, col] == ("flat" if level else "stairs")
+
+    def test_geoms_have_the_material(self, map_ground):
+        model = compiled(map_ground)
+        assert (model.geom_rgba == 1).all()
+        assert (model.geom_matid == model.material("ground").id).all()
+
+    def test_origins_are_on_the_ground(self, map_ground):
+        origins = map_ground.env_origins.reshape(-1, 3)
+        found = map_ground.height(origins[:, 0], origins[:, 1])
+        np.testing.assert_allclose(found, origins[:, 2], atol=EXACT)
+
+
+class TestModelTerrain:
+    def test_model_height_matches_rays(self, scanned):
+        xy = anywhere(scanned, 3000)
+        found = scanned.height(xy[:, 0], xy[:, 1])
+        near = np.stack(
+            [
+                scanned.height(xy[:, 0] + np.float32(dx), xy[:, 1] + np.float32(dy))
+                for dx, dy in np.random.default_rng(0).uniform(-0.03, 0.03, (12, 2))
+            ]
+        )
+        smooth = np.ptp(near, axis=0) < 0.02
+        off = np.abs(found - rays(compiled(scanned), xy))
+        assert smooth.mean() > 0.8
+        assert off[smooth].max() < EXACT
+
+    def test_model_is_one_custom_patch(self, scanned):
+        assert scanned.terrain_names.tolist() == [["custom"]]
+        assert Plane().terrain_names.tolist() == [["plane"]]
+
+    def test_model_bounds_are_half_size(self, scanned):
+        assert scanned.lower == (-1.5, -1.5)
+        assert scanned.upper == (1.5, 1.5)
+
+    def test_model_origin_is_on_the_ground(self, scanned):
+        np.testing.assert_allclose(scanned.env_origins, [[[0, 0, 0]]], atol=1e-6)
+
+    def test_missing_ground_is_far_below(self, tmp_path):
+        path = tmp_path / "slab.xml"
+        path.write_text(
+            '<mujoco><worldbody><geom type="box" size=".5 .5 .1"/></worldbody></mujoco>'
+        )
+        ground = ModelTerrain(path, cell=0.1, half_size=1.0)
+        found = ground.height(np.float32([0, 0.9]), np.float32([0, 0]))
+        np.testing.assert_allclose(found, [0.1, 0.1 - 10], atol=1e-6)
+
+    @pytest.mark.parametrize("turn", ["0 10 0", "0 -10 0", "10 0 0"])
+    @pytest.mark.parametrize("x", [0, 3])
+    def test_tilted_plane_is_measured_uphill(self, tmp_path, turn, x):
+        path = tmp_path / "tilted.xml"
+        path.write_text(
+            "<mujoco><worldbody>"
+            f'<geom type="plane" size="0 0 1" euler="{turn}" pos="{x} 0 0"/>'
+            "</worldbody></mujoco>"
+        )
+        ground = ModelTerrain(path, cell=1.0, half_size=12.0)
+        corners = np.float32([[-12, -12], [-12, 12], [12, -12], [12, 12]])
+        found = ground.height(corners[:, 0], corners[:, 1])
+        np.testing.assert_allclose(found, rays(compiled(ground), corners), atol=1e-4)
+
+    @pytest.mark.parametrize(
+        ("text", "message"),
+        [
+            ("<mujoco/>", "no ground at the origin"),
+            ("<mujoco", "MuJoCo cannot read"),
+            ("<robot name='x'/>", "MuJoCo cannot read|no ground at the origin"),
+            ("", "MuJoCo cannot read"),
+            (
+                '<mujoco><worldbody><geom type="plane" size="1 1 1"/><body pos="0 0 1"><freejoint/>'
+                '<geom size="0.1"/></body></worldbody></mujoco>',
+                "got 6 degrees of freedom; expected a static model",
+            ),
+            (
+                '<mujoco><worldbody><geom type="box" pos="3 0 0" size="1 1 1"/></worldbody>'
+                "</mujoco>",
+                "no ground at the origin",
+            ),
+        ],
+    )
+    def test_invalid_source_is_rejected(self, tmp_path, text, message):
+        path = tmp_path / "ground.xml"
+        path.write_text(text)
+        with pytest.raises(ConfigError, match=message) as caught:
+            ModelTerrain(path, cell=0.1, half_size=0.5)
+        assert "\n" not in str(caught.value)
+        assert not (tmp_path / "MUJOCO_LOG.TXT").exists()
+
+    def test_statistic_of_file_is_ignored(self, tmp_path):
+        # The statistics of a scene are for its cameras: they do not say how high it is.
+        path = tmp_path / "tower.xml"
+        path.write_text(
+            '<mujoco><statistic extent="0.8" center="0 0 0.1"/><worldbody>'
+            '<geom type="plane" size="5 5 0.1" pos="0 0 -1"/>'
+            '<geom type="box" size="0.5 0.5 3"/></worldbody></mujoco>'
+        )
+        ground = ModelTerrain(path, cell=0.1, half_size=0.5)
+        np.testing.assert_allclose(ground.env_origins[0, 0], [0, 0, 3], atol=1e-6)
+
+    def test_visual_geoms_are_ignored(self, tmp_path):
+        path = tmp_path / "carpet.xml"
+        path.write_text(
+            '<mujoco><worldbody><geom type="plane" size="5 5 0.1"/>'
+            '<geom type="box" size="3 3 0.1" pos="0 0 0.5" contype="0" conaffinity="0"/>'
+            "</worldbody></mujoco>"
+        )
+        ground = ModelTerrain(path, cell=0.1, half_size=0.5)
+        np.testing.assert_allclose(ground.env_origins[0, 0], [0, 0, 0], atol=1e-6)
+
+    def test_transparent_geoms_are_measured(self, tmp_path):
+        # Rays of MuJoCo pass through what is fully transparent.
+        path = tmp_path / "glass.xml"
+        path.write_text(
+            '<mujoco><worldbody><geom type="plane" size="5 5 0.1" pos="0 0 -1"/>'
+            '<geom type="box" size="3 3 0.1" rgba="1 1 1 0"/></worldbody></mujoco>'
+        )
+        ground = ModelTerrain(path, cell=0.1, half_size=0.5)
+        np.testing.assert_allclose(ground.env_origins[0, 0], [0, 0, 0.1], atol=1e-6)
+
+
+class TestLoadTerrain:
+    def test_load_every_kind(self, mixed_map, tmp_path):
+        mixed_map.save(tmp_path / "map.npz")
+        (tmp_path / "slab.xml").write_text(
+            '<mujoco><worldbody><geom type="plane" size="1 1 1"/></worldbody></mujoco>'
+        )
+        assert isinstance(load_terrain("plane"), Plane)
+        assert isinstance(load_terrain(tmp_path / "map.npz"), MapTerrain)
+        assert isinstance(load_terrain(str(tmp_path / "map.npz")), MapTerrain)
+        assert isinstance(load_terrain(tmp_path / "map.npz", "plane"), Plane)
+
+    def test_load_config_is_deterministic(self, tmp_path):
+        config = tmp_path / "map.toml"
+        config.write_text(
+            "rows = 1\ncols = 1\npatch_size = [4.0, 3.0]\nborder = 0.5\nseed = 3\n"
+            '[[terrains]]\nterrain = "rough"\n'
+        )
+        first, second = load_terrain(config), load_terrain(config)
+        xy = anywhere(first, 100)
+        np.testing.assert_array_equal(
+            first.height(xy[:, 0], xy[:, 1]), second.height(xy[:, 0], xy[:, 1])
+        )
+        assert np.ptp(first.height(xy[:, 0], xy[:, 1])) > 0.01
+
+    @pytest.mark.parametrize(
+        ("name", "message"),
+        [
+            ("moon", "terrain: got 'moon'; expected plane, a map"),
+            ("", "terrain: got ''; expected plane, a map"),
+            ("map.obj", "expected plane, a map"),
+            ("none.npz", "none.npz"),
+            ("none.toml", "none.toml"),
+            ("none.xml", "there is no file"),
+            ("folder.xml", "there is no file"),
+        ],
+    )
+    def test_invalid_source_is_rejected(self, tmp_path, name, message):
+        (tmp_path / "folder.xml").mkdir()
+        source = tmp_path / name if "." in name else name
+        with pytest.raises(TerrainkitError, match=message) as caught:
+            load_terrain(source)
+        assert "\n" not in str(caught.value)
+
+
+class TestHeightScan:
+    @staticmethod
+    def cast(env, yaw):
+        """Return the scan of a robot, by rays at the points where it should look."""
+        points = env.cfg.terrain
+        x, y = np.meshgrid(points.measured_points_x, points.measured_points_y, indexing="ij")
+        x, y = x.ravel(), y.ravel()
+        base = env.sim.qpos[0]
+        # To the left of where it heads is a quarter of a turn further.
+        at = base[:2] + np.column_stack(
+            [x * np.cos(yaw) - y * np.sin(yaw), x * np.sin(yaw) + y * np.cos(yaw)]
+        )
+        only_ground = np.array([1, 0, 0, 0, 0, 0], np.uint8)
+        return base[2] - rays(compiled(env.terrain), at, only_ground)
+
+    @pytest.mark.parametrize("yaw", [0.0, 0.7, 2.5, -1.6])
+    @pytest.mark.parametrize("tilt", [0.0, 0.2])
+    def test_height_scan_matches_rays(self, quadruped, calm, mixed_map, yaw, tilt):
+        env = LeggedEnv(calm(1, init_state=InitState(position=0)), quadruped, MapTerrain(mixed_map))
+        quat = np.zeros(4)
+        turn = np.array([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)])
+        pitch = np.array([np.cos(tilt / 2), 0, np.sin(tilt / 2), 0])
+        mujoco.mju_mulQuat(quat, turn, pitch)
+        env.sim.qpos[0, :2] += (0.83, 0.41)
+        env.sim.qpos[0, 3:7] = quat
+        state = env._compute_state(np.arange(1))
+        assert state.height_scan.shape == (1, 187)
+        np.testing.assert_allclose(state.height_scan[0], self.cast(env, yaw), atol=EXACT)
+        assert np.ptp(state.height_scan) > 0.05
+
+    def test_base_height_is_above_the_ground(self, quadruped, calm, mixed_map):
+        env = LeggedEnv(calm(6), quadruped, MapTerrain(mixed_map))
+        env.sim.qpos[:, :2] += np.random.default_rng(0).uniform(-1, 1, (6, 2))
+        state = env._compute_state(np.arange(6))
+        under = rays(
+            compiled(env.terrain), env.sim.qpos[:, :2], np.array([1, 0, 0, 0, 0, 0], np.uint8)
+        )
+        np.testing.assert_allclose(state.base_height, env.sim.qpos[:, 2] - under, atol=EXACT)
+
+    def test_no_height_scan_on_a_plane(self, quadruped, calm):
+        env = LeggedEnv(calm(1), quadruped, Plane())
+        assert env.get_observations()["policy"].shape == (1, 45)
+        assert env.state.height_scan.shape == (1, 0)

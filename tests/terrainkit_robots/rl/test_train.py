@@ -1,0 +1,418 @@
+import os
+import resource
+import shutil
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+import terrainkit
+from terrainkit.errors import CapacityError, ConfigError, ExportError
+from terrainkit_robots.rl import runner, tasks
+from terrainkit_robots.rl.config import Algorithm, Env, Policy, Runner, Task, Terrain
+from terrainkit_robots.rl.run import (
+    checkpoints,
+    open_run,
+    policy_state,
+    read_checkpoint,
+    save_checkpoint,
+)
+from terrainkit_robots.rl.runner import TrainingProgress
+from terrainkit_robots.rl.train import train
+
+
+@pytest.fixture
+def task() -> Task:
+    """Return a task of short episodes, so that many end, and of small networks."""
+    return Task(
+        env=Env(num_envs=4, num_threads=1, episode_length_s=0.3),
+        policy=Policy(actor_hidden_dims=(16,), critic_hidden_dims=(16,)),
+        algorithm=Algorithm(num_learning_epochs=2, num_mini_batches=2),
+        runner=Runner(num_steps_per_env=8, max_iterations=4),
+    )
+
+
+def lasting(task: Task, iterations: int) -> Task:
+    return replace(task, runner=replace(task.runner, max_iterations=iterations))
+
+
+def weights(path: Path) -> list[torch.Tensor]:
+    return list(read_checkpoint(path)["actor_state_dict"].values())
+
+
+def same_weights(a: Path, b: Path) -> bool:
+    return all(torch.equal(x, y) for x, y in zip(weights(a), weights(b), strict=True))
+
+
+@contextmanager
+def full_disk(size: int) -> Iterator[None]:
+    """Let no file grow beyond a size [bytes]."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+def test_train_writes_a_run(task, tmp_path):
+    trained = train("quadruped", "plane", task, folder=tmp_path / "run")
+    assert (trained.folder, trained.iteration, trained.signal) == (tmp_path / "run", 4, 0)
+    run = open_run(tmp_path / "run")
+    assert run.task == task
+    assert run.checkpoint == tmp_path / "run" / "model_4.pt"
+
+
+def test_train_names_the_default_folder(task, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    folder = train("quadruped", "plane", lasting(task, 1)).folder
+    assert folder.parent == Path("logs/quadruped")
+    assert (folder / "model_1.pt").exists()
+
+
+def test_resume_continues_exactly_in_its_folder(task, tmp_path):
+    train("quadruped", "plane", task, folder=tmp_path / "whole")
+    train("quadruped", "plane", lasting(task, 2), folder=tmp_path / "run")
+    done = train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
+    assert done.folder == tmp_path / "run"
+    assert same_weights(tmp_path / "whole" / "model_4.pt", tmp_path / "run" / "model_4.pt")
+    assert list(checkpoints(tmp_path / "run")) == [2, 4]
+    assert open_run(tmp_path / "run").task == task
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_run_resumes_exactly(task, tmp_path, number):
+    def interrupt(progress: TrainingProgress) -> None:
+        if progress.iteration == 2:
+            signal.raise_signal(number)
+
+    before = [signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)]
+    train("quadruped", "plane", task, folder=tmp_path / "whole")
+    stopped = train(
+        "quadruped", "plane", task, folder=tmp_path / "run", progress_callback=interrupt
+    )
+    assert (stopped.iteration, stopped.signal) == (2, number)
+    assert [signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)] == before
+    train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
+    assert same_weights(tmp_path / "whole" / "model_4.pt", tmp_path / "run" / "model_4.pt")
+
+
+def test_signal_in_last_iteration_is_ignored(task, tmp_path):
+    def interrupt(progress: TrainingProgress) -> None:
+        if progress.iteration == 4:
+            signal.raise_signal(signal.SIGTERM)
+
+    done = train("quadruped", "plane", task, folder=tmp_path / "run", progress_callback=interrupt)
+    assert (done.iteration, done.signal) == (4, 0)
+
+
+def test_second_signal_raises_keyboard_interrupt(task, tmp_path, monkeypatch):
+    monkeypatch.setattr(runner, "SIGNAL_INTERVAL", 0.0)
+
+    def interrupt(_progress: TrainingProgress) -> None:
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        train("quadruped", "plane", task, folder=tmp_path / "run", progress_callback=interrupt)
+    assert checkpoints(tmp_path / "run") == {}
+
+
+def test_repeated_signal_counts_once(task, tmp_path):
+    def interrupt(progress: TrainingProgress) -> None:
+        if progress.iteration == 2:
+            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(signal.SIGTERM)
+
+    stopped = train(
+        "quadruped", "plane", task, folder=tmp_path / "run", progress_callback=interrupt
+    )
+    assert (stopped.iteration, stopped.signal) == (2, signal.SIGINT)
+    assert list(checkpoints(tmp_path / "run")) == [2]
+
+
+def test_train_runs_in_a_thread(task, tmp_path):
+    trained: list[Any] = []
+    work = threading.Thread(
+        target=lambda: trained.append(
+            train("quadruped", "plane", lasting(task, 1), folder=tmp_path / "run")
+        )
+    )
+    work.start()
+    work.join()
+    assert trained[0].iteration == 1
+
+
+def test_resume_accepts_other_num_envs(task, tmp_path):
+    train("quadruped", "plane", lasting(task, 1), folder=tmp_path / "run")
+    more = lasting(replace(task, env=replace(task.env, num_envs=6)), 2)
+    done = train("quadruped", "plane", more, resume=open_run(tmp_path / "run"))
+    assert (done.folder, done.iteration) == (tmp_path / "run", 2)
+    assert open_run(tmp_path / "run").task.env.num_envs == 6
+
+
+def test_tensorboard_has_each_iteration_once_after_a_crash(task, tmp_path):
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    task = replace(task, runner=replace(task.runner, save_interval=2))
+    train("quadruped", "plane", task, folder=tmp_path / "run")
+    (tmp_path / "run" / "model_4.pt").unlink()  # as if it had been killed before
+    train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
+    curves = EventAccumulator(str(tmp_path / "run")).Reload()
+    assert [event.step for event in curves.Scalars("Loss/value")] == [1, 2, 3, 4]
+
+
+def test_resume_from_earlier_checkpoint_overwrites_nothing(task, tmp_path):
+    run, branch = tmp_path / "run", tmp_path / "branch"
+    train(
+        "quadruped",
+        "plane",
+        replace(task, runner=replace(task.runner, save_interval=2)),
+        folder=run,
+    )
+    before = (run / "model_4.pt").read_bytes()
+    done = train("quadruped", "plane", task, resume=open_run(run, 2), folder=branch)
+    assert done.folder == branch
+    assert (run / "model_4.pt").read_bytes() == before
+    assert same_weights(run / "model_4.pt", branch / "model_4.pt")
+
+
+@pytest.mark.parametrize("name", ["quadruped.xml", "robot.toml"])
+def test_resume_rejects_a_modified_robot(task, tmp_path, name):
+    mine, run = tmp_path / "mine", tmp_path / "run"
+    shutil.copytree(tasks.get_task("quadruped").folder, mine)
+    train(mine, "plane", lasting(task, 1), folder=run)
+    (mine / name).write_text((mine / name).read_text() + "\n")
+    with pytest.raises(ConfigError, match=rf"{name} of .*mine changed since .*run was trained"):
+        train(mine, "plane", task, resume=open_run(run))
+    assert list(checkpoints(run)) == [1]
+    other = tmp_path / "other"
+    shutil.copytree(mine, other)
+    done = train(other, "plane", lasting(task, 1), resume=open_run(run), folder=tmp_path / "new")
+    assert list(checkpoints(done.folder)) == [1]
+
+
+def test_resume_with_other_task_starts_new_run(task, tmp_path, mixed_map):
+    run = tmp_path / "run"
+    train("quadruped", "plane", task, folder=run)
+    other = lasting(replace(task, rewards=replace(task.rewards, base_height=-1.0)), 1)
+    seen: list[int] = []
+    done = train(
+        "quadruped",
+        "plane",
+        other,
+        resume=open_run(run),
+        folder=tmp_path / "other",
+        progress_callback=lambda progress: seen.append(progress.iteration),
+    )
+    assert (done.folder, seen) == (tmp_path / "other", [1])
+    blind = replace(task.terrain, measure_heights=False)
+    path = mixed_map.save(tmp_path / "map.npz")
+    done = train(
+        "quadruped",
+        path,
+        lasting(replace(task, terrain=blind), 1),
+        resume=open_run(run),
+        folder=tmp_path / "map",
+    )
+    assert open_run(done.folder).terrain == str(path)
+
+
+def test_new_run_keeps_optimizer_unless_rates_differ(task, tmp_path):
+    """With Adam begun anew, at the first step's rate, one update undoes what was learned."""
+    train("quadruped", "plane", task, folder=tmp_path / "run")
+    run = open_run(tmp_path / "run")
+    before = read_checkpoint(run.checkpoint)
+    before["optimizer_state_dict"]["param_groups"][0]["lr"] = 3e-5
+    save_checkpoint(run.checkpoint, before)
+    steps = int(before["optimizer_state_dict"]["state"][0]["step"])
+    for name, algorithm, rate, done in (
+        ("as_before", replace(task.algorithm, entropy_coef=0.0), 3e-5, steps),
+        ("rate", replace(task.algorithm, learning_rate=2e-4), 2e-4, 0),
+        ("schedule", replace(task.algorithm, schedule="fixed"), 1e-3, 0),
+    ):
+        other = lasting(replace(task, algorithm=algorithm), 1)
+        train("quadruped", "plane", other, resume=run, folder=tmp_path / name)
+        after = read_checkpoint(open_run(tmp_path / name).checkpoint)["optimizer_state_dict"]
+        # 2 epochs of 2 batches, each of which may change the rate by half
+        assert after["param_groups"][0]["lr"] == pytest.approx(rate, rel=1.5**4 - 1)
+        assert int(after["state"][0]["step"]) == done + 4
+
+
+def test_new_run_keeps_levels_on_same_map(task, tmp_path, mixed_map):
+    path, copied, other = (tmp_path / f"{name}.npz" for name in ("map", "copied", "other"))
+    mixed_map.save(path)
+    mixed_map.save(copied)
+    terrainkit.generate(replace(mixed_map.config, seed=mixed_map.config.seed + 1)).save(other)
+    task = lasting(replace(task, terrain=Terrain(curriculum=False, max_init_level=0)), 1)
+    train("quadruped", path, task, folder=tmp_path / "run")
+    run = open_run(tmp_path / "run")
+    before = read_checkpoint(run.checkpoint)
+    curriculum = before["processes"][0]["env"]["curriculum"]
+    top = len(curriculum["success"]) - 1
+    curriculum["levels"][:] = top
+    save_checkpoint(run.checkpoint, before)
+    rewarded = replace(task, rewards=replace(task.rewards, base_height=-1.0))
+    for ground, levels in ((path, {top}), (copied, {top}), (other, {0})):
+        folder = tmp_path / f"from_{ground.stem}"
+        train("quadruped", ground, rewarded, resume=run, folder=folder)
+        after = read_checkpoint(open_run(folder).checkpoint)["processes"][0]["env"]["curriculum"]
+        assert set(after["levels"].tolist()) == levels
+
+
+@pytest.mark.parametrize("before", ["plane", "auto"])
+def test_resume_switches_between_plane_and_map(task, tmp_path, mixed_map, before):
+    path = mixed_map.save(tmp_path / "map.npz")
+    after = {"plane": "auto", "auto": "plane"}[before]
+    first, second = (
+        lasting(replace(task, terrain=Terrain(collision=touched, measure_heights=True)), 1)
+        for touched in (before, after)
+    )
+    train("quadruped", path, first, folder=tmp_path / "run")
+    run = open_run(tmp_path / "run")
+    done = train("quadruped", path, second, resume=run, folder=tmp_path / "more")
+    assert done.iteration == 1
+
+
+def test_resume_from_renamed_checkpoint_starts_new_run(task, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    run = tmp_path / "run"
+    train("quadruped", "plane", lasting(task, 1), folder=run)
+    (run / "model_1.pt").rename(run / "best.pt")
+    done = train("quadruped", "plane", task, resume=open_run(run / "best.pt"))
+    assert done.folder.parent == Path("logs/quadruped")
+    assert [path.name for path in run.glob("*.pt")] == ["best.pt"]
+
+
+def test_resume_from_policy_starts_new_run(task, tmp_path):
+    run = tmp_path / "run"
+    train("quadruped", "plane", lasting(task, 1), folder=run)
+    path = run / "model_1.pt"
+    save_checkpoint(path, policy_state(read_checkpoint(path)))
+    done = train("quadruped", "plane", task, resume=open_run(run), folder=tmp_path / "more")
+    assert (done.folder, done.iteration) == (tmp_path / "more", 4)
+    assert list(checkpoints(run)) == [1]
+
+
+def test_resume_rejects_a_completed_run(task, tmp_path):
+    train("quadruped", "plane", task, folder=tmp_path / "run")
+    with pytest.raises(
+        ConfigError, match=r"runner\.max_iterations: got 4; expected more than the 4"
+    ):
+        train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
+
+
+def test_resume_rejects_another_robot(task, tmp_path):
+    train("quadruped", "plane", lasting(task, 1), folder=tmp_path / "run")
+    with pytest.raises(ConfigError, match="belongs to another robot, quadruped"):
+        train("biped", "plane", task, resume=open_run(tmp_path / "run"), folder=tmp_path / "b")
+    assert not (tmp_path / "b").exists()
+
+
+def test_train_rejects_a_nonempty_folder(task, tmp_path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "mine.txt").touch()
+    with pytest.raises(ExportError, match="exists"):
+        train("quadruped", "plane", task, folder=tmp_path / "run")
+    assert [path.name for path in (tmp_path / "run").iterdir()] == ["mine.txt"]
+
+
+def test_full_disk_keeps_the_last_checkpoint(task, tmp_path, capfd):
+    task = replace(task, runner=replace(task.runner, save_interval=2))
+    disk = full_disk(20_000)
+
+    def fill(progress: TrainingProgress) -> None:
+        if progress.iteration == 3:
+            disk.__enter__()
+
+    run = tmp_path / "run"
+    try:
+        with pytest.raises(
+            ExportError, match=r"cannot write .*model_4\.pt: File too large; .* is .*model_2\.pt"
+        ):
+            train("quadruped", "plane", task, folder=run, progress_callback=fill)
+    finally:
+        disk.__exit__(None, None, None)
+    assert open_run(run).checkpoint == run / "model_2.pt"
+    assert read_checkpoint(run / "model_2.pt")["iteration"] == 2
+    assert sorted(path.name for path in run.iterdir() if path.name.startswith(".")) == []
+    assert capfd.readouterr() == ("", "")
+
+
+def test_full_disk_for_logs_is_one_error(task, tmp_path, capfd):
+    disk = full_disk(200)
+
+    def fill(progress: TrainingProgress) -> None:
+        if progress.iteration == 1:
+            disk.__enter__()
+
+    try:
+        with pytest.raises(
+            ExportError, match=r"cannot write .*: File too large; there is no check"
+        ):
+            train("quadruped", "plane", task, folder=tmp_path / "run", progress_callback=fill)
+    finally:
+        disk.__exit__(None, None, None)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_divergence_names_the_last_checkpoint(task, tmp_path):
+    algorithm = replace(task.algorithm, learning_rate=1e30, schedule="fixed")
+    mad = replace(task, algorithm=algorithm)
+    with pytest.raises(ConfigError, match=r"networks have diverged.*; there is no checkpoint"):
+        train("quadruped", "plane", mad, folder=tmp_path / "run")
+
+
+def test_too_many_environments_write_nothing(task, tmp_path):
+    many = replace(task, env=replace(task.env, num_envs=100_000_000))
+    with pytest.raises(CapacityError, match=r"100000000 environments needs .* GB .* would fit"):
+        train("quadruped", "plane", many, folder=tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_missing_wandb_is_reported(task, tmp_path, monkeypatch):
+    monkeypatch.setattr("terrainkit_robots.rl.train.find_spec", lambda _: None)
+    task = replace(task, runner=replace(task.runner, logger="wandb"))
+    with pytest.raises(ConfigError, match="wandb is not installed: pip install wandb"):
+        train("quadruped", "plane", task, folder=tmp_path / "run")
+
+
+@pytest.mark.parametrize("device", ["gpu", "cuda:99", "meta"])
+def test_train_rejects_unknown_device(task, tmp_path, device):
+    if torch.cuda.is_available():
+        pytest.skip("there is one")
+    with pytest.raises(ConfigError, match=f"device: got '{device}'; expected one of: cpu"):
+        train("quadruped", "plane", task, folder=tmp_path / "run", device=device)
+
+
+def test_train_rejects_more_processes_than_environments(task, tmp_path, monkeypatch):
+    monkeypatch.setenv("WORLD_SIZE", "9")
+    with pytest.raises(
+        ConfigError, match=r"env\.num_envs: got 4; expected one for each of 9 processes"
+    ):
+        train("quadruped", "plane", task, folder=tmp_path / "run")
+
+
+def test_train_rejects_a_mismatched_spec(task, tmp_path):
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    for path in tasks.get_task("quadruped").folder.iterdir():
+        if path.is_file():
+            (mine / path.name).write_bytes(path.read_bytes())
+    model = mine / "quadruped.xml"
+    model.write_text(model.read_text().replace("FL_hip_joint", "FL_shoulder_joint"))
+    with pytest.raises(ConfigError, match="has the joint 'FL_hip_joint'"):
+        train(mine, "plane", task, folder=tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_train_sets_passive_wait_policy(task, tmp_path, monkeypatch):
+    monkeypatch.delenv("OMP_WAIT_POLICY", raising=False)
+    train("quadruped", "plane", lasting(task, 1), folder=tmp_path / "run")
+    assert os.environ["OMP_WAIT_POLICY"] == "PASSIVE"

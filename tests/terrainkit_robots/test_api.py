@@ -1,0 +1,31 @@
+import subprocess
+import sys
+
+import pytest
+
+import terrainkit_robots
+from terrainkit_robots.description import bundled
+
+
+@pytest.mark.parametrize("name", terrainkit_robots.__all__)
+def test_public_name_can_be_imported(name):
+    assert getattr(terrainkit_robots, name).__name__ == name
+    assert name in dir(terrainkit_robots)
+
+
+def test_unknown_name_is_attribute_error():
+    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+        terrainkit_robots.nothing  # noqa: B018
+
+
+def test_import_is_lazy():
+    script = "import sys, terrainkit_robots; print('numpy' in sys.modules)"
+    command = [sys.executable, "-c", script]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    assert run.stdout == "False\n"
+
+
+def test_check_robot_accepts_string():
+    report = terrainkit_robots.check_robot(str(bundled.find("quadruped")))
+    assert report.verdict == "pass"
+    assert report.facts.model.name == "quadruped"
