@@ -61,7 +61,7 @@ def test_bundled_robot_can_be_trained(biped):
         "stands for 1 s with zero action",
     ]
     assert names[-2:] == ["memory is bounded", "trains for 3 iterations"]
-    assert {f"reward {name}" for name in ("torques", "collision", "stand_still")} < set(names)
+    assert {f"reward {name}" for name in ("torques", "collision", "stand_test")} < set(names)
     assert len(set(names)) == len(names)
 
 

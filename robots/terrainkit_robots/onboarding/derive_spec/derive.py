@@ -8,7 +8,6 @@ import numpy as np
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.symmetry.mirror_map import mirror_map
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.onboarding.derive_spec import named_bodies
 from terrainkit_robots.onboarding.derive_spec.foot_radius import foot_radius
@@ -23,7 +22,7 @@ from terrainkit_robots.spec.robot_spec import Provenance, RobotSpec
 from terrainkit_robots.text import names
 
 if TYPE_CHECKING:
-    from terrainkit_robots.simulation.pd_gains import Gain
+    from terrainkit_robots.simulation.gain import Gain
 
 _SOFT = 0.9
 """Share of a joint's range that is left free; legged_gym's and Isaac Lab's for their robots."""
@@ -58,7 +57,7 @@ def derive_spec(
     missing = [joint.name for joint in facts.actuated if joint.name not in gains]
     if missing:
         raise ConfigError(f"no gains for {names(missing)}; wanted some for each actuated joint")
-    twins = mirror_map(facts)
+    twins = facts.mirror_map
     columns = _columns(facts, gains)
     columns["effort"] = efforts(facts, gains, twins)
     columns["velocity"] = velocities(facts, twins)

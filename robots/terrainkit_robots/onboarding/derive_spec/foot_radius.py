@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.bodies import Placed
-from terrainkit_robots.analysis.bodies.contact import sole
+from terrainkit_robots.analysis.bodies.bodies import BodyShape
+from terrainkit_robots.analysis.bodies.contact import contact_points
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
-from terrainkit_robots.analysis.bodies.shapes import has_extent, lowest, reach
+from terrainkit_robots.analysis.bodies.shapes import has_bounds, min_height, support
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.transforms import Matrix
@@ -33,15 +33,15 @@ def _radius(robot: Facts, leg: Leg, poses: Sequence[Matrix]) -> float:
     """Return the radius of one foot; 0 if it is not known."""
     body = robot.bodies[leg.limb.chain[-1]]
     pose = poses[body.index]
-    shapes = [shape for shape in body.collisions if has_extent(shape.geometry, robot.meshes)]
+    shapes = [shape for shape in body.collisions if has_bounds(shape.geometry, robot.meshes)]
     if not shapes:
         return 0.0
-    width = float(np.ptp(sole(body, pose, robot.meshes) @ leg.pitch))
-    touching = min(shapes, key=lambda shape: lowest(shape, pose, robot.meshes))
+    width = float(np.ptp(contact_points(body, pose, robot.meshes) @ leg.pitch))
+    touching = min(shapes, key=lambda shape: min_height(shape, pose, robot.meshes))
     return max(width / 2, _roundness(robot, touching, pose, leg.pitch))
 
 
-def _roundness(robot: Facts, placed: Placed, pose: Matrix, side: Matrix) -> float:
+def _roundness(robot: Facts, placed: BodyShape, pose: Matrix, side: Matrix) -> float:
     """Return the radius on which a shape rolls to the side or ahead; 0 for one with a flat sole."""
     geometry, turn = placed.geometry, (pose @ placed.pose)[:3, :3]
     match geometry.shape:
@@ -50,5 +50,5 @@ def _roundness(robot: Facts, placed: Placed, pose: Matrix, side: Matrix) -> floa
         case "cylinder" if abs(turn[2, 2]) < _LEVEL:
             return geometry.size[0]
         case "ellipsoid":
-            return reach(geometry, turn.T @ side, robot.meshes)
+            return support(geometry, turn.T @ side, robot.meshes)
     return 0.0

@@ -5,13 +5,12 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.legs.effort import effort_of
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.spec.column import Column, rounded
 from terrainkit_robots.spec.robot_spec import MirrorJoint, Provenance
 
 if TYPE_CHECKING:
-    from terrainkit_robots.simulation.pd_gains import Gain
+    from terrainkit_robots.simulation.gain import Gain
 
 _SATURATED = {"prismatic": 0.1}
 _SATURATED_ELSE = 1.0
@@ -38,7 +37,7 @@ _RANGE_SHARE = 0.25
 
 def efforts(robot: Facts, gains: "Mapping[str, Gain]", twins: Mapping[str, MirrorJoint]) -> Column:
     """Return the largest torque of each joint [N m] or force [N]."""
-    declared = {joint.name: _sound(effort_of(robot, joint)) for joint in robot.actuated}
+    declared = {joint.name: _sound(robot.effort_limit(joint)) for joint in robot.actuated}
     holding = robot.stance.torques if robot.stance is not None else {}
     column = Column()
     for joint in robot.actuated:

@@ -8,7 +8,6 @@ import re
 
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.legs.joint_roles import bodies_by_joint
 from terrainkit_robots.analysis.legs.legs import Leg
 
 _UPPER_WORDS = frozenset({"head", "torso", "chest", "trunk", "neck"})
@@ -41,7 +40,7 @@ def thighs(robot: Facts) -> tuple[str, ...]:
     found = []
     for leg in robot.legs:
         shank = _below_knee(robot, leg)
-        thigh = robot.carrier_of(shank) if shank is not None else None
+        thigh = robot.physical_parent(shank) if shank is not None else None
         if thigh is not None and thigh.index in leg.limb.chain:
             found.append(body_name(thigh))
     return tuple(dict.fromkeys(found))
@@ -69,7 +68,7 @@ def _below_knee(robot: Facts, leg: Leg) -> Body | None:
     knee = leg.joint("knee")
     if knee is None:
         return None
-    start = bodies_by_joint(robot)[knee.name].index
+    start = robot.body_of_joint[knee.name].index
     chain = leg.limb.chain[leg.limb.chain.index(start) :]
     return next((robot.bodies[i] for i in chain if not robot.bodies[i].virtual), None)
 
@@ -81,7 +80,7 @@ def _is_upper(robot: Facts, body: Body) -> bool:
     """
     if body.index in robot.leg_bodies or body.virtual or not body.collisions:
         return False
-    if robot.mirror.twin(body.index) is not None:
+    if robot.mirror.counterpart(body.index) is not None:
         return False
     carried = _carried(robot, body.index)
     pairs = robot.mirror.pairs

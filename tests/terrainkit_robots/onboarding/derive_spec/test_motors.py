@@ -1,7 +1,6 @@
 import pytest
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.symmetry.mirror_map import mirror_map
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.onboarding.derive_spec.motors import (
     action_scales,
@@ -25,14 +24,14 @@ def without_one(bundled, tmp_path, *, limit):
 
 def test_what_is_declared_is_taken(bundled, gains):
     facts = bundled("quadruped.urdf")
-    column = efforts(facts, gains(facts), mirror_map(facts))
+    column = efforts(facts, gains(facts), facts.mirror_map)
     assert column.values["FR_calf_joint"] == 45.43
     assert dict(column.provenance("effort"))["effort"].reason == "in quadruped.urdf"
 
 
 def test_what_is_missing_is_that_of_the_twin(bundled, gains, tmp_path):
     facts = without_one(bundled, tmp_path, limit='<limit lower="-1" upper="1"/>')
-    twins = mirror_map(facts)
+    twins = facts.mirror_map
     effort = efforts(facts, gains(facts), twins)
     speed = velocities(facts, twins)
     assert effort.values["FL_hip_joint"] == 23.7
@@ -46,7 +45,7 @@ def test_what_is_missing_is_that_of_the_twin(bundled, gains, tmp_path):
 
 def test_what_neither_side_declares_is_guessed(bundled, gains, tmp_path):
     facts = bundled("quadruped.urdf", (HIP, ""), tmp_path=tmp_path)
-    twins = mirror_map(facts)
+    twins = facts.mirror_map
     column = efforts(facts, gains(facts, stiffness=40.0), twins)
     assert column.values["FL_hip_joint"] == 40.0
     assert "the stiffness at an error of 1 rad" in column.origins["FL_hip_joint"].reason
@@ -82,7 +81,7 @@ def test_armature_is_declared_or_more_where_the_gains_need_it(bundled, gains):
 )
 def test_an_action_asks_for_a_share_of_the_torque(bundled, gains, stiffness, scale, reason):
     facts = bundled("quadruped.urdf")
-    gain, twins = gains(facts, stiffness=stiffness), mirror_map(facts)
+    gain, twins = gains(facts, stiffness=stiffness), facts.mirror_map
     effort, velocity = efforts(facts, gain, twins), velocities(facts, twins)
     column = action_scales(facts, gain, effort, velocity)
     assert column.values["FL_hip_joint"] == pytest.approx(scale, rel=0.01)
@@ -93,7 +92,7 @@ def test_an_action_of_a_short_range_is_short(bundled, gains, tmp_path):
     facts = without_one(
         bundled, tmp_path, limit='<limit lower="-0.1" upper="0.1" effort="23.7" velocity="30.1"/>'
     )
-    gain, twins = gains(facts, stiffness=10.0), mirror_map(facts)
+    gain, twins = gains(facts, stiffness=10.0), facts.mirror_map
     effort, velocity = efforts(facts, gain, twins), velocities(facts, twins)
     column = action_scales(facts, gain, effort, velocity)
     assert column.values["FL_hip_joint"] == pytest.approx(0.05)
