@@ -143,7 +143,9 @@ def stands(verification: Verification | None) -> str:
         return f"not simulated: {verification.error}" if verification else ""
     standing = verification.standing
     locked = ", locked joints" if verification.joints_locked else ""
-    contacts = f", {names(standing.touching, 2)} on the ground" if standing.touching else ""
+    contacts = (
+        f", {names(standing.other_contacts, 2)} on the ground" if standing.other_contacts else ""
+    )
     tilt = f"{math.degrees(standing.tilt):.1f} degrees"
     return f"{'yes' if verification.is_stable else 'NO'}: {tilt}{locked}{contacts}"
 

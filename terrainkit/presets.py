@@ -1,9 +1,10 @@
 """Presets: ready mixes of terrains, by name."""
 
 from terrainkit import registry
-from terrainkit.errors import ConfigError, known_names
+from terrainkit.errors import ConfigError
 from terrainkit.parameter import parameters_of
 from terrainkit.sub_terrain import SubTerrain
+from terrainkit.text import known_names
 
 _MIXES = {
     # legged_gym's columns in its order. What it calls "stairs up" is climbed from the platform

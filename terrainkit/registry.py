@@ -9,9 +9,10 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from terrainkit import terrains
-from terrainkit.errors import ConfigError, known_names
+from terrainkit.errors import ConfigError
 from terrainkit.parameter import parameters_of
 from terrainkit.terrain import Terrain
+from terrainkit.text import known_names
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.annotations import show
-from terrainkit.errors import ConfigError, known_names
+from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.parameter import (
     Parameter,
@@ -20,6 +20,7 @@ from terrainkit.parameter import (
     convert_parameter,
     parameters_of,
 )
+from terrainkit.text import known_names
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -118,7 +118,7 @@ def in_thigh(robot: Patient, primitive: bool | None) -> tuple[str, np.ndarray]:
         and _leg(b.name)
         and primitive in (None, _is_primitive(b))
     )
-    pose = robot.facts.at_zero[thigh.index]
+    pose = robot.facts.zero_poses[thigh.index]
     middle = (pose @ thigh.collisions[0].pose)[:3, 3]
     return thigh.name, 0.8 * pose[:3, 3] + 0.2 * middle
 
@@ -152,7 +152,7 @@ def _ball_in_leg(robot: Patient, primitive: bool) -> Subjects:
     other = robot.choose(
         b for b in firsts if b is not one and b.collisions and _is_primitive(b) is primitive
     )
-    poses = robot.facts.at_zero
+    poses = robot.facts.zero_poses
     middle = (poses[other.index] @ other.collisions[0].pose)[:, 3]
     place = np.linalg.inv(poses[one.index]) @ middle
     _add(robot, one.top.name, '<sphere radius="0.05"/>', place[:3])
@@ -177,7 +177,7 @@ def cage(robot: Patient) -> Subjects:
     bodies = robot.facts.bodies
     calf = robot.facts.body_of[child(robot.choose(robot.knees()))]
     thigh = bodies[calf.parent]
-    hip, knee = (robot.facts.at_zero[body.index][:3, 3] for body in (thigh, calf))
+    hip, knee = (robot.facts.zero_poses[body.index][:3, 3] for body in (thigh, calf))
     length = float(np.linalg.norm(knee - hip))
     trunk = robot.trunk().get("name")
     home = np.linalg.inv(robot.place(trunk))

@@ -138,7 +138,7 @@ class Patient:
         return found
 
     def _lowest(self, index: int) -> str:
-        body, pose = self.facts.bodies[index], self.facts.at_zero[index]
+        body, pose = self.facts.bodies[index], self.facts.zero_poses[index]
         shapes = [(float((pose @ s.pose)[2, 3]), s.link) for s in body.collisions]
         return min(shapes)[1] if shapes else body.name
 
@@ -152,7 +152,7 @@ class Patient:
         """Return the pose of a link in the trunk's frame at zero, shape (4, 4) [m]."""
         body = self.facts.body_of[link]
         names = [part.name for part in body.links]
-        pose: np.ndarray = self.facts.at_zero[body.index] @ body.poses[names.index(link)]
+        pose: np.ndarray = self.facts.zero_poses[body.index] @ body.poses[names.index(link)]
         return pose
 
 

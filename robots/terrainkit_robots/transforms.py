@@ -63,6 +63,32 @@ def quat_to_matrix(quat: Matrix) -> Matrix:
     )
 
 
+def matrix_to_quat(rotation: Matrix) -> Matrix:
+    """Return the quaternion of a rotation.
+
+    The largest element is computed first, as in MuJoCo, so that no division loses accuracy.
+
+    Args:
+        rotation: Rotation matrix, shape (3, 3).
+
+    Returns:
+        Unit quaternion (w, x, y, z) with w >= 0, shape (4,).
+    """
+    trace = rotation.trace()
+    # Products of the quaternion with its largest element, times 4.
+    products = np.empty((4, 4))
+    products[0] = [
+        1 + trace,
+        rotation[2, 1] - rotation[1, 2],
+        rotation[0, 2] - rotation[2, 0],
+        rotation[1, 0] - rotation[0, 1],
+    ]
+    products[1:, 0] = products[0, 1:]
+    products[1:, 1:] = rotation + rotation.T + (1 - trace) * np.eye(3)
+    quat = products[int(products.diagonal().argmax())]
+    return np.asarray(quat / np.copysign(np.linalg.norm(quat), quat[0]))
+
+
 def rpy_to_matrix(rpy: Matrix) -> Matrix:
     """Return the rotation matrix of roll, pitch and yaw, as in URDF.
 

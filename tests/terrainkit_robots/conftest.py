@@ -15,7 +15,7 @@ from terrainkit_robots.description import bundled as bundled_robots
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.onboarding.frameworks.frameworks import framework_names
 from terrainkit_robots.onboarding.pipeline import OnboardOptions, OnboardResult, onboard
-from terrainkit_robots.simulation.standing import Standing
+from terrainkit_robots.simulation.standing import StandResult
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
 _PROJECT = Path(__file__).resolve().parents[2]
@@ -66,21 +66,21 @@ def sliding_shanks(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def stood() -> Standing:
+def stood() -> StandResult:
     """Return how a robot with four legs stood that is as it should be."""
-    return Standing(
+    return StandResult(
         tilt=0.01,
-        largest_tilt=0.7,
+        max_tilt=0.7,
         height=0.3,
-        sink=0.02,
+        height_loss=0.02,
         drift=0.03,
         leg_length=0.4,
-        touching=(),
-        lifted=(),
+        other_contacts=(),
+        lifted_feet=(),
         saturation=0.2,
-        saturated="knee",
+        saturated_joint="knee",
         joint_error=0.05,
-        blew_up=False,
+        diverged=False,
         seconds=5.0,
     )
 

@@ -1,26 +1,26 @@
-"""What several rules need of a robot, worked out once."""
+"""Cache a function of a robot's facts."""
 
 from collections.abc import Callable
 from functools import wraps
 from typing import TypeVar
 from weakref import WeakKeyDictionary
 
-from terrainkit_robots.analysis.facts import Facts
+_K = TypeVar("_K")
+_V = TypeVar("_V")
 
-_T = TypeVar("_T")
 
+def cached_fact(function: Callable[[_K], _V]) -> Callable[[_K], _V]:
+    """Cache the result of a function of `Facts` for as long as the facts exist.
 
-def per_robot(function: Callable[[Facts], _T]) -> Callable[[Facts], _T]:
-    """Return the function, which now remembers its answer for as long as the robot is in use.
-
-    The answer must not hold the robot itself, or neither would ever be let go.
+    For facts of the layers above `analysis`, which cannot be properties of `Facts`. The result
+    must not refer to the facts: the reference would keep both alive forever.
     """
-    known: WeakKeyDictionary[Facts, _T] = WeakKeyDictionary()
+    cache: WeakKeyDictionary[_K, _V] = WeakKeyDictionary()
 
     @wraps(function)
-    def remembered(robot: Facts) -> _T:
-        if robot not in known:
-            known[robot] = function(robot)
-        return known[robot]
+    def wrapper(facts: _K) -> _V:
+        if facts not in cache:
+            cache[facts] = function(facts)
+        return cache[facts]
 
-    return remembered
+    return wrapper

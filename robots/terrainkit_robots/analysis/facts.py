@@ -1,29 +1,49 @@
-"""Facts: what follows from a robot's description, each worked out when it is first asked for."""
+"""Facts that follow from a robot description, each computed on first use."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from terrainkit_robots.analysis.bodies.bodies import Body, merge_bodies
+from terrainkit_robots.analysis.bodies.bodies import Body, merge_bodies, physical_parent
+from terrainkit_robots.analysis.bodies.bounds import BodyBounds
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.bodies.overlap import OverlapScene
 from terrainkit_robots.analysis.bodies.tree import Tree, build_tree
-from terrainkit_robots.analysis.legs.default_pose import starting_positions
-from terrainkit_robots.analysis.legs.legs import Leg, find_legs
-from terrainkit_robots.analysis.legs.limbs import Limb, find_limbs
-from terrainkit_robots.analysis.legs.stance import Stance, stand
-from terrainkit_robots.analysis.symmetry.mirror import Mirror, find_mirror
+from terrainkit_robots.analysis.inertia.repair import InertiaRepair
+from terrainkit_robots.analysis.legs.default_pose import default_positions
+from terrainkit_robots.analysis.legs.effort import effort_limit
+from terrainkit_robots.analysis.legs.joint_roles import is_wheel, leg_joints
+from terrainkit_robots.analysis.legs.leg_model import LegModel
+from terrainkit_robots.analysis.legs.legs import Leg, detect_legs
+from terrainkit_robots.analysis.legs.limbs import Limb, detect_limbs
+from terrainkit_robots.analysis.legs.stance import Stance, compute_stance
+from terrainkit_robots.analysis.simulator_conventions.fixed_joints import fixed_joints
+from terrainkit_robots.analysis.simulator_conventions.joint_order import (
+    SimulatorOrder,
+    simulator_orders,
+)
+from terrainkit_robots.analysis.symmetry.mirror import Mirror, detect_mirror
+from terrainkit_robots.analysis.symmetry.mirror_map import mirror_map
+from terrainkit_robots.analysis.symmetry.mirror_pairs import (
+    MirrorPair,
+    MirrorSide,
+    mirror_pairs,
+    outlier_first,
+)
 from terrainkit_robots.description.model import Joint, Link, RobotModel
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.transforms import Matrix
 
 if TYPE_CHECKING:
-    from terrainkit_robots.spec.robot_spec import RobotSpec
+    from terrainkit_robots.spec.robot_spec import MirrorJoint, RobotSpec
 
 
 class Facts:
-    """A robot's facts. Units are SI and radians; the trunk's frame is the robot's."""
+    """Facts about a robot, in SI units and radians, in the frame of the trunk.
+
+    This class only passes facts to the functions that compute others.
+    """
 
     def __init__(
         self,
@@ -37,107 +57,202 @@ class Facts:
         """The description."""
 
         self.against: Facts | None = against
-        """Another description of the same robot, to be compared with this one."""
+        """Another description of the same robot that this one is compared with."""
 
         self.spec: RobotSpec | None = spec
-        """What is known of the robot beyond its description: its robot.toml."""
+        """The robot.toml of the robot."""
 
         self.meshes: Meshes = meshes or Meshes()
-        """Its mesh files; each is opened when something asks for it, and then once."""
+        """The mesh files. Each file is opened on first use, and only once."""
+
+    # Bodies
 
     @cached_property
     def tree(self) -> Tree:
-        """The tree of links, made sound where the file is not."""
+        """The tree of links, without the joints that do not fit into a tree."""
         return build_tree(self.model)
 
     @cached_property
     def bodies(self) -> tuple[Body, ...]:
-        """Links that fixed joints hold together, as one; the trunk first."""
+        """The rigid bodies: links merged across fixed joints. The trunk is first."""
         return merge_bodies(self.tree)
 
     @cached_property
     def body_of(self) -> Mapping[str, Body]:
-        """The body that each link of the main tree is a part of, by the link's name."""
+        """The body of each link of the main tree, by name of the link."""
         return {link.name: body for body in self.bodies for link in body.links}
 
     @cached_property
+    def body_of_joint(self) -> Mapping[str, Body]:
+        """The body that each joint moves, by name of the joint."""
+        return {body.joint.name: body for body in self.bodies if body.joint is not None}
+
+    @cached_property
     def links(self) -> tuple[Link, ...]:
-        """Links of the main tree, each after its parent; virtual ones are left out."""
+        """Links of the main tree without virtual ones, each after its parent."""
         return tuple(link for b in self.bodies for link in b.links if not link.virtual)
 
     @cached_property
     def joints(self) -> tuple[Joint, ...]:
-        """The joints of the main tree with one degree of freedom, parents first."""
+        """Joints of the main tree with one degree of freedom, each after its parent."""
         return tuple(b.joint for b in self.bodies if b.joint is not None and b.joint.moves)
 
     @cached_property
     def actuated(self) -> tuple[Joint, ...]:
-        """The joints that a motor drives.
+        """The actuated joints.
 
-        In URDF those that mimic no other; in MJCF those with an actuator, or all without any.
+        In URDF these are the joints that mimic no other. In MJCF these are the joints with an
+        actuator, or all joints if the file has no actuators.
         """
         joints = tuple(joint for joint in self.joints if joint.mimic is None)
-        driven = {actuator.joint for actuator in self.model.actuators} - {""}
-        return tuple(j for j in joints if j.name in driven) if driven else joints
+        names = {actuator.joint for actuator in self.model.actuators} - {""}
+        return tuple(joint for joint in joints if joint.name in names) if names else joints
+
+    @cached_property
+    def actuator_order(self) -> tuple[str, ...]:
+        """Names of the joints in the order of their first actuators. Empty without actuators."""
+        known = {joint.name for joint in self.joints}
+        names = (actuator.joint for actuator in self.model.actuators)
+        return tuple(dict.fromkeys(name for name in names if name in known))
 
     @cached_property
     def total_mass(self) -> float:
-        """Sum of the declared masses [kg]; NaN where MuJoCo takes one from a mesh file."""
+        """Sum of the declared masses [kg]. NaN if MuJoCo derives one of them from a mesh file."""
         masses = [link.inertial.mass for link in self.links if link.inertial is not None]
         if any(mass is not None and math.isnan(mass) for mass in masses):
             return math.nan
         return sum(body.mass for body in self.bodies)
 
     @cached_property
-    def at_zero(self) -> tuple[Matrix, ...]:
-        """Pose of each body in the trunk's frame with all joints at 0, shape (4, 4) each [m]."""
+    def zero_poses(self) -> tuple[Matrix, ...]:
+        """Poses of the bodies in the frame of the trunk, all joints at 0, each (4, 4) [m]."""
         return tuple(body_poses(self.bodies, {}))
+
+    @cached_property
+    def body_bounds(self) -> BodyBounds:
+        """Bounding boxes of the bodies."""
+        return BodyBounds(self.bodies, self.zero_poses, self.meshes)
+
+    @cached_property
+    def overlap_scene(self) -> OverlapScene:
+        """The collision shapes, ready to be tested for overlaps."""
+        return OverlapScene(self.bodies, self.meshes, self.model.excluded)
+
+    @cached_property
+    def inertia_repair(self) -> InertiaRepair:
+        """The fixes of inertias."""
+        return InertiaRepair(
+            bodies=self.bodies, zero_poses=self.zero_poses, mirror=self.mirror, meshes=self.meshes
+        )
+
+    def physical_parent(self, body: Body) -> Body | None:
+        """Return the nearest ancestor of a body that is not virtual."""
+        return physical_parent(self.bodies, body)
+
+    @cached_property
+    def _parents(self) -> frozenset[int | None]:
+        return frozenset(body.parent for body in self.bodies)
+
+    def is_wheel(self, body: Body) -> bool:
+        """Return whether a body is a wheel or a propeller."""
+        return is_wheel(body, self._parents)
+
+    # Legs
 
     @cached_property
     def limbs(self) -> tuple[Limb, ...]:
         """Chains from the trunk to each leaf with at least two actuated joints."""
-        return find_limbs(self)
+        has_tendons = any(not actuator.joint for actuator in self.model.actuators)
+        drivable = self.joints if has_tendons else self.actuated
+        return detect_limbs(self.tree, self.bodies, drivable, self.zero_poses, self.meshes)
 
     @cached_property
     def legs(self) -> tuple[Leg, ...]:
-        """The limbs that the robot stands on; empty for an arm, a drone or a car."""
-        return find_legs(self)
+        """The limbs that the robot stands on. Empty for an arm, a drone or a car."""
+        return detect_legs(self.limbs, self.bodies, self.zero_poses)
 
     @cached_property
     def leg_bodies(self) -> frozenset[int]:
-        """Indices of the bodies of all legs, those that carry several of them included."""
+        """Indices of the bodies of all legs, including bodies that several legs share."""
         return frozenset(index for leg in self.legs for index in leg.limb.chain)
 
-    def carrier_of(self, body: Body) -> Body | None:
-        """Return the body that carries another, past those that only stand between two joints."""
-        at = body.parent
-        while at is not None and self.bodies[at].virtual:
-            at = self.bodies[at].parent
-        return None if at is None else self.bodies[at]
+    @cached_property
+    def leg_joints(self) -> list[Joint]:
+        """Joints that belong to exactly one leg."""
+        return leg_joints(self.legs, self.bodies)
 
     @cached_property
-    def mirror(self) -> Mirror:
-        """Which bodies and joints are mirror images of which."""
-        return find_mirror(self)
+    def leg_model(self) -> LegModel:
+        """The facts that pose and stance are computed from."""
+        return LegModel(
+            bodies=self.bodies,
+            joints=self.joints,
+            legs=self.legs,
+            mirror=self.mirror,
+            zero_poses=self.zero_poses,
+            keyframe=self.model.home,
+            meshes=self.meshes,
+        )
 
     @cached_property
     def stance(self) -> Stance | None:
-        """How it stands: at the pose of its spec, of its first keyframe, or as the search finds.
-
-        None without legs.
-        """
-        return stand(self, starting_positions(self)) if self.legs else None
+        """The stance at `positions`. None without legs."""
+        if not self.legs:
+            return None
+        return compute_stance(self.leg_model, self.positions, total_mass=self.total_mass)
 
     @cached_property
     def positions(self) -> Mapping[str, float]:
-        """Joint positions that the robot starts from [rad] or [m], by name.
+        """Default joint positions [rad] or [m], by name.
 
-        Those of its stance, of its spec, of its first keyframe, or the closest to zero that the
-        limits allow.
+        A position comes from the spec, the first keyframe, the solved standing pose, or is the
+        value within the limits that is closest to zero, in this order.
         """
-        return starting_positions(self) if self.stance is None else self.stance.positions
+        spec_pose = None if self.spec is None else self.spec.default_pose
+        actuated = [joint.name for joint in self.actuated]
+        return default_positions(self.leg_model, spec_pose, actuated)
+
+    def effort_limit(self, joint: Joint) -> float | None:
+        """Return the effort limit of a joint [N m] or [N]. None if it is unlimited."""
+        return effort_limit(self.model, joint)
+
+    # Symmetry
 
     @cached_property
-    def overlaps(self) -> OverlapScene:
-        """The collision shapes, ready to be asked which are inside each other."""
-        return OverlapScene(self)
+    def mirror(self) -> Mirror:
+        """The mirror plane, and the pairs of mirrored bodies."""
+        return detect_mirror(self.legs, self.bodies, self.zero_poses)
+
+    @cached_property
+    def mirror_map(self) -> "Mapping[str, MirrorJoint]":
+        """The mirrored joint of each actuated joint that has one, by name."""
+        return mirror_map(self.bodies, self.actuated, self.mirror, self.zero_poses)
+
+    @cached_property
+    def mirror_pairs(self) -> tuple[MirrorPair, ...]:
+        """The pairs of mirrored joints, parents first."""
+        return mirror_pairs(self.bodies, self.zero_poses, self.mirror, self.leg_bodies)
+
+    def outlier_first(
+        self, left: MirrorSide, right: MirrorSide, value: Callable[[Body], Matrix | None]
+    ) -> tuple[MirrorSide, MirrorSide]:
+        """Return the two joints, the one whose value deviates more from the other legs first."""
+        return outlier_first(left, right, value, self.bodies, self.legs, self.mirror)
+
+    # Simulators
+
+    @cached_property
+    def fixed_joints(self) -> tuple[Joint, ...]:
+        """Fixed joints of the main tree of a URDF. Empty for MJCF."""
+        return fixed_joints(self.model.kind, self.tree, self.bodies)
+
+    @cached_property
+    def file_order(self) -> tuple[str, ...]:
+        """Names of the joints in the order of the file."""
+        known = set(self.joints)
+        return tuple(joint.name for joint in self.model.joints if joint in known)
+
+    @cached_property
+    def simulator_orders(self) -> tuple[SimulatorOrder, ...]:
+        """The order of joints and bodies in each simulator."""
+        return simulator_orders(self.model, self.tree, self.bodies, self.fixed_joints)

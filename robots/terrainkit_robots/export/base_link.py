@@ -87,7 +87,7 @@ def _is_driven(facts: "Facts", root: str) -> bool:
     stack = [root]
     while stack:
         link = stack.pop()
-        stack += [joint.child for joint in facts.tree.below[link]]
-        if any(joint.name in motors for joint in facts.tree.below[link]):
+        stack += [joint.child for joint in facts.tree.child_joints[link]]
+        if any(joint.name in motors for joint in facts.tree.child_joints[link]):
             return True
     return any(j.child == root and j.name in motors for j in facts.model.joints)

@@ -15,9 +15,7 @@ import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.kinematics import joint_motion
-from terrainkit_robots.analysis.bodies.mimic_joints import followers
-from terrainkit_robots.analysis.legs.effort import effort_of
-from terrainkit_robots.analysis.legs.joint_roles import is_wheel
+from terrainkit_robots.analysis.bodies.mimic_joints import mimic_joints
 from terrainkit_robots.description.model import (
     Actuator,
     Inertial,
@@ -144,12 +142,12 @@ _ENDLESS = 4 * np.pi
 
 def _rolls(facts: "Facts", body: Body) -> bool:
     """Return whether a body is a wheel or a propeller: on the base, or on what steers it."""
-    carrier = facts.carrier_of(body)
+    carrier = facts.physical_parent(body)
     if body.joint is None or body.joint.kind == "prismatic" or carrier is None:
         return False
     lower, upper = body.joint.range or (-np.inf, np.inf)
     near = carrier.index == 0 or carrier.parent == 0
-    return near and upper - lower > _ENDLESS and is_wheel(facts, body)
+    return near and upper - lower > _ENDLESS and facts.is_wheel(body)
 
 
 def plain_name(model: RobotModel) -> str:
@@ -248,9 +246,9 @@ def _joints(facts: "Facts", notes: list[str]) -> list[tuple[Joint, str]]:
     base = facts.bodies[0].top.name
     bodies = {body.top.name: body for body in facts.bodies}
     inside = sorted((n for n in facts.body_of if n != base), key=lambda n: order[n])
-    above = [facts.tree.above[name] for name in inside]
+    above = [facts.tree.parent_joint[name] for name in inside]
     uses = Counter(joint.name for joint in above)
-    following = {joint.name for joint in followers(facts.joints)}
+    following = {joint.name for joint in mimic_joints(facts.joints)}
     taken, found = set[str](), []
     for joint in above:
         name = joint.name or f"{joint.child}_joint"
@@ -286,7 +284,7 @@ def _normal_joint(facts: "Facts", joint: Joint, body: Body | None, notes: list[s
             source=joint.limit.source if joint.limit else joint.source,
             lower=lower,
             upper=upper,
-            effort=_positive(effort_of(facts, joint)),
+            effort=_positive(facts.effort_limit(joint)),
             velocity=_positive(joint.limit.velocity if joint.limit else None),
         ),
         damping=_positive(joint.damping) or 0.0,

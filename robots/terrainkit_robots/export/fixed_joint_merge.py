@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from terrainkit_robots.analysis.inertia.merged_inertia import combined
+from terrainkit_robots.analysis.inertia.merged_inertia import merged_inertia
 from terrainkit_robots.description.model import Geometry, Joint, Link, RobotModel
 from terrainkit_robots.transforms import Matrix
 
@@ -60,7 +60,7 @@ def _body(parts: Sequence[tuple[Link, Matrix]]) -> Link:
     weights = [(link.inertial, pose) for link, pose in parts if link.inertial is not None]
     return replace(
         top,
-        inertial=combined(weights),
+        inertial=merged_inertia(weights),
         visuals=tuple(_placed(g, pose) for link, pose in parts for g in link.visuals),
         collisions=tuple(_placed(g, pose) for link, pose in parts for g in link.collisions),
     )

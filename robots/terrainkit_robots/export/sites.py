@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.bodies import Body, Placed
-from terrainkit_robots.analysis.bodies.contact import SOLE
+from terrainkit_robots.analysis.bodies.bodies import Body, BodyShape
+from terrainkit_robots.analysis.bodies.contact import MAX_SOLE_DEPTH
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
-from terrainkit_robots.analysis.bodies.shapes import bounds, has_extent, lowest
+from terrainkit_robots.analysis.bodies.shapes import bounds, has_bounds, min_height
 from terrainkit_robots.export.mjcf import Site
 from terrainkit_robots.transforms import Matrix, invert_poses
 
@@ -48,11 +48,13 @@ def _foot_site(leg: "Leg", foot: str, facts: "Facts", poses: Sequence[Matrix]) -
     return Site(name=foot, body=foot, pose=pose, half_size=tuple(half.tolist()))
 
 
-def _touching(body: Body, pose: Matrix, facts: "Facts") -> list[Placed]:
+def _touching(body: Body, pose: Matrix, facts: "Facts") -> list[BodyShape]:
     """Return the shapes of a body that reach as far down as any of them."""
-    shapes = [s for s in body.collisions if has_extent(s.geometry, facts.meshes)]
-    depths = [lowest(shape, pose, facts.meshes) for shape in shapes]
-    return [s for s, depth in zip(shapes, depths, strict=True) if depth <= min(depths) + SOLE]
+    shapes = [s for s in body.collisions if has_bounds(s.geometry, facts.meshes)]
+    depths = [min_height(shape, pose, facts.meshes) for shape in shapes]
+    return [
+        s for s, depth in zip(shapes, depths, strict=True) if depth <= min(depths) + MAX_SOLE_DEPTH
+    ]
 
 
 def imu_site(facts: "Facts") -> Site:

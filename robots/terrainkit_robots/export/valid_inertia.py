@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terrainkit_robots.analysis.inertia.merged_inertia import combined
+from terrainkit_robots.analysis.inertia.merged_inertia import merged_inertia
 from terrainkit_robots.analysis.inertia.physical import (
-    NOTHING,
-    in_reach,
+    MIN_INERTIA,
+    is_in_range,
     principal_moments,
     triangle_ratio,
 )
@@ -57,7 +57,7 @@ def with_valid_inertia(
 
 def _is_sound(inertia: Matrix) -> bool:
     moments = principal_moments(inertia)
-    return bool(moments[0] > NOTHING) and triangle_ratio(moments) >= 1
+    return bool(moments[0] > MIN_INERTIA) and triangle_ratio(moments) >= 1
 
 
 def _has_mass(inertial: Inertial | None) -> bool:
@@ -69,7 +69,7 @@ def _is_refused(link: Link) -> bool:
     inertial = link.inertial
     if inertial is None or inertial.inertia is None or not _has_mass(inertial):
         return False
-    return in_reach(inertial.inertia) and not _is_sound(inertial.inertia)
+    return is_in_range(inertial.inertia) and not _is_sound(inertial.inertia)
 
 
 def _written(link: Link) -> Link:
@@ -83,10 +83,10 @@ def _written(link: Link) -> Link:
 def _rounded_up(link: Link) -> Link:
     """Return a link whose inertia is not thinner than a plate, if rounding may have made it so."""
     inertia = link.inertial.inertia if link.inertial else None
-    if inertia is None or not _has_mass(link.inertial) or not in_reach(inertia):
+    if inertia is None or not _has_mass(link.inertial) or not is_in_range(inertia):
         return link
     moments = principal_moments(inertia)
-    if moments[0] <= NOTHING or not _ROUNDED <= triangle_ratio(moments) < 1 + _THINNEST:
+    if moments[0] <= MIN_INERTIA or not _ROUNDED <= triangle_ratio(moments) < 1 + _THINNEST:
         return link
     second, axes = np.linalg.eigh(np.trace(inertia) / 2 * np.eye(3) - inertia)
     kept = (axes * np.maximum(second, _THINNEST * second.max())) @ axes.T
@@ -107,7 +107,7 @@ def _gathered(
     moved = [name for name in refused if name != heaviest]
     back = invert_poses(poses[heaviest])
     inertials = {name: links[name].inertial for name in (heaviest, *moved)}
-    whole = combined((part, back @ poses[name]) for name, part in inertials.items() if part)
+    whole = merged_inertia((part, back @ poses[name]) for name, part in inertials.items() if part)
     if whole is None or whole.inertia is None or not moved or not _is_sound(whole.inertia):
         return links
     notes.append(

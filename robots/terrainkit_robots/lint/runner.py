@@ -97,7 +97,7 @@ def lint(facts: Facts, selected: Sequence[Rule] | None = None, *, simulate: bool
         selected = [rule for rule in selected if rule.family == "XML"]  # no robot was read
     for rule in selected:
         try:
-            if rule.family in _NEEDS_COMPLETE_TREE and facts.tree.left_out:
+            if rule.family in _NEEDS_COMPLETE_TREE and facts.tree.rejected:
                 raise CannotCheckError("links or joints are missing from the kinematic tree")
             missing = _missing_need(rule, facts, simulate=simulate)
             if missing:

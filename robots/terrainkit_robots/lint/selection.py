@@ -90,7 +90,7 @@ def _apply_suppressions(
     suppressed: list[Suppressed] = []
     for finding in report.findings:
         candidates = by_rule.get((finding.file, finding.code), ())
-        comment = next((c for c in candidates if c.is_covering(finding.line)), None)
+        comment = next((c for c in candidates if c.applies_to(finding.line)), None)
         if comment is None:
             kept.append(finding)
             continue

@@ -78,7 +78,7 @@ class SuppressionComment:
     error: str | None
     """Why the comment is invalid. None if it is valid."""
 
-    def is_covering(self, line: int) -> bool:
+    def applies_to(self, line: int) -> bool:
         """Return whether the comment applies to the element that starts on `line`."""
         if line == self.first_line or line in self.extra_lines:
             return True

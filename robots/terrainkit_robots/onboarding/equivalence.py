@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
-from terrainkit_robots.analysis.bodies.mimic_joints import follower_positions
-from terrainkit_robots.analysis.inertia.composite_inertia import carried_inertias
-from terrainkit_robots.analysis.legs.standing_pose import range_of
+from terrainkit_robots.analysis.bodies.mimic_joints import mimic_positions
+from terrainkit_robots.analysis.inertia.composite_inertia import composite_inertias
+from terrainkit_robots.analysis.legs.standing_pose import joint_range
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.transforms import Matrix
 
@@ -108,7 +108,9 @@ def reference_kinematics(source: "Facts", written: "Facts") -> ReferenceKinemati
     }
     inertias = {
         body.joint.name: inertia
-        for body, inertia in zip(source.bodies, carried_inertias(source), strict=True)
+        for body, inertia in zip(
+            source.bodies, composite_inertias(source.bodies, source.zero_poses), strict=True
+        )
         if body.joint is not None and math.isfinite(inertia) and inertia > 0
     }
     positions = _random_positions(written)
@@ -146,9 +148,9 @@ def _random_positions(facts: "Facts") -> dict[str, Matrix]:
     rng = np.random.default_rng(0)
     positions: dict[str, Matrix] = {}
     for joint in facts.joints:
-        lower, upper = np.clip(range_of(joint), -_MAX_POSITION, _MAX_POSITION)
+        lower, upper = np.clip(joint_range(joint), -_MAX_POSITION, _MAX_POSITION)
         positions[joint.name] = rng.uniform(lower, upper, NUM_POSES)
-    return positions | follower_positions(facts.joints, positions)
+    return positions | mimic_positions(facts.joints, positions)
 
 
 def _compare(file: str, model: Any, reference: ReferenceKinematics) -> Equivalence:

@@ -7,7 +7,6 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.bodies.joint_order import permutation
-from terrainkit_robots.analysis.simulator_conventions.joint_order import simulator_orders
 from terrainkit_robots.analysis.simulator_conventions.order_table import order_table
 from terrainkit_robots.lint.report.escape import escape_control, escape_surrogates
 from terrainkit_robots.lint.report.grouping import group_findings
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from terrainkit_robots.onboarding.pipeline import OnboardResult
     from terrainkit_robots.onboarding.robot_files import RobotFiles
     from terrainkit_robots.onboarding.verify import Verification
-    from terrainkit_robots.simulation.standing import Standing
+    from terrainkit_robots.simulation.standing import StandResult
 
 
 def report_markdown(result: "OnboardResult") -> str:
@@ -142,19 +141,21 @@ def _standing(verification: "Verification | None", robot: "RobotFiles") -> Itera
     yield from _table([("quantity", "value"), *rows])
 
 
-def _standing_rows(standing: "Standing", unit: str, *, locked: bool) -> Iterator[tuple[str, str]]:
-    unstable = "; then the simulation became unstable" if standing.blew_up else ""
+def _standing_rows(
+    standing: "StandResult", unit: str, *, locked: bool
+) -> Iterator[tuple[str, str]]:
+    unstable = "; then the simulation became unstable" if standing.diverged else ""
     yield "duration", f"{format_number(standing.seconds)} s{unstable}"
-    tilts = [format_number(math.degrees(t), 2) for t in (standing.tilt, standing.largest_tilt)]
+    tilts = [format_number(math.degrees(t), 2) for t in (standing.tilt, standing.max_tilt)]
     yield "tilt", "{} deg at the end, {} deg at most".format(*tilts)
-    sink = f"{1000 * standing.sink:.1f} mm below the start"
+    sink = f"{1000 * standing.height_loss:.1f} mm below the start"
     yield "base height", f"{format_number(standing.height)} m at the end, {sink}"
     yield "drift", f"{1000 * standing.drift:.1f} mm"
-    yield "ground contacts", ", ".join(standing.touching) or "only the feet"
+    yield "ground contacts", ", ".join(standing.other_contacts) or "only the feet"
     if locked:
         return
-    if standing.saturated:
-        effort = f"{standing.saturation:.0%} of the effort limit of {standing.saturated}"
+    if standing.saturated_joint:
+        effort = f"{standing.saturation:.0%} of the effort limit of {standing.saturated_joint}"
         yield "largest torque", effort
     yield "largest joint position error", f"{format_number(standing.joint_error, 2)} {unit}"
 
@@ -196,11 +197,11 @@ def _joints(robot: "RobotFiles") -> Iterator[str]:
 
 
 def _joint_orders(robot: "RobotFiles") -> Iterator[str]:
-    orders = simulator_orders(robot.facts)
+    orders = robot.facts.simulator_orders
     if not robot.spec.joint_order or not any(order.joints for order in orders):
         return
     yield "## Joint order by simulator\n"
-    yield from _table(order_table(robot.facts))
+    yield from _table(order_table(robot.facts.file_order, robot.facts.simulator_orders))
     for order in orders:
         certainty = "certain" if order.certain else "to be verified"
         yield f"- {order.simulator} ({certainty}): {cell(order.reason)}"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
-from terrainkit_robots.analysis.bodies.shapes import lowest
+from terrainkit_robots.analysis.bodies.shapes import min_height
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.export.actuator import ActuatorConfig
@@ -221,7 +221,7 @@ def _excluded_contacts(facts: Facts) -> tuple[frozenset[frozenset[str]], tuple[s
     """Return the pairs of links that must not collide, and a note on each derived pair."""
     from_file = facts.model.excluded
     try:
-        overlaps = facts.overlaps.overlaps(facts.positions)
+        overlaps = facts.overlap_scene.detect(facts.positions)
     except CannotCheckError as error:
         return from_file, (f"links that penetrate each other were not searched for: {error}",)
     pairs = {
@@ -252,7 +252,7 @@ def _clearance(facts: Facts, positions: Mapping[str, float]) -> float:
     """Return the height of the base at which the lowest shape touches the ground [m]."""
     poses = body_poses(facts.bodies, positions)
     heights = [
-        lowest(shape, pose, facts.meshes)
+        min_height(shape, pose, facts.meshes)
         for body, pose in zip(facts.bodies, poses, strict=True)
         for shape in (*body.collisions, *body.visuals)
     ]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from terrainkit.errors import ExportError
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
-from terrainkit_robots.analysis.legs.stance import stands_alone
+from terrainkit_robots.analysis.legs.stance import is_statically_stable
 from terrainkit_robots.export.base_link import with_world_base
 from terrainkit_robots.export.canonical import has_unknown_inertia, to_canonical
 from terrainkit_robots.onboarding.equivalence import (
@@ -17,13 +17,13 @@ from terrainkit_robots.onboarding.equivalence import (
 )
 from terrainkit_robots.onboarding.robot_files import MJCF, SCENE, URDF
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.simulation.assessment import judge
+from terrainkit_robots.simulation.assessment import assess
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
     from terrainkit_robots.onboarding.robot_files import RobotFiles
-    from terrainkit_robots.simulation.pd_gains import Gain
-    from terrainkit_robots.simulation.standing import Standing
+    from terrainkit_robots.simulation.gain import Gain
+    from terrainkit_robots.simulation.standing import StandResult
     from terrainkit_robots.spec.robot_spec import RobotSpec
 
 _DURATION = 5.0
@@ -37,7 +37,7 @@ class Verification:
     equivalences: tuple[Equivalence, ...]
     """Differences of each file from the source."""
 
-    standing: "Standing | None" = None
+    standing: "StandResult | None" = None
     """Result of the standing test of scene.xml; None without legs, or with a fixed base."""
 
     joints_locked: bool = False
@@ -51,7 +51,7 @@ class Verification:
         """The reasons why the robot does not stand; empty if it stands, or has no legs."""
         if self.standing is None:
             return (f"it could not be simulated: {self.error}",) if self.error else ()
-        return judge(self.standing).faults
+        return assess(self.standing).failures
 
     @property
     def is_stable(self) -> bool:
@@ -70,8 +70,8 @@ def verify(source: "Facts", robot: "RobotFiles", folder: Path) -> Verification:
     Raises:
         ExportError: if MuJoCo cannot load the files, or they differ from the source.
     """
-    from terrainkit_robots.simulation.sim_model import plant_of
-    from terrainkit_robots.simulation.standing import footholds, stand_still
+    from terrainkit_robots.simulation.sim_model import SimModel
+    from terrainkit_robots.simulation.standing import contact_regions, stand_test
 
     floating = bool(robot.facts.model.floating)
     # MuJoCo releases the interpreter lock while it compiles. The scene includes robot.xml.
@@ -84,13 +84,13 @@ def verify(source: "Facts", robot: "RobotFiles", folder: Path) -> Verification:
             raise ExportError(f"{each.file} differs from the source: {'; '.join(each.failures)}")
     if not robot.facts.legs or not floating:
         return Verification(equivalences=equivalences)
-    joints_locked = not stands_alone(robot.facts)
+    joints_locked = not is_statically_stable(robot.facts.legs)
     try:
-        standing = stand_still(
-            plant_of(scene.result(), base=robot.facts.bodies[0].top.name),
+        standing = stand_test(
+            SimModel.from_mujoco(scene.result(), base=robot.facts.bodies[0].top.name),
             _gains(robot.spec),
             positions=robot.facts.positions,
-            feet=footholds(robot.facts),
+            regions=contact_regions(robot.facts),
             seconds=_DURATION,
             joints_locked=joints_locked,
         )
@@ -119,7 +119,7 @@ def _load_model(path: Path) -> Any:
 
 
 def _gains(spec: "RobotSpec") -> "dict[str, Gain]":
-    from terrainkit_robots.simulation.pd_gains import Gain
+    from terrainkit_robots.simulation.gain import Gain
 
     stiffness, damping, armature = map(spec.per_joint, ("stiffness", "damping", "armature"))
     return {

@@ -1,1 +1,1 @@
-"""Simulation: the robot in MuJoCo, dropped, standing, swept through its joints."""
+"""Simulate a robot in MuJoCo: drop it, let it stand, and sweep its joints."""

@@ -1,90 +1,93 @@
-"""The verdict: whether a robot that was simulated stood, and if not, what was wrong."""
+"""Assess whether a simulated robot stood."""
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from terrainkit_robots.simulation.standing import Standing
+from terrainkit_robots.simulation.standing import StandResult
 from terrainkit_robots.text import names
 
-_UPRIGHT, _LEANING, _FALLEN = map(math.radians, (3, 9, 29))
-"""Tilt of one that stands, that leans, and of one that fell [rad]: more than 3 degrees is seen in
-what a policy observes, from 9 on a robot sits or hangs over, and from 29 on none comes back."""
+_MAX_TILT, _MAX_LEANING_TILT, _MAX_RECOVERABLE_TILT = map(math.radians, (3, 9, 29))
+"""Tilt of a standing robot, of a leaning one, and of one that may recover, at most [rad]. More than
+3 degrees changes the observations of a policy, from 9 on a robot sits or hangs over, and from 29 on
+none recovers."""
 
-_SUNK, _COLLAPSED = 0.25, 0.5
-"""Loss of height over leg length: from a quarter on it squats, from a half on it lies, or fell
-through the floor."""
+_MAX_HEIGHT_LOSS, _MAX_RECOVERABLE_HEIGHT_LOSS = 0.25, 0.5
+"""Loss of height over leg length: from a quarter on a robot squats, from a half on it lies or has
+fallen through the floor."""
 
-_DRIFTED = 0.25
-"""Way of the base over leg length; feet that hold let it move by a tenth."""
+_MAX_DRIFT = 0.25
+"""Horizontal motion of the base over leg length, at most. Feet that hold allow for a tenth."""
 
-_SATURATED = 0.95
-"""Share of its effort that a joint has to give all the time."""
+_MAX_SATURATION = 0.95
+"""Torque over effort limit of a joint, at most."""
 
-_MOST_NAMES = 4
+_MAX_NAMES = 4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Verdict:
+class Assessment:
     """Whether a robot stood."""
 
-    faults: tuple[str, ...]
-    """What was wrong, each with the number and its limit; empty if it stood."""
+    failures: tuple[str, ...]
+    """Failed criteria, each with the value and the limit. Empty if it stood."""
 
     degree: int
-    """How wrong: 0, it stood or leans a little; 1, it stands badly; 2, it fell or blew up."""
+    """0: it stood or leans a little. 1: it stands badly. 2: it fell or the simulation diverged."""
 
     @property
     def stands(self) -> bool:
-        """Whether nothing was wrong."""
-        return not self.faults
+        """Whether no criterion failed."""
+        return not self.failures
 
 
-def judge(standing: Standing) -> Verdict:
-    """Return whether a robot stood.
+def assess(result: StandResult) -> Assessment:
+    """Assess whether a robot stood.
 
-    That is: upright, at its height and place, on all of its feet and on nothing else, by less than
-    its motors have.
+    It has to be upright at its height and position, on all of its feet and on nothing else, and
+    its joints must not saturate.
     """
-    if standing.blew_up:
-        fault = f"its state blew up after {standing.seconds:.2f} s"
-        return Verdict(faults=(fault,), degree=2)
-    found = list(_faults(standing))
-    return Verdict(
-        faults=tuple(text for _, text in found), degree=max((much for much, _ in found), default=0)
+    if result.diverged:
+        failure = f"its simulation diverged after {result.seconds:.2f} s"
+        return Assessment(failures=(failure,), degree=2)
+    found = list(_failures(result))
+    return Assessment(
+        failures=tuple(text for _, text in found),
+        degree=max((degree for degree, _ in found), default=0),
     )
 
 
-def _faults(standing: Standing) -> Iterator[tuple[int, str]]:
-    """Yield what was wrong, and how much."""
-    tilt, length = standing.tilt, standing.leg_length
-    if tilt > _UPRIGHT:
-        degrees, most = math.degrees(tilt), math.degrees(_UPRIGHT)
+def _failures(result: StandResult) -> Iterator[tuple[int, str]]:
+    """Yield the degree and the description of each failed criterion."""
+    tilt, length = result.tilt, result.leg_length
+    if tilt > _MAX_TILT:
         yield (
-            (tilt > _LEANING) + (tilt > _FALLEN),
-            f"it tilts by {degrees:.1f} degrees; wanted at most {most:g}",
+            (tilt > _MAX_LEANING_TILT) + (tilt > _MAX_RECOVERABLE_TILT),
+            f"it tilts by {math.degrees(tilt):.1f} degrees; expected at most "
+            f"{math.degrees(_MAX_TILT):g}",
         )
-    if standing.sink > _SUNK * length:
+    if result.height_loss > _MAX_HEIGHT_LOSS * length:
         yield (
-            1 + (standing.sink > _COLLAPSED * length),
-            f"its base sinks by {standing.sink:.3f} m; wanted at most {_SUNK * length:.3f}",
+            1 + (result.height_loss > _MAX_RECOVERABLE_HEIGHT_LOSS * length),
+            f"its base sinks by {result.height_loss:.3f} m; expected at most "
+            f"{_MAX_HEIGHT_LOSS * length:.3f}",
         )
-    if standing.drift > _DRIFTED * length:
+    if result.drift > _MAX_DRIFT * length:
         yield (
             1,
-            f"it drifts by {standing.drift:.3f} m; wanted at most {_DRIFTED * length:.3f}",
+            f"it drifts by {result.drift:.3f} m; expected at most {_MAX_DRIFT * length:.3f}",
         )
-    if standing.touching:
-        touch = "touches" if len(standing.touching) == 1 else "touch"
-        yield 1, f"{_listed(standing.touching)} {touch} the ground; wanted feet alone"
-    if standing.lifted:
-        hang = "does" if len(standing.lifted) == 1 else "do"
-        yield 1, f"{_listed(standing.lifted)} {hang} not touch the ground; wanted every foot"
-    if standing.saturation > _SATURATED:
-        share = f"{standing.saturation:.0%} of its effort; wanted at most {_SATURATED:.0%}"
-        yield 1, f"{standing.saturated} gives {share}"
+    if result.other_contacts:
+        verb = "touches" if len(result.other_contacts) == 1 else "touch"
+        yield 1, f"{_join(result.other_contacts)} {verb} the ground; expected only feet"
+    if result.lifted_feet:
+        verb = "does" if len(result.lifted_feet) == 1 else "do"
+        yield 1, f"{_join(result.lifted_feet)} {verb} not touch the ground; expected all feet"
+    if result.saturation > _MAX_SATURATION:
+        share = f"{result.saturation:.0%} of its effort; expected at most {_MAX_SATURATION:.0%}"
+        yield 1, f"{result.saturated_joint} gives {share}"
 
 
-def _listed(bodies: tuple[str, ...]) -> str:
-    more = len(bodies) - _MOST_NAMES
-    return names(bodies[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+def _join(bodies: tuple[str, ...]) -> str:
+    more = len(bodies) - _MAX_NAMES
+    return names(bodies[:_MAX_NAMES]) + (f" and {more} more" if more > 0 else "")

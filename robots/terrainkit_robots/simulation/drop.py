@@ -1,60 +1,60 @@
-"""A drop: the robot falls without torque, which shows whether it is sound at all."""
+"""Drop a robot without joint torques, to test whether its model is valid."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.simulation.rollout import Trial
-from terrainkit_robots.simulation.sim_model import Plant
-from terrainkit_robots.simulation.time_step import free_dofs
+from terrainkit_robots.simulation.rollout import Rollout
+from terrainkit_robots.simulation.sim_model import SimModel
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drop:
-    """What happened to a robot that was dropped, or let swing if it is bolted down."""
+class DropResult:
+    """The motion of a robot that was dropped, or that swung because its base is fixed."""
 
-    blew_up: bool
-    """Whether a position, speed or acceleration stopped being a number, or was huge."""
+    diverged: bool
+    """Whether a position, velocity or acceleration was not finite, or huge."""
 
-    top_speed: float
-    """Highest speed of a joint, or at which the base turned [rad/s] or [m/s]."""
+    max_speed: float
+    """Highest speed of a joint, or of the rotation of the base [rad/s] or [m/s]."""
 
-    fastest: str
-    """The joint that had it; `base` for the base."""
+    fastest_joint: str
+    """The joint with that speed; `base` for the base."""
 
     seconds: float
-    """How long it was simulated: less than asked for if it blew up [s]."""
+    """Simulated time [s]; shorter than requested if the simulation diverged."""
 
 
-def let_fall(
-    plant: Plant, *, height: float = 0.1, seconds: float = 1.5, self_collision: bool = True
-) -> Drop:
-    """Drop a robot from its standing pose, nothing holding its joints.
+def drop_test(
+    sim: SimModel, *, height: float = 0.1, seconds: float = 1.5, self_collision: bool = True
+) -> DropResult:
+    """Drop a robot from its standing pose without joint torques.
 
     Args:
-        plant: The robot.
-        height: Of its lowest shape above the floor [m].
-        seconds: How long to simulate [s].
-        self_collision: Whether the robot can touch itself.
+        sim: The robot.
+        height: Height of its lowest shape above the floor [m].
+        seconds: Time to simulate [s].
+        self_collision: Whether the shapes of the robot collide with each other.
 
     Raises:
-        CannotCheckError: if simulating it would take too long.
+        CannotCheckError: if the simulation would take too long.
     """
     with quiet_mujoco():
-        trial = Trial(plant, self_collision=self_collision)
-        trial.put(plant.home, above=height)
-        top, steps = np.zeros(trial.model.nv), 0
-        for _ in trial.steps(seconds):
-            np.maximum(top, np.abs(trial.data.qvel), out=top)
+        rollout = Rollout(sim, self_collision=self_collision)
+        rollout.reset(sim.standing_qpos, clearance=height)
+        speeds, steps = np.zeros(rollout.model.nv), 0
+        for _ in rollout.steps(seconds):
+            np.maximum(speeds, np.abs(rollout.data.qvel), out=speeds)
             steps += 1
-        blew_up, step = trial.blew_up, trial.model.opt.timestep
-    base = free_dofs(plant)
-    top[: base // 2] = 0  # how fast the base falls says nothing
-    fastest = int(np.argmax(top)) if len(top) else 0
-    return Drop(
-        blew_up=blew_up,
-        top_speed=float(top[fastest]) if len(top) else 0.0,
-        fastest="base" if fastest < base else plant.joints[fastest - base] if len(top) else "base",
-        seconds=steps * float(step),
+        diverged, time_step = rollout.diverged, rollout.model.opt.timestep
+    base = sim.base_dofs
+    speeds[: base // 2] = 0  # the speed at which the base falls is expected
+    fastest = int(np.argmax(speeds)) if len(speeds) else 0
+    is_joint = fastest >= base and len(speeds)
+    return DropResult(
+        diverged=diverged,
+        max_speed=float(speeds[fastest]) if len(speeds) else 0.0,
+        fastest_joint=sim.joints[fastest - base] if is_joint else "base",
+        seconds=steps * float(time_step),
     )

@@ -1,7 +1,7 @@
-"""A sweep: each joint moved to both of its limits, as slowly as can be, the base held in the air.
+"""Move each joint to both of its limits quasi-statically, with the base fixed in the air.
 
-So slowly that only gravity counts: the joint is put from place to place, the others stay at the
-standing pose, and MuJoCo says what touches and what torque holds the joint there.
+Only gravity acts: the joint is set to a sequence of positions while the others stay in the standing
+pose, and MuJoCo computes the contacts and the holding torque at each position.
 """
 
 from collections.abc import Sequence
@@ -11,134 +11,132 @@ from typing import Any
 import numpy as np
 
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.simulation.rollout import Trial
-from terrainkit_robots.simulation.sim_model import Plant
-from terrainkit_robots.simulation.stiffness import effort_in
-from terrainkit_robots.simulation.units import Units, units_of
+from terrainkit_robots.simulation.rollout import Rollout
+from terrainkit_robots.simulation.sim_model import SimModel
+from terrainkit_robots.simulation.units import JointUnits
 
-_PLACES = 40
-"""Places over the range of a joint."""
+_SAMPLES = 40
+"""Number of positions over the range of a joint."""
 
-_TOUCH = 0.001
-"""How deep two bodies are inside each other that block a joint [m], as COL005 has it."""
+_MIN_DEPTH = 0.001
+"""Penetration depth from which a contact blocks a joint [m], as in COL005."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reach:
-    """How far a joint gets."""
+class SweepResult:
+    """The range that a joint can reach."""
 
     joint: str
 
-    units: Units
-    """What its numbers are in."""
+    units: JointUnits
 
     limits: tuple[float, float]
     """Lower and upper limit [rad] or [m]."""
 
     reached: tuple[float, float]
-    """Lowest and highest place that nothing blocks, to a fortieth of the range [rad] or [m]."""
+    """Lowest and highest unblocked position, accurate to a fortieth of the range [rad] or [m]."""
 
     blocked: tuple[tuple[str, str] | None, tuple[str, str] | None]
-    """The bodies that meet past the lowest and the highest place; None where nothing does."""
+    """The bodies that collide beyond the lowest and the highest position; None if none do."""
 
     load: float
-    """Torque [N m] or force [N] that holds the limb against gravity in the standing pose."""
+    """Torque [N m] or force [N] against gravity in the standing pose."""
 
-    largest_load: float
-    """The largest on the way."""
+    max_load: float
+    """Largest torque or force over the sweep."""
 
     effort: float
-    """What the joint has for that [N m] or [N]; infinite if it is not limited."""
+    """Effort limit of the joint [N m] or [N]; infinite if it is unlimited."""
 
     @property
     def share(self) -> float:
-        """Return the share of the range that the joint can use, in 0..1."""
+        """Return the reachable share of the range, in 0..1."""
         lower, upper = self.limits
         return (self.reached[1] - self.reached[0]) / (upper - lower)
 
 
-def sweep(plant: Plant) -> tuple[Reach, ...]:
-    """Return how far each actuated joint with limits gets, in the order of the actuators.
+def joint_sweep(sim: SimModel) -> tuple[SweepResult, ...]:
+    """Return the reachable range of each actuated joint with limits, in actuator order.
 
-    Bodies that touch each other in the standing pose already block nothing.
+    Bodies that touch each other in the standing pose do not block a joint.
 
     Raises:
-        CannotCheckError: if it would take too long.
+        CannotCheckError: if the simulation would take too long.
     """
-    limited = [name for name in plant.drives if plant.model.joint(name).limited[0]]
+    limited = [name for name in sim.actuated if sim.model.joint(name).limited[0]]
     with quiet_mujoco():
-        trial = Trial(plant)
-        trial.without_floor()
-        trial.put(plant.home)
-        around = _Around(trial)
-        return tuple(around.reach(name) for name in limited)
+        rollout = Rollout(sim)
+        rollout.disable_floor()
+        rollout.reset(sim.standing_qpos)
+        sweep = _Sweep(rollout)
+        return tuple(sweep.run(name) for name in limited)
 
 
-class _Around:
-    """A robot that hangs, and the pairs of bodies that touch where it hangs."""
+class _Sweep:
+    """A robot with a fixed base, and the pairs of bodies that touch in the standing pose."""
 
-    def __init__(self, trial: Trial) -> None:
-        self._trial = trial
-        self._followers = _followers(trial.model)
-        self._touching: frozenset[tuple[int, int]] = frozenset()
-        self._put(None, 0.0)
-        self._touching = frozenset(self._pairs(0.0))
+    def __init__(self, rollout: Rollout) -> None:
+        self._rollout = rollout
+        self._mimic_joints = _mimic_joints(rollout.model)
+        self._ignored: frozenset[tuple[int, int]] = frozenset()
+        self._set_position(None, 0.0)
+        self._ignored = frozenset(self._contact_pairs(0.0))
 
-    def reach(self, name: str) -> Reach:
-        """Return how far a joint gets."""
-        joint = self._trial.model.joint(name)
+    def run(self, name: str) -> SweepResult:
+        """Sweep one joint."""
+        sim, joint = self._rollout.sim, self._rollout.model.joint(name)
         lower, upper = (float(limit) for limit in joint.range)
-        home = float(np.clip(self._trial.plant.home[int(joint.qposadr[0])], lower, upper))
-        down = self._go(name, home, lower, (upper - lower) / _PLACES)
-        up = self._go(name, home, upper, (upper - lower) / _PLACES)
-        return Reach(
+        start = float(np.clip(sim.standing_qpos[int(joint.qposadr[0])], lower, upper))
+        down = self._move(name, start, lower, (upper - lower) / _SAMPLES)
+        up = self._move(name, start, upper, (upper - lower) / _SAMPLES)
+        return SweepResult(
             joint=name,
-            units=units_of(self._trial.plant, name),
+            units=sim.units(name),
             limits=(lower, upper),
             reached=(down[0], up[0]),
             blocked=(down[1], up[1]),
             load=abs(down[2][0]),
-            largest_load=max(map(abs, (*down[2], *up[2]))),
-            effort=effort_in(self._trial.plant, name),
+            max_load=max(map(abs, (*down[2], *up[2]))),
+            effort=sim.effort_limit(name),
         )
 
-    def _go(
-        self, name: str, start: float, end: float, stride: float
+    def _move(
+        self, name: str, start: float, end: float, step: float
     ) -> tuple[float, tuple[str, str] | None, list[float]]:
-        """Return the last place that is free, what blocks the next, and the load at each."""
-        model, data = self._trial.model, self._trial.data
+        """Return the last unblocked position, the bodies that block the next one, and the loads."""
+        model, data = self._rollout.model, self._rollout.data
         dof = int(model.joint(name).dofadr[0])
         reached, loads = start, []
-        for place in np.linspace(start, end, 1 + int(np.ceil(abs(end - start) / stride))):
-            self._put(name, float(place))
+        for position in np.linspace(start, end, 1 + int(np.ceil(abs(end - start) / step))):
+            self._set_position(name, float(position))
             loads.append(float(data.qfrc_bias[dof]))
-            for first, second in self._pairs(_TOUCH):
+            for first, second in self._contact_pairs(_MIN_DEPTH):
                 return reached, (model.body(first).name, model.body(second).name), loads
-            reached = float(place)
+            reached = float(position)
         return reached, None, loads
 
-    def _put(self, name: str | None, place: float) -> None:
+    def _set_position(self, name: str | None, position: float) -> None:
         import mujoco
 
-        model, data = self._trial.model, self._trial.data
-        data.qpos[:] = self._trial.plant.home
+        model, data = self._rollout.model, self._rollout.data
+        data.qpos[:] = self._rollout.sim.standing_qpos
         if name is not None:
-            data.qpos[int(model.joint(name).qposadr[0])] = place
-            for follower, followed, coefficients in self._followers:
-                data.qpos[follower] = np.polynomial.Polynomial(coefficients)(data.qpos[followed])
+            data.qpos[int(model.joint(name).qposadr[0])] = position
+            for address, target, coefficients in self._mimic_joints:
+                data.qpos[address] = np.polynomial.Polynomial(coefficients)(data.qpos[target])
         mujoco.mj_fwdPosition(model, data)
-        mujoco.mj_fwdVelocity(model, data)  # at rest: gravity alone
+        mujoco.mj_fwdVelocity(model, data)  # at zero velocity the bias force is gravity
 
-    def _pairs(self, depth: float) -> Sequence[tuple[int, int]]:
-        """Return the bodies deeper inside each other than `depth` [m], but for those at rest."""
-        model, data = self._trial.model, self._trial.data
+    def _contact_pairs(self, depth: float) -> Sequence[tuple[int, int]]:
+        """Return the pairs of bodies that overlap deeper than `depth` [m], except ignored ones."""
+        model, data = self._rollout.model, self._rollout.data
         deep = data.contact.geom[data.contact.dist < -depth]
         pairs = {tuple(sorted(pair)) for pair in model.geom_bodyid[deep].tolist()}
-        return sorted((a, b) for a, b in pairs if (a, b) not in self._touching)
+        return sorted((a, b) for a, b in pairs if (a, b) not in self._ignored)
 
 
-def _followers(model: Any) -> list[tuple[int, int, Any]]:
-    """Return the places in qpos of joints that follow another, of that other, and how."""
+def _mimic_joints(model: Any) -> list[tuple[int, int, Any]]:
+    """Return the qpos addresses of mimic joints and their targets, and the coefficients."""
     import mujoco
 
     return [

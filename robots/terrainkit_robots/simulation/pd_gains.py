@@ -1,153 +1,131 @@
-"""Gains: stiffness and damping of a position controller for each joint, and why.
+"""Compute PD gains for each joint, with the reason.
 
-Stiffness comes from what a joint has to hold, and is capped by what its motor and the time step
-bear; damping is critical. One round number serves all joints that are alike. The constants were
-held against what a1, go2, cassie, h1 and g1 are trained with in legged_gym, walk-these-ways,
-unitree_rl_gym and Isaac Lab: bipeds come out close to it. Quadrupeds come out 1.5 to 3 times as
-stiff, the more the deeper they stand: with the 20 N m/rad of a go2 or the 80 of an anymal_c legs
-that are bent like here sit down, unless a policy holds them up.
+The stiffness follows from the loads of a joint, and is capped by its effort limit and the time
+step. The damping is critical. Similar joints share one rounded value. The constants were compared
+with the gains that a1, go2, cassie, h1 and g1 are trained with in legged_gym, walk-these-ways,
+unitree_rl_gym and Isaac Lab. The results for bipeds are close. Those for quadrupeds are 1.5 to 3
+times as stiff, the more the lower they stand: with the 20 N m/rad of a go2 or the 80 of an
+anymal_c, legs that are bent as much as here collapse without a policy.
 """
 
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.cached_fact import per_robot
+from terrainkit_robots.analysis.cached_fact import cached_fact
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.legs.joint_roles import bodies_by_joint, is_wheel
-from terrainkit_robots.simulation.sim_model import TIME_STEP, Plant, plant
+from terrainkit_robots.simulation.gain import Gain
+from terrainkit_robots.simulation.sim_model import TIME_STEP, SimModel, make_sim_model
 from terrainkit_robots.simulation.stiffness import (
-    Inertias,
-    Wish,
-    effort_in,
-    leg_wish,
-    other_wish,
+    GainTarget,
+    leg_gain_target,
+    other_gain_target,
 )
-from terrainkit_robots.simulation.time_step import joint_inertias
-from terrainkit_robots.simulation.units import TURNING, Units, units_of
+from terrainkit_robots.simulation.time_step import JointInertia, joint_inertias
+from terrainkit_robots.simulation.units import REVOLUTE, JointUnits
 
-_QUICKEST = 20.0
-"""Stiffness over damping, at least [1/s]: a joint that is damped more comes back too slowly."""
+_MIN_STIFFNESS_RATIO = 20.0
+"""Stiffness over damping, at least [1/s]. A joint with more damping returns too slowly."""
 
-_ALIKE = 1.3
-"""Joints of a leg whose stiffness differs by less than this factor share one."""
+_MAX_SIMILAR_RATIO = 1.3
+"""Joints of legs whose stiffness differs by a smaller factor share one value."""
 
-_WHEEL_TIME = 0.05
-"""Time in which a wheel without declared effort or speed takes a new speed [s]."""
+_WHEEL_TIME_CONSTANT = 0.05
+"""Time constant of the velocity of a wheel without effort or velocity limit [s]."""
 
-_WHEEL_SHARE = 0.5
-"""Damping times the time step over a wheel's inertia, at most; from 2 on its speed diverges."""
+_MAX_WHEEL_DAMPING = 0.5
+"""Damping times the time step over the inertia of a wheel, at most. From 2 on it diverges."""
 
-_ROUND = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
-"""What a suggested number may start with."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Gain:
-    """A controller: torque = stiffness * (target - q) - damping * dq."""
-
-    stiffness: float
-    """[N m/rad] or [N/m]; 0 for a wheel, which is told a speed."""
-
-    damping: float
-    """[N m s/rad] or [N s/m]."""
-
-    armature: float
-    """Inertia of the rotor, reflected to the joint [kg m2] or [kg]: as declared, or more where the
-    joint is too light for its gains without."""
-
-    reason: str
-    """How the numbers came about."""
-
-
-@per_robot
-def suggest_gains(facts: Facts) -> Mapping[str, Gain]:
-    """Return a gain for each actuated joint, in the order of the actuators.
-
-    Raises:
-        CannotCheckError: if the robot cannot be simulated.
-    """
-    scene = plant(facts)
-    inertias = joint_inertias(scene)
-    wheels = _wheels(facts, scene)
-    found = {name: _wheel(facts, scene, inertias, name) for name in wheels}
-    legs, rest = _groups(facts, [name for name in scene.drives if name not in wheels])
-    leg_wishes = {key: leg_wish(facts, scene, inertias, joints) for key, joints in legs.items()}
-    for wish in _shared(leg_wishes):
-        found |= dict.fromkeys(wish.joints, _gain(wish, wish.inertia))
-    # Joints of arms that are equally stiff are damped alike.
-    alike: dict[tuple[float, float, Units], list[Wish]] = defaultdict(list)
-    for joints in rest.values():
-        wish = other_wish(scene, inertias, joints)
-        alike[_rounded(wish.stiffness), wish.armature, wish.units].append(wish)
-    for wishes in alike.values():
-        lightest = min(wish.inertia for wish in wishes)
-        for wish in wishes:
-            found |= dict.fromkeys(wish.joints, _gain(wish, lightest))
-    return {name: found[name] for name in scene.drives}
-
-
-def _gain(wish: Wish, inertia: float) -> Gain:
-    stiffness = _rounded(wish.stiffness)
-    critical = 2 * math.sqrt(wish.stiffness * inertia)
-    most = wish.stiffness / _QUICKEST
-    reason = f"kp {wish.reason}; kd " + (
-        f"critical on the lightest inertia of such joints, {inertia:.2g} {wish.units.inertia}"
-        if critical <= most
-        else f"kp / {_QUICKEST:g}, less than critical, so that the joint is quick"
-    )
-    if wish.too_light:
-        reason += f"; armature so that all bear kp at a time step of {1000 * TIME_STEP:g} ms"
-    return Gain(
-        stiffness=stiffness,
-        damping=_rounded(min(critical, most)),
-        armature=wish.armature,
-        reason=reason,
-    )
-
-
-def _rounded(value: float) -> float:
-    """Return the closest number that starts with one of _ROUND."""
-    if not 0 < value < math.inf:
-        return 0.0
-    scale = 10.0 ** math.floor(math.log10(value))
-    best = min(_ROUND, key=lambda start: abs(math.log(start * scale / value)))
-    return float(f"{best * scale:.2g}")
-
-
-# Which joints are alike.
+_MANTISSAS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+"""Leading digits of a rounded gain."""
 
 _Groups = dict[tuple[str, str], list[str]]
 
 
-def _groups(facts: Facts, joints: Sequence[str]) -> tuple[_Groups, _Groups]:
-    """Return joints of legs by section and role, and others with their mirror images."""
+@cached_fact
+def suggest_gains(facts: Facts) -> Mapping[str, Gain]:
+    """Return gains for each actuated joint, in actuator order.
+
+    Raises:
+        CannotCheckError: if the robot cannot be simulated.
+    """
+    sim = make_sim_model(facts)
+    inertias = joint_inertias(sim)
+    wheels = _wheels(facts, sim)
+    found = {name: _wheel_gain(facts, sim, inertias, name) for name in wheels}
+    legs, others = _group_joints(facts, [name for name in sim.actuated if name not in wheels])
+    leg_targets = {
+        key: leg_gain_target(facts, sim, inertias, joints) for key, joints in legs.items()
+    }
+    for target in _unify_similar(leg_targets):
+        found |= dict.fromkeys(target.joints, _make_gain(target, target.inertia))
+    # Other joints of the same stiffness get the same damping.
+    similar: dict[tuple[float, float, JointUnits], list[GainTarget]] = defaultdict(list)
+    for joints in others.values():
+        target = other_gain_target(sim, inertias, joints)
+        similar[_round(target.stiffness), target.armature, target.units].append(target)
+    for targets in similar.values():
+        lightest = min(target.inertia for target in targets)
+        for target in targets:
+            found |= dict.fromkeys(target.joints, _make_gain(target, lightest))
+    return {name: found[name] for name in sim.actuated}
+
+
+def _make_gain(target: GainTarget, inertia: float) -> Gain:
+    stiffness = _round(target.stiffness)
+    critical = 2 * math.sqrt(target.stiffness * inertia)
+    limit = target.stiffness / _MIN_STIFFNESS_RATIO
+    reason = f"kp {target.reason}; kd " + (
+        f"critical for the lightest inertia of these joints, {inertia:.2g} {target.units.inertia}"
+        if critical <= limit
+        else f"kp / {_MIN_STIFFNESS_RATIO:g}, below critical for a fast response"
+    )
+    if target.adds_armature:
+        reason += f"; armature for stability at a time step of {1000 * TIME_STEP:g} ms"
+    return Gain(
+        stiffness=stiffness,
+        damping=_round(min(critical, limit)),
+        armature=target.armature,
+        reason=reason,
+    )
+
+
+def _round(value: float) -> float:
+    """Return the closest number whose leading digits are one of `_MANTISSAS`."""
+    if not 0 < value < math.inf:
+        return 0.0
+    scale = 10.0 ** math.floor(math.log10(value))
+    best = min(_MANTISSAS, key=lambda mantissa: abs(math.log(mantissa * scale / value)))
+    return float(f"{best * scale:.2g}")
+
+
+def _group_joints(facts: Facts, joints: Sequence[str]) -> tuple[_Groups, _Groups]:
+    """Return the joints of legs by section and role, and other joints with their mirror images."""
     legs: _Groups = defaultdict(list)
-    rest: _Groups = defaultdict(list)
-    roles = _roles(facts)
-    bodies = bodies_by_joint(facts)
+    others: _Groups = defaultdict(list)
+    sections = _sections(facts)
     for name in joints:
-        if name in roles:
-            legs[roles[name]].append(name)
+        if name in sections:
+            legs[sections[name]].append(name)
             continue
-        rest[min(name, _twin_of(facts, bodies.get(name), joints) or name), ""].append(name)
-    return dict(legs), dict(rest)
+        others[min(name, _mirrored_joint(facts, name, joints) or name), ""].append(name)
+    return dict(legs), dict(others)
 
 
-def _twin_of(facts: Facts, body: Body | None, joints: Sequence[str]) -> str | None:
-    """Return the joint that mirrors that of a body, if it is one of those and of its kind."""
-    twin = facts.mirror.twin(body.index) if body is not None else None
-    if body is None or body.joint is None or twin is None:
+def _mirrored_joint(facts: Facts, name: str, joints: Sequence[str]) -> str | None:
+    """Return the mirrored joint, if it is of the same type and one of `joints`."""
+    body = facts.body_of_joint.get(name)
+    counterpart = facts.mirror.counterpart(body.index) if body is not None else None
+    if body is None or body.joint is None or counterpart is None:
         return None
-    other = facts.bodies[twin[0]].joint
-    alike = other is not None and other.kind == body.joint.kind and other.name in joints
-    return other.name if other is not None and alike else None
+    other = facts.bodies[counterpart[0]].joint
+    is_valid = other is not None and other.kind == body.joint.kind and other.name in joints
+    return other.name if other is not None and is_valid else None
 
 
-def _roles(facts: Facts) -> dict[str, tuple[str, str]]:
-    """Return section and role of each joint of the legs; past the knee all are of the ankle."""
+def _sections(facts: Facts) -> dict[str, tuple[str, str]]:
+    """Return section and role of each joint of the legs. Past the knee all are ankle joints."""
     found: dict[str, tuple[str, str]] = {}
     for leg in facts.legs:
         section = "hip"
@@ -158,84 +136,82 @@ def _roles(facts: Facts) -> dict[str, tuple[str, str]]:
             elif role == "waist":
                 continue
             else:
-                plain = section == "ankle" and role != "slide"
-                found[joint.name] = section, "ankle" if plain else role
+                is_ankle = section == "ankle" and role != "slide"
+                found[joint.name] = section, "ankle" if is_ankle else role
     return found
 
 
-def _shared(wishes: Mapping[tuple[str, str], Wish]) -> Iterable[Wish]:
-    """Return wishes of the same stiffness where those of a leg, or of a section, are close."""
-    found = [wish for (_, role), wish in wishes.items() if role == "slide"]
-    turning = {key: wish for key, wish in wishes.items() if key[1] != "slide"}
-    if _close(turning.values()):
-        return [*found, *_same(turning.values())]
-    for section in dict.fromkeys(section for section, _ in turning):
-        part = [wish for (of, _), wish in turning.items() if of == section]
-        found += _same(part) if _close(part) else part
+def _unify_similar(targets: Mapping[tuple[str, str], GainTarget]) -> Iterable[GainTarget]:
+    """Return targets with one stiffness for all joints of a leg, or of a section, if similar."""
+    found = [target for (_, role), target in targets.items() if role == "slide"]
+    revolute = {key: target for key, target in targets.items() if key[1] != "slide"}
+    if _are_similar(revolute.values()):
+        return [*found, *_unify(revolute.values())]
+    for section in dict.fromkeys(section for section, _ in revolute):
+        part = [target for (of, _), target in revolute.items() if of == section]
+        found += _unify(part) if _are_similar(part) else part
     return found
 
 
-def _close(wishes: Iterable[Wish]) -> bool:
-    values = [wish.stiffness for wish in wishes]
-    return bool(values) and max(values) <= _ALIKE * min(values)
+def _are_similar(targets: Iterable[GainTarget]) -> bool:
+    values = [target.stiffness for target in targets]
+    return bool(values) and max(values) <= _MAX_SIMILAR_RATIO * min(values)
 
 
-def _same(wishes: Iterable[Wish]) -> list[Wish]:
-    """Return wishes with one stiffness, one armature and one inertia to be damped."""
-    lowest = min(wishes, key=lambda wish: wish.stiffness)
-    armature = max(wish.armature for wish in wishes)
-    inertia = min(wish.inertia + armature - wish.armature for wish in wishes)
+def _unify(targets: Iterable[GainTarget]) -> list[GainTarget]:
+    """Return targets with the same stiffness, armature and inertia."""
+    lowest = min(targets, key=lambda target: target.stiffness)
+    armature = max(target.armature for target in targets)
+    inertia = min(target.inertia + armature - target.armature for target in targets)
     return [
         replace(
-            wish,
+            target,
             stiffness=lowest.stiffness,
             reason=lowest.reason,
             inertia=inertia,
             armature=armature,
-            too_light=any(wish.too_light for wish in wishes),
+            adds_armature=any(target.adds_armature for target in targets),
         )
-        for wish in wishes
+        for target in targets
     ]
 
 
-# Wheels.
-
-
-def _wheels(facts: Facts, scene: Plant) -> frozenset[str]:
-    """Return the actuated joints that spin without end what is balanced on them, but for legs'."""
-    bodies = bodies_by_joint(facts)
+def _wheels(facts: Facts, sim: SimModel) -> frozenset[str]:
+    """Return the actuated joints without limits that turn a wheel and are not part of a leg."""
     legs = {joint.name for leg in facts.legs for joint in leg.joints}
     return frozenset(
         name
-        for name in scene.drives
-        if name in bodies
+        for name in sim.actuated
+        if name in facts.body_of_joint
         and name not in legs
-        and not scene.model.joint(name).limited[0]
-        and units_of(scene, name) == TURNING
-        and is_wheel(facts, bodies[name])
+        and not sim.model.joint(name).limited[0]
+        and sim.units(name) == REVOLUTE
+        and facts.is_wheel(facts.body_of_joint[name])
     )
 
 
-def _wheel(facts: Facts, scene: Plant, inertias: Inertias, name: str) -> Gain:
-    """Return the gain of a wheel: of its speed alone."""
-    joint = bodies_by_joint(facts)[name].joint
+def _wheel_gain(
+    facts: Facts, sim: SimModel, inertias: Mapping[str, JointInertia], name: str
+) -> Gain:
+    """Return the gains of a wheel, which control its velocity."""
+    joint = facts.body_of_joint[name].joint
     assert joint is not None
-    effort = effort_in(scene, name)
-    speed = joint.limit.velocity if joint.limit else None
+    effort = sim.effort_limit(name)
+    velocity = joint.limit.velocity if joint.limit else None
     inertia = inertias[name].free
-    most = _WHEEL_SHARE * inertia / TIME_STEP
-    if math.isfinite(effort) and speed is not None and 0 < speed < math.inf:
-        damping = effort / speed
-        reason = f"all of its effort of {effort:.3g} N m at an error of its top speed"
+    limit = _MAX_WHEEL_DAMPING * inertia / TIME_STEP
+    if math.isfinite(effort) and velocity is not None and 0 < velocity < math.inf:
+        damping = effort / velocity
+        reason = f"its effort limit of {effort:.3g} N m at an error of its maximum velocity"
     else:
-        damping = inertia / _WHEEL_TIME
-        reason = f"it takes a new speed within {_WHEEL_TIME:g} s"
-    if damping > most:
-        damping = most
-        reason = f"what a time step of {1000 * TIME_STEP:g} ms bears at {inertia:.2g} kg m2"
+        damping = inertia / _WHEEL_TIME_CONSTANT
+        reason = f"a time constant of {_WHEEL_TIME_CONSTANT:g} s"
+    if damping > limit:
+        damping = limit
+        reason = f"stability limit at a time step of {1000 * TIME_STEP:g} ms, {inertia:.2g} kg m2"
     return Gain(
         stiffness=0.0,
-        damping=_rounded(damping),
-        armature=float(scene.model.joint(name).armature[0]),
-        reason=f"a wheel is told a speed, so kp is 0; kd: {reason}",
+        damping=_round(damping),
+        armature=float(sim.model.joint(name).armature[0]),
+        reason=f"kp 0, because the target of a wheel is a velocity; kd {reason}",
     )

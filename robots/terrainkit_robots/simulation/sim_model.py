@@ -1,9 +1,10 @@
-"""The plant: a robot on a floor as a MuJoCo model, in memory and without anything to look at.
+"""Compile a robot on a floor as a MuJoCo model, in memory and without visual geometry.
 
-It is compiled from what was read, not from the file, so that a robot can be simulated that MuJoCo
-does not load as it stands: with paths of packages, COLLADA meshes, or without a free joint.
+It is compiled from our description, not from the file, so that it works for robots that MuJoCo does
+not load unchanged: with package paths, COLLADA meshes, or without a free joint.
 """
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -13,7 +14,7 @@ import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import merge_bodies
 from terrainkit_robots.analysis.bodies.tree import build_tree
-from terrainkit_robots.analysis.cached_fact import per_robot
+from terrainkit_robots.analysis.cached_fact import cached_fact
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Geometry, Inertial, Link, RobotModel
@@ -24,96 +25,146 @@ from terrainkit_robots.export.mjcf import Extras, floor_text, mjcf_text
 from terrainkit_robots.mesh.mesh_cache import MeshError
 from terrainkit_robots.mesh.surface import binary_stl
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.simulation.units import PRISMATIC, REVOLUTE, JointUnits
 from terrainkit_robots.text import short
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-_MOST_BODIES = 300
+_MAX_BODIES = 300
 """A robot with more bodies is not simulated: two seconds of it would take minutes."""
 
-_HULL_CORNERS = 64
-"""Corners of a collision mesh's hull; more cost time at every contact, and change little."""
+_MAX_HULL_VERTICES = 64
+"""Vertices of the convex hull of a collision mesh. More slow down every contact for little gain."""
 
 _PRIMITIVES = frozenset({"box", "sphere", "cylinder", "capsule", "ellipsoid"})
 
 TIME_STEP = 0.005
-"""Time step of legged_gym [s], and of the training loop."""
+"""Time step of legged_gym and of the training loop [s]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Plant:
-    """A compiled robot, with a position controller of no gain on each actuated joint.
+class SimModel:
+    """A compiled robot with a position actuator of zero gains on each actuated joint.
 
-    The model is shared by all that ask for the plant: copy it before changing it.
+    The MuJoCo model is shared. Copy it before you change it.
     """
 
     model: Any
     """The `mujoco.MjModel`."""
 
     floating: bool
-    """Whether the base moves freely: then qpos begins with its seven numbers, and qvel with six."""
+    """Whether the base has a free joint: the first 7 elements of qpos, and the first 6 of qvel."""
 
     joints: tuple[str, ...]
     """Moving joints in the order of qpos."""
 
-    drives: tuple[str, ...]
-    """Actuated joints in the order of the actuators."""
+    actuated: tuple[str, ...]
+    """Actuated joints in actuator order."""
 
     base: str
-    """Body that carries the limbs."""
+    """Name of the body that the limbs are attached to."""
 
-    home: Any
-    """qpos of the standing pose, the lowest shape on the floor, shape (nq,)."""
+    standing_qpos: Any
+    """qpos of the standing pose with the lowest shape on the floor, shape (nq,)."""
+
+    @classmethod
+    def from_mujoco(cls, model: Any, *, base: str) -> "SimModel":
+        """Return the simulation model of a MuJoCo model.
+
+        Args:
+            model: The `mujoco.MjModel` of a robot and a floor, with an actuator for each actuated
+                joint.
+            base: Name of the body that the limbs are attached to.
+        """
+        import mujoco
+
+        free = mujoco.mjtJoint.mjJNT_FREE
+        joints = [model.joint(k).name for k in range(model.njnt) if model.jnt_type[k] != free]
+        return cls(
+            model=model,
+            floating=len(joints) < model.njnt,
+            joints=tuple(joints),
+            actuated=tuple(model.actuator(k).name for k in range(model.nu)),
+            base=base,
+            standing_qpos=model.key_qpos[0].copy() if model.nkey else model.qpos0.copy(),
+        )
+
+    @property
+    def base_dofs(self) -> int:
+        """Return the number of degrees of freedom of the base."""
+        return 6 if self.floating else 0
+
+    def units(self, name: str) -> JointUnits:
+        """Return the units of a joint. Any other name, such as that of the base, is revolute."""
+        import mujoco
+
+        if name not in self.joints:
+            return REVOLUTE
+        is_slide = int(self.model.joint(name).type[0]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
+        return PRISMATIC if is_slide else REVOLUTE
+
+    def effort_limit(self, name: str) -> float:
+        """Return the effort limit of an actuated joint [N m] or [N]; infinite if unlimited."""
+        index = self.actuated.index(name)
+        is_limited = self.model.actuator_forcelimited[index]
+        return float(self.model.actuator_forcerange[index, 1]) if is_limited else math.inf
+
+    def qpos_at(self, positions: Mapping[str, float]) -> Any:
+        """Return the standing qpos with other joint positions [rad] or [m], shape (nq,)."""
+        qpos = np.array(self.standing_qpos)
+        start = len(qpos) - len(self.joints)
+        for address, name in enumerate(self.joints, start):
+            qpos[address] = positions.get(name, qpos[address])
+        return qpos
 
 
-@per_robot
-def plant(facts: Facts) -> Plant:
-    """Return the plant of a robot.
+@cached_fact
+def make_sim_model(facts: Facts) -> SimModel:
+    """Return the simulation model of a robot.
 
     Raises:
-        CannotCheckError: if it cannot be simulated, with the reason.
+        CannotCheckError: if the robot cannot be simulated, with the reason.
     """
-    if len(facts.bodies) > _MOST_BODIES:
+    if len(facts.bodies) > _MAX_BODIES:
         raise CannotCheckError(
-            f"it has {len(facts.bodies)} bodies, and of more than {_MOST_BODIES} none is simulated"
+            f"bodies: got {len(facts.bodies)}; expected at most {_MAX_BODIES} to simulate it"
         )
     try:
-        model, assets = _lean(to_canonical(facts).model, facts)
+        model, assets = _keep_collision_shapes(to_canonical(facts).model, facts)
     except RobotFileError as error:
         raise CannotCheckError(str(error)) from None
-    drives = {motor.joint: ActuatorConfig(stiffness=0, damping=0) for motor in model.actuators}
+    actuators = {motor.joint: ActuatorConfig(stiffness=0, damping=0) for motor in model.actuators}
     for joint in model.joints:
-        if joint.name in drives:
+        if joint.name in actuators:
             effort = joint.limit.effort if joint.limit else None
-            drives[joint.name] = ActuatorConfig(
+            actuators[joint.name] = ActuatorConfig(
                 stiffness=0, damping=0, effort=effort, armature=joint.armature
             )
-    height = facts.stance.height if facts.stance else 1.0
     extras = Extras(
-        actuators=drives,
+        actuators=actuators,
         excluded=model.excluded,
         home=facts.positions,
-        height=height,
+        height=facts.stance.height if facts.stance else 1.0,
         time_step=TIME_STEP,
     )
     try:
         compiled = _compile(model, extras, assets)
     except ValueError as error:
         try:
-            compiled = _compile(_lumped(model), extras, assets)
+            compiled = _compile(_merge_inertials(model), extras, assets)
         except ValueError:
-            reason = _reason(str(error))
-            raise CannotCheckError(f"MuJoCo does not simulate it: {reason}") from None
-    return plant_of(compiled, base=model.links[0].name)
+            reason = _compiler_message(str(error))
+            raise CannotCheckError(f"MuJoCo cannot simulate it: {reason}") from None
+    return SimModel.from_mujoco(compiled, base=model.links[0].name)
 
 
-def _reason(error: str) -> str:
-    """Return what MuJoCo said on one line, and of which element, but not where in our text."""
-    what, _, where = error.partition("\nElement ")
-    name = re.match(r"name '(.*?)(?:', id -?\d+(?:, line -?\d+)?)?$", where, re.DOTALL)
-    of = f"{short(' '.join(name[1].split()))}: " if name else ""
-    return of + " ".join(what.removeprefix("Error: ").split())
+def _compiler_message(error: str) -> str:
+    """Return an error of the compiler on one line, with the element but without line numbers."""
+    message, _, location = error.partition("\nElement ")
+    name = re.match(r"name '(.*?)(?:', id -?\d+(?:, line -?\d+)?)?$", location, re.DOTALL)
+    subject = f"{short(' '.join(name[1].split()))}: " if name else ""
+    return subject + " ".join(message.removeprefix("Error: ").split())
 
 
 def _compile(model: RobotModel, extras: Extras, assets: Mapping[str, bytes]) -> Any:
@@ -126,35 +177,14 @@ def _compile(model: RobotModel, extras: Extras, assets: Mapping[str, bytes]) -> 
         return mujoco.MjModel.from_xml_string(text, assets)
 
 
-def plant_of(model: Any, *, base: str) -> Plant:
-    """Return the plant that a MuJoCo model is.
+def _merge_inertials(model: RobotModel) -> RobotModel:
+    """Return a robot whose inertials are merged into the links directly below moving joints.
 
-    Args:
-        model: The `mujoco.MjModel` of a robot and a floor, with an actuator for each driven joint.
-        base: Body that carries the limbs.
-    """
-    import mujoco
-
-    free = mujoco.mjtJoint.mjJNT_FREE
-    hinged = [model.joint(k).name for k in range(model.njnt) if model.jnt_type[k] != free]
-    return Plant(
-        model=model,
-        floating=len(hinged) < model.njnt,
-        joints=tuple(hinged),
-        drives=tuple(model.actuator(k).name for k in range(model.nu)),
-        base=base,
-        home=model.key_qpos[0].copy() if model.nkey else model.qpos0.copy(),
-    )
-
-
-def _lumped(model: RobotModel) -> RobotModel:
-    """Return a robot whose masses are on the links below its moving joints.
-
-    Of the frames and sensors that are fixed to them many have an inertia that MuJoCo refuses.
+    MuJoCo rejects the inertias of many frames and sensors on fixed joints.
     """
     bodies = {body.top.name: body for body in merge_bodies(build_tree(model))}
 
-    def lumped(link: Link) -> Link:
+    def with_body_inertial(link: Link) -> Link:
         body = bodies.get(link.name)
         if body is None or body.mass <= 0:
             return replace(link, inertial=None)
@@ -163,40 +193,34 @@ def _lumped(model: RobotModel) -> RobotModel:
         inertial = Inertial(source=link.source, mass=body.mass, origin=origin, inertia=body.inertia)
         return replace(link, inertial=inertial)
 
-    return replace(model, links=tuple(lumped(link) for link in model.links))
+    return replace(model, links=tuple(with_body_inertial(link) for link in model.links))
 
 
-def _lean(model: RobotModel, facts: Facts) -> tuple[RobotModel, dict[str, bytes]]:
-    """Return a robot with nothing but collision shapes, whose meshes are hulls, and their files."""
+def _keep_collision_shapes(model: RobotModel, facts: Facts) -> tuple[RobotModel, dict[str, bytes]]:
+    """Return a robot with only its collision shapes, with hulls for meshes, and the mesh files."""
     assets: dict[str, bytes] = {}
     files: dict[Path, str] = {}
 
-    def lean(shape: Geometry) -> Geometry | None:
+    def convert(shape: Geometry) -> Geometry | None:
+        if not shape.contacts:
+            return None
         if shape.mesh is None or shape.shape != "mesh":
-            return shape if shape.shape in _PRIMITIVES and shape.contacts else None
+            return shape if shape.shape in _PRIMITIVES else None
         path = shape.mesh.path
         if path not in files:
             try:
-                hull = facts.meshes.hull(path, _HULL_CORNERS)
+                hull = facts.meshes.hull(path, _MAX_HULL_VERTICES)
             except MeshError as error:
                 if facts.meshes.is_readable(shape.mesh) and facts.meshes.is_flat(shape.mesh):
-                    return None  # nothing can be inside of it, and no simulator takes it
+                    return None  # a flat mesh has no volume, and no simulator accepts it
                 raise CannotCheckError(f"its collision mesh {path.name} {error}") from None
             files[path] = f"{len(files)}.stl"
             assets[files[path]] = binary_stl(hull)
         return replace(shape, mesh=replace(shape.mesh, filename=files[path]))
 
-    def slim(link: Link) -> Link:
-        shapes = (lean(shape) for shape in link.collisions if shape.contacts)
-        return replace(link, visuals=(), collisions=tuple(s for s in shapes if s is not None))
-
-    return replace(model, links=tuple(slim(link) for link in model.links)), assets
-
-
-def positions_in(plant: Plant, positions: Mapping[str, float]) -> Any:
-    """Return qpos of a plant at other joint positions [rad] or [m], shape (nq,)."""
-    qpos = np.array(plant.home)
-    start = len(qpos) - len(plant.joints)
-    for place, name in enumerate(plant.joints):
-        qpos[start + place] = positions.get(name, qpos[start + place])
-    return qpos
+    links = []
+    for link in model.links:
+        shapes = (convert(shape) for shape in link.collisions)
+        collisions = tuple(shape for shape in shapes if shape is not None)
+        links.append(replace(link, visuals=(), collisions=collisions))
+    return replace(model, links=tuple(links)), assets

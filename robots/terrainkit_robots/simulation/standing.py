@@ -1,4 +1,4 @@
-"""Standing: the robot at its pose under position control, and what comes of it."""
+"""Let a robot stand in its pose under position control."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -10,94 +10,93 @@ import numpy as np
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.simulation.pd_gains import Gain
-from terrainkit_robots.simulation.rollout import Trial
-from terrainkit_robots.simulation.sim_model import Plant, positions_in
-from terrainkit_robots.transforms import invert_poses
+from terrainkit_robots.simulation.gain import Gain
+from terrainkit_robots.simulation.rollout import Rollout
+from terrainkit_robots.simulation.sim_model import SimModel
+from terrainkit_robots.transforms import invert_poses, quat_to_matrix
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
 
-_LOOKS = 4
-"""The robot is looked at every so many steps: 20 ms."""
+_DECIMATION = 4
+"""Number of steps between observations: 20 ms."""
 
-_END = 0.1
-"""What touches in the last tenth of a second still touches at the end [s]."""
+_FINAL_SECONDS = 0.1
+"""A foot that touches the ground within the last tenth of a second touches it at the end [s]."""
 
-_FOOT_SHARE = 0.3
-"""Share of a leg's length around its tip that is still foot, where that is a part of the shank."""
+_FOOT_RADIUS_RATIO = 0.3
+"""Radius around the tip that counts as foot if the foot is a part of the shank, over leg length."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Foothold:
-    """Where a body may touch the ground."""
+class ContactRegion:
+    """A region of a body that may touch the ground."""
 
     body: str
-    """A body of the simulated robot."""
+    """Name of the body."""
 
-    tip: tuple[float, float, float]
-    """Middle of where it touches in the standing pose, in the body's frame [m]."""
+    center: tuple[float, float, float]
+    """Center of the contact in the standing pose, in the frame of the body [m]."""
 
-    reach: float
-    """Distance from there within which it is the foot that touches [m]; infinite for a body that
-    is nothing but a foot."""
+    radius: float
+    """Radius of the region [m]; infinite if the whole body is a foot."""
 
     foot: str
-    """The link that is the foot of this leg; one leg may have several footholds."""
+    """Name of the link that is the foot of the leg. A leg may have several regions."""
 
     leg_length: float
     """Length of the leg [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Standing:
-    """How a robot stood."""
+class StandResult:
+    """The motion of a robot that was to stand."""
 
     tilt: float
-    """Angle between its up at the start and at the end [rad]."""
+    """Angle between the up direction of the base at the start and at the end [rad]."""
 
-    largest_tilt: float
-    """Largest such angle on the way [rad]."""
+    max_tilt: float
+    """Largest such angle over time [rad]."""
 
     height: float
-    """Height of the base's origin at the end [m]."""
+    """Height of the base at the end [m]."""
 
-    sink: float
-    """How much less that is than at the start [m]."""
+    height_loss: float
+    """Height of the base at the start minus that at the end [m]."""
 
     drift: float
-    """How far the base's origin moved over the ground [m]."""
+    """Horizontal distance that the base moved [m]."""
 
     leg_length: float
-    """Length of its shortest leg [m]; infinite without footholds."""
+    """Length of the shortest leg [m]; infinite without contact regions."""
 
-    touching: tuple[str, ...]
-    """Bodies other than feet that touched the ground, in the order of the robot's bodies."""
+    other_contacts: tuple[str, ...]
+    """Bodies that touched the ground outside of the contact regions, in the order of the bodies."""
 
-    lifted: tuple[str, ...]
+    lifted_feet: tuple[str, ...]
     """Feet that did not touch the ground at the end, in the order of the legs."""
 
     saturation: float
-    """Largest torque over effort in the second half, in 0..1; 0 if no effort is limited."""
+    """Largest torque over effort limit in the second half, in 0..1; 0 if all are unlimited."""
 
-    saturated: str
-    """The joint that had it; empty if no effort is limited."""
+    saturated_joint: str
+    """The joint with that torque; empty if all are unlimited."""
 
     joint_error: float
     """Largest distance of a joint from its target at the end [rad] or [m]."""
 
-    blew_up: bool
-    """Whether a position, speed or acceleration stopped being a number, or was huge."""
+    diverged: bool
+    """Whether a position, velocity or acceleration was not finite, or huge."""
 
     seconds: float
-    """How long it was simulated: less than asked for if it blew up [s]."""
+    """Simulated time [s]; shorter than requested if the simulation diverged."""
 
 
-def footholds(facts: "Facts") -> tuple[Foothold, ...]:
+def contact_regions(facts: "Facts") -> tuple[ContactRegion, ...]:
     """Return where a robot with legs may touch the ground.
 
-    A link that is the foot may anywhere. A shank may with its tip, where the foot is a part of it,
-    but not with its knee.
+    A separate foot link may touch it anywhere. If the foot is a part of the shank, only the tip of
+    the shank may.
     """
     if facts.stance is None:
         return ()
@@ -105,17 +104,16 @@ def footholds(facts: "Facts") -> tuple[Foothold, ...]:
     poses = body_poses(facts.bodies, facts.positions)
     for leg, contact in zip(facts.legs, facts.stance.contacts, strict=True):
         body = facts.bodies[leg.limb.chain[-1]]
-        whole = "knee" in leg.roles[:-1]  # past an ankle there is nothing but foot
-        place = invert_poses(poses[body.index]) @ [*contact, 1.0]
+        has_ankle = "knee" in leg.roles[:-1]  # the body below an ankle is a foot
+        point = invert_poses(poses[body.index]) @ [*contact, 1.0]
         for link, local in zip(body.links, body.poses, strict=True):
-            only = whole or (link.name == leg.foot and link is not body.top)
-            x, y, z = (invert_poses(local) @ place)[:3].tolist()
-            reach = math.inf if only else _FOOT_SHARE * leg.length
+            is_foot = has_ankle or (link.name == leg.foot and link is not body.top)
+            x, y, z = (invert_poses(local) @ point)[:3].tolist()
             found.append(
-                Foothold(
+                ContactRegion(
                     body=link.name,
-                    tip=(x, y, z),
-                    reach=reach,
+                    center=(x, y, z),
+                    radius=math.inf if is_foot else _FOOT_RADIUS_RATIO * leg.length,
                     foot=leg.foot,
                     leg_length=leg.length,
                 )
@@ -123,140 +121,132 @@ def footholds(facts: "Facts") -> tuple[Foothold, ...]:
     return tuple(found)
 
 
-def stand_still(
-    plant: Plant,
+def stand_test(
+    sim: SimModel,
     gains: Mapping[str, Gain],
     *,
     positions: Mapping[str, float],
-    feet: Sequence[Foothold] = (),
+    regions: Sequence[ContactRegion] = (),
     seconds: float = 2.0,
     self_collision: bool = True,
     joints_locked: bool = False,
-) -> Standing:
-    """Let a robot stand, its motors holding its joints.
+) -> StandResult:
+    """Simulate a robot that holds its pose.
 
     Args:
-        plant: The robot.
-        gains: Gain of each actuated joint.
-        positions: Position of each joint at the start, and the target of its motor [rad] or [m].
-        feet: Where it may touch the ground; unless told, nowhere.
-        seconds: How long to simulate [s].
-        self_collision: Whether the robot can touch itself.
-        joints_locked: Whether the joints cannot move at all.
+        sim: The robot.
+        gains: Gains of each actuated joint.
+        positions: Initial position of each joint, and target of its actuator [rad] or [m].
+        regions: Where the robot may touch the ground; nowhere by default.
+        seconds: Time to simulate [s].
+        self_collision: Whether the shapes of the robot collide with each other.
+        joints_locked: Whether the joints are immovable.
 
     Raises:
-        CannotCheckError: if it is bolted down, or simulating it would take too long.
+        CannotCheckError: if the base is fixed, or the simulation would take too long.
     """
-    if not plant.floating:
+    if not sim.floating:
         raise CannotCheckError("it does not stand: its base is fixed to the world")
     with quiet_mujoco():
-        trial = Trial(plant, {} if joints_locked else gains, self_collision=self_collision)
+        rollout = Rollout(sim, {} if joints_locked else gains, self_collision=self_collision)
         if joints_locked:
-            trial.lock()
-        qpos = positions_in(plant, positions)
-        trial.put(qpos, above=0.0)
-        watch = _Watch(trial, positions, feet, seconds)
-        for step in trial.steps(seconds):
-            watch.look(step)
-        return watch.result()
+            rollout.lock_joints()
+        rollout.reset(sim.qpos_at(positions), clearance=0.0)
+        monitor = _Monitor(rollout, positions, regions, seconds)
+        for step in rollout.steps(seconds):
+            monitor.update(step)
+        return monitor.result()
 
 
 @dataclass(eq=False)
-class _Watch:
-    """What is seen of a robot while it stands."""
+class _Monitor:
+    """Accumulates the measurements while a robot stands."""
 
-    trial: Trial
+    rollout: Rollout
     positions: Mapping[str, float]
-    feet: Sequence[Foothold]
+    regions: Sequence[ContactRegion]
     seconds: float
-    largest_tilt: float = 0.0
-    touched: set[int] = field(default_factory=set)
-    standing_on: set[str] = field(default_factory=set)
+    max_tilt: float = 0.0
+    other_bodies: set[int] = field(default_factory=set)
+    contact_feet: set[str] = field(default_factory=set)
     steps: int = 0
 
     def __post_init__(self) -> None:
-        trial = self.trial
-        plant, model = trial.plant, trial.model
-        self.start = trial.data.qpos[:3].copy()
-        self.up = _up(trial.data.qpos[3:7])
-        targets = dict(zip(plant.joints, trial.data.qpos[7:], strict=True)) | dict(self.positions)
-        trial.data.ctrl[:] = [targets[name] for name in plant.drives]
-        self.targets = np.array([targets[name] for name in plant.joints])
+        import mujoco
+
+        sim, model, data = self.rollout.sim, self.rollout.model, self.rollout.data
+        self.start = data.qpos[:3].copy()
+        self.up = quat_to_matrix(data.qpos[3:7])[:, 2]
+        targets = dict(zip(sim.joints, data.qpos[7:], strict=True)) | dict(self.positions)
+        data.ctrl[:] = [targets[name] for name in sim.actuated]
+        self.targets = np.array([targets[name] for name in sim.joints])
         ranges = model.actuator_forcerange[:, 1]
         limited = (model.actuator_forcelimited != 0) & (ranges > 0)
         self.efforts = np.where(limited, ranges, np.inf)
-        self.shares = np.zeros(model.nu)
-        self.holds = {
-            model.body(foot.body).id: foot for foot in self.feet if _has(model, foot.body)
-        }
+        self.saturation = np.zeros(model.nu)
+        self.region_of: dict[int, ContactRegion] = {}
+        for region in self.regions:
+            body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, region.body)
+            if body >= 0:
+                self.region_of[body] = region
 
-    def look(self, step: int) -> None:
-        """See how it stands after a step."""
+    def update(self, step: int) -> None:
+        """Measure the state after a step."""
         self.steps = step + 1
-        if step % _LOOKS:
+        if step % _DECIMATION:
             return
-        data, time = self.trial.data, step * float(self.trial.model.opt.timestep)
-        self.largest_tilt = max(self.largest_tilt, self._tilt())
+        data, time = self.rollout.data, step * float(self.rollout.model.opt.timestep)
+        self.max_tilt = max(self.max_tilt, self._tilt())
         if 2 * time >= self.seconds:
-            shares = np.abs(data.actuator_force) / self.efforts
-            np.maximum(self.shares, shares, out=self.shares)
-        self._touch(ending=time >= self.seconds - _END)
+            saturation = np.abs(data.actuator_force) / self.efforts
+            np.maximum(self.saturation, saturation, out=self.saturation)
+        self._record_contacts(is_final=time >= self.seconds - _FINAL_SECONDS)
 
     def _tilt(self) -> float:
-        return math.acos(np.clip(self.up @ _up(self.trial.data.qpos[3:7]), -1.0, 1.0))
+        up = quat_to_matrix(self.rollout.data.qpos[3:7])[:, 2]
+        return math.acos(np.clip(self.up @ up, -1.0, 1.0))
 
-    def _touch(self, *, ending: bool) -> None:
-        """Note which bodies touch the floor with anything but a foot, and which feet in the end."""
-        model, data = self.trial.model, self.trial.data
+    def _record_contacts(self, *, is_final: bool) -> None:
+        """Record the bodies that touch the floor outside of their region, and the final feet."""
+        model, data = self.rollout.model, self.rollout.data
         pairs = model.geom_bodyid[data.contact.geom]
         for contact in np.flatnonzero((pairs == 0).any(axis=1)):
             body = int(pairs[contact].max())
-            foot = self.holds.get(body)
-            if foot is None or not self._within(foot, body, data.contact.pos[contact]):
-                self.touched.add(body)
-            elif ending:
-                self.standing_on.add(foot.foot)
+            region = self.region_of.get(body)
+            if region is None or not self._is_within(region, body, data.contact.pos[contact]):
+                self.other_bodies.add(body)
+            elif is_final:
+                self.contact_feet.add(region.foot)
 
-    def _within(self, foot: Foothold, body: int, place: Any) -> bool:
-        """Return whether a place on a body is a part of its foot."""
-        if math.isinf(foot.reach):
+    def _is_within(self, region: ContactRegion, body: int, point: Any) -> bool:
+        if math.isinf(region.radius):
             return True
-        data = self.trial.data
-        tip = data.xpos[body] + data.xmat[body].reshape(3, 3) @ foot.tip
-        return bool(np.linalg.norm(place - tip) <= foot.reach)
+        data = self.rollout.data
+        center = data.xpos[body] + data.xmat[body].reshape(3, 3) @ region.center
+        return bool(np.linalg.norm(point - center) <= region.radius)
 
-    def result(self) -> Standing:
-        """Return what was seen."""
-        trial, data = self.trial, self.trial.data
+    def result(self) -> StandResult:
+        """Return the measurements."""
+        rollout, data = self.rollout, self.rollout.data
         error = np.abs(data.qpos[7:] - self.targets)
-        moved = data.qpos[:3] - self.start
-        most = int(np.argmax(self.shares)) if len(self.shares) else 0
-        share = float(self.shares[most]) if len(self.shares) else 0.0
-        feet = dict.fromkeys(hold.foot for hold in self.holds.values())
-        return Standing(
+        motion = data.qpos[:3] - self.start
+        joint = int(np.argmax(self.saturation)) if len(self.saturation) else 0
+        saturation = float(self.saturation[joint]) if len(self.saturation) else 0.0
+        feet = dict.fromkeys(region.foot for region in self.region_of.values())
+        return StandResult(
             tilt=self._tilt(),
-            largest_tilt=max(self.largest_tilt, self._tilt()),
+            max_tilt=max(self.max_tilt, self._tilt()),
             height=float(data.qpos[2]),
-            sink=-float(moved[2]),
-            drift=float(np.hypot(moved[0], moved[1])),
-            leg_length=min((foot.leg_length for foot in self.feet), default=math.inf),
-            touching=tuple(trial.model.body(body).name for body in sorted(self.touched)),
-            lifted=tuple(foot for foot in feet if foot not in self.standing_on),
-            saturation=share,
-            saturated=trial.plant.drives[most] if share > 0 else "",
+            height_loss=-float(motion[2]),
+            drift=float(np.hypot(motion[0], motion[1])),
+            leg_length=min((region.leg_length for region in self.regions), default=math.inf),
+            other_contacts=tuple(
+                rollout.model.body(body).name for body in sorted(self.other_bodies)
+            ),
+            lifted_feet=tuple(foot for foot in feet if foot not in self.contact_feet),
+            saturation=saturation,
+            saturated_joint=rollout.sim.actuated[joint] if saturation > 0 else "",
             joint_error=float(error.max(initial=0.0)),
-            blew_up=trial.blew_up,
-            seconds=self.steps * float(trial.model.opt.timestep),
+            diverged=rollout.diverged,
+            seconds=self.steps * float(rollout.model.opt.timestep),
         )
-
-
-def _up(quaternion: Any) -> Any:
-    """Return the world's z axis of a frame with this orientation, shape (3,)."""
-    w, x, y, z = quaternion
-    return np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])
-
-
-def _has(model: Any, body: str) -> bool:
-    import mujoco
-
-    return int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body)) >= 0

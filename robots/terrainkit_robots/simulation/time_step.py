@@ -1,113 +1,107 @@
-"""Step size: what inertia each joint has, and how long a time step of simulation it bears.
+"""Compute the inertia of each joint, and the longest time step at which PD control is stable.
 
-Training computes torque = kp (target - q) - kd dq once per time step. A light joint answers so fast
-that the torque comes too late, and shakes itself to pieces. Motors of a simulator that solve for
-the damping, as MuJoCo's implicitfast does, are spared that.
+Training computes torque = kp (target - q) - kd dq once per time step. A light joint responds so
+fast that the torque comes too late, and oscillates. Actuators of a simulator that integrates the
+damping implicitly, such as MuJoCo's implicitfast, do not have this problem.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.simulation.sim_model import TIME_STEP, Plant
+from terrainkit_robots.simulation.gain import Gain
+from terrainkit_robots.simulation.sim_model import TIME_STEP, SimModel
 
-if TYPE_CHECKING:
-    from terrainkit_robots.simulation.pd_gains import Gain
-
-_BRISK = 0.4
-"""Natural frequency times the time step that is still quiet: a joint with critical damping shakes
-from 0.83 on, and others that move along make it lighter."""
+_MAX_FREQUENCY_STEP = 0.4
+"""Natural frequency times time step, at most. A joint with critical damping oscillates from 0.83
+on, and joints that move along reduce its inertia."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class JointInertia:
-    """Inertia of a joint with armature, in the standing pose [kg m2] or [kg]."""
+    """Inertia of a joint in the standing pose, including armature [kg m2] or [kg]."""
 
     free: float
-    """When all other joints and the base give way: what a sudden torque has to turn."""
+    """Inertia when all other joints and the base are free: the response to a sudden torque."""
 
     locked: float
-    """When nothing else moves."""
+    """Inertia when nothing else moves."""
 
 
-def joint_inertias(plant: Plant) -> Mapping[str, JointInertia]:
+def joint_inertias(sim: SimModel) -> Mapping[str, JointInertia]:
     """Return the inertia of each moving joint, by name."""
-    mass, inverse = _mass_matrix(plant)
+    mass, inverse = _mass_matrix(sim)
     return {
         name: JointInertia(free=float(1 / inverse[dof, dof]), locked=float(mass[dof, dof]))
-        for dof, name in enumerate(plant.joints, free_dofs(plant))
+        for dof, name in enumerate(sim.joints, sim.base_dofs)
     }
 
 
-def free_dofs(plant: Plant) -> int:
-    """Return how many degrees of freedom the base has."""
-    return 6 if plant.floating else 0
-
-
-def stable_stiffness(inertia: float, step: float = TIME_STEP) -> float:
-    """Return the stiffness that a joint bears with critical damping [N m/rad] or [N/m].
+def max_stable_stiffness(inertia: float, time_step: float = TIME_STEP) -> float:
+    """Return the stiffness up to which critical damping is stable [N m/rad] or [N/m].
 
     Args:
-        inertia: What it turns when all others give way [kg m2] or [kg].
-        step: The time step [s].
+        inertia: Inertia of the joint when all others are free [kg m2] or [kg].
+        time_step: Time step [s].
     """
-    return (_BRISK / step) ** 2 * inertia
+    return (_MAX_FREQUENCY_STEP / time_step) ** 2 * inertia
 
 
-def needed_inertia(stiffness: float, step: float = TIME_STEP) -> float:
-    """Return the inertia with which a joint bears a stiffness [kg m2] or [kg]."""
-    return stiffness * (step / _BRISK) ** 2
+def min_stable_inertia(stiffness: float, time_step: float = TIME_STEP) -> float:
+    """Return the inertia from which a stiffness with critical damping is stable [kg m2] or [kg]."""
+    return stiffness * (time_step / _MAX_FREQUENCY_STEP) ** 2
 
 
 @dataclass(frozen=True, kw_only=True)
-class StepSize:
-    """The longest time step at which a robot under explicit PD does not shake."""
+class StableTimeStep:
+    """The longest time step at which a robot is stable under explicit PD control."""
 
     seconds: float
     """Time step [s]; infinite without gains."""
 
     joint: str
-    """The joint that shakes first; empty without gains."""
+    """The joint that becomes unstable first; empty without gains."""
 
 
-def longest_step(plant: Plant, gains: Mapping[str, "Gain"]) -> StepSize:
-    """Return the longest stable time step of explicit PD in the standing pose, all joints at once.
+def max_stable_time_step(sim: SimModel, gains: Mapping[str, Gain]) -> StableTimeStep:
+    """Return the longest stable time step of explicit PD control in the standing pose.
 
-    With M, D and K the matrices of mass, damping and stiffness, and positions that take the new
-    speed, M (q+ - 2 q + q-) + h D (q - q-) + h^2 K q = 0. Each motion x makes that a quadratic of
-    positive numbers whose roots are inside the unit circle if and only if x'(4 M - 2 h D - h^2 K)x
-    is positive (Jury's criterion): the step h is stable as long as this matrix is.
+    With mass, damping and stiffness matrices M, D and K, and semi-implicit integration,
+    M (q+ - 2 q + q-) + h D (q - q-) + h^2 K q = 0. For each motion x this is a quadratic equation
+    with positive coefficients. By Jury's criterion its roots are inside the unit circle if and only
+    if x'(4 M - 2 h D - h^2 K)x is positive. The time step h is stable if this matrix is positive
+    definite.
     """
-    mass, _ = _mass_matrix(plant)
+    mass, _ = _mass_matrix(sim)
     stiffness, damping = np.zeros(len(mass)), np.zeros(len(mass))
-    for dof, name in enumerate(plant.joints, free_dofs(plant)):
+    for dof, name in enumerate(sim.joints, sim.base_dofs):
         if name in gains:
             stiffness[dof], damping[dof] = gains[name].stiffness, gains[name].damping
-            armature = plant.model.dof_armature[dof]
+            armature = sim.model.dof_armature[dof]
             mass[dof, dof] += max(gains[name].armature - armature, 0.0)
     if not (stiffness.any() or damping.any()):
-        return StepSize(seconds=np.inf, joint="")
+        return StableTimeStep(seconds=np.inf, joint="")
 
-    def rest(step: float) -> Any:
-        return 4 * mass - np.diag(2 * step * damping + step**2 * stiffness)
+    def criterion(time_step: float) -> Any:
+        return 4 * mass - np.diag(2 * time_step * damping + time_step**2 * stiffness)
 
     stable, unstable = 0.0, 1.0
     for _ in range(30):
         middle = (stable + unstable) / 2
-        if _is_positive(rest(middle)):
+        if _is_positive_definite(criterion(middle)):
             stable = middle
         else:
             unstable = middle
-    shaking = np.linalg.eigh(rest(unstable))[1][:, 0]
-    loudest = int(np.argmax((2 * damping + unstable * stiffness) * shaking**2))
-    return StepSize(seconds=stable, joint=plant.joints[loudest - free_dofs(plant)])
+    motion = np.linalg.eigh(criterion(unstable))[1][:, 0]
+    dof = int(np.argmax((2 * damping + unstable * stiffness) * motion**2))
+    return StableTimeStep(seconds=stable, joint=sim.joints[dof - sim.base_dofs])
 
 
-def _is_positive(matrix: Any) -> bool:
+def _is_positive_definite(matrix: Any) -> bool:
     try:
         np.linalg.cholesky(matrix)
     except np.linalg.LinAlgError:
@@ -115,13 +109,13 @@ def _is_positive(matrix: Any) -> bool:
     return True
 
 
-def _mass_matrix(plant: Plant) -> tuple[Any, Any]:
-    """Return the mass matrix in the standing pose and its inverse, shape (nv, nv)."""
+def _mass_matrix(sim: SimModel) -> tuple[Any, Any]:
+    """Return the mass matrix in the standing pose and its inverse, each of shape (nv, nv)."""
     import mujoco
 
-    model = plant.model
+    model = sim.model
     data = mujoco.MjData(model)
-    data.qpos[:] = plant.home
+    data.qpos[:] = sim.standing_qpos
     mass, inverse = np.zeros((model.nv, model.nv)), np.zeros((model.nv, model.nv))
     with quiet_mujoco():
         mujoco.mj_fwdPosition(model, data)
@@ -129,5 +123,5 @@ def _mass_matrix(plant: Plant) -> tuple[Any, Any]:
             mujoco.mj_mulM(model, data, row, unit)
         mujoco.mj_solveM(model, data, inverse, np.eye(model.nv))
     if not (np.isfinite(inverse).all() and (np.diag(inverse) > 0).all()):
-        raise CannotCheckError("its mass matrix cannot be inverted")
+        raise CannotCheckError("its mass matrix is singular")
     return mass, inverse

@@ -54,7 +54,7 @@ def test_facts_of_a_small_robot():
         "c": 1,
         "d": 2,
     }
-    assert len(robot.at_zero) == 3
+    assert len(robot.zero_poses) == 3
     assert robot.limbs == robot.legs == ()
     assert robot.stance is None
     assert robot.positions["bc"] == 0.2
@@ -65,9 +65,9 @@ def test_facts_of_nothing():
     assert robot.bodies == robot.links == robot.joints == robot.actuated == ()
     assert robot.body_of == robot.positions == {}
     assert robot.total_mass == 0
-    assert robot.at_zero == robot.limbs == robot.legs == robot.mirror.pairs == ()
+    assert robot.zero_poses == robot.limbs == robot.legs == robot.mirror.pairs == ()
     assert robot.stance is None
-    assert robot.overlaps.overlaps({}) == []
+    assert robot.overlap_scene.detect({}) == []
 
 
 def test_what_is_no_robot_has_no_facts():
@@ -78,7 +78,16 @@ def test_what_is_no_robot_has_no_facts():
 
 def test_each_fact_is_worked_out_once():
     robot = facts(ROBOT)
-    for name in ("tree", "bodies", "at_zero", "limbs", "legs", "mirror", "positions", "overlaps"):
+    for name in (
+        "tree",
+        "bodies",
+        "zero_poses",
+        "limbs",
+        "legs",
+        "mirror",
+        "positions",
+        "overlap_scene",
+    ):
         assert getattr(robot, name) is getattr(robot, name)
 
 
@@ -144,7 +153,7 @@ def test_no_mesh_is_opened_before_one_is_needed(robot_file):
     robot = Facts(load_robot(robot_file("g1/g1_29dof.urdf")), meshes)
     assert len(robot.bodies) == 30
     assert robot.total_mass > 30
-    assert len(robot.at_zero) == 30
+    assert len(robot.zero_poses) == 30
     assert not meshes.opened
 
 

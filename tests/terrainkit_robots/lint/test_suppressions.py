@@ -13,7 +13,7 @@ def covered(data):
     """Return the lines of the elements that the comment in `data` covers; 0 is the file."""
     (comment,) = read_comments(Path("robot.urdf"), data)
     starts = [i for i, line in enumerate(data.split(b"\n"), 1) if re.search(rb"<[a-z]", line)]
-    return [line for line in (0, *starts) if comment.is_covering(line)]
+    return [line for line in (0, *starts) if comment.applies_to(line)]
 
 
 @pytest.mark.parametrize(

@@ -258,7 +258,7 @@ def test_onboard_reports_failed_standing_test(tmp_path, monkeypatch):
     def fail(*_arguments, **_options):
         raise CannotCheckError("300 contacts at once")
 
-    monkeypatch.setattr("terrainkit_robots.simulation.standing.stand_still", fail)
+    monkeypatch.setattr("terrainkit_robots.simulation.standing.stand_test", fail)
     result = onboard(QUADRUPED, tmp_path / "robot", options())
     assert not result.verification.is_stable
     assert dict(summarize(result))["standing"] == "not simulated: 300 contacts at once"

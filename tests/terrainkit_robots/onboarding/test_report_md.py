@@ -15,25 +15,25 @@ from terrainkit_robots.onboarding.pipeline import OnboardResult
 from terrainkit_robots.onboarding.report_md import report_markdown
 from terrainkit_robots.onboarding.robot_files import RobotFiles
 from terrainkit_robots.onboarding.verify import Verification
-from terrainkit_robots.simulation.pd_gains import Gain
-from terrainkit_robots.simulation.standing import Standing
+from terrainkit_robots.simulation.gain import Gain
+from terrainkit_robots.simulation.standing import StandResult
 
 NASTY = 'a|b`c*_<b>@me\x1b[31m\r\n# title\u202e\udc80"$'
 """A name with characters that could break a table or a terminal."""
 
-STOOD = Standing(
+STOOD = StandResult(
     tilt=0.01,
-    largest_tilt=0.02,
+    max_tilt=0.02,
     height=0.3125,
-    sink=0.004,
+    height_loss=0.004,
     drift=0.0012,
     leg_length=0.4,
-    touching=(),
-    lifted=(),
+    other_contacts=(),
+    lifted_feet=(),
     saturation=0.413,
-    saturated="FL_calf_joint",
+    saturated_joint="FL_calf_joint",
     joint_error=0.02,
-    blew_up=False,
+    diverged=False,
     seconds=5.0,
 )
 
@@ -190,7 +190,7 @@ def test_report_standing_test(quadruped):
 
 
 def test_report_failed_standing_test(quadruped):
-    fell = replace(STOOD, tilt=1.5, touching=("base", "FL_hip"), blew_up=True, seconds=0.3)
+    fell = replace(STOOD, tilt=1.5, other_contacts=("base", "FL_hip"), diverged=True, seconds=0.3)
     verification = Verification(equivalences=(), standing=fell, joints_locked=True)
     text = section(report_markdown(replace(quadruped, verification=verification)), "Standing test")
     assert "**It does not stand**, with locked joints" in text
@@ -283,7 +283,7 @@ def test_report_escapes_names(quadruped):
     )
     verification = Verification(
         equivalences=(equivalence(NASTY, link=NASTY),),
-        standing=replace(STOOD, touching=(NASTY,), saturated=NASTY),
+        standing=replace(STOOD, other_contacts=(NASTY,), saturated_joint=NASTY),
     )
     result = replace(
         quadruped,

@@ -6,8 +6,8 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.simulation.drop import let_fall
-from terrainkit_robots.simulation.sim_model import plant
+from terrainkit_robots.simulation.drop import drop_test
+from terrainkit_robots.simulation.sim_model import make_sim_model
 
 PENDULUM = """
 <robot name="pendulum">
@@ -27,33 +27,33 @@ PENDULUM = """
 def read(folder, text):
     path = folder / "robot.urdf"
     path.write_text(text)
-    return plant(Facts(load_robot(path)))
+    return make_sim_model(Facts(load_robot(path)))
 
 
 def test_a_pendulum_is_fastest_at_the_bottom(tmp_path):
-    drop = let_fall(read(tmp_path, PENDULUM))
+    drop = drop_test(read(tmp_path, PENDULUM))
     inertia = 0.01 + 2 * 0.5**2
-    assert drop.top_speed == pytest.approx(math.sqrt(2 * 2 * 9.81 * 0.5 / inertia), rel=0.02)
-    assert (drop.fastest, drop.blew_up, drop.seconds) == ("j", False, pytest.approx(1.5))
+    assert drop.max_speed == pytest.approx(math.sqrt(2 * 2 * 9.81 * 0.5 / inertia), rel=0.02)
+    assert (drop.fastest_joint, drop.diverged, drop.seconds) == ("j", False, pytest.approx(1.5))
 
 
 @pytest.mark.parametrize("name", bundled.names())
 def test_healthy_robots_come_down_gently_and_alike_each_time(name):
-    scene = plant(Facts(load_robot(bundled.find(name))))
-    before = scene.home.copy(), scene.model.geom_contype.copy()
-    drop = let_fall(scene)
-    assert not drop.blew_up
-    assert 2 < drop.top_speed < 40
-    assert drop == let_fall(scene)
-    np.testing.assert_array_equal(scene.home, before[0])
-    np.testing.assert_array_equal(scene.model.geom_contype, before[1])
+    sim = make_sim_model(Facts(load_robot(bundled.find(name))))
+    before = sim.standing_qpos.copy(), sim.model.geom_contype.copy()
+    drop = drop_test(sim)
+    assert not drop.diverged
+    assert 2 < drop.max_speed < 40
+    assert drop == drop_test(sim)
+    np.testing.assert_array_equal(sim.standing_qpos, before[0])
+    np.testing.assert_array_equal(sim.model.geom_contype, before[1])
 
 
 def test_a_robot_that_blows_up_is_noticed(tmp_path):
-    scene = read(tmp_path, PENDULUM)
-    scene.model.opt.gravity[2] = -1e12
-    drop = let_fall(scene)
-    assert drop.blew_up
+    sim = read(tmp_path, PENDULUM)
+    sim.model.opt.gravity[2] = -1e12
+    drop = drop_test(sim)
+    assert drop.diverged
     assert drop.seconds < 1.5
 
 
@@ -62,7 +62,7 @@ def test_a_robot_without_joints_falls_as_one(tmp_path):
       <inertial><mass value="1"/>
         <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
       <collision><geometry><sphere radius="0.1"/></geometry></collision></link></robot>"""
-    drop = let_fall(read(tmp_path, text))
-    assert drop.fastest == "base"
-    assert drop.top_speed < 0.1
-    assert not drop.blew_up
+    drop = drop_test(read(tmp_path, text))
+    assert drop.fastest_joint == "base"
+    assert drop.max_speed < 0.1
+    assert not drop.diverged

@@ -5,8 +5,8 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.simulation.joint_sweep import sweep
-from terrainkit_robots.simulation.sim_model import plant
+from terrainkit_robots.simulation.joint_sweep import joint_sweep
+from terrainkit_robots.simulation.sim_model import make_sim_model
 
 CRANE = """
 <robot name="crane">
@@ -48,7 +48,7 @@ CRANE = """
 def crane(tmp_path):
     path = tmp_path / "robot.urdf"
     path.write_text(CRANE)
-    return {reach.joint: reach for reach in sweep(plant(Facts(load_robot(path))))}
+    return {result.joint: result for result in joint_sweep(make_sim_model(Facts(load_robot(path))))}
 
 
 def test_a_wall_stops_a_boom(crane):
@@ -64,26 +64,29 @@ def test_a_wall_stops_a_boom(crane):
 def test_gravity_is_held(crane):
     hook = crane["hook_joint"]
     assert hook.load == pytest.approx(0.5 * 9.81 * 0.2)
-    assert hook.largest_load == pytest.approx(0.5 * 9.81 * 0.2)
+    assert hook.max_load == pytest.approx(0.5 * 9.81 * 0.2)
     assert hook.effort == 10
     assert hook.share == pytest.approx(1)
-    assert crane["swing"].largest_load == pytest.approx(0, abs=1e-9)
+    assert crane["swing"].max_load == pytest.approx(0, abs=1e-9)
 
 
 def test_all_limited_joints_are_swept_in_the_order_of_the_motors():
     facts = Facts(load_robot(bundled.find("biped")))
-    scene = plant(facts)
-    reaches = sweep(scene)
-    assert tuple(reach.joint for reach in reaches) == scene.drives
-    assert reaches == sweep(scene)
-    for reach in reaches:
-        assert reach.limits[0] <= reach.reached[0] <= reach.reached[1] <= reach.limits[1]
-        assert reach.load < reach.effort
+    sim = make_sim_model(facts)
+    results = joint_sweep(sim)
+    assert tuple(result.joint for result in results) == sim.actuated
+    assert results == joint_sweep(sim)
+    for result in results:
+        assert result.limits[0] <= result.reached[0] <= result.reached[1] <= result.limits[1]
+        assert result.load < result.effort
 
 
 def test_left_and_right_reach_the_same():
-    reaches = {r.joint: r for r in sweep(plant(Facts(load_robot(bundled.find("quadruped")))))}
-    left, right = reaches["FL_hip_joint"], reaches["FR_hip_joint"]
+    results = {
+        r.joint: r
+        for r in joint_sweep(make_sim_model(Facts(load_robot(bundled.find("quadruped")))))
+    }
+    left, right = results["FL_hip_joint"], results["FR_hip_joint"]
     assert left.reached[0] == pytest.approx(-right.reached[1], abs=1e-9)
     assert left.share < 0.9  # the feet meet under the trunk
     assert set(left.blocked[0]) == {"FL_foot", "FR_foot"}
@@ -96,6 +99,8 @@ def test_a_joint_that_follows_is_moved_along(tmp_path):
     )
     path = tmp_path / "robot.urdf"
     path.write_text(text)
-    reaches = {reach.joint: reach for reach in sweep(plant(Facts(load_robot(path))))}
-    assert set(reaches) == {"lift", "swing"}
-    assert reaches["swing"].share < 1
+    results = {
+        result.joint: result for result in joint_sweep(make_sim_model(Facts(load_robot(path))))
+    }
+    assert set(results) == {"lift", "swing"}
+    assert results["swing"].share < 1

@@ -12,8 +12,8 @@ from terrainkit_robots.lint.fixes.apply import fix_robot
 from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.simulation.pd_gains import suggest_gains
-from terrainkit_robots.simulation.sim_model import TIME_STEP, plant
-from terrainkit_robots.simulation.time_step import longest_step
+from terrainkit_robots.simulation.sim_model import TIME_STEP, make_sim_model
+from terrainkit_robots.simulation.time_step import max_stable_time_step
 
 BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]
 
@@ -150,7 +150,7 @@ def test_they_are_within_a_factor_of_what_people_train_with(name, robot_file):
 def test_every_motor_has_one_and_twins_have_the_same(name, robot_file):
     facts = facts_of(name, robot_file)
     found = suggest_gains(facts)
-    assert tuple(found) == plant(facts).drives
+    assert tuple(found) == make_sim_model(facts).actuated
     for pair in facts.mirror.pairs:
         left, right = (facts.bodies[index].joint for index in (pair.left, pair.right))
         assert found[left.name] == found[right.name]
@@ -169,7 +169,9 @@ def test_they_are_round_and_say_why(name, robot_file):
 @every_robot
 def test_explicit_control_is_stable_with_them_at_the_time_step_of_training(name, robot_file):
     facts = facts_of(name, robot_file)
-    assert longest_step(plant(facts), suggest_gains(facts)).seconds > 1.1 * TIME_STEP
+    assert (
+        max_stable_time_step(make_sim_model(facts), suggest_gains(facts)).seconds > 1.1 * TIME_STEP
+    )
 
 
 @every_robot
@@ -201,7 +203,7 @@ def test_an_arm_holds_its_weight_within_a_degree(tmp_path):
 def test_a_weak_motor_is_not_asked_for_all_it_has_at_a_small_error(tmp_path):
     gain = suggest_gains(written(tmp_path, ARM.format(kind="revolute", effort="10")))["shoulder"]
     assert gain.stiffness == pytest.approx(20)
-    assert "effort of 10 N m at an error of 0.5 rad" in gain.reason
+    assert "effort limit of 10 N m at an error of 0.5 rad" in gain.reason
 
 
 @pytest.mark.parametrize(("effort", "why"), [("1e5", "N within 0.002 m"), ("10", "10 N at an err")])

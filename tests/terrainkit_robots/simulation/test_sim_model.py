@@ -7,7 +7,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.simulation.sim_model import TIME_STEP, plant, plant_of, positions_in
+from terrainkit_robots.simulation.sim_model import TIME_STEP, SimModel, make_sim_model
 
 ROBOTS = [(name, suffix) for name in bundled.names() for suffix in (".urdf", ".xml")]
 BASES = {"quadruped": "base", "biped": "pelvis"}
@@ -44,26 +44,26 @@ def arm(tmp_path):
 
 
 def test_its_names_are_those_of_the_robot(facts):
-    scene = plant(facts)
-    assert scene.floating
-    assert scene.base == BASES[facts.model.name]
-    assert scene.drives == tuple(joint.name for joint in facts.actuated)
-    assert set(scene.joints) == {joint.name for joint in facts.joints if joint.moves}
-    assert scene.model.nq == 7 + len(scene.joints)
+    sim = make_sim_model(facts)
+    assert sim.floating
+    assert sim.base == BASES[facts.model.name]
+    assert sim.actuated == tuple(joint.name for joint in facts.actuated)
+    assert set(sim.joints) == {joint.name for joint in facts.joints if joint.moves}
+    assert sim.model.nq == 7 + len(sim.joints)
     for joint in facts.actuated:
-        assert scene.model.joint(joint.name).range == pytest.approx(joint.range)
+        assert sim.model.joint(joint.name).range == pytest.approx(joint.range)
 
 
 def test_its_mass_is_that_of_the_robot(facts):
-    model = plant(facts).model
+    model = make_sim_model(facts).model
     assert model.body_subtreemass[0] == pytest.approx(facts.total_mass)
     assert model.opt.timestep == TIME_STEP
 
 
 def test_it_stands_at_home_with_its_lowest_shape_on_the_floor(facts):
-    scene = plant(facts)
-    model, data = scene.model, mujoco.MjData(scene.model)
-    data.qpos[:] = scene.home
+    sim = make_sim_model(facts)
+    model, data = sim.model, mujoco.MjData(sim.model)
+    data.qpos[:] = sim.standing_qpos
     with quiet_mujoco():
         mujoco.mj_forward(model, data)
     (floor,) = (k for k in range(model.ngeom) if model.geom_type[k] == mujoco.mjtGeom.mjGEOM_PLANE)
@@ -73,54 +73,57 @@ def test_it_stands_at_home_with_its_lowest_shape_on_the_floor(facts):
         if geom != floor
     ]
     assert min(heights) == pytest.approx(0, abs=1e-3)
-    assert scene.home[2] == pytest.approx(facts.stance.height)
-    placed = dict(zip(scene.joints, scene.home[7:], strict=True))
-    assert placed == pytest.approx({name: facts.positions[name] for name in scene.joints})
+    assert sim.standing_qpos[2] == pytest.approx(facts.stance.height)
+    placed = dict(zip(sim.joints, sim.standing_qpos[7:], strict=True))
+    assert placed == pytest.approx({name: facts.positions[name] for name in sim.joints})
 
 
 def test_motors_have_no_gain_and_the_effort_that_is_declared(facts):
-    scene = plant(facts)
-    assert not scene.model.actuator_gainprm[:, 0].any()
+    sim = make_sim_model(facts)
+    assert not sim.model.actuator_gainprm[:, 0].any()
     for joint in facts.actuated:
-        actuator = scene.model.actuator(joint.name)
+        actuator = sim.model.actuator(joint.name)
         assert actuator.forcerange[1] == pytest.approx(joint.limit.effort)
 
 
 def test_nothing_is_in_it_that_is_only_seen(facts):
-    model = plant(facts).model
+    model = make_sim_model(facts).model
     assert ((model.geom_contype != 0) | (model.geom_conaffinity != 0)).all()
 
 
 def test_it_is_compiled_once(facts):
-    assert plant(facts) is plant(facts)
-    again = plant_of(plant(facts).model, base=plant(facts).base)
-    assert (again.joints, again.drives) == (plant(facts).joints, plant(facts).drives)
+    assert make_sim_model(facts) is make_sim_model(facts)
+    again = SimModel.from_mujoco(make_sim_model(facts).model, base=make_sim_model(facts).base)
+    assert (again.joints, again.actuated) == (
+        make_sim_model(facts).joints,
+        make_sim_model(facts).actuated,
+    )
 
 
 def test_other_positions_leave_what_is_not_named(facts):
-    scene = plant(facts)
-    first, *others = scene.joints
-    moved = positions_in(scene, {first: 0.123, "no such joint": 9.0})
+    sim = make_sim_model(facts)
+    first, *others = sim.joints
+    moved = sim.qpos_at({first: 0.123, "no such joint": 9.0})
     assert moved[7] == 0.123
-    np.testing.assert_array_equal(moved[8:], scene.home[8:])
-    np.testing.assert_array_equal(moved[:7], scene.home[:7])
+    np.testing.assert_array_equal(moved[8:], sim.standing_qpos[8:])
+    np.testing.assert_array_equal(moved[:7], sim.standing_qpos[:7])
     assert len(others) == len(moved) - 8
 
 
 def test_what_is_bolted_down_has_no_floor(arm):
-    scene = plant(arm())
-    assert not scene.floating
-    assert scene.model.ngeom == 0
-    assert len(scene.home) == 1
+    sim = make_sim_model(arm())
+    assert not sim.floating
+    assert sim.model.ngeom == 0
+    assert len(sim.standing_qpos) == 1
 
 
 @pytest.mark.parametrize("name", ["arm", "it's, id 7, line 3", "n" * 5000])
 def test_what_mujoco_refuses_is_told_in_one_line_and_of_no_file(arm, name):
     """MuJoCo counts the lines of a text that nobody has."""
     with pytest.raises(CannotCheckError) as caught:
-        plant(arm(name=name, ixx="1.0"))
+        make_sim_model(arm(name=name, ixx="1.0"))
     told = str(caught.value)
-    assert told.startswith(f"MuJoCo does not simulate it: {name[:50]}")
+    assert told.startswith(f"MuJoCo cannot simulate it: {name[:50]}")
     assert told.endswith(": inertia must satisfy A + B >= C; use 'balanceinertia' to fix")
     assert "\n" not in told
     assert "Element" not in told
@@ -135,5 +138,5 @@ def test_a_robot_of_thousands_of_bodies_is_not_simulated(tmp_path):
     ]
     path = tmp_path / "robot.urdf"
     path.write_text(f'<robot name="r"><link name="l0"/>{"".join(parts)}</robot>')
-    with pytest.raises(CannotCheckError, match="it has 400 bodies, and of more than 300 none"):
-        plant(Facts(load_robot(path)))
+    with pytest.raises(CannotCheckError, match="bodies: got 400; expected at most 300"):
+        make_sim_model(Facts(load_robot(path)))

@@ -5,13 +5,14 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.simulation.pd_gains import Gain, suggest_gains
-from terrainkit_robots.simulation.sim_model import plant
+from terrainkit_robots.simulation.gain import Gain
+from terrainkit_robots.simulation.pd_gains import suggest_gains
+from terrainkit_robots.simulation.sim_model import make_sim_model
 from terrainkit_robots.simulation.time_step import (
     joint_inertias,
-    longest_step,
-    needed_inertia,
-    stable_stiffness,
+    max_stable_stiffness,
+    max_stable_time_step,
+    min_stable_inertia,
 )
 
 PENDULUM = """
@@ -34,7 +35,7 @@ INERTIA = 0.01 + 2 * 0.5**2
 def pendulum(tmp_path):
     path = tmp_path / "robot.urdf"
     path.write_text(PENDULUM)
-    return plant(Facts(load_robot(path)))
+    return make_sim_model(Facts(load_robot(path)))
 
 
 def gain(stiffness, damping, armature=0.0):
@@ -43,7 +44,7 @@ def gain(stiffness, damping, armature=0.0):
 
 def quadruped():
     facts = Facts(load_robot(bundled.find("quadruped")))
-    return plant(facts), suggest_gains(facts)
+    return make_sim_model(facts), suggest_gains(facts)
 
 
 def test_inertia_of_a_pendulum_that_is_bolted_down(pendulum):
@@ -53,34 +54,34 @@ def test_inertia_of_a_pendulum_that_is_bolted_down(pendulum):
 
 
 def test_what_gives_way_is_lighter():
-    scene, _ = quadruped()
-    for found in joint_inertias(scene).values():
+    sim, _ = quadruped()
+    for found in joint_inertias(sim).values():
         assert 0 < found.free < found.locked
 
 
 def test_inertia_agrees_with_a_sudden_torque():
-    scene, _ = quadruped()
-    data = mujoco.MjData(scene.model)
-    model = scene.model.__copy__()
+    sim, _ = quadruped()
+    data = mujoco.MjData(sim.model)
+    model = sim.model.__copy__()
     model.opt.gravity[:] = 0
     model.dof_damping[:] = model.dof_frictionloss[:] = 0
     model.geom_contype[:] = model.geom_conaffinity[:] = 0
     for name in ("FL_hip_joint", "RR_calf_joint"):
         dof = model.joint(name).dofadr[0]
-        data.qpos[:] = scene.home
+        data.qpos[:] = sim.standing_qpos
         data.qfrc_applied[:] = 0
         data.qfrc_applied[dof] = 1.0
         mujoco.mj_forward(model, data)
-        assert 1 / data.qacc[dof] == pytest.approx(joint_inertias(scene)[name].free, rel=1e-6)
+        assert 1 / data.qacc[dof] == pytest.approx(joint_inertias(sim)[name].free, rel=1e-6)
 
 
 def test_needed_inertia_undoes_stable_stiffness():
-    assert needed_inertia(stable_stiffness(0.02)) == pytest.approx(0.02)
+    assert min_stable_inertia(max_stable_stiffness(0.02)) == pytest.approx(0.02)
 
 
 @pytest.mark.parametrize(("stiffness", "damping"), [(100.0, 3.0), (0.0, 5.0), (1000.0, 0.0)])
 def test_longest_step_of_one_joint(pendulum, stiffness, damping):
-    step = longest_step(pendulum, {"j": gain(stiffness, damping)})
+    step = max_stable_time_step(pendulum, {"j": gain(stiffness, damping)})
     # 4 m - 2 h d - h^2 k = 0
     roots = np.roots([stiffness, 2 * damping, -4 * INERTIA])
     wanted = min(root for root in roots if root > 0)
@@ -89,30 +90,30 @@ def test_longest_step_of_one_joint(pendulum, stiffness, damping):
 
 
 def test_longest_step_counts_armature(pendulum):
-    bare = longest_step(pendulum, {"j": gain(0.0, 5.0)}).seconds
-    more = longest_step(pendulum, {"j": gain(0.0, 5.0, armature=INERTIA)}).seconds
+    bare = max_stable_time_step(pendulum, {"j": gain(0.0, 5.0)}).seconds
+    more = max_stable_time_step(pendulum, {"j": gain(0.0, 5.0, armature=INERTIA)}).seconds
     assert more == pytest.approx(2 * bare)
 
 
 def test_longest_step_without_gains(pendulum):
-    assert longest_step(pendulum, {}).seconds == np.inf
-    assert longest_step(pendulum, {"j": gain(0.0, 0.0)}).joint == ""
+    assert max_stable_time_step(pendulum, {}).seconds == np.inf
+    assert max_stable_time_step(pendulum, {"j": gain(0.0, 0.0)}).joint == ""
 
 
 @pytest.mark.parametrize(("factor", "grows"), [(0.98, False), (1.02, True)])
 def test_a_robot_shakes_from_the_longest_step_on(factor, grows):
-    scene, gains = quadruped()
-    step = factor * longest_step(scene, gains).seconds
-    model = scene.model.__copy__()
+    sim, gains = quadruped()
+    step = factor * max_stable_time_step(sim, gains).seconds
+    model = sim.model.__copy__()
     for name, each in gains.items():
         model.dof_armature[model.joint(name).dofadr[0]] = each.armature
     data = mujoco.MjData(model)
-    data.qpos[:] = scene.home
+    data.qpos[:] = sim.standing_qpos
     mujoco.mj_forward(model, data)
     inverse = np.zeros((model.nv, model.nv))
     mujoco.mj_solveM(model, data, inverse, np.eye(model.nv))
-    stiffness = np.array([0.0] * 6 + [gains[name].stiffness for name in scene.joints])
-    damping = np.array([0.0] * 6 + [gains[name].damping for name in scene.joints])
+    stiffness = np.array([0.0] * 6 + [gains[name].stiffness for name in sim.joints])
+    damping = np.array([0.0] * 6 + [gains[name].damping for name in sim.joints])
     speed, place = np.zeros(model.nv), np.zeros(model.nv)
     place[6:] = 1e-3 * np.cos(np.arange(12))
     for _ in range(3000):

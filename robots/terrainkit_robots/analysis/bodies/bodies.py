@@ -1,78 +1,84 @@
-"""Bodies: links that fixed joints hold together, as one, with their mass and shapes.
+"""Merge links that fixed joints connect into rigid bodies, with their mass and shapes.
 
-Placeholder links (a camera's frame, an IMU of one gram) are judged as what they are: a part of the
-body that they are fixed to.
+A placeholder link, such as the frame of a camera or an IMU of one gram, is thus judged as a part
+of the body that it is fixed to.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.tree import Tree
-from terrainkit_robots.analysis.inertia.physical import LARGEST
-from terrainkit_robots.description.model import Geometry, Inertial, Joint, Link
+from terrainkit_robots.analysis.inertia.merged_inertia import parallel_axis
+from terrainkit_robots.analysis.inertia.physical import MAX_INERTIA
+from terrainkit_robots.description.model import Geometry, Joint, Link
 from terrainkit_robots.transforms import Matrix
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Placed:
+class BodyShape:
     """A shape in the frame of a body."""
 
     geometry: Geometry
     link: str
-    """The link it is on."""
+    """Name of the link that the shape belongs to."""
 
     pose: Matrix
-    """Its pose in the body's frame, shape (4, 4) [m]."""
+    """Pose in the frame of the body, shape (4, 4) [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Body:
-    """Links that move as one. Its frame is that of its top link."""
+    """Links that move as one. The frame of a body is the frame of its top link."""
 
     index: int
-    """Place in the list of bodies; a parent comes before its children."""
+    """Index in the list of bodies. A parent comes before its children."""
 
     parent: int | None
-    """Index of the parent; None for the trunk."""
+    """Index of the parent. None for the trunk."""
 
     joint: Joint | None
-    """The joint that moves it, of whatever kind; None for the trunk."""
+    """The joint that connects it to its parent. None for the trunk."""
 
-    mount: Matrix
-    """Frame of the joint's child at its reference in the parent body's, shape (4, 4) [m]."""
+    origin: Matrix
+    """Pose in the frame of the parent at the reference position of the joint, shape (4, 4) [m]."""
 
     links: tuple[Link, ...]
-    """Its links, the top one first."""
+    """Its links, the top link first."""
 
     poses: tuple[Matrix, ...]
-    """Pose of each link in the body's frame, shape (4, 4) [m]."""
+    """Pose of each link in the frame of the body, shape (4, 4) [m]."""
 
     @property
     def name(self) -> str:
-        """Return the name of the link that stands for it: the one with the most mass."""
-        return max(self.links, key=_mass_of).name
+        """Return the name of the link with the most mass."""
+        return self.main_link.name
+
+    @property
+    def main_link(self) -> Link:
+        """Return the link with the most mass."""
+        return max(self.links, key=_mass)
 
     @property
     def top(self) -> Link:
-        """Return the link right below the joint."""
+        """Return the link directly below the joint."""
         return self.links[0]
 
     @property
     def virtual(self) -> bool:
-        """Whether it only stands between two joints of one MJCF body."""
+        """Whether it only separates two joints of one MJCF body."""
         return all(link.virtual for link in self.links)
 
     @cached_property
     def mass(self) -> float:
-        """Sum of the masses of its links [kg]; what is missing or not finite counts as none."""
-        return sum(_mass_of(link) for link in self.links)
+        """Sum of the masses of its links [kg]. Missing and non-finite masses count as zero."""
+        return sum(_mass(link) for link in self.links)
 
     @cached_property
     def center(self) -> Matrix:
-        """Centre of mass in the body's frame, shape (3,) [m]; the origin where there is no mass."""
+        """Center of mass in the frame of the body, shape (3,) [m]. Zero for a massless body."""
         if self.mass <= 0:
             return np.zeros(3)
         weighted = [mass * pose[:3, 3] for mass, pose, _ in self._parts()]
@@ -81,12 +87,11 @@ class Body:
 
     @cached_property
     def inertia(self) -> Matrix:
-        """Inertia about the centre of mass, axes of the body's frame, shape (3, 3) [kg m2]."""
+        """Inertia about the center of mass, in the axes of the body, shape (3, 3) [kg m2]."""
         total = np.zeros((3, 3))
         for mass, pose, inertia in self._parts():
-            arm = pose[:3, 3] - self.center
             total += pose[:3, :3] @ inertia @ pose[:3, :3].T
-            total += mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))  # parallel axes
+            total += parallel_axis(mass, pose[:3, 3] - self.center)
         return total
 
     @cached_property
@@ -96,82 +101,85 @@ class Body:
         return principal
 
     @cached_property
-    def collisions(self) -> tuple[Placed, ...]:
+    def collisions(self) -> tuple[BodyShape, ...]:
         """Its collision shapes."""
-        return tuple(self._placed("collisions"))
+        return tuple(self._shapes("collisions"))
 
     @cached_property
-    def visuals(self) -> tuple[Placed, ...]:
+    def visuals(self) -> tuple[BodyShape, ...]:
         """Its visual shapes."""
-        return tuple(self._placed("visuals"))
+        return tuple(self._shapes("visuals"))
 
     def _parts(self) -> Iterator[tuple[float, Matrix, Matrix]]:
-        """Yield mass, pose of the frame of inertia, and inertia in it, of each link with mass."""
+        """Yield mass, inertial frame and inertia of each link with mass."""
         for link, pose in zip(self.links, self.poses, strict=True):
-            if _mass_of(link):
+            if _mass(link):
                 assert link.inertial is not None
-                yield _mass_of(link), pose @ link.inertial.origin, _inertia_of(link.inertial)
+                inertia = link.inertial.inertia
+                if inertia is None or not (np.abs(inertia) < MAX_INERTIA).all():
+                    inertia = np.zeros((3, 3))
+                yield _mass(link), pose @ link.inertial.origin, inertia
 
-    def _placed(self, kind: str) -> Iterator[Placed]:
+    def _shapes(self, kind: str) -> Iterator[BodyShape]:
         for link, pose in zip(self.links, self.poses, strict=True):
             for geometry in getattr(link, kind):
-                yield Placed(geometry=geometry, link=link.name, pose=pose @ geometry.origin)
+                yield BodyShape(geometry=geometry, link=link.name, pose=pose @ geometry.origin)
 
 
-def _mass_of(link: Link) -> float:
+def _mass(link: Link) -> float:
     mass = link.inertial.mass if link.inertial else None
-    return mass if mass is not None and abs(mass) < LARGEST else 0.0
-
-
-def _inertia_of(inertial: Inertial) -> Matrix:
-    inertia = inertial.inertia
-    sound = inertia is not None and (np.abs(inertia) < LARGEST).all()
-    return inertia if inertia is not None and sound else np.zeros((3, 3))
+    return mass if mass is not None and abs(mass) < MAX_INERTIA else 0.0
 
 
 def merge_bodies(tree: Tree) -> tuple[Body, ...]:
     """Return the bodies of the main tree, the trunk first and each after its parent.
 
-    A joint of a type that is not known is taken as fixed. A floating, planar or ball joint inside
-    the tree starts a body that is held as if it were fixed, since nothing drives it.
+    A joint of unknown type counts as fixed. A floating, planar or ball joint inside the tree
+    starts a new body that is held in place, because nothing actuates it.
     """
     if not tree.order:
         return ()
-    order = tree.order[_first_link(tree) :]
-    home: dict[str, int] = {order[0]: 0}
+    order = tree.order[_base_index(tree) :]
+    index_of: dict[str, int] = {order[0]: 0}
     frames: list[dict[str, Matrix]] = [{order[0]: np.eye(4)}]
-    made: list[tuple[int | None, Joint | None, Matrix]] = [(None, None, np.eye(4))]
+    edges: list[tuple[int | None, Joint | None, Matrix]] = [(None, None, np.eye(4))]
     for name in order[1:]:
-        joint = tree.above[name]
-        if joint.parent not in home:
-            continue  # beside the base, under a world link
-        parent = home[joint.parent]
-        mount = frames[parent][joint.parent] @ joint.origin
+        joint = tree.parent_joint[name]
+        if joint.parent not in index_of:
+            continue  # a sibling of the base below a world link
+        parent = index_of[joint.parent]
+        origin = frames[parent][joint.parent] @ joint.origin
         if joint.moves or joint.kind in ("floating", "planar", "ball"):
-            home[name] = len(made)
-            made.append((parent, joint, mount))
+            index_of[name] = len(edges)
+            edges.append((parent, joint, origin))
             frames.append({name: np.eye(4)})
         else:
-            home[name] = parent
-            frames[parent][name] = mount
+            index_of[name] = parent
+            frames[parent][name] = origin
     return tuple(
         Body(
             index=index,
             parent=parent,
             joint=joint,
-            mount=mount,
+            origin=origin,
             links=tuple(tree.links[name] for name in frames[index]),
             poses=tuple(frames[index].values()),
         )
-        for index, (parent, joint, mount) in enumerate(made)
+        for index, (parent, joint, origin) in enumerate(edges)
     )
 
 
-def _first_link(tree: Tree) -> int:
-    """Return the place of the base in the order: below a floating joint, if the root has one."""
+def _base_index(tree: Tree) -> int:
+    """Return 1 if the first link is an empty root with a floating joint, which is not the base."""
     root = tree.links[tree.order[0]]
-    joints = tree.below[root.name]
+    joints = tree.child_joints[root.name]
     empty = root.inertial is None and not root.collisions
-    if empty and len(joints) == 1 and joints[0].kind == "floating":
-        return 1
-    return 0
+    return int(empty and len(joints) == 1 and joints[0].kind == "floating")
+
+
+def physical_parent(bodies: Sequence[Body], body: Body) -> Body | None:
+    """Return the nearest ancestor of a body that is not virtual. None for the trunk."""
+    parent = body.parent
+    while parent is not None and bodies[parent].virtual:
+        parent = bodies[parent].parent
+    return None if parent is None else bodies[parent]

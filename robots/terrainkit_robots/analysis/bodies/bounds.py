@@ -1,147 +1,144 @@
-"""How much room a body takes, found out no more precisely than a question needs.
+"""Bounding boxes of bodies, computed only as precisely as a check requires.
 
-Mesh files are slow to open, the visual ones above all. Most questions are settled by the frames
-and the primitives of a body; only where those leave a doubt are the meshes asked.
+Opening mesh files is slow, especially visual ones. The frames and primitives of a body settle most
+checks, and meshes are read only if the result still depends on them.
 """
 
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.bodies import Body, Placed
-from terrainkit_robots.analysis.bodies.shapes import bounds, has_extent
-from terrainkit_robots.analysis.cached_fact import per_robot
-from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.bodies.bodies import Body, BodyShape
+from terrainkit_robots.analysis.bodies.shapes import bounds, has_bounds
+from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.transforms import Matrix
 
-_ANYTHING = 1e9
-"""Size of a robot of which nothing is known [m]."""
+_UNKNOWN_SIZE = 1e9
+"""Size of a robot of unknown size [m]."""
 
-_STAND_IN = 0.005
-"""Side length up to which a body has no shape, but something that stands for one [m]."""
+_MAX_MARKER_SIZE = 0.005
+"""A body whose shapes are smaller than this has only a marker, not a shape [m]."""
 
-_UNSEEN = 3.0
-"""How many times as large as the frames of a robot a body may be whose shape cannot be read."""
+_MAX_UNREADABLE_RATIO = 3.0
+"""Largest size of a body with unreadable shapes, over the size of the robot."""
 
 
-class BodyExtents:
-    """Boxes around the bodies of a robot, each in the frame of its body, shape (2, 3) [m]."""
+class BodyBounds:
+    """Bounding boxes of the bodies of a robot.
 
-    def __init__(self, robot: Facts) -> None:
-        self._meshes = robot.meshes
-        self._frames: list[list[Matrix]] = [
-            [pose[:3, 3] for pose in body.poses] for body in robot.bodies
-        ]
-        for body in robot.bodies:
+    Each box is in the frame of its body and has shape (2, 3): lower and upper corner [m].
+    """
+
+    def __init__(
+        self, bodies: Sequence[Body], zero_poses: Sequence[Matrix], meshes: Meshes
+    ) -> None:
+        self._meshes = meshes
+        self._frames: list[list[Matrix]] = [[pose[:3, 3] for pose in body.poses] for body in bodies]
+        for body in bodies:
             if body.parent is not None:
                 anchor = np.zeros(3) if body.joint is None else body.joint.anchor
-                place = body.mount[:3, :3] @ anchor + body.mount[:3, 3]
-                self._frames[body.parent].append(place)
-        origins = np.array([pose[:3, 3] for pose in robot.at_zero]).reshape(-1, 3)
-        self._simple: dict[int, Matrix | None] = {}
+                point = body.origin[:3, :3] @ anchor + body.origin[:3, 3]
+                self._frames[body.parent].append(point)
+        origins = np.array([pose[:3, 3] for pose in zero_poses]).reshape(-1, 3)
+        self._primitive_boxes: dict[int, Matrix | None] = {}
         self.robot_size: float = (
             float(np.linalg.norm(np.ptp(origins, axis=0))) if len(origins) else 0.0
         )
-        """Diagonal of the box around the frames of all bodies, all joints at 0 [m]."""
+        """Diagonal of the bounding box of all body frames, all joints at 0 [m]."""
 
-    def still(self, body: Body, wrong: Callable[[Matrix], bool]) -> Matrix | None:
-        """Return a box around all of a body if `wrong` says so even of that; else None.
+    def box_if(self, body: Body, is_violated: Callable[[Matrix], bool]) -> Matrix | None:
+        """Return the bounding box of a body if the condition holds for it; otherwise None.
 
-        The boxes that `wrong` is asked of grow, and the first that is not wrong settles it. A body
-        with shapes that cannot be read, or without any, may be larger than the robot.
+        The condition is evaluated on boxes of increasing size, and the first box for which it does
+        not hold ends the search. A body without readable shapes gets a box larger than the robot.
 
         Args:
             body: The body.
-            wrong: Says whether something is off for a body that fills a box.
+            is_violated: Condition on the bounding box of the body. If it holds for a box, it holds
+                for every smaller one.
         """
         last = None
         for box in self._boxes(body):
-            if not wrong(box):
+            if not is_violated(box):
                 return None
             last = box
         return last
 
-    def own(self, body: Body, doubtful: Callable[[float], bool]) -> Matrix | None:
-        """Return the box around a body's collision shapes, or without any, around its visual ones.
-
-        None if that is not known.
+    def shape_box(self, body: Body, needs_visuals: Callable[[float], bool]) -> Matrix | None:
+        """Return the bounding box of the collision shapes, or of the visual shapes without any.
 
         Args:
             body: The body.
-            doubtful: Says whether there is reason to open a visual mesh, for a body that is about
-                as long as this [m].
+            needs_visuals: Whether visual meshes are worth opening for a body of about this
+                length [m].
+
+        Returns:
+            The box, or None if it is unknown.
         """
         shapes = body.collisions
         if not shapes:
             shapes = body.visuals
             length = max(self._length(body), 2 * float(np.linalg.norm(body.center)))
-            if _has_mesh(shapes) and not doubtful(length):
+            if _has_mesh(shapes) and not needs_visuals(length):
                 return None
-        return bounds(shapes, self._meshes) if self._readable(shapes) else None
+        return bounds(shapes, self._meshes) if self._is_readable(shapes) else None
 
     def _boxes(self, body: Body) -> Iterator[Matrix]:
         shapes = (*body.collisions, *body.visuals)
-        box = _around(self._frames[body.index])
-        simple = self._primitives(body)
-        if simple is not None:
-            box = _joined(box, simple)
+        box = _point_box(self._frames[body.index])
+        primitives = self._primitive_box(body)
+        if primitives is not None:
+            box = _union(box, primitives)
             yield box
         elif not body.collisions:
-            yield _grown(box, self._length(body) / 2)  # spares the visual mesh of what looks sound
+            yield _pad(box, self._length(body) / 2)  # avoids the visual mesh of a plausible body
         if _has_mesh(body.collisions):
-            box = _joined(box, bounds(body.collisions, self._meshes))
+            box = _union(box, bounds(body.collisions, self._meshes))
             yield box
         if _has_mesh(body.visuals):
-            box = _joined(box, bounds(body.visuals, self._meshes))
-        if not self._readable(shapes):
-            box = _grown(box, _UNSEEN * self.robot_size or _ANYTHING)
+            box = _union(box, bounds(body.visuals, self._meshes))
+        if not self._is_readable(shapes):
+            box = _pad(box, _MAX_UNREADABLE_RATIO * self.robot_size or _UNKNOWN_SIZE)
         yield box
 
-    def _primitives(self, body: Body) -> Matrix | None:
-        if body.index not in self._simple:
+    def _primitive_box(self, body: Body) -> Matrix | None:
+        if body.index not in self._primitive_boxes:
             shapes = (*body.collisions, *body.visuals)
-            simple = [placed for placed in shapes if placed.geometry.shape != "mesh"]
-            self._simple[body.index] = bounds(simple, self._meshes)
-        return self._simple[body.index]
+            primitives = [shape for shape in shapes if shape.geometry.shape != "mesh"]
+            self._primitive_boxes[body.index] = bounds(primitives, self._meshes)
+        return self._primitive_boxes[body.index]
 
     def _length(self, body: Body) -> float:
-        """Return about how long a body is, judged by the joints on it and above it [m]."""
-        frames = _around(self._frames[body.index])
-        return max(
-            float(np.linalg.norm(part)) for part in (frames[1] - frames[0], body.mount[:3, 3])
-        )
+        """Estimate the length of a body from the joints on it and above it [m]."""
+        frames = _point_box(self._frames[body.index])
+        spans = (frames[1] - frames[0], body.origin[:3, 3])
+        return max(float(np.linalg.norm(span)) for span in spans)
 
-    def _readable(self, shapes: Sequence[Placed]) -> bool:
-        if not all(has_extent(placed.geometry, self._meshes) for placed in shapes):
+    def _is_readable(self, shapes: Sequence[BodyShape]) -> bool:
+        if not all(has_bounds(shape.geometry, self._meshes) for shape in shapes):
             return False
         box = bounds(shapes, self._meshes)
-        return box is not None and float((box[1] - box[0]).max()) > _STAND_IN
+        return box is not None and float((box[1] - box[0]).max()) > _MAX_MARKER_SIZE
 
 
-def _has_mesh(shapes: Sequence[Placed]) -> bool:
-    return any(placed.geometry.shape == "mesh" for placed in shapes)
+def _has_mesh(shapes: Sequence[BodyShape]) -> bool:
+    return any(shape.geometry.shape == "mesh" for shape in shapes)
 
 
-def _around(points: Sequence[Matrix]) -> Matrix:
+def _point_box(points: Sequence[Matrix]) -> Matrix:
     return np.array([np.min(points, axis=0), np.max(points, axis=0)])
 
 
-def _joined(box: Matrix, other: Matrix | None) -> Matrix:
+def _union(box: Matrix, other: Matrix | None) -> Matrix:
     if other is None:
         return box
     return np.array([np.minimum(box[0], other[0]), np.maximum(box[1], other[1])])
 
 
-def _grown(box: Matrix, by: float) -> Matrix:
-    return np.asarray(box + np.array([[-by], [by]]))
+def _pad(box: Matrix, size: float) -> Matrix:
+    return np.asarray(box + np.array([[-size], [size]]))
 
 
 def half_diagonal(box: Matrix) -> float:
     """Return half the diagonal of a box [m]."""
     return float(np.linalg.norm(box[1] - box[0]) / 2)
-
-
-@per_robot
-def extents_of(robot: Facts) -> BodyExtents:
-    """Return the extents of a robot's bodies."""
-    return BodyExtents(robot)

@@ -1,7 +1,7 @@
-"""Kinematics: where the bodies are when the joints are somewhere.
+"""Forward kinematics of the bodies.
 
-Written out here, rather than left to a simulator, because it must also work on robots that no
-simulator loads; the tests hold it against MuJoCo and yourdfpy.
+It does not use a simulator, because it must also work for robots that no simulator loads. The
+tests compare it with MuJoCo and yourdfpy.
 """
 
 from collections.abc import Mapping, Sequence
@@ -9,65 +9,79 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.bodies.mimic_joints import follower_positions
+from terrainkit_robots.analysis.bodies.mimic_joints import mimic_positions
 from terrainkit_robots.transforms import Matrix, axis_angle_to_matrix
 
 
 def body_poses(
     bodies: Sequence[Body], positions: Mapping[str, float] | Mapping[str, Matrix]
 ) -> list[Matrix]:
-    """Return the pose of each body in the trunk's frame, shape (..., 4, 4) [m].
+    """Return the pose of each body in the frame of the trunk, shape (..., 4, 4) [m].
 
     Args:
         bodies: The bodies, parents first.
-        positions: Joint positions [rad] or [m], all of shape (...); joints that are not named are
-            at 0, and those that follow another where that puts them.
+        positions: Joint positions [rad] or [m] by name, all of shape (...). Joints without a
+            position are at 0. Positions of mimic joints are computed.
     """
     joints = [body.joint for body in bodies if body.joint is not None and body.joint.moves]
-    placed: Mapping[str, float | Matrix] = {**positions, **follower_positions(joints, positions)}
+    all_positions: Mapping[str, float | Matrix] = {
+        **positions,
+        **mimic_positions(joints, positions),
+    }
     poses: list[Matrix] = []
     for body in bodies:
         if body.parent is None:
             poses.append(np.eye(4))
             continue
-        local = body.mount
+        local = body.origin
         if body.joint is not None and body.joint.moves:
-            q = np.asarray(placed.get(body.joint.name, 0.0), dtype=float)
-            local = local @ joint_motion(body, q)
+            position = np.asarray(all_positions.get(body.joint.name, 0.0), dtype=float)
+            local = local @ joint_motion(body, position)
         poses.append(poses[body.parent] @ local)
     return poses
 
 
 def joint_motion(body: Body, position: Matrix | np.float64) -> Matrix:
-    """Return how the joint above `body` moves it, shape (..., 4, 4), at `position`, shape (...)."""
+    """Return the motion of a body by its joint.
+
+    Args:
+        body: A body with a joint.
+        position: Joint position [rad] or [m], shape (...).
+
+    Returns:
+        Transforms that are applied in the frame of the body, shape (..., 4, 4) [m].
+    """
     assert body.joint is not None
     joint, q = body.joint, np.asarray(position) - body.joint.reference
     motion = np.broadcast_to(np.eye(4), (*q.shape, 4, 4)).copy()
     if joint.kind == "prismatic":
         motion[..., :3, 3] = q[..., None] * joint.direction
         return motion
-    turn = axis_angle_to_matrix(joint.direction, q)
-    motion[..., :3, :3] = turn
-    motion[..., :3, 3] = joint.anchor - turn @ joint.anchor
+    rotation = axis_angle_to_matrix(joint.direction, q)
+    motion[..., :3, :3] = rotation
+    motion[..., :3, 3] = joint.anchor - rotation @ joint.anchor
     return motion
 
 
-def axis_in_trunk(body: Body, pose: Matrix) -> tuple[Matrix, Matrix]:
-    """Return a point of the joint's axis and its direction in the trunk's frame, shapes (3,).
+def joint_axis(body: Body, pose: Matrix) -> tuple[Matrix, Matrix]:
+    """Return the axis of a body's joint in the frame of the trunk.
 
     Args:
         body: A body with a joint.
-        pose: The body's pose in the trunk's frame.
+        pose: Pose of the body in the frame of the trunk, shape (4, 4) [m].
+
+    Returns:
+        A point of the axis [m] and the direction of the axis, each of shape (3,).
     """
     assert body.joint is not None
     return pose[:3, :3] @ body.joint.anchor + pose[:3, 3], pose[:3, :3] @ body.joint.direction
 
 
 def ancestors(bodies: Sequence[Body], index: int) -> list[int]:
-    """Return the bodies from the one below the trunk down to `index`, the trunk left out."""
+    """Return the indices of the bodies from below the trunk down to `index`."""
     chain = []
-    at: int | None = index
-    while at is not None and at > 0:
-        chain.append(at)
-        at = bodies[at].parent
+    current: int | None = index
+    while current is not None and current > 0:
+        chain.append(current)
+        current = bodies[current].parent
     return chain[::-1]

@@ -1,4 +1,4 @@
-"""Followers: joints that mimic others, and where those put them."""
+"""Joints that mimic other joints, and their positions."""
 
 from collections.abc import Iterable, Mapping
 
@@ -7,53 +7,54 @@ import numpy as np
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.transforms import Matrix
 
-_FARTHEST = 1e30
-"""No joint is farther off [rad] or [m], whatever the factors of a chain multiply to."""
+_MAX_POSITION = 1e30
+"""Bound of the position of a mimic joint [rad] or [m], whatever the product of the multipliers."""
 
 
-def followers(joints: Iterable[Joint]) -> tuple[Joint, ...]:
-    """Return the joints that follow another, each after the one that it follows.
+def mimic_joints(joints: Iterable[Joint]) -> tuple[Joint, ...]:
+    """Return the joints that mimic another one, each after the joint that it mimics.
 
-    A joint follows none if it mimics one that is not among `joints`, or in the end itself.
+    A joint that mimics a joint outside of `joints`, or itself through a cycle, is left out.
     """
-    known: dict[str, Joint] = {}
+    by_name: dict[str, Joint] = {}
     for joint in joints:
-        known.setdefault(joint.name, joint)
+        by_name.setdefault(joint.name, joint)
     found: dict[str, Joint] = {}
-    free = {name for name, joint in known.items() if joint.mimic is None}
-    for name in known:
+    free = {name for name, joint in by_name.items() if joint.mimic is None}
+    for start in by_name:
         path: dict[str, Joint] = {}
-        at = name
-        while at in known and at not in path and at not in found and at not in free:
-            path[at] = known[at]
-            mimic = known[at].mimic
+        name = start
+        while name in by_name and name not in path and name not in found and name not in free:
+            path[name] = by_name[name]
+            mimic = by_name[name].mimic
             assert mimic is not None
-            at = mimic.joint
+            name = mimic.joint
         names = list(path)
-        # What leads to nobody, or to itself, is free; what leads there follows it.
-        if at not in known:
+        # A joint with an unknown target and the joints of a cycle are free; joints that lead there
+        # mimic them.
+        if name not in by_name:
             free.update(names[-1:])
-        elif at in path:
-            free.update(names[names.index(at) :])
-        found |= {name: path[name] for name in reversed(names) if name not in free}
+        elif name in path:
+            free.update(names[names.index(name) :])
+        found |= {key: path[key] for key in reversed(names) if key not in free}
     return tuple(found.values())
 
 
-def follower_positions(
+def mimic_positions(
     joints: Iterable[Joint], positions: Mapping[str, float] | Mapping[str, Matrix]
 ) -> dict[str, Matrix]:
-    """Return the positions of the joints that follow another [rad] or [m], by name.
+    """Return the positions of the mimic joints [rad] or [m], by name.
 
     Args:
-        joints: The joints.
-        positions: Positions of those that are followed, in the end; what is not named is at 0.
+        joints: All joints.
+        positions: Positions of the joints that are mimicked. Joints without a position are at 0.
     """
     found: dict[str, Matrix] = {}
-    for joint in followers(joints):
+    for joint in mimic_joints(joints):
         assert joint.mimic is not None
-        lead = joint.mimic.joint
-        position = found[lead] if lead in found else np.asarray(positions.get(lead, 0.0))
+        target = joint.mimic.joint
+        position = found[target] if target in found else np.asarray(positions.get(target, 0.0))
         with np.errstate(over="ignore"):
-            moved = joint.mimic.multiplier * position + joint.mimic.offset
-        found[joint.name] = np.clip(moved, -_FARTHEST, _FARTHEST)
+            position = joint.mimic.multiplier * position + joint.mimic.offset
+        found[joint.name] = np.clip(position, -_MAX_POSITION, _MAX_POSITION)
     return found

@@ -1,7 +1,7 @@
-"""Shapes: how far each one reaches in a direction, and how much room it takes.
+"""Bounding boxes, lowest points and volumes of shapes.
 
-The support function of a convex shape gives its bounding box and its lowest point in any pose,
-exactly, without a mesh of it.
+The support function of a convex shape gives its bounding box and its lowest point in any pose
+exactly, without a mesh of the shape.
 """
 
 from collections.abc import Iterable
@@ -9,20 +9,33 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.bodies import Placed
+from terrainkit_robots.analysis.bodies.bodies import BodyShape
 from terrainkit_robots.description.model import Geometry
 from terrainkit_robots.transforms import Matrix
 
 if TYPE_CHECKING:
     from terrainkit_robots.mesh.mesh_cache import Meshes
 
+_MAX_SIZE = 1e6
+"""A larger shape counts as unknown [m]."""
 
-def reach(geometry: Geometry, direction: Matrix, meshes: "Meshes") -> float:
-    """Return how far the shape reaches from its origin along a unit vector in its frame [m].
+_SIZE_COUNTS = {"box": 3, "sphere": 1, "cylinder": 2, "capsule": 2, "ellipsoid": 3}
+
+
+def support(geometry: Geometry, direction: Matrix, meshes: "Meshes") -> float:
+    """Return the support function of a shape: its largest extent along a direction.
+
+    Args:
+        geometry: The shape.
+        direction: Unit vector in the frame of the shape, shape (3,).
+        meshes: Mesh files.
+
+    Returns:
+        Distance from the origin of the shape [m].
 
     Raises:
         MeshError: if the shape is a mesh that cannot be read.
-        ValueError: if the shape has no extent that is known, such as a plane.
+        ValueError: if the shape is unbounded or unknown, such as a plane.
     """
     d, size = direction, geometry.size
     match geometry.shape:
@@ -38,58 +51,53 @@ def reach(geometry: Geometry, direction: Matrix, meshes: "Meshes") -> float:
             return float(np.linalg.norm(np.array(size) * d))
         case "mesh" if geometry.mesh is not None:
             return float((meshes.vertices(geometry.mesh) @ d).max())
-    raise ValueError(f"a {geometry.shape} has no extent")
+    raise ValueError(f"shape: got {geometry.shape}; expected a bounded shape")
 
 
-def has_extent(geometry: Geometry, meshes: "Meshes") -> bool:
-    """Return whether `reach` has an answer: a primitive with sizes, or a mesh that can be read."""
+def has_bounds(geometry: Geometry, meshes: "Meshes") -> bool:
+    """Return whether a shape is a primitive with valid sizes or a mesh that can be read."""
     if geometry.shape == "mesh":
         return geometry.mesh is not None and meshes.is_readable(geometry.mesh)
-    wanted = {"box": 3, "sphere": 1, "cylinder": 2, "capsule": 2, "ellipsoid": 3}
     return (
-        len(geometry.size) == wanted.get(geometry.shape, -1)
+        len(geometry.size) == _SIZE_COUNTS.get(geometry.shape, -1)
         and bool(np.isfinite(geometry.size).all())
-        and max(map(abs, geometry.size)) < _LARGEST
+        and max(map(abs, geometry.size)) < _MAX_SIZE
     )
 
 
-_LARGEST = 1e6
-"""Of a shape larger than this nothing is asked [m]."""
+def bounds(shapes: Iterable[BodyShape], meshes: "Meshes") -> Matrix | None:
+    """Return the bounding box of shapes along the axes of their body, shape (2, 3) [m].
 
-
-def bounds(shapes: Iterable[Placed], meshes: "Meshes") -> Matrix | None:
-    """Return the box around `shapes` along the axes of their body, shape (2, 3) [m].
-
-    None if none of them has an extent.
+    None if no shape has bounds.
     """
     boxes = []
-    for placed in shapes:
-        if not has_extent(placed.geometry, meshes):
+    for shape in shapes:
+        if not has_bounds(shape.geometry, meshes):
             continue
-        turned, center = placed.pose[:3, :3].T, placed.pose[:3, 3]
-        above = [reach(placed.geometry, turned[:, k], meshes) for k in range(3)]
-        below = [reach(placed.geometry, -turned[:, k], meshes) for k in range(3)]
-        boxes.append((center - below, center + above))
+        axes, center = shape.pose[:3, :3].T, shape.pose[:3, 3]
+        upper = [support(shape.geometry, axes[:, k], meshes) for k in range(3)]
+        lower = [support(shape.geometry, -axes[:, k], meshes) for k in range(3)]
+        boxes.append((center - lower, center + upper))
     if not boxes:
         return None
-    lower, upper = zip(*boxes, strict=True)
-    return np.array([np.min(lower, axis=0), np.max(upper, axis=0)])
+    lowers, uppers = zip(*boxes, strict=True)
+    return np.array([np.min(lowers, axis=0), np.max(uppers, axis=0)])
 
 
-def lowest(placed: Placed, pose: Matrix, meshes: "Meshes") -> float:
-    """Return the lowest z of a shape whose body is at `pose` [m]; of its origin without extent."""
-    whole = pose @ placed.pose
-    if not has_extent(placed.geometry, meshes):
-        return float(whole[2, 3])
-    return float(whole[2, 3] - reach(placed.geometry, -whole[2, :3], meshes))
+def min_height(shape: BodyShape, pose: Matrix, meshes: "Meshes") -> float:
+    """Return the lowest z of a shape whose body is at `pose` [m]; of its origin without bounds."""
+    world = pose @ shape.pose
+    if not has_bounds(shape.geometry, meshes):
+        return float(world[2, 3])
+    return float(world[2, 3] - support(shape.geometry, -world[2, :3], meshes))
 
 
 def volume(geometry: Geometry, meshes: "Meshes") -> float:
-    """Return the volume of a shape [m3]; that of a mesh if it is closed, else of its hull.
+    """Return the volume of a shape [m3]; for a mesh that is not closed, of its convex hull.
 
     Raises:
         MeshError: if the shape is a mesh that cannot be read.
-        ValueError: if it has no volume that is known.
+        ValueError: if the shape has no volume, such as a plane.
     """
     s = geometry.size
     match geometry.shape:
@@ -105,4 +113,4 @@ def volume(geometry: Geometry, meshes: "Meshes") -> float:
             return 4 / 3 * np.pi * s[0] * s[1] * s[2]
         case "mesh" if geometry.mesh is not None:
             return float(meshes.volume(geometry.mesh))
-    raise ValueError(f"a {geometry.shape} has no volume")
+    raise ValueError(f"shape: got {geometry.shape}; expected a shape with a volume")

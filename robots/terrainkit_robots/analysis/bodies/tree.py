@@ -1,7 +1,7 @@
-"""The tree: links in the order in which joints hang them, whatever the file says.
+"""Build the tree of links.
 
-A file can name links that are not there, hang one under two others, or close a circle. Of such a
-file the tree keeps what makes sense, and says which joints it left out and why.
+A file can refer to missing links, give a link two parents, or contain a cycle. The tree then keeps
+the joints that fit, and records the rejected joints with the reason.
 """
 
 from collections.abc import Mapping
@@ -18,91 +18,91 @@ class Tree:
     """A forest of links, and its main tree."""
 
     roots: tuple[str, ...]
-    """Links without a parent; the first is the robot. It is the one with the most descendants of
-    those that never had a parent."""
+    """Links without a parent. The first one is the root of the robot: the root with the most
+    descendants among those that never had a parent."""
 
     links: Mapping[str, Link]
     """The first link of each name."""
 
-    above: Mapping[str, Joint]
+    parent_joint: Mapping[str, Joint]
     """The joint above each link that has one."""
 
-    below: Mapping[str, tuple[Joint, ...]]
+    child_joints: Mapping[str, tuple[Joint, ...]]
     """The joints below each link, in the order of the file."""
 
     order: tuple[str, ...]
-    """Links of the main tree, each after its parent, depth first."""
+    """Links of the main tree, depth first, each after its parent."""
 
-    left_out: tuple[tuple[Joint, Reason], ...]
-    """Joints that have no place in a tree."""
+    rejected: tuple[tuple[Joint, Reason], ...]
+    """Joints that do not fit into a tree."""
 
     cycles: tuple[tuple[str, ...], ...]
-    """Circles of links."""
+    """Cycles of links."""
 
 
 def build_tree(model: RobotModel) -> Tree:
-    """Return the tree of a robot; the world of MJCF is not part of it."""
+    """Return the tree of a robot. The world body of MJCF is not part of it."""
     links: dict[str, Link] = {}
     for link in model.links:
         links.setdefault(link.name, link)
-    above, left_out = _parents(model, links)
-    cycles = _cycles(above)
+    parent_joint, rejected = _parent_joints(model, links)
+    cycles = _detect_cycles(parent_joint)
     for cycle in cycles:
-        left_out.append((above.pop(cycle[0]), "cycle"))
-    below: dict[str, list[Joint]] = {name: [] for name in links}
-    for joint in above.values():
-        below[joint.parent].append(joint)
-    children = {name: [j.child for j in joints] for name, joints in below.items()}
-    orders = {root: _depth_first(root, children) for root in links if root not in above}
-    # A root that only lost its joint is not where the robot begins; of others the first wins.
-    lost = {joint.child for joint, _ in left_out}
-    roots = sorted(orders, key=lambda root: (root in lost, -len(orders[root])))
+        rejected.append((parent_joint.pop(cycle[0]), "cycle"))
+    child_joints: dict[str, list[Joint]] = {name: [] for name in links}
+    for joint in parent_joint.values():
+        child_joints[joint.parent].append(joint)
+    children = {name: [j.child for j in joints] for name, joints in child_joints.items()}
+    orders = {root: _depth_first(root, children) for root in links if root not in parent_joint}
+    # A root whose joint was rejected is not the root of the robot; among others the first wins.
+    orphans = {joint.child for joint, _ in rejected}
+    roots = sorted(orders, key=lambda root: (root in orphans, -len(orders[root])))
     return Tree(
         roots=tuple(roots),
         links=links,
-        above=above,
-        below={name: tuple(joints) for name, joints in below.items()},
+        parent_joint=parent_joint,
+        child_joints={name: tuple(joints) for name, joints in child_joints.items()},
         order=tuple(orders[roots[0]]) if roots else (),
-        left_out=tuple(left_out),
+        rejected=tuple(rejected),
         cycles=tuple(cycles),
     )
 
 
-def _parents(
+def _parent_joints(
     model: RobotModel, links: Mapping[str, Link]
 ) -> tuple[dict[str, Joint], list[tuple[Joint, Reason]]]:
-    above: dict[str, Joint] = {}
-    left_out: list[tuple[Joint, Reason]] = []
+    parent_joint: dict[str, Joint] = {}
+    rejected: list[tuple[Joint, Reason]] = []
     seen: set[str] = set()
     for joint in model.joints:
         if joint.parent == "world" and "world" not in links and model.kind == "mjcf":
-            continue  # what holds a root is not between two links
-        if joint.name in seen and joint.child in above:
-            left_out.append((joint, "duplicate"))
+            continue  # connects a root to the world, not two links
+        if joint.name in seen and joint.child in parent_joint:
+            rejected.append((joint, "duplicate"))
         elif joint.parent not in links or joint.child not in links:
-            left_out.append((joint, "unknown-link"))
-        elif joint.child in above:
-            left_out.append((joint, "second-parent"))
+            rejected.append((joint, "unknown-link"))
+        elif joint.child in parent_joint:
+            rejected.append((joint, "second-parent"))
         else:
-            above[joint.child] = joint
+            parent_joint[joint.child] = joint
         seen.add(joint.name)
-    return above, left_out
+    return parent_joint, rejected
 
 
-def _cycles(above: Mapping[str, Joint]) -> list[tuple[str, ...]]:
-    """Return the circles, each from its first link in the file on, upwards."""
-    done: set[str] = set()
+def _detect_cycles(parent_joint: Mapping[str, Joint]) -> list[tuple[str, ...]]:
+    """Return the cycles, each from its first link in the file upwards."""
+    visited: set[str] = set()
     cycles = []
-    for start in above:
+    for start in parent_joint:
         path: dict[str, None] = {}
-        at = start
-        while at in above and at not in done and at not in path:
-            path[at] = None
-            at = above[at].parent
-        if at in path:
-            walked = list(path)
-            cycles.append(tuple(walked[walked.index(at) :]))
-        done.update(path)
+        link = start
+        while link in parent_joint and link not in visited and link not in path:
+            path[link] = None
+            link = parent_joint[link].parent
+        if link in path:
+            names = list(path)
+            cycles.append(tuple(names[names.index(link) :]))
+        visited.update(path)
     return cycles
 
 

@@ -1,1 +1,1 @@
-"""Validate, combine and repair inertias."""
+"""Validate, merge and repair inertias."""

@@ -1,39 +1,44 @@
-"""Carried inertia: what a joint turns or pushes, all that hangs from it included."""
+"""Compute the inertia that each joint moves, including all bodies below it."""
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.inertia.merged_inertia import parallel_axis
 from terrainkit_robots.transforms import Matrix
 
-if TYPE_CHECKING:
-    from terrainkit_robots.analysis.facts import Facts
 
+def composite_inertias(bodies: Sequence[Body], zero_poses: Sequence[Matrix]) -> list[float]:
+    """Return the diagonal of the mass matrix, all joints at 0.
 
-def carried_inertias(facts: "Facts") -> list[float]:
-    """Return what the joint above each body carries, all other joints held at 0 [kg m2] or [kg].
+    Args:
+        bodies: The bodies, parents first.
+        zero_poses: Their poses in the frame of the trunk, all joints at 0, each (4, 4) [m].
 
-    That is the inertia about its axis of the body and all below it, of a sliding joint their mass;
-    NaN for a body without a joint that moves. It is the diagonal of the mass matrix.
+    Returns:
+        For each body the inertia of it and all bodies below it about the axis of its joint
+        [kg m2], or their mass [kg] for a prismatic joint. NaN for a body without a moving joint.
     """
-    masses = [body.mass for body in facts.bodies]
+    masses = [body.mass for body in bodies]
     firsts: list[Matrix] = []
     seconds: list[Matrix] = []
-    for body, pose in zip(facts.bodies, facts.at_zero, strict=True):
-        turn, center = pose[:3, :3], pose[:3, :3] @ body.center + pose[:3, 3]
+    for body, pose in zip(bodies, zero_poses, strict=True):
+        rotation, center = pose[:3, :3], pose[:3, :3] @ body.center + pose[:3, 3]
         firsts.append(body.mass * center)
-        seconds.append(turn @ body.inertia @ turn.T + _steiner(body.mass, center))
+        seconds.append(rotation @ body.inertia @ rotation.T + parallel_axis(body.mass, center))
     inertias = [math.nan] * len(masses)
-    for body in reversed(facts.bodies):  # children before their parents
+    for body in reversed(bodies):  # children before their parents
         index, joint = body.index, body.joint
         if joint is not None and joint.moves:
-            pose = facts.at_zero[index]
+            pose = zero_poses[index]
             axis, point = pose[:3, :3] @ joint.direction, pose[:3, :3] @ joint.anchor + pose[:3, 3]
             mass, first, second = masses[index], firsts[index], seconds[index]
-            # Moved from the trunk's origin to the point, which the centre of mass need not be.
-            about = second - _mixed(first, point) + _steiner(mass, point)
-            inertias[index] = mass if joint.kind == "prismatic" else float(axis @ about @ axis)
+            # Shifted from the origin of the trunk to the axis, neither of which is the center of
+            # mass, hence the cross terms.
+            about_axis = second - _cross_terms(first, point) + parallel_axis(mass, point)
+            inertias[index] = mass if joint.kind == "prismatic" else float(axis @ about_axis @ axis)
         if body.parent is not None:
             masses[body.parent] += masses[index]
             firsts[body.parent] = firsts[body.parent] + firsts[index]
@@ -41,11 +46,7 @@ def carried_inertias(facts: "Facts") -> list[float]:
     return inertias
 
 
-def _steiner(mass: float, arm: Matrix) -> Matrix:
-    return np.asarray(mass * (arm @ arm * np.eye(3) - np.outer(arm, arm)))
-
-
-def _mixed(first: Matrix, point: Matrix) -> Matrix:
+def _cross_terms(first: Matrix, point: Matrix) -> Matrix:
     """Return the cross terms of sum m |r - p|^2, with `first` the sum of m r."""
     return np.asarray(
         2 * (first @ point) * np.eye(3) - np.outer(first, point) - np.outer(point, first)

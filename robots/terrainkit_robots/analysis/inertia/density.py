@@ -1,66 +1,65 @@
-"""Density: whether a mass fits the room that its body takes."""
+"""Check whether the mass of a body fits its size."""
 
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.bodies.bounds import BodyExtents
-from terrainkit_robots.analysis.bodies.shapes import has_extent, volume
-from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.bodies.bounds import BodyBounds
+from terrainkit_robots.analysis.bodies.shapes import has_bounds, volume
 from terrainkit_robots.description.model import Geometry
-from terrainkit_robots.mesh.mesh_cache import MeshError
+from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes
 from terrainkit_robots.transforms import Matrix
 
-LIGHTEST, DENSEST = 10.0, 20_000.0
-"""Density between the lightest packing foam and gold [kg/m3]; the collision shapes of drones, which
-are mostly air, come down to 20."""
+MIN_DENSITY, MAX_DENSITY = 10.0, 20_000.0
+"""Densities of the lightest packing foam and of gold [kg/m3]. The collision shapes of drones, which
+are mostly air, have 20."""
+
+_PLAUSIBLE_DENSITY = 200.0
+"""If the bounding box of a body has at least this density, its volume is not computed [kg/m3]."""
+
+_SLENDERNESS = 20.0
+"""Cubed length over volume of a rather slender limb."""
 
 
-def is_derived(body: Body) -> bool:
-    """Return whether MuJoCo makes the mass from the shapes, so that the two cannot disagree."""
+def has_derived_mass(body: Body) -> bool:
+    """Return whether MuJoCo derives the mass from the shapes, so that the two always agree."""
     return all(link.inertial is None or link.inertial.source == link.source for link in body.links)
 
 
-def too_dense(extents: BodyExtents, body: Body) -> tuple[float, float] | None:
-    """Return the room around a body [m3] and the limit, if it is too heavy for that."""
+def max_density_violation(body: Body, body_bounds: BodyBounds) -> tuple[float, float] | None:
+    """Return the volume of the bounding box [m3] and MAX_DENSITY if a body is too heavy for it."""
 
-    def wrong(box: Matrix) -> bool:
-        return body.mass > DENSEST * room(box)
+    def is_too_dense(box: Matrix) -> bool:
+        return body.mass > MAX_DENSITY * _box_volume(box)
 
-    box = extents.still(body, wrong)
-    return None if box is None or room(box) <= 0 else (room(box), DENSEST)
+    box = body_bounds.box_if(body, is_too_dense)
+    return None if box is None or _box_volume(box) <= 0 else (_box_volume(box), MAX_DENSITY)
 
 
-def too_light(robot: Facts, extents: BodyExtents, body: Body) -> tuple[float, float] | None:
-    """Return the volume of a body's largest shape [m3] and the limit, if it is too light."""
+def min_density_violation(
+    body: Body, body_bounds: BodyBounds, meshes: Meshes
+) -> tuple[float, float] | None:
+    """Return the volume of the largest shape [m3] and MIN_DENSITY if a body is too light for it."""
 
-    def doubtful(length: float) -> bool:
-        return body.mass < _LIGHT * length**3 / _SLENDER
+    def may_be_too_light(length: float) -> bool:
+        return body.mass < _PLAUSIBLE_DENSITY * length**3 / _SLENDERNESS
 
-    box = extents.own(body, doubtful)
-    if box is None or body.mass >= _LIGHT * room(box):
+    box = body_bounds.shape_box(body, may_be_too_light)
+    if box is None or body.mass >= _PLAUSIBLE_DENSITY * _box_volume(box):
         return None
     shapes = (*body.collisions, *body.visuals)
-    largest = max(volume_of(robot, placed.geometry) for placed in shapes)
-    return (largest, LIGHTEST) if body.mass < LIGHTEST * largest else None
+    largest = max(shape_volume(shape.geometry, meshes) for shape in shapes)
+    return (largest, MIN_DENSITY) if body.mass < MIN_DENSITY * largest else None
 
 
-_LIGHT = 200.0
-"""Density of the box around a body from which on nobody asks for its volume [kg/m3]."""
-
-_SLENDER = 20.0
-"""The cube of its length over the volume of a limb that is rather slender."""
-
-
-def room(box: Matrix) -> float:
-    """Return the volume of a box [m3]."""
+def _box_volume(box: Matrix) -> float:
     return float(np.prod(box[1] - box[0]))
 
 
-def volume_of(robot: Facts, shape: Geometry) -> float:
-    """Return the volume of a shape [m3]; 0 where that is not known."""
-    if not has_extent(shape, robot.meshes):
+def shape_volume(shape: Geometry, meshes: Meshes) -> float:
+    """Return the volume of a shape [m3], or 0 if it is unknown."""
+    if not has_bounds(shape, meshes):
         return 0.0
     try:
-        return max(0.0, volume(shape, robot.meshes))
+        return max(0.0, volume(shape, meshes))
     except (MeshError, ValueError):
         return 0.0

@@ -1,48 +1,47 @@
-"""Placeholders: inertias that nobody took from the part."""
+"""Detect inertias that are placeholders."""
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.main_link import main_link
-from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.inertia.physical import NOTHING, in_reach, is_zero
+from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.inertia.physical import MIN_INERTIA, is_in_range, is_zero
 from terrainkit_robots.description.model import Link
 
 
-def placeholders(robot: Facts) -> list[list[Link]]:
-    """Return the groups of links, one a body at most, whose inertia is a placeholder."""
-    links = {body.index: main_link(body) for body in robot.bodies if body.mass > NOTHING}
+def placeholder_inertias(bodies: Sequence[Body]) -> list[list[Link]]:
+    """Return groups of links with the same placeholder inertia, at most one link per body."""
+    links = {body.index: body.main_link for body in bodies if body.mass > MIN_INERTIA}
     groups: dict[tuple[float, ...], list[int]] = {}
     for index, link in links.items():
         inertia = link.inertial.inertia if link.inertial else None
-        if inertia is not None and in_reach(inertia) and not is_zero(inertia):
+        if inertia is not None and is_in_range(inertia) and not is_zero(inertia):
             groups.setdefault(tuple(float(x) for x in inertia.flat), []).append(index)
     found = []
     for indices in groups.values():
         members = {i: links[i] for i in indices}
-        most = len(indices) >= max(3, math.ceil(len(links) / 2))
-        if is_identity(links[indices[0]]) or (most and _differ(robot, members)):
+        is_majority = len(indices) >= max(3, math.ceil(len(links) / 2))
+        if is_identity(links[indices[0]]) or (is_majority and _are_different(members, bodies)):
             found.append(list(members.values()))
     return found
 
 
-def _differ(robot: Facts, links: Mapping[int, Link]) -> bool:
-    """Return whether bodies of one inertia are not one part that is used again and again."""
+def _are_different(links: Mapping[int, Link], bodies: Sequence[Body]) -> bool:
+    """Return whether links with the same inertia are not copies of one part."""
     masses = {link.inertial.mass for link in links.values() if link.inertial}
-    if len(masses) == 1 and not _looks_made_up(next(iter(links.values()))):
+    if len(masses) == 1 and not _is_rounded(next(iter(links.values()))):
         return False
     for index, link in links.items():
-        parent = links.get(robot.bodies[index].parent or 0)
-        if parent not in (None, link) and _shapes_of(parent) != (_shapes_of(link) or None):
+        parent = links.get(bodies[index].parent or 0)
+        if parent not in (None, link) and _shapes(parent) != (_shapes(link) or None):
             return True
     return False
 
 
-def _looks_made_up(link: Link) -> bool:
-    """Return whether an inertia is that of a ball, or has no products and two digits at most."""
+def _is_rounded(link: Link) -> bool:
+    """Return whether an inertia is spherical, or diagonal with at most two digits."""
     assert link.inertial is not None
     assert link.inertial.inertia is not None
     moments = np.diag(link.inertial.inertia)
@@ -51,7 +50,7 @@ def _looks_made_up(link: Link) -> bool:
     return len(set(moments)) == 1 or all(float(f"{x:.2g}") == x for x in moments)
 
 
-def _shapes_of(link: Link) -> Counter[tuple[str, tuple[float, ...], str]]:
+def _shapes(link: Link) -> Counter[tuple[str, tuple[float, ...], str]]:
     return Counter(
         (shape.shape, shape.size, shape.mesh.filename if shape.mesh else "")
         for shape in (*link.collisions, *link.visuals)
@@ -59,6 +58,6 @@ def _shapes_of(link: Link) -> Counter[tuple[str, tuple[float, ...], str]]:
 
 
 def is_identity(link: Link) -> bool:
-    """Return whether an inertia is that of 1 kg m2 about every axis."""
+    """Return whether the inertia of a link is 1 kg m2 about every axis."""
     assert link.inertial is not None
     return np.array_equal(link.inertial.inertia, np.eye(3))  # type: ignore[arg-type]

@@ -1,40 +1,45 @@
-"""The default pose: where the joints of a robot start, whoever says so."""
+"""Compute the default joint positions of a robot."""
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
-from terrainkit_robots.analysis.bodies.mimic_joints import follower_positions
-from terrainkit_robots.analysis.legs.standing_pose import nearest, solve_positions
+from terrainkit_robots.analysis.bodies.mimic_joints import mimic_positions
+from terrainkit_robots.analysis.legs.leg_model import LegModel
+from terrainkit_robots.analysis.legs.standing_pose import clip_to_limits, solve_standing_pose
 from terrainkit_robots.spec.per_joint import match_joints
 
-if TYPE_CHECKING:
-    from terrainkit_robots.analysis.facts import Facts
 
+def default_positions(
+    robot: LegModel, spec_pose: Mapping[str, float] | None, actuated: Sequence[str]
+) -> Mapping[str, float]:
+    """Return the default position of each moving joint [rad] or [m], by name.
 
-def starting_positions(facts: "Facts") -> Mapping[str, float]:
-    """Return the position of each moving joint that the robot starts from [rad] or [m], by name.
+    Positions of the spec are used unchanged. The others come from the first keyframe, from the
+    standing pose for joints of legs, or are the closest to zero that the limits allow. Positions
+    of mimic joints are computed.
 
-    What the spec says of a joint is taken as it is. The others are where the first keyframe has
-    them, where legs stand, or as close to zero as the limits allow. A joint that follows another is
-    where that puts it.
+    Args:
+        robot: The robot.
+        spec_pose: Default pose of the spec: position [rad] or [m] by joint name or pattern.
+        actuated: Names of the actuated joints, which the patterns are matched with.
     """
-    positions = _positions(facts)
-    followed = follower_positions(facts.joints, positions)
-    return {**positions, **{name: float(position) for name, position in followed.items()}}
+    positions = _positions(robot, spec_pose, actuated)
+    mimicked = mimic_positions(robot.joints, positions)
+    return {**positions, **{name: float(position) for name, position in mimicked.items()}}
 
 
-def _positions(facts: "Facts") -> Mapping[str, float]:
-    if facts.spec is None:
-        return solve_positions(facts) if facts.legs else _close_to_zero(facts)
-    actuated = [joint.name for joint in facts.actuated]
-    told = match_joints(facts.spec.default_pose, actuated).values
-    # Where the spec leaves nothing open, there is nothing to search for.
-    open_ones = any(joint.name not in told for leg in facts.legs for joint in leg.joints)
-    return {**(solve_positions(facts) if open_ones else _close_to_zero(facts)), **told}
+def _positions(
+    robot: LegModel, spec_pose: Mapping[str, float] | None, actuated: Sequence[str]
+) -> Mapping[str, float]:
+    if spec_pose is None:
+        return solve_standing_pose(robot) if robot.legs else _near_zero(robot)
+    known = match_joints(spec_pose, actuated).values
+    # The search is skipped if the spec has a position for every joint of the legs.
+    incomplete = any(joint.name not in known for leg in robot.legs for joint in leg.joints)
+    return {**(solve_standing_pose(robot) if incomplete else _near_zero(robot)), **known}
 
 
-def _close_to_zero(facts: "Facts") -> dict[str, float]:
-    home = facts.model.home
+def _near_zero(robot: LegModel) -> dict[str, float]:
     return {
-        joint.name: home.get(joint.name, nearest(joint, joint.reference)) for joint in facts.joints
+        joint.name: robot.keyframe.get(joint.name, clip_to_limits(joint, joint.reference))
+        for joint in robot.joints
     }

@@ -1,24 +1,18 @@
-"""Effort: what the motors of a joint can give."""
+"""Compute the effort limits of joints."""
 
-from terrainkit_robots.analysis.cached_fact import per_robot
-from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.model import Joint
+from terrainkit_robots.description.model import Joint, RobotModel
 
 
-def effort_of(robot: Facts, joint: Joint) -> float | None:
-    """Return what the motors of a joint can give [N m] or [N]; None if it is not limited."""
-    limited = joint.limit.effort if joint.limit else None
-    if robot.model.kind != "mjcf":
-        return limited
-    both = [effort for effort in (_driven(robot).get(joint.name), limited) if effort is not None]
-    return min(both, default=None)
+def effort_limit(model: RobotModel, joint: Joint) -> float | None:
+    """Return the effort limit of a joint [N m] or [N]. None if it is unlimited.
 
-
-@per_robot
-def _driven(robot: Facts) -> dict[str, float | None]:
-    """Return the sum of the efforts of the motors on each joint; None if one is not limited."""
-    efforts: dict[str, float | None] = {}
-    for motor in robot.model.actuators:
-        so_far, more = efforts.get(motor.joint, 0.0), motor.effort
-        efforts[motor.joint] = None if so_far is None or more is None else so_far + more
-    return efforts
+    In MJCF this is the sum of the limits of the actuators on the joint, or the limit of the joint
+    if that is lower.
+    """
+    limit = joint.limit.effort if joint.limit else None
+    if model.kind != "mjcf":
+        return limit
+    efforts = [motor.effort for motor in model.actuators if motor.joint == joint.name]
+    known = [effort for effort in efforts if effort is not None]
+    actuated = sum(known) if efforts and len(known) == len(efforts) else None
+    return min((effort for effort in (actuated, limit) if effort is not None), default=None)

@@ -1,60 +1,57 @@
-"""What joints are for: which are the legs', which carry the trunk, which spin a wheel."""
+"""Classify joints: joints of legs, planar base joints, wheels."""
 
 import math
 from collections import Counter
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.cached_fact import per_robot
-from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.description.model import Joint
 
-_BALANCED = 0.1
-"""Distance of a centre of mass to the axis over the radius of gyration: a wheel or a propeller has
-less, a part of a leg more than 1."""
+_MAX_WHEEL_OFFSET = 0.1
+"""Distance of the center of mass to the axis over the radius of gyration, at most, of a wheel or a
+propeller. Parts of legs have more than 1."""
 
 
-def leg_joints(robot: Facts) -> list[Joint]:
-    """Return the joints of the legs, or where some are called legs, of those.
+def leg_joints(legs: Sequence[Leg], bodies: Sequence[Body]) -> list[Joint]:
+    """Return the joints that belong to exactly one leg.
 
-    A joint that legs share, such as a waist, is of none.
+    If some legs are named as legs, only those count. A joint that legs share, such as a waist, is
+    left out.
     """
-    uses = Counter(joint.name for leg in robot.legs for joint in leg.joints)
-    own = {joint.name for joint in own_joints(robot) if uses[joint.name] == 1}
-    called = [leg for leg in robot.legs if leg.limb.words]
-    return [joint for leg in called or robot.legs for joint in leg.joints if joint.name in own]
+    uses = Counter(joint.name for leg in legs for joint in leg.joints)
+    unshared = {joint.name for joint in robot_joints(bodies) if uses[joint.name] == 1}
+    named = [leg for leg in legs if leg.limb.has_leg_names]
+    return [joint for leg in named or legs for joint in leg.joints if joint.name in unshared]
 
 
-def bodies_by_joint(robot: Facts) -> dict[str, Body]:
-    """Return the body that each joint moves, by the joint's name."""
-    return {body.joint.name: body for body in robot.bodies if body.joint is not None}
+def is_wheel(body: Body, parents: Collection[int | None]) -> bool:
+    """Return whether a body without children is balanced on its axis: a wheel or a propeller.
 
-
-@per_robot
-def _carriers(robot: Facts) -> frozenset[int | None]:
-    """Return the bodies that carry others."""
-    return frozenset(body.parent for body in robot.bodies)
-
-
-def is_wheel(robot: Facts, body: Body) -> bool:
-    """Return whether a body is balanced on its axis and carries no other: a wheel, a propeller."""
-    if body.joint is None or body.index in _carriers(robot):
+    Args:
+        body: The body.
+        parents: Indices of all bodies with children.
+    """
+    if body.joint is None or body.index in parents:
         return False
     arm = body.center - body.joint.anchor
-    aside = float(np.linalg.norm(arm - (arm @ body.joint.direction) * body.joint.direction))
+    offset = float(np.linalg.norm(arm - (arm @ body.joint.direction) * body.joint.direction))
     moment = float(body.principal[2])
-    return body.mass > 0 and moment > 0 and aside < _BALANCED * math.sqrt(moment / body.mass)
+    if body.mass <= 0 or moment <= 0:
+        return False
+    return offset < _MAX_WHEEL_OFFSET * math.sqrt(moment / body.mass)
 
 
-def own_joints(robot: Facts) -> list[Joint]:
-    """Return the moving joints but those that carry the trunk of a model of the plane."""
-    carriers = {0} if robot.bodies and robot.bodies[0].virtual else set()
+def robot_joints(bodies: Sequence[Body]) -> list[Joint]:
+    """Return the moving joints without those that move the base of a planar model."""
+    base = {0} if bodies and bodies[0].virtual else set()
     found = []
-    for body in robot.bodies[1:]:
-        if body.parent in carriers:
+    for body in bodies[1:]:
+        if body.parent in base:
             if body.virtual:
-                carriers.add(body.index)
+                base.add(body.index)
             continue
         if body.joint is not None and body.joint.moves:
             found.append(body.joint)

@@ -1,35 +1,33 @@
-"""Legs: the limbs that the robot stands on, and what each of their joints is for."""
+"""Detect the legs of a robot and the role of each of their joints."""
 
 import itertools
 import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.kinematics import axis_in_trunk
-from terrainkit_robots.analysis.legs.limbs import Limb, forks
+from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.bodies.kinematics import joint_axis
+from terrainkit_robots.analysis.legs.limbs import Limb, is_branch
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.transforms import Matrix
 
-if TYPE_CHECKING:
-    from terrainkit_robots.analysis.facts import Facts
-
 Role = Literal["waist", "yaw", "roll", "hip", "knee", "ankle", "slide"]
-"""Hip, knee and ankle bend the leg in its plane; roll and yaw turn that plane. A waist is what it
-shares with other legs."""
+"""Hip, knee and ankle bend the leg in its plane. Roll and yaw rotate that plane. A waist is shared
+with other legs."""
 
 _WAIST: Role = "waist"
 
-_LEGGY = 1.5
-"""Score from which a limb is taken for a leg."""
+_MIN_LEG_SCORE = 1.5
+"""Score from which a limb counts as a leg."""
 
-_PARALLEL = 0.9
+_MIN_PARALLEL_COSINE = 0.9
 """Cosine from which two axes count as parallel: 26 degrees, more than legs are splayed."""
 
-_FOOT_WORDS = re.compile(r"foot|feet|toe|sole", re.IGNORECASE)
+_FOOT_NAME = re.compile(r"foot|feet|toe|sole", re.IGNORECASE)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,16 +37,16 @@ class Leg:
     limb: Limb
 
     foot: str
-    """Link that touches the ground."""
+    """Name of the link that touches the ground."""
 
     roles: tuple[Role, ...]
-    """What each joint of the limb is for."""
+    """Role of each joint of the limb."""
 
     pitch: Matrix
-    """Axis about which the leg bends, in the trunk's frame at zero, shape (3,)."""
+    """Axis about which the leg bends, in the frame of the trunk at zero, shape (3,)."""
 
     length: float
-    """From hip over knee and ankle to the contact, in the plane in which the leg bends [m]."""
+    """Length from hip over knee and ankle to the contact, in the plane of the leg [m]."""
 
     @property
     def joints(self) -> tuple[Joint, ...]:
@@ -60,104 +58,125 @@ class Leg:
         return next((j for j, r in zip(self.joints, self.roles, strict=True) if r == role), None)
 
 
-def find_legs(facts: "Facts") -> tuple[Leg, ...]:
-    """Return the legs of a robot, in the order of its bodies; empty for one that has none."""
-    likely = sorted(
-        (limb for limb in facts.limbs if limb.score >= _LEGGY),
+def detect_legs(
+    limbs: Sequence[Limb], bodies: Sequence[Body], zero_poses: Sequence[Matrix]
+) -> tuple[Leg, ...]:
+    """Return the legs of a robot in the order of its bodies.
+
+    Args:
+        limbs: The limbs of the robot.
+        bodies: The bodies, parents first.
+        zero_poses: Their poses in the frame of the trunk, all joints at 0, each (4, 4) [m].
+    """
+    candidates = sorted(
+        (limb for limb in limbs if limb.score >= _MIN_LEG_SCORE),
         key=lambda limb: (-limb.score, float(limb.tip[2]), -len(limb.joints)),
     )
-    if not likely:
+    if not candidates:
         return ()
     kept: list[Limb] = []
-    size = float(np.linalg.norm(np.ptp([pose[:3, 3] for pose in facts.at_zero], axis=0)))
-    for limb in likely:
-        if not any(forks(limb, other, size) for other in kept):
+    size = float(np.linalg.norm(np.ptp([pose[:3, 3] for pose in zero_poses], axis=0)))
+    for limb in candidates:
+        if not any(is_branch(limb, other, size) for other in kept):
             kept.append(limb)
     kept.sort(key=lambda limb: limb.chain)
     uses = Counter(index for limb in kept for index in limb.chain)
-    return tuple(_leg(limb, facts, [uses[i] > 1 for i in limb.chain]) for limb in kept)
+    return tuple(
+        _make_leg(limb, bodies, zero_poses, [uses[i] > 1 for i in limb.chain]) for limb in kept
+    )
 
 
-def _leg(limb: Limb, facts: "Facts", shared: Sequence[bool]) -> Leg:
-    hinged = [i for i in limb.chain if (j := facts.bodies[i].joint) is not None and j.moves]
-    waist = sum(s for s, i in zip(shared, limb.chain, strict=True) if i in hinged)
-    turning = [
-        None if joint.kind == "prismatic" else axis_in_trunk(facts.bodies[i], facts.at_zero[i])[1]
-        for joint, i in zip(limb.joints[waist:], hinged[waist:], strict=True)
+def _make_leg(
+    limb: Limb, bodies: Sequence[Body], zero_poses: Sequence[Matrix], shared: Sequence[bool]
+) -> Leg:
+    moving = [i for i in limb.chain if (j := bodies[i].joint) is not None and j.moves]
+    waist = sum(s for s, i in zip(shared, limb.chain, strict=True) if i in moving)
+    axes = [
+        None if joint.kind == "prismatic" else joint_axis(bodies[i], zero_poses[i])[1]
+        for joint, i in zip(limb.joints[waist:], moving[waist:], strict=True)
     ]
     points = limb.points[waist:]
-    pitch = _pitch_axis([axis for axis in turning if axis is not None])
-    bends = [k for k, axis in enumerate(turning) if axis is not None and _along(axis, pitch)]
-    path = [_in_plane(points[k], pitch) for k in bends] + [_in_plane(limb.tip, pitch)]
+    pitch = _pitch_axis([axis for axis in axes if axis is not None])
+    bending = [k for k, axis in enumerate(axes) if axis is not None and _is_parallel(axis, pitch)]
+    path = [_project(points[k], pitch) for k in bending] + [_project(limb.tip, pitch)]
     return Leg(
         limb=limb,
-        foot=_foot(limb, facts),
-        roles=(*[_WAIST] * waist, *_roles(turning, bends, path)),
+        foot=_foot_link(limb, bodies, zero_poses),
+        roles=(*[_WAIST] * waist, *_roles(axes, bending, path)),
         pitch=pitch,
         length=float(sum(np.linalg.norm(b - a) for a, b in itertools.pairwise(path))),
     )
 
 
-def _along(axis: Matrix, other: Matrix) -> bool:
-    return bool(abs(axis @ other) > _PARALLEL)
+def _is_parallel(axis: Matrix, other: Matrix) -> bool:
+    return bool(abs(axis @ other) > _MIN_PARALLEL_COSINE)
 
 
 def _pitch_axis(axes: Sequence[Matrix]) -> Matrix:
-    """Return the level axis that most joints of a leg share; of two the one more to the side."""
-    level = []
+    """Return the horizontal axis that most joints of a leg share; in a tie the more lateral one."""
+    horizontal = []
     for axis in axes:
         flat = axis * [1, 1, 0]
         length = float(np.linalg.norm(flat))
-        if length > _PARALLEL:
-            level.append(flat / length)
-    if not level:
+        if length > _MIN_PARALLEL_COSINE:
+            horizontal.append(flat / length)
+    if not horizontal:
         return np.array([0.0, 1.0, 0.0])
-    best = max(level, key=lambda a: (sum(_along(a, b) for b in level), round(abs(float(a[1])), 6)))
+    best = max(
+        horizontal,
+        key=lambda a: (sum(_is_parallel(a, b) for b in horizontal), round(abs(float(a[1])), 6)),
+    )
     return np.asarray(best if best[int(np.abs(best).argmax())] > 0 else -best)
 
 
-def _in_plane(point: Matrix, normal: Matrix) -> Matrix:
+def _project(point: Matrix, normal: Matrix) -> Matrix:
     return np.asarray(point - (point @ normal) * normal)
 
 
 def _roles(
-    turning: Sequence[Matrix | None], bends: Sequence[int], path: Sequence[Matrix]
+    axes: Sequence[Matrix | None], bending: Sequence[int], path: Sequence[Matrix]
 ) -> tuple[Role, ...]:
-    """Return the roles; `path` holds the joints of `bends` and the contact, in the leg's plane."""
-    halves = [
+    """Return the role of each joint.
+
+    Args:
+        axes: Axis of each joint, shape (3,); None for a prismatic joint.
+        bending: Indices of the joints that bend the leg in its plane.
+        path: Positions of these joints and of the contact in that plane, each of shape (3,) [m].
+    """
+    imbalances = [
         abs(np.linalg.norm(path[k] - path[0]) - np.linalg.norm(path[-1] - path[k]))
-        for k in range(1, len(bends))
+        for k in range(1, len(bending))
     ]
-    knee = bends[1 + int(np.argmin(halves))] if halves else None
+    knee = bending[1 + int(np.argmin(imbalances))] if imbalances else None
 
     def role(k: int) -> Role:
-        axis = turning[k]
+        axis = axes[k]
         if axis is None:
             return "slide"
-        if k in bends:
+        if k in bending:
             return "hip" if knee is None or k < knee else "knee" if k == knee else "ankle"
         return "yaw" if abs(axis[2]) > np.hypot(axis[0], axis[1]) else "roll"
 
-    return tuple(role(k) for k in range(len(turning)))
+    return tuple(role(k) for k in range(len(axes)))
 
 
-def _foot(limb: Limb, facts: "Facts") -> str:
-    """Return the link at the tip: one that is called a foot, or else carries the lowest shape.
+def _foot_link(limb: Limb, bodies: Sequence[Body], zero_poses: Sequence[Matrix]) -> str:
+    """Return the link at the tip that is named a foot, or else has the lowest shape.
 
-    A frame without any shape, such as that of a sensor in the sole, is one only if nothing else is.
+    A frame without shapes, such as that of a sensor in the sole, is the last choice.
     """
-    body = facts.bodies[limb.chain[-1]]
-    pose = facts.at_zero[body.index]
-    reach = float(np.linalg.norm(limb.tip - pose[:3, 3]))
+    body = bodies[limb.chain[-1]]
+    pose = zero_poses[body.index]
+    distance = float(np.linalg.norm(limb.tip - pose[:3, 3]))
     near = [
         link
         for link, local in zip(body.links, body.poses, strict=True)
-        if np.linalg.norm((pose @ local)[:3, 3] - limb.tip) <= 0.5 * reach + 0.01
+        if np.linalg.norm((pose @ local)[:3, 3] - limb.tip) <= 0.5 * distance + 0.01
     ]
-    carriers = [link for link in body.links if link.collisions]
-    drawn = [link for link in body.links if link.visuals]
-    shaped = [link for link in near if link in carriers or link in drawn]
-    candidates = shaped or carriers or drawn or near or [body.top]
-    named = [link for link in candidates if _FOOT_WORDS.search(link.name)]
-    touching = [link for link in candidates if link in carriers]
+    colliding = [link for link in body.links if link.collisions]
+    visible = [link for link in body.links if link.visuals]
+    shaped = [link for link in near if link in colliding or link in visible]
+    candidates = shaped or colliding or visible or near or [body.top]
+    named = [link for link in candidates if _FOOT_NAME.search(link.name)]
+    touching = [link for link in candidates if link in colliding]
     return (named or touching or candidates)[0].name

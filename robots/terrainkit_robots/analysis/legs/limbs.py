@@ -1,57 +1,55 @@
-"""Limbs: chains of bodies from the trunk to a leaf, and how much each one looks like a leg.
+"""Detect limbs, the chains of bodies from the trunk to a leaf, and score how leg-like they are.
 
-The score and its thresholds were tried on 60 robots: quadrupeds, humanoids, hexapods, arms, hands,
-drones and cars, as published, and with names that say nothing.
+The score and its thresholds were calibrated on 60 published robots: quadrupeds, humanoids,
+hexapods, arms, hands, drones and cars, with their own names and with meaningless ones.
 """
 
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.bodies.contact import sole
-from terrainkit_robots.analysis.bodies.kinematics import ancestors, axis_in_trunk
-from terrainkit_robots.analysis.bodies.shapes import bounds, lowest
+from terrainkit_robots.analysis.bodies.contact import contact_points
+from terrainkit_robots.analysis.bodies.kinematics import ancestors, joint_axis
+from terrainkit_robots.analysis.bodies.shapes import bounds, min_height
+from terrainkit_robots.analysis.bodies.tree import Tree
 from terrainkit_robots.description.model import Joint
+from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.transforms import Matrix
 
-if TYPE_CHECKING:
-    from terrainkit_robots.analysis.facts import Facts
+_NEAR_GROUND, _LOW = 0.12, 0.25
+"""Height of a foot above the ground over the height of the robot at zero."""
 
-_NEAR, _NEARISH = 0.12, 0.25
-"""How far above the ground a foot may end, as a share of the robot's height at zero."""
+_MIN_ARM_HEIGHT = 0.5
+"""A limb that ends this high above the rest of the robot, such as wheels or a pedestal, is an arm.
+Over the height of the robot. A leg that is folded at zero ends lower above the belly."""
 
-_HELD_UP = 0.5
-"""A limb that ends this share of the robot's height above what carries it, wheels or a pedestal, is
-an arm. A leg that is folded at zero ends less high above the belly."""
+_MAX_MIRROR_ERROR = 0.05
+"""Distance of a leaf to the mirror image of another one, at most, over the size of the robot."""
 
-_MIRRORED = 0.05
-"""How far apart a leaf and another's mirror image may be, as a share of the robot's size."""
+_MIN_SEPARATE_LENGTH = 0.5
+"""Unshared length over length, at least, of each of two limbs that share joints."""
 
-_APART = 0.5
-"""Of two limbs that share joints, at least this share of each one's length is its own."""
-
-_LEG_WORDS = re.compile(
+_LEG_NAME = re.compile(
     r"(?<!al)leg|foot|feet|toe|calf|thigh|shank|shin|knee|ankle|(?<![csw])hip|femur|tibia|tarsus"
     r"|coxa|(?<!tor)(?<!con)sole|haa|hfe|kfe"
 )
-_OTHER_WORDS = re.compile(
+_OTHER_NAME = re.compile(
     r"arm(?!at)|hand(?!le)|finger|thumb|wrist|elbow|shoulder|grip|palm|head|neck|tail|wheel|rotor"
     r"|prop(?!r)|camera|mcp|knuckle|distal"
 )
 
-_TURN = 0.25
-"""A body whose center of mass is this share of its radius of gyration or less away from the axis
-about which it turns without end is a wheel."""
+_MAX_WHEEL_OFFSET = 0.25
+"""Distance of the center of mass to the axis over the radius of gyration, at most, of a wheel on a
+continuous joint."""
 
-_MOST_JOINTS = 32
-"""A chain of more joints is no leg, but a tail, a snake or a rope."""
+_MAX_JOINTS = 32
+"""A chain of more joints is a tail, a snake or a rope."""
 
-_MOST_LIMBS = 64
-"""More leaves than this are no limbs; the lowest are looked at."""
+_MAX_LIMBS = 64
+"""Number of leaves that are considered: the lowest ones."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,88 +57,98 @@ class Chain:
     """Bodies from the trunk to a leaf."""
 
     chain: tuple[int, ...]
-    """Indices of its bodies, from the one below the trunk to the leaf."""
+    """Indices of its bodies, from below the trunk to the leaf."""
 
     joints: tuple[Joint, ...]
-    """Joints with one degree of freedom along it, from the trunk."""
+    """Its joints with one degree of freedom, from the trunk."""
 
     points: Matrix
-    """A point of the axis of each of these joints, all joints at 0, in the trunk's frame, shape
-    (joints, 3) [m]."""
+    """A point of the axis of each of these joints in the frame of the trunk, all joints at 0,
+    shape (joints, 3) [m]."""
 
     tip: Matrix
-    """Middle of the points that would touch the ground first, all joints at 0, in the trunk's
-    frame, shape (3,) [m]."""
+    """Center of the points that touch the ground first in the frame of the trunk, all joints at 0,
+    shape (3,) [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Limb(Chain):
-    """A chain, and whether it is a leg."""
+    """A chain and its score."""
 
     score: float
-    """How much it looks like a leg; one from 1.5 on is taken for a leg."""
+    """How leg-like it is. A limb with at least 1.5 is a leg."""
 
-    words: bool
-    """Whether its names speak of legs more than of anything else."""
+    has_leg_names: bool
+    """Whether more of its names suggest a leg than anything else."""
 
 
-def find_limbs(facts: "Facts") -> tuple[Limb, ...]:
-    """Return the limbs of a robot, in the order of its bodies."""
-    leaves = _leaves(facts)
+def detect_limbs(
+    tree: Tree,
+    bodies: Sequence[Body],
+    drivable: Sequence[Joint],
+    zero_poses: Sequence[Matrix],
+    meshes: Meshes,
+) -> tuple[Limb, ...]:
+    """Return the limbs of a robot in the order of its bodies.
+
+    Args:
+        tree: The tree of links.
+        bodies: The bodies, parents first.
+        drivable: Joints that an actuator moves, directly or perhaps through a tendon.
+        zero_poses: Poses of the bodies in the frame of the trunk, all joints at 0, each (4, 4) [m].
+        meshes: Mesh files.
+    """
+    leaves = _leaves(bodies, drivable, zero_poses, meshes)
     if not leaves:
         return ()
-    lower, upper = _extent(facts)
+    lower, upper = _robot_bounds(bodies, zero_poses, meshes)
     ground = min(float(leaf.tip[2]) for leaf in leaves)
     height = max(float(upper[2]) - min(float(lower[2]), ground), 1e-6)
     size = max(float(np.linalg.norm(upper - lower)), 1e-6)
-    rest = _lowest_of_the_rest(facts, leaves)
-    bolted = 0.5 * _bolted(facts)
-
-    def stands(foot: float) -> float:
-        above, held_up = (foot - ground) / height, foot - rest > _HELD_UP * height
-        return (above <= _NEARISH) / 2 + (above <= _NEAR) / 2 - held_up - bolted
-
-    return tuple(
-        _scored(leaf, leaves, facts.bodies, size, stands(float(leaf.tip[2]))) for leaf in leaves
-    )
-
-
-def _lowest_of_the_rest(facts: "Facts", leaves: Sequence[Chain]) -> float:
-    """Return the lowest point of what belongs to no limb, such as a pedestal or wheels [m]."""
-    limbs = {index for leaf in leaves for index in leaf.chain}
-    return min(
+    in_limbs = {index for leaf in leaves for index in leaf.chain}
+    rest = min(  # the lowest point outside of the limbs, such as a pedestal or wheels
         (
-            lowest(shape, facts.at_zero[body.index], facts.meshes)
-            for body in facts.bodies
-            if body.index not in limbs
+            min_height(shape, zero_poses[body.index], meshes)
+            for body in bodies
+            if body.index not in in_limbs
             for shape in body.collisions
         ),
         default=np.inf,
     )
+    is_fixed_base = bool(tree.order) and tree.order[0] == bodies[0].top.name == "world"
+
+    def height_score(tip: float) -> float:
+        ratio, is_arm = (tip - ground) / height, tip - rest > _MIN_ARM_HEIGHT * height
+        return (ratio <= _LOW) / 2 + (ratio <= _NEAR_GROUND) / 2 - is_arm - is_fixed_base / 2
+
+    return tuple(
+        _make_limb(leaf, leaves, bodies, size, height_score(float(leaf.tip[2]))) for leaf in leaves
+    )
 
 
-def forks(one: Chain, other: Chain, size: float) -> bool:
-    """Return whether two limbs are one that forks, as with toes or a closed loop that was cut.
+def is_branch(one: Chain, other: Chain, size: float) -> bool:
+    """Return whether two chains are branches of one limb, such as toes or a cut closed loop.
 
-    Legs that share a waist or a spine are two: what they share is the smaller part of both, or
-    they are mirrored and long.
+    Legs that share a waist or a spine are separate: the shared part is the smaller one in both, or
+    the legs are mirrored and long.
 
     Args:
-        one: A limb.
-        other: Another.
+        one: A chain.
+        other: Another chain.
         size: Diagonal of the robot [m].
     """
     shared = sum(a is b for a, b in zip(one.joints, other.joints, strict=False))
     if not shared:
         return False
-    apart = [_length(limb, shared) / max(_length(limb, 0), 1e-9) for limb in (one, other)]
-    if min(apart) < _APART:
+    separate = [_length(limb, shared) / max(_length(limb, 0), 1e-9) for limb in (one, other)]
+    if min(separate) < _MIN_SEPARATE_LENGTH:
         return True
-    return 2 * shared >= min(len(one.joints), len(other.joints)) and not _alike(one, other, size)
+    is_short = 2 * shared >= min(len(one.joints), len(other.joints))
+    return is_short and not _is_mirrored(one, other, size)
 
 
 def _length(limb: Chain, start: int) -> float:
-    """Return the length of a limb from a joint to its tip, as far as its hinges bend it [m]."""
+    """Return the length of a limb from a joint over its hinges to its tip [m]."""
     hinges = [
         point
         for joint, point in zip(limb.joints[start:], limb.points[start:], strict=True)
@@ -150,100 +158,92 @@ def _length(limb: Chain, start: int) -> float:
     return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
-def _leaves(facts: "Facts") -> list[Chain]:
-    bodies = facts.bodies
+def _leaves(
+    bodies: Sequence[Body],
+    drivable: Sequence[Joint],
+    zero_poses: Sequence[Matrix],
+    meshes: Meshes,
+) -> list[Chain]:
     parents = {body.parent for body in bodies}
-    driven = _driven(facts)
+    drivable_ids = {id(joint) for joint in drivable}
     leaves = []
     for body in bodies[1:]:
         if body.index in parents:
             continue
         chain = ancestors(bodies, body.index)
-        hinged = [i for i in chain if (j := bodies[i].joint) is not None and j.moves]
-        joints = [j for i in hinged if (j := bodies[i].joint) is not None]
-        # A wheel that spins at the end does not bend the limb.
-        bending = joints[:-1] if joints and _is_wheel(bodies[hinged[-1]]) else joints
-        if len(joints) <= _MOST_JOINTS and sum(id(joint) in driven for joint in bending) >= 2:
-            tip = sole(body, facts.at_zero[body.index], facts.meshes).mean(axis=0)
-            points = [axis_in_trunk(bodies[i], facts.at_zero[i])[0] for i in hinged]
+        moving = [i for i in chain if (j := bodies[i].joint) is not None and j.moves]
+        joints = [j for i in moving if (j := bodies[i].joint) is not None]
+        # A wheel at the end does not bend the limb.
+        bending = joints[:-1] if joints and _is_spinning_wheel(bodies[moving[-1]]) else joints
+        driven = sum(id(joint) in drivable_ids for joint in bending)
+        if len(joints) <= _MAX_JOINTS and driven >= 2:
+            tip = contact_points(body, zero_poses[body.index], meshes).mean(axis=0)
+            points = [joint_axis(bodies[i], zero_poses[i])[0] for i in moving]
             leaves.append(
                 Chain(chain=tuple(chain), joints=tuple(joints), points=np.array(points), tip=tip)
             )
-    return sorted(leaves, key=lambda leaf: float(leaf.tip[2]))[:_MOST_LIMBS]
+    return sorted(leaves, key=lambda leaf: float(leaf.tip[2]))[:_MAX_LIMBS]
 
 
-def _driven(facts: "Facts") -> set[int]:
-    """Return the joints that a motor drives, or may drive through a tendon, by id."""
-    tendons = any(not actuator.joint for actuator in facts.model.actuators)
-    return {id(joint) for joint in (facts.joints if tendons else facts.actuated)}
-
-
-def _is_wheel(body: Body) -> bool:
-    """Return whether a body turns without end, balanced on its axis."""
+def _is_spinning_wheel(body: Body) -> bool:
+    """Return whether a body on a continuous joint is balanced on its axis."""
     joint = body.joint
     assert joint is not None
     if joint.kind != "continuous":
         return False
     arm = body.center - joint.anchor
-    aside = float(np.linalg.norm(arm - (arm @ joint.direction) * joint.direction))
-    spread = float(np.clip(np.trace(body.inertia) / 2, 0, None))
-    return body.mass <= 0 or aside <= _TURN * float(np.sqrt(spread / body.mass))
+    offset = float(np.linalg.norm(arm - (arm @ joint.direction) * joint.direction))
+    moment = float(np.clip(np.trace(body.inertia) / 2, 0, None))
+    return body.mass <= 0 or offset <= _MAX_WHEEL_OFFSET * float(np.sqrt(moment / body.mass))
 
 
-def _extent(facts: "Facts") -> tuple[Matrix, Matrix]:
-    """Return the lower and upper corner of a box around the robot at zero."""
-    corners = [pose[:3, 3] for pose in facts.at_zero]
-    for body, pose in zip(facts.bodies, facts.at_zero, strict=True):
-        box = bounds(body.collisions, facts.meshes)
+def _robot_bounds(
+    bodies: Sequence[Body], zero_poses: Sequence[Matrix], meshes: Meshes
+) -> tuple[Matrix, Matrix]:
+    """Return the lower and upper corner of the bounding box of the robot at zero."""
+    corners = [pose[:3, 3] for pose in zero_poses]
+    for body, pose in zip(bodies, zero_poses, strict=True):
+        box = bounds(body.collisions, meshes)
         if box is not None:
             grid = np.array([[x, y, z] for x in box[:, 0] for y in box[:, 1] for z in box[:, 2]])
             corners += list(grid @ pose[:3, :3].T + pose[:3, 3])
     return np.min(corners, axis=0), np.max(corners, axis=0)
 
 
-def _bolted(facts: "Facts") -> bool:
-    """Return whether the root is a link that stands for the world."""
-    return bool(facts.tree.order) and facts.tree.order[0] == facts.bodies[0].top.name == "world"
-
-
-def _scored(
-    leaf: Chain,
-    leaves: Sequence[Chain],
-    bodies: Sequence[Body],
-    size: float,
-    score: float,
+def _make_limb(
+    leaf: Chain, leaves: Sequence[Chain], bodies: Sequence[Body], size: float, score: float
 ) -> Limb:
-    names = [link.name for i in leaf.chain for link in bodies[i].links]
-    leggy, other = _words([*names, *(joint.name for joint in leaf.joints)])
-    score += 0.5 * any(_is_twin(leaf, twin, size) for twin in leaves)
-    score += 0.5 if leggy > other else -1.0 if other > leggy else 0.0
+    links = [link.name for i in leaf.chain for link in bodies[i].links]
+    leg_names, other_names = _count_names([*links, *(joint.name for joint in leaf.joints)])
+    has_mirror_image = any(
+        other is not leaf and _is_mirrored(leaf, other, size) and not is_branch(leaf, other, size)
+        for other in leaves
+    )
+    score += 0.5 * has_mirror_image
+    score += 0.5 if leg_names > other_names else -1.0 if other_names > leg_names else 0.0
     return Limb(
         chain=leaf.chain,
         joints=leaf.joints,
         points=leaf.points,
         tip=leaf.tip,
         score=score,
-        words=leggy > other,
+        has_leg_names=leg_names > other_names,
     )
 
 
-def _words(names: Sequence[str]) -> tuple[int, int]:
-    """Return how many names speak of legs, and how many of other limbs and of none."""
-    apart = [re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower() for name in names]
-    rest = [name for name in apart if not _LEG_WORDS.search(name)]
-    return len(apart) - len(rest), sum(bool(_OTHER_WORDS.search(name)) for name in rest)
+def _count_names(names: Sequence[str]) -> tuple[int, int]:
+    """Return how many names suggest a leg, and how many suggest another limb."""
+    separated = [re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower() for name in names]
+    rest = [name for name in separated if not _LEG_NAME.search(name)]
+    return len(separated) - len(rest), sum(bool(_OTHER_NAME.search(name)) for name in rest)
 
 
-def _is_twin(leaf: Chain, twin: Chain, size: float) -> bool:
-    return twin is not leaf and _alike(leaf, twin, size) and not forks(leaf, twin, size)
-
-
-def _alike(one: Chain, other: Chain, size: float) -> bool:
+def _is_mirrored(one: Chain, other: Chain, size: float) -> bool:
     """Return whether two limbs are mirror images of each other."""
-    # One joint of a leg may have been turned into a fixed one, which is a finding of its own.
+    # One joint of a leg may have become fixed, which is a violation of its own.
     if abs(len(other.joints) - len(one.joints)) > 1:
         return False
     return any(
-        float(np.linalg.norm(one.tip * flip - other.tip)) < _MIRRORED * size
+        float(np.linalg.norm(one.tip * flip - other.tip)) < _MAX_MIRROR_ERROR * size
         for flip in (np.array([1, -1, 1]), np.array([-1, 1, 1]))
     )

@@ -1,26 +1,25 @@
-"""The stance: how a robot stands at given joint positions, and what that takes."""
+"""Compute how a robot stands at given joint positions, and the required torques."""
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.contact import convex_hull, margin, sole
-from terrainkit_robots.analysis.bodies.kinematics import axis_in_trunk, body_poses
-from terrainkit_robots.analysis.bodies.shapes import lowest
+from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.bodies.contact import contact_points, convex_hull, margin
+from terrainkit_robots.analysis.bodies.kinematics import body_poses, joint_axis
+from terrainkit_robots.analysis.bodies.shapes import min_height
+from terrainkit_robots.analysis.legs.leg_model import LegModel
+from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.analysis.legs.standing_pose import center_of_mass
 from terrainkit_robots.transforms import Matrix
 
-if TYPE_CHECKING:
-    from terrainkit_robots.analysis.facts import Facts
-
 GRAVITY = 9.81
-"""Acceleration [m/s2], as MuJoCo has it."""
+"""Acceleration of gravity, as in MuJoCo [m/s2]."""
 
-_ENOUGH_LEGS = 3
-"""Robots with so many legs stand by the springs of their joints; those with fewer balance."""
+_MIN_STABLE_LEGS = 3
+"""Robots with at least this many legs stand without a balance controller."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,147 +30,156 @@ class Stance:
     """Position of each moving joint [rad] or [m], by name."""
 
     height: float
-    """Trunk's origin above the ground, when the lowest collision shape touches it [m]."""
+    """Height of the trunk's origin above the ground when the lowest collision shape touches it
+    [m]."""
 
     contacts: Matrix
-    """Middle of each foot's contact in the trunk's frame, shape (legs, 3) [m]."""
+    """Center of each foot's contact in the frame of the trunk, shape (legs, 3) [m]."""
 
     pressures: Matrix
-    """Where the ground pushes on each foot in the trunk's frame, shape (legs, 3) [m]: moved within
-    its sole from the middle to where the feet balance the mass."""
+    """Center of pressure of each foot in the frame of the trunk, shape (legs, 3) [m]: the point of
+    its sole closest to the center at which the feet balance the robot."""
 
     support: Matrix
-    """Support polygon in the trunk's frame, convex, counter-clockwise, shape (n, 2) [m]."""
+    """Support polygon in the frame of the trunk, convex, counter-clockwise, shape (n, 2) [m]."""
 
     center: Matrix
-    """Centre of mass in the trunk's frame, shape (3,) [m]."""
+    """Center of mass in the frame of the trunk, shape (3,) [m]."""
 
     margin: float
-    """Distance of the centre of mass to the edge of the support polygon [m]; negative outside, NaN
-    if a mass is not known."""
+    """Distance of the center of mass to the edge of the support polygon [m]. Negative outside, NaN
+    if a mass is unknown."""
 
     torques: Mapping[str, float]
-    """Torque [N m], or force [N] of a sliding joint, that holds each joint of the legs, by name;
-    empty if a mass is not known."""
+    """Holding torque of each joint of the legs [N m], or force of a prismatic joint [N], by name.
+    Empty if a mass is unknown."""
 
     @property
     def spawn_height(self) -> float:
-        """Return the height of the trunk's origin to let the robot go from: 1 cm of air [m]."""
+        """Return the height of the trunk's origin with 1 cm of clearance [m]."""
         return self.height + 0.01
 
 
-def stand(facts: "Facts", positions: Mapping[str, float]) -> Stance:
-    """Return how a robot with legs stands at these joint positions [rad] or [m]."""
-    bodies = facts.bodies
+def compute_stance(robot: LegModel, positions: Mapping[str, float], *, total_mass: float) -> Stance:
+    """Return the stance of a robot with legs.
+
+    Args:
+        robot: The robot.
+        positions: Position of each moving joint [rad] or [m], by name.
+        total_mass: Total declared mass [kg]. NaN if a mass is unknown.
+    """
+    bodies, legs = robot.bodies, robot.legs
     poses = body_poses(bodies, positions)
-    feet = [leg.limb.chain[-1] for leg in facts.legs]
-    soles = [sole(bodies[i], poses[i], facts.meshes) for i in feet]
+    feet = [leg.limb.chain[-1] for leg in legs]
+    soles = [contact_points(bodies[i], poses[i], robot.meshes) for i in feet]
     contacts = np.array([points.mean(axis=0) for points in soles])
+    heights = [
+        min_height(shape, pose, robot.meshes)
+        for body, pose in zip(bodies, poses, strict=True)
+        for shape in body.collisions
+    ]
     center = center_of_mass(bodies, poses)
     support = convex_hull(np.concatenate(soles)[:, :2])
-    known = math.isfinite(facts.total_mass)
+    is_known = math.isfinite(total_mass)
     weight = sum(body.mass for body in bodies) * GRAVITY
     forces = ground_forces(contacts[:, :2], center[:2], weight)
-    pressures = _pressures(soles, contacts, forces, center)
+    pressures = _pressure_centers(soles, contacts, forces, center)
     return Stance(
         positions=positions,
-        height=-_lowest(facts, poses, contacts),
+        height=-min([*heights, float(contacts[:, 2].min())]),
         contacts=contacts,
         pressures=pressures,
         support=support,
         center=center,
-        margin=margin(center[:2], support) if known else math.nan,
-        torques=_torques(facts, poses, pressures, forces) if known else {},
+        margin=margin(center[:2], support) if is_known else math.nan,
+        torques=_holding_torques(bodies, legs, poses, pressures, forces) if is_known else {},
     )
 
 
-def stands_alone(facts: "Facts") -> bool:
-    """Return whether it has legs enough to stand by the stiffness of its joints alone.
+def is_statically_stable(legs: Sequence[Leg]) -> bool:
+    """Return whether a robot has enough legs to stand by the stiffness of its joints alone.
 
-    One with fewer is held in balance by a policy, and stands for itself only with locked joints.
+    A policy has to balance a robot with fewer legs, unless its joints are locked.
     """
-    return len(facts.legs) >= _ENOUGH_LEGS
+    return len(legs) >= _MIN_STABLE_LEGS
 
 
-def _pressures(soles: Sequence[Matrix], contacts: Matrix, forces: Matrix, center: Matrix) -> Matrix:
-    """Return where feet are pushed, shape (n, 3) [m]: as far from the middle as balance needs."""
+def _pressure_centers(
+    soles: Sequence[Matrix], contacts: Matrix, forces: Matrix, center: Matrix
+) -> Matrix:
+    """Return the centers of pressure, shape (n, 3) [m], shifted from the contacts for balance."""
     weight = float(forces.sum())
     if weight <= 0:
         return contacts
-    missing = (center - forces @ contacts / weight) * [1, 1, 0]
-    moved = [
-        np.clip(contact + missing, sole.min(axis=0), sole.max(axis=0))
-        for contact, sole in zip(contacts, soles, strict=True)
+    shift = (center - forces @ contacts / weight) * [1, 1, 0]
+    shifted = [
+        np.clip(contact + shift, points.min(axis=0), points.max(axis=0))
+        for contact, points in zip(contacts, soles, strict=True)
     ]
     return np.array(
-        [[*place[:2], contact[2]] for place, contact in zip(moved, contacts, strict=True)]
+        [[*point[:2], contact[2]] for point, contact in zip(shifted, contacts, strict=True)]
     )
 
 
-def _lowest(facts: "Facts", poses: Sequence[Matrix], contacts: Matrix) -> float:
-    shapes = [
-        lowest(shape, pose, facts.meshes)
-        for body, pose in zip(facts.bodies, poses, strict=True)
-        for shape in body.collisions
-    ]
-    return min([*shapes, float(contacts[:, 2].min())])
-
-
-def _torques(
-    facts: "Facts", poses: Sequence[Matrix], places: Matrix, forces: Matrix
+def _holding_torques(
+    bodies: Sequence[Body],
+    legs: Sequence[Leg],
+    poses: Sequence[Matrix],
+    pressures: Matrix,
+    forces: Matrix,
 ) -> dict[str, float]:
-    """Return what holds each joint of the legs against gravity and the ground's push."""
+    """Return the torque of each joint of the legs that balances gravity and the ground forces."""
     up = np.array([0.0, 0.0, 1.0])
     torques: dict[str, float] = {}
-    for index in sorted(facts.leg_bodies):
-        joint = facts.bodies[index].joint
+    for index in sorted({index for leg in legs for index in leg.limb.chain}):
+        joint = bodies[index].joint
         if joint is None or not joint.moves:
             continue
-        # A waist carries what all legs below it do.
+        # A waist carries the loads of all legs below it.
         loads = [
-            (place, push * up)
-            for leg, place, push in zip(facts.legs, places, forces, strict=True)
+            (point, force * up)
+            for leg, point, force in zip(legs, pressures, forces, strict=True)
             if index in leg.limb.chain
         ]
-        for below in _below(facts, index):
-            body, pose = facts.bodies[below], poses[below]
+        for descendant in _subtree(bodies, index):
+            body, pose = bodies[descendant], poses[descendant]
             loads.append((pose[:3, :3] @ body.center + pose[:3, 3], -body.mass * GRAVITY * up))
-        point, axis = axis_in_trunk(facts.bodies[index], poses[index])
+        origin, axis = joint_axis(bodies[index], poses[index])
         if joint.kind == "prismatic":
             torques[joint.name] = -float(sum(axis @ force for _, force in loads))
         else:
-            torques[joint.name] = -float(sum(axis @ np.cross(p - point, f) for p, f in loads))
+            torques[joint.name] = -float(sum(axis @ np.cross(p - origin, f) for p, f in loads))
     return torques
 
 
-def _below(facts: "Facts", index: int) -> list[int]:
-    """Return a body and all that hang from it; a parent comes before its children."""
+def _subtree(bodies: Sequence[Body], index: int) -> list[int]:
+    """Return the indices of a body and its descendants, parents first."""
     found = {index}
-    for body in facts.bodies[index + 1 :]:
+    for body in bodies[index + 1 :]:
         if body.parent in found:
             found.add(body.index)
     return sorted(found)
 
 
-def ground_forces(places: Matrix, center: Matrix, weight: float) -> Matrix:
-    """Return how feet share a weight: the even-most upward forces in balance, shape (n,) [N].
+def ground_forces(points: Matrix, center: Matrix, weight: float) -> Matrix:
+    """Return the most even upward forces of the feet that balance a weight, shape (n,) [N].
 
     Args:
-        places: Where the feet are, shape (n, 2) [m].
-        center: Where the weight is, shape (2,) [m].
-        weight: How much it is [N].
+        points: Contacts of the feet, shape (n, 2) [m].
+        center: Center of mass, shape (2,) [m].
+        weight: Weight [N].
     """
-    forces = np.zeros(len(places))
-    standing = np.arange(len(places))
-    while len(standing):
-        balance = np.vstack([np.ones(len(standing)), (places[standing] - center).T])
-        even = np.full(len(standing), weight / len(standing))
-        missing = np.array([weight, 0.0, 0.0]) - balance @ even
-        change, *_ = np.linalg.lstsq(balance, missing, rcond=1e-9)
-        pulled = even + change < -1e-9 * abs(weight)  # the ground does not pull: a foot that lifts
-        if not pulled.any():
-            forces[standing] = np.clip(even + change, 0, None)
+    forces = np.zeros(len(points))
+    loaded = np.arange(len(points))
+    while len(loaded):
+        balance = np.vstack([np.ones(len(loaded)), (points[loaded] - center).T])
+        even = np.full(len(loaded), weight / len(loaded))
+        residual = np.array([weight, 0.0, 0.0]) - balance @ even
+        change, *_ = np.linalg.lstsq(balance, residual, rcond=1e-9)
+        pulling = even + change < -1e-9 * abs(weight)  # the ground cannot pull: this foot lifts off
+        if not pulling.any():
+            forces[loaded] = np.clip(even + change, 0, None)
             break
-        standing = standing[~pulled]
+        loaded = loaded[~pulling]
     total = float(forces.sum())
-    return forces * weight / total if total > 0 else np.full(len(places), weight / len(places))
+    return forces * weight / total if total > 0 else np.full(len(points), weight / len(points))

@@ -1,110 +1,106 @@
-"""The standing pose: joint positions at which the legs carry the trunk, found by a search.
+"""Solve for the standing pose: joint positions at which the legs carry the trunk.
 
-Each leg is bent by its hip and knee over a grid that closes in on the best place; the ankle keeps
-the sole level, and everything else stays at zero. Pairs of legs stand alike, so one is searched.
+For each leg, hip and knee are searched over a grid that is refined around its best points. The
+ankle keeps the sole level, and all other joints stay at zero. Of mirrored legs only one is solved.
 """
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.bodies.contact import level_turn, sole
-from terrainkit_robots.analysis.bodies.kinematics import axis_in_trunk, body_poses, joint_motion
-from terrainkit_robots.analysis.bodies.mimic_joints import follower_positions
+from terrainkit_robots.analysis.bodies.contact import contact_points, flat_foot_angle
+from terrainkit_robots.analysis.bodies.kinematics import body_poses, joint_axis, joint_motion
+from terrainkit_robots.analysis.bodies.mimic_joints import mimic_positions
+from terrainkit_robots.analysis.legs.leg_model import LegModel
 from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.transforms import Matrix, axis_angle_to_matrix
 
-if TYPE_CHECKING:
-    from terrainkit_robots.analysis.facts import Facts
+_HEIGHT_RATIO = {2: 0.965}
+"""Distance from hip to ground over leg length, by number of legs. Bipeds stand almost straight."""
 
-_BENT = {2: 0.965}
-"""Distance from hip to ground over leg length, by number of legs: two stand almost straight."""
-
-_BENT_ELSE = 0.75
-"""The same for four legs and more."""
+_DEFAULT_HEIGHT_RATIO = 0.75
+"""The same ratio for all other numbers of legs."""
 
 _PRECISION = np.array([0.02, 0.02, 0.1])
-"""Distance from where the foot should be that costs 1, along x, y and z, as a share of the leg's
-length: under the mass is a must, the height a preference."""
+"""Distance of the foot from its target that costs 1, along x, y and z, over the leg length. The
+foot must be below the mass; the height is only a preference."""
 
-_GRID = 21
-"""Positions of a joint that are tried in each round."""
+_GRID_SIZE = 21
+"""Number of positions of a joint in each round of the search."""
 
 _ROUNDS = 4
-"""Each round closes in on a fifth of the range around the best place."""
+"""Number of refinements, each to a fifth of the range around the best point."""
 
-_BASINS = 4
-"""So many places that are better than all around them are looked at closer."""
+_MAX_STARTS = 4
+"""Number of local minima of the grid that are refined."""
 
-_BENDING = ("hip", "knee", "ankle")
+_BENDING_ROLES = ("hip", "knee", "ankle")
 
-_WIDEST = 2.4
-"""A joint without limits is tried within +- this [rad]."""
+_DEFAULT_RANGE = 2.4
+"""A joint without limits is searched within plus and minus this [rad]."""
 
-_MARGIN = 0.08
-"""Positions closer to a limit than this share of the range are avoided."""
+_LIMIT_MARGIN = 0.08
+"""Positions closer to a limit than this are penalized, over the range."""
 
-_FARTHEST = 0.3
-"""How far all feet may be from below their hips, as a share of the leg's length; a robot that has
-to reach farther does not stand."""
+_MAX_FOOT_OFFSET = 0.3
+"""Largest horizontal offset of all feet from their hips, over the leg length. A robot that needs
+more does not stand."""
 
-_OUTWARD = 0.05
-"""Cost of a knee that is a leg's length outside of its hip; next to nothing."""
+_OUTWARD_COST = 0.05
+"""Cost of a knee that is a leg length outside of its hip. It only breaks ties."""
 
-_CLEAR = 0.15
-"""How far the knee has to be above the ground, as a share of the leg's length."""
+_MIN_KNEE_HEIGHT = 0.15
+"""Smallest height of the knee above the ground, over the leg length."""
 
 
-def solve_positions(facts: "Facts") -> Mapping[str, float]:
-    """Return the position of each moving joint [rad] or [m] in the standing pose, by name.
+def solve_standing_pose(robot: LegModel) -> Mapping[str, float]:
+    """Return the position of each moving joint in the standing pose [rad] or [m], by name.
 
-    A keyframe of the file that has every joint of the legs is taken as it is.
+    A keyframe with positions of all joints of the legs is used unchanged.
     """
-    joints = [joint for leg in facts.legs for joint in leg.joints]
-    home = facts.model.home
-    if home and all(joint.name in home for joint in joints):
-        return {joint.name: home.get(joint.name, 0.0) for joint in facts.joints}
-    positions = {joint.name: nearest(joint, joint.reference) for joint in facts.joints}
-    # The centre of mass moves with the legs, so that their feet follow it in a second pass.
-    for _ in range(2 if facts.legs else 0):
-        shift = _offset(facts, positions)
-        for leg, twin, signs in _alike(facts):
-            bent = _bend(leg, facts, positions, shift)
-            positions |= bent
-            if twin is not None:
-                positions |= _copied(bent, leg, twin, signs)
-    followed = follower_positions(facts.joints, positions)
-    return positions | {name: float(position) for name, position in followed.items()}
+    keyframe = robot.keyframe
+    if keyframe and all(j.name in keyframe for leg in robot.legs for j in leg.joints):
+        return {joint.name: keyframe.get(joint.name, 0.0) for joint in robot.joints}
+    positions = {joint.name: clip_to_limits(joint, joint.reference) for joint in robot.joints}
+    # The center of mass moves with the legs, hence a second pass.
+    for _ in range(2 if robot.legs else 0):
+        shift = _foot_shift(robot, positions)
+        for leg, mirrored, signs in _leg_pairs(robot):
+            solution = _solve_leg(leg, robot, positions, shift)
+            positions |= solution
+            if mirrored is not None:
+                positions |= _mirror_solution(solution, leg, mirrored, signs)
+    mimicked = mimic_positions(robot.joints, positions)
+    return positions | {name: float(position) for name, position in mimicked.items()}
 
 
-def nearest(joint: Joint, position: float) -> float:
-    """Return the position closest to `position` that the limits allow."""
-    lower, upper = range_of(joint)
+def clip_to_limits(joint: Joint, position: float) -> float:
+    """Return the position closest to `position` within the limits [rad] or [m]."""
+    lower, upper = joint_range(joint)
     return float(np.clip(position, lower, upper))
 
 
-def range_of(joint: Joint) -> tuple[float, float]:
-    """Return the limits of a joint [rad] or [m]; infinite where there are none that make sense."""
+def joint_range(joint: Joint) -> tuple[float, float]:
+    """Return the limits of a joint [rad] or [m]. Infinite without valid limits."""
     return joint.range or (-np.inf, np.inf)
 
 
-def _alike(facts: "Facts") -> list[tuple[Leg, Leg | None, Sequence[int]]]:
-    """Return each leg to be searched, with the one that mirrors it and the signs of its joints."""
-    legs, done = facts.legs, set[int]()
-    uses = Counter(i for leg in legs for i in leg.limb.chain)  # a waist is its own twin
+def _leg_pairs(robot: LegModel) -> list[tuple[Leg, Leg | None, Sequence[int]]]:
+    """Return each leg to solve, the leg that mirrors it, and the signs of its joints."""
+    legs, done = robot.legs, set[int]()
+    uses = Counter(i for leg in legs for i in leg.limb.chain)  # a waist mirrors itself
     found: list[tuple[Leg, Leg | None, Sequence[int]]] = []
     for index, leg in enumerate(legs):
         if index in done:
             continue
-        twins = [(i, 1) if uses[i] > 1 else facts.mirror.twin(i) for i in leg.limb.chain]
-        chain = tuple(twin[0] for twin in twins if twin is not None)
+        images = [(i, 1) if uses[i] > 1 else robot.mirror.counterpart(i) for i in leg.limb.chain]
+        chain = tuple(image[0] for image in images if image is not None)
         other = next((k for k, o in enumerate(legs) if o.limb.chain == chain), None)
-        signs = [twin[1] for twin in twins if twin is not None]
+        signs = [image[1] for image in images if image is not None]
         if other is None or other == index or 0 in signs:
             found.append((leg, None, ()))
             continue
@@ -113,29 +109,29 @@ def _alike(facts: "Facts") -> list[tuple[Leg, Leg | None, Sequence[int]]]:
     return found
 
 
-def _copied(
-    bent: Mapping[str, float], leg: Leg, twin: Leg, signs: Sequence[int]
+def _mirror_solution(
+    solution: Mapping[str, float], leg: Leg, mirrored: Leg, signs: Sequence[int]
 ) -> dict[str, float]:
-    """Return the positions of the twin's joints, which its own limits may hold back."""
+    """Return the positions of the mirrored leg, clipped to its own limits."""
     return {
-        other.name: nearest(other, sign * bent[joint.name])
-        for joint, other, sign in zip(leg.joints, twin.joints, signs, strict=False)
-        if joint.name in bent
+        other.name: clip_to_limits(other, sign * solution[joint.name])
+        for joint, other, sign in zip(leg.joints, mirrored.joints, signs, strict=False)
+        if joint.name in solution
     }
 
 
-def _offset(facts: "Facts", positions: Mapping[str, float]) -> Matrix:
-    """Return how far all feet have to be from below their hips, for the mass to be above them."""
-    poses = body_poses(facts.bodies, positions)
-    center = center_of_mass(facts.bodies, poses)
-    hips = [_hip(leg, facts, poses) for leg in facts.legs]
-    away = (center - np.mean(hips, axis=0)) * [1, 1, 0]
-    most = _FARTHEST * float(np.mean([leg.length for leg in facts.legs]))
-    return np.asarray(away * min(1.0, most / max(float(np.linalg.norm(away)), 1e-9)))
+def _foot_shift(robot: LegModel, positions: Mapping[str, float]) -> Matrix:
+    """Return the offset of the feet from their hips that puts the mass above them, shape (3,)."""
+    poses = body_poses(robot.bodies, positions)
+    center = center_of_mass(robot.bodies, poses)
+    hips = [_hip_point(leg, robot, poses) for leg in robot.legs]
+    offset = (center - np.mean(hips, axis=0)) * [1, 1, 0]
+    limit = _MAX_FOOT_OFFSET * float(np.mean([leg.length for leg in robot.legs]))
+    return np.asarray(offset * min(1.0, limit / max(float(np.linalg.norm(offset)), 1e-9)))
 
 
 def center_of_mass(bodies: Sequence[Body], poses: Sequence[Matrix]) -> Matrix:
-    """Return the centre of mass in the frame of the poses, shape (3,) [m]."""
+    """Return the center of mass in the frame of the poses, shape (3,) [m]."""
     total = sum(body.mass for body in bodies)
     if total <= 0:
         return poses[0][:3, 3]
@@ -145,209 +141,212 @@ def center_of_mass(bodies: Sequence[Body], poses: Sequence[Matrix]) -> Matrix:
     )
 
 
-def _hip(leg: Leg, facts: "Facts", poses: Sequence[Matrix]) -> Matrix:
-    """Return where the leg hangs: the axis of its first joint that bends it, shape (3,)."""
-    hinged = [i for i in leg.limb.chain if _moves(facts.bodies[i])]
-    own = [(i, r) for i, r in zip(hinged, leg.roles, strict=True) if r != "waist"]
-    index = next((i for i, r in own if r == "hip"), own[0][0])
-    return axis_in_trunk(facts.bodies[index], poses[index])[0]
-
-
-def _moves(body: Body) -> bool:
-    return body.joint is not None and body.joint.moves
+def _hip_point(leg: Leg, robot: LegModel, poses: Sequence[Matrix]) -> Matrix:
+    """Return a point of the hip axis, or of the first joint of a leg without a hip, shape (3,)."""
+    moving = [i for i in leg.limb.chain if (j := robot.bodies[i].joint) is not None and j.moves]
+    own = [(i, role) for i, role in zip(moving, leg.roles, strict=True) if role != "waist"]
+    index = next((i for i, role in own if role == "hip"), own[0][0])
+    return joint_axis(robot.bodies[index], poses[index])[0]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Bending:
-    """One leg, ready to be tried at many positions of its hip and knee."""
+class _LegProblem:
+    """The cost of one leg as a function of its hip and knee."""
 
     chain: tuple[Body, ...]
-    start: Matrix
-    """Pose of the body that the leg hangs from, shape (4, 4)."""
+    base_pose: Matrix
+    """Pose of the body that the leg is attached to, shape (4, 4) [m]."""
 
     hip: Joint
     knee: Joint
     ankle: Joint | None
     level: tuple[float, float, float]
-    """Position of the ankle that keeps the sole level: a constant, and per hip and knee."""
+    """Ankle position that keeps the sole level: a constant, and its slopes over hip and knee."""
 
     fixed: Mapping[str, float]
-    tip: Matrix
-    """The contact in the frame of the leaf, shape (3,) [m]."""
+    """Positions of the other joints."""
 
-    hip_place: Matrix
-    wanted: Matrix
-    """Where the contact should be, seen from the hip, shape (3,) [m]."""
+    tip: Matrix
+    """Contact in the frame of the leaf, shape (3,) [m]."""
+
+    hip_point: Matrix
+    target: Matrix
+    """Target of the contact relative to the hip, shape (3,) [m]."""
 
     pitch: Matrix
 
     outward: Matrix
-    """Where the knee of one of four legs rather is not, if both ways are open, shape (3,): ahead of
-    a fore leg and behind a hind one; zero for two legs."""
+    """Direction in which the knee should not bend if both ways are open, shape (3,): forward for a
+    front leg and backward for a rear leg of a quadruped, else zero."""
 
     length: float
 
-    def at(self, hip: Matrix, knee: Matrix) -> dict[str, Matrix]:
-        """Return the positions of the joints that bend."""
-        bent = {self.hip.name: hip, self.knee.name: knee}
+    def positions(self, hip: Matrix, knee: Matrix) -> dict[str, Matrix]:
+        """Return the positions of hip, knee and ankle."""
+        positions = {self.hip.name: hip, self.knee.name: knee}
         if self.ankle is not None:
-            level = self._level(hip, knee)
-            bent[self.ankle.name] = np.clip(level, *range_of(self.ankle))
-        return bent
+            level = self._level_ankle(hip, knee)
+            positions[self.ankle.name] = np.clip(level, *joint_range(self.ankle))
+        return positions
 
     def cost(self, hip: Matrix, knee: Matrix) -> Matrix:
-        """Return how bad positions are, shape as theirs."""
-        bent = self.at(hip, knee)
-        contact, joint = self._places(bent)
-        flat = self.pitch * [1, 1, 0]
-        away = contact - self.hip_place - self.wanted
-        away = away - (away @ flat)[..., None] * flat  # sideways it cannot go
-        total = ((away / (self.length * _PRECISION)) ** 2).sum(-1)
-        for name, limits in ((self.hip.name, self.hip), (self.knee.name, self.knee)):
-            total = total + 10 * _crowding(bent[name], limits) + 1e-3 * np.abs(bent[name])
+        """Return the cost of positions, broadcast to a common shape."""
+        positions = self.positions(hip, knee)
+        contact, knee_point = self._forward(positions)
+        lateral = self.pitch * [1, 1, 0]
+        error = contact - self.hip_point - self.target
+        error = error - (error @ lateral)[..., None] * lateral  # the leg cannot move sideways
+        total = ((error / (self.length * _PRECISION)) ** 2).sum(-1)
+        for joint in (self.hip, self.knee):
+            position = positions[joint.name]
+            total = total + 10 * _limit_cost(position, joint) + 1e-3 * np.abs(position)
         if self.ankle is not None:
-            total = total + 10 * (bent[self.ankle.name] - self._level(hip, knee)) ** 2
-        total = total + _OUTWARD * np.clip((joint - self.hip_place) @ self.outward, 0, None)
-        low = _CLEAR * self.length - (joint[..., 2] - contact[..., 2])
+            total = total + 10 * (positions[self.ankle.name] - self._level_ankle(hip, knee)) ** 2
+        outward = np.clip((knee_point - self.hip_point) @ self.outward, 0, None)
+        total = total + _OUTWARD_COST * outward
+        low = _MIN_KNEE_HEIGHT * self.length - (knee_point[..., 2] - contact[..., 2])
         return np.asarray(total + 100 * np.clip(low / self.length, 0, None))
 
-    def _level(self, hip: Matrix, knee: Matrix) -> Matrix:
+    def _level_ankle(self, hip: Matrix, knee: Matrix) -> Matrix:
         constant, per_hip, per_knee = self.level
         return np.asarray(constant + per_hip * hip + per_knee * knee)
 
-    def _places(self, bent: Mapping[str, Matrix]) -> tuple[Matrix, Matrix]:
-        """Return where the contact and the knee are, shapes (..., 3) [m]."""
-        pose = self.start
-        joint = pose[..., :3, 3]
+    def _forward(self, positions: Mapping[str, Matrix]) -> tuple[Matrix, Matrix]:
+        """Return the positions of the contact and of the knee, each of shape (..., 3) [m]."""
+        pose = self.base_pose
+        knee_point = pose[..., :3, 3]
         for body in self.chain:
-            pose = pose @ body.mount
+            pose = pose @ body.origin
             if body.joint is not None and body.joint.moves:
                 name = body.joint.name
-                q = bent[name] if name in bent else np.float64(self.fixed[name])
+                q = positions[name] if name in positions else np.float64(self.fixed[name])
                 pose = pose @ joint_motion(body, q)
                 if name == self.knee.name:
-                    joint = (pose[..., :3, :3] @ body.joint.anchor) + pose[..., :3, 3]
-        return pose[..., :3, :3] @ self.tip + pose[..., :3, 3], joint
+                    knee_point = (pose[..., :3, :3] @ body.joint.anchor) + pose[..., :3, 3]
+        return pose[..., :3, :3] @ self.tip + pose[..., :3, 3], knee_point
 
 
-def _crowding(position: Matrix, joint: Joint) -> Matrix:
-    """Return by how much a position is too close to a limit: 0 away from them, 1 at one."""
-    lower, upper = range_of(joint)
+def _limit_cost(position: Matrix, joint: Joint) -> Matrix:
+    """Return the penalty of positions near a limit: 0 outside of the margin, 1 at the limit."""
+    lower, upper = joint_range(joint)
     if not np.isfinite(upper - lower):
         return np.zeros_like(position)
-    room = _MARGIN * (upper - lower)
-    near = np.minimum(position - lower, upper - position)
-    return np.asarray(np.clip((room - near) / room, 0, None) ** 2)
+    margin = _LIMIT_MARGIN * (upper - lower)
+    distance = np.minimum(position - lower, upper - position)
+    return np.asarray(np.clip((margin - distance) / margin, 0, None) ** 2)
 
 
-def _bend(
-    leg: Leg, facts: "Facts", positions: Mapping[str, float], shift: Matrix
+def _solve_leg(
+    leg: Leg, robot: LegModel, positions: Mapping[str, float], shift: Matrix
 ) -> dict[str, float]:
-    """Return the best positions of a leg's hip, knee and ankle; none without a hip and a knee."""
-    bending = _bending(leg, facts, positions, shift)
-    if bending is None:
+    """Return the best positions of hip, knee and ankle. Empty without a hip and a knee."""
+    problem = _make_problem(leg, robot, positions, shift)
+    if problem is None:
         return {}
-    limits = np.array([_searched(bending.hip), _searched(bending.knee)])
-    axes = np.linspace(limits[:, 0], limits[:, 1], _GRID, axis=-1)
-    cost = bending.cost(*np.meshgrid(axes[0], axes[1], indexing="ij"))
-    # The knee may bend both ways; which is better shows only close to the best place of each.
-    starts = np.array([(axes[0, i], axes[1, j]) for i, j in _minima(cost)[:_BASINS]])
-    hip, knee = _closest_in(bending, starts, limits)
-    return {name: float(q) for name, q in bending.at(hip, knee).items()}
+    limits = np.array([_search_range(problem.hip), _search_range(problem.knee)])
+    axes = np.linspace(limits[:, 0], limits[:, 1], _GRID_SIZE, axis=-1)
+    cost = problem.cost(*np.meshgrid(axes[0], axes[1], indexing="ij"))
+    # The knee may bend both ways, and only the refined minima tell which way is better.
+    starts = np.array([(axes[0, i], axes[1, j]) for i, j in _local_minima(cost)[:_MAX_STARTS]])
+    hip, knee = _refine(problem, starts, limits)
+    return {name: float(q) for name, q in problem.positions(hip, knee).items()}
 
 
-def _minima(cost: Matrix) -> list[tuple[int, int]]:
-    """Return where no neighbour costs less, the cheapest first."""
+def _local_minima(cost: Matrix) -> list[tuple[int, int]]:
+    """Return the indices of the local minima of a grid, the lowest first."""
     padded = np.pad(cost, 1, constant_values=np.inf)
-    around = np.lib.stride_tricks.sliding_window_view(padded, (3, 3)).min(axis=(-1, -2))
-    places = [(int(i), int(j)) for i, j in np.argwhere(cost <= around)]
-    return sorted(places, key=lambda place: float(cost[place]))
+    lowest = np.lib.stride_tricks.sliding_window_view(padded, (3, 3)).min(axis=(-1, -2))
+    indices = [(int(i), int(j)) for i, j in np.argwhere(cost <= lowest)]
+    return sorted(indices, key=lambda index: float(cost[index]))
 
 
-def _closest_in(bending: _Bending, starts: Matrix, limits: Matrix) -> Matrix:
-    """Return the best positions of hip and knee around any of the starts, shape (n, 2)."""
+def _refine(problem: _LegProblem, starts: Matrix, limits: Matrix) -> Matrix:
+    """Return the best position of hip and knee near any of the starts, shape (2,)."""
     best, width, rows = starts, np.ptp(limits, axis=1), np.arange(len(starts))
     for _ in range(_ROUNDS):
         width = width / 5
         lower, upper = (np.clip(best + side * width / 2, *limits.T) for side in (-1, 1))
-        axes = np.linspace(lower, upper, _GRID, axis=-1)
-        # Not as a grid, but as its two sides: what only one of them turns is worked out once.
-        cost = bending.cost(axes[:, 0, :, None], axes[:, 1, None, :]).reshape(len(starts), -1)
-        hip, knee = np.divmod(cost.argmin(axis=1), _GRID)
+        axes = np.linspace(lower, upper, _GRID_SIZE, axis=-1)
+        # Broadcasting instead of a full grid computes the motion of each joint only once.
+        cost = problem.cost(axes[:, 0, :, None], axes[:, 1, None, :]).reshape(len(starts), -1)
+        hip, knee = np.divmod(cost.argmin(axis=1), _GRID_SIZE)
         best = np.stack([axes[rows, 0, hip], axes[rows, 1, knee]], axis=1)
     return np.asarray(best[cost.min(axis=1).argmin()])
 
 
-def _searched(joint: Joint) -> tuple[float, float]:
-    lower, upper = range_of(joint)
-    if upper - lower > 4 * np.pi:
-        return -_WIDEST, _WIDEST
-    return lower, upper
+def _search_range(joint: Joint) -> tuple[float, float]:
+    lower, upper = joint_range(joint)
+    return (-_DEFAULT_RANGE, _DEFAULT_RANGE) if upper - lower > 4 * np.pi else (lower, upper)
 
 
-def _bending(
-    leg: Leg, facts: "Facts", positions: Mapping[str, float], shift: Matrix
-) -> _Bending | None:
+def _make_problem(
+    leg: Leg, robot: LegModel, positions: Mapping[str, float], shift: Matrix
+) -> _LegProblem | None:
     hip, knee = leg.joint("hip"), leg.joint("knee")
     if hip is None or knee is None:
         return None
-    bodies = [facts.bodies[i] for i in leg.limb.chain]
-    ankles = [j for j, r in zip(leg.joints, leg.roles, strict=True) if r == "ankle"]
-    leaf = facts.bodies[leg.limb.chain[-1]]
-    poses = body_poses(facts.bodies, positions)
+    chain = [robot.bodies[i] for i in leg.limb.chain]
+    ankles = [j for j, role in zip(leg.joints, leg.roles, strict=True) if role == "ankle"]
+    leaf = chain[-1]
+    poses = body_poses(robot.bodies, positions)
     if ankles:
-        turn = level_turn(leaf, facts.at_zero[leaf.index], leg.pitch, facts.meshes)
-        foot = facts.at_zero[leaf.index].copy()
-        foot[:3, :3] = axis_angle_to_matrix(leg.pitch, np.float64(turn)) @ foot[:3, :3]
+        angle = flat_foot_angle(leaf, robot.zero_poses[leaf.index], leg.pitch, robot.meshes)
+        foot = robot.zero_poses[leaf.index].copy()
+        foot[:3, :3] = axis_angle_to_matrix(leg.pitch, np.float64(angle)) @ foot[:3, :3]
     else:
-        turn, foot = 0.0, poses[leaf.index]  # a ball rolls: its contact depends on the pose
-    contact = sole(leaf, foot, facts.meshes).mean(axis=0)
-    start = poses[bodies[0].parent or 0]
-    ratio = _BENT.get(len(facts.legs), _BENT_ELSE)
-    hip_place, length = _hip(leg, facts, poses), max(leg.length, 1e-6)
-    return _Bending(
-        chain=tuple(bodies),
-        start=start,
+        angle, foot = 0.0, poses[leaf.index]  # the contact of a ball depends on the pose
+    contact = contact_points(leaf, foot, robot.meshes).mean(axis=0)
+    ratio = _HEIGHT_RATIO.get(len(robot.legs), _DEFAULT_HEIGHT_RATIO)
+    hip_point, length = _hip_point(leg, robot, poses), max(leg.length, 1e-6)
+    return _LegProblem(
+        chain=tuple(chain),
+        base_pose=poses[chain[0].parent or 0],
         hip=hip,
         knee=knee,
         ankle=ankles[-1] if ankles else None,
-        level=_level(leg, facts, positions, turn) if ankles else (0.0, 0.0, 0.0),
+        level=_level_coefficients(leg, robot, positions, angle) if ankles else (0.0, 0.0, 0.0),
         fixed=positions,
         tip=foot[:3, :3].T @ (contact - foot[:3, 3]),
-        hip_place=hip_place,
-        wanted=shift + np.array([0.0, 0.0, -ratio * leg.length]),
+        hip_point=hip_point,
+        target=shift + np.array([0.0, 0.0, -ratio * leg.length]),
         pitch=leg.pitch,
-        outward=_outward(leg, facts, poses, hip_place) / length,
+        outward=_outward(leg, robot, poses, hip_point) / length,
         length=length,
     )
 
 
-def _outward(leg: Leg, facts: "Facts", poses: Sequence[Matrix], hip_place: Matrix) -> Matrix:
-    """Return the level unit vector from the middle of the robot in the plane of one of four legs.
+def _outward(leg: Leg, robot: LegModel, poses: Sequence[Matrix], hip_point: Matrix) -> Matrix:
+    """Return the horizontal unit vector in the plane of a leg that points away from the middle.
 
-    Zero for a leg that hangs in the middle, or reaches to the side as a spider's.
+    Zero for robots that do not have four legs, for a leg in the middle, and for a leg that points
+    sideways as that of a spider.
     """
-    middle = np.mean([_hip(other, facts, poses) for other in facts.legs], axis=0)
-    across = np.cross(leg.pitch, [0.0, 0.0, 1.0])
-    ahead = float((hip_place - middle) @ across)
-    alone = len(facts.legs) != 4 or abs(ahead) < 0.1 * leg.length
-    return np.zeros(3) if alone else np.asarray(np.sign(ahead) * across)
+    middle = np.mean([_hip_point(other, robot, poses) for other in robot.legs], axis=0)
+    forward = np.cross(leg.pitch, [0.0, 0.0, 1.0])
+    distance = float((hip_point - middle) @ forward)
+    if len(robot.legs) != 4 or abs(distance) < 0.1 * leg.length:
+        return np.zeros(3)
+    return np.asarray(np.sign(distance) * forward)
 
 
-def _level(
-    leg: Leg, facts: "Facts", positions: Mapping[str, float], wanted: float
+def _level_coefficients(
+    leg: Leg, robot: LegModel, positions: Mapping[str, float], angle: float
 ) -> tuple[float, float, float]:
-    """Return what keeps the sole level: the turns of all joints that bend add up to `wanted`."""
+    """Return the ankle position that keeps the sole level: constant and slopes over hip and knee.
+
+    The rotations of all joints that bend the leg then add up to `angle`.
+    """
     signs = {
-        joint.name: float(np.sign(axis_in_trunk(facts.bodies[i], facts.at_zero[i])[1] @ leg.pitch))
+        joint.name: float(np.sign(joint_axis(robot.bodies[i], robot.zero_poses[i])[1] @ leg.pitch))
         for i in leg.limb.chain
-        if (joint := facts.bodies[i].joint) is not None and joint.moves
+        if (joint := robot.bodies[i].joint) is not None and joint.moves
     }
-    bends = {j.name for j, r in zip(leg.joints, leg.roles, strict=True) if r in _BENDING}
-    ankle = [j.name for j, r in zip(leg.joints, leg.roles, strict=True) if r == "ankle"][-1]
+    roles = [(j.name, role) for j, role in zip(leg.joints, leg.roles, strict=True)]
+    bending = {name for name, role in roles if role in _BENDING_ROLES}
+    ankle = [name for name, role in roles if role == "ankle"][-1]
     hip, knee = leg.joint("hip"), leg.joint("knee")
     assert hip is not None
     assert knee is not None
-    others = sum(signs[n] * positions[n] for n in bends - {hip.name, knee.name, ankle})
-    last = signs[ankle]
-    return last * (wanted - others), -last * signs[hip.name], -last * signs[knee.name]
+    others = sum(signs[n] * positions[n] for n in bending - {hip.name, knee.name, ankle})
+    sign = signs[ankle]
+    return sign * (angle - others), -sign * signs[hip.name], -sign * signs[knee.name]

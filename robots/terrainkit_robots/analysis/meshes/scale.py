@@ -1,7 +1,7 @@
-"""Whether a mesh is as large as the robot around it, or in other units.
+"""Check whether a mesh has the scale of the robot, or other units.
 
-A mesh is measured against the joints next to it, and against the robot as a whole. Details may be
-small, and a base may be large; what nothing but a wrong unit explains is told.
+The size of a mesh is compared with the distances to the next joints and with the whole robot.
+Details may be small and a base may be large. Only a size that a wrong unit explains is reported.
 """
 
 from collections.abc import Sequence
@@ -9,143 +9,146 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.bodies import Placed
+from terrainkit_robots.analysis.bodies.bodies import Body, BodyShape
 from terrainkit_robots.analysis.bodies.shapes import bounds
-from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.bodies.tree import Tree
 from terrainkit_robots.analysis.meshes.uses import MeshUse
-from terrainkit_robots.description.model import Geometry, Link
-from terrainkit_robots.mesh.mesh_cache import MeshError
+from terrainkit_robots.description.model import Geometry
+from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes
 from terrainkit_robots.transforms import Matrix
 
-LARGE, HUGE = 15.0, 50.0
-"""Times the distance to the next joints. Shells reach a few times beyond them; millimetres read as
-metres are 1000 times too large, and inches 39 times."""
+MAX_RATIO, MAX_PLAUSIBLE_RATIO = 15.0, 50.0
+"""Size of a mesh over the distance to the next joints: limit of a valid mesh, and of one that may
+be valid. Shells are a few times larger. Millimeters read as meters are 1000 times too large, and
+inches 39 times."""
 
-TINY = 0.02
-"""Share of that distance under which a part is a dot: metres read as millimetres are 1/1000."""
+MIN_RATIO = 0.02
+"""The same ratio for a part that is too small. Meters read as millimeters are 1/1000."""
 
-_LEAST_LARGE = 3.0
-"""No mesh is told to be too large that measures less [m], whatever the joints: a camera that turns
-on a small car is many times smaller than it."""
+_MIN_LARGE_SIZE = 3.0
+"""Smaller meshes are never too large [m], whatever the distances between the joints: a camera on a
+small vehicle is many times smaller than the vehicle."""
 
-_MOST_TINY = 0.005
-"""No mesh is told to be too small that measures more [m]: it may be a marker or a sensor."""
+_MAX_SMALL_SIZE = 0.005
+"""Larger meshes are never too small [m]: they may be a marker or a sensor."""
 
-_DOT = 0.001
-"""Share of the whole robot under which the only mesh of a link cannot be seen."""
+_MIN_VISIBLE_RATIO = 0.001
+"""Size of the only mesh of a link over the size of the robot below which it is invisible."""
 
-_NEAR = 0.1
-"""Share of the whole robot below which a distance between joints says nothing about a part: the
-axes of a hip or wrist meet in one point."""
+_MIN_JOINT_DISTANCE_RATIO = 0.1
+"""Distances between joints that are shorter than this, over the size of the robot, are no reference
+for the size of a part: the axes of a hip or a wrist intersect."""
+
+_MAX_LENGTH = 1e6
+"""Longer distances are invalid [m]."""
+
+_JOINTS = "from its frame to the next joints"
+_ROBOT = "across all joints"
+_OTHER_SHAPES = "across the other shapes of the link"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Misfit:
-    """A mesh that does not fit the robot."""
+class ScaleMismatch:
+    """A mesh whose size does not fit the robot."""
 
     diagonal: float
-    """Of the box around it [m]."""
+    """Diagonal of its bounding box [m]."""
 
     reference: float
-    """What it was held against [m]."""
+    """The length that it was compared with [m]."""
 
-    against: str
-    """That in words."""
+    description: str
+    """Description of that length."""
 
     @property
     def ratio(self) -> float:
-        """How many times as large it is."""
+        """Return the diagonal over the reference."""
         return self.diagonal / self.reference
 
 
-class Scales:
-    """The sizes of a robot's joints and parts."""
+class MeshScales:
+    """The lengths of a robot that meshes are compared with."""
 
-    def __init__(self, robot: Facts) -> None:
-        self._robot = robot
-        places = np.array([np.zeros(3), *(pose[:3, 3] for pose in robot.at_zero)])
-        self.span = _length(np.ptp(places, axis=0)) if (np.abs(places) < _LARGEST).all() else 0.0
-        """Diagonal of the box around all joints, at their zero [m]; 0 where that says nothing."""
+    def __init__(
+        self, tree: Tree, bodies: Sequence[Body], zero_poses: Sequence[Matrix], meshes: Meshes
+    ) -> None:
+        """Measure a robot.
 
-    def misfit(self, use: MeshUse) -> Misfit | None:
-        """Return by how much a mesh is too large or too small; None if it may be right."""
-        if self.span <= 0 or use.link.name not in self._robot.tree.links:
+        Args:
+            tree: The tree of links.
+            bodies: The bodies, the trunk first.
+            zero_poses: Their poses in the frame of the trunk, all joints at 0, each (4, 4) [m].
+            meshes: Mesh files.
+        """
+        self._tree, self._meshes = tree, meshes
+        self._trunk_links = {link.name for link in bodies[0].links} if bodies else set()
+        points = np.array([np.zeros(3), *(pose[:3, 3] for pose in zero_poses)])
+        is_valid = (np.abs(points) < _MAX_LENGTH).all()
+        self.robot_size = _length(np.ptp(points, axis=0)) if is_valid else 0.0
+        """Diagonal of the bounding box of all joints, all joints at 0 [m]. 0 if it is invalid."""
+
+    def mismatch(self, use: MeshUse) -> ScaleMismatch | None:
+        """Return how much a mesh is too large or too small; None if its size may be right."""
+        if self.robot_size <= 0 or use.link.name not in self._tree.links:
             return None
-        near, far = self._offsets(use.link)
-        meshes = self._robot.meshes
         try:
-            about = meshes.partial_diagonal(use.mesh)
-            if about is not None and _MOST_TINY < about < _LEAST_LARGE:
-                return None  # the rest of it is not worth the reading
-            diagonal = meshes.diagonal(use.mesh)
+            estimate = self._meshes.partial_diagonal(use.mesh)
+            if estimate is not None and _MAX_SMALL_SIZE < estimate < _MIN_LARGE_SIZE:
+                return None  # the file does not have to be read completely
+            diagonal = self._meshes.diagonal(use.mesh)
         except MeshError:
             return None
-        return self._too_large(use, diagonal, near) or self._too_small(use, diagonal, far)
+        parent = self._tree.parent_joint.get(use.link.name)
+        children = self._tree.child_joints.get(use.link.name, ())
+        below = max((_offset(joint.origin) for joint in children), default=0.0)
+        nearby = max(below, _offset(parent.origin) if parent else 0.0)
+        return self._too_large(use, diagonal, nearby) or self._too_small(use, diagonal, below)
 
-    def _offsets(self, link: Link) -> tuple[float, float]:
-        """Return the largest distance from the link's frame to a joint, and to one below it [m]."""
-        tree = self._robot.tree
-        above = tree.above.get(link.name)
-        below = [_offset(joint.origin) for joint in tree.below.get(link.name, ())]
-        far = max(below, default=0.0)
-        return max(far, _offset(above.origin) if above else 0.0), far
-
-    def _too_large(self, use: MeshUse, diagonal: float, near: float) -> Misfit | None:
-        if self._is_scenery(use.link) or diagonal < max(_LEAST_LARGE, 3 * self.span):
+    def _too_large(self, use: MeshUse, diagonal: float, nearby: float) -> ScaleMismatch | None:
+        # A massless trunk may be the environment of the robot.
+        if use.link.name in self._trunk_links and use.link.inertial is None:
             return None
-        local = max(near, _NEAR * self.span)
-        if use.link.name not in self._robot.tree.above or local >= self.span:
-            found = Misfit(diagonal=diagonal, reference=self.span, against=_WHOLE)
+        if diagonal < max(_MIN_LARGE_SIZE, 3 * self.robot_size):
+            return None
+        local = max(nearby, _MIN_JOINT_DISTANCE_RATIO * self.robot_size)
+        if use.link.name not in self._tree.parent_joint or local >= self.robot_size:
+            found = ScaleMismatch(diagonal=diagonal, reference=self.robot_size, description=_ROBOT)
         else:
-            found = Misfit(diagonal=diagonal, reference=local, against=_JOINTS)
-        return found if found.ratio > LARGE else None
+            found = ScaleMismatch(diagonal=diagonal, reference=local, description=_JOINTS)
+        return found if found.ratio > MAX_RATIO else None
 
-    def _is_scenery(self, link: Link) -> bool:
-        """Return whether a link may be the room around the robot: it is still and has no mass."""
-        body = self._robot.body_of.get(link.name)
-        return body is not None and body.index == 0 and link.inertial is None
-
-    def _too_small(self, use: MeshUse, diagonal: float, far: float) -> Misfit | None:
-        if diagonal > _MOST_TINY:
+    def _too_small(self, use: MeshUse, diagonal: float, below: float) -> ScaleMismatch | None:
+        if diagonal > _MAX_SMALL_SIZE:
             return None
         same, other = use.link.collisions, use.link.visuals
         if use.geometry not in same:
             same, other = other, same
-        largest = self._largest(same)
+        largest = self._largest_diagonal(same)
         if largest is None or largest > 2 * diagonal:
             return None  # a detail of the part
-        shape = self._largest(other) or 0.0
-        if diagonal < TINY * max(far, shape):
-            if shape > far:
-                return Misfit(diagonal=diagonal, reference=shape, against=_SHAPE)
-            return Misfit(diagonal=diagonal, reference=far, against=_JOINTS)
-        if diagonal < _DOT * self.span:
-            return Misfit(diagonal=diagonal, reference=self.span, against=_WHOLE)
+        other_shapes = self._largest_diagonal(other) or 0.0
+        if diagonal < MIN_RATIO * max(below, other_shapes):
+            reference, description = max((below, _JOINTS), (other_shapes, _OTHER_SHAPES))
+            return ScaleMismatch(diagonal=diagonal, reference=reference, description=description)
+        if diagonal < _MIN_VISIBLE_RATIO * self.robot_size:
+            return ScaleMismatch(diagonal=diagonal, reference=self.robot_size, description=_ROBOT)
         return None
 
-    def _largest(self, shapes: Sequence[Geometry]) -> float | None:
-        """Return the longest diagonal of the boxes around shapes [m]; None if one is not known."""
+    def _largest_diagonal(self, shapes: Sequence[Geometry]) -> float | None:
+        """Return the longest diagonal of the bounding boxes [m]; None if one is unknown."""
         lengths = []
         for shape in shapes:
-            box = bounds([Placed(geometry=shape, link="", pose=np.eye(4))], self._robot.meshes)
+            box = bounds([BodyShape(geometry=shape, link="", pose=np.eye(4))], self._meshes)
             if box is None:
                 return None
             lengths.append(_length(box[1] - box[0]))
         return max(lengths, default=0.0)
 
 
-_LARGEST = 1e6
-"""Beyond this a distance is no robot's [m]."""
-
-_JOINTS = "from its frame to the next joints"
-_WHOLE = "across all joints"
-_SHAPE = "across the other shapes of the link"
-
-
 def _offset(origin: Matrix) -> float:
-    """Return the length of a translation [m]; 0 where it is none of a robot."""
-    moved = origin[:3, 3]
-    return _length(moved) if (np.abs(moved) < _LARGEST).all() else 0.0
+    """Return the length of a translation [m], or 0 if it is invalid."""
+    translation = origin[:3, 3]
+    return _length(translation) if (np.abs(translation) < _MAX_LENGTH).all() else 0.0
 
 
 def _length(vector: Matrix) -> float:

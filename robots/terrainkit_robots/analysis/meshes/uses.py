@@ -1,4 +1,4 @@
-"""Where a robot uses its mesh files: each file once, with everything that refers to it."""
+"""Group the meshes of a robot by file, and edit the references to a file."""
 
 import os
 from collections.abc import Callable, Iterable, Iterator
@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.fix import Edit, SetAttribute, WriteFile
-from terrainkit_robots.description.model import Geometry, Link, MeshFile, Source
+from terrainkit_robots.description.model import Geometry, Link, MeshFile, RobotModel, Source
 from terrainkit_robots.description.package_resolver import (
     filename_on_disk,
     is_absolute,
@@ -21,106 +20,109 @@ from terrainkit_robots.text import names
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeshUse:
-    """A shape of a link that is a mesh."""
+    """A mesh of a link."""
 
     link: Link
     geometry: Geometry
     mesh: MeshFile
 
-    collides: bool
-    """Whether things touch it, by its hull or as it is."""
+    is_collision: bool
+    """Whether the mesh itself, or its convex hull, has contacts."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class UsedMesh:
-    """A mesh file and its uses, of which there is at least one."""
+    """A mesh file and its uses."""
 
     uses: tuple[MeshUse, ...]
+    """Its uses, at least one."""
 
     meshes: Meshes
-    """The files of the run."""
+    """All mesh files."""
 
     strict: bool
-    """Whether every simulator reads it: one that collides, or any of a MJCF file. MuJoCo drops the
-    visual meshes of a URDF unless it is told to keep them."""
+    """Whether every simulator reads the file: a collision mesh, or any mesh of an MJCF file. MuJoCo
+    discards the visual meshes of a URDF by default."""
 
     @property
     def header(self) -> Header:
-        """What the file is."""
+        """Return the header of the file."""
         return self.meshes.header(self.mesh.path)
 
     @property
     def mesh(self) -> MeshFile:
-        """The first use."""
+        """Return the first reference to the file."""
         return self.uses[0].mesh
 
     @property
     def name(self) -> str:
-        """The name of the file, as it is first written."""
+        """Return the name of the file in its first reference."""
         return self.mesh.filename
 
     @property
     def source(self) -> Source:
-        """Where that is."""
+        """Return where the first reference is written."""
         return self.mesh.source
 
     @cached_property
     def collisions(self) -> tuple[MeshUse, ...]:
-        """The uses that collide."""
-        return tuple(use for use in self.uses if use.collides)
+        """The uses as a collision mesh."""
+        return tuple(use for use in self.uses if use.is_collision)
 
     @property
     def role(self) -> str:
-        """What the file is, in words: a collision mesh of which links, or a visual one."""
+        """Return a description of its use, such as `collision mesh of FL_calf, FR_calf`."""
         kind, uses = ("collision", self.collisions) if self.collisions else ("visual", self.uses)
         return f"{kind} mesh of {names(dict.fromkeys(use.link.name for use in uses), 2)}"
 
 
-def mesh_uses(robot: Facts) -> Iterator[MeshUse]:
-    """Yield every mesh of every link, collision before visual, as far as it has a file."""
-    for link in robot.model.links:
+def mesh_uses(model: RobotModel) -> Iterator[MeshUse]:
+    """Yield every mesh with a file of every link, collision meshes before visual ones."""
+    for link in model.links:
         for shapes, may_collide in ((link.collisions, True), (link.visuals, False)):
             for geometry in shapes:
                 if geometry.shape == "mesh" and geometry.mesh is not None:
-                    collides = may_collide and geometry.contacts and not geometry.fit_to_mesh
                     yield MeshUse(
-                        link=link, geometry=geometry, mesh=geometry.mesh, collides=collides
+                        link=link,
+                        geometry=geometry,
+                        mesh=geometry.mesh,
+                        is_collision=may_collide and geometry.contacts and not geometry.fit_to_mesh,
                     )
 
 
-def meshes_by_name(robot: Facts) -> list[UsedMesh]:
-    """Return the meshes of a robot, one for each name that is written."""
-    return _grouped(robot, lambda mesh: mesh.filename)
+def meshes_by_name(model: RobotModel, meshes: Meshes) -> list[UsedMesh]:
+    """Return the meshes of a robot, one for each name in the file."""
+    return _group(model, meshes, lambda mesh: mesh.filename)
 
 
-def meshes_by_file(robot: Facts) -> list[UsedMesh]:
-    """Return the meshes of a robot, one for each file, without those that MSH001 reports."""
-    files = _grouped(robot, lambda mesh: mesh.path)
-    return [file for file in files if not is_lost(file)]
+def meshes_by_file(model: RobotModel, meshes: Meshes) -> list[UsedMesh]:
+    """Return the meshes of a robot, one for each file, without the files that MSH001 reports."""
+    used = _group(model, meshes, lambda mesh: mesh.path)
+    return [each for each in used if not is_missing(each)]
 
 
-def _grouped(robot: Facts, key: Callable[[MeshFile], object]) -> list[UsedMesh]:
+def _group(model: RobotModel, meshes: Meshes, key: Callable[[MeshFile], object]) -> list[UsedMesh]:
     groups: dict[object, list[MeshUse]] = {}
-    for use in mesh_uses(robot):
+    for use in mesh_uses(model):
         groups.setdefault(key(use.mesh), []).append(use)
     return [
         UsedMesh(
-            # in the order of the file, so that the first is the one that is reported
+            # in the order of the file, because findings refer to the first one
             uses=tuple(sorted(uses, key=lambda use: use.mesh.source.line)),
-            meshes=robot.meshes,
-            strict=robot.model.kind == "mjcf" or any(use.collides for use in uses),
+            meshes=meshes,
+            strict=model.kind == "mjcf" or any(use.is_collision for use in uses),
         )
         for uses in groups.values()
     ]
 
 
-def is_lost(used: UsedMesh) -> bool:
-    """Return whether there is no file where the name says, letters and packages aside."""
-    return not used.meshes.exists(used.mesh.path) or is_elsewhere(used.mesh)
+def is_missing(used: UsedMesh) -> bool:
+    """Return whether no file has the name, apart from its letter case and package."""
+    return not used.meshes.exists(used.mesh.path) or is_in_other_folder(used.mesh)
 
 
-def is_elsewhere(mesh: MeshFile) -> bool:
-    """Return whether a search found it in another folder than the one that is written."""
+def is_in_other_folder(mesh: MeshFile) -> bool:
+    """Return whether the file was found by a search, in another folder than its name says."""
     return (
         mesh.found_by == "search"
         and not is_package_uri(mesh.filename)
@@ -129,56 +131,66 @@ def is_elsewhere(mesh: MeshFile) -> bool:
     )
 
 
-def relative_name(robot: Facts, path: Path) -> str:
-    """Return what a URDF has to call a file, with slashes on every system."""
-    folder = robot.model.file.parent
+def relative_name(model: RobotModel, path: Path) -> str:
+    """Return the name of a file relative to the robot file, with forward slashes."""
+    folder = model.file.parent
     name = os.path.relpath(path, folder)
     real = os.path.realpath(path)
-    if os.path.realpath(folder / name) != real:  # a link on the way: `..` leads elsewhere
+    if os.path.realpath(folder / name) != real:  # `..` leaves a symbolic link elsewhere
         name = os.path.relpath(real, os.path.realpath(folder))
     return Path(name).as_posix()
 
 
-def renamed(robot: Facts, uses: Iterable[MeshUse], name: str) -> tuple[SetAttribute, ...] | None:
-    """Return edits that let uses refer to a file by this name; None if they cannot be edited."""
+def rename_edits(
+    model: RobotModel, uses: Iterable[MeshUse], name: str
+) -> tuple[SetAttribute, ...] | None:
+    """Return the edits that change the name of a file; None if its uses are not editable."""
     edits: dict[Source, SetAttribute] = {}
     for use in uses:
         source = use.mesh.source
-        if source.element is None or robot.model.kind == "xacro":
+        if source.element is None or model.kind == "xacro":
             return None
         edits[source] = SetAttribute(source=source, name=use.mesh.attribute, value=name)
     return tuple(edits.values())
 
 
-def replaced(
-    robot: Facts, uses: Iterable[MeshUse], ending: str, content: Callable[[], bytes]
+def replace_edits(
+    model: RobotModel,
+    meshes: Meshes,
+    uses: Iterable[MeshUse],
+    ending: str,
+    content: Callable[[], bytes],
 ) -> tuple[Edit, ...] | None:
-    """Return edits that write a new mesh beside the one in use, and let the uses refer to it.
+    """Return the edits that write a new mesh beside the current one and refer to it instead.
 
     Args:
-        robot: The robot.
+        model: The description.
+        meshes: All mesh files.
         uses: Uses of one file.
-        ending: Of the new name, after that of the file without its own: `_hull.stl`.
-        content: Makes the new file.
+        ending: End of the new name, which replaces the suffix of the file: `_hull.stl`.
+        content: Returns the content of the new file.
+
+    Returns:
+        The edits, or None if the uses are not editable.
     """
     uses = list(uses)
     mesh = uses[0].mesh
-    target = _free(robot, mesh.path, ending)
-    if robot.model.kind == "mjcf":  # its names start at meshdir, which stays as it is
+    target = _unused_path(meshes, mesh.path, ending)
+    if model.kind == "mjcf":  # names are relative to meshdir, which does not change
         folder = mesh.filename.replace("\\", "/").rpartition("/")
         name = f"{folder[0]}{folder[1]}{target.name}"
     else:
-        name = relative_name(robot, target)
-    edits = renamed(robot, uses, name)
+        name = relative_name(model, target)
+    edits = rename_edits(model, uses, name)
     return None if edits is None else (WriteFile(path=target, content=content), *edits)
 
 
-def _free(robot: Facts, path: Path, ending: str) -> Path:
-    """Return a name beside `path` that no file has."""
+def _unused_path(meshes: Meshes, path: Path, ending: str) -> Path:
+    """Return a path beside `path` at which no file exists."""
     stem, dot, suffix = ending.rpartition(".")
     for number in range(1, 100):
-        counted = f"{stem}_{number}" if number > 1 else stem
-        target = path.with_name(f"{path.stem}{counted}{dot}{suffix}")
-        if not robot.meshes.exists(target):
+        numbered = f"{stem}_{number}" if number > 1 else stem
+        target = path.with_name(f"{path.stem}{numbered}{dot}{suffix}")
+        if not meshes.exists(target):
             return target
     return path.with_name(f"{path.stem}{ending}")

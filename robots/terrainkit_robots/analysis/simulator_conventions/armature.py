@@ -1,47 +1,47 @@
-"""Default armature: the rotor inertia that Genesis gives to joints whose file names none.
+"""Compare the default armature of Genesis with the inertia that each joint moves.
 
-A URDF cannot name one, so every joint of a URDF gets it. Where it is more than what the joint moves
-by itself, the joint reacts to torque as if it carried something else.
+Genesis adds this armature to all joints without one, which includes every joint of a URDF. If it
+exceeds the inertia that a joint moves, the joint responds to torque like a much heavier one.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terrainkit_robots.analysis.inertia.composite_inertia import carried_inertias
+from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.inertia.composite_inertia import composite_inertias
 from terrainkit_robots.description.model import Joint
-
-if TYPE_CHECKING:
-    from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.transforms import Matrix
 
 GENESIS_ARMATURE = 0.1
-"""What `default_armature` of the morphs URDF, MJCF and Drone is in genesis-world 1.4.5 [kg m2] or
-[kg]."""
+"""`default_armature` of the morphs URDF, MJCF and Drone in genesis-world 1.4.5 [kg m2] or [kg]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Moved:
-    """A joint without armature and what it moves."""
+class JointInertia:
+    """A joint without armature, and the inertia that it moves."""
 
     joint: Joint
 
     inertia: float
-    """Inertia about its axis of all that is below it, all joints held at 0 [kg m2]; of a prismatic
-    joint the mass [kg]."""
+    """Inertia about its axis of all bodies below it, all joints at 0 [kg m2]; for a prismatic joint
+    their mass [kg]."""
 
 
-def moved_by_joints(facts: "Facts") -> tuple[Moved, ...]:
-    """Return the motor-driven joints without armature; those that move no number are left out."""
-    driven = set(facts.actuated)
+def inertias_without_armature(
+    bodies: Sequence[Body], actuated: Sequence[Joint], zero_poses: Sequence[Matrix]
+) -> tuple[JointInertia, ...]:
+    """Return the inertia of each actuated joint without armature, if it is positive and finite."""
     with np.errstate(all="ignore"):
-        inertias = carried_inertias(facts)
+        inertias = composite_inertias(bodies, zero_poses)
+    actuated_set = set(actuated)
     return tuple(
-        Moved(joint=body.joint, inertia=inertias[body.index])
-        for body in facts.bodies
+        JointInertia(joint=body.joint, inertia=inertias[body.index])
+        for body in bodies
         if body.joint is not None
-        and body.joint in driven
+        and body.joint in actuated_set
         and body.joint.armature == 0
         and math.isfinite(inertias[body.index])
         and inertias[body.index] > 0

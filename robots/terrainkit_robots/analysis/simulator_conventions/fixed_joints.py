@@ -1,25 +1,26 @@
-"""Fixed joints: which of them a simulator merges away, and what becomes of the feet.
+"""Compute which fixed joints each simulator merges, and which feet disappear by that.
 
-A link on a fixed joint moves as a part of its parent, so most importers make one body of both. The
-body keeps the name of the upper link: what is looked for under the name of the lower one, such as a
-foot's contact force, is then not there.
+Most importers merge a link on a fixed joint into its parent, because the two move as one. The
+merged body has the name of the parent, and a contact force that is looked up by the name of the
+merged link, such as a foot, does not exist.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
-from terrainkit_robots.description.model import Joint
-
-if TYPE_CHECKING:
-    from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.bodies.tree import Tree
+from terrainkit_robots.analysis.legs.legs import Leg
+from terrainkit_robots.description.model import Joint, Kind
 
 Simulator = Literal["MuJoCo", "Isaac Gym", "Isaac Lab", "Genesis"]
 
 SIMULATORS: tuple[Simulator, ...] = get_args(Simulator)
 
-TO_KEEP: Mapping[Simulator, str] = MappingProxyType(
+KEEP_LINK_OPTIONS: Mapping[Simulator, str] = MappingProxyType(
     {
         "MuJoCo": '<mujoco><compiler fusestatic="false"/></mujoco> in the URDF',
         "Isaac Gym": 'dont_collapse="true" on the joint, or collapse_fixed_joints = False',
@@ -27,108 +28,106 @@ TO_KEEP: Mapping[Simulator, str] = MappingProxyType(
         "Genesis": "links_to_keep=[...] of gs.morphs.URDF, or merge_fixed_links=False",
     }
 )
-"""What keeps a link on a fixed joint as a body of its own. MuJoCo, Isaac Lab and Genesis merge
-unless told; Isaac Gym does as legged_gym and its kin tell it."""
+"""How to keep a link on a fixed joint as a separate body. MuJoCo, Isaac Lab and Genesis merge by
+default; Isaac Gym merges as configured by legged_gym and its forks."""
 
-_ATTRIBUTE = frozenset({"Isaac Gym", "Isaac Lab"})
-"""Those whose importers look at dont_collapse."""
+_READS_DONT_COLLAPSE = frozenset({"Isaac Gym", "Isaac Lab"})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Merged:
-    """A tree of links, once fixed joints are merged."""
+class MergedTree:
+    """The tree of links after fixed joints are merged."""
 
     base: str
-    """Name of its root."""
+    """Name of the root body."""
 
-    home: Mapping[str, str]
-    """The body that each link is a part of, by the link's name; a body has the name of its top
-    link."""
+    body_of: Mapping[str, str]
+    """Name of the body of each link, by name of the link. A body is named after its top link."""
 
-    below: Mapping[str, tuple[Joint, ...]]
-    """The joints to the bodies below each body. Those of a link that was merged stand where its own
-    joint did."""
+    child_joints: Mapping[str, tuple[Joint, ...]]
+    """The joints below each body. The joints of a merged link replace the joint above it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class FootMerge:
-    """A foot that some simulators merge away."""
+class MergedFoot:
+    """A foot that some simulators merge into its parent."""
 
     foot: str
     """Name of the link."""
 
     joint: Joint
-    """The fixed joint that it hangs on."""
+    """The fixed joint above it."""
 
-    into: Mapping[Simulator, str]
-    """The body that it becomes a part of, for each simulator that merges it."""
-
-
-def keeps(simulator: Simulator, joint: Joint) -> bool:
-    """Return whether a simulator keeps what hangs on a fixed joint of a URDF as a body."""
-    return joint.dont_collapse and simulator in _ATTRIBUTE
+    merged_into: Mapping[Simulator, str]
+    """Name of the merged body, by simulator that merges it."""
 
 
-def merge(facts: "Facts", merges: frozenset[Joint] | set[Joint]) -> Merged | None:
-    """Return the main tree from the base down with some joints merged; None without any link.
+def merge_joints(tree: Tree, bodies: Sequence[Body], merged: AbstractSet[Joint]) -> MergedTree:
+    """Return the main tree below the base with some joints merged.
 
     Args:
-        facts: The robot.
-        merges: The joints to be merged.
+        tree: The tree of links.
+        bodies: Its bodies, at least one.
+        merged: The joints to merge.
     """
-    if not facts.bodies:
-        return None
-    base = facts.bodies[0].top.name
-    home = {base: base}
-    below: dict[str, list[Joint]] = {base: []}
-    for link in facts.tree.order:  # depth first, each after its parent
-        if link == base or link not in facts.body_of:
+    base = bodies[0].top.name
+    links = {link.name for body in bodies for link in body.links}
+    body_of = {base: base}
+    child_joints: dict[str, list[Joint]] = {base: []}
+    for link in tree.order:  # depth first, each after its parent
+        if link == base or link not in links:
             continue
-        joint = facts.tree.above[link]
-        parent = home[joint.parent]
-        if joint in merges:
-            home[link] = parent
+        joint = tree.parent_joint[link]
+        parent = body_of[joint.parent]
+        if joint in merged:
+            body_of[link] = parent
         else:
-            home[link] = link
-            below[link] = []
-            below[parent].append(joint)
-    return Merged(base=base, home=home, below={k: tuple(v) for k, v in below.items()})
+            body_of[link] = link
+            child_joints[link] = []
+            child_joints[parent].append(joint)
+    return MergedTree(
+        base=base,
+        body_of=body_of,
+        child_joints={body: tuple(joints) for body, joints in child_joints.items()},
+    )
 
 
-def merged_joints(facts: "Facts", simulator: Simulator) -> frozenset[Joint]:
-    """Return the joints of the main tree that a simulator merges.
+def fixed_joints(kind: Kind, tree: Tree, bodies: Sequence[Body]) -> tuple[Joint, ...]:
+    """Return the joints inside the bodies of a URDF: fixed joints and joints of unknown type.
 
-    Those are the fixed ones of a URDF, and those of a type that is not known. The bodies of MJCF
-    stay as they are.
+    Empty for MJCF, whose bodies no simulator merges.
     """
-    return frozenset(joint for joint in fixed_joints(facts) if not keeps(simulator, joint))
-
-
-def fixed_joints(facts: "Facts") -> tuple[Joint, ...]:
-    """Return the joints of the main tree of a URDF that hold two links together."""
-    if facts.model.kind == "mjcf":
+    if kind == "mjcf":
         return ()
-    tops = {body.top.name for body in facts.bodies}
-    return tuple(facts.tree.above[link] for link in facts.body_of if link not in tops)
+    return tuple(tree.parent_joint[link.name] for body in bodies for link in body.links[1:])
 
 
-def foot_merges(facts: "Facts") -> tuple[FootMerge, ...]:
-    """Return the feet with a shape of their own that at least one simulator merges away."""
-    fixed = set(fixed_joints(facts))
-    found = []
-    merged = {
-        simulator: merge(facts, merged_joints(facts, simulator))
-        for simulator in (SIMULATORS if fixed and facts.legs else ())
+def merged_joints(fixed: Iterable[Joint], simulator: Simulator) -> frozenset[Joint]:
+    """Return the fixed joints that a simulator merges by default."""
+    reads_attribute = simulator in _READS_DONT_COLLAPSE
+    return frozenset(joint for joint in fixed if not (joint.dont_collapse and reads_attribute))
+
+
+def find_merged_feet(
+    tree: Tree, bodies: Sequence[Body], legs: Sequence[Leg], fixed: Sequence[Joint]
+) -> tuple[MergedFoot, ...]:
+    """Return the feet with collision shapes that at least one simulator merges."""
+    if not fixed or not legs:
+        return ()
+    trees = {
+        simulator: merge_joints(tree, bodies, merged_joints(fixed, simulator))
+        for simulator in SIMULATORS
     }
-    for leg in facts.legs:
-        joint = facts.tree.above.get(leg.foot)
-        if joint is None or joint not in fixed or not facts.tree.links[leg.foot].collisions:
+    found = []
+    for leg in legs:
+        joint = tree.parent_joint.get(leg.foot)
+        if joint is None or joint not in fixed or not tree.links[leg.foot].collisions:
             continue
-        into = {
-            simulator: tree.home[leg.foot]
-            for simulator, tree in merged.items()
-            if tree is not None and tree.home[leg.foot] != leg.foot
+        merged_into = {
+            simulator: merged.body_of[leg.foot]
+            for simulator, merged in trees.items()
+            if merged.body_of[leg.foot] != leg.foot
         }
-        if into:
-            found.append(FootMerge(foot=leg.foot, joint=joint, into=into))
+        if merged_into:
+            found.append(MergedFoot(foot=leg.foot, joint=joint, merged_into=merged_into))
     return tuple(found)

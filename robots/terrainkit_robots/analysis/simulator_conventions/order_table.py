@@ -1,27 +1,27 @@
-"""The order table: each joint of the file, and its number in every simulator."""
+"""Tabulate the index of each joint in every simulator."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
-from terrainkit_robots.analysis.simulator_conventions.joint_order import (
-    file_order,
-    simulator_orders,
-)
-
-if TYPE_CHECKING:
-    from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.simulator_conventions.joint_order import SimulatorOrder
 
 
-def order_table(facts: "Facts") -> tuple[tuple[str, ...], ...]:
-    """Return rows of cells: the header, one row a joint in the order of the file, and how sure.
+def order_table(
+    file_order: Sequence[str], orders: Sequence[SimulatorOrder]
+) -> tuple[tuple[str, ...], ...]:
+    """Return the rows of a table: a header, one row per joint, and the certainty of each order.
 
-    The numbers count from 0.
+    Args:
+        file_order: Names of the joints in the order of the file.
+        orders: Order of the joints in each simulator.
+
+    Returns:
+        Cells of text. Indices start at 0.
     """
-    orders = simulator_orders(facts)
-    places = [{name: index for index, name in enumerate(order.joints)} for order in orders]
+    indices = [{name: index for index, name in enumerate(order.joints)} for order in orders]
     header = ("joint", "file", *(order.simulator for order in orders))
     rows = [
-        (name, str(index), *(str(place.get(name, "-")) for place in places))
-        for index, name in enumerate(file_order(facts))
+        (name, str(row), *(str(index_of.get(name, "-")) for index_of in indices))
+        for row, name in enumerate(file_order)
     ]
-    sure = tuple("certain" if order.certain else "to be verified" for order in orders)
-    return (header, *rows, ("", "", *sure))
+    certainty = tuple("certain" if order.certain else "to be verified" for order in orders)
+    return (header, *rows, ("", "", *certainty))

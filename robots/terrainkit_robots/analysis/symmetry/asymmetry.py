@@ -1,209 +1,242 @@
-"""Asymmetry: joints that are not where, or do not turn as, the mirror image of their twin."""
+"""Detect joints whose origin or axis is not the mirror image of their counterpart."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.kinematics import axis_in_trunk
-from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.symmetry.mirror_pairs import Twin, partners, twins
+from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.bodies.kinematics import joint_axis
+from terrainkit_robots.analysis.legs.legs import Leg
+from terrainkit_robots.analysis.symmetry.mirror import Mirror
+from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair, MirrorSide
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.transforms import Matrix
 
-LIMIT, LIMIT_SHARE = 0.01, 0.02
-"""How far limits may differ: half a degree [rad], or [m], and a share of the range, since some are
-measured on the robot."""
+MAX_LIMIT_ERROR, MAX_RELATIVE_LIMIT_ERROR = 0.01, 0.02
+"""Difference of mirrored limits, at most: half a degree [rad], or [m], plus a share of the range,
+because some limits are measured on the robot."""
 
-PLACE, PLACE_SHARE = 0.002, 0.01
-"""How far joints may be from mirrored: some metres and a share of the way from the joint above."""
+MAX_POSITION_ERROR, MAX_RELATIVE_POSITION_ERROR = 0.002, 0.01
+"""Distance of a joint from its mirrored position, at most [m], plus a share of the distance from
+the joint above."""
 
-TURNED = math.radians(1.0)
-"""Angle by which axes may be from mirrored [rad]."""
+MAX_AXIS_ERROR = math.radians(1.0)
+"""Angle of an axis from its mirrored direction, at most [rad]."""
 
+_MIN_COM_DISTANCE = 0.005
+"""A center of mass closer than this to its joint does not show the rotation of the body [m]."""
 
-_SHORT = 0.005
-"""A centre of mass closer than this to its joint does not tell how the body is turned [m]."""
+_MIN_LEGS = 4
+"""Number of legs from which one of them can be an outlier: of two or three, any may be right."""
+
+_MIN_OTHER_PAIRS = 2
+"""Number of pairs with the same convention from which one other pair is an outlier."""
+
+_MIN_PARALLEL_COSINE = 0.9
+"""Cosine from which two axes count as parallel."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Slip:
-    """A pair of joints that are not mirrored."""
+class Misalignment:
+    """A pair of joints that are not mirror images."""
 
-    left: Twin
-    right: Twin
+    left: MirrorSide
+    right: MirrorSide
 
-    axis: bool
-    """Whether the axis is what was written differently; else the origin."""
+    is_axis: bool
+    """Whether the declared axes differ; otherwise the origins do."""
 
-    gap: float
-    """Distance from mirrored [m], or 0."""
+    distance: float
+    """Distance from the mirrored position [m], or 0."""
 
     angle: float
-    """Angle from mirrored [rad], or 0."""
+    """Angle from the mirrored direction [rad], or 0."""
 
 
-def slips(robot: Facts) -> tuple[list[Slip], set[int]]:
-    """Return the pairs that are not mirrored, and the bodies that these displace."""
-    found: list[Slip] = []
+def find_misalignments(
+    mirror: Mirror, pairs: Sequence[MirrorPair], leg_bodies: Collection[int]
+) -> tuple[list[Misalignment], set[int]]:
+    """Return the misaligned pairs of joints, and the indices of the bodies that they displace.
+
+    Args:
+        mirror: The mirror plane.
+        pairs: The pairs of mirrored joints, parents first.
+        leg_bodies: Indices of the bodies of legs.
+    """
+    found: list[Misalignment] = []
     displaced: set[int] = set()
-    above: dict[int, tuple[Twin, Twin]] = {}
-    paired = partners(robot)
-    in_legs = robot.leg_bodies
-    for pair, left, right in twins(robot):
-        above[pair.left] = left, right
-        if _points_nowhere(left.joint) or _points_nowhere(right.joint):
-            displaced |= {pair.left, pair.right}
+    pair_of: dict[int, MirrorPair] = {}
+    for pair in pairs:
+        left, right = pair.left, pair.right
+        pair_of[left.body.index] = pair
+        if _has_zero_axis(left.joint) or _has_zero_axis(right.joint):
+            displaced |= pair.indices
             continue
         parents = {left.body.parent, right.body.parent}
-        if not parents & displaced and _hang_alike(left, right, paired):
-            slip = _slip(robot, left, right, above.get(left.body.parent or 0))
-            if slip is None:
+        if not parents & displaced and _have_mirrored_parents(pair, mirror):
+            misalignment = _misalignment(mirror, pair, pair_of.get(left.body.parent or 0))
+            if misalignment is None:
                 continue
-            displaced |= {slip.left.body.index, slip.right.body.index}
-            if slip.gap and _turned_around(left, right):
+            displaced |= {misalignment.left.body.index, misalignment.right.body.index}
+            if misalignment.distance and _is_half_turn(left, right):
                 continue
-            # Many arms have their zero wherever the motor has it: not the same pose left and right.
-            if pair.left in in_legs or slip.axis or slip.gap:
-                found.append(slip)
-        displaced |= {pair.left, pair.right}
+            # The zero of many arm joints is that of the motor, which differs from left to right.
+            if left.body.index in leg_bodies or misalignment.is_axis or misalignment.distance:
+                found.append(misalignment)
+        displaced |= pair.indices
     return found, displaced
 
 
-def _points_nowhere(joint: Joint) -> bool:
+def _has_zero_axis(joint: Joint) -> bool:
     return joint.axis is not None and not np.abs(joint.axis).max() > 1e-6
 
 
-def _turned_around(left: Twin, right: Twin) -> bool:
-    """Return whether one is the other turned by half a turn, as the fingers of a gripper may be."""
+def _is_half_turn(left: MirrorSide, right: MirrorSide) -> bool:
+    """Return whether one joint is the other rotated by half a turn, as in fingers of a gripper."""
     if left.body.parent != right.body.parent:
         return False
-    allowed = PLACE + PLACE_SHARE * float(np.linalg.norm(left.offset))
+    offset = float(np.linalg.norm(left.offset))
+    tolerance = MAX_POSITION_ERROR + MAX_RELATIVE_POSITION_ERROR * offset
     turns = (np.array([1, -1, -1]), np.array([-1, 1, -1]), np.array([-1, -1, 1]))
-    return any(float(np.linalg.norm(left.offset * t - right.offset)) <= allowed for t in turns)
+    return any(
+        float(np.linalg.norm(left.offset * turn - right.offset)) <= tolerance for turn in turns
+    )
 
 
-def _hang_alike(left: Twin, right: Twin, paired: Mapping[int, int]) -> bool:
-    """Return whether two bodies hang from one body, or from mirror images of each other."""
-    a, b = left.body.parent, right.body.parent
+def _have_mirrored_parents(pair: MirrorPair, mirror: Mirror) -> bool:
+    """Return whether the bodies of a pair have the same parent, or mirrored ones."""
+    a, b = pair.left.body.parent, pair.right.body.parent
     if a is None or b is None:
         return False
-    return a == b or paired.get(a) == b
+    return a == b or mirror.counterparts.get(a) == b
 
 
-def _slip(robot: Facts, left: Twin, right: Twin, above: tuple[Twin, Twin] | None) -> Slip | None:
-    image = robot.mirror.image
-    gap = float(np.linalg.norm(image(left.offset) - right.offset))
-    lengths = [float(np.linalg.norm(twin.offset)) for twin in (left, right)]
-    allowed = PLACE + PLACE_SHARE * min(lengths)
-    if gap > allowed:
-        angle = 2 * math.asin(min(1.0, gap / (lengths[0] + lengths[1])))
-        same = abs(lengths[0] - lengths[1]) <= allowed
-        if above is not None and same and _is_turned(robot, *above, angle):
-            # As far away, but elsewhere: the frame of the joint above is turned about its axis.
-            return Slip(left=above[0], right=above[1], axis=False, gap=0.0, angle=angle)
-        return Slip(left=left, right=right, axis=False, gap=gap, angle=0.0)
-    angle = math.acos(min(1.0, abs(float(image(left.axis) @ right.axis))))
-    if angle > TURNED:
-        written = [np.abs(twin.joint.direction) for twin in (left, right)]
-        axis = bool(np.abs(written[0] - written[1]).max() > math.sin(TURNED))
-        return Slip(left=left, right=right, axis=axis, gap=0.0, angle=angle)
+def _misalignment(
+    mirror: Mirror, pair: MirrorPair, parents: MirrorPair | None
+) -> Misalignment | None:
+    left, right = pair.left, pair.right
+    distance = float(np.linalg.norm(mirror.image(left.offset) - right.offset))
+    lengths = [float(np.linalg.norm(joint.offset)) for joint in (left, right)]
+    tolerance = MAX_POSITION_ERROR + MAX_RELATIVE_POSITION_ERROR * min(lengths)
+    if distance > tolerance:
+        angle = 2 * math.asin(min(1.0, distance / (lengths[0] + lengths[1])))
+        is_same_length = abs(lengths[0] - lengths[1]) <= tolerance
+        if parents is not None and is_same_length and _is_rotated(mirror, parents, angle):
+            # The same distance in another direction: the frame of the parent joint is rotated.
+            return Misalignment(
+                left=parents.left, right=parents.right, is_axis=False, distance=0.0, angle=angle
+            )
+        return Misalignment(left=left, right=right, is_axis=False, distance=distance, angle=0.0)
+    angle = math.acos(min(1.0, abs(float(mirror.image(left.axis) @ right.axis))))
+    if angle > MAX_AXIS_ERROR:
+        declared = [np.abs(joint.joint.direction) for joint in (left, right)]
+        is_axis = bool(np.abs(declared[0] - declared[1]).max() > math.sin(MAX_AXIS_ERROR))
+        return Misalignment(left=left, right=right, is_axis=is_axis, distance=0.0, angle=angle)
     return None
 
 
-def _is_turned(robot: Facts, left: Twin, right: Twin, angle: float) -> bool:
-    """Return whether the mass of a body is turned like what hangs from it.
+def _is_rotated(mirror: Mirror, pair: MirrorPair, angle: float) -> bool:
+    """Return whether the center of mass of a body is rotated like the joint below it.
 
-    If it is not, the joint below is out of place, and not the frame of this one.
+    If it is not, the joint below is misplaced rather than the frame of this body.
     """
-    arm = float(np.linalg.norm(right.arm))
-    gap = float(np.linalg.norm(robot.mirror.image(left.arm) - right.arm))
-    return arm < _SHORT or gap > 0.5 * 2 * math.sin(angle / 2) * arm
+    arm = float(np.linalg.norm(pair.right.arm))
+    distance = float(np.linalg.norm(mirror.image(pair.left.arm) - pair.right.arm))
+    return arm < _MIN_COM_DISTANCE or distance > 0.5 * 2 * math.sin(angle / 2) * arm
 
 
 def limits_match(a: tuple[float, float], b: tuple[float, float], sign: int) -> bool:
-    """Return whether limits are mirrored: the same, or with a negative sign, turned around."""
+    """Return whether limits are mirrored: equal, or negated and swapped for a negative sign."""
     mirrored = b if sign > 0 else (-b[1], -b[0])
-    allowed = LIMIT + LIMIT_SHARE * min(a[1] - a[0], b[1] - b[0])
-    return all(abs(x - y) <= allowed for x, y in zip(a, mirrored, strict=True))
+    tolerance = MAX_LIMIT_ERROR + MAX_RELATIVE_LIMIT_ERROR * min(a[1] - a[0], b[1] - b[0])
+    return all(abs(x - y) <= tolerance for x, y in zip(a, mirrored, strict=True))
 
 
-def opposed(left: Twin, right: Twin) -> bool:
-    """Return whether two axes point apart: not the way of files that give both sides one axis."""
+def has_opposite_axes(left: MirrorSide, right: MirrorSide) -> bool:
+    """Return whether two axes point in opposite directions, instead of in the same one."""
     return bool(left.axis @ right.axis < 0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Stray:
-    """A joint of a leg that turns the other way than those of all other legs."""
+class ReversedJoint:
+    """A joint of a leg whose axis is opposite to that of all other legs."""
 
     joint: Joint
 
     others: int
-    """How many other legs there are: three or more."""
+    """Number of the other legs, at least three."""
 
     axis: Matrix
-    """Its axis in the trunk's frame, all joints at 0, shape (3,)."""
+    """Its axis in the frame of the trunk, all joints at 0, shape (3,)."""
 
-    usual: Matrix
-    """That of the same joint of another leg."""
+    usual_axis: Matrix
+    """Axis of the same joint of another leg."""
 
 
-def against_the_rest(robot: Facts) -> Iterator[Stray]:
-    """Yield the joints of legs that turn the other way than those of all other legs."""
-    lengths = {len(leg.limb.chain) for leg in robot.legs}
-    if len(robot.legs) < _CROWD or len(lengths) != 1:
+def find_reversed_joints(
+    legs: Sequence[Leg], bodies: Sequence[Body], zero_poses: Sequence[Matrix]
+) -> Iterator[ReversedJoint]:
+    """Yield the joints of legs whose axes are opposite to those of all other legs."""
+    lengths = {len(leg.limb.chain) for leg in legs}
+    if len(legs) < _MIN_LEGS or len(lengths) != 1:
         return
-    for column in zip(*(leg.limb.chain for leg in robot.legs), strict=True):
-        bodies = [robot.bodies[i] for i in column]
-        joints = [body.joint for body in bodies]
-        axes = [axis_in_trunk(body, robot.at_zero[body.index])[1] for body in bodies]
-        agreement = [float(axis @ axes[0]) for axis in axes]
-        if min(map(abs, agreement)) < _PARALLEL:
+    for indices in zip(*(leg.limb.chain for leg in legs), strict=True):
+        joints = [bodies[i].joint for i in indices]
+        axes = [joint_axis(bodies[i], zero_poses[i])[1] for i in indices]
+        cosines = [float(axis @ axes[0]) for axis in axes]
+        if min(map(abs, cosines)) < _MIN_PARALLEL_COSINE:
             continue
-        with_first = [k for k, x in enumerate(agreement) if x > 0]
-        against = [k for k, x in enumerate(agreement) if x < 0]
-        for few, many in ((with_first, against), (against, with_first)):
-            joint = joints[few[0]] if len(few) == 1 else None
+        same = [k for k, cosine in enumerate(cosines) if cosine > 0]
+        opposite = [k for k, cosine in enumerate(cosines) if cosine < 0]
+        for minority, majority in ((same, opposite), (opposite, same)):
+            joint = joints[minority[0]] if len(minority) == 1 else None
             if joint is not None:
-                yield Stray(joint=joint, others=len(many), axis=axes[few[0]], usual=axes[many[0]])
+                yield ReversedJoint(
+                    joint=joint,
+                    others=len(majority),
+                    axis=axes[minority[0]],
+                    usual_axis=axes[majority[0]],
+                )
 
 
-def against_its_kind(robot: Facts) -> Iterator[tuple[Twin, Twin, int]]:
-    """Yield the joints of two legs that turn against each other, as no others of their kind do.
+def find_opposed_pairs(
+    legs: Sequence[Leg],
+    mirror: Mirror,
+    pairs: Sequence[MirrorPair],
+    leg_bodies: Collection[int],
+) -> Iterator[tuple[MirrorPair, int]]:
+    """Yield the pairs of a biped with opposite axes if all comparable pairs have equal axes.
 
-    Of one kind are those that bend the legs, and those that do not. Where the limits tell left from
-    right, they are believed. Also yields how many others there are, two or more.
+    The pairs that bend the legs are compared with each other, and so are the rest. Pairs whose
+    limits depend on the direction of the axis are intended.
+
+    Args:
+        legs: The legs of the robot.
+        mirror: The mirror plane.
+        pairs: The pairs of mirrored joints.
+        leg_bodies: Indices of the bodies of legs.
+
+    Yields:
+        A pair, and the number of the pairs that it was compared with, at least two.
     """
-    if len(robot.legs) != 2:
+    if len(legs) != 2:
         return
-    in_legs = robot.leg_bodies
-    pairs = [(left, right) for pair, left, right in twins(robot) if pair.left in in_legs]
+    in_legs = [pair for pair in pairs if pair.left.body.index in leg_bodies]
     for bends in (True, False):
-        kind = [
-            (left, right)
-            for left, right in pairs
-            if (abs(float(left.axis @ robot.mirror.normal)) > _PARALLEL) == bends
+        comparable = [
+            pair
+            for pair in in_legs
+            if (abs(float(pair.left.axis @ mirror.normal)) > _MIN_PARALLEL_COSINE) == bends
         ]
-        few = [(left, right) for left, right in kind if opposed(left, right)]
-        others = len(kind) - len(few)
-        if len(few) == 1 and others >= _FEWEST_OTHERS and _either_way(*few[0]):
-            yield *few[0], others
+        opposed = [pair for pair in comparable if has_opposite_axes(pair.left, pair.right)]
+        others = len(comparable) - len(opposed)
+        if len(opposed) == 1 and others >= _MIN_OTHER_PAIRS and _has_ambiguous_limits(opposed[0]):
+            yield opposed[0], others
 
 
-_FEWEST_OTHERS = 2
-"""Pairs that turn one way from which on the one that does not is odd."""
-
-
-def _either_way(left: Twin, right: Twin) -> bool:
-    """Return whether the limits of two joints are the same whichever way these turn."""
-    a, b = left.joint.range, right.joint.range
+def _has_ambiguous_limits(pair: MirrorPair) -> bool:
+    """Return whether the limits of a pair are mirrored for either direction of the axes."""
+    a, b = pair.left.joint.range, pair.right.joint.range
     return a is None or b is None or (limits_match(a, b, 1) and limits_match(a, b, -1))
-
-
-_CROWD = 4
-"""Legs from which on one can be told to be odd: of two, or of three, either may be right."""
-
-_PARALLEL = 0.9
-"""Cosine from which axes are about one direction."""

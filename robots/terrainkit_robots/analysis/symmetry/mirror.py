@@ -1,25 +1,31 @@
-"""The mirror: which bodies are left and right of each other."""
+"""Detect the mirror plane of a robot and the pairs of mirrored bodies."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.bodies.kinematics import axis_in_trunk
+from terrainkit_robots.analysis.bodies.kinematics import joint_axis
+from terrainkit_robots.analysis.legs.legs import Leg
+from terrainkit_robots.description.model import Joint
 from terrainkit_robots.transforms import Matrix
 
-if TYPE_CHECKING:
-    from terrainkit_robots.analysis.facts import Facts
+Sign = Literal[-1, 0, 1]
 
-_NEAR = 0.02
-"""How far a joint may be from the mirror image of its twin, as a share of the robot's size."""
+MAX_MIRROR_ERROR = 0.02
+"""Distance of a joint from the mirror image of its counterpart, at most, over the size of the
+robot."""
+
+_MIN_ALIGNED_COSINE = 0.7
+"""Cosine from which two axes count as aligned."""
 
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Za-z][a-z]*|\d+")
 
-_LEFTS = {
+_LEFT_TO_RIGHT = {
     "left": "right",
     "l": "r",
     "fl": "fr",
@@ -34,14 +40,14 @@ _LEFTS = {
     "larm": "rarm",
     "lleg": "rleg",
 }
-"""Words for the left side, and those for the right that go with them."""
+"""Words for the left side, and the corresponding words for the right side."""
 
-_SIDES = _LEFTS | {right: left for left, right in _LEFTS.items()}
+_SIDES = _LEFT_TO_RIGHT | {right: left for left, right in _LEFT_TO_RIGHT.items()}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Pair:
-    """Two bodies that are mirror images of each other, or are meant to be."""
+class BodyPair:
+    """Two bodies that are mirror images of each other, or are named so."""
 
     left: int
     """Index of the body on the positive side."""
@@ -49,149 +55,172 @@ class Pair:
     right: int
     """Index of the body on the negative side."""
 
-    sign: int
-    """+1 if equal positions of their joints look mirrored, -1 if opposite ones do, 0 if neither."""
+    sign: Sign
+    """+1 if equal joint positions are mirrored, -1 if opposite ones are, 0 if neither."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mirror:
-    """The pairs of a robot."""
+    """The mirror plane of a robot, and its pairs of bodies."""
 
     normal: Matrix
-    """Normal of the mirror plane, to the left, in the trunk's frame, shape (3,): y, or x where the
-    robot walks along y."""
+    """Normal of the plane to the left in the frame of the trunk, shape (3,): y, or x if the robot
+    walks along y."""
 
-    pairs: tuple[Pair, ...]
-    """Pairs in the order of the left bodies; a body is in one pair at most."""
+    pairs: tuple[BodyPair, ...]
+    """Pairs in the order of the left bodies. A body is in at most one pair."""
 
     offset: float = 0.0
-    """How far the plane is from the trunk's origin along the normal [m]: not where the trunk's
-    frame is that of an IMU at one side."""
+    """Distance of the plane from the trunk's origin along the normal [m]. Nonzero if the frame of
+    the trunk is at one side, such as that of an IMU."""
 
     def image(self, vectors: Matrix) -> Matrix:
         """Return mirrored vectors, shape (..., 3)."""
         return np.asarray(vectors - 2 * (vectors @ self.normal)[..., None] * self.normal)
 
-    def twin(self, index: int) -> tuple[int, int] | None:
-        """Return the other body of the pair of body `index`, and the pair's sign."""
+    @cached_property
+    def counterparts(self) -> Mapping[int, int]:
+        """Index of the mirror image of each body that has one, by index."""
+        return {p.left: p.right for p in self.pairs} | {p.right: p.left for p in self.pairs}
+
+    def counterpart(self, index: int) -> tuple[int, Sign] | None:
+        """Return the index of the mirror image of a body, and the sign of the pair."""
         for pair in self.pairs:
             if index in (pair.left, pair.right):
                 return (pair.right if index == pair.left else pair.left), pair.sign
         return None
 
+    def joint_sign(self, joint: Joint, axis: Matrix, other: Matrix) -> Sign:
+        """Return how two joints of a kind mirror each other.
 
-def find_mirror(facts: "Facts") -> Mirror:
-    """Return the mirrored pairs of a robot: by place first, and by name where that finds none."""
-    normal = _normal(facts)
-    mirror = Mirror(normal=normal, pairs=())
-    offset = _offset(facts, normal)
-    points = np.array([pose[:3, 3] - offset * normal for pose in facts.at_zero]).reshape(-1, 3)
-    near = _NEAR * float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
-    twins: dict[int, int] = {}
-    for find in (_by_place, _by_name):
-        for a, b in find(facts, mirror, points, near):
-            if a not in twins and b not in twins:
-                twins[a], twins[b] = b, a
+        A reflection turns a rotation by q about an axis into a rotation by -q about the reflected
+        axis.
+
+        Args:
+            joint: One of the joints.
+            axis: Its axis in the frame of the trunk, shape (3,).
+            other: Axis of the other joint, shape (3,).
+
+        Returns:
+            +1 if equal positions are mirrored, -1 if opposite ones are, 0 if neither.
+        """
+        image = self.image(axis) if joint.kind == "prismatic" else -self.image(axis)
+        cosine = float(image @ other)
+        return 0 if abs(cosine) < _MIN_ALIGNED_COSINE else 1 if cosine > 0 else -1
+
+
+def detect_mirror(
+    legs: Sequence[Leg], bodies: Sequence[Body], zero_poses: Sequence[Matrix]
+) -> Mirror:
+    """Return the mirror plane of a robot, with pairs by position, and by name for the rest.
+
+    Args:
+        legs: The legs of the robot.
+        bodies: The bodies, the trunk first.
+        zero_poses: Their poses in the frame of the trunk, all joints at 0, each (4, 4) [m].
+    """
+    normal = _plane_normal(legs)
+    offset = _plane_offset(legs, bodies, normal)
+    mirror = Mirror(normal=normal, pairs=(), offset=offset)
+    points = np.array([pose[:3, 3] - offset * normal for pose in zero_poses]).reshape(-1, 3)
+    size = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
+    counterparts: dict[int, int] = {}
+    for candidates in (
+        _pairs_by_position(bodies, mirror, points, MAX_MIRROR_ERROR * size),
+        _pairs_by_name(bodies, mirror, points),
+    ):
+        for a, b in candidates:
+            if a not in counterparts and b not in counterparts:
+                counterparts[a], counterparts[b] = b, a
     pairs = []
-    for a, b in twins.items():
+    for a, b in counterparts.items():
         left, right = (a, b) if points[a] @ normal >= points[b] @ normal else (b, a)
         if (left, right) == (a, b):
-            pairs.append(Pair(left=left, right=right, sign=_sign(facts, mirror, left, right)))
+            sign = _pair_sign(mirror, bodies, zero_poses, left, right)
+            pairs.append(BodyPair(left=left, right=right, sign=sign))
     pairs.sort(key=lambda pair: pair.left)
     return Mirror(normal=normal, pairs=tuple(pairs), offset=offset)
 
 
-def _normal(facts: "Facts") -> Matrix:
-    """Return y, or x where most legs bend about x, as those of a robot that walks along y do."""
-    sideways = sum(abs(leg.pitch[0]) > abs(leg.pitch[1]) for leg in facts.legs)
-    radial = any(0.5 < abs(leg.pitch[0]) < 0.87 for leg in facts.legs)  # legs around, as a spider's
-    x = 2 * sideways > len(facts.legs) and not radial
-    return np.array([1.0, 0, 0] if x else [0, 1.0, 0])
+def _plane_normal(legs: Sequence[Leg]) -> Matrix:
+    """Return y, or x if most legs bend about x, as those of a robot that walks along y."""
+    lateral = sum(abs(leg.pitch[0]) > abs(leg.pitch[1]) for leg in legs)
+    radial = any(0.5 < abs(leg.pitch[0]) < 0.87 for leg in legs)  # legs all around, as a spider's
+    is_x = 2 * lateral > len(legs) and not radial
+    return np.array([1.0, 0, 0] if is_x else [0, 1.0, 0])
 
 
-def _offset(facts: "Facts", normal: Matrix) -> float:
-    """Return how far the middle of the legs is aside of the trunk's origin [m].
+def _plane_offset(legs: Sequence[Leg], bodies: Sequence[Body], normal: Matrix) -> float:
+    """Return the distance of the center of the legs from the trunk's origin along the normal [m].
 
-    Only if the trunk's own mass is there, too: else a leg is out of place, not the origin.
+    Zero unless the center of mass of the trunk is there too; otherwise a leg is misplaced.
     """
-    starts = sorted(float(leg.limb.points[0] @ normal) for leg in facts.legs)
+    starts = sorted(float(leg.limb.points[0] @ normal) for leg in legs)
     if len(starts) < 2:
         return 0.0
     half = len(starts) // 2
-    middle = (starts[half - 1] + starts[-half]) / 2
-    mass = float(facts.bodies[0].center @ normal)
-    return middle if abs(mass - middle) < abs(mass) / 2 else 0.0
+    median = (starts[half - 1] + starts[-half]) / 2
+    trunk = float(bodies[0].center @ normal)
+    return median if abs(trunk - median) < abs(trunk) / 2 else 0.0
 
 
-def _by_place(
-    facts: "Facts", mirror: Mirror, points: Matrix, near: float
+def _pairs_by_position(
+    bodies: Sequence[Body], mirror: Mirror, points: Matrix, tolerance: float
 ) -> Iterator[tuple[int, int]]:
-    """Yield pairs of bodies whose places are mirrored, the closest first for each body."""
-    bodies = facts.bodies
-    depth = _depths(bodies)
-    images = mirror.image(points)
-    aside = np.abs(points @ mirror.normal) > max(near, 1e-3)
-    for body in bodies[1:]:
-        if not aside[body.index] or points[body.index] @ mirror.normal < 0:
-            continue
-        apart = np.linalg.norm(points - images[body.index], axis=1)
-        close = np.flatnonzero(aside & (apart <= near))
-        alike = [
-            bodies[k]
-            for k in close
-            if k > 0 and depth[k] == depth[body.index] and _kind(bodies[k]) == _kind(body)
-        ]
-        swapped = swap_sides(body.name)
-        alike.sort(key=lambda other: (other.name != swapped, round(float(apart[other.index]), 6)))
-        yield from ((body.index, other.index) for other in alike)
-
-
-def _by_name(
-    facts: "Facts", mirror: Mirror, points: Matrix, _near: float
-) -> Iterator[tuple[int, int]]:
-    """Yield pairs of bodies on the two sides whose names, or whose joints', differ in the side."""
-    for label in (_body_name, _joint_name):
-        named = {label(body): body.index for body in facts.bodies[1:]}
-        for name, index in named.items():
-            other = named.get(swap_sides(name)) if name else None
-            if other is None or other == index:
-                continue
-            # Where a sign was lost both may be on one side; the pair is the same.
-            sides = points[[index, other]] @ mirror.normal
-            if sides[0] >= sides[1] and _is_left(name):
-                yield index, other
-
-
-def _body_name(body: Body) -> str:
-    return body.name
-
-
-def _is_left(name: str) -> bool:
-    return any(word.lower() in _LEFTS for word in _TOKEN.findall(name))
-
-
-def _joint_name(body: Body) -> str:
-    return body.joint.name if body.joint is not None else ""
-
-
-def _kind(body: Body) -> str:
-    return body.joint.kind if body.joint is not None else ""
-
-
-def _depths(bodies: Sequence[Body]) -> list[int]:
+    """Yield pairs of bodies at mirrored positions, for each body the closest first."""
     depths: list[int] = []
     for body in bodies:
         depths.append(0 if body.parent is None else depths[body.parent] + 1)
-    return depths
+    images = mirror.image(points)
+    lateral = np.abs(points @ mirror.normal) > max(tolerance, 1e-3)
+    for body in bodies[1:]:
+        if not lateral[body.index] or points[body.index] @ mirror.normal < 0:
+            continue
+        distances = np.linalg.norm(points - images[body.index], axis=1)
+        near = np.flatnonzero(lateral & (distances <= tolerance)).tolist()
+        candidates = [
+            bodies[k]
+            for k in near
+            if k > 0
+            and depths[k] == depths[body.index]
+            and _joint_kind(bodies[k]) == _joint_kind(body)
+        ]
+        swapped = swap_sides(body.name)
+        candidates.sort(
+            key=lambda other: (other.name != swapped, round(float(distances[other.index]), 6))
+        )
+        yield from ((body.index, other.index) for other in candidates)
+
+
+def _joint_kind(body: Body) -> str:
+    return body.joint.kind if body.joint is not None else ""
+
+
+def _pairs_by_name(
+    bodies: Sequence[Body], mirror: Mirror, points: Matrix
+) -> Iterator[tuple[int, int]]:
+    """Yield pairs of bodies whose names, or whose joints' names, differ only in the side."""
+    body_names = {body.name: body.index for body in bodies[1:]}
+    joint_names = {body.joint.name if body.joint else "": body.index for body in bodies[1:]}
+    for index_of in (body_names, joint_names):
+        for name, index in index_of.items():
+            other = index_of.get(swap_sides(name)) if name else None
+            if other is None or other == index:
+                continue
+            # If a sign is wrong, both may be on one side; they still are a pair.
+            left, right = points[[index, other]] @ mirror.normal
+            is_left = any(word.lower() in _LEFT_TO_RIGHT for word in _TOKEN.findall(name))
+            if left >= right and is_left:
+                yield index, other
 
 
 def swap_sides(name: str) -> str:
-    """Return a name with left and right exchanged: FL_calf becomes FR_calf, left_toe right_toe.
+    """Return a name with left and right swapped: FL_calf becomes FR_calf, left_toe right_toe.
 
-    A name without a side comes back as it is.
+    A name without a side is returned unchanged.
     """
 
-    def swapped(match: re.Match[str]) -> str:
+    def swap(match: re.Match[str]) -> str:
         word = match.group()
         other = _SIDES.get(word.lower())
         if other is None:
@@ -200,19 +229,16 @@ def swap_sides(name: str) -> str:
             return other.upper()
         return other.capitalize() if word[0].isupper() else other
 
-    return _TOKEN.sub(swapped, name)
+    return _TOKEN.sub(swap, name)
 
 
-def _sign(facts: "Facts", mirror: Mirror, left: int, right: int) -> int:
-    """Return how the joints of two bodies mirror each other.
-
-    A reflection turns a rotation by q about a into one by -q about the reflected a.
-    """
-    a, b = facts.bodies[left], facts.bodies[right]
-    if a.joint is None or b.joint is None or a.joint.kind != b.joint.kind or not a.joint.moves:
+def _pair_sign(
+    mirror: Mirror, bodies: Sequence[Body], zero_poses: Sequence[Matrix], left: int, right: int
+) -> Sign:
+    """Return the sign of the joints of two bodies, 0 if they are not comparable."""
+    a, b = bodies[left].joint, bodies[right].joint
+    if a is None or b is None or a.kind != b.kind or not a.moves:
         return 0
-    _, axis = axis_in_trunk(a, facts.at_zero[left])
-    _, other = axis_in_trunk(b, facts.at_zero[right])
-    image = mirror.image(axis) if a.joint.kind == "prismatic" else -mirror.image(axis)
-    agreement = float(image @ other)
-    return 0 if abs(agreement) < 0.7 else 1 if agreement > 0 else -1
+    _, axis = joint_axis(bodies[left], zero_poses[left])
+    _, other = joint_axis(bodies[right], zero_poses[right])
+    return mirror.joint_sign(a, axis, other)

@@ -1,58 +1,60 @@
-"""Mirror map: the joint on the other side of each joint, and the sign between the two."""
+"""Compute the mirrored joint of each joint, and the sign between the two."""
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.bodies.kinematics import axis_in_trunk
-from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.bodies.kinematics import joint_axis
+from terrainkit_robots.analysis.symmetry.mirror import MAX_MIRROR_ERROR, Mirror, Sign
+from terrainkit_robots.description.model import Joint
 from terrainkit_robots.spec.robot_spec import MirrorJoint
-
-_NEAR = 0.02
-"""A body this share of the robot's size away from the mirror plane lies in it, as in
-symmetry/mirror.py."""
-
-_ALONG = 0.7
-"""Cosine from which two axes are the same one."""
+from terrainkit_robots.transforms import Matrix
 
 
-def mirror_map(robot: Facts) -> dict[str, MirrorJoint]:
-    """Return the twin of each actuated joint that has one.
+def mirror_map(
+    bodies: Sequence[Body],
+    actuated: Sequence[Joint],
+    mirror: Mirror,
+    zero_poses: Sequence[Matrix],
+) -> dict[str, MirrorJoint]:
+    """Return the mirrored joint of each actuated joint that has one, by name.
 
-    A joint in the mirror plane is its own: a waist that yaws does so the other way, one that
-    pitches the same way.
+    A joint in the mirror plane mirrors itself: with sign -1 if it yaws, with +1 if it pitches.
+
+    Args:
+        bodies: The bodies, the trunk first.
+        actuated: The actuated joints.
+        mirror: The mirror plane.
+        zero_poses: Poses of the bodies in the frame of the trunk, all joints at 0, each (4, 4) [m].
     """
-    driven = {joint.name for joint in robot.actuated}
-    points = np.array([pose[:3, 3] for pose in robot.at_zero]).reshape(-1, 3)
-    near = max(_NEAR * float(np.linalg.norm(np.ptp(points, axis=0))), 1e-3) if len(points) else 0.0
+    names = {joint.name for joint in actuated}
+    points = np.array([pose[:3, 3] for pose in zero_poses]).reshape(-1, 3)
+    size = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
+    tolerance = max(MAX_MIRROR_ERROR * size, 1e-3)
     found: dict[str, MirrorJoint] = {}
-    for body in robot.bodies:
+    for body in bodies:
         joint = body.joint
-        if joint is None or joint.name not in driven:
+        if joint is None or joint.name not in names:
             continue
-        twin = robot.mirror.twin(body.index)
-        if twin is None:
-            sign = _own_sign(robot, body, near)
+        counterpart = mirror.counterpart(body.index)
+        if counterpart is None:
+            sign = _own_sign(mirror, body, zero_poses[body.index], tolerance)
             if sign:
                 found[joint.name] = MirrorJoint(joint=joint.name, sign=sign)
             continue
-        other, sign = robot.bodies[twin[0]].joint, twin[1]
-        if sign and other is not None and other.name in driven:
+        other, sign = bodies[counterpart[0]].joint, counterpart[1]
+        if sign and other is not None and other.name in names:
             found[joint.name] = MirrorJoint(joint=other.name, sign=sign)
-    return {joint.name: found[joint.name] for joint in robot.actuated if joint.name in found}
+    return {joint.name: found[joint.name] for joint in actuated if joint.name in found}
 
 
-def _own_sign(robot: Facts, body: Body, near: float) -> int:
-    """Return how a joint in the mirror plane mirrors itself; 0 for one that is elsewhere.
-
-    A reflection turns a rotation by q about a into one by -q about the reflected a.
-    """
+def _own_sign(mirror: Mirror, body: Body, pose: Matrix, tolerance: float) -> Sign:
+    """Return how a joint in the mirror plane mirrors itself, 0 for a joint outside of the plane."""
     assert body.joint is not None
-    pose, mirror = robot.at_zero[body.index], robot.mirror
-    anchor, axis = axis_in_trunk(body, pose)
+    anchor, axis = joint_axis(body, pose)
     center = pose[:3, :3] @ body.center + pose[:3, 3]
-    aside = [abs(float(p @ mirror.normal) - mirror.offset) for p in (anchor, pose[:3, 3], center)]
-    if min(aside) > near:
+    points = (anchor, pose[:3, 3], center)
+    if min(abs(float(point @ mirror.normal) - mirror.offset) for point in points) > tolerance:
         return 0
-    image = mirror.image(axis) if body.joint.kind == "prismatic" else -mirror.image(axis)
-    agreement = float(image @ axis)
-    return 0 if abs(agreement) < _ALONG else 1 if agreement > 0 else -1
+    return mirror.joint_sign(body.joint, axis, axis)

@@ -1,139 +1,158 @@
-"""Twins: a body, its mirror image, and which of the two is the odd one."""
+"""Compute the pairs of mirrored joints, and which joint of a pair is the outlier."""
 
-from collections.abc import Callable, Container, Iterator
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.bodies.kinematics import axis_in_trunk
-from terrainkit_robots.analysis.cached_fact import per_robot
-from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.symmetry.mirror import Pair, swap_sides
+from terrainkit_robots.analysis.bodies.kinematics import joint_axis
+from terrainkit_robots.analysis.legs.legs import Leg
+from terrainkit_robots.analysis.symmetry.mirror import Mirror, Sign, swap_sides
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.transforms import Matrix
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Twin:
-    """A body and where it is, all joints at 0, in the trunk's frame."""
+class MirrorSide:
+    """A joint of a pair and its body, all joints at 0, in the frame of the trunk."""
 
     body: Body
 
     joint: Joint
-    """The joint that moves it."""
+    """The joint of the body."""
 
     point: Matrix
-    """A point of the joint's axis, shape (3,) [m]."""
+    """A point of the axis, shape (3,) [m]."""
 
     axis: Matrix
-    """The joint's axis, shape (3,)."""
+    """Direction of the axis, shape (3,)."""
 
     offset: Matrix
-    """From the parent's joint, or the trunk's origin, to this one, shape (3,) [m]."""
+    """Vector from the joint of the parent, or the trunk's origin, to this one, shape (3,) [m]."""
 
     arm: Matrix
-    """From the joint to the centre of mass, shape (3,) [m]."""
+    """Vector from the joint to the center of mass, shape (3,) [m]."""
 
 
-@per_robot
-def twins(robot: Facts) -> tuple[tuple[Pair, Twin, Twin], ...]:
-    """Return the mirrored pairs, each with left and right, parents first."""
-    return tuple(_twins(robot))
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MirrorPair:
+    """Two joints that are mirror images of each other, or are named so."""
+
+    left: MirrorSide
+    right: MirrorSide
+
+    sign: Sign
+    """+1 if equal positions are mirrored, -1 if opposite ones are, 0 if neither."""
+
+    @property
+    def indices(self) -> set[int]:
+        """Return the indices of the two bodies."""
+        return {self.left.body.index, self.right.body.index}
 
 
-def _twins(robot: Facts) -> Iterator[tuple[Pair, Twin, Twin]]:
-    paired = set(partners(robot))
-    in_legs = robot.leg_bodies
-    for pair in robot.mirror.pairs:
-        left, right = _twin(robot, pair.left, paired), _twin(robot, pair.right, paired)
+def mirror_pairs(
+    bodies: Sequence[Body],
+    zero_poses: Sequence[Matrix],
+    mirror: Mirror,
+    leg_bodies: Collection[int],
+) -> tuple[MirrorPair, ...]:
+    """Return the pairs of mirrored joints, parents first.
+
+    Outside of the legs the names have to be mirrored too: two fingers of a hand, for example, only
+    happen to be at mirrored positions.
+
+    Args:
+        bodies: The bodies, the trunk first.
+        zero_poses: Their poses in the frame of the trunk, all joints at 0, each (4, 4) [m].
+        mirror: The mirror plane.
+        leg_bodies: Indices of the bodies of legs.
+    """
+    found = []
+    for pair in mirror.pairs:
+        left, right = (
+            _mirror_joint(bodies, zero_poses, mirror, index) for index in (pair.left, pair.right)
+        )
         if left is None or right is None:
             continue
-        if {pair.left, pair.right} <= in_legs or _named_alike(left, right):
-            yield pair, left, right
+        has_mirrored_names = (
+            swap_sides(left.body.name) == right.body.name
+            or swap_sides(left.joint.name) == right.joint.name
+        )
+        if (pair.left in leg_bodies and pair.right in leg_bodies) or has_mirrored_names:
+            found.append(MirrorPair(left=left, right=right, sign=pair.sign))
+    return tuple(found)
 
 
-def _named_alike(left: Twin, right: Twin) -> bool:
-    """Return whether the names say so, too: two fingers of a hand only happen to be mirrored."""
-    return (
-        swap_sides(left.body.name) == right.body.name
-        or swap_sides(left.joint.name) == right.joint.name
-    )
-
-
-@per_robot
-def partners(robot: Facts) -> dict[int, int]:
-    """Return the index of the mirror image of each body that has one."""
-    pairs = robot.mirror.pairs
-    return {p.left: p.right for p in pairs} | {p.right: p.left for p in pairs}
-
-
-def _twin(robot: Facts, index: int, paired: Container[int]) -> Twin | None:
-    body, pose = robot.bodies[index], robot.at_zero[index]
+def _mirror_joint(
+    bodies: Sequence[Body], zero_poses: Sequence[Matrix], mirror: Mirror, index: int
+) -> MirrorSide | None:
+    body, pose = bodies[index], zero_poses[index]
     if body.joint is None or body.parent is None:
         return None
-    point, axis = axis_in_trunk(body, pose)
-    return Twin(
+    parent, parent_pose = bodies[body.parent], zero_poses[body.parent]
+    origin = parent_pose[:3, 3] if parent.joint is None else joint_axis(parent, parent_pose)[0]
+    if parent.index not in mirror.counterparts:  # on the mirror plane
+        origin = origin - (origin @ mirror.normal - mirror.offset) * mirror.normal
+    point, axis = joint_axis(body, pose)
+    return MirrorSide(
         body=body,
         joint=body.joint,
         point=point,
         axis=axis,
-        offset=point - _joint_of(robot, body.parent, paired),
+        offset=point - origin,
         arm=pose[:3, :3] @ body.center + pose[:3, 3] - point,
     )
 
 
-def _joint_of(robot: Facts, index: int, paired: Container[int]) -> Matrix:
-    """Return where the joint of a body is; for one on the mirror plane that is the plane."""
-    body, pose = robot.bodies[index], robot.at_zero[index]
-    point = pose[:3, 3] if body.joint is None else axis_in_trunk(body, pose)[0]
-    if index not in paired:
-        normal, offset = robot.mirror.normal, robot.mirror.offset
-        return np.asarray(point - (point @ normal - offset) * normal)
-    return point
+def outlier_first(
+    left: MirrorSide,
+    right: MirrorSide,
+    value: Callable[[Body], Matrix | None],
+    bodies: Sequence[Body],
+    legs: Sequence[Leg],
+    mirror: Mirror,
+) -> tuple[MirrorSide, MirrorSide]:
+    """Return two mirrored joints, the one that deviates more from the legs on its side first.
 
-
-def odd_one_first(
-    robot: Facts, left: Twin, right: Twin, value: Callable[[Body], Matrix | None]
-) -> tuple[Twin, Twin]:
-    """Return the two in the order of how unlike the legs on their side they are.
-
-    Without others to compare with, the right one comes first.
+    The right joint is first if there are no other legs to compare with.
 
     Args:
-        robot: The robot.
-        left: The one on the left.
-        right: The other.
-        value: What differs between the two. Signs count less than sizes, since those of front and
-            rear differ with good reason.
+        left: The left joint.
+        right: The right joint.
+        value: The property in which the two differ. Signs count less than magnitudes, because they
+            differ between front and rear for good reason.
+        bodies: The bodies, the trunk first.
+        legs: The legs of the robot.
+        mirror: The mirror plane.
     """
-    sides = {True: {pair.left for pair in robot.mirror.pairs}}
-    sides[False] = {pair.right for pair in robot.mirror.pairs}
+    comparable = _comparable_bodies(legs, {left.body.index, right.body.index})
+    left_bodies = {pair.left for pair in mirror.pairs}
+    right_bodies = {pair.right for pair in mirror.pairs}
 
-    def strangeness(twin: Twin) -> float:
-        own, side = value(twin.body), sides[twin is left]
+    def deviation(joint: MirrorSide) -> float:
+        own, side = value(joint.body), left_bodies if joint is left else right_bodies
         if own is None:
             return np.inf
-        others = [value(robot.bodies[i]) for i in _alike(robot, left, right) if i in side]
-        return min((_unlike(own, other) for other in others if other is not None), default=0.0)
+        others = [value(bodies[i]) for i in comparable if i in side]
+        return min((_difference(own, other) for other in others if other is not None), default=0.0)
 
-    return (left, right) if strangeness(left) > strangeness(right) else (right, left)
+    return (left, right) if deviation(left) > deviation(right) else (right, left)
 
 
-def _unlike(a: Matrix, b: Matrix) -> float:
+def _difference(a: Matrix, b: Matrix) -> float:
     return float(np.linalg.norm(np.abs(a) - np.abs(b)) + 0.01 * np.linalg.norm(a - b))
 
 
-def _alike(robot: Facts, left: Twin, right: Twin) -> list[int]:
-    """Return the bodies at the same place of other legs."""
-    own = {left.body.index, right.body.index}
+def _comparable_bodies(legs: Sequence[Leg], own: set[int]) -> list[int]:
+    """Return the indices of the bodies at the same position of other legs."""
     found = []
-    for leg in robot.legs:
-        place = next((k for k, i in enumerate(leg.limb.chain) if i in own), None)
-        if place is None:
+    for leg in legs:
+        position = next((k for k, i in enumerate(leg.limb.chain) if i in own), None)
+        if position is None:
             continue
-        for other in robot.legs:
+        for other in legs:
             chain = other.limb.chain
-            if len(chain) == len(leg.limb.chain) and chain[place] not in own:
-                found.append(chain[place])
+            if len(chain) == len(leg.limb.chain) and chain[position] not in own:
+                found.append(chain[position])
     return found

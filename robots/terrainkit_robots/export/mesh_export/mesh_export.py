@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.shapes import has_extent
+from terrainkit_robots.analysis.bodies.shapes import has_bounds
 from terrainkit_robots.description.model import Geometry, Link, MeshFile, RobotModel
 from terrainkit_robots.description.xml.document import RobotFileError
 from terrainkit_robots.export.collision_simplification.oriented_box import oriented_box
@@ -95,7 +95,7 @@ class _Packing:
         self.notes[note] = None  # each once, in order
 
     def _primitive(self, link: Link, shape: Geometry) -> Geometry | None:
-        if not has_extent(shape, self._meshes) or min(shape.size[:1]) <= 0:
+        if not has_bounds(shape, self._meshes) or min(shape.size[:1]) <= 0:
             what = "shape without a size" if shape.shape == "unknown" else shape.shape
             self._tell(f"left out a {what} of {link.name}: it has no extent that can be written")
             return None

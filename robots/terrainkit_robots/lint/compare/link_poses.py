@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.mimic_joints import follower_positions
+from terrainkit_robots.analysis.bodies.mimic_joints import mimic_positions
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint
@@ -120,7 +120,7 @@ def sample_positions(
         sampled = generator.uniform(*_bounds(joint, other), poses)
         positions[joint.name] = np.zeros(poses) if joint.name in locked else sampled
     joints = [replace(j, mimic=None) if j.name in locked else j for j, _ in pairs.joints]
-    positions |= follower_positions(joints, positions)
+    positions |= mimic_positions(joints, positions)
     return positions, {other.name: positions[joint.name] for joint, other in pairs.joints}
 
 

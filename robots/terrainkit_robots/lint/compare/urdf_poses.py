@@ -38,7 +38,7 @@ def urdf_poses(robot: Facts, positions: Mapping[str, Matrix]) -> dict[str, Matri
     Raises:
         CannotCheckError: if yourdfpy cannot load the robot, or the file has changed.
     """
-    joints = [robot.tree.above[name] for name in robot.tree.order[1:]]
+    joints = [robot.tree.parent_joint[name] for name in robot.tree.order[1:]]
     if not joints:
         raise CannotCheckError(f"{robot.model.file.name} has no joints")
     count = len(next(iter(positions.values()))) if positions else 1

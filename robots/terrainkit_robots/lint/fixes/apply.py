@@ -221,8 +221,8 @@ class _Batch:
                 edits.setdefault(self._source_path(edit.source.file), []).append(edit)
         created = {path: data for path, data in new.items() if self._is_new(path, data)}
         edited = {path: self._edited_bytes(path) for path in edits}
-        splices = {path: edited[path].prepare(edits[path]) for path in edits}
-        for path, each in splices.items():
+        replacements = {path: edited[path].prepare(edits[path]) for path in edits}
+        for path, each in replacements.items():
             edited[path].apply(each)
         self._new |= created
 

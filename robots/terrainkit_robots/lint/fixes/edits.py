@@ -42,12 +42,12 @@ def edit_bytes(data: bytes, edits: Sequence[Edit]) -> bytes:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Splice:
+class _Replacement:
     """A replacement of a range of bytes."""
 
     start: int
     end: int
-    replacement: bytes
+    data: bytes
 
     lock: tuple[int, int]
     """Range that no other fix may change. For an attribute, this is the whole tag."""
@@ -58,15 +58,15 @@ class EditedBytes:
 
     def __init__(self, data: bytes) -> None:
         self._text = _Text(data)
-        self._splices: list[_Splice] = []
+        self._replacements: list[_Replacement] = []
         self._locks: list[tuple[int, int]] = []
 
     def add(self, edits: Sequence[Edit]) -> None:
         """Apply all of `edits`, or none; see `prepare`."""
         self.apply(self.prepare(edits))
 
-    def prepare(self, edits: Sequence[Edit]) -> tuple[_Splice, ...]:
-        """Return the splices that `apply` needs for `edits`, without applying them.
+    def prepare(self, edits: Sequence[Edit]) -> tuple[_Replacement, ...]:
+        """Return the replacements that `apply` needs for `edits`, without applying them.
 
         An earlier edit of the same tag is a conflict, even if it changes another attribute, because
         the fixes were computed independently.
@@ -74,27 +74,27 @@ class EditedBytes:
         Raises:
             EditError: if an edit is not possible, or conflicts with another edit.
         """
-        splices = sorted(_make_splices(self._text, edits), key=_range)
-        for one, other in itertools.pairwise(splices):
+        replacements = sorted(_make_replacements(self._text, edits), key=_range)
+        for one, other in itertools.pairwise(replacements):
             if one.end > other.start:
                 raise EditError("two edits change the same bytes")
-        if any(self._is_locked(splice.lock) for splice in splices):
+        if any(self._is_locked(replacement.lock) for replacement in replacements):
             raise EditError("another fix changes the same element")
-        return tuple(splices)
+        return tuple(replacements)
 
-    def apply(self, splices: Sequence[_Splice]) -> None:
+    def apply(self, replacements: Sequence[_Replacement]) -> None:
         """Apply the result of `prepare`. No other edit may have been applied in between."""
-        self._splices += splices
-        for lock in {splice.lock for splice in splices}:
+        self._replacements += replacements
+        for lock in {replacement.lock for replacement in replacements}:
             insort(self._locks, lock)
 
     def result(self) -> bytes:
         """Return the bytes with all edits applied."""
         parts: list[bytes] = []
         position = 0
-        for splice in sorted(self._splices, key=_range):
-            parts += (self._text.data[position : splice.start], splice.replacement)
-            position = splice.end
+        for replacement in sorted(self._replacements, key=_range):
+            parts += (self._text.data[position : replacement.start], replacement.data)
+            position = replacement.end
         return b"".join((*parts, self._text.data[position:]))
 
     def _is_locked(self, lock: tuple[int, int]) -> bool:
@@ -108,8 +108,8 @@ class EditedBytes:
         return index > 0 and self._locks[index - 1][1] > start
 
 
-def _range(splice: _Splice) -> tuple[int, int]:
-    return splice.start, splice.end
+def _range(replacement: _Replacement) -> tuple[int, int]:
+    return replacement.start, replacement.end
 
 
 _PREFIX = re.compile(rb"(?:\xef\xbb\xbf|\s)*")
@@ -254,7 +254,7 @@ class _Text:
         encoding = "utf-8"
         parser = expat.ParserCreate()
 
-        def declaration(_version: str, name: str | None, _alone: int) -> None:
+        def set_encoding(_version: str, name: str | None, _: int) -> None:
             nonlocal encoding
             encoding = name or encoding
 
@@ -269,7 +269,7 @@ class _Text:
         def end(_name: str) -> None:
             closes[open_elements.pop()] = prefix.end() + parser.CurrentByteIndex
 
-        parser.XmlDeclHandler = declaration
+        parser.XmlDeclHandler = set_encoding
         parser.EntityDeclHandler = entity
         parser.StartElementHandler = start
         parser.EndElementHandler = end
@@ -282,8 +282,8 @@ class _Text:
         return starts, closes, encoding
 
 
-def _make_splices(text: _Text, edits: Sequence[Edit]) -> Iterator[_Splice]:
-    """Yield the splices for `edits`."""
+def _make_replacements(text: _Text, edits: Sequence[Edit]) -> Iterator[_Replacement]:
+    """Yield the replacements for `edits`."""
     changed: set[tuple[int | None, str]] = set()
     children: dict[int, list[InsertChild]] = {}
     for edit in edits:
@@ -305,34 +305,34 @@ def _make_splices(text: _Text, edits: Sequence[Edit]) -> Iterator[_Splice]:
         yield from _insert(text, text.element(insertions[0].source), insertions)
 
 
-def _replace(text: _Text, edit: ReplaceBytes) -> _Splice:
+def _replace(text: _Text, edit: ReplaceBytes) -> _Replacement:
     size = len(text.data)
     if not 0 <= edit.start <= edit.end <= size:
         raise EditError(f"byte range: got {edit.start} to {edit.end}; expected within 0 to {size}")
     lock = edit.start, edit.end
-    return _Splice(start=edit.start, end=edit.end, replacement=edit.replacement, lock=lock)
+    return _Replacement(start=edit.start, end=edit.end, data=edit.replacement, lock=lock)
 
 
-def _edit_attribute(text: _Text, edit: SetAttribute | RemoveAttribute) -> _Splice:
+def _edit_attribute(text: _Text, edit: SetAttribute | RemoveAttribute) -> _Replacement:
     element = text.element(edit.source)
     attributes = text.attributes(element)
     found = next((a for a in attributes if a["name"] == text.encode(edit.name)), None)
     if isinstance(edit, RemoveAttribute):
         if found is None:
             raise EditError(f"attribute {edit.name!r} does not exist")
-        return _Splice(start=found.start(), end=found.end(), replacement=b"", lock=element.tag)
+        return _Replacement(start=found.start(), end=found.end(), data=b"", lock=element.tag)
     if found is not None:
         value = _escape(text, edit.value, found["quote"])
         start, end = found.span("value")
-        return _Splice(start=start, end=end, replacement=value, lock=element.tag)
+        return _Replacement(start=start, end=end, data=value, lock=element.tag)
     if _NAME.fullmatch(edit.name) is None:
         raise EditError(f"{edit.name!r} is not a valid attribute name")
     quote = attributes[-1]["quote"] if attributes else b'"'
     value = quote + _escape(text, edit.value, quote) + quote
-    return _Splice(
+    return _Replacement(
         start=element.attributes_end,
         end=element.attributes_end,
-        replacement=_separator(attributes) + text.encode(edit.name) + b"=" + value,
+        data=_attribute_indent(attributes) + text.encode(edit.name) + b"=" + value,
         lock=element.tag,
     )
 
@@ -349,7 +349,7 @@ def _escape(text: _Text, value: str, delimiter: bytes) -> bytes:
     return text.encode("".join(escapes.get(letter, letter) for letter in value))
 
 
-def _separator(attributes: Sequence[re.Match[bytes]]) -> bytes:
+def _attribute_indent(attributes: Sequence[re.Match[bytes]]) -> bytes:
     """Return the white space before a new attribute: a new line if each attribute has its own."""
     own_lines = [b"\n" in attribute["space"] for attribute in attributes]
     if own_lines and own_lines[-1] and all(own_lines[1:]):
@@ -357,7 +357,7 @@ def _separator(attributes: Sequence[re.Match[bytes]]) -> bytes:
     return b" "
 
 
-def _remove(text: _Text, element: _Element) -> _Splice:
+def _remove(text: _Text, element: _Element) -> _Replacement:
     if element.index == 0:
         raise EditError("the root element cannot be removed")
     start, end = element.start, element.end
@@ -368,10 +368,10 @@ def _remove(text: _Text, element: _Element) -> _Splice:
         else:  # remove the white space at the end of the line
             while text.data[start - 1 : start] in (b" ", b"\t"):
                 start -= 1
-    return _Splice(start=start, end=end, replacement=b"", lock=(start, end))
+    return _Replacement(start=start, end=end, data=b"", lock=(start, end))
 
 
-def _insert(text: _Text, parent: _Element, edits: Sequence[InsertChild]) -> Iterator[_Splice]:
+def _insert(text: _Text, parent: _Element, edits: Sequence[InsertChild]) -> Iterator[_Replacement]:
     for edit in edits:
         _check_element(edit.xml)
     first = [text.encode(edit.xml) for edit in edits if edit.first]
@@ -383,22 +383,22 @@ def _insert(text: _Text, parent: _Element, edits: Sequence[InsertChild]) -> Iter
     indent = None if parent_indent is None else parent_indent + text.indent
     if child is not None:
         indent = text.indent_before(child.start)
-    separator = b"" if indent is None else text.newline(parent.start) + indent
+    prefix = b"" if indent is None else text.newline(parent.start) + indent
     if first:
         comments = _COMMENTS.match(text.data, parent.tag_end)
-        yield _insert_at(comments.end() if comments else parent.tag_end, separator, first)
+        yield _insert_at(comments.end() if comments else parent.tag_end, prefix, first)
     if last:
         content = text.data[parent.tag_end : parent.close].rstrip()
-        yield _insert_at(parent.tag_end + len(content), separator, last)
+        yield _insert_at(parent.tag_end + len(content), prefix, last)
 
 
-def _insert_at(position: int, separator: bytes, elements: Sequence[bytes]) -> _Splice:
-    new = b"".join(separator + element for element in elements)
-    return _Splice(start=position, end=position, replacement=new, lock=(position, position))
+def _insert_at(position: int, prefix: bytes, elements: Sequence[bytes]) -> _Replacement:
+    new = b"".join(prefix + element for element in elements)
+    return _Replacement(start=position, end=position, data=new, lock=(position, position))
 
 
-def _fill(text: _Text, parent: _Element, elements: Sequence[bytes]) -> _Splice:
-    """Return the splice that adds children to an empty element."""
+def _fill(text: _Text, parent: _Element, elements: Sequence[bytes]) -> _Replacement:
+    """Return the replacement that adds children to an empty element."""
     indent = text.indent_before(parent.start)
     newline = text.newline(parent.start)
     outer = b"" if indent is None else newline + indent
@@ -406,11 +406,11 @@ def _fill(text: _Text, parent: _Element, elements: Sequence[bytes]) -> _Splice:
     content = b"".join(inner + element for element in elements) + outer
     if not parent.is_empty_tag:
         lock = parent.tag_end, parent.close
-        return _Splice(start=lock[0], end=lock[1], replacement=content, lock=lock)
-    return _Splice(
+        return _Replacement(start=lock[0], end=lock[1], data=content, lock=lock)
+    return _Replacement(
         start=parent.attributes_end,
         end=parent.tag_end,
-        replacement=b">" + content + b"</" + parent.name + b">",
+        data=b">" + content + b"</" + parent.name + b">",
         lock=parent.tag,
     )
 

@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from terrainkit_robots.analysis.simulator_conventions.joint_order import simulator_orders
-
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
     from terrainkit_robots.analysis.legs.legs import Leg
@@ -81,7 +79,7 @@ def _gains(facts: "Facts") -> dict[str, Any] | None:
 
 def _joint_orders(facts: "Facts") -> dict[str, Any]:
     orders: dict[str, Any] = {"file": [joint.name for joint in facts.model.joints if joint.moves]}
-    for order in simulator_orders(facts):
+    for order in facts.simulator_orders:
         orders[order.key] = {
             "joints": list(order.joints),
             "bodies": list(order.bodies),

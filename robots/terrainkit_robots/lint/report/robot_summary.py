@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from terrainkit_robots.analysis.legs.effort import effort_of
 from terrainkit_robots.lint.report.facts_json import facts_json
 from terrainkit_robots.text import count
 
@@ -26,7 +25,7 @@ def robot_summary(report: "Report") -> Iterator[tuple[str, str]]:
     if data["standing_pose"] is None:
         return
     yield "standing", ", ".join(_standing(data))
-    limits = {joint.name: effort_of(facts, joint) for joint in facts.joints}
+    limits = {joint.name: facts.effort_limit(joint) for joint in facts.joints}
     yield from _joints(data, {name: limit for name, limit in limits.items() if limit})
 
 

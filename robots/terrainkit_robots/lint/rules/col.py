@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.bodies import Body, Placed
-from terrainkit_robots.analysis.bodies.shapes import has_extent, lowest
+from terrainkit_robots.analysis.bodies.bodies import Body, BodyShape
+from terrainkit_robots.analysis.bodies.shapes import has_bounds, min_height
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.legs import Leg
-from terrainkit_robots.analysis.legs.standing_pose import range_of
+from terrainkit_robots.analysis.legs.standing_pose import joint_range
 from terrainkit_robots.lint.rule import Severity, Violation, rule
 from terrainkit_robots.text import count
 
@@ -47,7 +47,7 @@ def _has_contacts(body: Body) -> bool:
     return any(placed.geometry.contacts for placed in body.collisions)
 
 
-def _disabled_shapes(body: Body) -> list[Placed]:
+def _disabled_shapes(body: Body) -> list[BodyShape]:
     """Return the primitive shapes of a body whose contacts are disabled (MJCF only)."""
     return [
         placed
@@ -93,9 +93,9 @@ def _is_visual_only(leg: Leg, body: Body, robot: Facts) -> bool:
     link = robot.tree.links[leg.foot]
     if link is body.top or not link.visuals or link.collisions:
         return False
-    pose = robot.at_zero[body.index]
+    pose = robot.zero_poses[body.index]
     position = (pose @ body.poses[body.links.index(link)])[:3, 3]
-    floor = min(lowest(placed, pose, robot.meshes) for placed in body.collisions)
+    floor = min(min_height(placed, pose, robot.meshes) for placed in body.collisions)
     return floor > float(position[2])
 
 
@@ -197,7 +197,7 @@ def overlap(robot: Facts) -> Iterator[Violation]:
     """
     if not robot.bodies:
         raise CannotCheckError("there is no tree of links")
-    for pair, deepest in _deepest(robot, robot.overlaps.overlaps(robot.positions)).items():
+    for pair, deepest in _deepest(robot, robot.overlap_scene.detect(robot.positions)).items():
         if deepest.depth <= _MAX_OVERLAP:
             continue
         # Fixed-base arms often disable contacts of pairs that always touch, so no error for them.
@@ -205,11 +205,11 @@ def overlap(robot: Facts) -> Iterator[Violation]:
         yield Violation(
             subject=" and ".join(pair),
             source=deepest.second.geometry.source,
-            message=f"overlap of {'the convex hulls of ' if deepest.hulls else ''}"
+            message=f"overlap of {'the convex hulls of ' if deepest.has_mesh else ''}"
             f"{deepest.first.link} and {deepest.second.link} at the default pose: got "
             f"{1000 * deepest.depth:.1f} mm; expected at most {1000 * _MAX_OVERLAP:.0f} mm",
-            severity=levels[1 + (deepest.depth > _MAX_OVERLAP_ERROR) - deepest.hulls],
-            certainty="likely" if deepest.hulls else "proven",
+            severity=levels[1 + (deepest.depth > _MAX_OVERLAP_ERROR) - deepest.has_mesh],
+            certainty="likely" if deepest.has_mesh else "proven",
             measured={"depth": round(deepest.depth, 5)},
         )
 
@@ -241,14 +241,14 @@ def overlap_in_range(robot: Facts) -> Iterator[Violation]:
         raise CannotCheckError("there are no moving joints")
     positions = {}
     for index, joint in enumerate(robot.joints):
-        lower, upper = range_of(joint)
+        lower, upper = joint_range(joint)
         if upper - lower > 4 * np.pi:
             lower, upper = -_DEFAULT_RANGE, _DEFAULT_RANGE
         # Multiples of the square roots of different primes are evenly distributed modulo 1.
         samples = np.arange(1, _NUM_SAMPLES + 1) * math.sqrt(_PRIMES[index % len(_PRIMES)]) % 1
         positions[joint.name] = lower + (upper - lower) * samples
     counts: Counter[tuple[str, str]] = Counter()
-    for overlaps in robot.overlaps.sweep(positions, _NUM_SAMPLES):
+    for overlaps in robot.overlap_scene.sweep(positions, _NUM_SAMPLES):
         deepest = _deepest(robot, overlaps)
         counts.update(pair for pair, each in deepest.items() if each.depth > _MAX_OVERLAP)
     for pair, number in counts.items():
@@ -279,16 +279,16 @@ def foot_contacts_disabled(robot: Facts) -> Iterator[Violation]:
     """
     for leg in robot.legs:
         body = robot.bodies[leg.limb.chain[-1]]
-        pose, meshes = robot.at_zero[body.index], robot.meshes
+        pose, meshes = robot.zero_poses[body.index], robot.meshes
         disabled = [
-            (lowest(placed, pose, meshes), placed)
+            (min_height(placed, pose, meshes), placed)
             for placed in _disabled_shapes(body)
-            if has_extent(placed.geometry, meshes)
+            if has_bounds(placed.geometry, meshes)
         ]
         enabled = [
-            lowest(placed, pose, meshes)
+            min_height(placed, pose, meshes)
             for placed in body.collisions
-            if placed.geometry.contacts and has_extent(placed.geometry, meshes)
+            if placed.geometry.contacts and has_bounds(placed.geometry, meshes)
         ]
         if not disabled:
             continue

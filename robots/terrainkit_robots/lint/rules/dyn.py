@@ -6,16 +6,20 @@ from dataclasses import replace
 from terrainkit_robots.analysis.bodies.kinematics import ancestors
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.legs.stance import stands_alone
+from terrainkit_robots.analysis.legs.stance import is_statically_stable
 from terrainkit_robots.lint.rule import Severity, Violation, rule
-from terrainkit_robots.simulation.assessment import judge
-from terrainkit_robots.simulation.drop import Drop, let_fall
-from terrainkit_robots.simulation.joint_sweep import Reach, sweep
+from terrainkit_robots.simulation.assessment import assess
+from terrainkit_robots.simulation.drop import DropResult, drop_test
+from terrainkit_robots.simulation.joint_sweep import SweepResult, joint_sweep
 from terrainkit_robots.simulation.pd_gains import suggest_gains
-from terrainkit_robots.simulation.sim_model import TIME_STEP, plant
-from terrainkit_robots.simulation.standing import Standing, footholds, stand_still
-from terrainkit_robots.simulation.time_step import joint_inertias, longest_step, stable_stiffness
-from terrainkit_robots.simulation.units import SLIDING, units_of
+from terrainkit_robots.simulation.sim_model import TIME_STEP, make_sim_model
+from terrainkit_robots.simulation.standing import StandResult, contact_regions, stand_test
+from terrainkit_robots.simulation.time_step import (
+    joint_inertias,
+    max_stable_stiffness,
+    max_stable_time_step,
+)
+from terrainkit_robots.simulation.units import PRISMATIC
 from terrainkit_robots.text import count
 
 _MAX_SPEED, _MAX_SPEED_ERROR = 100.0, 500.0
@@ -65,27 +69,27 @@ def unstable_drop(robot: Facts) -> Iterator[Violation]:
     Source:
         MuJoCo at a time step of 5 ms, that of legged_gym; its warnings BADQPOS, BADQVEL, BADQACC.
     """
-    model = plant(robot)
-    drop = let_fall(model, height=_DROP_HEIGHT)
+    model = make_sim_model(robot)
+    drop = drop_test(model, height=_DROP_HEIGHT)
     if not _is_unstable(drop):
         return
-    without = let_fall(model, height=_DROP_HEIGHT, self_collision=False)
+    without = drop_test(model, height=_DROP_HEIGHT, self_collision=False)
     stable = not _is_unstable(without)
     with_hulls = stable and _has_mesh_collision(robot)
-    level = 2 if drop.blew_up or drop.top_speed > _MAX_SPEED_ERROR else 1
-    unit, unit_without = (units_of(model, each.fastest).speed for each in (drop, without))
-    got = f"{drop.top_speed:.0f} {unit} at {drop.fastest}"
-    if drop.blew_up:
+    level = 2 if drop.diverged or drop.max_speed > _MAX_SPEED_ERROR else 1
+    unit, unit_without = (model.units(each.fastest_joint).velocity for each in (drop, without))
+    got = f"{drop.max_speed:.0f} {unit} at {drop.fastest_joint}"
+    if drop.diverged:
         got = f"an unstable state after {drop.seconds:.2f} s"
     start = f"dropped from {_DROP_HEIGHT:g} m" if model.floating else "released"
-    calm = f"; without self-collision {without.top_speed:.0f} {unit_without}" if stable else ""
+    calm = f"; without self-collision {without.max_speed:.0f} {unit_without}" if stable else ""
     measured: dict[str, float | int | str] = {
-        "speed": round(drop.top_speed, 1),
-        "blew_up": int(drop.blew_up),
+        "speed": round(drop.max_speed, 1),
+        "blew_up": int(drop.diverged),
         "seconds": round(drop.seconds, 3),
     }
     if stable:
-        measured["speed_without_self_collision"] = round(without.top_speed, 1)
+        measured["speed_without_self_collision"] = round(without.max_speed, 1)
     yield Violation(
         subject=robot.model.title,
         source=robot.model.source,
@@ -98,8 +102,8 @@ def unstable_drop(robot: Facts) -> Iterator[Violation]:
     )
 
 
-def _is_unstable(drop: Drop) -> bool:
-    return drop.blew_up or drop.top_speed > _MAX_SPEED
+def _is_unstable(drop: DropResult) -> bool:
+    return drop.diverged or drop.max_speed > _MAX_SPEED
 
 
 def _has_mesh_collision(robot: Facts) -> bool:
@@ -124,13 +128,15 @@ def does_not_stand(robot: Facts) -> Iterator[Violation]:
     Source:
         MuJoCo for 2 s at a time step of 5 ms; gains as suggested by `terrainkit onboard`.
     """
-    locked = not stands_alone(robot)
+    locked = not is_statically_stable(robot.legs)
     _check_can_stand(robot, locked=locked)
     standing = _stand(robot, locked=locked)
-    assessment = judge(standing)
+    assessment = assess(standing)
     if assessment.stands:
         return
-    stands_without = not locked and judge(_stand(robot, locked=locked, self_collision=False)).stands
+    stands_without = (
+        not locked and assess(_stand(robot, locked=locked, self_collision=False)).stands
+    )
     level = assessment.degree
     if locked or len(robot.legs) > _MAX_SINGLE_LEGS:
         level = min(level, 1)
@@ -142,26 +148,26 @@ def does_not_stand(robot: Facts) -> Iterator[Violation]:
         source=robot.model.source,
         severity=_SEVERITIES[level],
         certainty="likely",
-        message=f"standing pose {control}: {', '.join(assessment.faults)}"
+        message=f"standing pose {control}: {', '.join(assessment.failures)}"
         + ("; without self-collision the robot stands" if stands_without else ""),
         hint=_OVERLAP_HINT if stands_without else "",
         measured={
             "tilt": round(standing.tilt, 4),
-            "sink": round(standing.sink, 4),
+            "sink": round(standing.height_loss, 4),
             "drift": round(standing.drift, 4),
             "saturation": round(standing.saturation, 3),
-            "touching": len(standing.touching),
-            "lifted": len(standing.lifted),
+            "touching": len(standing.other_contacts),
+            "lifted": len(standing.lifted_feet),
         },
     )
 
 
-def _stand(robot: Facts, *, locked: bool, self_collision: bool = True) -> Standing:
-    return stand_still(
-        plant(robot),
+def _stand(robot: Facts, *, locked: bool, self_collision: bool = True) -> StandResult:
+    return stand_test(
+        make_sim_model(robot),
         suggest_gains(robot),
         positions=robot.positions,
-        feet=footholds(robot),
+        regions=contact_regions(robot),
         self_collision=self_collision,
         joints_locked=locked,
     )
@@ -196,7 +202,7 @@ def unreachable_limits(robot: Facts) -> Iterator[Violation]:
         MuJoCo: 40 positions in the range of each joint, base fixed in the air, contacts deeper than
         1 mm.
     """
-    reaches = sweep(plant(robot))
+    reaches = joint_sweep(make_sim_model(robot))
     if not reaches:
         raise CannotCheckError("no joint with an actuator has limits")
     sources = {joint.name: joint.source for joint in robot.joints}
@@ -210,8 +216,8 @@ def unreachable_limits(robot: Facts) -> Iterator[Violation]:
         elif robot.legs and reach.load > reach.effort:
             message = (
                 f"torque of joint {reach.joint} that holds its limb at the default pose: got "
-                f"{reach.load:.3g} {reach.units.push}; expected at most its effort limit of "
-                f"{reach.effort:.3g} {reach.units.push}"
+                f"{reach.load:.3g} {reach.units.effort}; expected at most its effort limit of "
+                f"{reach.effort:.3g} {reach.units.effort}"
             )
         if message:
             yield Violation(
@@ -223,7 +229,7 @@ def unreachable_limits(robot: Facts) -> Iterator[Violation]:
                 measured={"share": round(reach.share, 3), "load": round(reach.load, 4)},
             )
     blocked = [reach for reach in reaches if reach.share < _FULL_RANGE_SHARE]
-    weak = [reach for reach in reaches if reach.largest_load > reach.effort]
+    weak = [reach for reach in reaches if reach.max_load > reach.effort]
     total, parts = count(len(reaches), "joint"), []
     if blocked:
         worst = min(blocked, key=lambda reach: reach.share)
@@ -232,11 +238,11 @@ def unreachable_limits(robot: Facts) -> Iterator[Violation]:
             f"pose: {len(blocked)} of {total}; worst {_describe(worst)}"
         )
     if weak:
-        worst = max(weak, key=lambda reach: reach.largest_load / reach.effort)
+        worst = max(weak, key=lambda reach: reach.max_load / reach.effort)
         parts.append(
             f"too weak to lift the limb over the whole range: {len(weak)} of {total}; worst "
-            f"{worst.joint}: got {worst.largest_load:.3g} {worst.units.push}; expected at most its "
-            f"effort limit of {worst.effort:.3g} {worst.units.push}"
+            f"{worst.joint}: got {worst.max_load:.3g} {worst.units.effort}; expected at most its "
+            f"effort limit of {worst.effort:.3g} {worst.units.effort}"
         )
     if parts:
         yield Violation(
@@ -248,16 +254,16 @@ def unreachable_limits(robot: Facts) -> Iterator[Violation]:
         )
 
 
-def _describe(reach: Reach) -> str:
+def _describe(reach: SweepResult) -> str:
     first, second = next(pair for pair in reach.blocked if pair is not None)
     return (
         f"{reach.joint}: got {reach.reached[0]:.2f} to {reach.reached[1]:.2f} of "
-        f"{reach.limits[0]:.2f} to {reach.limits[1]:.2f} {reach.units.place}, where {first} "
+        f"{reach.limits[0]:.2f} to {reach.limits[1]:.2f} {reach.units.position}, where {first} "
         f"collides with {second}"
     )
 
 
-def _is_blocked_by_limb(robot: Facts, reach: Reach) -> bool:
+def _is_blocked_by_limb(robot: Facts, reach: SweepResult) -> bool:
     """Return whether both directions are blocked by two bodies of which one carries the other."""
     if reach.share >= _MIN_RANGE_SHARE:
         return False
@@ -287,21 +293,21 @@ def low_joint_inertia(robot: Facts) -> Iterator[Violation]:
         Largest stable time step of explicit PD, by Jury's criterion on the mass matrix; Unitree's
         MJCF has an armature of 0.01 kg m2.
     """
-    model, gains = plant(robot), suggest_gains(robot)
+    model, gains = make_sim_model(robot), suggest_gains(robot)
     declared = {name: float(model.model.joint(name).armature[0]) for name in gains}
     inertias = joint_inertias(model)
     shares = {
-        name: stable_stiffness(inertias[name].free) / gain.stiffness
+        name: max_stable_stiffness(inertias[name].free) / gain.stiffness
         for name, gain in gains.items()
         if gain.armature > declared[name] and gain.stiffness > 0
     }
     if not shares:
         return
     lightest = min(shares, key=lambda name: shares[name])
-    gain, units = gains[lightest], units_of(model, lightest)
+    gain, units = gains[lightest], model.units(lightest)
     inertia = inertias[lightest].free
     without = {name: replace(each, armature=declared[name]) for name, each in gains.items()}
-    step = longest_step(model, without).seconds
+    step = max_stable_time_step(model, without).seconds
     legged = {joint.name for leg in robot.legs for joint in leg.joints}
     is_wrong = lightest in legged and shares[lightest] < _MIN_STIFFNESS_SHARE
     others = count(len(shares) - 1, "other joint")
@@ -311,7 +317,7 @@ def low_joint_inertia(robot: Facts) -> Iterator[Violation]:
         severity="warning" if is_wrong else "info",
         certainty="likely",
         message=f"largest stable time step of explicit PD on joint {lightest} (kp "
-        f"{gain.stiffness:g}, kd {gain.damping:g}, {'mass' if units == SLIDING else 'inertia'} "
+        f"{gain.stiffness:g}, kd {gain.damping:g}, {'mass' if units == PRISMATIC else 'inertia'} "
         f"{inertia:.2g} {units.inertia}): got {1000 * step:.2g} ms; expected at least twice the "
         f"training time step of {1000 * TIME_STEP:g} ms, as with an armature of {gain.armature:g} "
         f"{units.inertia}" + (f"; the same applies to {others}" if len(shares) > 1 else ""),

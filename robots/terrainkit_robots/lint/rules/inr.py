@@ -6,27 +6,26 @@ from dataclasses import replace
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.bodies.bounds import extents_of, half_diagonal
-from terrainkit_robots.analysis.bodies.main_link import inertia_source, main_link, mass_source
-from terrainkit_robots.analysis.cached_fact import per_robot
+from terrainkit_robots.analysis.bodies.bounds import half_diagonal
+from terrainkit_robots.analysis.bodies.link_sources import inertia_source, mass_source
+from terrainkit_robots.analysis.cached_fact import cached_fact
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.inertia.density import (
-    is_derived,
-    too_dense,
-    too_light,
-    volume_of,
+    has_derived_mass,
+    max_density_violation,
+    min_density_violation,
+    shape_volume,
 )
 from terrainkit_robots.analysis.inertia.physical import (
-    LARGEST,
-    NOTHING,
+    MAX_INERTIA,
+    MIN_INERTIA,
     gyration_radius,
-    in_reach,
+    is_in_range,
     is_zero,
     principal_moments,
     triangle_ratio,
 )
-from terrainkit_robots.analysis.inertia.placeholder import is_identity, placeholders
-from terrainkit_robots.analysis.inertia.repair import repair
+from terrainkit_robots.analysis.inertia.placeholder import is_identity, placeholder_inertias
 from terrainkit_robots.description.model import Link
 from terrainkit_robots.description.xml.unparsed import UnparsedNumbers
 from terrainkit_robots.lint.rule import Severity, Violation, rule
@@ -108,7 +107,7 @@ def massless_body(robot: Facts) -> Iterator[Violation]:
     trunk = {link.name for body in robot.bodies[:1] for link in body.links}
     floating = any(j.kind == "floating" and j.child in trunk for j in robot.model.joints)
     for body in robot.bodies:
-        if body.virtual or not _has_valid_mass(body) or body.mass > NOTHING:
+        if body.virtual or not _has_valid_mass(body) or body.mass > MIN_INERTIA:
             continue
         if body.parent is not None or robot.legs or floating:
             declared = [link for link in body.links if link.inertial is not None]
@@ -128,12 +127,12 @@ def _massless_links(robot: Facts) -> Iterator[Violation]:
     massless = [
         (link, _max_inertia(link))
         for body in robot.bodies
-        if body.mass > NOTHING
+        if body.mass > MIN_INERTIA
         for link in body.links
         if link.inertial is not None and link.inertial.mass == 0
     ]
     for link, inertia in massless:
-        if inertia > NOTHING:
+        if inertia > MIN_INERTIA:
             yield Violation(
                 subject=link.name,
                 source=mass_source(link),
@@ -142,7 +141,7 @@ def _massless_links(robot: Facts) -> Iterator[Violation]:
                 f"{inertia:.3g} kg m2; expected a mass above 0 kg, or no inertia",
                 measured={"mass": 0.0, "inertia": inertia},
             )
-    links = [link for link, inertia in massless if inertia <= NOTHING]
+    links = [link for link, inertia in massless if inertia <= MIN_INERTIA]
     # A frame has no mass on purpose; the mass of a link with shapes was probably forgotten.
     parts = [link for link in links if link.visuals or link.collisions]
     frames = [link for link in links if link not in parts]
@@ -168,7 +167,7 @@ def _max_inertia(link: Link) -> float:
 def _has_valid_mass(body: Body) -> bool:
     """Return whether every mass of the body is given, not negative, and below the upper limit."""
     masses = [link.inertial.mass for link in body.links if link.inertial is not None]
-    return all(mass is not None and 0 <= mass < LARGEST for mass in masses)
+    return all(mass is not None and 0 <= mass < MAX_INERTIA for mass in masses)
 
 
 @rule("INR002", "negative-mass", "error")
@@ -212,7 +211,7 @@ def not_positive_definite(robot: Facts) -> Iterator[Violation]:
         MuJoCo 4.0: "inertia must have positive eigenvalues", "missing element: 'inertia'".
     """
     unparsed = UnparsedNumbers(robot.model)
-    main = {id(main_link(body)) for body in robot.bodies}
+    main = {id(body.main_link) for body in robot.bodies}
     for link in robot.model.links:
         if not _has_finite_mass(link) or unparsed.has(link.name, *_INERTIA_ATTRIBUTES):
             continue
@@ -223,17 +222,17 @@ def not_positive_definite(robot: Facts) -> Iterator[Violation]:
                 yield _missing_inertia(robot, link)
             continue
         zero = is_zero(inertia)
-        if not in_reach(inertia) or (zero and not _needs_inertia(robot, link, main)):
+        if not is_in_range(inertia) or (zero and not _needs_inertia(robot, link, main)):
             continue
         moments = principal_moments(inertia)
-        if zero or moments[0] <= NOTHING:
+        if zero or moments[0] <= MIN_INERTIA:
             yield Violation(
                 subject=link.name,
                 source=inertia_source(link),
                 message=f"principal moments of link {link.name}: got {_format(moments)} kg m2 "
                 f"({'zero' if zero else 'not positive definite'}); expected all above 0 kg m2",
                 measured=_measured(moments),
-                fix=repair(robot, link),
+                fix=robot.inertia_repair.fix(link),
             )
 
 
@@ -260,10 +259,10 @@ def _needs_inertia(robot: Facts, link: Link, main: Container[int]) -> bool:
     body is part of another one on purpose.
     """
     body = robot.body_of.get(link.name) if id(link) in main else None
-    if body is None or body.virtual or body.mass <= NOTHING:
+    if body is None or body.virtual or body.mass <= MIN_INERTIA:
         return False
     moving = body.parent is not None or bool(robot.legs)
-    return moving and (robot.model.kind != "mjcf" or float(body.principal[0]) <= NOTHING)
+    return moving and (robot.model.kind != "mjcf" or float(body.principal[0]) <= MIN_INERTIA)
 
 
 @rule("INR004", "triangle-inequality", "error", fixes="unsafe")
@@ -285,10 +284,10 @@ def triangle_inequality(robot: Facts) -> Iterator[Violation]:
     """
     for link in robot.model.links:
         inertia = link.inertial.inertia if link.inertial else None
-        if inertia is None or not _has_finite_mass(link) or not in_reach(inertia):
+        if inertia is None or not _has_finite_mass(link) or not is_in_range(inertia):
             continue
         moments = principal_moments(inertia)
-        if moments[0] <= NOTHING or triangle_ratio(moments) >= _MIN_EXACT_RATIO:
+        if moments[0] <= MIN_INERTIA or triangle_ratio(moments) >= _MIN_EXACT_RATIO:
             continue
         ratio = triangle_ratio(moments)
         severity: Severity = "warning" if ratio < _MIN_ROUNDED_RATIO else "info"
@@ -300,7 +299,7 @@ def triangle_inequality(robot: Facts) -> Iterator[Violation]:
             message=f"principal moments of link {link.name}: got {_format(moments)} kg m2, where "
             f"the two smaller ones sum to {text} times the largest; expected 1 or more",
             measured={"ratio": ratio, **_measured(moments)},
-            fix=repair(robot, link),
+            fix=robot.inertia_repair.fix(link),
         )
 
 
@@ -318,8 +317,8 @@ def placeholder_inertia(robot: Facts) -> Iterator[Violation]:
     Source:
         Exporters and tutorials use the identity matrix or 0.001 as defaults.
     """
-    massive = sum(body.mass > NOTHING for body in robot.bodies)
-    for links in placeholders(robot):
+    massive = sum(body.mass > MIN_INERTIA for body in robot.bodies)
+    for links in placeholder_inertias(robot.bodies):
         first = links[0]
         assert first.inertial is not None
         assert first.inertial.inertia is not None
@@ -355,22 +354,22 @@ def inertia_too_large(robot: Facts) -> Iterator[Violation]:
     """
     for link in robot.model.links:
         inertia = _max_inertia(link)
-        if inertia >= LARGEST:
+        if inertia >= MAX_INERTIA:
             yield Violation(
                 subject=link.name,
                 source=inertia_source(link),
                 severity="error",
                 message=f"inertia of link {link.name}: got {inertia:.3g} kg m2; expected less than "
-                f"{LARGEST:.0e} kg m2",
+                f"{MAX_INERTIA:.0e} kg m2",
                 measured={"inertia": inertia},
             )
-    extents, candidates = extents_of(robot), []
+    body_bounds, candidates = robot.body_bounds, []
     for body, radius in _gyration_radii(robot):
 
         def is_too_large(box: Matrix, radius: float = radius) -> bool:
             return radius > _MAX_GYRATION * half_diagonal(box)
 
-        box = extents.still(body, is_too_large)
+        box = body_bounds.box_if(body, is_too_large)
         if box is not None:
             candidates.append((body, radius, box))
     reported = _reported_bodies(robot) if candidates else set()
@@ -396,7 +395,7 @@ def inertia_too_small(robot: Facts) -> Iterator[Violation]:
     Source:
         The ratio is 0.58 for a rod, 0.47 for a cube, and 0.36 for a sphere.
     """
-    extents, candidates = extents_of(robot), []
+    body_bounds, candidates = robot.body_bounds, []
     for whole, _ in _gyration_radii(robot):
         index = next(k for k, link in enumerate(whole.links) if link.name == whole.name)
         part = slice(index, index + 1)
@@ -407,7 +406,7 @@ def inertia_too_small(robot: Facts) -> Iterator[Violation]:
             def is_doubtful(length: float, radius: float = radius) -> bool:
                 return radius < _MIN_GYRATION * length
 
-            box = extents.own(body, is_doubtful) if radius > 0 else None
+            box = body_bounds.shape_box(body, is_doubtful) if radius > 0 else None
             if box is not None and radius < _MIN_GYRATION * half_diagonal(box):
                 candidates.append((body, radius, box))
                 break
@@ -424,7 +423,7 @@ def _gyration_violation(
     half = half_diagonal(box)
     return Violation(
         subject=body.name,
-        source=inertia_source(main_link(body)),
+        source=inertia_source(body.main_link),
         severity=severity,
         message=f"radius of gyration of body {body.name}: got {radius:.3g} m (mass "
         f"{body.mass:.4g} kg, largest principal moment {body.principal[2]:.3g} kg m2); expected "
@@ -433,10 +432,10 @@ def _gyration_violation(
     )
 
 
-@per_robot
+@cached_fact
 def _reported_bodies(robot: Facts) -> set[str]:
     """Return the bodies whose mass or inertia is reported by another rule."""
-    reported = {link.name for links in placeholders(robot) for link in links}
+    reported = {link.name for links in placeholder_inertias(robot.bodies) for link in links}
     for check in (not_positive_definite, triangle_inequality):
         reported |= {v.subject for v in check(robot) if v.severity in (None, "error")}
     for check in (implausible_density, com_outside_body):
@@ -447,12 +446,12 @@ def _reported_bodies(robot: Facts) -> set[str]:
 def _gyration_radii(robot: Facts) -> Iterator[tuple[Body, float]]:
     """Yield each body with a valid inertia, and its radius of gyration [m]."""
     for body in robot.bodies:
-        if body.virtual or not _has_valid_mass(body) or body.mass <= NOTHING:
+        if body.virtual or not _has_valid_mass(body) or body.mass <= MIN_INERTIA:
             continue
-        main = main_link(body).inertial
-        if main is None or main.inertia is None or not in_reach(main.inertia):
+        main = body.main_link.inertial
+        if main is None or main.inertia is None or not is_in_range(main.inertia):
             continue
-        if body.principal[0] > NOTHING:
+        if body.principal[0] > MIN_INERTIA:
             yield body, gyration_radius(body.principal, body.mass)
 
 
@@ -471,21 +470,21 @@ def com_outside_body(robot: Facts) -> Iterator[Violation]:
         The center of mass of a convex body lies inside it. The margin of 10 % of the diagonal is
         for shapes that omit parts of the body.
     """
-    extents = extents_of(robot)
+    body_bounds = robot.body_bounds
     for body in robot.bodies:
-        if body.virtual or not _has_valid_mass(body) or body.mass <= NOTHING:
+        if body.virtual or not _has_valid_mass(body) or body.mass <= MIN_INERTIA:
             continue
 
         def is_outside(box: Matrix, center: Matrix = body.center) -> bool:
             return _distance(center, box) > _max_distance(box)
 
-        box = extents.still(body, is_outside)
+        box = body_bounds.box_if(body, is_outside)
         if box is None:
             continue
         distance, limit = _distance(body.center, box), _max_distance(box)
         yield Violation(
             subject=body.name,
-            source=mass_source(main_link(body)),
+            source=mass_source(body.main_link),
             severity="error" if distance > _COM_ERROR * limit else "warning",
             message=f"center of mass of body {body.name}: got {distance:.3g} m outside of the "
             f"bounding box, whose diagonal is {2 * half_diagonal(box):.3g} m; expected at most "
@@ -518,13 +517,13 @@ def mass_ratio(robot: Facts) -> Iterator[Violation]:
     """
     candidates = []
     for body in robot.bodies:
-        parent = robot.carrier_of(body)
+        parent = robot.physical_parent(body)
         if body.virtual or parent is None:
             continue
         if not (_has_valid_mass(body) and _has_valid_mass(parent)):
             continue
         light, heavy = sorted((body, parent), key=lambda b: b.mass)
-        if light.mass > NOTHING and heavy.mass > _MAX_MASS_RATIO * light.mass:
+        if light.mass > MIN_INERTIA and heavy.mass > _MAX_MASS_RATIO * light.mass:
             candidates.append((light, heavy))
     reported = {v.subject for v in implausible_density(robot)} if candidates else set()
     for light, heavy in candidates:
@@ -533,7 +532,7 @@ def mass_ratio(robot: Facts) -> Iterator[Violation]:
         ratio = heavy.mass / light.mass
         yield Violation(
             subject=light.name,
-            source=mass_source(main_link(light)),
+            source=mass_source(light.main_link),
             message=f"mass ratio of {heavy.name} ({heavy.mass:.4g} kg) and its neighbor "
             f"{light.name} ({light.mass:.3g} kg): got {ratio:.0f}; expected at most "
             f"{_MAX_MASS_RATIO:.0f}",
@@ -557,27 +556,34 @@ def implausible_density(robot: Facts) -> Iterator[Violation]:
     """
     for link in robot.model.links:
         mass = link.inertial.mass if link.inertial else None
-        if mass is not None and mass >= LARGEST:
+        if mass is not None and mass >= MAX_INERTIA:
             yield Violation(
                 subject=link.name,
                 source=mass_source(link),
                 severity="error",
                 message=f"mass of link {link.name}: got {mass:.3g} kg; expected less than "
-                f"{LARGEST:.0e} kg",
+                f"{MAX_INERTIA:.0e} kg",
                 measured={"mass": mass},
             )
-    extents = extents_of(robot)
+    body_bounds = robot.body_bounds
     for body in robot.bodies:
-        if body.virtual or not _has_valid_mass(body) or body.mass <= NOTHING or is_derived(body):
+        if (
+            body.virtual
+            or not _has_valid_mass(body)
+            or body.mass <= MIN_INERTIA
+            or has_derived_mass(body)
+        ):
             continue
-        result = too_dense(extents, body) or too_light(robot, extents, body)
+        result = max_density_violation(body, body_bounds) or min_density_violation(
+            body, body_bounds, robot.meshes
+        )
         if result:
             volume, limit = result
             density = body.mass / volume
             got, expected = ("at least", "at most") if density > limit else ("at most", "at least")
             yield Violation(
                 subject=body.name,
-                source=mass_source(main_link(body)),
+                source=mass_source(body.main_link),
                 message=f"density of body {body.name}: got {got} {density:.3g} kg/m3 "
                 f"({body.mass:.3g} kg in {volume:.3g} m3); expected {expected} {limit:,.0f} kg/m3",
                 measured={"mass": body.mass, "volume": volume, "density": density},
@@ -599,12 +605,12 @@ def inferred_mass(robot: Facts) -> Iterator[Violation]:
     Source:
         Tested with MuJoCo 4.0: a fixed link with a box of 1 m3 adds 1000 kg.
     """
-    if robot.model.kind == "mjcf" or robot.total_mass <= NOTHING:
+    if robot.model.kind == "mjcf" or robot.total_mass <= MIN_INERTIA:
         return
     inferred = {
-        link: _DEFAULT_DENSITY * sum(volume_of(robot, shape) for shape in link.collisions)
+        link: _DEFAULT_DENSITY * sum(shape_volume(shape, robot.meshes) for shape in link.collisions)
         for body in robot.bodies
-        if body.mass > NOTHING
+        if body.mass > MIN_INERTIA
         for link in body.links
         if link.inertial is None
     }
@@ -626,7 +632,7 @@ def inferred_mass(robot: Facts) -> Iterator[Violation]:
 
 def _has_finite_mass(link: Link) -> bool:
     mass = link.inertial.mass if link.inertial else None
-    return mass is not None and 0 <= mass < LARGEST
+    return mass is not None and 0 <= mass < MAX_INERTIA
 
 
 def _format(moments: Matrix) -> str:

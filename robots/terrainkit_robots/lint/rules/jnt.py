@@ -5,16 +5,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.bounds import extents_of
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.legs.effort import effort_of
-from terrainkit_robots.analysis.legs.joint_roles import (
-    bodies_by_joint,
-    is_wheel,
-    leg_joints,
-    own_joints,
-)
+from terrainkit_robots.analysis.legs.joint_roles import robot_joints
 from terrainkit_robots.analysis.legs.stance import GRAVITY
 from terrainkit_robots.description.fix import Fix, SetAttribute
 from terrainkit_robots.description.model import JOINT_TYPES, Joint, Limit
@@ -115,7 +108,7 @@ def prismatic_leg_joint(robot: Facts) -> Iterator[Violation]:
         Of the published legged robots that were tested, none has a prismatic leg joint, except for
         the joints that carry the trunk of planar models.
     """
-    for joint in leg_joints(robot):
+    for joint in robot.leg_joints:
         if joint.kind == "prismatic":
             yield Violation(
                 subject=joint.name,
@@ -141,9 +134,9 @@ def continuous_leg_joint(robot: Facts) -> Iterator[Violation]:
     """
     if robot.model.kind == "mjcf":
         return  # reported by JNT017
-    bodies = bodies_by_joint(robot)
-    for joint in leg_joints(robot):
-        if joint.kind == "continuous" and not is_wheel(robot, bodies[joint.name]):
+    bodies = robot.body_of_joint
+    for joint in robot.leg_joints:
+        if joint.kind == "continuous" and not robot.is_wheel(bodies[joint.name]):
             yield Violation(
                 subject=joint.name,
                 source=joint.source,
@@ -432,7 +425,7 @@ def placeholder_limit(robot: Facts) -> Iterator[Violation]:
     weight = max(robot.total_mass, 0.0) * GRAVITY
     max_effort = {
         "N": max(_MAX_EFFORT, _MAX_WEIGHTS * weight),
-        "N m": max(_MAX_EFFORT, weight * extents_of(robot).robot_size),
+        "N m": max(_MAX_EFFORT, weight * robot.body_bounds.robot_size),
     }
     for joint in _joints_with_limit(robot):
         assert joint.limit is not None
@@ -595,8 +588,8 @@ def insufficient_torque(robot: Facts) -> Iterator[Violation]:
     if stance is None or stance.margin < 0:
         raise CannotCheckError("no statically stable standing pose was found")
     overloaded = []
-    for joint in leg_joints(robot):
-        effort, torque = effort_of(robot, joint), abs(stance.torques.get(joint.name, 0.0))
+    for joint in robot.leg_joints:
+        effort, torque = robot.effort_limit(joint), abs(stance.torques.get(joint.name, 0.0))
         if effort is None or effort <= 0 or not math.isfinite(torque):
             continue
         if torque > _MAX_LOAD * effort:
@@ -613,7 +606,7 @@ def insufficient_torque(robot: Facts) -> Iterator[Violation]:
     ):
         for violation in check(robot):
             raise CannotCheckError(f"the mass or joint of {violation.subject} is probably wrong")
-    named = any(leg.limb.words for leg in robot.legs)
+    named = any(leg.limb.has_leg_names for leg in robot.legs)
     for joint, torque, effort in overloaded:
         share, unit = torque / effort, joint.effort_unit
         yield Violation(
@@ -659,7 +652,7 @@ def missing_actuator(robot: Facts) -> Iterator[Violation]:
     actuated = {actuator.joint for actuator in robot.model.actuators}
     if "" in actuated:
         return
-    for joint in own_joints(robot):
+    for joint in robot_joints(robot.bodies):
         if joint.name not in actuated and joint.mimic is None:
             yield Violation(
                 subject=joint.name,
@@ -686,9 +679,9 @@ def unlimited_joint(robot: Facts) -> Iterator[Violation]:
     """
     if robot.model.kind != "mjcf":
         return
-    bodies = bodies_by_joint(robot)
-    for joint in own_joints(robot):
-        if joint.kind == "continuous" and not is_wheel(robot, bodies[joint.name]):
+    bodies = robot.body_of_joint
+    for joint in robot_joints(robot.bodies):
+        if joint.kind == "continuous" and not robot.is_wheel(bodies[joint.name]):
             yield Violation(
                 subject=joint.name,
                 source=joint.source,

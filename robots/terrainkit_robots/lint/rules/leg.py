@@ -63,7 +63,7 @@ def _inverted_legs(robot: Facts) -> list[Limb]:
         if limb in legs or rise < _MAX_RISE * float(np.linalg.norm(limb.tip - start)):
             continue
         at_leg_height = any(abs(float(leg.points[0][2] - start[2])) < rise / 2 for leg in legs)
-        if limb.words and _joint_types(limb) in leg_types and at_leg_height:
+        if limb.has_leg_names and _joint_types(limb) in leg_types and at_leg_height:
             inverted.append(limb)
     return inverted
 
@@ -173,7 +173,7 @@ def foot_collapsed(robot: Facts) -> Iterator[Violation]:
     if robot.model.kind == "mjcf":
         raise CannotCheckError("Isaac Gym's URDF importer does not read MJCF")
     for leg in robot.legs:
-        joint = robot.tree.above.get(leg.foot)
+        joint = robot.tree.parent_joint.get(leg.foot)
         has_shapes = bool(robot.tree.links[leg.foot].collisions)
         if joint is None or joint.kind != "fixed" or joint.dont_collapse or not has_shapes:
             continue

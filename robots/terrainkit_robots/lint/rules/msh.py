@@ -8,17 +8,23 @@ from typing import Literal
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.meshes.scale import HUGE, LARGE, TINY, Misfit, Scales
+from terrainkit_robots.analysis.meshes.scale import (
+    MAX_PLAUSIBLE_RATIO,
+    MAX_RATIO,
+    MIN_RATIO,
+    MeshScales,
+    ScaleMismatch,
+)
 from terrainkit_robots.analysis.meshes.uses import (
     MeshUse,
     UsedMesh,
-    is_elsewhere,
-    is_lost,
+    is_in_other_folder,
+    is_missing,
     meshes_by_file,
     meshes_by_name,
     relative_name,
-    renamed,
-    replaced,
+    rename_edits,
+    replace_edits,
 )
 from terrainkit_robots.description.fix import Edit, Fix
 from terrainkit_robots.description.package_resolver import (
@@ -73,8 +79,8 @@ def missing_mesh(robot: Facts) -> Iterator[Violation]:
     Source:
         MuJoCo: "Error opening file"; paths in a URDF are relative to its folder.
     """
-    for used in meshes_by_name(robot):
-        if is_lost(used) and not _is_written_absolute(robot, used):
+    for used in meshes_by_name(robot.model, robot.meshes):
+        if is_missing(used) and not _is_written_absolute(robot, used):
             is_required = robot.model.kind == "mjcf" and not used.collisions
             yield Violation(
                 subject=used.name,
@@ -82,14 +88,14 @@ def missing_mesh(robot: Facts) -> Iterator[Violation]:
                 message=f"{_describe(used)}: does not exist; {_search_result(robot, used)}"
                 + ("; MuJoCo cannot load the robot without it" if is_required else ""),
                 severity="error" if used.collisions else "warning",
-                fix=_relative_fix(robot, used, "unsafe") if is_elsewhere(used.mesh) else None,
+                fix=_relative_fix(robot, used, "unsafe") if is_in_other_folder(used.mesh) else None,
             )
 
 
 def _search_result(robot: Facts, used: UsedMesh) -> str:
     """Return where a missing mesh was searched."""
     mesh = used.mesh
-    if is_elsewhere(mesh):
+    if is_in_other_folder(mesh):
         folder = display_path(robot.model.file.parent)
         return f"not found in {folder}, but {display_path(mesh.path)} exists"
     if re.match(r"(?i)[a-z]{2,}://", mesh.filename) and mesh.found_by == "nothing":
@@ -116,7 +122,7 @@ def absolute_path(robot: Facts) -> Iterator[Violation]:
     Source:
         All readers use absolute paths unchanged.
     """
-    for used in meshes_by_name(robot):
+    for used in meshes_by_name(robot.model, robot.meshes):
         if not _is_written_absolute(robot, used):
             continue
         is_missing = not robot.meshes.exists(used.mesh.path)
@@ -170,9 +176,9 @@ def package_uri(robot: Facts) -> Iterator[Violation]:
         Observed in MuJoCo 4.0: "Error opening file 'package:/...'".
     """
     groups: dict[tuple[str, str], list[tuple[UsedMesh, Fix | None]]] = {}
-    for used in meshes_by_name(robot):
+    for used in meshes_by_name(robot.model, robot.meshes):
         has_host = used.name.lower().startswith("file:") and not is_absolute(used.name)
-        if not (has_host or is_package_uri(used.name)) or is_lost(used):
+        if not (has_host or is_package_uri(used.name)) or is_missing(used):
             continue
         # A file of the same name in another folder may not be the one that ROS would find.
         fix = _relative_fix(robot, used, "safe" if _is_same_path(used) else "unsafe")
@@ -218,12 +224,14 @@ def filename_case(robot: Facts) -> Iterator[Violation]:
     Source:
         POSIX compares file names byte by byte.
     """
-    for used in meshes_by_name(robot):
-        expected = None if is_lost(used) else filename_on_disk(used.name, used.mesh.path)
+    for used in meshes_by_name(robot.model, robot.meshes):
+        expected = None if is_missing(used) else filename_on_disk(used.name, used.mesh.path)
         if expected is None:
             continue
         # MSH003 makes a package path relative, with the correct case.
-        edits = None if is_package_uri(used.name) else renamed(robot, used.uses, expected)
+        edits = (
+            None if is_package_uri(used.name) else rename_edits(robot.model, used.uses, expected)
+        )
         yield Violation(
             subject=used.name,
             source=used.source,
@@ -248,14 +256,16 @@ def unsupported_format(robot: Facts) -> Iterator[Violation]:
     Source:
         Observed in MuJoCo 4.0: "no decoder found for mesh file".
     """
-    for used in meshes_by_file(robot):
+    for used in meshes_by_file(robot.model, robot.meshes):
         suffix = used.mesh.path.suffix.lower()
         if not used.strict or suffix in MUJOCO_SUFFIXES or used.header.state != "fine":
             continue
         uses = used.uses if robot.model.kind == "mjcf" else used.collisions
         edits = None
         if _is_solid(robot.meshes, uses):
-            edits = replaced(robot, uses, ".stl", _convert(robot.meshes, used))
+            edits = replace_edits(
+                robot.model, robot.meshes, uses, ".stl", _convert(robot.meshes, used)
+            )
         yield Violation(
             subject=used.name,
             source=used.source,
@@ -300,7 +310,7 @@ def malformed_mesh(robot: Facts) -> Iterator[Violation]:
         Observed in MuJoCo 4.0: "STL file has wrong size", "is empty", "vertex coordinate is not
         finite".
     """
-    for used in meshes_by_file(robot):
+    for used in meshes_by_file(robot.model, robot.meshes):
         problem, severity = _file_problem(robot.meshes, used)
         if problem:
             yield Violation(
@@ -344,10 +354,10 @@ def ascii_stl(robot: Facts) -> Iterator[Violation]:
     Source:
         Observed in MuJoCo 4.0: "perhaps this is an ASCII file?".
     """
-    for used in meshes_by_file(robot):
+    for used in meshes_by_file(robot.model, robot.meshes):
         if used.header.format == "ascii-stl" and used.header.state == "fine":
             content = _binary(robot.meshes, used)
-            edits = replaced(robot, used.uses, "_binary.stl", content)
+            edits = replace_edits(robot.model, robot.meshes, used.uses, "_binary.stl", content)
             yield Violation(
                 subject=used.name,
                 source=used.source,
@@ -376,7 +386,7 @@ def too_many_faces(robot: Facts) -> Iterator[Violation]:
     Source:
         Observed in MuJoCo 4.0: "number of faces should be between 1 and 200000".
     """
-    for used in meshes_by_file(robot):
+    for used in meshes_by_file(robot.model, robot.meshes):
         faces = _faces(robot.meshes, used)
         if faces is None or faces <= _MAX_STL_FACES:
             continue
@@ -408,16 +418,16 @@ def _simplify_edits(robot: Facts, used: UsedMesh) -> Sequence[Edit] | None:
     """Return the edits that replace collision meshes by hulls and simplify visual meshes."""
     if used.header.format == "ascii-stl":
         return None  # MSH007 converts it first
-    visuals = [use for use in used.uses if not use.collides]
+    visuals = [use for use in used.uses if not use.is_collision]
     simplify = _simplify(robot.meshes, used)
     if robot.model.kind == "mjcf":  # all uses share one element
-        return replaced(robot, used.uses, "_simplified.stl", simplify)
+        return replace_edits(robot.model, robot.meshes, used.uses, "_simplified.stl", simplify)
     edits: list[Edit] = []
     for uses, ending, content in (
         (used.collisions, "_hull.stl", _hull(robot.meshes, used)),
         (visuals, "_simplified.stl", simplify),
     ):
-        made = replaced(robot, uses, ending, content) if uses else ()
+        made = replace_edits(robot.model, robot.meshes, uses, ending, content) if uses else ()
         if made is None or (content is not simplify and not _is_solid(robot.meshes, uses)):
             return None
         edits += made
@@ -456,7 +466,7 @@ def dense_collision_mesh(robot: Facts) -> Iterator[Violation]:
     Source:
         MuJoCo's documentation, "Collision detection": meshes collide by their hulls.
     """
-    for used in meshes_by_file(robot):
+    for used in meshes_by_file(robot.model, robot.meshes):
         faces = _faces(robot.meshes, used) if used.collisions else None
         if faces is None or not _MAX_COLLISION_FACES < faces <= _MAX_STL_FACES:
             continue
@@ -473,7 +483,7 @@ def dense_collision_mesh(robot: Facts) -> Iterator[Violation]:
 
 
 def _hull_edits(robot: Facts, used: UsedMesh) -> Sequence[Edit] | None:
-    visuals = {use.mesh.source for use in used.uses if not use.collides}
+    visuals = {use.mesh.source for use in used.uses if not use.is_collision}
     is_shared = any(use.mesh.source in visuals for use in used.collisions)
     if (
         is_shared
@@ -481,7 +491,9 @@ def _hull_edits(robot: Facts, used: UsedMesh) -> Sequence[Edit] | None:
         or not _is_solid(robot.meshes, used.collisions)
     ):
         return None
-    return replaced(robot, used.collisions, "_hull.stl", _hull(robot.meshes, used))
+    return replace_edits(
+        robot.model, robot.meshes, used.collisions, "_hull.stl", _hull(robot.meshes, used)
+    )
 
 
 @rule("MSH010", "flat-mesh", "error")
@@ -497,7 +509,7 @@ def flat_mesh(robot: Facts) -> Iterator[Violation]:
     Source:
         Observed in MuJoCo 4.0: "has coplanar vertices", "at least 4 vertices required".
     """
-    for used in meshes_by_file(robot):
+    for used in meshes_by_file(robot.model, robot.meshes):
         for use in used.collisions:
             if not robot.meshes.is_readable(use.mesh) or not robot.meshes.is_flat(use.mesh):
                 continue
@@ -531,37 +543,39 @@ def wrong_scale(robot: Facts) -> Iterator[Violation]:
     Source:
         STL has no unit; URDF and MJCF use meters.
     """
-    scales = Scales(robot)
-    files = meshes_by_file(robot)
-    if files and scales.span <= 0:
+    scales = MeshScales(robot.tree, robot.bodies, robot.zero_poses, robot.meshes)
+    files = meshes_by_file(robot.model, robot.meshes)
+    if files and scales.robot_size <= 0:
         raise CannotCheckError("all joints have the same position, so the size is unknown")
     for used in files:
         for use in used.uses:
-            misfit = scales.misfit(use)
-            if misfit is None:
+            mismatch = scales.mismatch(use)
+            if mismatch is None:
                 continue
-            is_large = misfit.ratio > 1
+            is_large = mismatch.ratio > 1
             yield Violation(
                 subject=used.name,
                 source=use.mesh.scale_source or use.mesh.source,
                 message=f"size of mesh {used.name} on link {use.link.name}: got "
-                f"{misfit.diagonal:.3g} m, {misfit.ratio:.3g} times the {misfit.reference:.3g} m "
-                f"{misfit.against}; expected "
-                + (f"at most {LARGE:g} times" if is_large else f"at least {TINY:g} times"),
-                hint=_scale_hint(misfit),
-                severity="warning" if is_large and misfit.ratio <= HUGE else "error",
+                f"{mismatch.diagonal:.3g} m, {mismatch.ratio:.3g} times the "
+                f"{mismatch.reference:.3g} m {mismatch.description}; expected "
+                + (f"at most {MAX_RATIO:g} times" if is_large else f"at least {MIN_RATIO:g} times"),
+                hint=_scale_hint(mismatch),
+                severity="warning"
+                if is_large and mismatch.ratio <= MAX_PLAUSIBLE_RATIO
+                else "error",
                 certainty="likely",
                 measured={
-                    "diagonal": misfit.diagonal,
-                    "reference": misfit.reference,
-                    "ratio": misfit.ratio,
+                    "diagonal": mismatch.diagonal,
+                    "reference": mismatch.reference,
+                    "ratio": mismatch.ratio,
                 },
             )
             break
 
 
-def _scale_hint(misfit: Misfit) -> str:
-    if misfit.ratio > 1:
+def _scale_hint(mismatch: ScaleMismatch) -> str:
+    if mismatch.ratio > 1:
         return 'Set scale="0.001 0.001 0.001" if the file is in millimeters, 0.0254 if in inches.'
     return "Remove the scale if the file is in meters or was already scaled."
 
@@ -580,12 +594,12 @@ def negative_scale(robot: Facts) -> Iterator[Violation]:
     Source:
         PhysX: PxConvexMeshGeometry; Webots: Transform; MuJoCo: mesh/scale allows it.
     """
-    for used in meshes_by_file(robot):
+    for used in meshes_by_file(robot.model, robot.meshes):
         mirrored = [use for use in used.uses if min(use.mesh.scale) < 0]
         if not mirrored:
             continue
-        first = next((use for use in mirrored if use.collides), mirrored[0])
-        is_harmful = first.collides and robot.model.kind != "mjcf"
+        first = next((use for use in mirrored if use.is_collision), mirrored[0])
+        is_harmful = first.is_collision and robot.model.kind != "mjcf"
         scale = " ".join(f"{factor:g}" for factor in first.mesh.scale)
         yield Violation(
             subject=used.name,
@@ -608,7 +622,7 @@ def lfs_pointer(robot: Facts) -> Iterator[Violation]:
     Source:
         Git LFS, "Specification": pointer files start with the word version.
     """
-    for used in meshes_by_file(robot):
+    for used in meshes_by_file(robot.model, robot.meshes):
         if used.header.state == "lfs":
             yield Violation(
                 subject=used.name,
@@ -633,7 +647,7 @@ def nonconvex_collision(robot: Facts) -> Iterator[Violation]:
     Source:
         MuJoCo's documentation, "Collision detection": meshes collide by their hulls.
     """
-    for used in meshes_by_file(robot):
+    for used in meshes_by_file(robot.model, robot.meshes):
         faces = _faces(robot.meshes, used) if used.collisions else None
         if faces is None or faces > _MAX_STL_FACES:
             continue
@@ -664,10 +678,10 @@ def _relative_fix(robot: Facts, used: UsedMesh, safety: Literal["safe", "unsafe"
     """Return a fix that uses a relative path, or None if the file is too far away."""
     if robot.model.kind != "urdf":
         return None  # MJCF paths are relative to meshdir
-    name = relative_name(robot, used.mesh.path)
+    name = relative_name(robot.model, used.mesh.path)
     if is_absolute(name) or name.split("/").count("..") > _MAX_PARENT_FOLDERS:
         return None
-    return _fix(safety, f"Change the path to {name}.", renamed(robot, used.uses, name))
+    return _fix(safety, f"Change the path to {name}.", rename_edits(robot.model, used.uses, name))
 
 
 def _fix(

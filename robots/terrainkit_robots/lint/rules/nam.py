@@ -99,7 +99,7 @@ def inconsistent_name(robot: Facts) -> Iterator[Violation]:
     model_names = _ModelNames(robot, sides)
     for kind in ("joint", "link"):
         of_kind = [pair for pair in pairs if pair.kind == kind]
-        irregular = [pair for pair in of_kind if not sides.is_explaining(pair)]
+        irregular = [pair for pair in of_kind if not sides.is_consistent(pair)]
         if len(of_kind) < _MIN_PAIRS or len(irregular) > (1 - _MIN_REGULAR) * len(of_kind):
             continue
         if kind == "link":
@@ -129,13 +129,13 @@ class _Sides:
 
     def __init__(self, pairs: Sequence[_MirrorPair]) -> None:
         word_pairs = [words for pair in pairs for words in pair.word_pairs]
-        self._words = _frequent(word_pairs)
-        self._letters = _frequent([_strip_common(*words) for words in word_pairs])
+        self._words = _common(word_pairs)
+        self._letters = _common([_strip_common(*words) for words in word_pairs])
         self._known = {word for words in self._words for word in words}
         counts = Counter(
             words
             for pair in pairs
-            if self.is_explaining(pair)
+            if self.is_consistent(pair)
             and len(_words(pair.left.name)) == len(_words(pair.right.name))
             for words in pair.word_pairs
         )
@@ -143,7 +143,7 @@ class _Sides:
         self._to_right = dict(ordered)
         self._to_left = {right: left for left, right in ordered}
 
-    def is_explaining(self, pair: _MirrorPair) -> bool:
+    def is_consistent(self, pair: _MirrorPair) -> bool:
         """Return whether two names differ only by the side."""
         return all(
             words in self._words
@@ -165,7 +165,7 @@ class _Sides:
         return "".join("*" if word in sides else word for word in _words(name))
 
 
-def _frequent(items: Iterable[tuple[str, str]]) -> set[tuple[str, str]]:
+def _common(items: Iterable[tuple[str, str]]) -> set[tuple[str, str]]:
     return {item for item, count in Counter(items).items() if count >= _MIN_COUNT}
 
 

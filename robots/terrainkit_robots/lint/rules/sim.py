@@ -9,23 +9,21 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.simulator_conventions.armature import (
     GENESIS_ARMATURE,
-    moved_by_joints,
+    inertias_without_armature,
 )
 from terrainkit_robots.analysis.simulator_conventions.fixed_joints import (
+    KEEP_LINK_OPTIONS,
     SIMULATORS,
-    TO_KEEP,
-    foot_merges,
+    find_merged_feet,
 )
 from terrainkit_robots.analysis.simulator_conventions.joint_order import (
     SimulatorOrder,
-    file_order,
-    simulator_orders,
 )
 from terrainkit_robots.lint.rule import Violation, rule
 from terrainkit_robots.text import names, short
 
 if TYPE_CHECKING:
-    from terrainkit_robots.analysis.simulator_conventions.loading import Refusal
+    from terrainkit_robots.analysis.simulator_conventions.loading import LoadError
 
 _MAX_JOINTS = 40
 """Maximum number of joints for which the message contains the permutation."""
@@ -65,8 +63,8 @@ def joint_order(robot: Facts) -> Iterator[Violation]:
         published joint lists for Isaac Lab and Isaac Gym. An order that these do not confirm is
         marked as unverified.
     """
-    file = file_order(robot)
-    others = [order for order in simulator_orders(robot) if order.joints != file]
+    file = robot.file_order
+    others = [order for order in robot.simulator_orders if order.joints != file]
     if not others:
         return
     same = [name for name in SIMULATORS if name not in {order.simulator for order in others}]
@@ -112,12 +110,12 @@ def merged_feet(robot: Facts) -> Iterator[Violation]:
         MuJoCo's `fusestatic`, which is enabled for URDF; legged_gym's `collapse_fixed_joints`;
         Isaac Lab's `merge_fixed_joints`; `merge_fixed_links` of genesis-world 1.4.5.
     """
-    merges = foot_merges(robot)
+    merges = find_merged_feet(robot.tree, robot.bodies, robot.legs, robot.fixed_joints)
     if not merges:
         return
     first = merges[0]
-    by = [s for s in SIMULATORS if any(s in merge.into for merge in merges)]
-    into = next(iter(first.into.values()))
+    by = [s for s in SIMULATORS if any(s in merge.merged_into for merge in merges)]
+    into = next(iter(first.merged_into.values()))
     example = f"{first.foot} into {into}" + (", ..." if len(merges) > 1 else "")
     yield Violation(
         subject=first.foot,
@@ -126,7 +124,7 @@ def merged_feet(robot: Facts) -> Iterator[Violation]:
             f"{_join(by)} merge{'s' * (len(by) == 1)} {len(merges)} feet into their parent links "
             f"by default ({example})"
         ),
-        hint="; ".join(f"{simulator}: {TO_KEEP[simulator]}" for simulator in by),
+        hint="; ".join(f"{simulator}: {KEEP_LINK_OPTIONS[simulator]}" for simulator in by),
         measured={"feet": len(merges)},
     )
 
@@ -147,7 +145,7 @@ def genesis_armature(robot: Facts) -> Iterator[Violation]:
         `default_armature` in genesis-world 1.4.5 is 0.1 unless MuJoCo compatibility is enabled. It
         is compared with the inertia about the joint axis of all links below, at joint positions 0.
     """
-    moved = moved_by_joints(robot)
+    moved = inertias_without_armature(robot.bodies, robot.actuated, robot.zero_poses)
     slowed = [each for each in moved if each.inertia < GENESIS_ARMATURE]
     if not slowed:
         return
@@ -180,17 +178,17 @@ def mujoco_load_failure(robot: Facts) -> Iterator[Violation]:
         The file is compiled with the installed version of MuJoCo. Nothing is simulated.
     """
     from terrainkit_robots.analysis.simulator_conventions.loading import (
-        NotTriedError,
-        refused_by_mujoco,
+        NotAttemptedError,
+        mujoco_load_error,
     )
 
     _require_saved(robot)
     try:
-        refusal = refused_by_mujoco(robot)
-    except NotTriedError as reason:
+        refusal = mujoco_load_error(robot.model)
+    except NotAttemptedError as reason:
         raise CannotCheckError(str(reason)) from None
     if refusal is not None:
-        yield _load_failure(robot, "MuJoCo", refusal, _explaining_rule(robot, refusal.words))
+        yield _load_failure(robot, "MuJoCo", refusal, _explaining_rule(robot, refusal.message))
 
 
 @rule("SIM005", "yourdfpy-load-failure", "info", needs=("simulation",))
@@ -206,16 +204,16 @@ def yourdfpy_load_failure(robot: Facts) -> Iterator[Violation]:
         The file is loaded with the installed version of yourdfpy, without meshes.
     """
     from terrainkit_robots.analysis.simulator_conventions.loading import (
-        NotTriedError,
-        refused_by_yourdfpy,
+        NotAttemptedError,
+        yourdfpy_load_error,
     )
 
     if robot.model.kind == "mjcf":
         return
     _require_saved(robot)
     try:
-        refusal = refused_by_yourdfpy(robot)
-    except NotTriedError as reason:
+        refusal = yourdfpy_load_error(robot.model, robot.tree)
+    except NotAttemptedError as reason:
         raise CannotCheckError(str(reason)) from None
     if refusal is not None:
         yield _load_failure(robot, "yourdfpy", refusal, "")
@@ -248,13 +246,13 @@ def _explaining_rule(robot: Facts, error: str) -> str:
     return "" if all(mesh.found_by == "path" for mesh in found) else "MSH002"
 
 
-def _load_failure(robot: Facts, loader: str, refusal: "Refusal", code: str) -> Violation:
+def _load_failure(robot: Facts, loader: str, refusal: "LoadError", code: str) -> Violation:
     sources = {each.name: each.source for each in (*robot.model.joints, *robot.model.links)}
     source = sources.get(refusal.element) if refusal.element else None
     element = f" ({names([refusal.element])})" if refusal.element else ""
     return Violation(
         subject=refusal.element if source is not None else robot.model.title,
         source=source or robot.model.source,
-        message=f"{loader} cannot load the file: {short(refusal.words, 200)}{element}",
+        message=f"{loader} cannot load the file: {short(refusal.message, 200)}{element}",
         hint=f"See rule {code}." if code else "",
     )

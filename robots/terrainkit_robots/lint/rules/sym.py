@@ -9,24 +9,23 @@ from functools import cached_property
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.bodies.main_link import inertia_source, main_link, mass_source
+from terrainkit_robots.analysis.bodies.link_sources import inertia_source, mass_source
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.legs.effort import effort_of
 from terrainkit_robots.analysis.symmetry.asymmetry import (
-    LIMIT,
-    LIMIT_SHARE,
-    PLACE,
-    PLACE_SHARE,
-    TURNED,
-    Slip,
-    against_its_kind,
-    against_the_rest,
+    MAX_AXIS_ERROR,
+    MAX_LIMIT_ERROR,
+    MAX_POSITION_ERROR,
+    MAX_RELATIVE_LIMIT_ERROR,
+    MAX_RELATIVE_POSITION_ERROR,
+    Misalignment,
+    find_misalignments,
+    find_opposed_pairs,
+    find_reversed_joints,
+    has_opposite_axes,
     limits_match,
-    opposed,
-    slips,
 )
-from terrainkit_robots.analysis.symmetry.mirror_pairs import Twin, odd_one_first, twins
+from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorSide
 from terrainkit_robots.description.model import Joint, Source
 from terrainkit_robots.lint.rule import Check, Measured, Violation, rule
 from terrainkit_robots.lint.rules.inr import (
@@ -77,13 +76,14 @@ def mass_asymmetry(robot: Facts) -> Iterator[Violation]:
     """
     _check_joint_types(robot)
     reported = _Reported(robot, implausible_density, mass_ratio, massless_body)
-    for _, left, right in twins(robot):
+    for pair in robot.mirror_pairs:
+        left, right = pair.left, pair.right
         difference = _relative_difference(left.body.mass, right.body.mass)
         if not _have_masses(left, right) or difference <= _MAX_MASS_DIFFERENCE:
             continue
         if reported.has(left, right):
             continue
-        odd, other = odd_one_first(robot, left, right, lambda body: np.array([body.mass]))
+        odd, other = robot.outlier_first(left, right, lambda body: np.array([body.mass]))
         yield _violation(
             odd.body.name,
             other.body.name,
@@ -91,13 +91,13 @@ def mass_asymmetry(robot: Facts) -> Iterator[Violation]:
             f"{other.body.mass:.4g} kg of its mirror image {other.body.name}; expected at most "
             f"{_MAX_MASS_DIFFERENCE:.0%}",
             {"mass": odd.body.mass, "other": other.body.mass},
-            mass_source(main_link(odd.body)),
+            mass_source(odd.body.main_link),
         )
 
 
-def _have_masses(left: Twin, right: Twin) -> bool:
+def _have_masses(left: MirrorSide, right: MirrorSide) -> bool:
     """Return whether both bodies have valid masses; the INR rules report the others."""
-    inertials = [link.inertial for twin in (left, right) for link in twin.body.links]
+    inertials = [link.inertial for joint in (left, right) for link in joint.body.links]
     masses = [inertial.mass for inertial in inertials if inertial is not None]
     valid = all(mass is not None and mass >= 0 for mass in masses)
     return valid and min(left.body.mass, right.body.mass) > 0
@@ -135,10 +135,11 @@ def com_asymmetry(robot: Facts) -> Iterator[Violation]:
         plus 10 % of the radius of gyration.
     """
     _check_joint_types(robot)
-    _, displaced = slips(robot)
+    _, displaced = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
     reported = _Reported(robot, com_outside_body)
-    for pair, left, right in twins(robot):
-        if {pair.left, pair.right} & displaced or not _have_masses(left, right):
+    for pair in robot.mirror_pairs:
+        left, right = pair.left, pair.right
+        if pair.indices & displaced or not _have_masses(left, right):
             continue
         difference = _relative_difference(left.body.mass, right.body.mass)
         if _is_merged(left, right) and difference > _MAX_MASS_DIFFERENCE:
@@ -148,7 +149,7 @@ def com_asymmetry(robot: Facts) -> Iterator[Violation]:
             continue
         if _is_same_part(robot, left.body, right.body):
             continue
-        odd, other = odd_one_first(robot, left, right, lambda body: body.center)
+        odd, other = robot.outlier_first(left, right, lambda body: body.center)
         yield _violation(
             odd.body.name,
             other.body.name,
@@ -157,18 +158,18 @@ def com_asymmetry(robot: Facts) -> Iterator[Violation]:
             f"its own frame: {1000 * error:.3g} mm from mirrored; expected at most "
             f"{1000 * limit:.2g} mm",
             {"gap": error, "allowed": limit},
-            mass_source(main_link(odd.body)),
+            mass_source(odd.body.main_link),
         )
 
 
-def _com_error(robot: Facts, left: Twin, right: Twin) -> float:
+def _com_error(robot: Facts, left: MirrorSide, right: MirrorSide) -> float:
     return float(np.linalg.norm(robot.mirror.image(left.arm) - right.arm))
 
 
-def _max_com_error(left: Twin, right: Twin) -> float:
+def _max_com_error(left: MirrorSide, right: MirrorSide) -> float:
     radii = [
-        math.sqrt(max(float(twin.body.principal[2]), 0.0) / twin.body.mass)
-        for twin in (left, right)
+        math.sqrt(max(float(joint.body.principal[2]), 0.0) / joint.body.mass)
+        for joint in (left, right)
     ]
     return _MAX_COM_ERROR + _COM_ERROR_SHARE * min(radii)
 
@@ -196,15 +197,15 @@ def _features(robot: Facts, body: Body) -> Counter[tuple[object, ...]]:
         for placed in (*body.collisions, *body.visuals)
         for g in (placed.geometry,)
     ]
-    mounts = [rounded(other.mount) for other in robot.bodies if other.parent == body.index]
+    mounts = [rounded(other.origin) for other in robot.bodies if other.parent == body.index]
     return Counter([*shapes, *mounts])
 
 
-def _is_merged(left: Twin, right: Twin) -> bool:
+def _is_merged(left: MirrorSide, right: MirrorSide) -> bool:
     """Return whether one of two bodies has several links with mass."""
     return any(
-        sum(link.inertial is not None and bool(link.inertial.mass) for link in twin.body.links) > 1
-        for twin in (left, right)
+        sum(link.inertial is not None and bool(link.inertial.mass) for link in joint.body.links) > 1
+        for joint in (left, right)
     )
 
 
@@ -239,7 +240,8 @@ def inertia_asymmetry(robot: Facts) -> Iterator[Violation]:
     """
     _check_joint_types(robot)
     reported = _Reported(robot, *_INERTIA_RULES)
-    for _, left, right in twins(robot):
+    for pair in robot.mirror_pairs:
+        left, right = pair.left, pair.right
         if not _have_masses(left, right) or not _has_comparable_parts(robot, left, right):
             continue
         a, b = left.body.principal, right.body.principal
@@ -250,7 +252,7 @@ def inertia_asymmetry(robot: Facts) -> Iterator[Violation]:
         digit = max(_last_digit(left.body), _last_digit(right.body))
         if digit >= (difference - _MAX_MOMENT_DIFFERENCE) * float(max(a[2], b[2])):
             continue  # rounding explains the difference
-        odd, other = odd_one_first(robot, left, right, lambda body: body.principal)
+        odd, other = robot.outlier_first(left, right, lambda body: body.principal)
         yield _violation(
             odd.body.name,
             other.body.name,
@@ -259,11 +261,11 @@ def inertia_asymmetry(robot: Facts) -> Iterator[Violation]:
             f"{difference:.1%} of the largest apart; expected at most "
             f"{_MAX_MOMENT_DIFFERENCE:.0%}",
             {"gap": difference},
-            inertia_source(main_link(odd.body)),
+            inertia_source(odd.body.main_link),
         )
 
 
-def _has_comparable_parts(robot: Facts, left: Twin, right: Twin) -> bool:
+def _has_comparable_parts(robot: Facts, left: MirrorSide, right: MirrorSide) -> bool:
     """Return whether merged bodies agree in mass and center of mass; else moments must differ."""
     if not _is_merged(left, right):
         return True
@@ -279,7 +281,7 @@ def _moment_difference(a: Matrix, b: Matrix) -> float:
 
 def _last_digit(body: Body) -> float:
     """Return the value of the last decimal digit of a body's inertia [kg m2]."""
-    inertial = main_link(body).inertial
+    inertial = body.main_link.inertial
     if inertial is None or inertial.inertia is None:
         return 0.0
     numbers = [Decimal(repr(float(x))) for x in inertial.inertia.flat if x]
@@ -306,15 +308,16 @@ def limit_asymmetry(robot: Facts) -> Iterator[Violation]:
         The limits of tested robots without defects agree exactly.
     """
     reported = _Reported(robot, wide_range)
-    for pair, left, right in twins(robot):
+    for pair in robot.mirror_pairs:
+        left, right = pair.left, pair.right
         a, b = left.joint.range, right.joint.range
         if pair.sign == 0 or a is None or b is None or limits_match(a, b, pair.sign):
             continue
         if reported.has(left, right):
             continue
-        if opposed(left, right) and limits_match(a, b, -pair.sign):
+        if has_opposite_axes(left, right) and limits_match(a, b, -pair.sign):
             continue  # SYM007 reports the axis
-        odd, other = odd_one_first(robot, left, right, _limit_sizes)
+        odd, other = robot.outlier_first(left, right, _limit_sizes)
         own, mirror = (a, b) if odd is left else (b, a)
         expected = mirror if pair.sign > 0 else (-mirror[1], -mirror[0])
         unit, name = odd.joint.unit, other.joint.name
@@ -324,7 +327,7 @@ def limit_asymmetry(robot: Facts) -> Iterator[Violation]:
             name,
             f"limits of joint {odd.joint.name}: got {_format_limits(own)} {unit}; expected "
             f"{_format_limits(expected)} {unit}, the {kind}limits of its mirror image {name}, "
-            f"within {LIMIT:g} {unit} plus {LIMIT_SHARE:.0%} of the range",
+            f"within {MAX_LIMIT_ERROR:g} {unit} plus {MAX_RELATIVE_LIMIT_ERROR:.0%} of the range",
             {"lower": own[0], "upper": own[1], "other_lower": mirror[0], "other_upper": mirror[1]},
             _limit_source(odd.joint),
         )
@@ -357,8 +360,9 @@ def effort_asymmetry(robot: Facts) -> Iterator[Violation]:
         The limits of tested robots without defects agree exactly.
     """
     reported = _Reported(robot, placeholder_limit)
-    for _, left, right in twins(robot):
-        for name, limit_of in (("effort", effort_of), ("velocity", _velocity_of)):
+    for pair in robot.mirror_pairs:
+        left, right = pair.left, pair.right
+        for name, limit_of in (("effort", Facts.effort_limit), ("velocity", _velocity_of)):
             a, b = limit_of(robot, left.joint), limit_of(robot, right.joint)
             if a is None or b is None or min(a, b) <= 0:
                 continue
@@ -370,7 +374,7 @@ def effort_asymmetry(robot: Facts) -> Iterator[Violation]:
                 limit = limit_of(robot, body.joint) if body.joint else None
                 return None if limit is None else np.array([limit])
 
-            odd, other = odd_one_first(robot, left, right, value)
+            odd, other = robot.outlier_first(left, right, value)
             own, mirror = (b, a) if odd is right else (a, b)
             joint = odd.joint
             unit = joint.effort_unit if name == "effort" else joint.speed_unit
@@ -406,9 +410,10 @@ def joint_origin_asymmetry(robot: Facts) -> Iterator[Violation]:
         The joint origins of tested robots without defects agree to 0.1 mm.
     """
     _check_joint_types(robot)
-    for slip in slips(robot)[0]:
-        if not slip.axis:
-            yield _slip_violation(robot, slip)
+    misalignments, _ = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
+    for misalignment in misalignments:
+        if not misalignment.is_axis:
+            yield _misalignment_violation(robot, misalignment)
 
 
 @rule("SYM007", "joint-axis-asymmetry", "warning")
@@ -426,12 +431,13 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
         Tested robots have either the same axis on all legs, or mirrored axes on all legs.
     """
     _check_joint_types(robot)
-    for slip in slips(robot)[0]:
-        if slip.axis:
-            yield _slip_violation(robot, slip)
+    misalignments, _ = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
+    for misalignment in misalignments:
+        if misalignment.is_axis:
+            yield _misalignment_violation(robot, misalignment)
     reported = {violation.subject for violation in zero_axis(robot)}
-    for stray in against_the_rest(robot):
-        joint = stray.joint
+    for found in find_reversed_joints(robot.legs, robot.bodies, robot.zero_poses):
+        joint = found.joint
         if joint.name in reported:
             continue
         reported.add(joint.name)
@@ -440,18 +446,19 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
             source=joint.axis_source or joint.source,
             certainty="likely",
             message=f"axis of joint {joint.name} in the trunk frame: got "
-            f"{_format_axis(stray.axis)}; expected the direction of the same joint of all "
-            f"{stray.others} other legs, such as {_format_axis(stray.usual)}, or mirrored axes on "
-            "each side",
-            measured={"others": stray.others},
+            f"{_format_axis(found.axis)}; expected the direction of the same joint of all "
+            f"{found.others} other legs, such as {_format_axis(found.usual_axis)}, or mirrored "
+            "axes on each side",
+            measured={"others": found.others},
         )
-    for pair, left, right in twins(robot):
+    for pair in robot.mirror_pairs:
+        left, right = pair.left, pair.right
         a, b = left.joint.range, right.joint.range
         if pair.sign == 0 or a is None or b is None:
             continue
         negated = not limits_match(a, b, pair.sign) and limits_match(a, b, -pair.sign)
         known = not reported.isdisjoint({left.joint.name, right.joint.name})
-        if negated and opposed(left, right) and not known:
+        if negated and has_opposite_axes(left, right) and not known:
             reported.add(right.joint.name)
             yield _axis_violation(
                 left,
@@ -462,7 +469,11 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
                 "expected the negated axis or the negated limits",
                 {"lower": b[0], "upper": b[1], "other_lower": a[0], "other_upper": a[1]},
             )
-    for left, right, others in against_its_kind(robot):
+    opposed_pairs = find_opposed_pairs(
+        robot.legs, robot.mirror, robot.mirror_pairs, robot.leg_bodies
+    )
+    for pair, others in opposed_pairs:
+        left, right = pair.left, pair.right
         if right.joint.name not in reported:
             yield _axis_violation(
                 left,
@@ -474,7 +485,9 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
             )
 
 
-def _axis_violation(left: Twin, right: Twin, message: str, measured: Measured) -> Violation:
+def _axis_violation(
+    left: MirrorSide, right: MirrorSide, message: str, measured: Measured
+) -> Violation:
     joint = right.joint
     return _violation(
         joint.name,
@@ -489,34 +502,38 @@ def _format_axis(axis: Matrix) -> str:
     return "(" + ", ".join(f"{x:.3g}" for x in np.round(axis, 3) + 0.0) + ")"
 
 
-def _slip_violation(robot: Facts, slip: Slip) -> Violation:
+def _misalignment_violation(robot: Facts, misalignment: Misalignment) -> Violation:
     def position(body: Body) -> Matrix:
-        return body.mount[:3, 3]
+        return body.origin[:3, 3]
 
     def axis(body: Body) -> Matrix | None:
         return body.joint.direction if body.joint else None
 
     def rotation(body: Body) -> Matrix:
-        return body.mount[:3, :3].ravel()
+        return body.origin[:3, :3].ravel()
 
-    value = axis if slip.axis else position if slip.gap else rotation
-    odd, other = odd_one_first(robot, slip.left, slip.right, value)
+    value = axis if misalignment.is_axis else position if misalignment.distance else rotation
+    odd, other = robot.outlier_first(misalignment.left, misalignment.right, value)
     name, mirror = odd.joint.name, other.joint.name
-    if slip.gap:
+    if misalignment.distance:
         message = (
             f"position of joint {name} relative to the joint above it, in the trunk frame: got "
             f"{_format_mm(odd.offset)} mm, and {_format_mm(other.offset)} mm for its mirror image "
-            f"{mirror}: {1000 * slip.gap:.3g} mm from mirrored; expected at most "
-            f"{1000 * PLACE:g} mm plus {PLACE_SHARE:.0%} of the distance"
+            f"{mirror}: {1000 * misalignment.distance:.3g} mm from mirrored; expected at most "
+            f"{1000 * MAX_POSITION_ERROR:g} mm plus {MAX_RELATIVE_POSITION_ERROR:.0%} of the "
+            "distance"
         )
     else:
+        part = "axis" if misalignment.is_axis else "frame"
         message = (
-            f"angle between the {'axis' if slip.axis else 'frame'} of joint {name} and that of its "
-            f"mirror image {mirror}: got {math.degrees(slip.angle):.3g} deg; expected at most "
-            f"{math.degrees(TURNED):.0f} deg"
+            f"angle between the {part} of joint {name} and that of its mirror image {mirror}: got "
+            f"{math.degrees(misalignment.angle):.3g} deg; expected at most "
+            f"{math.degrees(MAX_AXIS_ERROR):.0f} deg"
         )
-    source = (odd.joint.axis_source if slip.axis else None) or odd.joint.source
-    return _violation(name, mirror, message, {"gap": slip.gap, "angle": slip.angle}, source)
+    source = (odd.joint.axis_source if misalignment.is_axis else None) or odd.joint.source
+    return _violation(
+        name, mirror, message, {"gap": misalignment.distance, "angle": misalignment.angle}, source
+    )
 
 
 def _check_joint_types(robot: Facts) -> None:
@@ -537,7 +554,7 @@ class _Reported:
         violations = (violation for check in self._checks for violation in check(self._robot))
         return {violation.subject for violation in violations if violation.severity != "info"}
 
-    def has(self, left: Twin, right: Twin) -> bool:
+    def has(self, left: MirrorSide, right: MirrorSide) -> bool:
         """Return whether a link or joint of one of two bodies is reported."""
-        names = {link.name for twin in (left, right) for link in twin.body.links}
+        names = {link.name for joint in (left, right) for link in joint.body.links}
         return not self._names.isdisjoint(names | {left.joint.name, right.joint.name})

@@ -83,7 +83,7 @@ def unknown_link(robot: Facts) -> Iterator[Violation]:
     """
     links = robot.tree.links
     missing: dict[str, list[tuple[str, Joint]]] = {}
-    for joint, reason in robot.tree.left_out:
+    for joint, reason in robot.tree.rejected:
         for role, name in (("parent", joint.parent), ("child", joint.child)):
             # XML013 reports a missing name.
             if reason == "unknown-link" and name and name not in links:
@@ -121,7 +121,7 @@ def multiple_parents(robot: Facts) -> Iterator[Violation]:
         wiki.ros.org/urdf/XML: a URDF describes a tree; MuJoCo: `URDF body has multiple parents`.
     """
     extra: dict[str, list[Joint]] = {}
-    for joint, reason in robot.tree.left_out:
+    for joint, reason in robot.tree.rejected:
         if reason == "second-parent":
             extra.setdefault(joint.child, []).append(joint)
     first = {joint.child: joint for joint in reversed(robot.model.joints)}
@@ -151,8 +151,8 @@ def cycle(robot: Facts) -> Iterator[Violation]:
         found`.
     """
     # TRE003 reports the joint that closes a cycle if its child has another parent.
-    with_two_parents = {j.child for j, reason in robot.tree.left_out if reason == "second-parent"}
-    closing = {joint.child: joint for joint, reason in robot.tree.left_out if reason == "cycle"}
+    with_two_parents = {j.child for j, reason in robot.tree.rejected if reason == "second-parent"}
+    closing = {joint.child: joint for joint, reason in robot.tree.rejected if reason == "cycle"}
     for links in robot.tree.cycles:
         if with_two_parents.isdisjoint(links):
             path = names([links[0], *links[:0:-1], links[0]], separator=" > ")
@@ -195,13 +195,13 @@ def _roots(tree: Tree) -> tuple[str, list[str]]:
     components = _components(tree)
     explained = {
         components[joint.child]
-        for joint, reason in tree.left_out
+        for joint, reason in tree.rejected
         if reason in ("unknown-link", "cycle") and joint.child in components
     }
     roots = [n for n in tree.roots if components[n] == n and n not in explained]
     root, *others = roots or [""]
     # A joint with an unknown child link was probably meant to hold one of these.
-    unknown = [joint.child for joint, _ in tree.left_out if joint.child not in tree.links]
+    unknown = [joint.child for joint, _ in tree.rejected if joint.child not in tree.links]
     for child in unknown[:_MAX_SUGGESTIONS]:
         if others:
             others.remove(_nearest(child, others) or others[0])
@@ -214,7 +214,7 @@ def _components(tree: Tree) -> dict[str, str]:
     Joints that are not part of the tree count as connections, because other rules report them.
     """
     neighbors: dict[str, list[str]] = {name: [] for name in tree.links}
-    for joint in (*tree.above.values(), *(joint for joint, _ in tree.left_out)):
+    for joint in (*tree.parent_joint.values(), *(joint for joint, _ in tree.rejected)):
         if joint.parent in neighbors and joint.child in neighbors:
             neighbors[joint.parent].append(joint.child)
             neighbors[joint.child].append(joint.parent)
@@ -308,7 +308,7 @@ def inner_floating_joint(robot: Facts) -> Iterator[Violation]:
         wiki.ros.org/urdf/XML/joint; MuJoCo: `free joint can only be used on top level`.
     """
     tree = robot.tree
-    for joint in tree.above.values():
+    for joint in tree.parent_joint.values():
         if joint.kind in ("floating", "planar") and not _is_world(robot, joint.parent):
             yield Violation(
                 subject=joint.name,
@@ -321,7 +321,9 @@ def inner_floating_joint(robot: Facts) -> Iterator[Violation]:
 
 def _is_world(robot: Facts, name: str) -> bool:
     """Return whether a link is a root that represents the world."""
-    return name not in robot.tree.above and (name == "world" or _is_empty(robot.tree.links[name]))
+    return name not in robot.tree.parent_joint and (
+        name == "world" or _is_empty(robot.tree.links[name])
+    )
 
 
 def _is_empty(link: Link) -> bool:
@@ -351,9 +353,9 @@ def dummy_root(robot: Facts) -> Iterator[Violation]:
     root, trunk = bodies[0].top, bodies[0].name
     if root.virtual or not _is_empty(root) or bodies[0].mass <= 0:
         return
-    joint = tree.above[trunk]
+    joint = tree.parent_joint[trunk]
     while joint.parent != root.name:
-        joint = tree.above[joint.parent]
+        joint = tree.parent_joint[joint.parent]
     is_welded = root.name == "world" and robot.model.kind != "mjcf" and bool(robot.legs)
     yield Violation(
         subject=root.name,

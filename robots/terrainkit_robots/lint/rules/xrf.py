@@ -7,16 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.joint_order import (
-    actuator_order,
-    is_moved,
-    permutation,
-    tree_order,
-)
-from terrainkit_robots.analysis.cached_fact import per_robot
+from terrainkit_robots.analysis.bodies.joint_order import is_reordered, permutation
+from terrainkit_robots.analysis.cached_fact import cached_fact
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.legs.effort import effort_of
 from terrainkit_robots.description.model import Joint, Mimic, Source
 from terrainkit_robots.lint.compare.body_masses import (
     body_difference,
@@ -60,7 +54,7 @@ _MAX_LISTED_BODIES = 3
 _JointPair = tuple[Joint, Joint]
 
 
-@per_robot
+@cached_fact
 def _optional_pairing(robot: Facts) -> "RobotPairs | None":
     from terrainkit_robots.lint.compare.robot_pairs import pair_robots
 
@@ -158,7 +152,7 @@ def compare_joint_sets(robot: Facts) -> Iterator[Violation]:
 
 def _fixed_source(robot: Facts, joint: Joint) -> Source | None:
     """Return the source of the fixed joint above the child of a joint of the other robot."""
-    above = robot.tree.above.get(joint.child)
+    above = robot.tree.parent_joint.get(joint.child)
     return above.source if above is not None and above.kind == "fixed" else None
 
 
@@ -237,7 +231,7 @@ def _axis_in_link(link: str, robot: Facts, joint: Joint) -> Matrix:
     """Return the axis of a joint in the frame of a link, all joints at 0."""
     from terrainkit_robots.lint.compare.robot_pairs import trunk_pose_in_link
 
-    pose = trunk_pose_in_link(robot, link) @ robot.at_zero[robot.body_of[joint.child].index]
+    pose = trunk_pose_in_link(robot, link) @ robot.zero_poses[robot.body_of[joint.child].index]
     return pose[:3, :3] @ joint.direction
 
 
@@ -362,9 +356,9 @@ def compare_joint_order(robot: Facts) -> Iterator[Violation]:
     """
     pairs, other, there = _joint_pairs(robot), _other(robot), _other_name(robot)
     ours = {one.name: two.name for one, two in pairs}
-    theirs = [name for name in tree_order(other) if name in ours.values()]
+    theirs = [name for name in (joint.name for joint in other.joints) if name in ours.values()]
     indices = permutation(list(ours.values()), theirs)
-    if indices is None or not is_moved(indices):
+    if indices is None or not is_reordered(indices):
         return
     subset = len(pairs) < max(len(robot.joints), len(other.joints))
     yield Violation(
@@ -403,8 +397,8 @@ def compare_actuator_order(robot: Facts) -> Iterator[Violation]:
     """
     other, there = _other(robot), _other_name(robot)
     partner = dict(_pairing(robot).joint_names.pairs)
-    ours = [partner[name] for name in actuator_order(robot) if name in partner]
-    theirs = actuator_order(other)
+    ours = [partner[name] for name in robot.actuator_order if name in partner]
+    theirs = other.actuator_order
     common = [name for name in theirs if name in ours]
     indices = permutation([name for name in ours if name in common], common)
     within = [
@@ -417,7 +411,7 @@ def compare_actuator_order(robot: Facts) -> Iterator[Violation]:
     ]
     if not common:  # at most one of the files is an MJCF with actuators
         yield from (_actuator_violation(robot, message) for message in within)
-    elif indices and is_moved(indices):
+    elif indices and is_reordered(indices):
         between = (
             f"actuator order: got another order than in {there}; "
             f"{_format_permutation('theirs', 'ours', indices)}"
@@ -429,10 +423,10 @@ def compare_actuator_order(robot: Facts) -> Iterator[Violation]:
 
 def _actuator_difference(robot: Facts) -> str:
     """Return the permutation between the actuators and joints of a file; empty if they agree."""
-    actuated = actuator_order(robot)
-    joints = [name for name in tree_order(robot) if name in actuated]
+    actuated = robot.actuator_order
+    joints = [name for name in (joint.name for joint in robot.joints) if name in actuated]
     indices = permutation(joints, actuated)
-    if indices is None or not is_moved(indices):
+    if indices is None or not is_reordered(indices):
         return ""
     return (
         f"{_format_permutation('ctrl', 'joints', indices)}, where joints has the order "
@@ -460,7 +454,7 @@ def compare_effort(robot: Facts) -> Iterator[Violation]:
     """
     other, there = _other(robot), _other_name(robot)
     pairs = _comparable_joints(robot)
-    efforts = {a.name: (effort_of(robot, a), effort_of(other, b)) for a, b in pairs}
+    efforts = {a.name: (robot.effort_limit(a), other.effort_limit(b)) for a, b in pairs}
 
     def difference(one: Joint, _: Joint) -> tuple[object, ...] | None:
         a, b = efforts[one.name]

@@ -3,9 +3,8 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from terrainkit_robots.analysis.bodies.joint_order import actuator_order, is_moved, permutation
+from terrainkit_robots.analysis.bodies.joint_order import is_reordered, permutation
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.legs.effort import effort_of
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.rule import Certainty, Violation, rule
 from terrainkit_robots.spec.per_joint import match_joints
@@ -112,11 +111,11 @@ def spec_joint_order(robot: Facts) -> Iterator[Violation]:
         The order of the actuators in an MJCF, else that of the tree, depth first as in MuJoCo.
     """
     ours = _spec(robot).joint_order
-    order, elements = actuator_order(robot), "actuators"
+    order, elements = robot.actuator_order, "actuators"
     if set(order) != set(ours):
         order, elements = tuple(joint.name for joint in robot.actuated), "joints"
     indices = permutation(ours, order)
-    if indices is None or not is_moved(indices):
+    if indices is None or not is_reordered(indices):
         return
     first = next(k for k, index in enumerate(indices) if index != k)
     yield Violation(
@@ -284,7 +283,7 @@ def spec_motor_limits(robot: Facts) -> Iterator[Violation]:
     Source:
         Limits of the description, and the force ranges of an MJCF's actuators.
     """
-    yield from _exceeded(robot, "effort", lambda j: effort_of(robot, j), lambda j: j.effort_unit)
+    yield from _exceeded(robot, "effort", lambda j: robot.effort_limit(j), lambda j: j.effort_unit)
     yield from _exceeded(
         robot, "velocity", lambda j: j.limit.velocity if j.limit else None, lambda j: j.speed_unit
     )
@@ -321,9 +320,7 @@ def spec_mirror(robot: Facts) -> Iterator[Violation]:
     Source:
         A reflection turns a rotation by q about an axis a into one by -q about the reflected axis.
     """
-    from terrainkit_robots.analysis.symmetry.mirror_map import mirror_map
-
-    mirror, expected = _spec(robot).mirror, mirror_map(robot)
+    mirror, expected = _spec(robot).mirror, robot.mirror_map
     known = [joint.name for joint in robot.actuated]
     for name, image in mirror.items():
         unknown = next((each for each in (name, image.joint) if each not in known), None)

@@ -75,8 +75,8 @@ def test_frames_of_links_and_of_the_joint_add_up_along_fixed_joints():
     )
     np.testing.assert_allclose(merged[0].poses[0], np.eye(4))
     np.testing.assert_allclose(merged[0].poses[1][:3, 3], [1, 0, 0], atol=1e-15)
-    np.testing.assert_allclose(merged[1].mount[:3, 3], [1, 2, 0], atol=1e-15)
-    np.testing.assert_allclose(merged[1].mount[:3, :3], rpy_to_matrix(np.array([0, 0, np.pi / 2])))
+    np.testing.assert_allclose(merged[1].origin[:3, 3], [1, 2, 0], atol=1e-15)
+    np.testing.assert_allclose(merged[1].origin[:3, :3], rpy_to_matrix(np.array([0, 0, np.pi / 2])))
     np.testing.assert_allclose(merged[1].poses[1][:3, 3], [0, 0, 3])
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from terrainkit_robots.analysis.bodies.bounds import extents_of, half_diagonal
+from terrainkit_robots.analysis.bodies.bounds import half_diagonal
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.mesh.mesh_cache import Meshes
@@ -51,44 +51,44 @@ def longer_than(length):
 
 def test_a_body_reaches_from_its_shapes_to_the_joints_on_it(robot):
     facts = robot(BALL.format("collision"))
-    box = extents_of(facts).still(facts.bodies[0], always)
+    box = facts.body_bounds.box_if(facts.bodies[0], always)
     assert box == pytest.approx(np.array([[-0.1, -0.1, -0.1], [0.1, 0.1, 0.5]]))
 
 
 def test_a_mesh_that_is_not_needed_is_not_opened(robot):
     facts = robot(BALL.format("collision"), BAR.format("visual"))
-    assert extents_of(facts).still(facts.bodies[1], longer_than(0.1)) is None
+    assert facts.body_bounds.box_if(facts.bodies[1], longer_than(0.1)) is None
     assert facts.meshes.asked == 0
 
 
 def test_a_mesh_that_settles_a_doubt_is_opened(robot):
     facts = robot(BALL.format("collision"), BAR.format("visual"))
-    assert extents_of(facts).still(facts.bodies[1], longer_than(0.9)) is None
+    assert facts.body_bounds.box_if(facts.bodies[1], longer_than(0.9)) is None
     assert facts.meshes.asked > 0
 
 
 def test_what_is_wrong_of_all_of_it_is_wrong(robot):
     facts = robot(BALL.format("collision"), BAR.format("visual"))
-    box = extents_of(facts).still(facts.bodies[1], longer_than(1.5))
+    box = facts.body_bounds.box_if(facts.bodies[1], longer_than(1.5))
     assert box == pytest.approx(np.array([[-0.1, -0.1, -0.1], [0.1, 0.1, 2.0]]))
 
 
 @pytest.mark.parametrize("shapes", [(), (BAR.format("collision"),)])
 def test_a_body_of_unknown_size_may_be_larger_than_the_robot(robot, shapes):
     facts = robot(*shapes, bar=False)
-    assert extents_of(facts).robot_size == pytest.approx(0.5)
-    assert extents_of(facts).still(facts.bodies[1], longer_than(1.2)) is None
-    assert extents_of(facts).still(facts.bodies[1], longer_than(5.0)) is not None
+    assert facts.body_bounds.robot_size == pytest.approx(0.5)
+    assert facts.body_bounds.box_if(facts.bodies[1], longer_than(1.2)) is None
+    assert facts.body_bounds.box_if(facts.bodies[1], longer_than(5.0)) is not None
 
 
 def test_what_only_stands_for_a_shape_is_none(robot):
     facts = robot("<collision><geometry><box size='0.002 0.002 0.002'/></geometry></collision>")
-    assert extents_of(facts).still(facts.bodies[1], longer_than(1.2)) is None
+    assert facts.body_bounds.box_if(facts.bodies[1], longer_than(1.2)) is None
 
 
 def test_the_collision_shapes_stand_for_a_body(robot):
     facts = robot(BALL.format("collision"), BAR.format("visual"))
-    box = extents_of(facts).own(facts.bodies[1], always)
+    box = facts.body_bounds.shape_box(facts.bodies[1], always)
     assert box == pytest.approx(np.array([[-0.1] * 3, [0.1] * 3]))
     assert facts.meshes.asked == 0
 
@@ -96,12 +96,15 @@ def test_the_collision_shapes_stand_for_a_body(robot):
 def test_a_mesh_that_is_only_seen_is_opened_where_there_is_doubt(robot):
     facts = robot(BAR.format("visual"))
     asked = []
-    assert extents_of(facts).own(facts.bodies[1], lambda length: bool(asked.append(length))) is None
+    assert (
+        facts.body_bounds.shape_box(facts.bodies[1], lambda length: bool(asked.append(length)))
+        is None
+    )
     assert asked == [pytest.approx(0.5)]
     assert facts.meshes.asked == 0
-    assert extents_of(facts).own(facts.bodies[1], always)[1, 2] == pytest.approx(2.0)
+    assert facts.body_bounds.shape_box(facts.bodies[1], always)[1, 2] == pytest.approx(2.0)
 
 
 def test_the_extents_are_worked_out_once(robot):
     facts = robot(BALL.format("collision"))
-    assert extents_of(facts) is extents_of(facts)
+    assert facts.body_bounds is facts.body_bounds

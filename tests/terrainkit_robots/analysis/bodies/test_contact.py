@@ -7,7 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.bodies.contact import SOLE, convex_hull, level_turn, margin, sole
+from terrainkit_robots.analysis.bodies.contact import (
+    MAX_SOLE_DEPTH,
+    contact_points,
+    convex_hull,
+    flat_foot_angle,
+    margin,
+)
 from terrainkit_robots.description.model import Geometry, Link, Source
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.transforms import rpy_to_matrix
@@ -34,14 +40,14 @@ def foot(*shapes, frames=()):
         index=0,
         parent=None,
         joint=None,
-        mount=np.eye(4),
+        origin=np.eye(4),
         links=tuple(links),
         poses=(np.eye(4), *frames),
     )
 
 
 def contact(body, at=None):
-    return sole(body, pose() if at is None else at, Meshes())
+    return contact_points(body, pose() if at is None else at, Meshes())
 
 
 # The sole
@@ -67,7 +73,7 @@ def test_of_a_tilted_box_one_edge_touches():
 
 
 def test_of_a_box_that_is_hardly_tilted_all_four_touch():
-    tilt = 0.9 * SOLE / 0.2
+    tilt = 0.9 * MAX_SOLE_DEPTH / 0.2
     assert len(contact(foot(("box", (0.1, 0.05, 0.02), pose())), pose(rpy=(0, tilt, 0)))) == 4
 
 
@@ -133,29 +139,29 @@ def test_a_shape_without_extent_does_not_count():
 @pytest.mark.parametrize("tilt", [-1.2, -0.5, -0.1, 0.0, 0.2, 0.7, 1.0])
 def test_a_flat_foot_is_turned_flat(tilt):
     body = foot(("box", (0.12, 0.04, 0.015), pose()))
-    turn = level_turn(body, pose(rpy=(0, tilt, 0)), SIDEWAYS, Meshes())
+    turn = flat_foot_angle(body, pose(rpy=(0, tilt, 0)), SIDEWAYS, Meshes())
     assert turn == pytest.approx(-tilt, abs=0.05)
 
 
 def test_a_foot_is_turned_about_the_axis_of_its_leg():
     body = foot(("box", (0.04, 0.12, 0.015), pose()))
-    turn = level_turn(body, pose(rpy=(0.4, 0, 0)), np.array([1.0, 0, 0]), Meshes())
+    turn = flat_foot_angle(body, pose(rpy=(0.4, 0, 0)), np.array([1.0, 0, 0]), Meshes())
     assert turn == pytest.approx(-0.4, abs=0.05)
 
 
 @pytest.mark.parametrize("shape", [("sphere", (0.02,)), ("cylinder", (0.02, 0.05))])
 def test_a_round_foot_is_as_flat_as_it_can_be(shape):
     body = foot((*shape, pose(rpy=(np.pi / 2, 0, 0))))
-    assert level_turn(body, pose(), SIDEWAYS, Meshes()) == 0
+    assert flat_foot_angle(body, pose(), SIDEWAYS, Meshes()) == 0
 
 
 def test_a_foot_without_shapes_is_left_as_it_is():
-    assert level_turn(foot(frames=(pose((0.1, 0, -0.1)),)), pose(), SIDEWAYS, Meshes()) == 0
+    assert flat_foot_angle(foot(frames=(pose((0.1, 0, -0.1)),)), pose(), SIDEWAYS, Meshes()) == 0
 
 
 def test_points_under_heel_and_toes_make_a_sole():
     balls = [("sphere", (0.005,), pose((x, 0, -0.03))) for x in (-0.05, 0.12)]
-    turn = level_turn(foot(*balls), pose(rpy=(0, 0.5, 0)), SIDEWAYS, Meshes())
+    turn = flat_foot_angle(foot(*balls), pose(rpy=(0, 0.5, 0)), SIDEWAYS, Meshes())
     assert turn == pytest.approx(-0.5, abs=0.05)
 
 

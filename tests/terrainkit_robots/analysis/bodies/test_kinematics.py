@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from terrainkit_robots.analysis.bodies.kinematics import ancestors, axis_in_trunk, body_poses
+from terrainkit_robots.analysis.bodies.kinematics import ancestors, body_poses, joint_axis
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
@@ -127,7 +127,7 @@ def test_an_axis_that_is_missing_is_x():
 def test_where_an_axis_is():
     bodies = facts(ARM).bodies
     poses = body_poses(bodies, {"turn": np.pi / 2, "slide": 0.5})
-    point, axis = axis_in_trunk(bodies[2], poses[2])
+    point, axis = joint_axis(bodies[2], poses[2])
     np.testing.assert_allclose(point, [0, 2.5, 1], atol=1e-15)
     np.testing.assert_allclose(axis, [0, 1, 0], atol=1e-15)
 

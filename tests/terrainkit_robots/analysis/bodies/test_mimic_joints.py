@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
-from terrainkit_robots.analysis.bodies.mimic_joints import follower_positions, followers
+from terrainkit_robots.analysis.bodies.mimic_joints import mimic_joints, mimic_positions
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 
@@ -29,11 +29,11 @@ def follows(joint, multiplier=1.0, offset=0.0):
 
 def test_a_follower_of_a_follower(tmp_path):
     robot = chain(tmp_path, "", follows("jA", offset=0.5), follows("jB", -2))
-    assert follower_positions(robot.joints, {"jA": 1.0}) == {"jB": 1.5, "jC": -3.0}
+    assert mimic_positions(robot.joints, {"jA": 1.0}) == {"jB": 1.5, "jC": -3.0}
     # However the file has them.
     backwards = chain(tmp_path, follows("jB", -2), follows("jC", offset=0.5), "")
-    assert [joint.name for joint in followers(backwards.joints)] == ["jB", "jA"]
-    assert follower_positions(backwards.joints, {"jC": 1.0}) == {"jB": 1.5, "jA": -3.0}
+    assert [joint.name for joint in mimic_joints(backwards.joints)] == ["jB", "jA"]
+    assert mimic_positions(backwards.joints, {"jC": 1.0}) == {"jB": 1.5, "jA": -3.0}
     assert body_poses(robot.bodies, {"jA": 1.0})[3][0, 3] == pytest.approx(1.0 + 1.5 - 3.0)
     assert body_poses(backwards.bodies, {"jC": 1.0})[3][0, 3] == pytest.approx(1.0 + 1.5 - 3.0)
 
@@ -41,7 +41,7 @@ def test_a_follower_of_a_follower(tmp_path):
 def test_many_positions_at_once(tmp_path):
     robot = chain(tmp_path, follows("jB", -2), follows("jC", offset=0.5), "")
     drawn = np.linspace(-1, 1, 5)
-    found = follower_positions(robot.joints, {"jC": drawn, "jA": drawn})
+    found = mimic_positions(robot.joints, {"jC": drawn, "jA": drawn})
     np.testing.assert_allclose(found["jA"], -2 * (drawn + 0.5))
 
 
@@ -56,28 +56,28 @@ def test_many_positions_at_once(tmp_path):
 )
 def test_who_follows_nobody_stays_where_it_is(tmp_path, mimics):
     robot = chain(tmp_path, *mimics)
-    assert followers(robot.joints) == ()
-    assert follower_positions(robot.joints, {"jC": 7.0}) == {}
+    assert mimic_joints(robot.joints) == ()
+    assert mimic_positions(robot.joints, {"jC": 7.0}) == {}
     assert body_poses(robot.bodies, {"jC": 7.0})[3][0, 3] == pytest.approx(7.0)
 
 
 def test_who_follows_one_of_a_circle_follows_it(tmp_path):
     robot = chain(tmp_path, follows("jB"), follows("jA"), follows("jB", 2))
-    assert follower_positions(robot.joints, {"jA": 5.0, "jB": 3.0}) == {"jC": 6.0}
+    assert mimic_positions(robot.joints, {"jA": 5.0, "jB": 3.0}) == {"jC": 6.0}
 
 
 def test_a_joint_that_does_not_move_is_not_followed(tmp_path):
     robot = chain(tmp_path, "", follows("jA", 2, 1))
     path = tmp_path / "robot.urdf"
     path.write_text(path.read_text().replace('"prismatic"', '"fixed"', 1))
-    assert follower_positions(Facts(load_robot(path)).joints, {"jA": 1.0}) == {}
+    assert mimic_positions(Facts(load_robot(path)).joints, {"jA": 1.0}) == {}
     assert len(robot.joints) == 2
 
 
 def test_positions_stay_numbers_however_large_the_factors(tmp_path):
     robot = chain(tmp_path, "", *(follows(f"j{letter}", -9e29, 9e29) for letter in "ABCDEFG"))
     for position in (1.0, np.array([1.0, -1e30])):
-        for found in follower_positions(robot.joints, {"jA": position}).values():
+        for found in mimic_positions(robot.joints, {"jA": position}).values():
             assert np.isfinite(found).all()
 
 
@@ -87,7 +87,7 @@ def test_who_leads_comes_first_whatever_the_order(tmp_path_factory, leaders, ord
     names = [f"j{letter}" for letter in "ABCDEFGH"]
     mimics = ["" if k < 0 else follows(names[k], 2, 0.1) for k in leaders]
     joints = chain(folder, *mimics).joints
-    found = followers([joints[k] for k in order])
+    found = mimic_joints([joints[k] for k in order])
     placed = {joint.name: place for place, joint in enumerate(found)}
     assert len(placed) == len(found)
     for joint in found:

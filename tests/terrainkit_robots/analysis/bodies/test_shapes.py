@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from terrainkit_robots.analysis.bodies.bodies import Placed
-from terrainkit_robots.analysis.bodies.shapes import bounds, has_extent, lowest, reach, volume
+from terrainkit_robots.analysis.bodies.bodies import BodyShape
+from terrainkit_robots.analysis.bodies.shapes import bounds, has_bounds, min_height, support, volume
 from terrainkit_robots.description.model import Geometry, MeshFile, Source
 from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes
 from terrainkit_robots.transforms import rpy_to_matrix
@@ -32,7 +32,7 @@ def geometry(shape, size=None, mesh=None):
 def placed(geometry, xyz=(0, 0, 0), rpy=(0, 0, 0)):
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = rpy_to_matrix(np.array(rpy)), xyz
-    return Placed(geometry=geometry, link="l", pose=pose)
+    return BodyShape(geometry=geometry, link="l", pose=pose)
 
 
 def mesh(path, scale=(1.0, 1.0, 1.0)):
@@ -85,7 +85,7 @@ def surface(geometry, rng, count=4000):
 )
 def test_reach_by_hand(shape, along_x, along_z, aslant):
     directions = np.array([[1, 0, 0], [0, 0, 1], [0.6, 0, 0.8]])
-    found = [reach(geometry(shape), d, Meshes()) for d in directions]
+    found = [support(geometry(shape), d, Meshes()) for d in directions]
     assert found == pytest.approx([along_x, along_z, aslant])
 
 
@@ -94,45 +94,45 @@ def test_reach_by_hand(shape, along_x, along_z, aslant):
 def test_a_shape_reaches_as_far_as_its_farthest_point(shape, direction):
     d = np.array(direction) / np.linalg.norm(direction)
     farthest = float((surface(geometry(shape), np.random.default_rng(0)) @ d).max())
-    found = reach(geometry(shape), d, Meshes())
+    found = support(geometry(shape), d, Meshes())
     assert farthest - 1e-12 <= found <= farthest + 0.02
 
 
 def test_a_mesh_reaches_to_its_corners(wedge):
     shape, meshes = geometry("mesh", mesh=mesh(wedge, (2.0, 1.0, -1.0))), Meshes()
-    found = [reach(shape, d, meshes) for d in (*np.eye(3), *-np.eye(3))]
+    found = [support(shape, d, meshes) for d in (*np.eye(3), *-np.eye(3))]
     assert found == pytest.approx([2, 1, 0, 0, 0, 1])
     assert meshes.opened[wedge] <= 2
 
 
 @pytest.mark.parametrize("shape", ["plane", "unknown", "mesh"])
 def test_what_has_no_extent_is_told(shape):
-    assert not has_extent(geometry(shape), Meshes())
-    with pytest.raises(ValueError, match="no extent"):
-        reach(geometry(shape), np.array([0, 0, 1.0]), Meshes())
+    assert not has_bounds(geometry(shape), Meshes())
+    with pytest.raises(ValueError, match="expected a bounded shape"):
+        support(geometry(shape), np.array([0, 0, 1.0]), Meshes())
 
 
 def test_a_mesh_that_is_not_there_has_no_extent(tmp_path):
     lost = geometry("mesh", mesh=mesh(tmp_path / "lost.stl"))
-    assert not has_extent(lost, Meshes())
+    assert not has_bounds(lost, Meshes())
     with pytest.raises(MeshError):
-        reach(lost, np.array([0, 0, 1.0]), Meshes())
+        support(lost, np.array([0, 0, 1.0]), Meshes())
 
 
 @every_shape
 def test_a_primitive_with_all_its_sizes_has_an_extent(shape):
-    assert has_extent(geometry(shape), Meshes())
+    assert has_bounds(geometry(shape), Meshes())
 
 
 @every_shape
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf, 1e30])
 def test_sizes_that_make_no_sense_are_no_extent(shape, wrong):
-    assert not has_extent(geometry(shape, (*SIZES[shape][:-1], wrong)), Meshes())
+    assert not has_bounds(geometry(shape, (*SIZES[shape][:-1], wrong)), Meshes())
 
 
 @every_shape
 def test_missing_sizes_are_no_extent(shape):
-    assert not has_extent(geometry(shape, SIZES[shape][:-1]), Meshes())
+    assert not has_bounds(geometry(shape, SIZES[shape][:-1]), Meshes())
 
 
 # Boxes around
@@ -188,18 +188,18 @@ def test_all_points_are_in_the_box_and_touch_it(shape, turn, place):
 def test_the_lowest_point_by_hand():
     pose = np.eye(4)
     pose[:3, 3] = [5, 5, 1]
-    assert lowest(placed(geometry("sphere"), (0, 0, 0.2)), pose, Meshes()) == pytest.approx(0.7)
+    assert min_height(placed(geometry("sphere"), (0, 0, 0.2)), pose, Meshes()) == pytest.approx(0.7)
     tilted = placed(geometry("cylinder"), rpy=(math.asin(0.6), 0, 0))
-    assert lowest(tilted, pose, Meshes()) == pytest.approx(1 - 0.06 - 0.32)
+    assert min_height(tilted, pose, Meshes()) == pytest.approx(1 - 0.06 - 0.32)
 
 
 def test_the_lowest_point_of_a_body_that_hangs_upside_down():
     pose = np.diag([1.0, -1.0, -1.0, 1.0])
-    assert lowest(placed(geometry("box"), (0, 0, 1)), pose, Meshes()) == pytest.approx(-1.3)
+    assert min_height(placed(geometry("box"), (0, 0, 1)), pose, Meshes()) == pytest.approx(-1.3)
 
 
 def test_without_extent_the_origin_is_lowest():
-    assert lowest(placed(geometry("unknown"), (0, 0, 0.2)), np.eye(4), Meshes()) == 0.2
+    assert min_height(placed(geometry("unknown"), (0, 0, 0.2)), np.eye(4), Meshes()) == 0.2
 
 
 # Volume
@@ -227,5 +227,5 @@ def test_the_volume_of_a_mesh_by_hand(wedge):
 
 @pytest.mark.parametrize("shape", ["plane", "unknown", "mesh"])
 def test_what_has_no_volume_is_told(shape):
-    with pytest.raises(ValueError, match="no volume"):
+    with pytest.raises(ValueError, match="expected a shape with a volume"):
         volume(geometry(shape), Meshes())

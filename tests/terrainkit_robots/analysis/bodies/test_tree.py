@@ -32,20 +32,20 @@ def tree(links, joints, kind="urdf"):
     return build_tree(robot(links.split(), joints, kind))
 
 
-def left_out(tree):
-    return [(joint.name, reason) for joint, reason in tree.left_out]
+def rejected(tree):
+    return [(joint.name, reason) for joint, reason in tree.rejected]
 
 
 def test_no_links():
     empty = tree("", [])
-    assert empty.roots == empty.order == empty.left_out == empty.cycles == ()
+    assert empty.roots == empty.order == empty.rejected == empty.cycles == ()
 
 
 def test_links_come_after_their_parents_depth_first():
     sound = tree("e d c b a", [("a", "b"), ("b", "c"), ("a", "d"), ("d", "e")])
     assert sound.order == ("a", "b", "c", "d", "e")
     assert sound.roots == ("a",)
-    assert sound.left_out == ()
+    assert sound.rejected == ()
 
 
 def test_children_are_in_the_order_of_the_joints():
@@ -54,10 +54,10 @@ def test_children_are_in_the_order_of_the_joints():
 
 def test_joints_above_and_below():
     sound = tree("a b c", [("a", "b"), ("a", "c")])
-    assert sound.above["b"].name == "a-b"
-    assert "a" not in sound.above
-    assert [j.child for j in sound.below["a"]] == ["b", "c"]
-    assert sound.below["c"] == ()
+    assert sound.parent_joint["b"].name == "a-b"
+    assert "a" not in sound.parent_joint
+    assert [j.child for j in sound.child_joints["a"]] == ["b", "c"]
+    assert sound.child_joints["c"] == ()
 
 
 def test_the_largest_of_several_trees_is_the_robot():
@@ -79,25 +79,25 @@ def test_the_first_link_of_a_name_counts():
 
 def test_a_joint_that_is_written_twice_is_left_out_once():
     double = tree("a b", [joint("a", "b", "j"), joint("a", "b", "j")])
-    assert left_out(double) == [("j", "duplicate")]
+    assert rejected(double) == [("j", "duplicate")]
     assert double.order == ("a", "b")
 
 
 def test_two_joints_of_a_name_both_hold_their_links():
     double = tree("a b c", [joint("a", "b", "j"), joint("a", "c", "j")])
-    assert left_out(double) == []
+    assert rejected(double) == []
     assert double.order == ("a", "b", "c")
 
 
 def test_a_joint_to_a_link_that_is_not_there_is_left_out():
     lost = tree("a b", [("a", "x"), ("y", "b"), ("a", "")])
-    assert left_out(lost) == [(name, "unknown-link") for name in ("a-x", "y-b", "a-")]
+    assert rejected(lost) == [(name, "unknown-link") for name in ("a-x", "y-b", "a-")]
     assert lost.order == ("a",)
 
 
 def test_a_second_parent_is_left_out():
     two = tree("a b c", [("a", "b"), ("a", "c"), ("b", "c")])
-    assert left_out(two) == [("b-c", "second-parent")]
+    assert rejected(two) == [("b-c", "second-parent")]
     assert two.order == ("a", "b", "c")
     assert two.cycles == ()
 
@@ -105,7 +105,7 @@ def test_a_second_parent_is_left_out():
 def test_a_link_below_itself():
     own = tree("a b", [("a", "b"), ("a", "a")])
     assert own.cycles == (("a",),)
-    assert left_out(own) == [("a-a", "cycle")]
+    assert rejected(own) == [("a-a", "cycle")]
     assert own.order == ("a", "b")
 
 
@@ -114,7 +114,7 @@ def test_a_circle_with_a_tail_is_opened():
     circle = tree("a b c d", [("a", "b"), ("b", "c"), ("c", "a"), ("c", "d")])
     assert len(circle.cycles) == 1
     assert set(circle.cycles[0]) == {"a", "b", "c"}
-    assert [reason for _, reason in circle.left_out] == ["cycle"]
+    assert [reason for _, reason in circle.rejected] == ["cycle"]
     assert set(circle.order) == {"a", "b", "c", "d"}
 
 
@@ -137,19 +137,19 @@ def test_the_robot_begins_where_there_never_was_a_parent():
 def test_two_circles():
     two = tree("a b c d", [("a", "b"), ("b", "a"), ("c", "d"), ("d", "c")])
     assert [set(cycle) for cycle in two.cycles] == [{"a", "b"}, {"c", "d"}]
-    assert len(two.left_out) == 2
+    assert len(two.rejected) == 2
     assert len(two.roots) == 2
 
 
 def test_what_holds_a_body_of_mjcf_in_the_world_is_not_between_links():
     held = tree("a b", [("world", "a"), ("a", "b")], kind="mjcf")
     assert held.order == ("a", "b")
-    assert held.left_out == ()
-    assert "a" not in held.above
+    assert held.rejected == ()
+    assert "a" not in held.parent_joint
 
 
 def test_in_urdf_the_world_is_a_link_like_others():
-    assert left_out(tree("a", [("world", "a")])) == [("world-a", "unknown-link")]
+    assert rejected(tree("a", [("world", "a")])) == [("world-a", "unknown-link")]
     assert tree("world a", [("world", "a")]).order == ("world", "a")
 
 
@@ -191,19 +191,23 @@ def test_any_joints_make_a_forest(links, joints):
     model = robot(links, [joint(p, c, n or f"{p}-{c}") for p, c, n in joints])
     forest = build_tree(model)
     # Every joint is in the tree or left out, and every link is below exactly one root.
-    assert len(forest.above) + len(forest.left_out) == len(joints)
+    assert len(forest.parent_joint) + len(forest.rejected) == len(joints)
     seen, stack = [], list(forest.roots)
     while stack:
         at = stack.pop()
         seen.append(at)
-        stack += [j.child for j in forest.below[at]]
+        stack += [j.child for j in forest.child_joints[at]]
     assert sorted(seen) == sorted(set(links))
-    for name, above in forest.above.items():
+    for name, above in forest.parent_joint.items():
         assert above.child == name
-        assert above in forest.below[above.parent]
+        assert above in forest.child_joints[above.parent]
     place = {name: k for k, name in enumerate(forest.order)}
-    assert all(place[forest.above[n].parent] < k for n, k in place.items() if n in forest.above)
-    assert sum(reason == "cycle" for _, reason in forest.left_out) == len(forest.cycles)
+    assert all(
+        place[forest.parent_joint[n].parent] < k
+        for n, k in place.items()
+        if n in forest.parent_joint
+    )
+    assert sum(reason == "cycle" for _, reason in forest.rejected) == len(forest.cycles)
 
 
 @given(st.permutations(range(7)))
@@ -211,7 +215,7 @@ def test_the_order_of_joints_does_not_change_the_tree(order):
     pairs = [("a", "b"), ("b", "c"), ("b", "d"), ("a", "e"), ("e", "f"), ("e", "g"), ("g", "h")]
     shuffled = tree("a b c d e f g h", [pairs[k] for k in order])
     assert set(shuffled.order) == set("abcdefgh")
-    assert {(j.parent, j.child) for j in shuffled.above.values()} == set(pairs)
+    assert {(j.parent, j.child) for j in shuffled.parent_joint.values()} == set(pairs)
 
 
 def test_a_real_robot_in_full(robot_file):
@@ -219,4 +223,4 @@ def test_a_real_robot_in_full(robot_file):
     sound = build_tree(model)
     assert sound.roots == ("pelvis",)
     assert set(sound.order) == {link.name for link in model.links}
-    assert sound.left_out == sound.cycles == ()
+    assert sound.rejected == sound.cycles == ()

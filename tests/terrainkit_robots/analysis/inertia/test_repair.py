@@ -6,7 +6,6 @@ import pytest
 
 import terrainkit_robots
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.inertia.repair import repair
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.fixes.edits import edit_bytes
 from terrainkit_robots.mesh.mesh_cache import Meshes
@@ -36,7 +35,7 @@ def repaired(tmp_path):
         path = tmp_path / "robot.xml"
         path.write_text(text)
         facts = Facts(load_robot(path), Meshes())
-        fix = repair(facts, facts.tree.links[link])
+        fix = facts.inertia_repair.fix(facts.tree.links[link])
         assert fix is not None
         data = edit_bytes(path.read_bytes(), fix.edits)
         model = mujoco.MjModel.from_xml_string(data.decode())
@@ -105,4 +104,4 @@ def test_what_mujoco_makes_of_shapes_has_no_repair(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(ARM.format(inertia='diaginertia="1 1 1"'))
     facts = Facts(load_robot(path), Meshes())
-    assert repair(facts, facts.tree.links["base"]) is None
+    assert facts.inertia_repair.fix(facts.tree.links["base"]) is None

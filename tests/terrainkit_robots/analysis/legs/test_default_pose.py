@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from terrainkit_robots.analysis.legs.default_pose import starting_positions
 from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
@@ -34,9 +33,9 @@ def test_what_the_spec_leaves_open_is_searched_for(bundled, gains):
     spec = derive_spec(plain, gains=gains(plain), floating=True)
     facts = bundled("quadruped.urdf", spec=changed(spec, default_pose={"FL_hip_joint": 0.2}))
     wanted = dict(plain.positions) | {"FL_hip_joint": 0.2}
-    assert starting_positions(facts) == wanted
+    assert facts.positions == wanted
     nothing = bundled("quadruped.urdf", spec=changed(spec, default_pose={"(": 1.0, "x": 2.0}))
-    assert starting_positions(nothing) == plain.positions
+    assert nothing.positions == plain.positions
 
 
 def test_a_joint_that_mimics_another_follows_the_spec(robot, spec):

@@ -68,7 +68,7 @@ def test_legs_of_known_robots(name, robot_file):
     for leg in legs:
         assert leg.length == pytest.approx(length, abs=0.002)
         np.testing.assert_allclose(leg.pitch, [0, 1, 0], atol=0.3)
-        assert leg.limb.words
+        assert leg.limb.has_leg_names
         assert len(leg.joints) == len(roles)
 
 

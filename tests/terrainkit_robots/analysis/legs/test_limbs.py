@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.legs.limbs import forks
+from terrainkit_robots.analysis.legs.limbs import is_branch
 from terrainkit_robots.description.load import load_robot
 
 FILE = Path("/robots/robot.urdf")
@@ -64,7 +64,7 @@ def test_a_limb_by_hand():
     assert [each.name for each in found.joints] == ["a0_joint", "a1_joint"]
     np.testing.assert_allclose(found.points, [[1, 2, 0], [1, 2, -0.3]])
     np.testing.assert_allclose(found.tip, [1, 2, -0.52])
-    assert not found.words
+    assert not found.has_leg_names
 
 
 def test_fixed_links_belong_to_what_they_are_fixed_to():
@@ -159,7 +159,7 @@ def test_what_stands_and_is_mirrored_is_a_leg_whatever_its_name():
 def test_a_name_is_worth_half_a_point():
     robot = facts(*(limb(f"{name}_thigh", root) for name, root in FOUR))
     assert set(scores(robot).values()) == {2.0}
-    assert all(each.words for each in robot.limbs)
+    assert all(each.has_leg_names for each in robot.limbs)
 
 
 def test_one_limb_alone_is_not_mirrored():
@@ -247,7 +247,7 @@ def test_a_robot_on_a_world_is_less_likely_to_walk():
     ],
 )  # fmt: skip
 def test_names_of_legs(name):
-    assert facts(limb(name, "0 0 0")).limbs[0].words
+    assert facts(limb(name, "0 0 0")).limbs[0].has_leg_names
 
 
 @pytest.mark.parametrize(
@@ -258,7 +258,7 @@ def test_names_of_legs(name):
     ],
 )  # fmt: skip
 def test_names_of_others(name):
-    assert not facts(limb(name, "0 0 0")).limbs[0].words
+    assert not facts(limb(name, "0 0 0")).limbs[0].has_leg_names
 
 
 @pytest.mark.parametrize("name", ["armature", "handle", "proprioception"])
@@ -273,8 +273,8 @@ def test_the_names_of_most_parts_decide():
             link(first), joint("trunk", first, "0 0 0"), limb(second, "0 0 -0.1", parent=first)
         ).limbs[0]
 
-    assert not chain("hip", "elbow").words
-    assert chain("shoulder", "foot").words
+    assert not chain("hip", "elbow").has_leg_names
+    assert chain("shoulder", "foot").has_leg_names
 
 
 # Limbs that share joints
@@ -289,15 +289,15 @@ def test_toes_are_one_leg():
         ),
     )
     one, other = robot.limbs
-    assert forks(one, other, 1.0)
-    assert forks(other, one, 1.0)
+    assert is_branch(one, other, 1.0)
+    assert is_branch(other, one, 1.0)
 
 
 def test_legs_below_a_waist_are_two():
     waist = link("w") + joint("trunk", "w", "0 0 -0.1", axis="0 0 1")
     robot = facts(waist, limb("a", "0 0.1 0", parent="w"), limb("b", "0 -0.1 0", parent="w"))
     one, other = robot.limbs
-    assert not forks(one, other, 1.0)
+    assert not is_branch(one, other, 1.0)
     assert scores(robot) == {"a1": 1.5, "b1": 1.5}
 
 
@@ -310,7 +310,7 @@ def test_legs_behind_a_long_spine_are_two():
         spine, limb("a", "0 0.1 0", (0.3, 0.3, 0.1), at), limb("b", "0 -0.1 0", (0.3, 0.3, 0.1), at)
     )
     one, other = robot.limbs
-    assert not forks(one, other, 1.0)
+    assert not is_branch(one, other, 1.0)
 
 
 def test_a_rod_of_a_closed_loop_is_no_leg_of_its_own():
@@ -323,12 +323,12 @@ def test_a_rod_of_a_closed_loop_is_no_leg_of_its_own():
         joint("rod", "rod1", "0 0 -0.05"),
     )
     one, other = robot.limbs
-    assert forks(one, other, 1.0)
+    assert is_branch(one, other, 1.0)
 
 
 def test_limbs_that_share_nothing_are_two():
     one, other = facts(limb("a", "0 0 0"), limb("b", "0 0.01 0")).limbs
-    assert not forks(one, other, 1.0)
+    assert not is_branch(one, other, 1.0)
 
 
 # Size

@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 
-from terrainkit_robots.analysis.bodies.contact import sole
+from terrainkit_robots.analysis.bodies.contact import contact_points
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.legs.stance import GRAVITY, ground_forces, stand
+from terrainkit_robots.analysis.legs.stance import GRAVITY, compute_stance, ground_forces
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 
@@ -219,6 +219,10 @@ def table(leg_mass=0.0, trunk_mass=12.0, foot=0.02):
     return Facts(load_robot(FILE, contents={FILE: text.encode()}))
 
 
+def stand(facts, positions):
+    return compute_stance(facts.leg_model, positions, total_mass=facts.total_mass)
+
+
 def at(hip, knee):
     return {
         f"{side}_{joint}": q
@@ -353,7 +357,7 @@ def test_feet_are_pushed_within_their_soles(name, robot_file):
     poses = body_poses(facts.bodies, stance.positions)
     for leg, place in zip(facts.legs, stance.pressures, strict=True):
         foot = leg.limb.chain[-1]
-        points = sole(facts.bodies[foot], poses[foot], facts.meshes)[:, :2]
+        points = contact_points(facts.bodies[foot], poses[foot], facts.meshes)[:, :2]
         assert (points.min(axis=0) - 1e-9 <= place[:2]).all()
         assert (place[:2] <= points.max(axis=0) + 1e-9).all()
 

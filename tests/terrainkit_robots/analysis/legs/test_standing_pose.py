@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from terrainkit_robots.analysis.bodies.contact import sole
-from terrainkit_robots.analysis.bodies.kinematics import axis_in_trunk, body_poses
+from terrainkit_robots.analysis.bodies.contact import contact_points
+from terrainkit_robots.analysis.bodies.kinematics import body_poses, joint_axis
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.standing_pose import (
     center_of_mass,
-    nearest,
-    range_of,
-    solve_positions,
+    clip_to_limits,
+    joint_range,
+    solve_standing_pose,
 )
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
@@ -63,11 +63,11 @@ def joint(lower, upper, kind="revolute"):
     ],
 )
 def test_limits_that_make_no_sense_do_not_limit(lower, upper, wanted):
-    assert range_of(joint(lower, upper)) == wanted
+    assert joint_range(joint(lower, upper)) == wanted
 
 
 def test_a_continuous_joint_has_no_limits():
-    assert range_of(joint(-1.0, 1.0, "continuous")) == (-math.inf, math.inf)
+    assert joint_range(joint(-1.0, 1.0, "continuous")) == (-math.inf, math.inf)
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def test_a_continuous_joint_has_no_limits():
     [(-1.0, 2.0, 0.0, 0.0), (0.5, 2.0, 0.0, 0.5), (-2.0, -0.5, 0.0, -0.5), (2.0, 1.0, 0.3, 0.3)],
 )
 def test_the_closest_position_that_is_allowed(lower, upper, position, wanted):
-    assert nearest(joint(lower, upper), position) == wanted
+    assert clip_to_limits(joint(lower, upper), position) == wanted
 
 
 # Real robots
@@ -84,10 +84,10 @@ def test_the_closest_position_that_is_allowed(lower, upper, position, wanted):
 @every_urdf
 def test_every_joint_has_a_position_within_its_limits(name, robot_file):
     robot = load(name, robot_file)
-    positions = solve_positions(robot)
+    positions = solve_standing_pose(robot.leg_model)
     assert set(positions) == {each.name for each in robot.joints}
     for each in robot.joints:
-        lower, upper = range_of(each)
+        lower, upper = joint_range(each)
         assert lower - 1e-9 <= positions[each.name] <= upper + 1e-9
 
 
@@ -108,7 +108,7 @@ def test_legs_are_bent_as_much_as_they_should(name, robot_file):
     for leg, contact in zip(robot.legs, robot.stance.contacts, strict=True):
         hinged = [i for i in leg.limb.chain if robot.bodies[i].joint.moves]
         hip = hinged[leg.roles.index("hip")]
-        point, _ = axis_in_trunk(robot.bodies[hip], poses[hip])
+        point, _ = joint_axis(robot.bodies[hip], poses[hip])
         assert (point - contact)[2] / leg.length == pytest.approx(wanted, abs=0.05)
 
 
@@ -128,7 +128,7 @@ def test_knees_are_above_the_ground(name, robot_file):
     for leg in robot.legs:
         hinged = [i for i in leg.limb.chain if robot.bodies[i].joint.moves]
         knee = hinged[leg.roles.index("knee")]
-        point, _ = axis_in_trunk(robot.bodies[knee], poses[knee])
+        point, _ = joint_axis(robot.bodies[knee], poses[knee])
         assert point[2] + robot.stance.height > 0.1 * leg.length
 
 
@@ -138,7 +138,7 @@ def test_soles_are_flat_on_the_ground(name, robot_file):
     poses = body_poses(robot.bodies, robot.stance.positions)
     for leg in robot.legs:
         foot = leg.limb.chain[-1]
-        points = sole(robot.bodies[foot], poses[foot], robot.meshes)
+        points = contact_points(robot.bodies[foot], poses[foot], robot.meshes)
         assert np.ptp(points[:, 0]) > 0.1  # heel and toes
 
 
@@ -265,7 +265,9 @@ def test_a_keyframe_is_taken_as_it_is():
     path = bundled.find("quadruped").with_suffix(".xml")
     robot = Facts(load_robot(path))
     assert robot.model.home
-    assert solve_positions(robot) == {j.name: robot.model.home[j.name] for j in robot.joints}
+    assert solve_standing_pose(robot.leg_model) == {
+        j.name: robot.model.home[j.name] for j in robot.joints
+    }
 
 
 def test_a_robot_without_legs_is_left_as_it_is():
@@ -275,7 +277,7 @@ def test_a_robot_without_legs_is_left_as_it_is():
     )
     robot = Facts(load_robot(FILE, contents={FILE: text.encode()}))
     assert robot.stance is None
-    assert solve_positions(robot) == {"j": 0.5}
+    assert solve_standing_pose(robot.leg_model) == {"j": 0.5}
 
 
 def test_the_centre_of_mass_by_hand():

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.meshes.scale import Scales
+from terrainkit_robots.analysis.meshes.scale import MeshScales
 from terrainkit_robots.analysis.meshes.uses import mesh_uses
 from terrainkit_robots.description.model import (
     Geometry,
@@ -39,7 +39,7 @@ class Builder:
             name=name, source=self.at, visuals=visuals, collisions=collisions, inertial=inertial
         )
 
-    def misfits(self, *links, reach=0.3):
+    def mismatches(self, *links, reach=0.3):
         offset = np.eye(4)
         offset[2, 3] = -reach
         joints = [
@@ -63,9 +63,9 @@ class Builder:
                 joints=tuple(joints),
             )
         )
-        scales = Scales(facts)
-        found = [scales.misfit(use) for use in mesh_uses(facts)]
-        return [misfit.ratio for misfit in found if misfit is not None]
+        scales = MeshScales(facts.tree, facts.bodies, facts.zero_poses, facts.meshes)
+        found = [scales.mismatch(use) for use in mesh_uses(facts.model)]
+        return [mismatch.ratio for mismatch in found if mismatch is not None]
 
 
 @pytest.fixture
@@ -77,23 +77,25 @@ def robot(tmp_path):
 def test_parts_of_a_robot_may_be_of_any_size(robot, size):
     part = robot.mesh(size)
     links = [robot.link(name, part, collisions=(part,)) for name in "abc"]
-    assert not robot.misfits(*links)
+    assert not robot.mismatches(*links)
 
 
 @pytest.mark.parametrize("size", [0.02, 0.05, 0.3])
 def test_millimetres_for_metres(robot, size):
     part = robot.mesh(size * 1000)
-    ratios = robot.misfits(*(robot.link(name, part) for name in "abc"))
+    ratios = robot.mismatches(*(robot.link(name, part) for name in "abc"))
     assert len(ratios) == 3
     assert min(ratios) > 15
-    assert not robot.misfits(*(robot.link(name, robot.mesh(1000 * size, 0.001)) for name in "abc"))
+    assert not robot.mismatches(
+        *(robot.link(name, robot.mesh(1000 * size, 0.001)) for name in "abc")
+    )
 
 
 @pytest.mark.parametrize("size", [0.01, 0.05, 0.3])
 def test_metres_for_millimetres(robot, size):
     part = robot.mesh(size, 0.001)
     box = Geometry(source=robot.at, shape="box", size=(size / 2,) * 3)
-    ratios = robot.misfits(*(robot.link(name, part, collisions=(box,)) for name in "abc"))
+    ratios = robot.mismatches(*(robot.link(name, part, collisions=(box,)) for name in "abc"))
     assert len(ratios) == 3
     assert max(ratios) < 0.02
 
@@ -101,40 +103,42 @@ def test_metres_for_millimetres(robot, size):
 def test_one_part_of_many_that_is_wrong(robot):
     right, wrong = robot.mesh(0.3), robot.mesh(0.31, 1000.0)
     links = [robot.link(name, right) for name in "abcd"]
-    assert robot.misfits(*links[:2], robot.link("x", wrong), *links[2:]) == pytest.approx(
+    assert robot.mismatches(*links[:2], robot.link("x", wrong), *links[2:]) == pytest.approx(
         [380 / 0.3], rel=0.01
     )
 
 
 def test_a_small_part_beside_a_large_one_is_a_detail(robot):
     screw, shell = robot.mesh(0.002), robot.mesh(0.3)
-    assert not robot.misfits(*(robot.link(name, shell, screw) for name in "abc"))
+    assert not robot.mismatches(*(robot.link(name, shell, screw) for name in "abc"))
 
 
 def test_axes_that_meet_in_one_point_say_nothing(robot):
     part = robot.mesh(0.2)
     wrist = [robot.link(name, part) for name in "abc"]
-    assert not robot.misfits(*wrist, reach=0.0)
-    assert not robot.misfits(*wrist, reach=0.004)
+    assert not robot.mismatches(*wrist, reach=0.0)
+    assert not robot.mismatches(*wrist, reach=0.004)
 
 
 def test_a_camera_that_turns_on_a_car(robot):
-    assert not robot.misfits(robot.link("car", robot.mesh(2.0)), robot.link("camera"), reach=0.05)
+    assert not robot.mismatches(
+        robot.link("car", robot.mesh(2.0)), robot.link("camera"), reach=0.05
+    )
 
 
 def test_a_room_around_a_robot(robot):
     room = robot.mesh(50.0)
     part = robot.mesh(0.3)
     links = [robot.link("a", part), robot.link("b", part)]
-    assert not robot.misfits(robot.link("room", room, mass=None), *links)
-    assert robot.misfits(robot.link("room", room, mass=3.0), *links) == pytest.approx(
+    assert not robot.mismatches(robot.link("room", room, mass=None), *links)
+    assert robot.mismatches(robot.link("room", room, mass=3.0), *links) == pytest.approx(
         [61.2 / 0.6], rel=0.01
     )
 
 
 def test_a_crane_is_no_robot_in_millimetres(robot):
     links = [robot.link(name, robot.mesh(size)) for name, size in (("a", 8.0), ("b", 25.0))]
-    assert not robot.misfits(*links, reach=8.0)
+    assert not robot.mismatches(*links, reach=8.0)
 
 
 def test_a_file_that_cannot_be_read(robot):
@@ -143,9 +147,9 @@ def test_a_file_that_cannot_be_read(robot):
         shape="mesh",
         mesh=MeshFile(source=robot.at, filename="x", path=robot.folder / "x.stl"),
     )
-    assert not robot.misfits(robot.link("a", lost), robot.link("b", lost))
+    assert not robot.mismatches(robot.link("a", lost), robot.link("b", lost))
 
 
 def test_joints_at_infinity(robot):
     part = robot.mesh(0.3)
-    assert not robot.misfits(robot.link("a", part), robot.link("b", part), reach=1e9)
+    assert not robot.mismatches(robot.link("a", part), robot.link("b", part), reach=1e9)

@@ -4,16 +4,17 @@ import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.meshes.uses import (
-    is_lost,
+    is_missing,
     mesh_uses,
     meshes_by_file,
     meshes_by_name,
     relative_name,
-    renamed,
-    replaced,
+    rename_edits,
+    replace_edits,
 )
 from terrainkit_robots.description.fix import SetAttribute, WriteFile
 from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.mesh.mesh_cache import Meshes
 
 TWO_LINKS = """<robot name="r">
   <link name="a">
@@ -42,7 +43,9 @@ def robot(tmp_path):
 
 
 def test_every_use(robot):
-    uses = [(use.link.name, use.mesh.filename, use.collides) for use in mesh_uses(robot())]
+    uses = [
+        (use.link.name, use.mesh.filename, use.is_collision) for use in mesh_uses(robot().model)
+    ]
     assert uses == [
         ("a", "./m/foot.stl", True),
         ("a", "m/foot.stl", False),
@@ -52,18 +55,18 @@ def test_every_use(robot):
 
 
 def test_one_for_each_name(robot):
-    used = meshes_by_name(robot())
+    used = meshes_by_name(robot().model, Meshes())
     assert [(u.name, len(u.uses), u.source.line) for u in used] == [
         ("./m/foot.stl", 1, 4),
         ("m/foot.stl", 2, 3),
         ("m/hand.stl", 1, 8),
     ]
     assert [u.strict for u in used] == [True, True, False]
-    assert [is_lost(u) for u in used] == [False, False, True]
+    assert [is_missing(u) for u in used] == [False, False, True]
 
 
 def test_one_for_each_file_that_is_there(robot):
-    (used,) = meshes_by_file(robot())
+    (used,) = meshes_by_file(robot().model, Meshes())
     assert used.name == "m/foot.stl"
     assert used.source.line == 3
     assert len(used.uses) == 3
@@ -73,8 +76,10 @@ def test_one_for_each_file_that_is_there(robot):
 
 def test_edits_of_every_use(robot):
     facts = robot()
-    (used,) = meshes_by_file(facts)
-    write, *edits = replaced(facts, used.uses, "_hull.stl", lambda: b"hull")
+    (used,) = meshes_by_file(facts.model, facts.meshes)
+    write, *edits = replace_edits(
+        facts.model, facts.meshes, used.uses, "_hull.stl", lambda: b"hull"
+    )
     assert isinstance(write, WriteFile)
     assert write.path.name == "foot_hull.stl"
     assert write.content() == b"hull"
@@ -87,15 +92,15 @@ def test_edits_of_every_use(robot):
 def test_a_name_that_is_taken_is_left(robot, tmp_path):
     facts = robot()
     (tmp_path / "m/foot_hull.stl").write_bytes(b"somebody's")
-    (used,) = meshes_by_file(facts)
-    write, *_ = replaced(facts, used.uses, "_hull.stl", bytes)
+    (used,) = meshes_by_file(facts.model, facts.meshes)
+    write, *_ = replace_edits(facts.model, facts.meshes, used.uses, "_hull.stl", bytes)
     assert write.path.name == "foot_hull_2.stl"
 
 
 def test_names_relative_to_the_robot(robot, tmp_path):
     facts = robot()
-    assert relative_name(facts, tmp_path / "m/foot.stl") == "m/foot.stl"
-    assert relative_name(facts, tmp_path.parent / "x/foot.stl") == "../x/foot.stl"
+    assert relative_name(facts.model, tmp_path / "m/foot.stl") == "m/foot.stl"
+    assert relative_name(facts.model, tmp_path.parent / "x/foot.stl") == "../x/foot.stl"
 
 
 def test_names_relative_to_a_link_to_the_robot(robot, tmp_path):
@@ -105,7 +110,7 @@ def test_names_relative_to_a_link_to_the_robot(robot, tmp_path):
     (tmp_path / "linked").symlink_to(elsewhere)
     (elsewhere / "robot.urdf").write_text(TWO_LINKS)
     facts = Facts(load_robot(tmp_path / "linked/robot.urdf"))
-    name = relative_name(facts, tmp_path / "m/foot.stl")
+    name = relative_name(facts.model, tmp_path / "m/foot.stl")
     assert (tmp_path / "linked" / name).samefile(tmp_path / "m/foot.stl")
 
 
@@ -115,21 +120,21 @@ def test_names_in_mjcf_start_at_meshdir(robot):
       <worldbody><body name="a"><freejoint/><geom type="mesh" mesh="f" mass="1"/></body></worldbody>
     </mujoco>"""
     facts = robot(text, "robot.xml")
-    (used,) = meshes_by_file(facts)
+    (used,) = meshes_by_file(facts.model, facts.meshes)
     assert used.strict
-    write, edit = replaced(facts, used.uses, "_hull.stl", bytes)
+    write, edit = replace_edits(facts.model, facts.meshes, used.uses, "_hull.stl", bytes)
     assert write.path.name == "foot_hull.stl"
     assert (edit.name, edit.value) == ("file", "foot_hull.stl")
 
 
 def test_what_xacro_made_is_not_edited(robot):
     facts = Facts(replace(robot().model, kind="xacro"))
-    (used,) = meshes_by_file(facts)
-    assert renamed(facts, used.uses, "x") is None
-    assert replaced(facts, used.uses, ".stl", bytes) is None
+    (used,) = meshes_by_file(facts.model, facts.meshes)
+    assert rename_edits(facts.model, used.uses, "x") is None
+    assert replace_edits(facts.model, facts.meshes, used.uses, ".stl", bytes) is None
 
 
 def test_what_is_not_well_formed_is_not_edited(robot):
     facts = robot(TWO_LINKS.replace("</robot>", ""))
-    (used,) = meshes_by_file(facts)
-    assert replaced(facts, used.uses, ".stl", bytes) is None
+    (used,) = meshes_by_file(facts.model, facts.meshes)
+    assert replace_edits(facts.model, facts.meshes, used.uses, ".stl", bytes) is None

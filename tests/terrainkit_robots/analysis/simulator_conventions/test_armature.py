@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.simulator_conventions.armature import moved_by_joints
+from terrainkit_robots.analysis.simulator_conventions.armature import inertias_without_armature
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 
@@ -18,7 +18,10 @@ def test_a_point_mass_on_a_rod(mjcf):
         f'<body name="tip" pos="0.5 0 0"><joint name="j2" axis="0 0 3"/>{inertial}</body>'
         "</body></body>"
     )
-    moved = {each.joint.name: each.inertia for each in moved_by_joints(facts)}
+    moved = {
+        each.joint.name: each.inertia
+        for each in inertias_without_armature(facts.bodies, facts.actuated, facts.zero_poses)
+    }
     assert moved == pytest.approx({"j1": 0.501, "j2": 0.001}, rel=1e-6)
 
 
@@ -28,7 +31,7 @@ def test_joints_with_armature_are_left_out(mjcf):
         f'<body name="b"><freejoint/>{geom}<body name="a">{geom}<joint name="j" armature="0.01"/>'
         f'</body><body name="s">{geom}<joint name="slide" type="slide"/></body></body>'
     )
-    (moved,) = moved_by_joints(facts)
+    (moved,) = inertias_without_armature(facts.bodies, facts.actuated, facts.zero_poses)
     assert (moved.joint.name, moved.inertia) == ("slide", pytest.approx(1.0))
 
 
@@ -42,7 +45,8 @@ def test_against_the_mass_matrix_of_mujoco(name):
     matrix = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, matrix)
     diagonal = {model.joint(i).name: matrix[model.jnt_dofadr[i]] for i in range(model.njnt)}
-    moved = moved_by_joints(Facts(load_robot(path)))
+    facts = Facts(load_robot(path))
+    moved = inertias_without_armature(facts.bodies, facts.actuated, facts.zero_poses)
     assert moved
     for each in moved:
         at = model.joint(each.joint.name).dofadr[0]

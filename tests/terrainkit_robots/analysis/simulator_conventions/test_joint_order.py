@@ -7,10 +7,6 @@ from hypothesis import strategies as st
 from lxml import etree
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.simulator_conventions.joint_order import (
-    file_order,
-    simulator_orders,
-)
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -26,7 +22,7 @@ SHARED = [
 
 
 def orders(facts):
-    return {order.simulator: order for order in simulator_orders(facts)}
+    return {order.simulator: order for order in facts.simulator_orders}
 
 
 def joints(facts):
@@ -54,7 +50,7 @@ TREE = (
 
 def test_siblings_out_of_order_and_fixed_joints_between(urdf):
     facts = urdf(*TREE)
-    assert " ".join(file_order(facts)) == "jc jz jx3 jx1 jy1 ja jk"
+    assert " ".join(facts.file_order) == "jc jz jx3 jx1 jy1 ja jk"
     assert joints(facts) == {
         "MuJoCo": "jc jk jx3 jy1 jx1 ja jz",  # G's children where G was, before x1
         "Isaac Gym": "ja jz jc jk jx1 jx3 jy1",
@@ -93,7 +89,7 @@ def test_a_link_that_is_kept_is_a_body_of_two_simulators(urdf):
 
 def test_one_order_of_siblings_is_certain_everywhere(urdf):
     facts = urdf("ja: b > a", "jc: b > c", "jd: a > d", "je: c > e")
-    assert all(order.certain for order in simulator_orders(facts))
+    assert all(order.certain for order in facts.simulator_orders)
     assert joints(facts)["Isaac Lab"] == "ja jc jd je"
     assert joints(facts)["Isaac Gym"] == "ja jd jc je"
 
@@ -264,10 +260,10 @@ def test_nothing_to_order(tmp_path):
     path = Path(tmp_path / "robot.urdf")
     path.write_text('<robot name="r"/>')
     assert all(
-        order.joints == order.bodies == () for order in simulator_orders(Facts(load_robot(path)))
+        order.joints == order.bodies == () for order in Facts(load_robot(path)).simulator_orders
     )
 
 
 def test_a_broken_tree_is_never_certain(urdf):
     facts = urdf("ja: b > a", "jc: b > c", "jd: a > c")
-    assert not any(order.certain for order in simulator_orders(facts))
+    assert not any(order.certain for order in facts.simulator_orders)

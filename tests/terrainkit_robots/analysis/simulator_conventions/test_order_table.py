@@ -3,7 +3,7 @@ from terrainkit_robots.analysis.simulator_conventions.order_table import order_t
 
 def test_a_row_for_each_joint_with_its_number_everywhere(urdf):
     facts = urdf("jc: b > c", "ja: b > a", "jk: c > k")
-    assert order_table(facts) == (
+    assert order_table(facts.file_order, facts.simulator_orders) == (
         ("joint", "file", "MuJoCo", "Isaac Gym", "Isaac Lab", "Genesis"),
         ("jc", "0", "0", "1", "1", "0"),
         ("ja", "1", "2", "0", "0", "2"),

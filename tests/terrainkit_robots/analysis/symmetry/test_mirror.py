@@ -126,7 +126,7 @@ def test_robots_are_mirrored_left_to_right(name, robot_file):
     assert robot.mirror.normal.tolist() == [0, 1, 0]
     assert len(robot.mirror.pairs) == PAIRS[name]
     for pair in robot.mirror.pairs:
-        assert robot.at_zero[pair.left][1, 3] > robot.at_zero[pair.right][1, 3]
+        assert robot.zero_poses[pair.left][1, 3] > robot.zero_poses[pair.right][1, 3]
         assert swap_sides(robot.bodies[pair.left].name) == robot.bodies[pair.right].name
 
 
@@ -151,10 +151,10 @@ def test_mirrored_positions_look_mirrored(name, robot_file):
 def test_the_twin_of_a_body(robot_file):
     robot = load("go2/urdf/go2.urdf", robot_file)
     index = {body.top.name: body.index for body in robot.bodies}
-    assert robot.mirror.twin(index["FL_hip"]) == (index["FR_hip"], -1)
-    assert robot.mirror.twin(index["FR_hip"]) == (index["FL_hip"], -1)
-    assert robot.mirror.twin(index["RL_calf"]) == (index["RR_calf"], 1)
-    assert robot.mirror.twin(0) is None
+    assert robot.mirror.counterpart(index["FL_hip"]) == (index["FR_hip"], -1)
+    assert robot.mirror.counterpart(index["FR_hip"]) == (index["FL_hip"], -1)
+    assert robot.mirror.counterpart(index["RL_calf"]) == (index["RR_calf"], 1)
+    assert robot.mirror.counterpart(0) is None
 
 
 # Pairs, by hand

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
-from terrainkit_robots.analysis.symmetry.mirror_map import mirror_map
 from terrainkit_robots.spec.robot_spec import MirrorJoint
 
 WAIST = """
@@ -20,7 +19,7 @@ LINK = """
 
 
 def waist(robot, axis, kind="revolute", y=0):
-    return mirror_map(robot(WAIST.format(links=LINK.format(name="w", kind=kind, axis=axis, y=y))))
+    return robot(WAIST.format(links=LINK.format(name="w", kind=kind, axis=axis, y=y))).mirror_map
 
 
 @pytest.mark.parametrize(
@@ -49,7 +48,7 @@ def test_an_axis_that_is_askew_has_no_mirror_image(robot):
 @pytest.mark.parametrize("name", ["quadruped.urdf", "biped.urdf", "biped.xml"])
 def test_mirrored_positions_look_mirrored(bundled, name):
     facts = bundled(name)
-    twins = mirror_map(facts)
+    twins = facts.mirror_map
     assert list(twins) == [joint.name for joint in facts.actuated]
     random = np.random.default_rng(0)
     positions = {name: float(random.uniform(-1, 1)) for name in twins}
@@ -67,8 +66,8 @@ def test_a_twin_that_no_motor_drives_is_none(robot):
         for n, y in (("left", 0.3), ("right", -0.3))
     )
     text = WAIST.format(links=links)
-    assert set(mirror_map(robot(text))) == {"left", "right"}
+    assert set(robot(text).mirror_map) == {"left", "right"}
     followed = text.replace('velocity="1"/></joint>', 'velocity="1"/><mimic joint="left"/></joint>')
     first = followed.index('<mimic joint="left"/>')
     followed = followed[:first] + followed[first + len('<mimic joint="left"/>') :]
-    assert mirror_map(robot(followed)) == {}
+    assert robot(followed).mirror_map == {}

@@ -71,8 +71,8 @@ def test_unstable_drop_units_of_sliding_joint(robot):
     [(2, (), None), (5, (), "info"), (12, (), "warning"), (5, ("toe",), "warning")],
 )
 def test_does_not_stand_severity(monkeypatch, stood, tilt, lifted, severity):
-    standing_with = replace(stood, tilt=math.radians(tilt), lifted=lifted)
-    monkeypatch.setattr(dyn, "stand_still", lambda *_, **__: standing_with)
+    standing_with = replace(stood, tilt=math.radians(tilt), lifted_feet=lifted)
+    monkeypatch.setattr(dyn, "stand_test", lambda *_, **__: standing_with)
     violations = check("DYN002", bundled.find("quadruped"))
     assert [violation.severity for violation in violations] == ([severity] if severity else [])
     assert all("tilts by" in violation.message for violation in violations)

@@ -1,0 +1,34 @@
+"""The facts that the standing pose and the stance are computed from."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.legs.legs import Leg
+from terrainkit_robots.analysis.symmetry.mirror import Mirror
+from terrainkit_robots.description.model import Joint
+from terrainkit_robots.mesh.mesh_cache import Meshes
+from terrainkit_robots.transforms import Matrix
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LegModel:
+    """Bodies, joints and legs of a robot."""
+
+    bodies: Sequence[Body]
+    """The bodies, parents first."""
+
+    joints: Sequence[Joint]
+    """Joints with one degree of freedom, parents first."""
+
+    legs: Sequence[Leg]
+
+    mirror: Mirror
+
+    zero_poses: Sequence[Matrix]
+    """Poses of the bodies in the frame of the trunk, all joints at 0, each (4, 4) [m]."""
+
+    keyframe: Mapping[str, float]
+    """Joint positions [rad] or [m] of the first keyframe, by name. Empty without one."""
+
+    meshes: Meshes
