@@ -77,13 +77,14 @@ def rules_page() -> str:
     parts = [
         "# The rules of check-robot\n",
         NOTE,
-        "What `terrainkit check-robot` looks for. An error would break the training or the",
-        "simulator, a warning is something that a careful engineer would change, and a note is to",
-        "be known. `--fix` repairs what can be repaired without a change for any reader that could",
-        "read the file; `--unsafe-fixes` changes numbers, shapes or other files, too.\n",
+        "The rules that `terrainkit check-robot` runs. An error breaks training or a simulator. A",
+        "warning is a likely mistake that should be corrected. A note is information. `--fix`",
+        "applies fixes that do not change the robot for any reader that accepts the file.",
+        "`--unsafe-fixes` also applies fixes that change numbers, shapes or other files.\n",
     ]
     for family, about in FAMILIES.items():
-        parts.append(f"## {family}: {about}\n\n| rule | | | fixed by |\n|---|---|---|---|")
+        parts.append(f"## {family}: {about}\n\n| rule | violation | severity | fix |")
+        parts.append("|---|---|---|---|")
         for rule in rules():
             if rule.family == family:
                 link = f"[{rule.code} {rule.name}](#{rule.code.lower()}-{rule.name})"
@@ -99,12 +100,12 @@ SEVERITY = {"error": "An error", "warning": "A warning", "info": "A note"}
 
 
 def rule_section(rule: Rule) -> str:
-    fixed = f", repaired by {FIXED[rule.fixes]}" if FIXED[rule.fixes] else ""
+    fixed = f", fixed by {FIXED[rule.fixes]}" if FIXED[rule.fixes] else ""
     return (
         f"### {rule.code} {rule.name}\n\n"
         f"**{markup(rule.title)}** {SEVERITY[rule.severity]}{fixed}.\n\n"
         f"{markup(rule.why)}\n\n"
-        f"*To fix it:* {markup(rule.how_to_fix)}\n\n"
+        f"*How to fix:* {markup(rule.how_to_fix)}\n\n"
         f"*Source:* {markup(rule.reference)}\n"
     )
 

@@ -1,7 +1,7 @@
 """The command that checks whether robots can be trained."""
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -148,6 +148,9 @@ def as_json(results: "dict[str, SmokeTestResult]") -> str:
         "schema_version": SCHEMA_VERSION,
         "tool": {"name": "terrainkit", "version": __version__},
     }
-    documents = [{**head, "file": name, **result.as_dict()} for name, result in results.items()]
+    documents = [
+        {**head, "file": name, "verdict": "pass" if result.passed else "fail", **asdict(result)}
+        for name, result in results.items()
+    ]
     indent = 2 if len(documents) == 1 else None
     return "".join(f"{json.dumps(document, indent=indent)}\n" for document in documents)
