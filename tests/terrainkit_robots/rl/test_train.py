@@ -86,7 +86,7 @@ def test_resume_continues_exactly_in_its_folder(task, tmp_path):
     assert open_run(tmp_path / "run").task == task
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_interrupted_run_resumes_exactly(task, tmp_path, number):
     def interrupt(progress: TrainingProgress) -> None:
         if progress.iteration == 2:
