@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from terrainkit.errors import MemoryLimitError, ConfigError
+from terrainkit.errors import ConfigError, MemoryLimitError
 from terrainkit_robots.rl.config import DomainRand, Env, Runner, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.events import RandomizedParams
