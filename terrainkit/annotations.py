@@ -11,7 +11,8 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from terrainkit.errors import ConfigError, nearest, shorten
+from terrainkit.errors import ConfigError
+from terrainkit.text import nearest, shorten
 from terrainkit.toml_text import key_text
 
 NONE = "none"

@@ -22,7 +22,7 @@ class ExportError(TerrainkitError):
     """A map that the wanted format cannot hold, or a target that cannot be written."""
 
 
-class CapacityError(TerrainkitError, MemoryError):
+class MemoryLimitError(TerrainkitError, MemoryError):
     """Work that would not fit in this machine's memory; raised before anything is allocated."""
 
 
@@ -40,36 +40,3 @@ def listing(names: Iterable[str]) -> str:
     more = len(listed) - MAX_LISTED
     shown = listed if more <= 0 else [*listed[:MAX_LISTED], f"and {more} more"]
     return ", ".join(shown) or "nothing"
-
-
-def shorten(text: str, max_length: int = 100) -> str:
-    """Return `text`, cut if it is longer than `max_length` characters."""
-    return text if len(text) <= max_length else f"{text[: max_length - 3]}..."
-
-
-def nearest(word: str, known: Iterable[str]) -> str:
-    """Return the known name that `word` is likely a misspelling of; empty if there is none."""
-    from difflib import get_close_matches
-
-    names = {name.lower(): name for name in known}
-    if len(word) > 100:  # the comparison takes quadratic time
-        return ""
-    return next((names[match] for match in get_close_matches(word.lower(), names, 1, 0.7)), "")
-
-
-def known_names(word: str, known: Iterable[str], lead: str = "there are", meant: str = "") -> str:
-    """Return the end of an error message about an unknown name.
-
-    Args:
-        word: The unknown name.
-        known: The names that exist.
-        lead: What to write before the list of names.
-        meant: The name that was meant; the nearest of `known` unless given.
-
-    Returns:
-        Such as `did you mean 'gap'? There are: flat, gap, pit`.
-    """
-    names = list(known)
-    meant = meant or nearest(word, names)
-    text = f"{lead}: {listing(names)}"
-    return f"did you mean {meant!r}? {text[0].upper()}{text[1:]}" if meant else text

@@ -8,7 +8,8 @@ from functools import cache
 from typing import Any, Self, TypeVar
 
 from terrainkit.annotations import NONE, convert, describe, is_table, parse_annotation
-from terrainkit.errors import ConfigError, known_names, shorten
+from terrainkit.errors import ConfigError
+from terrainkit.text import known_names, shorten
 from terrainkit.toml_text import key_text, line_text, parse_toml, read_text
 
 if typing.TYPE_CHECKING:

@@ -77,7 +77,7 @@ def _put_aside(name: str) -> None:
 
 def _run(arguments: list[str]) -> int:
     from terrainkit import __version__
-    from terrainkit.errors import known_names, shorten
+    from terrainkit.text import known_names, shorten
 
     name = arguments[0] if arguments else "--help"
     if name in ("-h", "--help"):

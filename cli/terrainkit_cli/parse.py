@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, TypeVar, get_type_hints
 
-from terrainkit.errors import TerrainkitError, nearest, shorten
+from terrainkit.errors import TerrainkitError
+from terrainkit.text import nearest, shorten
 
 if TYPE_CHECKING:
     from typing import Self

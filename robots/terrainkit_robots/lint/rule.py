@@ -27,7 +27,8 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import TYPE_CHECKING, Literal
 
-from terrainkit.errors import ConfigError, known_names, nearest
+from terrainkit.errors import ConfigError
+from terrainkit.text import known_names, nearest
 from terrainkit_robots.description.fix import Fix
 from terrainkit_robots.description.model import Source
 

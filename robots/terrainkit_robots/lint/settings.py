@@ -19,8 +19,9 @@ from typing import Annotated, Any, Self
 from msgspec import Meta
 
 from terrainkit.annotations import show
-from terrainkit.errors import ConfigError, listing, nearest
+from terrainkit.errors import ConfigError, listing
 from terrainkit.schema import Config
+from terrainkit.text import nearest
 from terrainkit.toml_text import parse_toml, read_text
 from terrainkit_robots.lint.rule import FAMILIES, Rule, rules
 

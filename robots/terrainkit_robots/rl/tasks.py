@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from terrainkit.errors import ConfigError, known_names, shorten
+from terrainkit.errors import ConfigError
+from terrainkit.text import known_names, shorten
 from terrainkit_robots.description import bundled
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.scene import SPEC_FILE

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.bodies.tree import Tree
-from terrainkit_robots.description.mjcf.document import MAX_ELEMENTS, harmless
+from terrainkit_robots.description.mjcf.document import MAX_ELEMENTS, is_allowed
 from terrainkit_robots.description.model import RobotModel
 from terrainkit_robots.description.xml.document import RobotFileError, parse_xml, read_bytes
 from terrainkit_robots.mesh.sniff import open_regular
@@ -175,11 +175,11 @@ def _check_element(element: "etree._Element") -> None:
     tag = str(element.tag)
     if tag in ("include", "model"):
         return  # the file that it refers to is one of the sources
-    if tag in _UNSAFE_TAGS or not harmless(tag):
+    if tag in _UNSAFE_TAGS or not is_allowed(tag):
         raise NotAttemptedError(f"a file with <{tag}> is not passed to MuJoCo")
     attributes = {str(name): str(value) for name, value in element.attrib.items()}
     for name, text in attributes.items():
-        if (not harmless(tag, name) and name != "user") or "octree" in name:
+        if (not is_allowed(tag, name) and name != "user") or "octree" in name:
             raise NotAttemptedError(f"<{tag} {name}=...> is not passed to MuJoCo")
         is_allocation = tag == "size" and (name.startswith("nuser") or name == "nkey")
         if is_allocation and _size(text) > _MAX_ALLOCATION:

@@ -1,0 +1,54 @@
+import pytest
+
+from terrainkit.text import known_names, nearest, shorten
+
+
+def test_shorten_cuts_long_text():
+    assert shorten("abc", 3) == "abc"
+    assert shorten("abcdefghij", 8) == "abcde..."
+    assert len(shorten("x" * 101)) == 100
+
+
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [
+        ("colision", "collision"),
+        ("Collision", "collision"),
+        ("visaul", "visual"),
+        ("vendor", ""),
+        ("", ""),
+        ("x" * 200, ""),
+    ],
+)
+def test_nearest_finds_misspelled_names(word, meant):
+    assert nearest(word, {"collision", "visual", "inertial", "x" * 201}, 0.7) == meant
+
+
+def test_nearest_prefers_case_then_same_letters():
+    assert nearest("fl_foot", ["FL_foot", "lf_foot"], 0.6) == "FL_foot"
+    assert nearest("fl_foot", ["lf_foot", "fl_foo"], 0.6) == "lf_foot"
+
+
+def test_nearest_does_not_swap_digits():
+    assert nearest("link_12", ["link_21", "link_1"], 0.6) == "link_1"
+
+
+def test_nearest_respects_the_similarity():
+    assert nearest("abcx", ["abcy"], 0.75) == "abcy"
+    assert nearest("abcx", ["abcy"], 0.76) == ""
+
+
+def test_nearest_ignores_the_order_of_names():
+    known = ["leg_a", "leg_b", "leg_c"]
+    assert nearest("leg_d", known, 0.6) == nearest("leg_d", known[::-1], 0.6)
+
+
+def test_nearest_is_fast_for_long_names():
+    known = [f"link_{number:095d}" for number in range(5000)]
+    assert nearest("y" * 100, known, 0.6) == ""
+
+
+def test_known_names_suggests_the_nearest():
+    assert known_names("gapp", ["flat", "gap"]) == "did you mean 'gap'? There are: flat, gap"
+    assert known_names("x", ["flat", "gap"], "it has") == "it has: flat, gap"
+    assert known_names("x", ["a"], meant="b.x") == "did you mean 'b.x'? There are: a"
