@@ -1,4 +1,4 @@
-"""Actuators of MJCF: how much force each can put on a joint, and which joints follow others."""
+"""Read the force limits of MJCF actuators and the joints that follow others."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -15,31 +15,36 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drive:
-    """An actuator before the frames around its joint scale it."""
+class ActuatorData:
+    """An actuator, before the frames around its joint scale it."""
 
     name: str
     source: Source
 
     joint: str
-    """Name of the joint; empty if it drives something else."""
+    """Name of the joint; empty if the actuator acts on something else."""
 
     effort: float | None
-    """Largest torque [N m] or force [N] that it puts on the joint; None if it is unlimited."""
+    """Maximum torque [N m] or force [N] on the joint; None if unlimited."""
 
     armature: float
-    """What it adds to the reflected inertia of the joint [kg m2] or [kg]."""
+    """Inertia that it adds to the armature of the joint [kg m2] or [kg]."""
 
-    def actuator(self, factor: float, most: float | None) -> Actuator:
-        """Return the actuator, with its force times `factor`, of which the joint lets `most` by."""
+    def actuator(self, factor: float, max_effort: float | None) -> Actuator:
+        """Return the actuator of the model.
+
+        Args:
+            factor: Factor on its force.
+            max_effort: Limit of the joint on actuator forces; None if there is none.
+        """
         effort = None if self.effort is None else self.effort * factor
-        if most is not None:
-            effort = most if effort is None else min(effort, most)
+        if max_effort is not None:
+            effort = max_effort if effort is None else min(effort, max_effort)
         return Actuator(name=self.name, source=self.source, joint=self.joint, effort=effort)
 
 
-def actuators(spec: "mujoco.MjSpec", node_of: Callable[[Any], Node]) -> Iterator[Drive]:
-    """Yield the actuators of a model; `node_of` tells which element each one is."""
+def read_actuators(spec: "mujoco.MjSpec", node_of: Callable[[Any], Node]) -> Iterator[ActuatorData]:
+    """Yield the actuators of a model; `node_of` returns the node of a MuJoCo element."""
     import mujoco
 
     joints = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
@@ -47,10 +52,10 @@ def actuators(spec: "mujoco.MjSpec", node_of: Callable[[Any], Node]) -> Iterator
         node = node_of(each)
         gear = float(each.gear[0])
         joint = each.target if each.trntype in joints else ""
-        force = None if "plugin" in node.written else _commanded(each)
+        force = None if "plugin" in node.written else _max_commanded_force(each)
         limit = _limit(each.forcelimited, each.forcerange, each.compiler.autolimits)
         force = limit if force is None else force if limit is None else min(force, limit)
-        yield Drive(
+        yield ActuatorData(
             name=each.name or (f"{joint}_actuator" if joint else node.tag),
             source=node.source,
             joint=joint,
@@ -59,10 +64,10 @@ def actuators(spec: "mujoco.MjSpec", node_of: Callable[[Any], Node]) -> Iterator
         )
 
 
-def _commanded(actuator: Any) -> float | None:
-    """Return the largest force that can be asked for: that of a motor with a range of commands.
+def _max_commanded_force(actuator: Any) -> float | None:
+    """Return the largest force that a command can request; None if commands do not limit it.
 
-    Where the force also hangs on where the joint is, as for a servo, no command limits it.
+    The force of a servo also depends on the joint position, so that no command limits it.
     """
     import mujoco
 
@@ -80,43 +85,43 @@ def _commanded(actuator: Any) -> float | None:
     return force if force is None or math.isfinite(force) else None
 
 
-def _limit(limited: Any, bounds: Sequence[float], automatic: bool) -> float | None:
-    """Return the largest size of what lies between two bounds; None if they do not hold."""
+def _limit(limited: Any, bounds: Sequence[float], autolimits: bool) -> float | None:
+    """Return the largest absolute value of a range; None if the range is not active."""
     import mujoco
 
     low, high = map(float, bounds)
     states = mujoco.mjtLimited
     holds = limited == states.mjLIMITED_TRUE or (
-        limited == states.mjLIMITED_AUTO and automatic and low < high
+        limited == states.mjLIMITED_AUTO and autolimits and low < high
     )
     largest = max(abs(low), abs(high))
     return largest if holds and math.isfinite(largest) else None
 
 
-def force_limit(joint: Any, drives: Sequence[Drive], factor: float) -> float | None:
-    """Return the most that actuators can put on a joint, and that it lets through; None if no end.
+def force_limit(joint: Any, actuators: Sequence[ActuatorData], factor: float) -> float | None:
+    """Return the maximum effort of the actuators of a joint; None if unlimited.
 
     Args:
-        joint: The joint.
-        drives: Its actuators.
-        factor: What the frames around it do to forces.
+        joint: The MuJoCo joint.
+        actuators: Its actuators.
+        factor: Factor of the frames around the joint on forces.
     """
     limits = [
         _limit(joint.actfrclimited, joint.actfrcrange, joint.compiler.autolimits),
-        sum(drive.effort for drive in drives if drive.effort is not None)
-        if drives and all(drive.effort is not None for drive in drives)
+        sum(actuator.effort for actuator in actuators if actuator.effort is not None)
+        if actuators and all(actuator.effort is not None for actuator in actuators)
         else None,
     ]
     known = [limit for limit in limits if limit is not None]
     return min(known) * factor if known else None
 
 
-def mimics(spec: "mujoco.MjSpec", node_of: Callable[[Any], Node]) -> dict[str, Mimic]:
-    """Return what each joint follows that an equality ties to another, in proportion."""
+def read_mimics(spec: "mujoco.MjSpec", node_of: Callable[[Any], Node]) -> dict[str, Mimic]:
+    """Return the mimic of each joint that a linear equality couples to another joint."""
     import mujoco
 
     joints = {joint.name: joint for joint in spec.joints}
-    found: dict[str, Mimic] = {}
+    mimics: dict[str, Mimic] = {}
     for each in spec.equalities:
         follower, target = joints.get(each.name1), joints.get(each.name2)
         tied = each.type == mujoco.mjtEq.mjEQ_JOINT and each.active
@@ -126,13 +131,13 @@ def mimics(spec: "mujoco.MjSpec", node_of: Callable[[Any], Node]) -> dict[str, M
         if any(higher) or not (math.isfinite(offset) and math.isfinite(factor)):
             continue
         ends = [float(joint.ref) * _unit(joint) for joint in (follower, target)]
-        found[each.name1] = Mimic(
+        mimics[each.name1] = Mimic(
             source=node_of(each).source,
             joint=each.name2,
             multiplier=factor,
             offset=offset + ends[0] - factor * ends[1],
         )
-    return found
+    return mimics
 
 
 def _unit(joint: Any) -> float:

@@ -1,8 +1,8 @@
-"""MJCF documents: the file and what it includes, as one tree that MuJoCo's parser may be given.
+"""Read an MJCF document and the files it includes into one tree.
 
-MuJoCo tells the line of an element, but not the file, and opens what it is told to. So includes are
-put in here, what would open a file or fill the memory is left out, and the tree is written with
-each element on a line of its own: the line says which element it is, wherever it came from.
+MuJoCo reports the line of an element, but not its file, and opens every file that is named.
+Includes are resolved here, elements that would open files or allocate much memory are removed, and
+the tree is written with one element per line, so that a line identifies an element.
 """
 
 import re
@@ -23,49 +23,49 @@ from terrainkit_robots.description.xml.document import (
 )
 
 MAX_ELEMENTS = 8_000
-"""MuJoCo's parser takes time with the square of the elements: seconds for these."""
+"""Maximum number of elements; MuJoCo's parser needs quadratic time, seconds for this many."""
 
-_MOST_DEPTH = 400
-"""MuJoCo's parser stops at 500."""
+_MAX_DEPTH = 400
+"""Maximum depth of nested elements; MuJoCo's parser stops at 500."""
 
-_MOST_FILES = 200
-"""So many files are read for one model."""
+_MAX_FILES = 200
+"""Maximum number of files of a model."""
 
-_ARRAYS = 1000
-"""So many characters of attributes count as one more element."""
+_CHARS_PER_ELEMENT = 1000
+"""Number of characters of attributes that count as one element."""
 
-_LEFT_OUT = {
+_EXCLUDED_ATTRIBUTES = {
     "*": {"user"},
     "hfield": {"nrow", "ncol", "elevation"},
     "mesh": {"builtin", "params", "vertex", "normal", "texcoord", "face"},
     "numeric": {"size"},
 }
-"""Attributes that make MuJoCo's parser allocate or compute, and say nothing of the robot."""
+"""Attributes that make MuJoCo's parser allocate memory, and do not describe the robot."""
 
-_SOFT = frozenset({"flexcomp", "deformable", "skin", "extension"})
-"""Elements that are left out: soft bodies and skins, and plugins that may not be installed."""
+_EXCLUDED_TAGS = frozenset({"flexcomp", "deformable", "skin", "extension"})
+"""Elements that are skipped: soft bodies, skins, and plugins that may not be installed."""
 
 
 @dataclass(eq=False, slots=True)
 class Node:
-    """An element of the tree. What MuJoCo refuses is taken out of it, so that it reads the rest."""
+    """An element of the tree; elements that MuJoCo rejects are removed."""
 
     tag: str
     source: Source
     folder: Path
-    """Where the model starts that it is a part of: mesh files are looked for from there."""
+    """Folder of the model that the element belongs to; mesh files are relative to it."""
 
     parent: "Node | None" = None
     attributes: dict[str, str] = field(default_factory=dict)
-    """As MuJoCo is given them."""
+    """Attributes that are passed to MuJoCo."""
 
     written: Mapping[str, str] = field(default_factory=dict)
-    """As they are in the file."""
+    """Attributes as written in the file."""
 
     children: list["Node"] = field(default_factory=list)
 
     def walk(self) -> Iterator["Node"]:
-        """Yield the node and all below it, in the order of the file."""
+        """Yield the node and its descendants in document order."""
         stack = [self]
         while stack:
             node = stack.pop()
@@ -73,25 +73,25 @@ class Node:
             stack.extend(reversed(node.children))
 
     def remove(self) -> None:
-        """Take it out of the tree."""
+        """Remove the node from the tree."""
         if self.parent is not None:
             self.parent.children.remove(self)
             self.parent = None
 
-    invented: str = ""
-    """Name of a body that has none."""
+    default_name: str = ""
+    """Generated name of a body that has none."""
 
-    placeholders: set[str] = field(default_factory=set)
-    """Attributes that stand for missing ones."""
+    defaults: set[str] = field(default_factory=set)
+    """Attributes that were added for missing required ones."""
 
     @property
     def name(self) -> str:
-        """Return its name, or that which was made up for it."""
-        return self.written.get("name", "") or self.invented
+        """Return the name of the node, or its generated name."""
+        return self.written.get("name", "") or self.default_name
 
     @property
     def owner(self) -> str:
-        """Return the name of the nearest element that has one, itself first."""
+        """Return the name of the nearest named element, starting at the node itself."""
         node: Node | None = self
         while node is not None and not node.name:
             node = node.parent
@@ -100,81 +100,81 @@ class Node:
 
 @dataclass(eq=False)
 class MjcfDocument:
-    """A model as trees: its own, and those of the models that it attaches."""
+    """Trees of a model and of the models that it attaches."""
 
     root: Node
     attached: dict[str, Node]
-    """By the name that `model` elements have for them in the text."""
+    """Attached models by the file name that `model` elements refer to."""
 
     problems: list[Problem]
     sources: tuple[Path, ...]
     """Every file that was read."""
 
-    whole: bool = True
-    """Whether everything in the file is in the trees; not so where soft bodies were left out."""
+    complete: bool = True
+    """Whether the trees contain the whole file; False if elements were skipped."""
 
     def roots(self) -> list[Node]:
-        """Return the tree of the model and those that it attaches."""
+        """Return the root of the model and those of the attached models."""
         return [self.root, *self.attached.values()]
 
     def nodes(self) -> Iterator[Node]:
-        """Yield every node."""
+        """Yield all nodes."""
         for root in self.roots():
             yield from root.walk()
 
     def write(self) -> tuple[str, dict[str, bytes], list[Node]]:
-        """Return the text of the model, those of what it attaches, and the node of each line.
+        """Return the text of the model, the files of attached models, and the node of each line.
 
-        The lines of an attached model follow those of the one before, so that a line is only one
-        element.
+        The lines of an attached model follow those of the previous one, so that each line
+        identifies one element.
         """
         lines: list[Node] = []
-        text = _text(self.root, lines)
+        text = _to_text(self.root, lines)
         attached = {
-            name: ("\n" * len(lines) + _text(root, lines)).encode()
+            name: ("\n" * len(lines) + _to_text(root, lines)).encode()
             for name, root in self.attached.items()
         }
         return text, attached, lines
 
 
 def read_document(document: XmlDocument, contents: Mapping[Path, bytes]) -> MjcfDocument:
-    """Return a document with what it includes and attaches.
+    """Return a document with the files that it includes and attaches.
 
     Args:
-        document: The main file; it has a root.
-        contents: What to read instead of the files of these paths.
+        document: The main file; it has a root element.
+        contents: File contents by path, which are used instead of the files on disk.
     """
     reader = _Reader(contents)
     reader.problems += document.problems
     root = reader.tree(document)
     if root.tag != "mujoco":
-        message = f"the root element is <{root.tag}>, a part of a model; wanted <mujoco>"
+        message = f"root element: got <{root.tag}>, a part of a model; expected <mujoco>"
         reader.problems.append(Problem(code="XML002", message=message, source=root.source))
         root.tag = "mujoco"
-    whole = MjcfDocument(
+    complete = MjcfDocument(
         root=root,
         attached=reader.attached,
         problems=reader.problems,
         sources=tuple(reader.files),
-        whole=reader.whole,
+        complete=reader.complete,
     )
-    bound(whole)
-    return whole
+    limit_size(complete)
+    return complete
 
 
-def harmless(tag: str, attribute: str = "") -> bool:
-    """Return whether an element or an attribute of it may be given to MuJoCo's parser."""
-    if tag in _SOFT | {"include", "model", "plugin"}:
+def is_allowed(tag: str, attribute: str = "") -> bool:
+    """Return whether an element or attribute may be passed to MuJoCo's parser."""
+    if tag in _EXCLUDED_TAGS | {"include", "model", "plugin"}:
         return False
-    return attribute not in _left_out(tag)
+    return attribute not in _excluded_attributes(tag)
 
 
-def _left_out(tag: str) -> set[str]:
-    return _LEFT_OUT["*"] | _LEFT_OUT.get(tag, set())
+def _excluded_attributes(tag: str) -> set[str]:
+    return _EXCLUDED_ATTRIBUTES["*"] | _EXCLUDED_ATTRIBUTES.get(tag, set())
 
 
 class _Reader:
-    """One walk through a model's files; its problems are gathered on the way."""
+    """Read the files of a model and collect their problems."""
 
     def __init__(self, contents: Mapping[Path, bytes]) -> None:
         self._contents = contents
@@ -184,31 +184,31 @@ class _Reader:
         self.files: list[Path] = []
         self.problems: list[Problem] = []
         self.attached: dict[str, Node] = {}
-        self.whole = True
+        self.complete = True
         self._deep = False
 
-    def tree(self, main: XmlDocument, above: tuple[Path, ...] = ()) -> Node:
-        """Return the tree of a model; `above` are the models that attach it."""
+    def tree(self, main: XmlDocument, parents: tuple[Path, ...] = ()) -> Node:
+        """Return the tree of a model; `parents` are the files of the models that attach it."""
         assert main.root is not None
         self.files.append(main.file)
         folder = main.file.parent
-        included: dict[Path, tuple[Path, ...]] = {_same(main.file): ()}
+        included: dict[Path, tuple[Path, ...]] = {_real_path(main.file): ()}
         top = Node(tag="", source=main.source(main.root), folder=folder)
         stack: list[tuple[etree._Element, XmlDocument, Node, int]] = [(main.root, main, top, 0)]
         while stack and self._count <= MAX_ELEMENTS:
             element, document, parent, depth = stack.pop()
             source = document.source(element)
             if element.tag == "include":
-                part = self._included(element, document, folder, included)
+                part = self._load_include(element, document, folder, included)
                 if part is not None and part.root is not None:
                     inner = reversed(list(part.root.iterchildren(etree.Element)))
                     stack += [(child, part, parent, depth) for child in inner]
                 continue
-            if depth > _MOST_DEPTH:
-                self._too_deep(source)
+            if depth > _MAX_DEPTH:
+                self._report_depth(source)
                 continue
             node = self._node(element, source, parent, folder)
-            if node is None or not self._attaches(node, (*above, main.file)):
+            if node is None or not self._load_attached(node, (*parents, main.file)):
                 continue
             parent.children.append(node)
             self._count += 1
@@ -221,23 +221,23 @@ class _Reader:
     def _node(
         self, element: "etree._Element", source: Source, parent: Node, folder: Path
     ) -> Node | None:
-        """Return an element without what MuJoCo's parser should not see; None for such a one."""
-        tag = _plain(element.tag, element)
-        written = {_plain(name, element): value for name, value in element.attrib.items()}
+        """Return the node of an element without excluded attributes, or None."""
+        tag = _prefixed_name(element.tag, element)
+        written = {_prefixed_name(name, element): value for name, value in element.attrib.items()}
         node = Node(tag=tag, source=source, folder=folder, parent=parent, written=written)
         node.attributes = {
-            k: _bare(v) if k.startswith("file") and tag != "model" else v
+            k: _base_name(v) if k.startswith("file") and tag != "model" else v
             for k, v in written.items()
-            if k not in _left_out(tag)
+            if k not in _excluded_attributes(tag)
         }
         if tag == "body" and not node.name:
             self._unnamed += 1
-            node.invented = f"unnamed_body_{self._unnamed}"
-        if tag in _SOFT:
-            self.whole = self.whole and tag != "flexcomp"
+            node.default_name = f"unnamed_body_{self._unnamed}"
+        if tag in _EXCLUDED_TAGS:
+            self.complete = self.complete and tag != "flexcomp"
             return None
         if tag == "plugin" and parent.tag == "actuator":
-            node.tag = "general"  # it drives a joint like any other
+            node.tag = "general"  # it acts on a joint like any other actuator
             node.attributes = {
                 k: v for k, v in node.attributes.items() if k not in ("plugin", "instance")
             }
@@ -245,101 +245,105 @@ class _Reader:
             return None
         return node
 
-    def _included(
+    def _load_include(
         self,
         element: "etree._Element",
         document: XmlDocument,
         folder: Path,
         included: dict[Path, tuple[Path, ...]],
     ) -> XmlDocument | None:
-        """Return what an include names, or None and tell why not."""
+        """Return the document of an <include>; None with a problem if it cannot be read."""
         source, name = document.source(element), (element.get("file") or "").strip()
-        chain = (*included[_same(document.file)], _same(document.file))
+        chain = (*included[_real_path(document.file)], _real_path(document.file))
         if not name:
-            self._tell(source, "<include> has no file", "")
+            self._add_problem(source, "<include> has no file", "")
             return None
         if len(element):
-            self._tell(source, f"<include file={name!r}> has children; MuJoCo refuses that", name)
+            self._add_problem(
+                source, f"<include file={name!r}> has children; MuJoCo rejects the file", name
+            )
         path = folder / name
-        beside = document.file.parent / name
-        if not self._exists(path) and self._exists(beside):
-            path = beside
-        if _same(path) in included:
-            how = "from within itself" if _same(path) in chain else "a second time"
-            self._tell(source, f"{name} is included {how}; MuJoCo refuses that", name)
+        sibling = document.file.parent / name
+        if not self._exists(path) and self._exists(sibling):
+            path = sibling
+        if _real_path(path) in included:
+            how = "by itself" if _real_path(path) in chain else "twice"
+            self._add_problem(source, f"{name} is included {how}; MuJoCo rejects the file", name)
             return None
         part = self._read(path, source, name)
         if part is not None and part.root is not None:
-            included[_same(path)] = chain
+            included[_real_path(path)] = chain
             self.files.append(path)
             if not len(part.root):
-                self._tell(source, f"{name} has nothing in it to include", name)
+                self._add_problem(source, f"{name} is empty; expected elements to include", name)
         return part
 
     def _exists(self, path: Path) -> bool:
         return path in self._contents or exists(path)
 
     def _read(self, path: Path, source: Source, name: str) -> XmlDocument | None:
-        if len(self.files) >= _MOST_FILES or self._bytes > MAX_BYTES:
-            self._tell(source, f"{name} is not read: too many or too large files", name)
+        if len(self.files) >= _MAX_FILES or self._bytes > MAX_BYTES:
+            self._add_problem(
+                source, f"{name} is not read: too many included files, or too much data", name
+            )
             return None
         try:
             data = self._contents[path] if path in self._contents else read_bytes(path)
         except RobotFileError as error:
-            self._tell(source, f"{name}: {error}", name)
+            self._add_problem(source, f"{name}: {error}", name)
             return None
         self._bytes += len(data)
         part = parse_xml(path, data)
         self.problems += part.problems
         if part.root is None:
-            self._tell(source, f"{name} could not be read", name)
+            self._add_problem(source, f"{name} could not be parsed", name)
             return None
         return part
 
-    def _attaches(self, node: Node, above: tuple[Path, ...]) -> bool:
-        """Read the model that a <model> element names; False if the element has no use."""
+    def _load_attached(self, node: Node, parents: tuple[Path, ...]) -> bool:
+        """Read the model of a <model> element; return whether the element is kept."""
         if node.tag != "model":
             return True
         name = node.written.get("file", "")
         if not name:
-            self._tell(node.source, "<model> has no file", "")
+            self._add_problem(node.source, "<model> has no file", "")
             return False
         path = node.folder / name
-        if _same(path) in map(_same, above):
-            self._tell(node.source, f"{name} attaches itself", name)
+        if _real_path(path) in map(_real_path, parents):
+            self._add_problem(node.source, f"{name} attaches itself", name)
             return False
         part = self._read(path, node.source, name)
         if part is None or part.root is None:
             return False
         if part.root.tag != "mujoco":
-            message = f"{name} is a <{part.root.tag}>, and only a <mujoco> is attached here"
-            self._tell(node.source, message, name)
+            message = f"root element of {name}: got <{part.root.tag}>; expected <mujoco>"
+            self._add_problem(node.source, message, name)
             return False
         key = f"attached_{len(self.attached)}.xml"
         self.attached[key] = Node(tag="mujoco", source=node.source, folder=path.parent)
         node.attributes["file"] = key
-        self.attached[key] = self.tree(part, above)
+        self.attached[key] = self.tree(part, parents)
         return True
 
-    def _tell(self, source: Source, message: str, subject: str) -> None:
+    def _add_problem(self, source: Source, message: str, subject: str) -> None:
         self.problems.append(
             Problem(code="XML012", message=message, source=source, subject=subject)
         )
 
-    def _too_deep(self, source: Source) -> None:
+    def _report_depth(self, source: Source) -> None:
         if not self._deep:
-            message = f"elements are nested more than {_MOST_DEPTH} deep; MuJoCo refuses that"
+            message = f"elements are nested more than {_MAX_DEPTH} deep; MuJoCo rejects the file"
             self.problems.append(Problem(code="XML011", message=message, source=source))
-        self._deep, self.whole = True, False
+        self._deep, self.complete = True, False
 
 
-def _bare(file: str) -> str:
-    """Return the name of a file without folders: MuJoCo's parser looks whether it is there."""
+def _base_name(file: str) -> str:
+    """Return a file name without folders, because MuJoCo's parser checks whether files exist."""
     return re.split(r"[/\\]", file)[-1] or file
 
 
-def _plain(name: str, element: "etree._Element") -> str:
-    """Return a name as it is written, with the prefix of its namespace."""
+def _prefixed_name(name: str, element: "etree._Element") -> str:
+    """Return a name as written, with its namespace prefix."""
     if not name.startswith("{"):
         return name
     namespace, _, local = name[1:].partition("}")
@@ -348,75 +352,75 @@ def _plain(name: str, element: "etree._Element") -> str:
     return f"{prefix}:{local}" if prefix else local
 
 
-def _same(path: Path) -> Path:
-    """Return one path for each file."""
+def _real_path(path: Path) -> Path:
+    """Return the real path, which is the same for all names of a file."""
     try:
         return path.resolve()
-    except (OSError, RuntimeError, ValueError):  # a loop of links, a NUL character
+    except (OSError, RuntimeError, ValueError):  # a cycle of symbolic links, a NUL character
         return path
 
 
-def bound(document: MjcfDocument) -> None:
-    """See to it that the model stays small: replicas are not made, or nothing is read at all."""
+def limit_size(document: MjcfDocument) -> None:
+    """Keep the model small: remove replicas or, if that is not enough, everything."""
     if sum(1 for _ in document.nodes()) <= MAX_ELEMENTS:
-        if _cost(document) <= MAX_ELEMENTS:
+        if _total_size(document) <= MAX_ELEMENTS:
             return
         replicas = [node for node in document.nodes() if node.tag == "replicate"]
         for node in replicas:
             node.attributes["count"] = "1"
-        if replicas and _cost(document) <= MAX_ELEMENTS:
-            _tell_size(document, replicas[0], "no replicas are made")
-            document.whole = False
+        if replicas and _total_size(document) <= MAX_ELEMENTS:
+            _report_size(document, replicas[0], "replicas are not created")
+            document.complete = False
             return
-    _tell_size(document, document.root, "nothing of the model is read")
+    _report_size(document, document.root, "the model is not read")
     document.root.children.clear()
     document.attached.clear()
-    document.whole = False
+    document.complete = False
 
 
-def _tell_size(document: MjcfDocument, node: Node, what: str) -> None:
+def _report_size(document: MjcfDocument, node: Node, what: str) -> None:
     message = (
-        f"{what}: it has more than {MAX_ELEMENTS} elements, long attributes counted as several, "
-        "and MuJoCo's parser takes the square of that in time"
+        f"number of elements: more than {MAX_ELEMENTS}, long attributes count as several; {what}, "
+        "because MuJoCo's parser needs quadratic time"
     )
     document.problems.append(
         Problem(code="XML011", message=message, source=node.source, subject=node.owner)
     )
 
 
-def _cost(document: MjcfDocument) -> int:
-    """Return the number of elements once all replicas are made; what is attached counts each time.
+def _total_size(document: MjcfDocument) -> int:
+    """Return the number of elements after replication, each attached copy counted.
 
     Long attributes count as further elements.
     """
-    costs: dict[str, int] = {}
-    for key in reversed(document.attached):  # an attached model comes after the one that names it
-        costs[key] = _cost_of(document, document.attached[key], costs)
-    return _cost_of(document, document.root, costs)
+    sizes: dict[str, int] = {}
+    for key in reversed(document.attached):  # attached models follow the models that name them
+        sizes[key] = _tree_size(document, document.attached[key], sizes)
+    return _tree_size(document, document.root, sizes)
 
 
-def _cost_of(document: MjcfDocument, root: Node, models: Mapping[str, int]) -> int:
+def _tree_size(document: MjcfDocument, root: Node, models: Mapping[str, int]) -> int:
     nodes = list(root.walk())
     files = {
         node.attributes.get("name") or document.attached[file].attributes.get("model", ""): file
         for node in nodes
         if node.tag == "model" and (file := node.attributes.get("file")) in document.attached
     }
-    costs: dict[Node, int] = {}
+    sizes: dict[Node, int] = {}
     for node in reversed(nodes):  # children before their parents
-        cost = sum(costs.pop(child) for child in node.children)
+        size = sum(sizes.pop(child) for child in node.children)
         if node.tag == "replicate":
             count = re.fullmatch(r"\s*\+?([0-9]{1,30})\s*", node.attributes.get("count", ""))
-            cost *= int(count[1]) if count else 1
+            size *= int(count[1]) if count else 1
         elif node.tag == "attach":
-            cost += models.get(files.get(node.attributes.get("model", ""), ""), 0)
-        costs[node] = 1 + cost + sum(map(len, node.attributes.values())) // _ARRAYS
-    return costs[root]
+            size += models.get(files.get(node.attributes.get("model", ""), ""), 0)
+        sizes[node] = 1 + size + sum(map(len, node.attributes.values())) // _CHARS_PER_ELEMENT
+    return sizes[root]
 
 
-def _text(root: Node, lines: list[Node]) -> str:
-    """Return a tree as text, one element on each line, and add the node of each to `lines`."""
-    from xml.sax.saxutils import quoteattr  # it brings urllib along
+def _to_text(root: Node, lines: list[Node]) -> str:
+    """Return a tree as text with one element per line, and append the nodes to `lines`."""
+    from xml.sax.saxutils import quoteattr  # imports urllib
 
     parts: list[str] = []
     stack: list[Node | str] = [root]

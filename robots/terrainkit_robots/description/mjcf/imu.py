@@ -1,4 +1,4 @@
-"""The IMU of a MJCF: the site at which turning and acceleration are sensed."""
+"""Find the site of the IMU of an MJCF."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,32 +12,32 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlacedSite:
+class BodySite:
     """A site on a body."""
 
     site: Any
     """The `mujoco.MjsSite`."""
 
     link: str
-    """Name of the body's link."""
+    """Name of the link of the body."""
 
     depth: int
-    """How many bodies it is below the world."""
+    """Depth of the body below the world."""
 
     node: Node
     scale: Scale
-    """What the frames around the body do to its size."""
+    """Scale of the frames around the body."""
 
 
-def find_imu(spec: "mujoco.MjSpec", sites: Sequence[PlacedSite]) -> PlacedSite | None:
-    """Return the site that a gyro or an accelerometer names, else one called imu; None without.
+def find_imu(spec: "mujoco.MjSpec", sites: Sequence[BodySite]) -> BodySite | None:
+    """Return the site of a gyro or an accelerometer, else a site named imu, else None.
 
-    Of several it is the one closest to the base, and of those the first.
+    Of several sites, the one closest to the base is returned.
     """
     import mujoco
 
     kinds = (mujoco.mjtSensor.mjSENS_GYRO, mujoco.mjtSensor.mjSENS_ACCELEROMETER)
     sensed = {sensor.objname for sensor in spec.sensors if sensor.type in kinds} - {""}
-    found = [each for each in sites if each.site.name in sensed]
-    found = found or [each for each in sites if each.site.name.lower() == "imu"]
-    return min(found, key=lambda each: each.depth, default=None)
+    mimics = [each for each in sites if each.site.name in sensed]
+    mimics = mimics or [each for each in sites if each.site.name.lower() == "imu"]
+    return min(mimics, key=lambda each: each.depth, default=None)

@@ -1,4 +1,4 @@
-"""Inertia of MJCF bodies without one: MuJoCo takes it from the mass or density of their shapes."""
+"""Compute the inertia of MJCF bodies from their geoms, as MuJoCo does."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,40 +11,41 @@ from terrainkit_robots.transforms import Matrix
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Solid:
-    """A shape that has mass."""
+    """A shape with mass."""
 
     mass: float
-    """Mass [kg]; NaN if a mesh file would have to be opened to know it."""
+    """Mass [kg]; NaN if it depends on a mesh file."""
 
     pose: Matrix
-    """Pose in the body's frame, shape (4, 4) [m]."""
+    """Pose in the body frame, shape (4, 4) [m]."""
 
     moments: Matrix
-    """Principal moments along the axes of the shape, shape (3,) [kg m2]; NaN like the mass."""
+    """Principal moments of inertia along the axes of the shape, shape (3,) [kg m2]; NaN if they
+    depend on a mesh file."""
 
 
-def solid(
+def make_solid(
     shape: str, size: Sequence[float], pose: Matrix, *, mass: float, density: float
 ) -> Solid | None:
-    """Return the solid of a shape, or None if it has no mass.
+    """Return the solid of a shape; None if it has no mass.
 
     Args:
-        shape: Its kind.
-        size: MuJoCo's size numbers [m].
-        pose: Its pose in the body's frame, shape (4, 4) [m].
-        mass: Its mass [kg]; NaN if that comes from the density.
-        density: Its density [kg/m3].
+        shape: Kind of the shape.
+        size: MuJoCo's size parameters [m].
+        pose: Pose in the body frame, shape (4, 4) [m].
+        mass: Mass [kg]; NaN to compute it from the density.
+        density: Density [kg/m3].
     """
-    weightless = mass == 0 or (np.isnan(mass) and density == 0)
-    if weightless or shape == "plane" or min(size, default=1) <= 0:
+    massless = mass == 0 or (np.isnan(mass) and density == 0)
+    if massless or shape == "plane" or min(size, default=1) <= 0:
         return None
-    volume, moments = _filled(shape, size)
+    volume, moments = _unit_volume_and_moments(shape, size)
     mass = float(density * volume) if np.isnan(mass) else mass
     return Solid(mass=mass, pose=pose, moments=mass * moments)
 
 
-def _filled(shape: str, size: Sequence[float]) -> tuple[float, Matrix]:
-    """Return volume and moments for a mass of one; NaN where the size does not say."""
+def _unit_volume_and_moments(shape: str, size: Sequence[float]) -> tuple[float, Matrix]:
+    """Return the volume [m3] and the moments of inertia for unit mass; NaN if unknown."""
     match shape:
         case "sphere":
             r = size[0]
@@ -65,21 +66,21 @@ def _filled(shape: str, size: Sequence[float]) -> tuple[float, Matrix]:
 
 
 def _capsule(r: float, half: float) -> tuple[float, Matrix]:
-    ends, middle = 4 / 3 * np.pi * r**3, 2 * np.pi * r**2 * half
-    volume = ends + middle
+    caps, middle = 4 / 3 * np.pi * r**3, 2 * np.pi * r**2 * half
+    volume = caps + middle
     if not volume > 0:
         return volume, np.zeros(3)
     # a half ball has its centre 3/8 r from its flat side, which is `half` from the middle
     across_ends = 2 / 5 * r**2 + half**2 + 3 / 4 * r * half
-    across = ends * across_ends + middle * (r**2 / 4 + half**2 / 3)
-    along = ends * 2 / 5 * r**2 + middle * r**2 / 2
+    across = caps * across_ends + middle * (r**2 / 4 + half**2 / 3)
+    along = caps * 2 / 5 * r**2 + middle * r**2 / 2
     return volume, np.array([across, across, along]) / volume
 
 
 def sum_solids(solids: Sequence[Solid], source: Source) -> Inertial | None:
-    """Return the inertia of a body that consists of solids; None if there are none.
+    """Return the inertia of a body made of solids; None if there are none.
 
-    It has NaN for what is not known.
+    Unknown values are NaN.
     """
     if not solids:
         return None
@@ -90,8 +91,8 @@ def sum_solids(solids: Sequence[Solid], source: Source) -> Inertial | None:
     center = sum((each.mass * each.pose[:3, 3] for each in solids), start=np.zeros(3)) / mass
     inertia = np.zeros((3, 3))
     for each in solids:
-        turn, arm = each.pose[:3, :3], each.pose[:3, 3] - center
-        inertia += turn @ np.diag(each.moments) @ turn.T
+        rotation, arm = each.pose[:3, :3], each.pose[:3, 3] - center
+        inertia += rotation @ np.diag(each.moments) @ rotation.T
         inertia += each.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))  # parallel axes
     if not np.isfinite(inertia).all():
         return unknown

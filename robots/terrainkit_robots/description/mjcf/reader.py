@@ -1,10 +1,10 @@
-"""MJCF: from XML to a robot.
+"""Read the robot of an MJCF document.
 
-MuJoCo's own parser says what the XML means (defaults, frames, degrees, replicas), this reader what
-of that a robot is. Nothing is compiled: that would open the meshes, and stop at the first defect.
+MuJoCo's parser resolves defaults, frames, units and replicas. Nothing is compiled, because the
+compiler opens meshes and stops at the first error.
 
-MuJoCo makes a body's mass from its shapes where there is no <inertial>. So does this reader; a mass
-that hangs on a mesh file is NaN here, since reading opens none.
+MuJoCo computes the mass of a body without <inertial> from its geoms, and so does this reader.
+Masses that depend on a mesh file are NaN.
 """
 
 import math
@@ -16,25 +16,30 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from terrainkit_robots.description.mjcf.actuators import Drive, actuators, force_limit, mimics
+from terrainkit_robots.description.mjcf.actuators import (
+    ActuatorData,
+    force_limit,
+    read_actuators,
+    read_mimics,
+)
 from terrainkit_robots.description.mjcf.document import MjcfDocument, Node, read_document
-from terrainkit_robots.description.mjcf.imu import PlacedSite, find_imu
-from terrainkit_robots.description.mjcf.inertia import Solid, solid, sum_solids
-from terrainkit_robots.description.mjcf.parser import parse_mjcf, tell
+from terrainkit_robots.description.mjcf.imu import BodySite, find_imu
+from terrainkit_robots.description.mjcf.inertia import Solid, make_solid, sum_solids
+from terrainkit_robots.description.mjcf.parser import add_problem, parse_mjcf
 from terrainkit_robots.description.mjcf.references import dangling_references
 from terrainkit_robots.description.mjcf.shapes import (
     SIZES,
     Scale,
-    between,
+    apply_frames,
     color_of,
-    in_frames,
+    fromto_pose,
+    geom_shape,
     mesh_file,
     mesh_geometry,
     mesh_name,
-    placed,
-    scaled,
-    shape_of,
-    turn_of,
+    pose_and_scale,
+    resolve_orientation,
+    scale_solid,
 )
 from terrainkit_robots.description.model import (
     Actuator,
@@ -55,15 +60,15 @@ if TYPE_CHECKING:
 WORLD = "world"
 
 _PAIRED = 1 << 30
-"""Contype of a shape that only a <pair> lets collide: a bit that others have no use for."""
+"""Contype bit of geoms that collide only through a <pair>; no other geom uses it."""
 
 
 def read_mjcf(document: XmlDocument, *, contents: Mapping[Path, bytes] | None = None) -> RobotModel:
     """Return the robot of a document whose root is <mujoco>.
 
     Args:
-        document: The document.
-        contents: What to read instead of the included files of these paths.
+        document: The XML document.
+        contents: File contents by path, which are used instead of included files on disk.
     """
     file = document.file
     if document.root is None:
@@ -85,12 +90,12 @@ def read_mjcf(document: XmlDocument, *, contents: Mapping[Path, bytes] | None = 
         sources=tree.sources,
     )
     if spec is not None:
-        robot = _Reader(tree, spec, lines).filled(robot)
+        robot = _Reader(tree, spec, lines).fill(robot)
     return replace(robot, problems=tuple(tree.problems))
 
 
 class _Reader:
-    """One walk through what MuJoCo has parsed; problems are added to those of the document."""
+    """Convert a parsed MuJoCo spec to links and joints, and collect problems."""
 
     def __init__(
         self, document: MjcfDocument, spec: "mujoco.MjSpec", lines: Sequence[Node]
@@ -103,28 +108,28 @@ class _Reader:
         self._paired = {name for p in spec.pairs for name in (p.geomname1, p.geomname2)} - {""}
         self._bodies = _Names(body.name for body in spec.bodies)
         self._joints = _Names(joint.name for joint in spec.joints)
-        self._actuators = tuple(actuators(spec, self._node))
-        self._drives: dict[str, list[Drive]] = {}
-        for drive in self._actuators:
-            self._drives.setdefault(drive.joint, []).append(drive)
-        self._mimics = mimics(spec, self._node)
+        self._actuators = tuple(read_actuators(spec, self._node))
+        self._joint_actuators: dict[str, list[ActuatorData]] = {}
+        for actuator in self._actuators:
+            self._joint_actuators.setdefault(actuator.joint, []).append(actuator)
+        self._mimics = read_mimics(spec, self._node)
         self._factors: dict[str, float] = {}
-        self._sites: list[PlacedSite] = []
-        self._told: set[str] = set()
+        self._sites: list[BodySite] = []
+        self._reported: set[str] = set()
 
-    def filled(self, robot: RobotModel) -> RobotModel:
-        """Return a robot with all that is in the model."""
-        links, joints = self._tree()
+    def fill(self, robot: RobotModel) -> RobotModel:
+        """Return the robot with the contents of the spec."""
+        links, joints = self._read_bodies()
         compiler = self._spec.compiler
         bounds = float(compiler.boundmass), float(compiler.boundinertia)
-        links = [replace(each, inertial=_bounded(each, *bounds)) for each in links]
+        links = [replace(each, inertial=_apply_minimums(each, *bounds)) for each in links]
         dangling_references(self._document, self._spec)
         return replace(
             robot,
-            links=_weighed(links, float(compiler.settotalmass)),
+            links=_scale_to_total_mass(links, float(compiler.settotalmass)),
             joints=joints,
-            actuators=self._driving(joints),
-            home=self._home(joints),
+            actuators=self._scaled_actuators(joints),
+            home=self._home_positions(joints),
             imu=self._imu(),
             excluded=frozenset(
                 frozenset((each.bodyname1, each.bodyname2))
@@ -133,57 +138,61 @@ class _Reader:
             ),
         )
 
-    def _node(self, element: Any, otherwise: Node | None = None) -> Node:
-        """Return the node that MuJoCo made an element of; it tells the line."""
+    def _node(self, element: Any, default: Node | None = None) -> Node:
+        """Return the node of a MuJoCo element, which stores its line."""
         match = re.fullmatch(r"line (\d+)", element.info)
         line = int(match[1]) if match else 0
         if 1 <= line <= len(self._lines):
             return self._lines[line - 1]
-        return otherwise or self._document.root
+        return default or self._document.root
 
-    def _tell(self, node: Node, message: str) -> None:
-        """Add what MuJoCo's compiler would refuse, each thing once."""
-        if message not in self._told:
-            self._told.add(message)
-            tell(self._document, node, "XML011", message)
+    def _add_problem(self, node: Node, message: str) -> None:
+        """Report what MuJoCo's compiler would reject, each message once."""
+        if message not in self._reported:
+            self._reported.add(message)
+            add_problem(self._document, node, "XML011", message)
 
-    def _driving(self, joints: Sequence[Joint]) -> tuple[Actuator, ...]:
+    def _scaled_actuators(self, joints: Sequence[Joint]) -> tuple[Actuator, ...]:
         most = {joint.name: joint.limit.effort for joint in joints if joint.limit is not None}
         return tuple(
-            drive.actuator(self._factors.get(drive.joint, 1.0), most.get(drive.joint))
-            for drive in self._actuators
+            actuator.actuator(self._factors.get(actuator.joint, 1.0), most.get(actuator.joint))
+            for actuator in self._actuators
         )
 
     # Bodies
 
-    def _tree(self) -> tuple[list[Link], tuple[Joint, ...]]:
+    def _read_bodies(self) -> tuple[list[Link], tuple[Joint, ...]]:
         links: list[Link] = []
         joints: list[Joint] = []
         stack = [(body, WORLD, Scale(), 0) for body in reversed(self._spec.worldbody.bodies)]
         while stack:
             body, parent, outer, depth = stack.pop()
             node = self._node(body)
-            name = body.name or self._bodies.unused(node.invented or "unnamed_body")
-            pose, scale = self._placed(body, node, outer)
-            between, moving = self._moved(body, node, name, parent, pose, scale)
-            links += [*between, self._link(body, node, name, scale)]
-            joints += moving
+            name = body.name or self._bodies.unused(node.default_name or "unnamed_body")
+            pose, scale = self._pose_and_scale(body, node, outer)
+            virtual_links, body_joints = self._read_joints(body, node, name, parent, pose, scale)
+            links += [*virtual_links, self._link(body, node, name, scale)]
+            joints += body_joints
             self._sites += [
-                PlacedSite(site=site, link=name, depth=depth, node=node, scale=scale)
+                BodySite(site=site, link=name, depth=depth, node=node, scale=scale)
                 for site in body.sites
             ]
             stack += [(child, name, scale, depth + 1) for child in reversed(body.bodies)]
         return links, tuple(joints)
 
-    def _placed(self, element: Any, node: Node, outer: Scale) -> tuple[Matrix, Scale]:
+    def _pose_and_scale(self, element: Any, node: Node, outer: Scale) -> tuple[Matrix, Scale]:
         try:
-            pose, scale = placed(element, outer, self._spec)
+            pose, scale = pose_and_scale(element, outer, self._spec)
         except ValueError as error:
-            self._tell(node, f"<{node.tag}> has no orientation: {error}; MuJoCo refuses the file")
+            self._add_problem(
+                node, f"<{node.tag}> has no orientation: {error}; MuJoCo rejects the file"
+            )
             pose, scale = np.eye(4), outer
             pose[:3, 3] = np.asarray(element.pos) * outer.length
-        if not scale.even:
-            self._tell(node, "a <frame> scales its axes differently; here, all by their mean")
+        if not scale.uniform:
+            self._add_problem(
+                node, "scale of <frame>: got different factors; their mean is used for all axes"
+            )
         return pose, scale
 
     def _link(self, body: Any, node: Node, name: str, scale: Scale) -> Link:
@@ -218,7 +227,7 @@ class _Reader:
             return (
                 None if how == derived.mjINERTIAFROMGEOM_FALSE else sum_solids(solids, node.source)
             )
-        written = next((n for n in _inside(node) if n.tag == "inertial"), node)
+        written = next((n for n in _iter_elements(node) if n.tag == "inertial"), node)
         origin = np.eye(4)
         origin[:3, 3] = np.asarray(body.ipos) * scale.length
         full = np.asarray(body.fullinertia)
@@ -228,9 +237,9 @@ class _Reader:
             inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         elif "diaginertia" in written.attributes:
             inertia = np.diag(body.inertia)
-        if math.isnan(full[0]):  # else its axes are those of the body
-            origin[:3, :3] = self._turn(body, written)
-        known = "mass" in written.attributes and "mass" not in written.placeholders
+        if math.isnan(full[0]):  # fullinertia is in the frame of the body
+            origin[:3, :3] = self._orientation(body, written)
+        known = "mass" in written.attributes and "mass" not in written.defaults
         return Inertial(
             source=written.source,
             mass=float(body.mass) * scale.mass if known else None,
@@ -240,51 +249,53 @@ class _Reader:
             axes_attribute=_first(written, ("quat", "axisangle", "xyaxes", "zaxis", "euler")),
         )
 
-    def _turn(self, body: Any, node: Node) -> Matrix:
+    def _orientation(self, body: Any, node: Node) -> Matrix:
         try:
-            return turn_of(body.iquat, body.ialt, body.compiler, self._spec)
+            return resolve_orientation(body.iquat, body.ialt, body.compiler, self._spec)
         except ValueError as error:
-            self._tell(node, f"<inertial> has no orientation: {error}; MuJoCo refuses the file")
+            self._add_problem(
+                node, f"<inertial> has no orientation: {error}; MuJoCo rejects the file"
+            )
             return np.eye(3)
 
     def _imu(self) -> tuple[str, Matrix] | None:
-        """Return the link of the IMU and its pose in the link's frame."""
+        """Return the link of the IMU and its pose in the link frame."""
         found = find_imu(self._spec, self._sites)
         if found is None:
             return None
         node = self._node(found.site, found.node)
         ends = np.asarray(found.site.fromto)
         if math.isnan(ends[0]):
-            return found.link, self._placed(found.site, node, found.scale)[0]
+            return found.link, self._pose_and_scale(found.site, node, found.scale)[0]
         try:
-            pose, _ = between(ends)
-            return found.link, in_frames(pose, found.site.frame, found.scale, self._spec)[0]
+            pose, _ = fromto_pose(ends)
+            return found.link, apply_frames(pose, found.site.frame, found.scale, self._spec)[0]
         except ValueError as error:
-            self._tell(node, f"<{node.tag}>: {error}; MuJoCo refuses the file")
+            self._add_problem(node, f"<{node.tag}>: {error}; MuJoCo rejects the file")
             return None
 
     # Shapes
 
     def _geometry(self, geom: Any, node: Node, outer: Scale) -> tuple[Geometry, Solid | None]:
-        """Return a geom, and the mass that it gives to its body."""
+        """Return the geometry of a geom, and the solid that it adds to its body."""
         import mujoco
 
-        shape, size = shape_of(geom), np.asarray(geom.size, dtype=np.float64)
-        pose, scale = self._placed(geom, node, outer)
+        shape, size = geom_shape(geom), np.asarray(geom.size, dtype=np.float64)
+        pose, scale = self._pose_and_scale(geom, node, outer)
         if not math.isnan(geom.fromto[0]) and shape in ("capsule", "cylinder", "ellipsoid", "box"):
             try:
-                pose, half = between(np.asarray(geom.fromto))
-                pose, scale = in_frames(pose, geom.frame, outer, self._spec)
+                pose, half = fromto_pose(np.asarray(geom.fromto))
+                pose, scale = apply_frames(pose, geom.frame, outer, self._spec)
                 flat = shape in ("ellipsoid", "box")
                 size = np.array([size[0], size[0] if flat else half, half])
             except ValueError as error:
-                self._tell(node, f"<{node.tag}>: {error}; MuJoCo refuses the file")
+                self._add_problem(node, f"<{node.tag}>: {error}; MuJoCo rejects the file")
         size = size[: SIZES.get(shape, 0)]
         fitted = bool(geom.meshname) and shape in SIZES
         shell = geom.typeinertia == mujoco.mjtGeomInertia.mjINERTIA_SHELL
-        massive = "plane" if geom.type == mujoco.mjtGeom.mjGEOM_HFIELD else shape
-        weight = solid(
-            "unknown" if fitted or shell else massive,
+        solid_shape = "plane" if geom.type == mujoco.mjtGeom.mjGEOM_HFIELD else shape
+        weight = make_solid(
+            "unknown" if fitted or shell else solid_shape,
             size.tolist(),
             pose,
             mass=float(geom.mass),
@@ -302,8 +313,8 @@ class _Reader:
             color=color_of(geom, self._materials),
         )
         if shape == "mesh" or fitted:
-            geometry = replace(self._meshed(geometry, geom, scale), fit_to_mesh=fitted)
-        return geometry, None if weight is None else scaled(weight, scale)
+            geometry = replace(self._with_mesh(geometry, geom, scale), fit_to_mesh=fitted)
+        return geometry, None if weight is None else scale_solid(weight, scale)
 
     def _bits(self, geom: Any) -> tuple[int, int]:
         """Return contype and conaffinity."""
@@ -315,7 +326,7 @@ class _Reader:
             return _PAIRED, 0
         return int(geom.contype), int(geom.conaffinity)
 
-    def _meshed(self, geometry: Geometry, geom: Any, scale: Scale) -> Geometry:
+    def _with_mesh(self, geometry: Geometry, geom: Any, scale: Scale) -> Geometry:
         mesh = self._meshes.get(geom.meshname)
         if mesh is None:
             return geometry
@@ -324,12 +335,12 @@ class _Reader:
 
     # Joints
 
-    def _moved(
+    def _read_joints(
         self, body: Any, node: Node, name: str, parent: str, pose: Matrix, scale: Scale
     ) -> tuple[list[Link], list[Joint]]:
-        """Return the joints above a body, and the links between them if there are several."""
-        moving = list(body.joints)
-        if not moving:
+        """Return the joints of a body, and virtual links between them if there are several."""
+        body_joints = list(body.joints)
+        if not body_joints:
             fixed = Joint(
                 name=self._joints.unused(f"{name}_fixed"),
                 source=node.source,
@@ -341,10 +352,10 @@ class _Reader:
             return [], [fixed]
         links: list[Link] = []
         joints: list[Joint] = []
-        for k, joint in enumerate(moving, 1):
+        for k, joint in enumerate(body_joints, 1):
             written = self._node(joint, node)
             own = joint.name or self._joints.unused(f"{name}_joint")
-            child = name if k == len(moving) else self._bodies.unused(f"{name}:{own}")
+            child = name if k == len(body_joints) else self._bodies.unused(f"{name}:{own}")
             if child != name:
                 links.append(Link(name=child, source=written.source, virtual=True))
             joints.append(
@@ -359,16 +370,18 @@ class _Reader:
         return links, joints
 
     def _joint(self, joint: Any, node: Node, name: str, outer: Scale) -> Joint:
-        """Return a joint, which is not hung up yet."""
+        """Return a joint without its parent and child."""
         import mujoco
 
         kinds = mujoco.mjtJoint
         at = np.eye(4)
         at[:3, 3] = joint.pos
         try:
-            at, scale = in_frames(at, joint.frame, outer, self._spec)
+            at, scale = apply_frames(at, joint.frame, outer, self._spec)
         except ValueError as error:
-            self._tell(node, f"a <frame> has no orientation: {error}; MuJoCo refuses the file")
+            self._add_problem(
+                node, f"a <frame> has no orientation: {error}; MuJoCo rejects the file"
+            )
             scale = outer
         bare = Joint(name=name, source=node.source, kind="ball", parent="", child="")
         if joint.type == kinds.mjJNT_FREE:
@@ -379,7 +392,7 @@ class _Reader:
         unit = scale.length if slides else math.pi / 180 if joint.compiler.degree else 1.0
         force, rotor = (scale.force, scale.rotor) if slides else (scale.torque, scale.torque)
         self._factors[joint.name] = force
-        drives = self._drives.get(joint.name, []) if joint.name else []
+        actuators = self._joint_actuators.get(joint.name, []) if joint.name else []
         limits = self._range(joint, node)
         return replace(
             bare,
@@ -387,15 +400,16 @@ class _Reader:
             axis=at[:3, :3] @ np.asarray(joint.axis),
             anchor=at[:3, 3],
             reference=float(joint.ref) * unit,
-            limit=_limit(node.source, limits, unit, force_limit(joint, drives, force)),
+            limit=_limit(node.source, limits, unit, force_limit(joint, actuators, force)),
             mimic=self._mimics.get(joint.name),
             damping=float(np.ravel(joint.damping)[0]) * rotor,
             friction=float(joint.frictionloss) * force,
-            armature=(float(joint.armature) + sum(drive.armature for drive in drives)) * rotor,
+            armature=(float(joint.armature) + sum(actuator.armature for actuator in actuators))
+            * rotor,
         )
 
     def _range(self, joint: Any, node: Node) -> tuple[float, float] | None:
-        """Return the limits as written; MuJoCo has none where the lower is not below the upper."""
+        """Return the limits as written, or None; MuJoCo ignores limits that are not in order."""
         import mujoco
 
         low, high = map(float, joint.range)
@@ -404,37 +418,37 @@ class _Reader:
             return None
         written = low != 0 or high != 0 or "range" in node.attributes
         if joint.limited == limited.mjLIMITED_AUTO and written and not joint.compiler.autolimits:
-            self._tell(
+            self._add_problem(
                 node,
-                f"joint {node.owner} has a range but not limited, and autolimits is off; "
-                "MuJoCo refuses the file",
+                f"joint {node.owner} has a range but no limited, and autolimits is off; "
+                "MuJoCo rejects the file",
             )
         return (low, high) if written or joint.limited == limited.mjLIMITED_TRUE else None
 
-    def _home(self, joints: Sequence[Joint]) -> dict[str, float]:
-        """Return the positions of the first keyframe that has some."""
+    def _home_positions(self, joints: Sequence[Joint]) -> dict[str, float]:
+        """Return the joint positions of the first keyframe that has any."""
         sizes = {"floating": 7, "ball": 4, "fixed": 0}
-        wanted = sum(sizes.get(joint.kind, 1) for joint in joints)
+        expected = sum(sizes.get(joint.kind, 1) for joint in joints)
         for key in self._spec.keys:
             positions = [float(each) for each in key.qpos]
             if not positions:
                 continue
-            if len(positions) != wanted:
-                if self._document.whole:
-                    self._tell(
+            if len(positions) != expected:
+                if self._document.complete:
+                    self._add_problem(
                         self._node(key),
-                        f"qpos of <key> has {len(positions)} numbers, the joints have {wanted}; "
-                        "MuJoCo refuses the file",
+                        f"qpos of <key>: got {len(positions)} numbers; expected {expected}; "
+                        "MuJoCo rejects the file",
                     )
                 return {}
-            return dict(_dealt(joints, sizes, positions))
+            return dict(_assign_positions(joints, sizes, positions))
         return {}
 
 
-def _dealt(
+def _assign_positions(
     joints: Sequence[Joint], sizes: Mapping[str, int], positions: Sequence[float]
 ) -> Iterator[tuple[str, float]]:
-    """Yield the position of each joint that has one."""
+    """Yield the name and position of each joint with one degree of freedom."""
     at = 0
     for joint in joints:
         if joint.moves and math.isfinite(positions[at]):
@@ -442,12 +456,12 @@ def _dealt(
         at += sizes.get(joint.kind, 1)
 
 
-def _inside(node: Node) -> Iterator[Node]:
-    """Yield the elements of a body, those in frames included."""
+def _iter_elements(node: Node) -> Iterator[Node]:
+    """Yield the elements of a body, including those in frames."""
     for child in node.children:
         yield child
         if child.tag in ("frame", "replicate"):
-            yield from _inside(child)
+            yield from _iter_elements(child)
 
 
 def _limit(
@@ -460,19 +474,19 @@ def _limit(
 
 
 def _first(node: Node, attributes: Sequence[str]) -> str:
-    """Return the first of some attributes that an element has; nothing if it has none of them."""
+    """Return the first of some attributes that a node has, or an empty string."""
     return next((name for name in attributes if name in node.attributes), "")
 
 
 class _Names:
-    """Names that are taken."""
+    """Set of used names."""
 
     def __init__(self, taken: Iterable[str]) -> None:
         self._taken = set(taken)
         self._counts: dict[str, int] = {}
 
     def unused(self, name: str) -> str:
-        """Return a name that is not taken, and take it."""
+        """Return an unused name and add it to the set."""
         free = name
         while free in self._taken:
             self._counts[name] = self._counts.get(name, 1) + 1
@@ -481,10 +495,10 @@ class _Names:
         return free
 
 
-def _bounded(link: Link, least: float, least_moment: float) -> Inertial | None:
-    """Return the inertial of a link with the least mass [kg] and moments [kg m2] of the file.
+def _apply_minimums(link: Link, least: float, least_moment: float) -> Inertial | None:
+    """Return the inertial of a link with the compiler's minimum mass [kg] and inertia [kg m2].
 
-    What is negative stays so.
+    Negative values are kept.
     """
     inertial = link.inertial
     if link.virtual or max(least, least_moment) <= 0:
@@ -501,8 +515,8 @@ def _bounded(link: Link, least: float, least_moment: float) -> Inertial | None:
     return replace(inertial, mass=mass, inertia=inertia)
 
 
-def _weighed(links: Sequence[Link], total: float) -> tuple[Link, ...]:
-    """Return links whose masses are scaled to a sum of `total` [kg], if the file asks for that."""
+def _scale_to_total_mass(links: Sequence[Link], total: float) -> tuple[Link, ...]:
+    """Return links with masses scaled to a total mass [kg], if the file sets one."""
     masses = [link.inertial.mass for link in links if link.inertial is not None]
     known = sum(mass for mass in masses if mass is not None)
     if not (total > 0 and known > 0 and math.isfinite(known)) or None in masses:

@@ -1,4 +1,4 @@
-"""References in MJCF: names that nothing has. MuJoCo's parser lets them be, its compiler not."""
+"""Report references in MJCF to names that do not exist, which MuJoCo's parser accepts."""
 
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
@@ -34,18 +34,18 @@ _NAMED: Mapping[str, str] = {
     "mesh": "mesh",
     "material": "material",
 }
-"""What the value of an attribute is the name of."""
+"""Kind of element that an attribute refers to."""
 
 _SECTIONS = frozenset({"worldbody", "contact", "tendon", "equality", "actuator", "sensor"})
 
 
 def dangling_references(document: MjcfDocument, spec: "mujoco.MjSpec") -> None:
-    """Add a problem for each name that nothing has.
+    """Add a problem for each reference to a name that does not exist.
 
-    Nothing is said where the names may be elsewhere: of a document that something was left out of,
-    of one without bodies, which others include, and of contacts with the ground of a scene.
+    Nothing is reported where the element may be elsewhere: in incomplete documents, in documents
+    without bodies, which others include, and for contacts with the ground of a scene.
     """
-    if not document.whole or len(spec.bodies) < 2:
+    if not document.complete or len(spec.bodies) < 2:
         return
     names = {
         "joint": {each.name for each in spec.joints},
@@ -56,26 +56,26 @@ def dangling_references(document: MjcfDocument, spec: "mujoco.MjSpec") -> None:
         "mesh": {mesh_name(each) for each in spec.meshes},
         "material": {each.name for each in spec.materials},
     }
-    scene = len(spec.worldbody.geoms) > 0
-    for node in _referring(document, scene):
+    has_ground = len(spec.worldbody.geoms) > 0
+    for node in _iter_references(document, has_ground):
         for attribute, value in node.attributes.items():
             kind = _NAMED.get(attribute)
             if kind is None or value in names[kind] or not value:
                 continue
             message = (
-                f"{attribute} of <{node.tag}> is {value!r}, and there is no {kind} of that name; "
-                "MuJoCo refuses the file"
+                f"{attribute} of <{node.tag}>: got {value!r}; expected the name of a {kind}; "
+                "MuJoCo rejects the file"
             )
             document.problems.append(
                 Problem(code="XML011", message=message, source=node.source, subject=value)
             )
 
 
-def _referring(document: MjcfDocument, scene: bool) -> Iterator[Node]:
-    """Yield the nodes of the model itself that may name others."""
+def _iter_references(document: MjcfDocument, has_ground: bool) -> Iterator[Node]:
+    """Yield the nodes of the model that may refer to other elements."""
     for section in document.root.children:
-        if section.tag not in _SECTIONS or (section.tag == "sensor" and not scene):
+        if section.tag not in _SECTIONS or (section.tag == "sensor" and not has_ground):
             continue
         for node in section.walk():
-            if node.tag != "attach" and (node.tag != "pair" or scene):
+            if node.tag != "attach" and (node.tag != "pair" or has_ground):
                 yield node

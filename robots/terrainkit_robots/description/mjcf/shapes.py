@@ -1,4 +1,4 @@
-"""Shapes and poses of MJCF: what MuJoCo's parser has read, in the frame of the body."""
+"""Convert parsed MuJoCo geoms and meshes to shapes and poses in the body frame."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -23,80 +23,80 @@ SIZES: Mapping[ShapeKind, int] = {
     "ellipsoid": 3,
     "box": 3,
 }
-"""How many size numbers a primitive has."""
+"""Number of size parameters of each primitive."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scale:
-    """What the frames around an element do to its size; MuJoCo from 3.16 on."""
+    """Scale factors of the frames around an element; MuJoCo 3.16 and newer."""
 
     length: float = 1.0
     mass: float = 1.0
 
     force: float = 1.0
-    """Factor on forces, which some frames leave alone."""
+    """Factor on forces."""
 
     torque: float = 1.0
     """Factor on torques."""
 
     rotor: float = 1.0
-    """Factor on damping and armature of a joint that slides."""
+    """Factor on damping and armature of a slide joint."""
 
-    even: bool = True
-    """Whether all axes are scaled alike; if not, `length` is a mean."""
+    uniform: bool = True
+    """Whether all axes have the same factor; otherwise `length` is the mean."""
 
     def __matmul__(self, inner: "Scale") -> "Scale":
-        """Return the scale of a frame in a frame."""
+        """Return the scale of nested frames."""
         return Scale(
             length=self.length * inner.length,
             mass=self.mass * inner.mass,
             force=self.force * inner.force,
             torque=self.torque * inner.torque,
             rotor=self.rotor * inner.rotor,
-            even=self.even and inner.even,
+            uniform=self.uniform and inner.uniform,
         )
 
 
 def local_pose(element: Any, spec: "mujoco.MjSpec") -> Matrix:
-    """Return the pose of an element in what it is written in, shape (4, 4) [m].
+    """Return the pose of an element in its parent, shape (4, 4) [m].
 
     Raises:
-        ValueError: if the orientation is none, such as one by an axis of length zero.
+        ValueError: If the orientation is invalid, such as an axis of zero length.
     """
     pose = np.eye(4)
-    pose[:3, :3] = turn_of(element.quat, element.alt, element.compiler, spec)
+    pose[:3, :3] = resolve_orientation(element.quat, element.alt, element.compiler, spec)
     pose[:3, 3] = element.pos
     return pose
 
 
-def turn_of(quat: Matrix, alternative: Any, compiler: Any, spec: "mujoco.MjSpec") -> Matrix:
-    """Return the rotation of a quaternion, or of what was written instead, shape (3, 3).
+def resolve_orientation(quat: Matrix, alt: Any, compiler: Any, spec: "mujoco.MjSpec") -> Matrix:
+    """Return the rotation of a quaternion or an alternative orientation, shape (3, 3).
 
     Raises:
-        ValueError: if it is none.
+        ValueError: If the orientation is invalid.
     """
     import mujoco
 
-    if alternative.type != mujoco.mjtOrientation.mjORIENTATION_QUAT:
+    if alt.type != mujoco.mjtOrientation.mjORIENTATION_QUAT:
         quat = np.array(
             spec.resolve_orientation(
-                degree=bool(compiler.degree), sequence=compiler.eulerseq, orientation=alternative
+                degree=bool(compiler.degree), sequence=compiler.eulerseq, orientation=alt
             )
         )
     return quat_to_matrix(quat)
 
 
 def frame_scale(frame: Any) -> Scale:
-    """Return what a frame does to the size of its contents."""
+    """Return the scale that a frame applies to its contents."""
     import mujoco
 
     written = getattr(frame, "scale", None)
     if written is None:  # MuJoCo before 3.16
         return Scale()
-    factors = np.abs(np.asarray(written, dtype=np.float64))
-    if (factors == 1).all() and frame.massscale <= 0:
+    scales = np.abs(np.asarray(written, dtype=np.float64))
+    if (scales == 1).all() and frame.massscale <= 0:
         return Scale()
-    length, volume = float(np.cbrt(factors.prod())), float(factors.prod())
+    length, volume = float(np.cbrt(scales.prod())), float(scales.prod())
     mass = float(frame.massscale) if frame.massscale > 0 else volume
     similar = frame.scaling == mujoco.mjtScaling.mjSCALING_SIMILAR
     return Scale(
@@ -105,37 +105,37 @@ def frame_scale(frame: Any) -> Scale:
         force=mass * length if similar else 1.0,
         torque=mass * length**2 if similar else 1.0,
         rotor=mass if similar else 1.0,
-        even=bool((factors == factors[0]).all()),
+        uniform=bool((scales == scales[0]).all()),
     )
 
 
-def scaled(weight: Solid, scale: Scale) -> Solid:
-    """Return a solid of which the pose is scaled already."""
+def scale_solid(solid: Solid, scale: Scale) -> Solid:
+    """Return a solid with scaled mass and moments; its pose is scaled already."""
     return replace(
-        weight,
-        mass=weight.mass * scale.mass,
-        moments=weight.moments * (scale.mass * scale.length**2),
+        solid,
+        mass=solid.mass * scale.mass,
+        moments=solid.moments * (scale.mass * scale.length**2),
     )
 
 
-def placed(element: Any, outer: Scale, spec: "mujoco.MjSpec") -> tuple[Matrix, Scale]:
-    """Return the pose of an element in its body, shape (4, 4) [m], and the scale of its insides.
+def pose_and_scale(element: Any, outer: Scale, spec: "mujoco.MjSpec") -> tuple[Matrix, Scale]:
+    """Return the pose of an element in its body, shape (4, 4) [m], and the scale of its contents.
 
     Args:
-        element: A body, geom or anything else with a pose, which frames may be around.
-        outer: Scale of the body that it is in.
+        element: A MuJoCo element with a pose, possibly inside of frames.
+        outer: Scale of the body that contains it.
         spec: The model.
 
     Raises:
-        ValueError: if an orientation is none.
+        ValueError: If an orientation is invalid.
     """
-    return in_frames(local_pose(element, spec), element.frame, outer, spec)
+    return apply_frames(local_pose(element, spec), element.frame, outer, spec)
 
 
-def in_frames(
+def apply_frames(
     pose: Matrix, frame: Any, outer: Scale, spec: "mujoco.MjSpec"
 ) -> tuple[Matrix, Scale]:
-    """Return a pose in a frame as one in the body that the frame is in, and the whole scale."""
+    """Transform a pose from a frame to its body; return it with the total scale."""
     inner = Scale()
     while frame is not None:
         scale = frame_scale(frame)
@@ -146,23 +146,26 @@ def in_frames(
     return pose, outer @ inner
 
 
-def between(ends: Matrix) -> tuple[Matrix, float]:
-    """Return the pose halfway between two points with z along them, and half their distance.
+def fromto_pose(ends: Matrix) -> tuple[Matrix, float]:
+    """Return the pose and half length of a shape between two points.
 
     Args:
         ends: The two points, shape (6,) [m].
 
+    Returns:
+        Pose at the center with z along the points, shape (4, 4) [m], and half their distance [m].
+
     Raises:
-        ValueError: if they are one point.
+        ValueError: If the points are equal.
     """
     along = ends[:3] - ends[3:]
     length = float(np.linalg.norm(along))
     if not length > 1e-14:
-        raise ValueError("the two points of fromto are one")
+        raise ValueError("the two points of fromto are equal")
     x, y, z = along / length
     pose = np.eye(4)
     if x * x + y * y > 1e-28 or z < 0:
-        axis = np.array([-y, x, 0.0])  # of the smallest turn from z to there
+        axis = np.array([-y, x, 0.0])  # of the smallest rotation from z to there
         norm = np.hypot(x, y)
         axis = axis / norm if norm > 1e-14 else np.array([1.0, 0, 0])
         half = np.arctan2(norm, z) / 2
@@ -171,8 +174,8 @@ def between(ends: Matrix) -> tuple[Matrix, float]:
     return pose, length / 2
 
 
-def shape_of(geom: Any) -> ShapeKind:
-    """Return the kind of shape that a geom is."""
+def geom_shape(geom: Any) -> ShapeKind:
+    """Return the shape of a geom."""
     import mujoco
 
     kinds: Mapping[Any, ShapeKind] = {
@@ -187,17 +190,17 @@ def shape_of(geom: Any) -> ShapeKind:
     return kinds.get(geom.type, "unknown")
 
 
-_PLAIN = np.array([0.5, 0.5, 0.5, 1], dtype=np.float32)
-"""Color of a geom that nobody gave one: MuJoCo takes the material's instead, where there is one."""
+_DEFAULT_COLOR = np.array([0.5, 0.5, 0.5, 1], dtype=np.float32)
+"""MuJoCo's default color; it uses the color of the material instead, if there is one."""
 
 
 def color_of(geom: Any, materials: Mapping[str, Any]) -> tuple[float, float, float, float] | None:
-    """Return what a geom is drawn with: its own color, or that of its material.
+    """Return the RGBA color of a geom or of its material.
 
-    None if it has neither, or numbers beyond 0..1.
+    Returns None if there is neither, or if a value is outside of [0, 1].
     """
     rgba = geom.rgba
-    if (rgba == _PLAIN).all():
+    if (rgba == _DEFAULT_COLOR).all():
         if geom.material not in materials:
             return None
         rgba = materials[geom.material].rgba
@@ -207,17 +210,17 @@ def color_of(geom: Any, materials: Mapping[str, Any]) -> tuple[float, float, flo
 
 
 def mesh_name(mesh: Any) -> str:
-    """Return the name of a mesh asset, which is that of its file if it has none of its own."""
+    """Return the name of a mesh asset, which defaults to the name of its file."""
     return mesh.name or Path(str(mesh.file).replace("\\", "/")).stem
 
 
 def mesh_file(mesh: Any, node: Node, strip: bool) -> MeshFile | None:
-    """Return the file of a mesh asset; None for one that is written in the model itself.
+    """Return the file of a mesh asset; None if the mesh is defined in the model.
 
     Args:
-        mesh: The asset.
-        node: The element that it is.
-        strip: Whether MuJoCo drops the folders from file names.
+        mesh: The MuJoCo mesh.
+        node: Its node.
+        strip: Whether MuJoCo removes the folders of file names.
     """
     name = node.written.get("file", "") or str(mesh.file)
     if not name:
@@ -236,21 +239,21 @@ def mesh_file(mesh: Any, node: Node, strip: bool) -> MeshFile | None:
 
 
 def mesh_geometry(geometry: Geometry, mesh: Any, file: MeshFile, scale: Scale) -> Geometry:
-    """Return a geometry with the shape of a mesh, whose own frame may lie elsewhere.
+    """Return a geometry with the shape of a mesh, including the mesh's own reference frame.
 
-    MuJoCo takes `refpos` from each vertex, turns by `refquat` back, and then scales.
+    MuJoCo subtracts `refpos` from each vertex, applies the inverse of `refquat`, and then scales.
     """
-    factors = np.array(file.scale)
-    turn = quat_to_matrix(np.asarray(mesh.refquat)).T
-    if np.any(factors != factors[0]) and np.abs(turn - np.eye(3)).max() > 1e-9:
-        return replace(geometry, shape="unknown", mesh=file)  # no scaled mesh in any pose
-    moved = np.eye(4)
-    moved[:3, :3] = turn
-    moved[:3, 3] = -scale.length * factors * (turn @ np.asarray(mesh.refpos))
-    x, y, z = map(float, scale.length * factors)
+    scales = np.array(file.scale)
+    rotation = quat_to_matrix(np.asarray(mesh.refquat)).T
+    if np.any(scales != scales[0]) and np.abs(rotation - np.eye(3)).max() > 1e-9:
+        return replace(geometry, shape="unknown", mesh=file)  # no scale_solid mesh in any pose
+    mesh_pose = np.eye(4)
+    mesh_pose[:3, :3] = rotation
+    mesh_pose[:3, 3] = -scale.length * scales * (rotation @ np.asarray(mesh.refpos))
+    x, y, z = map(float, scale.length * scales)
     return replace(
         geometry,
         shape="mesh",
         mesh=replace(file, scale=(x, y, z)),
-        origin=geometry.origin @ moved,
+        origin=geometry.origin @ mesh_pose,
     )

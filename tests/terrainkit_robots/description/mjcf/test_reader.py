@@ -768,10 +768,10 @@ def test_an_include_beside_the_including_file_is_found_as_by_mujoco(tmp_path: Pa
     [
         ('<include file="gone.xml"/>', "there is no file"),
         ("<include/>", "no file"),
-        ('<include file="robot.xml"/>', "from within itself"),
-        ('<include file="circle.xml"/>', "from within itself"),
-        ('<include file="part.xml"/><include file="./part.xml"/>', "a second time"),
-        ('<include file="empty.xml"/>', "nothing in it"),
+        ('<include file="robot.xml"/>', "included by itself"),
+        ('<include file="circle.xml"/>', "included by itself"),
+        ('<include file="part.xml"/><include file="./part.xml"/>', "included twice"),
+        ('<include file="empty.xml"/>', "is empty"),
         ('<include file="."/>', "folder"),
         ('<include file="part.xml"><body/></include>', "children"),
     ],
@@ -896,18 +896,18 @@ def test_a_defect_does_not_hide_the_next() -> None:
 @pytest.mark.parametrize(
     ("text", "code", "says"),
     [
-        (in_world('<body name="a" pos="1 2"/>'), "XML006", "'1 2'; wanted 3 numbers"),
-        (in_world('<body name="a" pos="1 2 3 4"/>'), "XML006", "wanted 3 numbers"),
+        (in_world('<body name="a" pos="1 2"/>'), "XML006", "'1 2'; expected 3 numbers"),
+        (in_world('<body name="a" pos="1 2 3 4"/>'), "XML006", "expected 3 numbers"),
         (in_world('<body name="a" pos="nan 0 0"/>'), "XML006", "'nan 0 0'"),
         (in_world('<body name="a" pos="inf 0 0"/>'), "XML006", "'inf 0 0'"),
         (in_world('<body name="a" pos="1e308 0 0"/>'), "XML006", "'1e308 0 0'"),
         (in_world('<body name="a" pos="x 0 0"/>'), "XML006", "'x 0 0'"),
         (in_world('<body name="a"><geom size="1" contype="1.5"/></body>'), "XML006", "'1.5'"),
-        (in_world('<body name="a"><geom sise="1"/></body>'), "XML007", "size is"),
+        (in_world('<body name="a"><geom sise="1"/></body>'), "XML007", "did you mean size?"),
         (in_world('<body name="a"><geom strange="1"/></body>'), "XML007", "strange of <geom>"),
-        (in_world('<body name="a"><gem size="1"/></body>'), "XML007", "<geom> is"),
+        (in_world('<body name="a"><gem size="1"/></body>'), "XML007", "did you mean <geom>?"),
         ("<mujoco><strange/></mujoco>", "XML007", "<strange> in <mujoco>"),
-        (in_world('<body name="a"/><body name="a"/>'), "TRE001", "twice"),
+        (in_world('<body name="a"/><body name="a"/>'), "TRE001", "duplicate body a"),
         (in_world('<body><joint name="j"/><joint name="j"/></body>'), "TRE001", "joint j"),
         (in_world('<body name="world"/>'), "TRE001", "world"),
         (in_world('<geom size="1" name="g"/><geom size="1" name="g"/>'), "XML011", "'g' in geom"),
@@ -938,7 +938,11 @@ def test_a_defect_does_not_hide_the_next() -> None:
             "found 2 times",
         ),
         (in_world('<body><geom type="mesh" mesh="no"/></body>'), "XML011", "'no'"),
-        (in_world("<body/>", '<actuator><motor joint="no"/></actuator>'), "XML011", "no joint of"),
+        (
+            in_world("<body/>", '<actuator><motor joint="no"/></actuator>'),
+            "XML011",
+            "expected the name of a joint",
+        ),
         (
             in_world("<body/>", '<contact><exclude body1="world" body2="no"/></contact>'),
             "XML011",
@@ -947,7 +951,7 @@ def test_a_defect_does_not_hide_the_next() -> None:
         (
             in_world("<body><joint/></body>", '<keyframe><key qpos="1 2"/></keyframe>'),
             "XML011",
-            "2 numbers, the joints have 1",
+            "got 2 numbers; expected 1",
         ),
         ("<mujoco><compiler angle='grad'/></mujoco>", "XML011", "'grad' in angle"),
         ("<mujocoinclude/>", "XML002", "mujocoinclude"),
@@ -1002,7 +1006,7 @@ def test_an_inertial_without_moments_has_none() -> None:
 def test_one_mistake_in_many_places_is_told_once() -> None:
     robot = read(in_world("".join(f'\n<body name="b{k}" poss="1 2 3"/>' for k in range(300))))
     problem = only(robot)
-    assert "299 times more, next on line 3" in problem.message
+    assert "300 times, next on line 3" in problem.message
     assert len(robot.links) == 300
     assert joint(robot, "b7_fixed").origin[:3, 3].tolist() == [1, 2, 3]
 
