@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.bodies.tree import Tree
-from terrainkit_robots.description.mjcf.document import MAX_ELEMENTS, is_allowed
+from terrainkit_robots.description.mjcf.tree import MAX_ELEMENTS, is_allowed
 from terrainkit_robots.description.model import RobotModel
 from terrainkit_robots.description.xml.document import RobotFileError, parse_xml, read_bytes
 from terrainkit_robots.mesh.sniff import open_regular
