@@ -1,1 +1,1 @@
-"""Derive a RobotSpec from the facts of a robot."""
+"""Derive the spec of a robot from its facts."""

@@ -1,4 +1,4 @@
-"""Derivation: the spec of a robot from its facts, and where each number came from."""
+"""Derive the spec of a robot from its facts, with the provenance of each number."""
 
 import math
 from collections.abc import Mapping
@@ -10,13 +10,13 @@ from terrainkit.errors import ConfigError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.onboarding.derive_spec import named_bodies
-from terrainkit_robots.onboarding.derive_spec.foot_radius import foot_radius
-from terrainkit_robots.onboarding.derive_spec.motors import (
-    action_scales,
-    armatures,
-    efforts,
-    velocities,
+from terrainkit_robots.onboarding.derive_spec.actuator_limits import (
+    derive_action_scale,
+    derive_armature,
+    derive_effort,
+    derive_velocity,
 )
+from terrainkit_robots.onboarding.derive_spec.foot_radius import foot_radius
 from terrainkit_robots.spec.column import Column, collect_provenance, rounded
 from terrainkit_robots.spec.robot_spec import Provenance, RobotSpec
 from terrainkit_robots.text import names
@@ -24,11 +24,11 @@ from terrainkit_robots.text import names
 if TYPE_CHECKING:
     from terrainkit_robots.simulation.gain import Gain
 
-_SOFT = 0.9
-"""Share of a joint's range that is left free; legged_gym's and Isaac Lab's for their robots."""
+_SOFT_LIMIT_FACTOR = 0.9
+"""Share of the joint range within the soft limits, as in legged_gym and Isaac Lab."""
 
-_RESET = (0.5, 1.5)
-"""Factors on the default pose between which legged_gym starts an episode."""
+_DEFAULT_RESET_RANGE = (0.5, 1.5)
+"""Range of the factor on the default pose at a reset, as in legged_gym."""
 
 
 def derive_spec(
@@ -43,26 +43,28 @@ def derive_spec(
 
     Args:
         facts: The robot.
-        gains: Suggested gains of each actuated joint, by name.
-        floating: Whether the base moves freely.
-        urdf: Name of its URDF, beside the spec.
-        mjcf: Name of its MJCF, beside the spec.
+        gains: PD gains of each actuated joint.
+        floating: Whether the base is floating.
+        urdf: Name of the URDF file in the folder of the spec.
+        mjcf: Name of the MJCF file in the folder of the spec.
 
     Raises:
-        ConfigError: if there is no body, or a joint without gains.
+        ConfigError: if the robot has no bodies, or gains are missing.
     """
     base = named_bodies.base_body(facts)
     if base is None:
-        raise ConfigError(f"{facts.model.title} has no bodies; there is nothing to derive")
+        raise ConfigError(f"{facts.model.title} has no bodies, so no spec can be derived")
     missing = [joint.name for joint in facts.actuated if joint.name not in gains]
     if missing:
-        raise ConfigError(f"no gains for {names(missing)}; wanted some for each actuated joint")
-    twins = facts.mirror_map
+        raise ConfigError(f"gains of {names(missing)} are missing; expected all actuated joints")
+    mirror = facts.mirror_map
     columns = _columns(facts, gains)
-    columns["effort"] = efforts(facts, gains, twins)
-    columns["velocity"] = velocities(facts, twins)
-    columns["armature"] = armatures(facts, gains)
-    columns["action_scale"] = action_scales(facts, gains, columns["effort"], columns["velocity"])
+    columns["effort"] = derive_effort(facts, gains, mirror)
+    columns["velocity"] = derive_velocity(facts, mirror)
+    columns["armature"] = derive_armature(facts, gains)
+    columns["action_scale"] = derive_action_scale(
+        facts, gains, columns["effort"], columns["velocity"]
+    )
     pose = columns["default_pose"].values
     reset, reset_reason = _reset_range(facts, pose)
     lengths = _lengths(facts)
@@ -84,13 +86,13 @@ def derive_spec(
         soft_limits=_soft_limits(facts, pose),
         reset_range=reset,
         **heights,
-        mirror=twins,
+        mirror=mirror,
         provenance={
             **collect_provenance(columns),
-            "soft_limits": _suggested(f"{_SOFT:g} of each range, about its middle"),
+            "soft_limits": _suggested(f"{_SOFT_LIMIT_FACTOR:g} of each joint range, centered"),
             "reset_range": _suggested(reset_reason),
             **{name: origin for name, (_, origin) in lengths.items()},
-            "mirror": _measured("places and axes of the joints, all of them at 0"),
+            "mirror": _measured("joint positions and axes at zero pose"),
         },
     )
 
@@ -109,82 +111,83 @@ def _solved(reason: str) -> Provenance:
 
 def _columns(facts: Facts, gains: "Mapping[str, Gain]") -> dict[str, Column]:
     pose, stiffness, damping = Column(), Column(), Column()
-    origin = _origin_of_pose(facts)
+    origin = _pose_provenance(facts)
     for joint in facts.actuated:
         gain = gains[joint.name]
         pose.add(joint.name, rounded(facts.positions[joint.name]), origin)
         stiffness.add(joint.name, rounded(gain.stiffness, 3), _suggested(gain.reason))
-        damping.add(joint.name, rounded(gain.damping, 3), _suggested("goes with the stiffness"))
+        damping.add(joint.name, rounded(gain.damping, 3), _suggested("see stiffness"))
     return {"default_pose": pose, "stiffness": stiffness, "damping": damping}
 
 
-def _origin_of_pose(facts: Facts) -> Provenance:
+def _pose_provenance(facts: Facts) -> Provenance:
     home = facts.model.home
     joints = [joint for leg in facts.legs for joint in leg.joints] or facts.actuated
     if home and all(joint.name in home for joint in joints):
         return Provenance(origin="declared", reason=f"first keyframe of {facts.model.file.name}")
     if facts.legs:
-        return _solved("legs bent, feet below the centre of mass, the other joints near 0")
-    return _suggested("as close to 0 as the limits allow")
+        return _solved("legs bent, feet below the center of mass, other joints near 0")
+    return _suggested("closest to 0 within the limits")
 
 
 def _soft_limits(facts: Facts, pose: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-    """Return limits for rewards, within those of the joint, and around the default pose."""
+    """Return soft limits within the joint limits that include the default pose."""
     limits = {}
     for joint in facts.actuated:
         if joint.range is None or not math.isfinite(joint.range[1] - joint.range[0]):
             continue
         lower, upper = joint.range
-        spare = (1 - _SOFT) / 2 * (upper - lower)
-        soft = rounded(lower + spare), rounded(upper - spare)
+        margin = (1 - _SOFT_LIMIT_FACTOR) / 2 * (upper - lower)
+        soft = rounded(lower + margin), rounded(upper - margin)
         position = pose[joint.name]
         limits[joint.name] = min(soft[0], position), max(soft[1], position)
     return limits
 
 
 def _reset_range(facts: Facts, pose: Mapping[str, float]) -> tuple[tuple[float, float], str]:
-    """Return factors on the default pose that keep every joint within its limits, and why those."""
-    factors = [_factors(joint, pose[joint.name]) for joint in facts.actuated]
-    lowest = max((low for low, _ in factors), default=_RESET[0])
-    highest = min((high for _, high in factors), default=_RESET[1])
+    """Return factors on the default pose that keep all joints within their limits, and why."""
+    factors = [_reset_factors(joint, pose[joint.name]) for joint in facts.actuated]
+    lowest = max((low for low, _ in factors), default=_DEFAULT_RESET_RANGE[0])
+    highest = min((high for _, high in factors), default=_DEFAULT_RESET_RANGE[1])
     inner = min(1.0, math.ceil(100 * lowest) / 100), max(1.0, math.floor(100 * highest) / 100)
-    if inner == _RESET:
-        return inner, "legged_gym's for its robots"
+    if inner == _DEFAULT_RESET_RANGE:
+        return inner, "as in legged_gym"
     bound = [
         joint.name
         for joint, (low, high) in zip(facts.actuated, factors, strict=True)
-        if low == lowest > _RESET[0] or high == highest < _RESET[1]
+        if low == lowest > _DEFAULT_RESET_RANGE[0] or high == highest < _DEFAULT_RESET_RANGE[1]
     ]
-    usual = f"{_RESET[0]:g} to {_RESET[1]:g} of legged_gym's robots"
-    return inner, f"{usual}, as far as the limits of {names(bound, most=2)} allow"
+    default = "{:g} to {:g}".format(*_DEFAULT_RESET_RANGE)
+    return inner, f"{default} as in legged_gym, reduced by the limits of {names(bound, most=2)}"
 
 
-def _factors(joint: Joint, position: float) -> tuple[float, float]:
-    """Return the factors on a position at which the joint is at its limits, within _RESET."""
+def _reset_factors(joint: Joint, position: float) -> tuple[float, float]:
+    """Return the factors on a position that move the joint to its limits, clipped."""
     if joint.range is None or position == 0:
-        return _RESET
+        return _DEFAULT_RESET_RANGE
     with np.errstate(all="ignore"):
         ends = sorted(float(np.float64(end) / position) for end in joint.range)
-    return float(np.clip(ends[0], _RESET[0], 1.0)), float(np.clip(ends[1], 1.0, _RESET[1]))
+    lowest, highest = _DEFAULT_RESET_RANGE
+    return float(np.clip(ends[0], lowest, 1.0)), float(np.clip(ends[1], 1.0, highest))
 
 
 def _lengths(facts: Facts) -> dict[str, tuple[float, Provenance]]:
-    """Return the lengths of a robot with legs that are known, and where they came from [m]."""
+    """Return the known lengths of a robot with legs, with their provenance [m]."""
     stance = facts.stance
     if stance is None:
         return {}
     count = f"mean of {len(facts.legs)} legs"
-    with np.errstate(all="ignore"):  # lengths of 1e308 are told by a rule, not by numpy
+    with np.errstate(all="ignore"):  # a lint rule reports lengths such as 1e308
         width = float(np.ptp(stance.contacts @ facts.mirror.normal))
         length = float(np.mean([leg.length for leg in facts.legs]))
     found = {
         "base_height_target": (stance.height, _solved("standing at the default pose")),
-        "spawn_height": (stance.spawn_height, _solved("standing at the default pose, 1 cm higher")),
-        "leg_length": (length, _measured(f"from hip over knee to contact, {count}")),
-        "stance_width": (width, _solved("between the contacts at the default pose")),
+        "spawn_height": (stance.spawn_height, _solved("1 cm above the standing height")),
+        "leg_length": (length, _measured(f"hip to knee to contact, {count}")),
+        "stance_width": (width, _solved("distance between the contacts at the default pose")),
         "foot_radius": (foot_radius(facts), _measured(f"collision shapes of the feet, {count}")),
     }
-    if facts.bodies[0].virtual:  # of what the world holds, no height is that of its base
+    if facts.bodies[0].virtual:  # the base is the world, which has no height
         del found["base_height_target"], found["spawn_height"]
     return {
         name: (rounded(value), origin)

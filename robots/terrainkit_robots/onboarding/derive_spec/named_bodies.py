@@ -1,7 +1,7 @@
-"""Named bodies: which bodies of a robot training calls base, thigh, shank and foot.
+"""Find the bodies that training frameworks refer to: base, thighs, shanks and feet.
 
-Frameworks merge fixed joints and keep the name of the link above them, so that a body is called as
-its top link is; a foot on a fixed joint is kept as a body of its own.
+Frameworks merge fixed joints and keep the name of the parent link, so a body has the name of its
+top link. A foot on a fixed joint remains a separate body.
 """
 
 import re
@@ -10,33 +10,33 @@ from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.legs import Leg
 
-_UPPER_WORDS = frozenset({"head", "torso", "chest", "trunk", "neck"})
-"""Words for what is above the legs of a biped, and must not touch the ground."""
+_UPPER_BODY_WORDS = frozenset({"head", "torso", "chest", "trunk", "neck"})
+"""Words in names of bodies of a biped that must not touch the ground."""
 
 
 def base_body(robot: Facts) -> Body | None:
-    """Return the body that carries the limbs; None if there is no body."""
+    """Return the first body that is not virtual; None if there is none."""
     return next((body for body in robot.bodies if not body.virtual), None)
 
 
 def body_name(body: Body) -> str:
-    """Return what simulators call a body: the first link of it that the file has."""
+    """Return the name of a body in simulators: its first link that is in the file."""
     return next((link for link in body.links if not link.virtual), body.top).name
 
 
 def feet(robot: Facts) -> tuple[str, ...]:
-    """Return the link on which each leg stands."""
+    """Return the foot link of each leg."""
     return tuple(leg.foot for leg in robot.legs)
 
 
 def shanks(robot: Facts) -> tuple[str, ...]:
-    """Return the body below each knee; a leg without a knee has none."""
+    """Return the body below each knee; legs without a knee have none."""
     found = (_below_knee(robot, leg) for leg in robot.legs)
     return tuple(dict.fromkeys(body_name(body) for body in found if body is not None))
 
 
 def thighs(robot: Facts) -> tuple[str, ...]:
-    """Return the body that ends in each knee: of several between hip and knee the last."""
+    """Return the body above each knee, the last one if there are several."""
     found = []
     for leg in robot.legs:
         shank = _below_knee(robot, leg)
@@ -47,19 +47,19 @@ def thighs(robot: Facts) -> tuple[str, ...]:
 
 
 def termination_contacts(robot: Facts) -> tuple[str, ...]:
-    """Return the bodies that touch the ground when the robot has fallen.
+    """Return the bodies whose ground contact ends an episode.
 
-    As in legged_gym the base; of two legs that carry a torso, that and a head, too.
+    This is the base, as in legged_gym, and for bipeds also a torso and a head.
     """
     base = base_body(robot)
     found = [] if base is None else [body_name(base)]
     if len(robot.legs) == 2:
-        found += [body_name(body) for body in robot.bodies[1:] if _is_upper(robot, body)]
+        found += [body_name(body) for body in robot.bodies[1:] if _is_upper_body(robot, body)]
     return tuple(dict.fromkeys(found))
 
 
 def penalized_contacts(robot: Facts) -> tuple[str, ...]:
-    """Return thighs and shanks, but for shanks that are the feet."""
+    """Return the bodies whose contacts are penalized: thighs and shanks that are not feet."""
     standing = feet(robot)
     return tuple(name for name in (*thighs(robot), *shanks(robot)) if name not in standing)
 
@@ -73,24 +73,25 @@ def _below_knee(robot: Facts, leg: Leg) -> Body | None:
     return next((robot.bodies[i] for i in chain if not robot.bodies[i].virtual), None)
 
 
-def _is_upper(robot: Facts, body: Body) -> bool:
-    """Return whether a body is a torso or a head: in the middle, above the legs, with a shape.
+def _is_upper_body(robot: Facts, body: Body) -> bool:
+    """Return whether a body is a torso or a head.
 
-    A torso carries limbs on both sides; a head is known by its name.
+    It must have a collision shape and no mirrored body, and must not be part of a leg. A torso has
+    limbs on both sides; a head is recognized by its name.
     """
     if body.index in robot.leg_bodies or body.virtual or not body.collisions:
         return False
-    if robot.mirror.counterpart(body.index) is not None:
+    if robot.mirror.image_body(body.index) is not None:
         return False
-    carried = _carried(robot, body.index)
+    subtree = _subtree(robot, body.index)
     pairs = robot.mirror.pairs
     names = [link.name for link in body.links if link.collisions]
-    return any(pair.left in carried and pair.right in carried for pair in pairs) or any(
-        _UPPER_WORDS & _words(name) for name in names
+    return any(pair.left in subtree and pair.right in subtree for pair in pairs) or any(
+        _UPPER_BODY_WORDS & _words(name) for name in names
     )
 
 
-def _carried(robot: Facts, index: int) -> set[int]:
+def _subtree(robot: Facts, index: int) -> set[int]:
     found = {index}
     for body in robot.bodies[index + 1 :]:
         if body.parent in found:

@@ -1,1 +1,1 @@
-"""Configurations: the robot as the class that a training framework wants."""
+"""Write the configuration of a robot for a training framework."""

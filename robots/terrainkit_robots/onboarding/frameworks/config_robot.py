@@ -1,4 +1,4 @@
-"""The robot that is configured: its spec, and what the frameworks ask of it."""
+"""The robot for which a configuration is written: its spec, bodies and joint limits."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -8,149 +8,157 @@ from statistics import median
 from typing import Literal, TypeVar
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit_robots.onboarding.frameworks.source import comment, number
+from terrainkit_robots.onboarding.frameworks.source import comment, float_literal
 from terrainkit_robots.spec.per_joint import by_joint, match_joints
 from terrainkit_robots.spec.robot_spec import RobotSpec, unit_of
 from terrainkit_robots.text import short
 
 _Value = TypeVar("_Value")
 
-USUAL_SOFT_FACTOR = 0.9
-"""Share of a joint's range that rewards leave free, where the ranges are not given; what
-legged_gym and Isaac Lab use for their own robots."""
+DEFAULT_SOFT_LIMIT_FACTOR = 0.9
+"""Soft limit factor of robots with unknown joint limits, as in legged_gym and Isaac Lab."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ConfigRobot:
-    """A robot, as a configuration is written of it."""
+    """A robot for which a configuration is written."""
 
     spec: RobotSpec
 
     bodies: Sequence[str] = ()
-    """Every body there is once fixed joints are merged; if empty, those that the spec names."""
+    """Names of all bodies after fixed joints are merged; if empty, those in the spec."""
 
     limits: Mapping[str, tuple[float, float]] | None = None
-    """Lower and upper limit of joints, as the URDF has them; None if they are not known."""
+    """Lower and upper limit of each joint in the URDF; None if unknown."""
 
     unactuated: Sequence[str] = ()
-    """Joints of the URDF that move and have no motor: they follow another, or swing."""
+    """Movable joints of the URDF without an actuator, such as mimic joints."""
 
     @property
     def title(self) -> str:
-        """Return what to call the robot in a message or a sentence."""
+        """Return the name of the robot for messages."""
         return short(re.sub(r"[^\w .+-]", "_", self.spec.name).strip() or "the robot", 60)
 
     @cached_property
     def all_bodies(self) -> tuple[str, ...]:
-        """Return every body."""
+        """Return the names of all known bodies."""
         spec = self.spec
         named = (spec.base, *spec.feet, *spec.shanks, *spec.thighs)
         contacts = (*spec.termination_contacts, *spec.penalized_contacts)
         return tuple(dict.fromkeys(self.bodies or (*named, *contacts)))
 
     @cached_property
-    def soft_factor(self) -> float:
-        """Return the share of the joints' ranges that rewards leave free, between 0 and 1."""
-        soft = self._matched("soft_limits", self.spec.soft_limits)
-        shares = []
+    def soft_limit_factor(self) -> float:
+        """Return the median share of the joint ranges within the soft limits, from 0 to 1."""
+        soft_limits = self._match("soft_limits", self.spec.soft_limits)
+        factors = []
         for joint, (lower, upper) in (self.limits or {}).items():
-            if joint in soft and upper > lower:
-                shares.append((soft[joint][1] - soft[joint][0]) / (upper - lower))
-        share = median(shares) if shares else USUAL_SOFT_FACTOR
-        return round(share, 4) if 0 < share <= 1 else 1.0
+            if joint in soft_limits and upper > lower:
+                soft_lower, soft_upper = soft_limits[joint]
+                factors.append((soft_upper - soft_lower) / (upper - lower))
+        factor = median(factors) if factors else DEFAULT_SOFT_LIMIT_FACTOR
+        return round(factor, 4) if 0 < factor <= 1 else 1.0
 
     @cached_property
     def velocity_joints(self) -> tuple[str, ...]:
-        """Return the joints that are told a speed: what has damping alone stays nowhere.
+        """Return the joints with velocity targets, such as wheels: damping, but no stiffness.
 
         Raises:
-            ConfigError: if a joint has no stiffness or damping, not even 0.
+            ConfigError: if the stiffness or damping of a joint is missing.
         """
-        stiffness, damping = map(self.of_every_joint, ("stiffness", "damping"))
+        stiffness, damping = map(self.all_joint_values, ("stiffness", "damping"))
         return tuple(
             joint for joint in self.spec.joint_order if stiffness[joint] == 0 < damping[joint]
         )
 
     @cached_property
     def position_joints(self) -> tuple[str, ...]:
-        """Return the joints that are told a position: all but wheels."""
+        """Return the joints with position targets."""
         return tuple(joint for joint in self.spec.joint_order if joint not in self.velocity_joints)
 
-    def by_joint(self, name: str) -> dict[str, float]:
-        """Return the table `name` of the spec by joint, in their order; joints may be missing.
+    def joint_values(self, field: str) -> dict[str, float]:
+        """Return the values of a field of the spec by joint; joints may be missing.
 
         Raises:
-            ConfigError: if two keys match a joint, or one matches none.
+            ConfigError: if two keys match a joint, or a key matches no joint.
         """
-        return self._matched(name, getattr(self.spec, name))
+        return self._match(field, getattr(self.spec, field))
 
-    def of_every_joint(self, name: str) -> dict[str, float]:
-        """Return the table `name` of the spec by joint, which has to have them all.
+    def all_joint_values(self, field: str) -> dict[str, float]:
+        """Return the values of a field of the spec for every joint.
 
         Raises:
-            ConfigError: if a joint is not matched exactly once, or a key matches none.
+            ConfigError: if a joint is not matched exactly once, or a key matches no joint.
         """
-        return by_joint(getattr(self.spec, name), self.spec.joint_order, name)
+        return by_joint(getattr(self.spec, field), self.spec.joint_order, field)
 
-    def _matched(self, name: str, table: Mapping[str, _Value]) -> dict[str, _Value]:
-        matching = match_joints(table, self.spec.joint_order)
-        for clash in matching.clashes(name, partial=True):
+    def _match(self, field: str, values: Mapping[str, _Value]) -> dict[str, _Value]:
+        matching = match_joints(values, self.spec.joint_order)
+        for clash in matching.clashes(field, partial=True):
             raise ConfigError(clash.message)
         return dict(matching.values)
 
-    def origin(self, name: str, *, depth: int = 0, what: str = "", unit: str = "") -> list[str]:
-        """Return a comment on the field `name`: its unit, and where its value came from.
+    def provenance_comment(
+        self, field: str, *, depth: int = 0, prefix: str = "", unit: str = ""
+    ) -> list[str]:
+        """Return a comment with the unit and the provenance of a field.
 
         Args:
-            name: The field.
-            depth: How far the comment will be indented, in steps of four.
-            what: What comes first.
-            unit: The unit, if it is not that of the field.
+            field: Name of the field of the spec.
+            depth: Indentation of the comment, in steps of four spaces.
+            prefix: Text before the unit.
+            unit: Unit, by default that of the field.
         """
-        unit, source = unit or unit_of(name), self.spec.provenance.get(name)
-        text = " ".join(part for part in (what, unit and f"[{unit}]") if part)
+        unit, source = unit or unit_of(field), self.spec.provenance.get(field)
+        text = " ".join(part for part in (prefix, unit and f"[{unit}]") if part)
         if source is not None:
             text += f"; {source.origin}" + (f": {source.reason}" if source.reason else "")
         return comment(text, depth=depth)
 
-    def soft_limits(self, *, depth: int = 0) -> list[str]:
-        """Return a comment on `soft_factor`."""
-        text = "Share of each joint's range that rewards leave free"
-        more = ", the median" if self.limits else ""
-        return comment(f"{text}{more}; limits by joint are in robot.toml.", depth=depth)
+    def velocity_scale_comment(self, *, depth: int = 0) -> list[str]:
+        """Return a comment on the action scales of joints with velocity targets."""
+        return self.provenance_comment("action_scale", depth=depth, unit=unit_of("velocity"))
 
-    def scales(self, joints: Iterable[str]) -> dict[str, float]:
-        """Return the action scale of joints: `placed` ones, or wheels."""
-        found = self.of_every_joint("action_scale")
-        return {joint: found[joint] for joint in joints}
+    def soft_limit_comment(self, *, depth: int = 0) -> list[str]:
+        """Return a comment on `soft_limit_factor`."""
+        median_of = ", median over joints" if self.limits else ""
+        text = f"Share of the joint range within the soft limits{median_of}"
+        return comment(f"{text}; soft limits by joint are in robot.toml.", depth=depth)
 
-    def speed_origin(self, *, depth: int = 0) -> list[str]:
-        """Return a comment on the action scales of wheels."""
-        return self.origin("action_scale", depth=depth, unit=unit_of("velocity"))
+    def action_scales(self, joints: Iterable[str]) -> dict[str, float]:
+        """Return the action scales of some joints."""
+        scales = self.all_joint_values("action_scale")
+        return {joint: scales[joint] for joint in joints}
 
-    def one_for_all(
-        self, values: Iterable[float], choice: Literal["median", "largest"], *, depth: int = 0
+    def shared_value(
+        self, values: Iterable[float], kind: Literal["median", "largest"], *, depth: int = 0
     ) -> tuple[float, list[str]]:
-        """Return the median or the largest of the joints' values, and a comment if they differ."""
-        listed = list(values) or [0.0]
-        lowest, highest = number(min(listed)), number(max(listed))
-        chosen = max(listed) if choice == "largest" else median(listed)
-        if lowest == highest:
-            return chosen, []
-        remark = f"One number for all joints, the {choice}: they have {lowest} to {highest}."
-        return chosen, comment(remark, depth=depth)
+        """Return one value for all joints, and a comment if the values differ.
 
-    def known(self, names: Iterable[str], what: str) -> tuple[str, ...]:
-        """Return the names, which have to be bodies.
+        Args:
+            values: Values of the joints.
+            kind: Which value to return.
+            depth: Indentation of the comment, in steps of four spaces.
+        """
+        values = list(values) or [0.0]
+        lowest, highest = float_literal(min(values)), float_literal(max(values))
+        value = max(values) if kind == "largest" else median(values)
+        if lowest == highest:
+            return value, []
+        text = f"One value for all joints, the {kind} of {lowest} to {highest}."
+        return value, comment(text, depth=depth)
+
+    def check_bodies(self, bodies: Iterable[str], field: str) -> tuple[str, ...]:
+        """Return names of bodies without duplicates.
 
         Raises:
-            ConfigError: if one is not a body.
+            ConfigError: if a name is not a body.
         """
-        listed = tuple(dict.fromkeys(names))
-        unknown = [name for name in listed if name not in self.all_bodies]
+        bodies = tuple(dict.fromkeys(bodies))
+        unknown = [name for name in bodies if name not in self.all_bodies]
         if unknown:
             raise ConfigError(
-                f"{what} of {self.title} are no bodies: {listing(map(repr, unknown))}; "
-                f"there are: {listing(map(repr, self.all_bodies))}"
+                f"{field} of {self.title}: got unknown bodies {listing(map(repr, unknown))}; "
+                f"expected {listing(map(repr, self.all_bodies))}"
             )
-        return listed
+        return bodies

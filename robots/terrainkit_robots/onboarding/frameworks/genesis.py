@@ -1,24 +1,24 @@
-"""Genesis: the entity of a robot, its gains and its pose."""
+"""Write the configuration of a robot for Genesis: entity, gains and default pose."""
 
 from collections.abc import Iterator
 
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.naming import package_name
 from terrainkit_robots.onboarding.frameworks.source import (
-    HERE,
-    WRITTEN,
-    assign_sum,
+    GENERATED_NOTE,
+    PARENT_FOLDER,
+    dict_entries,
     docstring,
-    literal,
-    module,
-    number,
-    spread,
-    strings,
-    table,
+    float_literal,
+    format_collection,
+    join_lines,
+    string_literal,
+    string_literals,
+    sum_assignment,
 )
 
 LEGGED_ONLY = False
-"""Whether it takes robots with legs only."""
+"""Whether the framework supports only robots with legs."""
 
 _TABLES = {
     "DEFAULT_POSE": "default_pose",
@@ -32,7 +32,7 @@ _REQUIRED = ("default_pose", "stiffness", "damping")
 
 _FUNCTIONS = '''
 def add(scene):
-    """Add the robot to a scene that is not built yet, and return its entity."""
+    """Add the robot to a scene before it is built, and return its entity."""
     return scene.add_entity(
         gs.morphs.URDF(
             file=str(ROBOT_URDF),
@@ -40,24 +40,24 @@ def add(scene):
             fixed=FIXED,
             merge_fixed_links=True,
             links_to_keep=LINKS_TO_KEEP,
-            # Rotors are ARMATURE; else Genesis gives 0.1 kg m2 to every joint.
+            # Set by ARMATURE below; Genesis' default for all joints is 0.1 kg m2.
             default_armature=None,
         )
     )
 
 
 def dofs(robot, joints=JOINTS):
-    """Return the degree of freedom of each joint, counted from the robot's first."""
+    """Return the local DOF index of each joint."""
     return [robot.get_joint(name).dofs_idx_local[0] for name in joints]
 
 
 def configure(robot):
-    """Give the robot its gains, limits and pose; its scene is built."""
+    """Set gains, limits and pose of the robot after its scene is built."""
     robot.set_dofs_kp(list(STIFFNESS.values()), dofs(robot, STIFFNESS))
     robot.set_dofs_kv(list(DAMPING.values()), dofs(robot, DAMPING))
     if EFFORT:
-        most = list(EFFORT.values())
-        robot.set_dofs_force_range([-each for each in most], most, dofs(robot, EFFORT))
+        limits = list(EFFORT.values())
+        robot.set_dofs_force_range([-x for x in limits], limits, dofs(robot, EFFORT))
     if ARMATURE:
         robot.set_dofs_armature(list(ARMATURE.values()), dofs(robot, ARMATURE))
     robot.set_dofs_position(list(DEFAULT_POSE.values()), dofs(robot, DEFAULT_POSE))
@@ -69,35 +69,35 @@ def configure(robot):
 
 
 def build(scene, n_envs=0):
-    """Add the robot to a scene, build that, and return the robot at its pose."""
+    """Add the robot to a scene, build the scene, and return the configured robot."""
     robot = add(scene)
     scene.build(n_envs=n_envs)
     configure(robot)
     return robot
 '''
-"""What can be done with the robot; the same for every one that has joints."""
+"""The functions of the configuration, the same for every robot with joints."""
 
-_WITHOUT_JOINTS = '''
+_CONFIGURE_WITHOUT_JOINTS = '''
 def configure(robot):
-    """Do nothing: there are no joints to be driven."""
+    """Do nothing, since the robot has no actuated joints."""
 '''
 
 
 def config_text(robot: ConfigRobot) -> str:
-    """Return the file `genesis_config.py` of a robot."""
+    """Return the text of `genesis_config.py`."""
     spec = robot.spec
-    height = number(spec.spawn_height or 0.0)
-    return module(
+    height = float_literal(spec.spawn_height or 0.0)
+    return join_lines(
         [
             docstring(_about(robot)),
             ["", "from pathlib import Path", "", "import genesis as gs", ""],
-            [*assign_sum("ROBOT_URDF", HERE, "/", literal(spec.urdf)), ""],
-            robot.origin("spawn_height", what="x, y, z"),
+            [*sum_assignment("ROBOT_URDF", PARENT_FOLDER, "/", string_literal(spec.urdf)), ""],
+            robot.provenance_comment("spawn_height", prefix="x, y, z"),
             [f"POSITION = (0.0, 0.0, {height})"],
-            ["# Whether the base is bolted down.", f"FIXED = {not spec.floating}", ""],
+            ["# Whether the base is fixed to the world.", f"FIXED = {not spec.floating}", ""],
             _bodies(robot),
             ["", "# The order of actions and observations."],
-            spread("JOINTS = ", strings(spec.joint_order)),
+            format_collection("JOINTS = ", string_literals(spec.joint_order)),
             *(["", *_table(robot, name, field)] for name, field in _TABLES.items()),
             *_scales(robot),
             ["", *_functions(robot).rstrip().split("\n")],
@@ -108,9 +108,9 @@ def config_text(robot: ConfigRobot) -> str:
 def _about(robot: ConfigRobot) -> list[str]:
     package = package_name(robot.spec.name)
     return [
-        f"{robot.title} for Genesis: its entity, gains and pose.",
-        WRITTEN,
-        f"Put the whole folder into a package of yours, as {package}, and use",
+        f"{robot.title} for Genesis: entity, gains and default pose.",
+        GENERATED_NOTE,
+        f"Copy the folder into your Python package as {package}, and use",
         "\n".join(
             [
                 "    import genesis as gs",
@@ -122,8 +122,8 @@ def _about(robot: ConfigRobot) -> list[str]:
                 "    robot = build(scene, n_envs=4096)",
             ]
         ),
-        "Genesis orders joints in its own way: index them by `dofs(robot)`, which is in the order "
-        "of JOINTS.",
+        "Genesis has its own joint order: index DOFs by `dofs(robot)`, which follows the order of "
+        "JOINTS.",
     ]
 
 
@@ -132,29 +132,31 @@ def _bodies(robot: ConfigRobot) -> list[str]:
     contacts = (*spec.penalized_contacts, *spec.termination_contacts)
     kept = dict.fromkeys([*spec.feet, *contacts])
     return [
-        *spread("FEET = ", strings(spec.feet)),
-        "# Bodies whose contacts cost reward.",
-        *spread("PENALIZED = ", strings(spec.penalized_contacts)),
-        "# Bodies whose contact with the ground ends an episode.",
-        *spread("TERMINATION = ", strings(spec.termination_contacts)),
-        "# Bodies that are not to be merged into their parents.",
-        *spread("LINKS_TO_KEEP = ", strings(kept)),
+        *format_collection("FEET = ", string_literals(spec.feet)),
+        "# Bodies whose contacts are penalized.",
+        *format_collection("PENALIZED = ", string_literals(spec.penalized_contacts)),
+        "# Bodies whose ground contact terminates an episode.",
+        *format_collection("TERMINATION = ", string_literals(spec.termination_contacts)),
+        "# Bodies that are not merged into their parents.",
+        *format_collection("LINKS_TO_KEEP = ", string_literals(kept)),
     ]
 
 
 def _table(robot: ConfigRobot, name: str, field: str) -> list[str]:
-    values = robot.of_every_joint(field) if field in _REQUIRED else robot.by_joint(field)
-    return [*robot.origin(field), *spread(f"{name} = ", table(values), "{}")]
+    values = robot.all_joint_values(field) if field in _REQUIRED else robot.joint_values(field)
+    lines = format_collection(f"{name} = ", dict_entries(values), "{}")
+    return [*robot.provenance_comment(field), *lines]
 
 
 def _scales(robot: ConfigRobot) -> Iterator[list[str]]:
-    """Yield what an action of 1 changes: a position, or the speed of what has no stiffness."""
-    for name, joints, told, origin in (
-        ("ACTION_SCALE", robot.position_joints, "position", robot.origin("action_scale")),
-        ("SPEED_SCALE", robot.velocity_joints, "speed", robot.speed_origin()),
+    """Yield the action scales of joints with position targets and with velocity targets."""
+    origin = robot.provenance_comment("action_scale")
+    for name, joints, target, comment in (
+        ("ACTION_SCALE", robot.position_joints, "position", origin),
+        ("SPEED_SCALE", robot.velocity_joints, "velocity", robot.velocity_scale_comment()),
     ):
-        yield ["", f"# Change of the {told} that a joint is told, for an action of 1.", *origin]
-        yield spread(f"{name} = ", table(robot.scales(joints)), "{}")
+        yield ["", f"# Change of the {target} target for an action of 1.", *comment]
+        yield format_collection(f"{name} = ", dict_entries(robot.action_scales(joints)), "{}")
 
 
 def _functions(robot: ConfigRobot) -> str:
@@ -162,4 +164,4 @@ def _functions(robot: ConfigRobot) -> str:
         return _FUNCTIONS
     start = _FUNCTIONS.index("\ndef dofs(")
     end = _FUNCTIONS.index("\ndef build(")
-    return _FUNCTIONS[:start] + _WITHOUT_JOINTS + "\n" + _FUNCTIONS[end:]
+    return _FUNCTIONS[:start] + _CONFIGURE_WITHOUT_JOINTS + "\n" + _FUNCTIONS[end:]

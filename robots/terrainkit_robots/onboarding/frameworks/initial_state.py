@@ -1,25 +1,29 @@
-"""The initial state: where a robot starts, as Isaac Lab and mjlab both want it."""
+"""Write the initial state of a robot for Isaac Lab and mjlab."""
 
 from collections.abc import Mapping
 
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
-from terrainkit_robots.onboarding.frameworks.source import number, spread, table
+from terrainkit_robots.onboarding.frameworks.source import (
+    dict_entries,
+    float_literal,
+    format_collection,
+)
 
 
 def initial_state(robot: ConfigRobot, patterns: Mapping[str, str], *, depth: int) -> list[str]:
-    """Return the fields of an InitialStateCfg.
+    """Return the source of the fields of an InitialStateCfg.
 
     Args:
         robot: The robot.
-        patterns: What matches each joint.
-        depth: How far they will be indented, in steps of four.
+        patterns: A pattern that matches each joint.
+        depth: Indentation of the fields, in steps of four spaces.
     """
-    pose = robot.of_every_joint("default_pose")
-    entries = table({patterns[joint]: angle for joint, angle in pose.items()})
+    pose = robot.all_joint_values("default_pose")
+    entries = dict_entries({patterns[joint]: angle for joint, angle in pose.items()})
     return [
-        *robot.origin("spawn_height", depth=depth, what="x, y, z"),
-        f"pos=(0.0, 0.0, {number(robot.spec.spawn_height or 0.0)}),",
-        *robot.origin("default_pose", depth=depth),
-        *spread("joint_pos=", entries, "{}", depth=depth, tail=","),
+        *robot.provenance_comment("spawn_height", depth=depth, prefix="x, y, z"),
+        f"pos=(0.0, 0.0, {float_literal(robot.spec.spawn_height or 0.0)}),",
+        *robot.provenance_comment("default_pose", depth=depth),
+        *format_collection("joint_pos=", entries, "{}", depth=depth, suffix=","),
         'joint_vel={".*": 0.0},',
     ]

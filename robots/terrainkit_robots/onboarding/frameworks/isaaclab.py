@@ -1,4 +1,4 @@
-"""Isaac Lab: the articulation of a robot, and its velocity task if it walks."""
+"""Write the configuration of a robot for Isaac Lab: articulation and velocity task."""
 
 from collections.abc import Mapping, Sequence
 
@@ -8,23 +8,23 @@ from terrainkit_robots.onboarding.frameworks.initial_state import initial_state
 from terrainkit_robots.onboarding.frameworks.naming import class_name, constant_name, package_name
 from terrainkit_robots.onboarding.frameworks.patterns import usd_patterns
 from terrainkit_robots.onboarding.frameworks.source import (
-    HERE,
-    WRITTEN,
-    assign,
-    assign_sum,
+    GENERATED_NOTE,
+    PARENT_FOLDER,
+    assignment,
+    dict_entries,
     docstring,
-    indented,
-    literal,
-    module,
-    number,
-    numbers,
-    spread,
-    strings,
-    table,
+    float_literal,
+    float_literals,
+    format_collection,
+    indent,
+    join_lines,
+    string_literal,
+    string_literals,
+    sum_assignment,
 )
 
 LEGGED_ONLY = False
-"""Whether it takes robots with legs only."""
+"""Whether the framework supports only robots with legs."""
 
 _LIMITS = {
     "effort_limit_sim": "effort",
@@ -33,45 +33,46 @@ _LIMITS = {
     "damping": "damping",
     "armature": "armature",
 }
-"""Fields of ImplicitActuatorCfg, and those of the spec that they hold."""
+"""Fields of ImplicitActuatorCfg, and the corresponding fields of the spec."""
 
 
 def config_text(robot: ConfigRobot) -> str:
-    """Return the file `isaaclab_config.py` of a robot.
+    """Return the text of `isaaclab_config.py`.
 
     Raises:
-        ConfigError: if it has no joints, or two of them have one name in USD.
+        ConfigError: if the robot has no joints, or two joints have the same name in USD.
     """
     if not robot.spec.joint_order:
-        raise ConfigError(f"{robot.title} has no joints; Isaac Lab configures articulations")
+        raise ConfigError(f"{robot.title} has no joints, which Isaac Lab requires")
     name = f"{constant_name(robot.spec.name)}_CFG"
-    walks = bool(robot.spec.feet) and robot.spec.floating
-    return module(
+    is_legged = bool(robot.spec.feet) and robot.spec.floating
+    return join_lines(
         [
-            docstring(_about(robot, name, walks)),
+            docstring(_about(robot, name, is_legged)),
             ["", "from pathlib import Path", "", "import isaaclab.sim as sim_utils"],
             ["from isaaclab.actuators import ImplicitActuatorCfg"],
             ["from isaaclab.assets import ArticulationCfg", ""],
-            [*assign_sum("ROBOT_URDF", HERE, "/", literal(robot.spec.urdf)), ""],
+            sum_assignment("ROBOT_URDF", PARENT_FOLDER, "/", string_literal(robot.spec.urdf)),
+            [""],
             _articulation(robot, name),
             _scales(robot),
-            _task(robot, name) if walks else [],
+            _task(robot, name) if is_legged else [],
         ]
     )
 
 
-def _about(robot: ConfigRobot, name: str, walks: bool) -> list[str]:
+def _about(robot: ConfigRobot, name: str, is_legged: bool) -> list[str]:
     package = package_name(robot.spec.name)
     paragraphs = [
-        f"{robot.title} for Isaac Lab 2: its articulation"
-        + (", and its velocity task." if walks else "."),
-        f"{WRITTEN} Patterns have to match the whole name of a joint or body, and each name just "
-        "one of them.",
-        f"Put the whole folder into a package of yours, as {package}, and use",
+        f"{robot.title} for Isaac Lab 2: articulation"
+        + (" and velocity task." if is_legged else "."),
+        f"{GENERATED_NOTE} A pattern matches the whole name of a joint or body, and each name is "
+        "matched by one pattern.",
+        f"Copy the folder into your Python package as {package}, and use",
         f"    from {package}.isaaclab_config import {name}\n\n"
         f'    robot = {name}.replace(prim_path="{{ENV_REGEX_NS}}/Robot")',
     ]
-    if walks:
+    if is_legged:
         paragraphs += [
             "or register the task:",
             "\n".join(
@@ -89,31 +90,31 @@ def _about(robot: ConfigRobot, name: str, walks: bool) -> list[str]:
         ]
     if robot.velocity_joints:
         paragraphs.append(
-            "What has no stiffness is told a speed: it wants a JointVelocityActionCfg of WHEELS "
-            "and SPEED_SCALE."
+            "Joints without stiffness have velocity targets: use a JointVelocityActionCfg with "
+            "WHEELS and SPEED_SCALE."
         )
     return [
         *paragraphs,
-        "Isaac Lab orders joints breadth first, which need not be the order of robot.toml.",
+        "Isaac Lab orders joints breadth-first, which may differ from the order of robot.toml.",
     ]
 
 
 def _articulation(robot: ConfigRobot, name: str) -> list[str]:
     lines = [
         "spawn=sim_utils.UrdfFileCfg(",
-        *indented(_spawn(robot)),
+        *indent(_spawn(robot)),
         "),",
         "init_state=ArticulationCfg.InitialStateCfg(",
-        *indented(initial_state(robot, usd_patterns(robot.spec.joint_order), depth=2)),
+        *indent(initial_state(robot, usd_patterns(robot.spec.joint_order), depth=2)),
         "),",
-        *robot.soft_limits(depth=1),
-        f"soft_joint_pos_limit_factor={number(robot.soft_factor)},",
+        *robot.soft_limit_comment(depth=1),
+        f"soft_joint_pos_limit_factor={float_literal(robot.soft_limit_factor)},",
         "actuators={",
-        *indented(_actuator(robot, "joints", robot.position_joints)),
-        *indented(_actuator(robot, "wheels", robot.velocity_joints)),
+        *indent(_actuator(robot, "joints", robot.position_joints)),
+        *indent(_actuator(robot, "wheels", robot.velocity_joints)),
         "},",
     ]
-    return [f"{name} = ArticulationCfg(", *indented(lines), ")"]
+    return [f"{name} = ArticulationCfg(", *indent(lines), ")"]
 
 
 def _spawn(robot: ConfigRobot) -> list[str]:
@@ -121,11 +122,11 @@ def _spawn(robot: ConfigRobot) -> list[str]:
     return [
         "asset_path=str(ROBOT_URDF),",
         f"fix_base={not spec.floating},",
-        "# Feet on fixed joints stay bodies where the URDF says dont_collapse.",
+        "# Feet on fixed joints with dont_collapse remain separate bodies.",
         "merge_fixed_joints=True,",
         "replace_cylinders_with_capsules=False,",
         "activate_contact_sensors=True,",
-        "# The actuators below drive the joints, not what the importer would set.",
+        "# Gains are set by the actuators below.",
         "joint_drive=sim_utils.UrdfConverterCfg.JointDriveCfg(",
         "    gains=sim_utils.UrdfConverterCfg.JointDriveCfg.PDGainsCfg(",
         "        stiffness=0.0,",
@@ -137,7 +138,7 @@ def _spawn(robot: ConfigRobot) -> list[str]:
         "    max_depenetration_velocity=1.0,",
         "),",
         "articulation_props=sim_utils.ArticulationRootPropertiesCfg(",
-        "    # A URDF cannot exclude pairs of bodies that overlap at rest.",
+        "    # URDF cannot exclude contacts between bodies that overlap at the default pose.",
         "    enabled_self_collisions=False,",
         "    solver_position_iteration_count=4,",
         "    solver_velocity_iteration_count=0,",
@@ -146,67 +147,69 @@ def _spawn(robot: ConfigRobot) -> list[str]:
 
 
 def _actuator(robot: ConfigRobot, name: str, joints: Sequence[str]) -> list[str]:
-    """Return the entry of an actuator of these joints; nothing without joints."""
+    """Return the source of an actuator of some joints, or nothing without joints."""
     if not joints:
         return []
     patterns = usd_patterns(robot.spec.joint_order)
-    names = strings(patterns[joint] for joint in joints)
-    lines = spread("joint_names_expr=", names, depth=3, tail=",")
+    names = string_literals(patterns[joint] for joint in joints)
+    lines = format_collection("joint_names_expr=", names, depth=3, suffix=",")
     for field, source in _LIMITS.items():
         required = field in ("stiffness", "damping")
-        known = robot.of_every_joint(source) if required else robot.by_joint(source)
+        known = robot.all_joint_values(source) if required else robot.joint_values(source)
         values = {joint: known[joint] for joint in joints if joint in known}
         if values:
-            lines += robot.origin(source, depth=3)
+            lines += robot.provenance_comment(source, depth=3)
             complete = len(values) == len(joints)
-            lines += _value(f"{field}=", values, patterns, complete=complete, depth=3, tail=",")
-    return [f'"{name}": ImplicitActuatorCfg(', *indented(lines), "),"]
+            lines += _value(f"{field}=", values, patterns, complete=complete, depth=3, suffix=",")
+    return [f'"{name}": ImplicitActuatorCfg(', *indent(lines), "),"]
 
 
 def _scales(robot: ConfigRobot) -> list[str]:
-    """Return what an action of 1 changes: a position, or a wheel's speed."""
+    """Return the action scales of joints with position targets and with velocity targets."""
     patterns = usd_patterns(robot.spec.joint_order)
     lines = []
     if robot.position_joints:
-        lines += ["", *robot.origin("action_scale")]
-        lines += _value("ACTION_SCALE = ", robot.scales(robot.position_joints), patterns)
+        lines += ["", *robot.provenance_comment("action_scale")]
+        lines += _value("ACTION_SCALE = ", robot.action_scales(robot.position_joints), patterns)
     if robot.velocity_joints:
-        lines += ["", *robot.speed_origin()]
-        lines += _value("SPEED_SCALE = ", robot.scales(robot.velocity_joints), patterns)
-        lines += spread("WHEELS = ", strings(patterns[joint] for joint in robot.velocity_joints))
+        lines += ["", *robot.velocity_scale_comment()]
+        lines += _value("SPEED_SCALE = ", robot.action_scales(robot.velocity_joints), patterns)
+        wheels = string_literals(patterns[joint] for joint in robot.velocity_joints)
+        lines += format_collection("WHEELS = ", wheels)
     if robot.position_joints and (robot.velocity_joints or robot.unactuated):
-        lines += spread("JOINTS = ", strings(patterns[joint] for joint in robot.position_joints))
+        joints = string_literals(patterns[joint] for joint in robot.position_joints)
+        lines += format_collection("JOINTS = ", joints)
     return lines
 
 
 def _value(
-    head: str,
+    prefix: str,
     values: Mapping[str, float],
     patterns: Mapping[str, str],
     *,
     complete: bool = True,
     depth: int = 0,
-    tail: str = "",
+    suffix: str = "",
 ) -> list[str]:
-    """Return a statement with one number, if all joints have it, else with one by pattern."""
-    different = set(numbers(values.values()))
+    """Return a statement with one number if all joints have the same value, else with a dict."""
+    different = set(float_literals(values.values()))
     if complete and len(different) == 1:
-        return [f"{head}{different.pop()}{tail}"]
-    entries = table({patterns[joint]: value for joint, value in values.items()})
-    return spread(head, entries, "{}", depth=depth, tail=tail)
+        return [f"{prefix}{different.pop()}{suffix}"]
+    entries = dict_entries({patterns[joint]: value for joint, value in values.items()})
+    return format_collection(prefix, entries, "{}", depth=depth, suffix=suffix)
 
 
 def _task(robot: ConfigRobot, name: str) -> list[str]:
-    """Return the bodies by name, and a function that puts the robot into the velocity task."""
-    low, high = numbers(robot.spec.reset_range)
+    """Return the names of bodies, and a function that configures the velocity task."""
+    low, high = float_literals(robot.spec.reset_range)
     return [
         "",
-        "# Bodies, once fixed joints are merged.",
+        "# Bodies after fixed joints are merged.",
         *_bodies(robot),
         "",
         "",
         "def rough_env_cfg():",
-        '    """Return Isaac Lab\'s velocity task on rough ground, with this robot in it."""',
+        '    """Return Isaac Lab\'s rough-terrain velocity task for this robot."""',
         *["    from isaaclab.envs.mdp import JointVelocityActionCfg"] * bool(robot.velocity_joints),
         "    from isaaclab_tasks.manager_based.locomotion.velocity.velocity_env_cfg import (",
         "        LocomotionVelocityRoughEnvCfg,",
@@ -218,10 +221,10 @@ def _task(robot: ConfigRobot, name: str) -> list[str]:
         "    )",
         '    cfg.scene.height_scanner.prim_path = "{ENV_REGEX_NS}/Robot/" + BASE',
         *_actions(robot),
-        "    # Factors on the default pose between which a joint starts an episode.",
+        "    # Range of the factor on the default pose at a reset.",
         "    reset = cfg.events.reset_robot_joints.params",
         f'    reset["position_range"] = ({low}, {high})',
-        "    # Which of these there are depends on the version of Isaac Lab.",
+        "    # Not all of these events exist in every version of Isaac Lab.",
         '    for event in ("add_base_mass", "base_com", "base_external_force_torque"):',
         "        term = getattr(cfg.events, event, None)",
         "        if term is not None:",
@@ -234,7 +237,7 @@ def _task(robot: ConfigRobot, name: str) -> list[str]:
 
 
 def _actions(robot: ConfigRobot) -> list[str]:
-    """Return what tells each joint a position, or a speed."""
+    """Return the source of the actions with position targets and velocity targets."""
     lines = ["cfg.actions.joint_pos.scale = ACTION_SCALE"] if robot.position_joints else []
     if robot.velocity_joints or robot.unactuated:
         lines += [
@@ -250,7 +253,7 @@ def _actions(robot: ConfigRobot) -> list[str]:
             "    scale=SPEED_SCALE,",
             ")",
         ]
-    return indented(lines)
+    return indent(lines)
 
 
 def _contact_term(term: str, name: str, bodies: Sequence[str]) -> list[str]:
@@ -262,12 +265,12 @@ def _contact_term(term: str, name: str, bodies: Sequence[str]) -> list[str]:
 def _bodies(robot: ConfigRobot) -> list[str]:
     spec = robot.spec
     patterns = usd_patterns(robot.all_bodies)
-    lines = assign("BASE", literal(patterns[robot.known([spec.base], "base")[0]]))
+    lines = assignment("BASE", string_literal(patterns[robot.check_bodies([spec.base], "base")[0]]))
     for name, field in (
         ("FEET", "feet"),
         ("PENALIZED", "penalized_contacts"),
         ("TERMINATION", "termination_contacts"),
     ):
-        names = robot.known(getattr(spec, field), field)
-        lines += spread(f"{name} = ", strings(patterns[body] for body in names))
+        names = robot.check_bodies(getattr(spec, field), field)
+        lines += format_collection(f"{name} = ", string_literals(patterns[body] for body in names))
     return lines

@@ -1,34 +1,34 @@
-"""legged_gym: the configuration class of a robot on rough terrain in Isaac Gym."""
+"""Write the configuration of a robot for legged_gym: rough terrain in Isaac Gym."""
 
 from terrainkit_robots.onboarding.frameworks import legged_robot
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.naming import class_name, package_name
 from terrainkit_robots.onboarding.frameworks.source import (
-    WRITTEN,
+    GENERATED_NOTE,
     docstring,
-    literal,
-    module,
-    number,
+    float_literal,
+    join_lines,
+    string_literal,
 )
 
-_HEIGHTS = 17 * 11
-"""Heights around the robot that legged_gym adds to the observations on rough terrain."""
+_NUM_HEIGHTS = 17 * 11
+"""Number of height samples in the observations of legged_gym on rough terrain."""
 
-_USUAL_JOINTS = 12
-"""Joints that legged_gym's noise on observations is laid out for."""
+_DEFAULT_NUM_JOINTS = 12
+"""Number of joints that legged_gym's observation noise supports."""
 
 LEGGED_ONLY = True
-"""Whether it takes robots with legs only."""
+"""Whether the framework supports only robots with legs."""
 
 
 def config_text(robot: ConfigRobot) -> str:
-    """Return the file `legged_gym_config.py` of a robot.
+    """Return the text of `legged_gym_config.py`.
 
     Raises:
-        ConfigError: if legged_gym cannot name the robot's parts.
+        ConfigError: if legged_gym does not support the names of the bodies.
     """
     name = class_name(robot.spec.name)
-    return module(
+    return join_lines(
         [
             docstring(_about(robot, name)),
             ["", *legged_robot.BEFORE_IMPORTS],
@@ -57,9 +57,9 @@ def config_text(robot: ConfigRobot) -> str:
 def _about(robot: ConfigRobot, name: str) -> list[str]:
     package = package_name(robot.spec.name)
     paragraphs = [
-        f"{robot.title} for legged_gym: its configuration on rough terrain.",
-        WRITTEN,
-        f"Copy the whole folder to legged_gym/envs/{package} and register the robot in "
+        f"{robot.title} for legged_gym: rough terrain.",
+        GENERATED_NOTE,
+        f"Copy the folder to legged_gym/envs/{package} and register the robot in "
         "legged_gym/envs/__init__.py:",
         "\n".join(
             [
@@ -72,14 +72,14 @@ def _about(robot: ConfigRobot, name: str) -> list[str]:
                 "    )",
             ]
         ),
-        "legged_gym moves every joint of the URDF, in the order of Isaac Gym, which need not be "
-        "that of robot.toml. Limits of torque and speed are those in robot.urdf.",
+        "legged_gym uses all movable joints of the URDF in the order of Isaac Gym, which may "
+        "differ from the order of robot.toml. Effort and velocity limits are read from robot.urdf.",
     ]
     count = len(robot.spec.joint_order)
-    if count != _USUAL_JOINTS:
+    if count != _DEFAULT_NUM_JOINTS:
         paragraphs.append(
-            f"LeggedRobot._get_noise_scale_vec is laid out for {_USUAL_JOINTS} joints; this robot "
-            f"has {count}: override it."
+            f"LeggedRobot._get_noise_scale_vec supports {_DEFAULT_NUM_JOINTS} joints, but this "
+            f"robot has {count}: override it."
         )
     return paragraphs
 
@@ -88,33 +88,33 @@ def _env(robot: ConfigRobot) -> list[str]:
     count = len(robot.spec.joint_order)
     return [
         "# 3 linear velocity, 3 angular velocity, 3 gravity, 3 commands; position, velocity",
-        f"# and last action of each joint; {_HEIGHTS} heights of the ground.",
-        f"num_observations = {12 + 3 * count + _HEIGHTS}",
+        f"# and last action of each joint; {_NUM_HEIGHTS} terrain heights.",
+        f"num_observations = {12 + 3 * count + _NUM_HEIGHTS}",
         f"num_actions = {count}",
     ]
 
 
 def _control(robot: ConfigRobot) -> list[str]:
-    return legged_robot.gains(robot, "the last key that fits counts, so the order matters.")
+    return legged_robot.gains(robot, "the last matching key is used, so the order matters.")
 
 
 def _asset(robot: ConfigRobot) -> list[str]:
-    # Too little shakes light joints; more than they need makes the others but a bit slower.
-    known = robot.by_joint("armature").values()
-    armature, differ = robot.one_for_all(known, "largest", depth=2)
+    # Too little armature makes light joints unstable; too much slows the others only slightly.
+    armatures = robot.joint_values("armature").values()
+    armature, difference = robot.shared_value(armatures, "largest", depth=2)
     return [
         *legged_robot.path_in_folder("file", robot.spec.urdf),
         legged_robot.asset_name(robot),
         *legged_robot.contacts(robot),
         *legged_robot.shapes(),
-        *robot.origin("armature", depth=2),
-        *differ,
-        f"armature = {number(armature)}",
+        *robot.provenance_comment("armature", depth=2),
+        *difference,
+        f"armature = {float_literal(armature)}",
     ]
 
 
 def _runner(robot: ConfigRobot) -> list[str]:
     return [
         'run_name = ""',
-        f"experiment_name = {literal(f'rough_{package_name(robot.spec.name)}')}",
+        f"experiment_name = {string_literal(f'rough_{package_name(robot.spec.name)}')}",
     ]

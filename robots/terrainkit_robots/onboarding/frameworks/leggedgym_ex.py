@@ -1,25 +1,25 @@
-"""LeggedGym-Ex: the configuration class of a robot, for Isaac Gym, Genesis and Isaac Lab."""
+"""Write the configuration of a robot for LeggedGym-Ex: Isaac Gym, Genesis and Isaac Lab."""
 
 from terrainkit_robots.onboarding.frameworks import legged_robot
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.naming import class_name, package_name
 from terrainkit_robots.onboarding.frameworks.source import (
-    WRITTEN,
-    assign,
+    GENERATED_NOTE,
+    assignment,
     comment,
     docstring,
-    indented,
-    literal,
-    module,
-    number,
-    spread,
-    strings,
+    float_literal,
+    format_collection,
+    indent,
+    join_lines,
+    string_literal,
+    string_literals,
 )
 
 LEGGED_ONLY = True
-"""Whether it takes robots with legs only."""
+"""Whether the framework supports only robots with legs."""
 
-_SCALES = {
+_REWARD_SCALES = {
     "tracking_lin_vel": "1.0",
     "tracking_ang_vel": "0.5",
     "lin_vel_z": "-2.0",
@@ -31,18 +31,17 @@ _SCALES = {
     "feet_air_time": "1.0",
     "collision": "-1.0",
 }
-"""Weights of rewards: those of legged_gym, and one that keeps joints off their limits. In
-LeggedGym-Ex all are zero, and a robot that is told nothing learns nothing."""
+"""Reward scales of legged_gym, and one for joint limits. The defaults in LeggedGym-Ex are 0."""
 
 
 def config_text(robot: ConfigRobot) -> str:
-    """Return the file `leggedgym_ex_config.py` of a robot.
+    """Return the text of `leggedgym_ex_config.py`.
 
     Raises:
-        ConfigError: if LeggedGym-Ex cannot name the robot's parts.
+        ConfigError: if LeggedGym-Ex does not support the names of the bodies.
     """
     name = class_name(robot.spec.name)
-    return module(
+    return join_lines(
         [
             docstring(_about(robot, name)),
             ["", *legged_robot.BEFORE_IMPORTS, "from legged_gym import SIMULATOR"],
@@ -69,9 +68,9 @@ def config_text(robot: ConfigRobot) -> str:
 def _about(robot: ConfigRobot, name: str) -> list[str]:
     package = package_name(robot.spec.name)
     return [
-        f"{robot.title} for LeggedGym-Ex: its configuration on flat ground.",
-        WRITTEN,
-        f"Copy the whole folder to legged_gym/envs/{package} and register the robot in "
+        f"{robot.title} for LeggedGym-Ex: flat ground.",
+        GENERATED_NOTE,
+        f"Copy the folder to legged_gym/envs/{package} and register the robot in "
         "legged_gym/envs/__init__.py:",
         "\n".join(
             [
@@ -84,19 +83,19 @@ def _about(robot: ConfigRobot, name: str) -> list[str]:
                 "    )",
             ]
         ),
-        "Isaac Gym reads robot.urdf, Genesis robot.xml (in versions without xml_file: robot.urdf). "
-        "On Isaac Lab, legged_gym/simulator/isaaclab_simulator.py picks actuators by asset.name "
-        f"and knows its own robots only: add a branch for {literal(package)}.",
-        "On Isaac Gym, LeggedGym-Ex takes the way from its order of joints to dof_names for the "
-        "way back as well. That holds if the two are the same or exchange joints in pairs; "
-        "elsewhere give dof_names, and what goes with it, the order that it prints.",
+        "Isaac Gym reads robot.urdf; Genesis reads robot.xml (robot.urdf in versions without "
+        "xml_file). With Isaac Lab, legged_gym/simulator/isaaclab_simulator.py selects actuators "
+        f"by asset.name: add a branch for {string_literal(package)}.",
+        "With Isaac Gym, LeggedGym-Ex uses the permutation from its joint order to dof_names also "
+        "for the inverse. This is correct only if the permutation is its own inverse; otherwise "
+        "set dof_names, dof_armature and dof_vel_limits in the order that it prints.",
     ]
 
 
 def _env(robot: ConfigRobot) -> list[str]:
     count = len(robot.spec.joint_order)
     return [
-        "# What LeggedRobot observes: 3 linear velocity, 3 gravity, 3 angular velocity,",
+        "# Observations: 3 linear velocity, 3 gravity, 3 angular velocity,",
         "# 3 commands; position, velocity and last action of each joint.",
         f"num_observations = {12 + 3 * count}",
         f"num_actions = {count}",
@@ -107,36 +106,37 @@ def _control(robot: ConfigRobot) -> list[str]:
     return [
         *legged_robot.gains(
             robot,
-            "on Isaac Gym and Isaac Lab the last key that fits counts, so the order matters; "
-            "Genesis takes a gain for each, which fails: rename the joint there.",
+            "Isaac Gym and Isaac Lab use the last matching key, so the order matters; "
+            "Genesis fails with several matching keys: rename the joint.",
         ),
-        "# s between two actions.",
+        "# Control time step [s].",
         "dt = 0.02",
     ]
 
 
 def _asset(robot: ConfigRobot) -> list[str]:
     spec = robot.spec
-    armature, speeds = robot.by_joint("armature"), robot.by_joint("velocity")
-    armatures = [number(armature.get(joint, 0.0)) for joint in spec.joint_order]
+    armature, velocities = robot.joint_values("armature"), robot.joint_values("velocity")
+    armatures = [float_literal(armature.get(joint, 0.0)) for joint in spec.joint_order]
     limits = [
-        number(speeds[joint]) if joint in speeds else 'float("inf")' for joint in spec.joint_order
+        float_literal(velocities[joint]) if joint in velocities else 'float("inf")'
+        for joint in spec.joint_order
     ]
-    base = robot.known([spec.base], "base")[0]
+    base = robot.check_bodies([spec.base], "base")[0]
     return [
         legged_robot.asset_name(robot),
         *legged_robot.path_in_folder("file", spec.urdf),
         *legged_robot.path_in_folder("xml_file", spec.mjcf),
         *legged_robot.contacts(robot),
-        *assign("base_link_name", literal(base), depth=2),
+        *assignment("base_link_name", string_literal(base), depth=2),
         "# The order of actions and observations.",
-        *spread("dof_names = ", strings(spec.joint_order), depth=2),
-        *robot.origin("armature", depth=2, what="In the order of dof_names"),
-        *spread("dof_armature = ", armatures, depth=2),
-        *robot.origin("velocity", depth=2, what="In the order of dof_names"),
-        *spread("dof_vel_limits = ", limits, depth=2),
-        *comment("Bodies on fixed joints that Genesis is not to merge.", depth=2),
-        *spread("links_to_keep = ", strings(spec.feet), depth=2),
+        *format_collection("dof_names = ", string_literals(spec.joint_order), depth=2),
+        *robot.provenance_comment("armature", depth=2, prefix="In the order of dof_names"),
+        *format_collection("dof_armature = ", armatures, depth=2),
+        *robot.provenance_comment("velocity", depth=2, prefix="In the order of dof_names"),
+        *format_collection("dof_vel_limits = ", limits, depth=2),
+        *comment("Bodies on fixed joints that Genesis does not merge.", depth=2),
+        *format_collection("links_to_keep = ", string_literals(spec.feet), depth=2),
         *legged_robot.shapes(),
     ]
 
@@ -146,13 +146,13 @@ def _rewards(robot: ConfigRobot) -> list[str]:
         *legged_robot.rewards(robot),
         "",
         "class scales(LeggedRobotCfg.rewards.scales):",
-        *indented(["# The weights that legged_gym starts from; in LeggedGym-Ex all are zero."]),
-        *indented(f"{name} = {weight}" for name, weight in _SCALES.items()),
+        *indent(["# The default scales of legged_gym; in LeggedGym-Ex the defaults are 0."]),
+        *indent(f"{name} = {weight}" for name, weight in _REWARD_SCALES.items()),
     ]
 
 
 def _runner(robot: ConfigRobot) -> list[str]:
     return [
         "run_name = SIMULATOR",
-        f"experiment_name = {literal(package_name(robot.spec.name))}",
+        f"experiment_name = {string_literal(package_name(robot.spec.name))}",
     ]

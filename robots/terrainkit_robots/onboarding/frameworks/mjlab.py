@@ -1,4 +1,4 @@
-"""mjlab: the entity of a robot, with actuators of its own."""
+"""Write the configuration of a robot for mjlab: entity and actuators."""
 
 from collections.abc import Mapping, Sequence
 
@@ -7,21 +7,21 @@ from terrainkit_robots.onboarding.frameworks.initial_state import initial_state
 from terrainkit_robots.onboarding.frameworks.naming import constant_name, package_name
 from terrainkit_robots.onboarding.frameworks.patterns import mjlab_patterns
 from terrainkit_robots.onboarding.frameworks.source import (
-    HERE,
-    WRITTEN,
-    assign_sum,
+    GENERATED_NOTE,
+    PARENT_FOLDER,
+    dict_entries,
     docstring,
-    indented,
-    literal,
-    module,
-    number,
-    spread,
-    strings,
-    table,
+    float_literal,
+    format_collection,
+    indent,
+    join_lines,
+    string_literal,
+    string_literals,
+    sum_assignment,
 )
 
 LEGGED_ONLY = False
-"""Whether it takes robots with legs only."""
+"""Whether the framework supports only robots with legs."""
 
 _FIELDS = {
     "stiffness": "stiffness",
@@ -29,31 +29,31 @@ _FIELDS = {
     "effort_limit": "effort",
     "armature": "armature",
 }
-"""Fields of BuiltinPositionActuatorCfg, and those of the spec that they hold. Those of
-BuiltinVelocityActuatorCfg are the same, but for the stiffness."""
+"""Fields of BuiltinPositionActuatorCfg, and the corresponding fields of the spec.
+BuiltinVelocityActuatorCfg has the same fields except for the stiffness."""
 
 _POSITION, _VELOCITY = "BuiltinPositionActuatorCfg", "BuiltinVelocityActuatorCfg"
 
 
 def config_text(robot: ConfigRobot) -> str:
-    """Return the file `mjlab_config.py` of a robot.
+    """Return the text of `mjlab_config.py`.
 
     Raises:
-        ConfigError: if two joints have one name in mjlab.
+        ConfigError: if two joints have the same name in mjlab.
     """
     name = constant_name(robot.spec.name)
     patterns = mjlab_patterns(robot.spec.joint_order)
     kinds = [_POSITION] * bool(robot.position_joints) + [_VELOCITY] * bool(robot.velocity_joints)
-    return module(
+    return join_lines(
         [
             docstring(_about(robot, name)),
             ["", "from pathlib import Path", "", "import mujoco"],
             [f"from mjlab.actuator import {', '.join(kinds)}"] if kinds else [],
             ["from mjlab.entity import EntityArticulationInfoCfg, EntityCfg", ""],
-            assign_sum("ROBOT_XML", HERE, "/", literal(robot.spec.mjcf)),
+            sum_assignment("ROBOT_XML", PARENT_FOLDER, "/", string_literal(robot.spec.mjcf)),
             _get_spec(),
             ["", f"{name}_INIT_STATE = EntityCfg.InitialStateCfg("],
-            [*indented(initial_state(robot, patterns, depth=1)), ")"],
+            [*indent(initial_state(robot, patterns, depth=1)), ")"],
             _articulation(robot, name, patterns),
             _scales(robot, name, patterns),
             _robot_cfg(name),
@@ -64,19 +64,19 @@ def config_text(robot: ConfigRobot) -> str:
 def _about(robot: ConfigRobot, name: str) -> list[str]:
     package = package_name(robot.spec.name)
     paragraphs = [
-        f"{robot.title} for mjlab: its entity.",
-        f"{WRITTEN} Patterns have to match the whole name of a joint.",
-        f"Put the whole folder into a package of yours, as {package}, and use",
+        f"{robot.title} for mjlab: entity and actuators.",
+        f"{GENERATED_NOTE} A pattern matches the whole name of a joint.",
+        f"Copy the folder into your Python package as {package}, and use",
         f"    from {package}.mjlab_config import get_robot_cfg\n\n"
         '    cfg.scene.entities = {"robot": get_robot_cfg()}',
-        "mjlab orders actions by the joints of robot.xml. Its position actuators know no limit of "
-        "speed; those are in robot.toml.",
+        "mjlab orders actions as the joints in robot.xml. Its position actuators have no velocity "
+        "limits; these are in robot.toml.",
     ]
     if robot.velocity_joints:
         paragraphs.append(
-            "What has no stiffness is told a speed: it wants a JointVelocityActionCfg with "
-            f"actuator_names=tuple({name}_SPEED_SCALE), and the JointPositionActionCfg those of "
-            f"{name}_ACTION_SCALE."
+            "Joints without stiffness have velocity targets: use a JointVelocityActionCfg with "
+            f"actuator_names=tuple({name}_SPEED_SCALE), and a JointPositionActionCfg with the "
+            f"names of {name}_ACTION_SCALE."
         )
     return paragraphs
 
@@ -86,11 +86,11 @@ def _get_spec() -> list[str]:
         "",
         "",
         "def get_spec() -> mujoco.MjSpec:",
-        '    """Return the robot without the actuators and keyframes that mjlab adds itself."""',
+        '    """Return the robot without actuators and keyframes, which mjlab adds."""',
         "    spec = mujoco.MjSpec.from_file(str(ROBOT_XML))",
         "    actuator = mujoco.mjtObj.mjOBJ_ACTUATOR",
-        "    theirs = [sensor for sensor in spec.sensors if sensor.objtype == actuator]",
-        "    for element in [*theirs, *spec.keys, *spec.actuators]:",
+        "    sensors = [sensor for sensor in spec.sensors if sensor.objtype == actuator]",
+        "    for element in [*sensors, *spec.keys, *spec.actuators]:",
         "        spec.delete(element)",
         "    return spec",
         "",
@@ -98,57 +98,59 @@ def _get_spec() -> list[str]:
 
 
 def _articulation(robot: ConfigRobot, name: str, patterns: Mapping[str, str]) -> list[str]:
-    """Return the actuators: joints that have the same numbers share one."""
+    """Return the source of the actuators; joints with the same values share an actuator."""
     tables = {
-        field: robot.by_joint(source)
+        field: robot.joint_values(source)
         if field in ("effort_limit", "armature")
-        else robot.of_every_joint(source)
+        else robot.all_joint_values(source)
         for field, source in _FIELDS.items()
     }
     groups: dict[tuple[str, ...], list[str]] = {}
     for joint in robot.spec.joint_order:
-        rolls = joint in robot.velocity_joints
+        is_wheel = joint in robot.velocity_joints
         arguments = [
-            f"{field}={number(values[joint])},"
+            f"{field}={float_literal(values[joint])},"
             for field, values in tables.items()
-            if joint in values and not (rolls and field == "stiffness")
+            if joint in values and not (is_wheel and field == "stiffness")
         ]
-        groups.setdefault((_VELOCITY if rolls else _POSITION, *arguments), []).append(joint)
+        groups.setdefault((_VELOCITY if is_wheel else _POSITION, *arguments), []).append(joint)
     actuators = []
     for (kind, *arguments), joints in groups.items():
-        names = strings(patterns[joint] for joint in joints)
-        expression = spread("target_names_expr=", names, "()", depth=3, tail=",")
-        actuators += [f"{kind}(", *indented([*expression, *arguments]), "),"]
+        names = string_literals(patterns[joint] for joint in joints)
+        expression = format_collection("target_names_expr=", names, "()", depth=3, suffix=",")
+        actuators += [f"{kind}(", *indent([*expression, *arguments]), "),"]
     origins = [
         line
         for field, source in _FIELDS.items()
-        for line in robot.origin(source, what=field.replace("_", " ").capitalize())
+        for line in robot.provenance_comment(source, prefix=field.replace("_", " ").capitalize())
     ]
-    opened = ["    actuators=(", *indented(actuators, 2), "    ),"]
+    block = ["    actuators=(", *indent(actuators, 2), "    ),"]
     return [
         "",
         *origins,
         f"{name}_ARTICULATION = EntityArticulationInfoCfg(",
-        *(opened if actuators else ["    actuators=(),"]),
-        *indented(robot.soft_limits(depth=1)),
-        f"    soft_joint_pos_limit_factor={number(robot.soft_factor)},",
+        *(block if actuators else ["    actuators=(),"]),
+        *indent(robot.soft_limit_comment(depth=1)),
+        f"    soft_joint_pos_limit_factor={float_literal(robot.soft_limit_factor)},",
         ")",
     ]
 
 
 def _scales(robot: ConfigRobot, name: str, patterns: Mapping[str, str]) -> list[str]:
-    """Return what an action of 1 changes: a position, or a wheel's speed."""
+    """Return the action scales of joints with position targets and with velocity targets."""
 
     def entries(joints: Sequence[str]) -> list[str]:
-        return table({patterns[joint]: scale for joint, scale in robot.scales(joints).items()})
+        scales = robot.action_scales(joints)
+        return dict_entries({patterns[joint]: scale for joint, scale in scales.items()})
 
     lines = []
     if robot.position_joints or not robot.velocity_joints:
-        lines += ["", "# For JointPositionActionCfg.scale.", *robot.origin("action_scale")]
-        lines += spread(f"{name}_ACTION_SCALE = ", entries(robot.position_joints), "{}")
+        origin = robot.provenance_comment("action_scale")
+        lines += ["", "# For JointPositionActionCfg.scale.", *origin]
+        lines += format_collection(f"{name}_ACTION_SCALE = ", entries(robot.position_joints), "{}")
     if robot.velocity_joints:
-        lines += ["", "# For JointVelocityActionCfg.scale.", *robot.speed_origin()]
-        lines += spread(f"{name}_SPEED_SCALE = ", entries(robot.velocity_joints), "{}")
+        lines += ["", "# For JointVelocityActionCfg.scale.", *robot.velocity_scale_comment()]
+        lines += format_collection(f"{name}_SPEED_SCALE = ", entries(robot.velocity_joints), "{}")
     return lines
 
 
@@ -157,7 +159,7 @@ def _robot_cfg(name: str) -> list[str]:
         "",
         "",
         "def get_robot_cfg() -> EntityCfg:",
-        '    """Return a new configuration of the robot, which may be changed."""',
+        '    """Return a new configuration of the robot."""',
         "    return EntityCfg(",
         "        spec_fn=get_spec,",
         f"        init_state={name}_INIT_STATE,",

@@ -1,31 +1,31 @@
-"""Naming: what a robot is called where only a Python identifier will do."""
+"""Convert the name of a robot to Python identifiers."""
 
 import keyword
 import re
 import unicodedata
 
-_MOST_LETTERS = 40
-"""Longer names are cut: they stand in identifiers that are typed."""
+_MAX_LENGTH = 40
+"""Longer names are truncated."""
 
 
 def words(name: str) -> list[str]:
-    """Return the words of a robot's name, in ASCII letters and digits; at least one."""
+    """Return the words of a name in ASCII letters and digits, at least one word."""
     ascii_name = unicodedata.normalize("NFKD", name[:1000]).encode("ascii", "ignore").decode()
-    found = re.findall(r"[A-Za-z0-9]+", ascii_name[:_MOST_LETTERS]) or ["robot"]
+    found = re.findall(r"[A-Za-z0-9]+", ascii_name[:_MAX_LENGTH]) or ["robot"]
     return ["robot", *found] if found[0][0].isdigit() else found
 
 
 def class_name(name: str) -> str:
-    """Return the name of a class, such as `AnymalC` for anymal_c."""
+    """Return a class name, such as `AnymalC` for anymal_c."""
     return "".join(word[0].upper() + word[1:] for word in words(name))
 
 
 def constant_name(name: str) -> str:
-    """Return the name of a constant, such as `ANYMAL_C` for anymal_c."""
+    """Return a constant name, such as `ANYMAL_C` for anymal_c."""
     return "_".join(words(name)).upper()
 
 
 def package_name(name: str) -> str:
-    """Return the name of a folder, task or experiment, such as `anymal_c` for ANYmal C."""
+    """Return the name of a package, task or experiment, such as `anymal_c` for ANYmal C."""
     joined = "_".join(words(name)).lower()
     return f"{joined}_robot" if keyword.iskeyword(joined) else joined

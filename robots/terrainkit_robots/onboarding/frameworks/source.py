@@ -1,7 +1,7 @@
-"""Python source: values, statements and comments as `ruff format` lays them out.
+"""Format Python source: literals, statements and comments in the style of `ruff format`.
 
-Everything that comes from a robot's file goes through `literal`, `comment` or `docstring`, so that
-no name of a link or a joint can end a string and begin a program.
+All text from a robot file passes through `string_literal`, `comment` or `docstring`, so that names
+of links and joints cannot inject code.
 """
 
 import math
@@ -12,23 +12,23 @@ from terrainkit.errors import ConfigError
 from terrainkit_robots.text import one_line
 
 WIDTH = 88
-"""Columns of a line; what ruff and black take where nothing is set."""
+"""Maximum line length, the default of ruff and black."""
 
-HERE = "Path(__file__).resolve().parent"
-"""The folder of a configuration, where the robot lies too."""
+PARENT_FOLDER = "Path(__file__).resolve().parent"
+"""Expression for the folder of the configuration and the robot."""
 
-WRITTEN = (
-    "Written by terrainkit from robot.toml; a comment before a value tells its unit and where it "
-    "came from. SI units and radians."
+GENERATED_NOTE = (
+    "Written by terrainkit from robot.toml. Comments before values state units and provenance. SI "
+    "units and radians."
 )
-"""What is said of every configuration."""
+"""Sentence in the docstring of every configuration."""
 
 _DIGITS = 6
-"""Digits of a number that are written: no motor or ruler is more exact."""
+"""Number of significant digits of numbers."""
 
 
-def literal(text: str) -> str:
-    """Return `text` as a string literal, in double quotes unless these need more escapes."""
+def string_literal(text: str) -> str:
+    """Return a string literal, in double quotes unless single quotes need fewer escapes."""
     quoted = repr(text)
     inside = quoted[1:-1]
     if '"' not in text:
@@ -38,72 +38,72 @@ def literal(text: str) -> str:
     return quoted
 
 
-def number(value: float) -> str:
-    """Return `value` as a float literal.
+def float_literal(value: float) -> str:
+    """Return a float literal.
 
     Raises:
-        ConfigError: if it is infinite or not a number.
+        ConfigError: if the value is infinite or NaN.
     """
     if not math.isfinite(value):
-        raise ConfigError(f"no configuration can hold the number {value}")
+        raise ConfigError(f"number in a configuration: got {value}; expected a finite number")
     short = f"{value + 0.0:.{_DIGITS}g}"
     return short if any(letter in short for letter in ".e") else f"{short}.0"
 
 
-def numbers(values: Iterable[float]) -> list[str]:
-    """Return each value as a float literal."""
-    return [number(value) for value in values]
+def float_literals(values: Iterable[float]) -> list[str]:
+    """Return a float literal for each value."""
+    return [float_literal(value) for value in values]
 
 
-def strings(texts: Iterable[str]) -> list[str]:
-    """Return each text as a string literal."""
-    return [literal(text) for text in texts]
+def string_literals(texts: Iterable[str]) -> list[str]:
+    """Return a string literal for each text."""
+    return [string_literal(text) for text in texts]
 
 
-def table(values: Mapping[str, float]) -> list[str]:
-    """Return the entries of a dict: names, and numbers."""
-    return [f"{literal(name)}: {number(value)}" for name, value in values.items()]
+def dict_entries(values: Mapping[str, float]) -> list[str]:
+    """Return the source of the entries of a dict."""
+    return [f"{string_literal(name)}: {float_literal(value)}" for name, value in values.items()]
 
 
-def spread(
-    head: str, items: Sequence[str], ends: str = "[]", *, depth: int = 0, tail: str = ""
+def format_collection(
+    prefix: str, items: Sequence[str], brackets: str = "[]", *, depth: int = 0, suffix: str = ""
 ) -> list[str]:
-    """Return a statement that holds a collection: on one line if it fits, else one item a line.
+    """Return a statement with a collection, on one line if it fits, else with one item per line.
 
     Args:
-        head: What comes before the opening bracket, such as `feet = `.
+        prefix: Text before the opening bracket, such as `feet = `.
         items: Source of each item.
-        ends: The brackets; the items of a dict, in `{}`, always stand one a line.
-        depth: How far the statement will be indented, in steps of four.
-        tail: What comes after the closing bracket.
+        brackets: The brackets; items of a dict are always on separate lines.
+        depth: Indentation of the statement, in steps of four spaces.
+        suffix: Text after the closing bracket.
     """
-    comma = "," if ends == "()" and len(items) == 1 else ""
-    line = f"{head}{ends[0]}{', '.join(items)}{comma}{ends[1]}{tail}"
-    if not items or (ends != "{}" and len(line) + 4 * depth <= WIDTH):
+    comma = "," if brackets == "()" and len(items) == 1 else ""
+    line = f"{prefix}{brackets[0]}{', '.join(items)}{comma}{brackets[1]}{suffix}"
+    if not items or (brackets != "{}" and len(line) + 4 * depth <= WIDTH):
         return [line]
-    return [head + ends[0], *(f"    {item}," for item in items), ends[1] + tail]
+    return [prefix + brackets[0], *(f"    {item}," for item in items), brackets[1] + suffix]
 
 
-def assign(name: str, value: str, *, depth: int = 0) -> list[str]:
-    """Return `name = value` for a value that cannot be broken, in brackets if that makes it fit."""
+def assignment(name: str, value: str, *, depth: int = 0) -> list[str]:
+    """Return `name = value`, with parentheses if the value then fits on a line of its own."""
     line = f"{name} = {value}"
-    room = WIDTH - 4 * depth
-    if len(line) > room >= len(value) + 4:
+    max_length = WIDTH - 4 * depth
+    if len(line) > max_length >= len(value) + 4:
         return [f"{name} = (", f"    {value}", ")"]
     return [line]
 
 
-def assign_sum(name: str, left: str, operator: str, right: str, *, depth: int = 0) -> list[str]:
-    """Return `name = left operator right`, in brackets and on two lines as that is needed."""
-    line, room = f"{left} {operator} {right}", WIDTH - 4 * depth
-    if len(f"{name} = {line}") <= room:
+def sum_assignment(name: str, left: str, operator: str, right: str, *, depth: int = 0) -> list[str]:
+    """Return `name = left operator right`, on several lines if necessary."""
+    line, max_length = f"{left} {operator} {right}", WIDTH - 4 * depth
+    if len(f"{name} = {line}") <= max_length:
         return [f"{name} = {line}"]
-    parts = [line] if len(line) + 4 <= room else [left, f"{operator} {right}"]
+    parts = [line] if len(line) + 4 <= max_length else [left, f"{operator} {right}"]
     return [f"{name} = (", *(f"    {each}" for each in parts), ")"]
 
 
 def comment(text: str, *, depth: int = 0) -> list[str]:
-    """Return `text` as comment lines, of printable characters only."""
+    """Return a text as comment lines of printable characters."""
     lines = textwrap.wrap(
         one_line(text), WIDTH - 4 * depth - 2, break_long_words=False, break_on_hyphens=False
     )
@@ -111,7 +111,7 @@ def comment(text: str, *, depth: int = 0) -> list[str]:
 
 
 def docstring(paragraphs: Iterable[str]) -> list[str]:
-    """Return the docstring of a module: a title, then paragraphs; those with newlines stay."""
+    """Return the docstring of a module; paragraphs with newlines are not wrapped."""
     blocks = [
         paragraph if "\n" in paragraph else textwrap.fill(paragraph, WIDTH, break_long_words=False)
         for paragraph in paragraphs
@@ -120,11 +120,11 @@ def docstring(paragraphs: Iterable[str]) -> list[str]:
     return ['"""' + text.split("\n", maxsplit=1)[0], *text.split("\n")[1:], '"""']
 
 
-def indented(lines: Iterable[str], depth: int = 1) -> list[str]:
-    """Return the lines, each `depth` steps of four further in; empty ones stay empty."""
+def indent(lines: Iterable[str], depth: int = 1) -> list[str]:
+    """Return the lines with an indentation of `depth` steps of four spaces."""
     return [" " * 4 * depth + line if line else line for line in lines]
 
 
-def module(parts: Iterable[Sequence[str]]) -> str:
-    """Return a module of parts that already end in the blank lines they want."""
+def join_lines(parts: Iterable[Sequence[str]]) -> str:
+    """Return the text of a module from lists of lines."""
     return "\n".join(line for part in parts for line in part).rstrip("\n") + "\n"

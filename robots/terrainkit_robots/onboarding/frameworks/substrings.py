@@ -1,120 +1,125 @@
-"""Substrings: how legged_gym and its successors name bodies and joints, and what that hits.
+"""Find substrings that identify bodies and joints, as legged_gym and LeggedGym-Ex need them.
 
-There a name means every body or joint that contains it, so that "hip" is eight joints of some
-robots, and "base" also "base_imu".
+In these frameworks a key matches every name that contains it: "hip" may match eight joints, and
+"base" also matches "base_imu".
 """
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-_MOST_LETTERS = 64
-"""Of longer names only whole words are tried: their substrings are too many."""
+_MAX_LENGTH = 64
+"""Only whole words of longer names are tried, since they have too many substrings."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Keys:
-    """What to write, and where it says more than was wanted."""
+    """Substrings, and the names that they match unintentionally."""
 
     keys: tuple[str, ...]
 
     clashes: tuple[tuple[str, str], ...] = ()
-    """Pairs of a key and a name that contains it and should not be hit, or is hit already."""
+    """Pairs of a key and a name that it should not match, or that another key matches."""
 
 
-def common_key(wanted: Sequence[str], others: Iterable[str]) -> str | None:
-    """Return a substring of every name that is wanted and of no other; None if there is none.
+def common_key(targets: Sequence[str], names: Iterable[str]) -> str | None:
+    """Return a substring of all targets and of no other name, or None if there is none.
 
-    The shortest that is made of whole words, as `foot` of `FL_foot` is, else the longest.
+    The shortest one of whole words is preferred, such as `foot` in `FL_foot`, then the longest.
+
+    Args:
+        targets: The names to match.
+        names: All names.
     """
-    unwanted = [other for other in others if other not in wanted]
-    shortest = min(wanted, key=len)
-    for candidate in [*_whole_words(shortest), *_pieces(shortest)]:
-        if _hits_all(candidate, wanted) and not any(candidate in other for other in unwanted):
+    others = [name for name in names if name not in targets]
+    shortest = min(targets, key=len)
+    for candidate in [*_whole_words(shortest), *_substrings(shortest)]:
+        if all(candidate in name for name in targets) and not any(
+            candidate in other for other in others
+        ):
             return candidate
     return None
 
 
-def keys_for(wanted: Sequence[str], bodies: Iterable[str]) -> Keys:
-    """Return few substrings that hit each wanted name once and, if that can be, no other."""
-    unwanted = [body for body in bodies if body not in wanted]
-    left = list(dict.fromkeys(wanted))
+def keys_for(targets: Sequence[str], names: Iterable[str]) -> Keys:
+    """Return few substrings that match each target once and, if possible, no other name.
+
+    Args:
+        targets: The names to match.
+        names: All names.
+    """
+    others = [name for name in names if name not in targets]
+    remaining = list(dict.fromkeys(targets))
     keys: list[str] = []
-    while left:
-        covered = [name for name in dict.fromkeys(wanted) if name not in left]
-        key = _best(left, [*unwanted, *covered])
+    while remaining:
+        matched = [name for name in dict.fromkeys(targets) if name not in remaining]
+        key = _best_key(remaining, [*others, *matched])
         keys.append(key)
-        left = [name for name in left if key not in name]
-    return Keys(keys=tuple(keys), clashes=_clashes(keys, wanted, unwanted))
+        remaining = [name for name in remaining if key not in name]
+    clashes = [(key, name) for key in keys for name in others if key in name]
+    for name in dict.fromkeys(targets):
+        matches = [key for key in keys if key in name]
+        clashes.extend((key, name) for key in matches[1:])
+    return Keys(keys=tuple(keys), clashes=tuple(clashes))
 
 
 def gain_keys(joints: Sequence[str], gains: Mapping[str, object]) -> Keys:
-    """Return names of joints in an order in which the last one that a joint contains is right.
+    """Return joint names in an order in which the last match of each joint has its gains.
 
-    A joint whose name contains others, all with its own gains, is left out: it has them already.
+    A joint is omitted if its name contains names of other joints with the same gains.
+
+    Args:
+        joints: Names of all joints.
+        gains: Gains of each joint.
     """
-    inside = {
+    contained = {
         joint: [other for other in joints if other != joint and other in joint] for joint in joints
     }
     keys = [
         joint
         for joint in joints
-        if not inside[joint] or any(gains[other] != gains[joint] for other in inside[joint])
+        if not contained[joint] or any(gains[other] != gains[joint] for other in contained[joint])
     ]
     clashes = tuple(
         (key, joint) for joint in joints for key in keys if key != joint and key in joint
     )
-    several = {joint for joint in joints if sum(key in joint for key in keys) > 1}
-    if several:
+    ambiguous = {joint for joint in joints if sum(key in joint for key in keys) > 1}
+    if ambiguous:
         keys.sort(key=len)
-    return Keys(keys=tuple(keys), clashes=tuple(pair for pair in clashes if pair[1] in several))
+    return Keys(keys=tuple(keys), clashes=tuple(pair for pair in clashes if pair[1] in ambiguous))
 
 
-def _best(left: Sequence[str], others: Sequence[str]) -> str:
-    """Return the key that hits most of what is left, and nothing else; else a whole name."""
+def _best_key(targets: Sequence[str], others: Sequence[str]) -> str:
+    """Return the key that matches most targets and no other name, or else a target."""
     candidates = dict.fromkeys(
-        candidate for name in left for candidate in [*_whole_words(name), name]
+        candidate for name in targets for candidate in [*_whole_words(name), name]
     )
-    best, most = left[0], 0
+    best, max_count = targets[0], 0
     for candidate in candidates:
-        hit = sum(candidate in name for name in left)
-        if hit > most and not any(candidate in other for other in others):
-            best, most = candidate, hit
+        count = sum(candidate in name for name in targets)
+        if count > max_count and not any(candidate in other for other in others):
+            best, max_count = candidate, count
     return best
 
 
-def _clashes(
-    keys: Sequence[str], wanted: Sequence[str], unwanted: Sequence[str]
-) -> tuple[tuple[str, str], ...]:
-    too_many = [(key, name) for key in keys for name in unwanted if key in name]
-    for name in dict.fromkeys(wanted):
-        hits = [key for key in keys if key in name]
-        too_many.extend((key, name) for key in hits[1:])
-    return tuple(too_many)
-
-
 def _whole_words(name: str) -> list[str]:
-    """Return the runs of words in a name, shortest first; a word is what separators part."""
+    """Return sequences of words in a name, shortest first; words are separated by _ and others."""
     spans = [match.span() for match in re.finditer(r"[^\W_]+", name)][:12]
-    runs = {
+    sequences = {
         name[start:end]
         for position, (start, _) in enumerate(spans)
         for _, end in spans[position:]
         if end - start > 1
     }
-    return sorted(runs, key=lambda run: (len(run), name.index(run)))
+    return sorted(sequences, key=lambda words: (len(words), name.index(words)))
 
 
-def _pieces(name: str) -> list[str]:
-    """Return the substrings of a name of two letters or more, longest first."""
-    if len(name) > _MOST_LETTERS:
+def _substrings(name: str) -> list[str]:
+    """Return the substrings of two or more letters of a name, longest first."""
+    if len(name) > _MAX_LENGTH:
         return [name]
     return [
         name[start : start + size]
         for size in range(len(name), 1, -1)
         for start in range(len(name) - size + 1)
     ]
-
-
-def _hits_all(candidate: str, names: Iterable[str]) -> bool:
-    return all(candidate in name for name in names)

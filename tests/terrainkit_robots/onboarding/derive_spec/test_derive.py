@@ -28,7 +28,7 @@ def derived(facts, gains, **changed):
     return derive_spec(facts, gains=gains(facts, **changed), floating=True)
 
 
-def test_a_quadruped(bundled, gains):
+def test_derive_spec_of_quadruped(bundled, gains):
     facts = bundled("quadruped.urdf")
     spec = derived(facts, gains)
     legs = ("FL", "FR", "RL", "RR")
@@ -55,7 +55,7 @@ def test_a_quadruped(bundled, gains):
     assert spec.provenance["default_pose"].origin == "solved"
 
 
-def test_a_biped(bundled, gains):
+def test_derive_spec_of_biped(bundled, gains):
     spec = derived(bundled("biped.urdf"), gains)
     assert spec.base == "pelvis"
     assert spec.feet == ("left_ankle_roll_link", "right_ankle_roll_link")
@@ -64,21 +64,21 @@ def test_a_biped(bundled, gains):
     assert spec.penalized_contacts == (*spec.thighs, *spec.shanks)
 
 
-def test_a_robot_without_legs(robot, gains):
+def test_derive_spec_without_legs(robot, gains):
     spec = derived(robot(ARM), gains)
     assert spec.joint_order == ("turn", "spin")
     assert spec.feet == spec.shanks == spec.thighs == spec.penalized_contacts == ()
     assert spec.base_height_target is spec.spawn_height is spec.leg_length is None
     assert spec.stance_width is spec.foot_radius is None
     assert spec.default_pose == {"turn": 0.5, "spin": 0.0}
-    assert spec.soft_limits == {"turn": (0.5, 2.4)}  # the pose is at the limit, and allowed
+    assert spec.soft_limits == {"turn": (0.5, 2.4)}  # the default pose is at the limit
     assert spec.reset_range == (1.0, 1.5)
     assert spec.provenance["default_pose"].origin == "suggested"
     assert RobotSpec.from_toml(spec.to_toml()) == spec
 
 
 @pytest.mark.parametrize("name", ["quadruped.urdf", "quadruped.xml", "biped.urdf", "biped.xml"])
-def test_a_spec_fits_the_robot_that_it_is_of(bundled, gains, name):
+def test_derive_spec_passes_lint_rules(bundled, gains, name):
     facts = bundled(name)
     spec = derived(facts, gains)
     assert RobotSpec.from_toml(spec.to_toml()) == spec
@@ -91,7 +91,7 @@ def test_a_spec_fits_the_robot_that_it_is_of(bundled, gains, name):
 
 
 @pytest.mark.parametrize("name", ["quadruped.urdf", "biped.xml"])
-def test_every_number_has_an_origin(bundled, gains, name):
+def test_derive_spec_has_provenance_of_all_numbers(bundled, gains, name):
     spec = derived(bundled(name), gains)
     for field in type(spec).__dataclass_fields__:
         if unit_of(field):
@@ -99,7 +99,7 @@ def test_every_number_has_an_origin(bundled, gains, name):
     assert spec.provenance["mirror"].origin == "measured"
 
 
-def test_a_keyframe_is_declared(robot, gains):
+def test_derive_spec_uses_keyframe(robot, gains):
     text = """<mujoco model="m"><worldbody><body name="trunk"><freejoint/>
         <geom type="box" size=".1 .1 .1"/>
         <body name="one"><joint name="a" axis="0 1 0"/><geom type="box" size=".1 .1 .1"/></body>
@@ -109,7 +109,7 @@ def test_a_keyframe_is_declared(robot, gains):
     assert spec.provenance["default_pose"].origin == "declared"
 
 
-def test_the_reset_range_stays_within_the_limits(bundled, gains):
+def test_derive_spec_reset_range_is_within_limits(bundled, gains):
     facts = bundled("quadruped.urdf")
     spec = derived(facts, gains)
     limits = {joint.name: joint.range for joint in facts.actuated}
@@ -120,9 +120,11 @@ def test_the_reset_range_stays_within_the_limits(bundled, gains):
     assert "calf_joint" in spec.provenance["reset_range"].reason
 
 
-def test_what_is_missing_is_an_error(robot, gains):
+def test_derive_spec_rejects_missing_gains_and_bodies(robot, gains):
     facts = robot(ARM)
-    with pytest.raises(ConfigError, match="no gains for spin; wanted some for each actuated joint"):
+    with pytest.raises(
+        ConfigError, match="gains of spin are missing; expected all actuated joints"
+    ):
         derive_spec(facts, gains={"turn": gains(facts)["turn"]}, floating=False)
     nothing = robot('<robot name="r"/>')
     with pytest.raises(ConfigError, match="r has no bodies"):
@@ -131,7 +133,7 @@ def test_what_is_missing_is_an_error(robot, gains):
 
 @pytest.mark.parametrize("value", ["1e29", "1e-300", "-1"])
 @pytest.mark.parametrize("old", ['effort="23.7"', 'radius="0.022"', 'lower="-2.7227"'])
-def test_numbers_without_measure_break_nothing(bundled, gains, tmp_path, old, value):
+def test_derive_spec_with_extreme_numbers(bundled, gains, tmp_path, old, value):
     new = f'{old.split("=")[0]}="{value}"'
     facts = bundled("quadruped.urdf", (old, new), tmp_path=tmp_path)
     spec = derived(facts, gains)
@@ -149,7 +151,7 @@ def test_numbers_without_measure_break_nothing(bundled, gains, tmp_path, old, va
         ("a1/urdf/a1.urdf", "base", ()),
     ],
 )
-def test_robots_of_others(robot_file, gains, file, base, torso):
+def test_derive_spec_of_real_robots(robot_file, gains, file, base, torso):
     facts = Facts(load_robot(robot_file(file)))
     spec = derived(facts, gains)
     assert spec.base == base

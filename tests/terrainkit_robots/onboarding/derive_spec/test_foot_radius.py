@@ -3,7 +3,7 @@ import pytest
 from terrainkit_robots.onboarding.derive_spec.foot_radius import foot_radius
 
 
-def test_of_a_ball_it_is_the_radius(bundled):
+def test_foot_radius_of_spheres(bundled):
     assert foot_radius(bundled("quadruped.urdf")) == pytest.approx(0.022)
     assert foot_radius(bundled("quadruped.xml")) == pytest.approx(0.022)
 
@@ -16,13 +16,13 @@ def test_of_a_ball_it_is_the_radius(bundled):
         ('<sphere radius="0.05"/>', 0.05),
     ],
 )
-def test_of_other_shapes(bundled, tmp_path, geometry, radius):
+def test_foot_radius_of_other_shapes(bundled, tmp_path, geometry, radius):
     text = '<geometry><sphere radius="0.022"/></geometry>'
     facts = bundled("quadruped.urdf", (text, f"<geometry>{geometry}</geometry>"), tmp_path=tmp_path)
     assert foot_radius(facts) == pytest.approx(radius, rel=0.05)
 
 
-def test_of_a_sole_it_is_half_the_width(bundled):
+def test_foot_radius_of_sole_is_half_width(bundled):
     facts = bundled("biped.urdf")
     radius = foot_radius(facts)
     (width,) = {
@@ -33,5 +33,5 @@ def test_of_a_sole_it_is_half_the_width(bundled):
     assert radius == pytest.approx(width)
 
 
-def test_without_legs_there_is_none(robot):
+def test_foot_radius_without_legs_is_none(robot):
     assert foot_radius(robot('<robot name="r"><link name="a"/></robot>')) is None

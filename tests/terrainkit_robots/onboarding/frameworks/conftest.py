@@ -1,4 +1,4 @@
-"""Robots to configure, and frameworks to be configured: stand-ins that refuse what they lack."""
+"""Specs of robots, and stub modules of frameworks that reject unknown fields."""
 
 import importlib.util
 import re
@@ -16,7 +16,7 @@ PARTS = ("hip", "thigh", "calf")
 
 
 def quadruped(**changes):
-    """Return the spec of a robot with four legs, tables by pattern."""
+    """Return the spec of a quadruped, with values by pattern."""
     leg = ".*_({})_joint".format
     given = {
         "name": "quad 4",
@@ -47,7 +47,7 @@ def quadruped(**changes):
 
 
 def wheeled(**changes):
-    """Return the spec of the robot with four legs, whose calves are wheels as far as gains go."""
+    """Return the spec of a quadruped whose calf joints have no stiffness, like wheels."""
     rolling = {
         "stiffness": {".*_(hip|thigh)_joint": 20.0, ".*_calf_joint": 0.0},
         "action_scale": {".*_(hip|thigh)_joint": 0.25, ".*_calf_joint": 5.0},
@@ -57,7 +57,7 @@ def wheeled(**changes):
 
 
 def wheels_of(spec):
-    """Return the joints of a `wheeled` robot that are told a speed, and those that are not."""
+    """Return the joints of a `wheeled` robot with velocity targets, and the others."""
     return (
         tuple(joint for joint in spec.joint_order if "calf" in joint),
         tuple(joint for joint in spec.joint_order if "calf" not in joint),
@@ -65,13 +65,13 @@ def wheels_of(spec):
 
 
 def of(spec, **value):
-    """Return the values that the patterns of `quadruped` give, by joint: calf, or else other."""
+    """Return a value for each joint of `quadruped`: calf for calf joints, else other."""
     calf, other = value["calf"], value["other"]
     return {joint: calf if "calf" in joint else other for joint in spec.joint_order}
 
 
 def plain_robot(joints, **changes):
-    """Return a spec without legs, each number its own."""
+    """Return a spec without legs, with different values for all joints."""
     numbers = {
         name: {joint: 0.5 + place + shift / 8 for place, joint in enumerate(joints)}
         for shift, name in enumerate(("stiffness", "damping", "effort", "armature"))
@@ -102,11 +102,11 @@ HOSTILE = (
     "1st-joint.2",
     "e" * 90,
 )
-"""Names that would like to be code."""
+"""Names that try to inject code."""
 
 
 def hostile_robot():
-    """Return a spec whose every name and word would like to be code."""
+    """Return a spec in which all names and texts try to inject code."""
     name = "x\"\"\"\nimport os\n'''\\"
     spec = plain_robot(
         HOSTILE,
@@ -129,14 +129,14 @@ def hostile_robot():
 
 
 def in_usd(name):
-    """Return what importing makes of a name: USD's own rule, then no underscore in front."""
+    """Return the name that the USD importer makes of a name."""
     plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
     plain = re.sub(r"^[0-9]", "_", plain)
     return f"a{plain}" if plain.startswith("_") else plain
 
 
 class Strict:
-    """Refuses attributes that it does not have."""
+    """A namespace that rejects new attributes."""
 
     def __init__(self, **fields):
         vars(self).update(fields)
@@ -148,7 +148,7 @@ class Strict:
 
 
 def refusing(title, *required, **defaults):
-    """Return a class whose objects are made of these fields by name and no other."""
+    """Return a class that accepts only these fields as keyword arguments."""
 
     def init(self, **given):
         unknown, missing = set(given) - {*required, *defaults}, set(required) - set(given)
@@ -160,7 +160,7 @@ def refusing(title, *required, **defaults):
 
 
 class Described:
-    """A part of legged_gym's configuration: subclasses may set what is there, nothing else."""
+    """A class of legged_gym's configuration whose subclasses can only set existing fields."""
 
     def __init_subclass__(cls):
         for name in vars(cls):
@@ -169,7 +169,7 @@ class Described:
 
 
 def part(title, **fields):
-    """Return a class of `fields`, which subclasses may set."""
+    """Return a configuration class with these fields."""
     made = type(title, (), {})
     for name, value in fields.items():
         setattr(made, name, value)
@@ -177,7 +177,7 @@ def part(title, **fields):
 
 
 def module(name, **content):
-    """Return a module that holds `content`."""
+    """Return a module with this content."""
     made = ModuleType(name)
     vars(made).update(content)
     return made
@@ -185,7 +185,7 @@ def module(name, **content):
 
 @pytest.fixture
 def load(tmp_path, monkeypatch):
-    """Return a function that runs the configuration of a robot amid stand-ins."""
+    """Return a function that executes a configuration with stub modules."""
 
     def run(framework, spec, stand_ins, **known):
         for name, stand_in in stand_ins.items():
@@ -202,7 +202,7 @@ def load(tmp_path, monkeypatch):
 
 @pytest.fixture
 def robots():
-    """Return the robots, and what makes more of them."""
+    """Return functions that make specs of robots."""
     return SimpleNamespace(
         quadruped=quadruped,
         wheeled=wheeled,
@@ -218,7 +218,7 @@ def robots():
 
 @pytest.fixture
 def stand_in():
-    """Return what stand-ins are made of."""
+    """Return functions that make stub modules."""
     return SimpleNamespace(
         module=module, refusing=refusing, part=part, Strict=Strict, Described=Described
     )
@@ -226,7 +226,7 @@ def stand_in():
 
 @pytest.fixture(scope="session")
 def bundled_xml():
-    """Return the MJCF of the quadruped that comes with terrainkit."""
+    """Return the MJCF file of the bundled quadruped."""
     from terrainkit_robots.description import bundled
 
     return Path(bundled.__file__).parent / "quadruped" / "quadruped.xml"

@@ -1,6 +1,6 @@
-"""Runs in an environment with Genesis: builds the robot of genesis_config.py and steps it.
+"""Build the robot of genesis_config.py and step it; runs in an environment with Genesis.
 
-A second word says whether it has wheels: calves that are told a speed.
+The second argument is `wheeled` if the calf joints have velocity targets.
 """
 
 import sys
@@ -22,10 +22,10 @@ def by_part(calf, other):
     return torch.tensor([calf if "calf" in joint else other for joint in genesis_config.JOINTS])
 
 
-rolls = sys.argv[2] == "wheeled"
+is_wheeled = sys.argv[2] == "wheeled"
 assert set(genesis_config.FEET) <= {link.name for link in robot.links}
 for found, calf, other in (
-    (robot.get_dofs_kp(dofs), 0.0 if rolls else 30.0, 20.0),
+    (robot.get_dofs_kp(dofs), 0.0 if is_wheeled else 30.0, 20.0),
     (robot.get_dofs_kv(dofs), 0.75, 0.5),
     (robot.get_dofs_force_range(dofs)[1], 45.43, 23.7),
     (robot.get_dofs_armature(dofs), 0.04, 0.01),
@@ -33,7 +33,7 @@ for found, calf, other in (
     torch.testing.assert_close(found.cpu().float(), by_part(calf, other))
 pose = torch.tensor(list(genesis_config.DEFAULT_POSE.values()))
 torch.testing.assert_close(robot.get_dofs_position(dofs).cpu().float(), pose)
-if rolls:
+if is_wheeled:
     wheels = genesis_config.dofs(robot, genesis_config.SPEED_SCALE)
     assert len(wheels) == 4
     robot.set_pos([0.0, 0.0, 5.0])

@@ -1,6 +1,6 @@
-"""Runs in an environment with mjlab: builds the robot of mjlab_config.py and steps it.
+"""Build the robot of mjlab_config.py and step it; runs in an environment with mjlab.
 
-A second word says whether it has wheels: calves that are told a speed.
+The second argument is `wheeled` if the calf joints have velocity targets.
 """
 
 import sys
@@ -24,9 +24,13 @@ def by_part(calf, other):
     return [calf if "calf" in joint else other for joint in joints]
 
 
-rolls = sys.argv[2] == "wheeled"
-np.testing.assert_allclose(model.actuator_gainprm[:, 0], by_part(0.75 if rolls else 30.0, 20.0))
-np.testing.assert_allclose(model.actuator_biasprm[:, 1], by_part(0.0 if rolls else -30.0, -20.0))
+is_wheeled = sys.argv[2] == "wheeled"
+np.testing.assert_allclose(
+    model.actuator_gainprm[:, 0], by_part(0.75 if is_wheeled else 30.0, 20.0)
+)
+np.testing.assert_allclose(
+    model.actuator_biasprm[:, 1], by_part(0.0 if is_wheeled else -30.0, -20.0)
+)
 np.testing.assert_allclose(model.actuator_biasprm[:, 2], by_part(-0.75, -0.5))
 np.testing.assert_allclose(model.actuator_forcerange[:, 1], by_part(45.43, 23.7))
 np.testing.assert_allclose(model.dof_armature[6:], by_part(0.04, 0.01))
@@ -36,7 +40,7 @@ np.testing.assert_allclose(model.key_ctrl[0], [0, 0.9, -1.8] * 4)
 
 data = mujoco.MjData(model)
 mujoco.mj_resetDataKeyframe(model, data, 0)
-if rolls:
+if is_wheeled:
     calves = [number for number, joint in enumerate(joints) if "calf" in joint]
     places = [model.joint(joints[number]).dofadr[0] for number in calves]
     model.opt.gravity[:] = 0

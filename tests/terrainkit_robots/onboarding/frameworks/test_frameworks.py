@@ -31,7 +31,7 @@ def test_framework_names_include_added_module(tmp_path, monkeypatch, robots):
     try:
         assert set(framework_names()) - {"brand_new"} == {*LEGGED, "isaaclab", "mjlab", "genesis"}
         assert config_text("brand_new", robots.quadruped()) == "# quad 4"
-        with pytest.raises(ConfigError, match="for others there are: brand_new, genesis"):
+        with pytest.raises(ConfigError, match="other frameworks: brand_new, genesis"):
             config_text("legged_gym", robots.plain(()))
     finally:
         frameworks.framework_names.cache_clear()
@@ -52,14 +52,14 @@ def test_framework_names_are_sorted():
     [
         (
             {"feet": ()},
-            "has no legs; .* trains legged robots; for others there are: genesis, isaaclab, mjlab$",
+            "but .* requires a legged robot; other frameworks: genesis, isaaclab, mjlab$",
         ),
         ({"joint_order": ()}, "has no legs"),
         ({"floating": False}, "the base of quad 4 is fixed"),
-        ({"spawn_height": None}, "lacks a spawn_height or a base_height_target"),
+        ({"spawn_height": None}, "has no spawn_height or base_height_target"),
         ({"stiffness": {".*_hip_joint": 1.0}}, "matched by no key of stiffness"),
-        ({"feet": ("FL_paw", "FR_paw")}, "are no bodies: 'FL_paw', 'FR_paw'; there are: 'base'"),
-        ({"feet": ("FL_hip", "RR_calf")}, "none is in all of 'FL_hip', 'RR_calf'"),
+        ({"feet": ("FL_paw", "FR_paw")}, "got unknown bodies 'FL_paw', 'FR_paw'; expected 'base'"),
+        ({"feet": ("FL_hip", "RR_calf")}, "no substring is in all of 'FL_hip', 'RR_calf'"),
     ],
 )
 def test_config_text_rejects_robot_in_one_line(robots, framework, changes, message):
@@ -154,7 +154,7 @@ def test_config_text_soft_limit_factor(robots):
 
 @pytest.mark.parametrize("framework", LEGGED)
 def test_legged_frameworks_reject_unactuated_joints(robots, framework):
-    with pytest.raises(ConfigError, match=f"no motor drives tail_joint of .*; {framework} drives"):
+    with pytest.raises(ConfigError, match=f"tail_joint of .* have no actuator, but {framework}"):
         config_text(framework, robots.quadruped(), unactuated=["tail_joint"])
 
 
@@ -162,7 +162,7 @@ def test_robot_config_text_finds_unactuated_joints(robots, bundled_xml):
     facts = Facts(load_robot(bundled_xml.with_suffix(".urdf")), Meshes())
     spec = robots.quadruped()
     fewer = replace(spec, joint_order=spec.joint_order[:-1])
-    with pytest.raises(ConfigError, match=f"no motor drives {spec.joint_order[-1]} of"):
+    with pytest.raises(ConfigError, match=f"{spec.joint_order[-1]} of .* have no actuator"):
         robot_config_text("legged_gym", facts, fewer)
 
 

@@ -1,4 +1,4 @@
-"""The configuration for Isaac Lab, read as that reads it."""
+"""Tests of the configuration for Isaac Lab, with stub modules."""
 
 import re
 from pathlib import Path
@@ -9,7 +9,7 @@ import pytest
 
 @pytest.fixture
 def modules(stand_in):
-    """Return the modules of Isaac Lab 2, with the fields that it has."""
+    """Return stub modules of Isaac Lab 2."""
     refusing = stand_in.refusing
     actuator = refusing(
         "ImplicitActuatorCfg",
@@ -86,7 +86,7 @@ def modules(stand_in):
 
 
 def velocity_task(stand_in):
-    """Return what Isaac Lab's velocity task has, as far as robots change it."""
+    """Return a stub of Isaac Lab's velocity task."""
     strict = stand_in.Strict
 
     def term(key):
@@ -106,7 +106,7 @@ def velocity_task(stand_in):
 
 
 def resolved(value, names):
-    """Return a value by joint; each pattern has to match, and each name one pattern at most."""
+    """Return values by joint; each pattern must match, and each name at most one pattern."""
     if not isinstance(value, dict):
         return dict.fromkeys(names, value)
     found = {name: [p for p in value if re.fullmatch(p, name)] for name in names}
@@ -115,10 +115,10 @@ def resolved(value, names):
     return {name: value[patterns[0]] for name, patterns in found.items() if patterns}
 
 
-def test_a_quadruped(load, modules, robots, tmp_path):
+def test_isaaclab_config_of_quadruped(load, modules, robots, tmp_path):
     spec = robots.quadruped()
     config = load("isaaclab", spec, modules, bodies=robots.bodies).QUAD_4_CFG
-    names = (*spec.joint_order, "FL_hip_joint_2", "tail")  # others that must not be matched
+    names = (*spec.joint_order, "FL_hip_joint_2", "tail")  # must not be matched
     assert config.spawn.asset_path == str(tmp_path / "robot.urdf")
     assert config.spawn.fix_base is False
     assert config.spawn.activate_contact_sensors
@@ -142,7 +142,7 @@ def test_a_quadruped(load, modules, robots, tmp_path):
     assert config.soft_joint_pos_limit_factor == 0.9
 
 
-def test_the_velocity_task(load, modules, robots):
+def test_isaaclab_velocity_task(load, modules, robots):
     spec = robots.quadruped()
     loaded = load("isaaclab", spec, modules, bodies=robots.bodies)
     task = loaded.rough_env_cfg()
@@ -158,27 +158,27 @@ def test_the_velocity_task(load, modules, robots):
     assert task.terminations.base_contact.params["sensor_cfg"].body_names == ["base"]
 
 
-def test_a_task_without_contacts_that_cost(load, modules, robots):
+def test_isaaclab_velocity_task_without_contacts(load, modules, robots):
     spec = robots.quadruped(penalized_contacts=(), termination_contacts=())
     task = load("isaaclab", spec, modules).rough_env_cfg()
     assert task.rewards.undesired_contacts is None
     assert task.terminations.base_contact is None
 
 
-def test_an_arm(load, modules, robots):
+def test_isaaclab_config_of_arm(load, modules, robots):
     spec = robots.plain(("joint1", "joint10"), effort={"joint1": 5.0})
     loaded = load("isaaclab", spec, modules)
     actuator = loaded.ARM_CFG.actuators["joints"]
     assert loaded.ARM_CFG.spawn.fix_base is True
     assert loaded.ARM_CFG.init_state.pos == (0.0, 0.0, 0.0)
     assert actuator.effort_limit_sim == {"joint1": 5.0}
-    assert actuator.velocity_limit_sim is None  # none is known: that of the URDF holds
+    assert actuator.velocity_limit_sim is None  # unknown: the limit of the URDF is used
     assert actuator.stiffness == {"joint1": 0.5, "joint10": 1.5}
     assert loaded.ACTION_SCALE == 0.25
     assert not hasattr(loaded, "rough_env_cfg")
 
 
-def test_wheels_are_told_a_speed(load, modules, robots):
+def test_isaaclab_config_of_wheels(load, modules, robots):
     spec = robots.wheeled(velocity={})
     loaded = load("isaaclab", spec, modules, bodies=robots.bodies)
     wheels, others = robots.wheels_of(spec)
@@ -201,13 +201,13 @@ def test_wheels_are_told_a_speed(load, modules, robots):
     assert not hasattr(task.actions, "joint_vel")
 
 
-def test_joints_without_a_motor_get_no_action(load, modules, robots):
+def test_isaaclab_actions_exclude_unactuated_joints(load, modules, robots):
     spec = robots.quadruped()
     task = load("isaaclab", spec, modules, unactuated=["tail_joint"]).rough_env_cfg()
     assert tuple(task.actions.joint_pos.joint_names) == spec.joint_order
 
 
-def test_a_robot_of_wheels_alone(load, modules, robots):
+def test_isaaclab_config_with_only_wheels(load, modules, robots):
     spec = robots.plain(("left", "right"), stiffness={".*": 0.0})
     loaded = load("isaaclab", spec, modules)
     assert list(loaded.ARM_CFG.actuators) == ["wheels"]
@@ -215,7 +215,7 @@ def test_a_robot_of_wheels_alone(load, modules, robots):
     assert not hasattr(loaded, "ACTION_SCALE")
 
 
-def test_hostile_names_match_themselves(load, modules, robots):
+def test_isaaclab_patterns_of_hostile_names(load, modules, robots):
     spec = robots.hostile()
     loaded = load("isaaclab", spec, modules)
     (config,) = (value for name, value in vars(loaded).items() if name.endswith("_CFG"))

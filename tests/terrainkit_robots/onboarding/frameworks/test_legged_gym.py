@@ -1,4 +1,4 @@
-"""The configurations for legged_gym and LeggedGym-Ex, read as these read them."""
+"""Tests of the configurations for legged_gym and LeggedGym-Ex, with stub modules."""
 
 from pathlib import Path
 
@@ -17,23 +17,23 @@ CLASSES = {
     "rewards": {"soft_dof_pos_limit": 1.0, "soft_dof_vel_limit": 1.0, "base_height_target": 1.0}
     | {"max_contact_force": 100.0},
 }
-"""The parts of legged_gym's LeggedRobotCfg that robots set, and what is in them."""
+"""Classes and fields of legged_gym's LeggedRobotCfg."""
 
 MORE = {
     "control": {"dt": 0.02},
     "asset": {"xml_file": "", "base_link_name": "", "dof_names": [], "dof_armature": []}
     | {"links_to_keep": [], "dof_vel_limits": []},
 }
-"""What LeggedGym-Ex has in addition."""
+"""Additional fields of LeggedGym-Ex."""
 
 SCALES = ("tracking_lin_vel", "tracking_ang_vel", "lin_vel_z", "ang_vel_xy", "torques", "dof_acc")
 SCALES += ("dof_pos_limits", "action_rate", "feet_air_time", "collision")
-"""Rewards that LeggedGym-Ex has functions for, among others."""
+"""Some of the rewards of LeggedGym-Ex."""
 
 
 @pytest.fixture
 def frameworks(stand_in):
-    """Return the modules of legged_gym, or of LeggedGym-Ex."""
+    """Return stub modules of legged_gym or LeggedGym-Ex."""
 
     def make(more):
         parts = {
@@ -59,13 +59,13 @@ def frameworks(stand_in):
 
 
 def gains_of(control, joint):
-    """Return the gains that legged_gym gives a joint: of the keys in its name, the last."""
+    """Return the gains that legged_gym assigns to a joint: those of the last matching key."""
     keys = [key for key in control.stiffness if key in joint]
     return control.stiffness[keys[-1]], control.damping[keys[-1]]
 
 
 def bodies_of(asset, attribute, bodies):
-    """Return the bodies that legged_gym finds, some perhaps twice."""
+    """Return the bodies that legged_gym finds, possibly with duplicates."""
     return [body for key in getattr(asset, attribute) for body in bodies if key in body]
 
 
@@ -102,7 +102,7 @@ def check_joints(config, robots, spec):
 RANGES = {f"{leg}_calf_joint": (-2.75, -0.75) for leg in ("FL", "FR", "RL", "RR")}
 
 
-def test_a_quadruped_in_legged_gym(load, frameworks, robots, tmp_path):
+def test_legged_gym_config_of_quadruped(load, frameworks, robots, tmp_path):
     spec = robots.quadruped()
     loaded = load("legged_gym", spec, frameworks({}), bodies=robots.bodies, limits=RANGES)
     config = loaded.Quad4RoughCfg
@@ -117,7 +117,7 @@ def test_a_quadruped_in_legged_gym(load, frameworks, robots, tmp_path):
     assert "_get_noise_scale_vec" not in loaded.__doc__
 
 
-def test_a_quadruped_in_leggedgym_ex(load, frameworks, robots, tmp_path):
+def test_leggedgym_ex_config_of_quadruped(load, frameworks, robots, tmp_path):
     spec = robots.quadruped(velocity={".*_calf_joint": 15.7})
     loaded = load("leggedgym_ex", spec, frameworks(MORE), bodies=robots.bodies, limits=RANGES)
     config = loaded.Quad4Cfg
@@ -135,39 +135,39 @@ def test_a_quadruped_in_leggedgym_ex(load, frameworks, robots, tmp_path):
     assert config.asset.links_to_keep == list(spec.feet)
     assert config.rewards.scales.tracking_lin_vel == 1.0
     assert loaded.Quad4CfgPPO.runner.run_name == "genesis"
-    # On Genesis every key that fits gives a gain: there has to be one for each joint.
+    # Genesis requires exactly one matching key for each joint.
     for joint in spec.joint_order:
         assert sum(key in joint for key in config.control.stiffness) == 1
 
 
-def test_no_joint_has_less_armature_than_it_needs(load, frameworks, robots):
-    """A light ankle shakes with the median of a robot, most of whose joints need none."""
+def test_legged_gym_config_uses_largest_armature(load, frameworks, robots):
+    """With the median armature of 0, a light ankle would be unstable."""
     spec = robots.quadruped(armature={".*_(hip|thigh)_joint": 0.0, ".*_calf_joint": 0.01})
     loaded = load("legged_gym", spec, frameworks({}))
     assert loaded.Quad4RoughCfg.asset.armature == 0.01
-    said = " ".join(Path(loaded.__file__).read_text().replace("#", "").split())
-    assert "One number for all joints, the largest: they have 0.0 to 0.01." in said
+    text = " ".join(Path(loaded.__file__).read_text().replace("#", "").split())
+    assert "One value for all joints, the largest of 0.0 to 0.01." in text
 
 
 @pytest.mark.parametrize("framework", ["legged_gym", "leggedgym_ex"])
-def test_wheels_are_not_driven_and_do_not_count(load, frameworks, robots, framework):
+def test_legged_configs_ignore_wheels_in_action_scale(load, frameworks, robots, framework):
     spec = robots.wheeled(joint_order=robots.quadruped().joint_order)
     loaded = load(framework, spec, frameworks(MORE))
     config = loaded.Quad4RoughCfg if framework == "legged_gym" else loaded.Quad4Cfg
     assert config.control.action_scale == 0.25
-    said = " ".join(Path(loaded.__file__).read_text().replace("#", "").split())
-    assert "wants a speed, which P does not tell it: FL_calf_joint, FR_calf_joint, " in said
+    text = " ".join(Path(loaded.__file__).read_text().replace("#", "").split())
+    assert "need velocity targets instead of P: FL_calf_joint, FR_calf_joint, " in text
     plain = load(framework, robots.quadruped(), frameworks(MORE))
-    assert "wants a speed" not in Path(plain.__file__).read_text()
+    assert "velocity targets" not in Path(plain.__file__).read_text()
 
 
-def test_stand_ins_refuse_what_the_framework_does_not_have(frameworks, load, robots):
-    """What LeggedGym-Ex alone has is refused by legged_gym, so that a slip would be too."""
+def test_stub_modules_reject_unknown_fields(frameworks, load, robots):
+    """The stubs of legged_gym reject the additional fields of LeggedGym-Ex."""
     with pytest.raises(AttributeError, match="has no"):
         load("leggedgym_ex", robots.quadruped(), frameworks({}))
 
 
-def test_a_robot_of_another_count_of_joints_is_told_about_the_noise(load, frameworks, robots):
+def test_legged_gym_config_warns_about_noise_vector(load, frameworks, robots):
     spec = robots.quadruped()
     fewer = robots.quadruped(
         joint_order=spec.joint_order[:6], feet=spec.feet[:2], default_pose={".*": 0.5}
@@ -176,11 +176,11 @@ def test_a_robot_of_another_count_of_joints_is_told_about_the_noise(load, framew
     fewer = type(fewer)(**(vars(fewer) | changed | {"soft_limits": {}}))
     loaded = load("legged_gym", fewer, frameworks({}))
     assert loaded.Quad4RoughCfg.env.num_observations == 12 + 18 + 187
-    assert "_get_noise_scale_vec is laid out for 12 joints" in " ".join(loaded.__doc__.split())
+    assert "_get_noise_scale_vec supports 12 joints" in " ".join(loaded.__doc__.split())
 
 
 @pytest.mark.parametrize("framework", ["legged_gym", "leggedgym_ex"])
-def test_joints_whose_names_contain_others(load, frameworks, robots, framework):
+def test_legged_configs_of_ambiguous_joint_names(load, frameworks, robots, framework):
     joints = tuple(f"joint{number}" for number in (10, 1, 2, 11))
     gains = dict(zip(joints, (4.0, 1.0, 2.0, 1.0), strict=True))
     tables = dict.fromkeys(("stiffness", "damping", "action_scale", "default_pose"), gains)
@@ -196,13 +196,13 @@ def test_joints_whose_names_contain_others(load, frameworks, robots, framework):
     assert config.control.action_scale == 1.5
 
 
-def test_a_folder_with_braces_is_found(load, frameworks, robots):
+def test_legged_gym_config_escapes_braces_in_path(load, frameworks, robots):
     spec = robots.quadruped(urdf="{my}.urdf")
     loaded = load("legged_gym", spec, frameworks({}))
     assert loaded.Quad4RoughCfg.asset.file.format().endswith("/{my}.urdf")
 
 
-def test_hostile_names_arrive_as_they_are(load, frameworks, robots):
+def test_leggedgym_ex_config_keeps_hostile_names(load, frameworks, robots):
     spec = robots.hostile()
     loaded = load("leggedgym_ex", spec, frameworks(MORE))
     (config,) = (c for n, c in vars(loaded).items() if n.endswith("Cfg") and n != "LeggedRobotCfg")

@@ -1,4 +1,4 @@
-"""The configuration for mjlab: amid stand-ins, and where mjlab is, in mjlab."""
+"""Tests of the configuration for mjlab, with stub modules and with mjlab if available."""
 
 import os
 import shutil
@@ -56,7 +56,7 @@ def modules(stand_in):
     }
 
 
-def test_a_quadruped(load, modules, robots):
+def test_mjlab_config_of_quadruped(load, modules, robots):
     spec = robots.quadruped()
     loaded = load("mjlab", spec, modules)
     entity = loaded.get_robot_cfg()
@@ -82,7 +82,7 @@ def test_a_quadruped(load, modules, robots):
     assert robots.of(spec, calf=0.2, other=0.25) == loaded.QUAD_4_ACTION_SCALE
 
 
-def test_wheels_are_told_a_speed(load, modules, robots):
+def test_mjlab_config_of_wheels(load, modules, robots):
     spec = robots.wheeled()
     loaded = load("mjlab", spec, modules)
     wheels, others = robots.wheels_of(spec)
@@ -101,7 +101,7 @@ def test_wheels_are_told_a_speed(load, modules, robots):
     assert "SPEED_SCALE" not in Path(plain.__file__).read_text()
 
 
-def test_a_robot_of_wheels_alone(load, modules, robots):
+def test_mjlab_config_with_only_wheels(load, modules, robots):
     spec = robots.plain(("left", "right"), stiffness={".*": 0.0})
     loaded = load("mjlab", spec, modules)
     kinds = {type(actuator).__name__ for actuator in loaded.ARM_ARTICULATION.actuators}
@@ -111,7 +111,7 @@ def test_a_robot_of_wheels_alone(load, modules, robots):
 
 
 @pytest.mark.parametrize("more", ["", '<actuatorfrc actuator="FL_calf"/>'])
-def test_the_actuators_of_the_file_make_way(load, modules, robots, tmp_path, bundled_xml, more):
+def test_mjlab_get_spec_removes_actuators(load, modules, robots, tmp_path, bundled_xml, more):
     text = bundled_xml.read_text().replace("</sensor>", more + "</sensor>")
     (tmp_path / "robot.xml").write_text(text)
     loaded = load("mjlab", robots.quadruped(), modules)
@@ -123,7 +123,7 @@ def test_the_actuators_of_the_file_make_way(load, modules, robots, tmp_path, bun
     assert made.nsensor == before.nsensor - bool(more)
 
 
-def test_an_arm_without_limits(load, modules, robots):
+def test_mjlab_config_of_arm_without_limits(load, modules, robots):
     spec = robots.plain(("joint1", "joint10", "robot/wrist"), effort={}, armature={})
     loaded = load("mjlab", spec, modules)
     actuators = loaded.ARM_ARTICULATION.actuators
@@ -132,17 +132,17 @@ def test_an_arm_without_limits(load, modules, robots):
     assert loaded.ARM_INIT_STATE.joint_pos == {"joint1$": 0.1, "joint10": 0.1, "wrist": 0.1}
 
 
-def test_a_robot_without_joints(load, modules, robots):
+def test_mjlab_config_without_joints(load, modules, robots):
     loaded = load("mjlab", robots.plain(()), modules)
     assert loaded.get_robot_cfg().articulation.actuators == ()
 
 
 @pytest.mark.parametrize("which", ["quadruped", "wheeled"])
-def test_in_mjlab(robots, tmp_path, bundled_xml, which):
-    """Set TERRAINKIT_MJLAB_PYTHON to the Python of an environment with mjlab."""
+def test_mjlab_config_in_mjlab(robots, tmp_path, bundled_xml, which):
+    """Set TERRAINKIT_MJLAB_PYTHON to a Python interpreter with mjlab."""
     python = os.environ.get("TERRAINKIT_MJLAB_PYTHON")
     if not python:
-        pytest.skip("TERRAINKIT_MJLAB_PYTHON names no Python with mjlab")
+        pytest.skip("TERRAINKIT_MJLAB_PYTHON is not set to a Python interpreter with mjlab")
     shutil.copy(bundled_xml, tmp_path / "robot.xml")
     text = config_text("mjlab", getattr(robots, which)(), bodies=robots.bodies)
     (tmp_path / "mjlab_config.py").write_text(text)

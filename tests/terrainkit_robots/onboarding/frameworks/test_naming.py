@@ -20,7 +20,7 @@ from terrainkit_robots.onboarding.frameworks.naming import class_name, constant_
         ('x"\nimport os', "XImportOs", "X_IMPORT_OS", "x_import_os"),
     ],
 )
-def test_identifiers_of_robots(name, class_, constant, package):
+def test_names_are_identifiers(name, class_, constant, package):
     assert (class_name(name), constant_name(name), package_name(name)) == (
         class_,
         constant,
@@ -30,5 +30,5 @@ def test_identifiers_of_robots(name, class_, constant, package):
     assert not keyword.iskeyword(package)
 
 
-def test_identifiers_are_cut():
+def test_class_name_is_truncated():
     assert len(class_name("a" * 10**6)) == 40

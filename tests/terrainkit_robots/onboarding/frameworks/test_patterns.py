@@ -8,36 +8,36 @@ from terrainkit_robots.onboarding.frameworks.patterns import mjlab_patterns, usd
 NAMES = ("FL_hip_joint", "FL_hip", "left.knee-2", "1st", "_tail", "\u5173\u8282", "a+b")
 
 
-def test_patterns_match_the_name_and_what_usd_makes_of_it(robots):
+def test_usd_patterns_match_original_and_usd_names(robots):
     patterns = usd_patterns(NAMES)
     for spelled in (NAMES, tuple(map(robots.in_usd, NAMES))):
-        for name, own in zip(NAMES, spelled, strict=True):
-            hits = [other for other in spelled if re.fullmatch(patterns[name], other)]
-            assert hits == [own]
+        for name, expected in zip(NAMES, spelled, strict=True):
+            matches = [other for other in spelled if re.fullmatch(patterns[name], other)]
+            assert matches == [expected]
     assert patterns["FL_hip_joint"] == "FL_hip_joint"
 
 
-def test_names_that_usd_makes_one_are_an_error():
-    with pytest.raises(ConfigError, match=r"'a\.b' and 'a_b' are one name in USD"):
+def test_usd_patterns_reject_equal_names():
+    with pytest.raises(ConfigError, match=r"'a\.b' and 'a_b' have the same name in USD"):
         usd_patterns(("a.b", "a_b"))
-    with pytest.raises(ConfigError, match="are one name in USD"):
+    with pytest.raises(ConfigError, match="have the same name in USD"):
         usd_patterns(("\u00e9_x", "___x"))
-    with pytest.raises(ConfigError, match="without a name"):
+    with pytest.raises(ConfigError, match="got an empty text"):
         usd_patterns(("",))
 
 
-def test_no_names_take_for_ever_to_be_told_apart():
+def test_usd_patterns_have_no_exponential_matching():
     names = ("\u00e9_" * 12 + "\u00e9", "_" * 40 + "x")
     assert set(usd_patterns(names)) == set(names)
 
 
-def test_patterns_of_mjlab_match_one_name_even_by_its_beginning():
+def test_mjlab_patterns_match_one_name_by_prefix():
     names = (*NAMES, "robot/arm")
     seen = (*NAMES, "arm")
     patterns = mjlab_patterns(names)
     assert patterns["FL_hip"] == "FL_hip$"
-    for matches in (re.match, re.fullmatch):
-        for name, own in zip(names, seen, strict=True):
-            assert [other for other in seen if matches(patterns[name], other)] == [own]
-    with pytest.raises(ConfigError, match="one name in mjlab"):
+    for match in (re.match, re.fullmatch):
+        for name, expected in zip(names, seen, strict=True):
+            assert [other for other in seen if match(patterns[name], other)] == [expected]
+    with pytest.raises(ConfigError, match="the same name in mjlab"):
         mjlab_patterns(("a/x", "b/x"))

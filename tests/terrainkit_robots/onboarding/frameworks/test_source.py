@@ -5,29 +5,29 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.onboarding.frameworks.source import (
-    assign,
-    assign_sum,
+    assignment,
     comment,
     docstring,
-    literal,
-    number,
-    spread,
+    float_literal,
+    format_collection,
+    string_literal,
+    sum_assignment,
 )
 
 
-def test_literals_are_what_they_stand_for():
+def test_string_literal_evaluates_to_text():
     letters = ["a", '"', "'", "\\", "\n", "\u202e", "\u00e9", "{"]
     for text in map("".join, itertools.product(letters, repeat=4)):
-        assert ast.literal_eval(literal(text)) == text
-        assert "\n" not in literal(text)
+        assert ast.literal_eval(string_literal(text)) == text
+        assert "\n" not in string_literal(text)
 
 
 @pytest.mark.parametrize(
     ("text", "source"),
     [("a", '"a"'), ("it's", '"it\'s"'), ('say "x"', "'say \"x\"'"), ("'\"", '"\'\\""')],
 )
-def test_literals_are_quoted_as_ruff_does(text, source):
-    assert literal(text) == source
+def test_string_literal_quotes_like_ruff(text, source):
+    assert string_literal(text) == source
 
 
 @pytest.mark.parametrize(
@@ -43,42 +43,46 @@ def test_literals_are_quoted_as_ruff_does(text, source):
         (123456.0, "123456.0"),
     ],
 )
-def test_numbers_are_floats_of_six_digits(value, source):
-    assert number(value) == source
+def test_float_literal_has_six_digits(value, source):
+    assert float_literal(value) == source
     assert isinstance(ast.literal_eval(source), float)
 
 
 @pytest.mark.parametrize("value", [float("inf"), float("nan")])
-def test_numbers_that_are_none_are_errors(value):
-    with pytest.raises(ConfigError, match="no configuration can hold"):
-        number(value)
+def test_float_literal_rejects_value(value):
+    with pytest.raises(ConfigError, match="expected a finite number"):
+        float_literal(value)
 
 
-def test_collections_are_on_one_line_if_they_fit():
-    assert spread("a = ", []) == ["a = []"]
-    assert spread("a = ", ["1", "2"]) == ["a = [1, 2]"]
-    assert spread("a=", ["1"], "()", tail=",") == ["a=(1,),"]
-    assert spread("a = ", ['"k": 1'], "{}") == ["a = {", '    "k": 1,', "}"]
+def test_format_collection():
+    assert format_collection("a = ", []) == ["a = []"]
+    assert format_collection("a = ", ["1", "2"]) == ["a = [1, 2]"]
+    assert format_collection("a=", ["1"], "()", suffix=",") == ["a=(1,),"]
+    assert format_collection("a = ", ['"k": 1'], "{}") == ["a = {", '    "k": 1,', "}"]
     long = ["1" * 41, "2" * 40]
-    assert spread("a = ", long, depth=1) == ["a = [", *(f"    {item}," for item in long), "]"]
+    assert format_collection("a = ", long, depth=1) == [
+        "a = [",
+        *(f"    {item}," for item in long),
+        "]",
+    ]
 
 
-def test_assignments_are_broken_where_that_helps():
-    assert assign("name", '"x"') == ['name = "x"']
+def test_assignment_is_wrapped():
+    assert assignment("name", '"x"') == ['name = "x"']
     value = '"' + "x" * 82 + '"'
-    assert assign("name", value) == ["name = (", f"    {value}", ")"]
-    assert assign("name", value, depth=1) == [f"name = {value}"]
-    assert assign_sum("a", "b", "+", value) == ["a = (", "    b", f"    + {value}", ")"]
+    assert assignment("name", value) == ["name = (", f"    {value}", ")"]
+    assert assignment("name", value, depth=1) == [f"name = {value}"]
+    assert sum_assignment("a", "b", "+", value) == ["a = (", "    b", f"    + {value}", ")"]
 
 
-def test_comments_stay_comments():
+def test_comment_prevents_code_injection():
     assert comment("") == []
     lines = comment("x\nraise SystemExit\r\x0c\u2028y " + "word " * 30)
     assert all(line.startswith("# ") and len(line) <= 88 for line in lines)
     assert compile("\n".join(lines), "comment", "exec").co_names == ()
 
 
-def test_docstrings_stay_docstrings():
+def test_docstring_prevents_code_injection():
     lines = docstring(['a """ title \\', "    code(\n        1\n    )"])
     (statement,) = ast.parse("\n".join(lines)).body
     assert ast.literal_eval(statement.value) == "a ''' title \\\n\n    code(\n        1\n    )\n"

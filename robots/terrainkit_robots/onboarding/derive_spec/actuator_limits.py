@@ -1,0 +1,166 @@
+"""Derive effort, velocity, armature and action scale of each joint from the file or the gains."""
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.model import Joint
+from terrainkit_robots.spec.column import Column, rounded
+from terrainkit_robots.spec.robot_spec import MirrorJoint, Provenance
+
+if TYPE_CHECKING:
+    from terrainkit_robots.simulation.gain import Gain
+
+_DEFAULT_ERROR = {"revolute": 1.0, "prismatic": 0.1}
+"""Position error at which a motor of unknown effort saturates [rad] or [m]."""
+
+_HOLDING_FACTOR = 2.0
+"""Smallest ratio of an unknown effort to the holding torque."""
+
+_DEFAULT_VELOCITY = {"revolute": 20.0, "prismatic": 1.0}
+"""Speed of a motor with unknown limits [rad/s] or [m/s]. Those of Go2 reach 30, of H1 14 to 23, of
+G1 20 to 37."""
+
+_ACTION_FACTOR = 0.25
+"""Share of the effort that an action of 1 commands; mjlab's value for its own robots."""
+
+_MAX_ACTION_SCALE = {"revolute": 0.5, "prismatic": 0.05}
+"""Largest action scale [rad] or [m]; legged_gym uses 0.25 rad."""
+
+_MAX_RANGE_FACTOR = 0.25
+"""Largest ratio of the action scale to the joint range."""
+
+
+def derive_effort(
+    robot: Facts, gains: "Mapping[str, Gain]", mirror: Mapping[str, MirrorJoint]
+) -> Column:
+    """Return the effort limit of each joint [N m] or [N].
+
+    Args:
+        robot: The robot.
+        gains: PD gains of each joint.
+        mirror: The joint on the other side of each joint.
+    """
+    in_file = {joint.name: _valid_limit(robot.effort_limit(joint)) for joint in robot.actuated}
+    torques = robot.stance.torques if robot.stance is not None else {}
+    column = Column()
+    for joint in robot.actuated:
+        if not _add_from_file(column, robot, joint, in_file, mirror):
+            error = _by_kind(_DEFAULT_ERROR, joint)
+            value = gains[joint.name].stiffness * error
+            reason = f"the stiffness at an error of {error:g} {joint.unit}"
+            holding = _HOLDING_FACTOR * abs(torques.get(joint.name, 0.0))
+            if math.isfinite(holding) and holding > value:
+                value, reason = holding, f"{_HOLDING_FACTOR:g} times the holding torque"
+            origin = _suggested(f"not in the file; {reason}")
+            column.add(joint.name, rounded(value, 3) or 1.0, origin)
+    return column
+
+
+def derive_velocity(robot: Facts, mirror: Mapping[str, MirrorJoint]) -> Column:
+    """Return the velocity limit of each joint [rad/s] or [m/s].
+
+    Args:
+        robot: The robot.
+        mirror: The joint on the other side of each joint.
+    """
+    in_file = {
+        joint.name: _valid_limit(joint.limit.velocity if joint.limit else None)
+        for joint in robot.actuated
+    }
+    column = Column()
+    for joint in robot.actuated:
+        if not _add_from_file(column, robot, joint, in_file, mirror):
+            origin = _suggested("not in the file; typical of motors of legged robots")
+            column.add(joint.name, _by_kind(_DEFAULT_VELOCITY, joint), origin)
+    return column
+
+
+def derive_armature(robot: Facts, gains: "Mapping[str, Gain]") -> Column:
+    """Return the armature of each joint [kg m2] or [kg]."""
+    column = Column()
+    for joint in robot.actuated:
+        in_file, required = joint.armature, gains[joint.name].armature
+        if 0 < in_file < math.inf and required <= in_file:
+            column.add(joint.name, rounded(in_file), _from_file(robot))
+            continue
+        reason = f"{in_file:.3g} in the file" if in_file > 0 else "not in the file"
+        reason += "; required by the gains" if required > 0 else ""
+        column.add(joint.name, rounded(required, 3), _suggested(reason))
+    return column
+
+
+def derive_action_scale(
+    robot: Facts, gains: "Mapping[str, Gain]", effort: Column, velocity: Column
+) -> Column:
+    """Return the change of each joint target for an action of 1 [rad] or [m].
+
+    The same angle for all joints, as in legged_gym, is too large for a soft ankle with a weak
+    motor, too small for a hip, and meaningless for a prismatic joint. A share of the effort is
+    suitable for all joints. The target of a wheel, which has no stiffness, is a speed [rad/s].
+
+    Args:
+        robot: The robot.
+        gains: PD gains of each joint.
+        effort: Effort limits.
+        velocity: Velocity limits.
+    """
+    column = Column()
+    for joint in robot.actuated:
+        stiffness = gains[joint.name].stiffness
+        if stiffness > 0:
+            largest = _by_kind(_MAX_ACTION_SCALE, joint)
+            scales = {
+                largest: f"{largest:g} {joint.unit}, the largest suggested scale",
+                _ACTION_FACTOR * effort.values[joint.name] / stiffness: (
+                    f"{_ACTION_FACTOR:g} * effort / stiffness"
+                ),
+            }
+            lower, upper = joint.range or (-math.inf, math.inf)
+            if math.isfinite(upper - lower):
+                scale = _MAX_RANGE_FACTOR * (upper - lower)
+                scales[scale] = f"{_MAX_RANGE_FACTOR:g} of the joint range"
+            value, reason = min(scales), scales[min(scales)]
+        else:
+            value = _ACTION_FACTOR * velocity.values[joint.name]
+            reason = f"{_ACTION_FACTOR:g} * velocity; the target is a speed without stiffness"
+        column.add(joint.name, rounded(value, 3), _suggested(reason))
+    return column
+
+
+def _by_kind(values: Mapping[str, float], joint: Joint) -> float:
+    return values["prismatic" if joint.kind == "prismatic" else "revolute"]
+
+
+def _valid_limit(value: float | None) -> float | None:
+    """Return a limit from a file, or None if it is not positive and finite."""
+    return (rounded(value) or None) if value is not None and 0 < value < math.inf else None
+
+
+def _suggested(reason: str) -> Provenance:
+    return Provenance(origin="suggested", reason=reason)
+
+
+def _from_file(robot: Facts) -> Provenance:
+    return Provenance(origin="declared", reason=f"in {robot.model.file.name}")
+
+
+def _add_from_file(
+    column: Column,
+    robot: Facts,
+    joint: Joint,
+    in_file: Mapping[str, float | None],
+    mirror: Mapping[str, MirrorJoint],
+) -> bool:
+    """Add the value of a joint, or of its mirror joint; return False if neither is in the file."""
+    value, mirrored = in_file[joint.name], mirror.get(joint.name)
+    if value is not None:
+        column.add(joint.name, value, _from_file(robot))
+        return True
+    value = in_file.get(mirrored.joint) if mirrored is not None else None
+    if mirrored is None or value is None:
+        return False
+    origin = _suggested(f"not in the file; copied from {mirrored.joint}")
+    column.add(joint.name, value, origin)
+    return True
