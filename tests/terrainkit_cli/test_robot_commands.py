@@ -118,7 +118,7 @@ def test_check_robot_formats_several_files(here):
             ("none.urdf",),
             "there is no file none.urdf, nor is a bundled robot called so; there are:",
         ),
-        ((".",), "cannot read .: got a folder; expected a robot file"),
+        ((".",), "cannot read .: it is a folder, not a file"),
         (("fifo",), "fifo is not a plain file"),
         (("good.urdf", "--select", "XYZ1"), "no rule 'XYZ1'; wanted a code"),
         (("good.urdf", "--ignore", "INR002"), "--ignore 'INR002'; wanted CODES=REASON"),
