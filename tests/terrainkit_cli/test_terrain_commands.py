@@ -114,7 +114,9 @@ WIDE_CELLS = ("--rows", 2, "--cell", 1, "--terrain", "pyramid_stairs")
 def test_cells_too_coarse_for_what_was_asked_are_a_warning(terrainkit):
     run = terrainkit("generate", "-o", "a.npz", *WIDE_CELLS)
     assert run.returncode == 0
-    assert "pyramid_stairs.step_width on 20 patches; the map records what was built" in run.stderr
+    assert (
+        "pyramid_stairs.step_width on 20 patches; the map records the realized values" in run.stderr
+    )
     assert run.stderr.count("\n") == 1
 
 
@@ -153,7 +155,7 @@ def test_a_terrain_that_a_preset_has_no_column_for_is_a_warning(terrainkit):
     run = terrainkit("generate", "-o", "a.npz", "--rows", 1, "--cols", 2, "--preset", "stairs")
     assert run.returncode == 0
     assert run.stderr == (
-        "terrainkit: warning: 2 columns are too few for 3 terrains at these proportions: "
+        "terrainkit: warning: 2 columns are too few for 3 sub-terrains at these proportions: "
         "no column for pyramid_stairs_inverted (preset stairs)\n"
     )
 
@@ -195,7 +197,7 @@ def test_a_long_map_shows_a_bar_on_a_terminal_only(tmp_path):
 
 def test_list_names_every_terrain(terrainkit):
     lines = terrainkit("list").stdout.splitlines()
-    for name in registry.names():
+    for name in registry.terrain_names():
         assert any(line.startswith(f"{name} ") for line in lines)
 
 

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from terrainkit.atomic import atomic_write
+from terrainkit.atomic_write import atomic_write
 from terrainkit.errors import ConfigError, ExportError, listing
 from terrainkit.toml_text import parse_toml, read_text
 from terrainkit_robots.mesh.sniff import open_regular
