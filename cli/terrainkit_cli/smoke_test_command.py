@@ -1,7 +1,7 @@
 """The command that checks whether robots can be trained."""
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -79,7 +79,7 @@ class SmokeTest(Command):
                     render.error(f"{name}: {error.strerror or error}")
         text = as_json(results) if self.format == "json" else as_text(results)
         if self.output:
-            from terrainkit.atomic import atomic_write
+            from terrainkit.atomic_write import atomic_write
 
             with atomic_write(Path(self.output), overwrite=True) as path:
                 path.write_text(text, encoding="utf-8")
@@ -101,7 +101,7 @@ class SmokeTest(Command):
             robots = listing(self.robots)
             raise ConfigError(f"--{given[0]}: got no robot file among {robots}; expected one")
         if self.output:
-            from terrainkit.atomic import check_target
+            from terrainkit.atomic_write import check_target
 
             check_target(Path(self.output), overwrite=True)  # before the tests
 
@@ -148,6 +148,9 @@ def as_json(results: "dict[str, SmokeTestResult]") -> str:
         "schema_version": SCHEMA_VERSION,
         "tool": {"name": "terrainkit", "version": __version__},
     }
-    documents = [{**head, "file": name, **result.as_dict()} for name, result in results.items()]
+    documents = [
+        {**head, "file": name, "verdict": "pass" if result.passed else "fail", **asdict(result)}
+        for name, result in results.items()
+    ]
     indent = 2 if len(documents) == 1 else None
     return "".join(f"{json.dumps(document, indent=indent)}\n" for document in documents)

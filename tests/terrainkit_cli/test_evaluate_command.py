@@ -103,7 +103,7 @@ def test_evaluate_bundled_policy_by_name(here):
     [
         ((), "RUN is missing; expected"),
         (("walk", "--checkpoint", "5"), "expected one of: 3, 7"),
-        (("walk", "--seconds", "-1"), "seconds: got -1; expected more than 0"),
+        (("walk", "--seconds", "-1"), "seconds: got -1.0; expected a number > 0"),
         (("walk", "--checkpoint", "-5"), "expected one of: 3, 7"),
         (("walk", "--num-envs", "-3"), "num_envs: got -3"),
         (("walk", "--num-envs", "0"), "num_envs: got 0"),
@@ -111,7 +111,7 @@ def test_evaluate_bundled_policy_by_name(here):
         (("walk", "--terrain", "gone.npz"), "gone.npz"),
         (("walk", "--device", "abacus"), "abacus"),
         (("walk", "--command", "1", "0"), "--command"),
-        (("walk", "--command", "nan", "0", "0"), "expected three finite numbers"),
+        (("walk", "--command", "nan", "0", "0"), "command: got [nan, 0.0, 0.0]; expected 3 values"),
         (("walk", "--command", "1", "0", "0", "--random-commands"), "expected one of them"),
         (("walk", "-o", "nowhere/result.json"), "there is no folder nowhere"),
     ],

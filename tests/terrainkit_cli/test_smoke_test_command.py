@@ -49,7 +49,7 @@ def test_failed_check_is_shown_with_its_expectation(here, tmp_path):
     lines = run.stdout.splitlines()
     assert lines[0] == "robot     quadruped (mine)"
     (failed,) = (k for k, line in enumerate(lines) if line.startswith("FAIL"))
-    assert lines[failed].split()[1:4] == ["spawn", "height", "31.0"]
+    assert lines[failed].split()[1:4] == ["spawn", "height", "FL_foot"]
     expected = "expected: every foot within 2.0 cm of the ground, none below"
     assert lines[failed + 1].strip() == expected
     assert sum(line.startswith("ok  ") for line in lines) >= 15

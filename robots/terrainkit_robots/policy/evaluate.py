@@ -5,22 +5,21 @@ plane each robot gets a command of a grid, on a map each robot walks forward fro
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import product
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import torch
+from msgspec import Meta
+from numpy.typing import NDArray
+from tensordict import TensorDict
 
+from terrainkit.annotations import PositiveInt
 from terrainkit.errors import ConfigError
+from terrainkit.schema import Config
 from terrainkit_robots.policy.load import load_policy
-from terrainkit_robots.policy.rollout import (
-    SETTLING_TIME,
-    BoolArray,
-    EvaluationRollout,
-    FloatArray,
-    Progress,
-)
 from terrainkit_robots.rl.config import Commands, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import uses_height_scan
@@ -28,50 +27,47 @@ from terrainkit_robots.rl.run import Run, is_same_terrain
 from terrainkit_robots.rl.runner import resolve_device, single_torch_thread
 from terrainkit_robots.rl.terrain import load_terrain
 
-MAX_SECONDS = 3600.0
-"""Longest evaluation [s]."""
+FloatArray = NDArray[np.float32]
+BoolArray = NDArray[np.bool_]
+Policy = Callable[[TensorDict], torch.Tensor]
+Progress = Callable[[float], object]
+"""Called after each step with the completed fraction of the time, 0 to 1."""
 
-MAX_DEFAULT_ENVS = 512
-"""Largest default number of robots on a map."""
+SETTLING_TIME, AVERAGING_TIME = 2.0, 1.0
+"""Time after the start and after each new command without measurements, and time over which
+velocities are averaged for the errors ending in `_1s` [s]."""
 
-_PATCH_ENVS = 16
-"""Default number of robots for one command on a single patch."""
+MAX_MAP_ENVS, SINGLE_PATCH_ENVS = 512, 16
+"""Default numbers of robots: at most on a map, and for one command on a single patch."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class EvaluationConfig:
+class EvaluationConfig(Config):
     """Settings of an evaluation.
 
     Attributes:
         seconds: Duration of the rollout [s].
         terrain: Terrain as `load_terrain` takes it; None for that of the training.
         num_envs: Number of robots; None for one per command of the grid, or several per patch.
-        command: Command for all robots: forward and left velocity [m/s], yaw rate [rad/s].
+        command: Command for all robots: forward and left velocity [m/s], yaw velocity [rad/s].
         random_commands: Whether commands are sampled as in training.
         seed: Seed of all random numbers.
         device: Device of the policy, as torch names it.
     """
 
-    seconds: float = 20.0
+    seconds: Annotated[float, Meta(gt=0, le=3600)] = 20.0
     terrain: str | None = None
-    num_envs: int | None = None
+    num_envs: PositiveInt | None = None
     command: tuple[float, float, float] | None = None
     random_commands: bool = False
-    seed: int = 1
+    seed: Annotated[int, Meta(ge=0)] = 1
     device: str = "cpu"
 
     def __post_init__(self) -> None:
-        if not 0 < self.seconds <= MAX_SECONDS:
-            limits = f"more than 0, at most {MAX_SECONDS:g}"
-            raise ConfigError(f"seconds: got {self.seconds:g}; expected {limits}")
-        if self.num_envs is not None and self.num_envs < 1:
-            raise ConfigError(f"num_envs: got {self.num_envs}; expected 1 or more")
-        if self.command is not None and not np.isfinite(self.command).all():
-            raise ConfigError(f"command: got {self.command}; expected three finite numbers")
+        """Validate the values, and that the commands are given once."""
+        super().__post_init__()
         if self.command is not None and self.random_commands:
             raise ConfigError("command: got a command and random_commands; expected one of them")
-        if self.seed < 0:
-            raise ConfigError(f"seed: got {self.seed}; expected 0 or more")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,12 +83,11 @@ class RolloutMetrics:
         level: Level of the group.
         robots: Number of robots.
         falls: Number of robots that fell.
-        success: Fraction of robots that crossed half a patch, or walked half of the commanded
-            distance without a fall; None on a plane.
+        success: Fraction of robots that succeeded on a map; see :class:`EvaluationRollout`.
         lin_vel_error: Norm of the horizontal velocity error [m/s].
         lin_vel_error_1s: The same for velocities averaged over 1 s, without the sway of a gait.
-        ang_vel_error: Absolute yaw rate error [rad/s].
-        ang_vel_error_1s: The same for yaw rates averaged over 1 s.
+        ang_vel_error: Absolute yaw velocity error [rad/s].
+        ang_vel_error_1s: The same for yaw velocities averaged over 1 s.
     """
 
     command: tuple[float, ...] | None = None
@@ -133,15 +128,10 @@ class EvaluationResult:
 
     def as_json(self) -> str:
         """Return the result as JSON; equal evaluations give equal bytes."""
-        document: dict[str, Any] = {
-            "robot": self.robot,
-            "checkpoint": self.checkpoint,
-            "terrain": self.config.terrain,
-            "seconds": float(self.config.seconds),
-            "settling_seconds": SETTLING_TIME,
-            "seed": self.config.seed,
-            "all": self.metrics.as_dict(),
-        }
+        config, settling = self.config, {"settling_seconds": SETTLING_TIME}
+        document: dict[str, Any] = {"robot": self.robot, "checkpoint": self.checkpoint}
+        document |= {"terrain": config.terrain, "seconds": config.seconds, **settling}
+        document |= {"seed": config.seed, "all": self.metrics.as_dict()}
         document |= {k: [group.as_dict() for group in v] for k, v in self.groups.items()}
         return json.dumps(document, indent=2) + "\n"
 
@@ -153,7 +143,7 @@ def evaluate(
     """Evaluate the policy of a run. The same seed gives the same result, bit for bit.
 
     Raises:
-        ConfigError: if the run has no policy, or one of another robot; if the terrain cannot be
+        ConfigError: If the run has no policy, or one of another robot; if the terrain cannot be
             read, or changed after the training; if the device does not exist.
     """
     config = config or EvaluationConfig()
@@ -165,7 +155,7 @@ def evaluate(
 
 
 def make_evaluation_env(
-    run: Run, config: EvaluationConfig, *, max_patch_envs: int = MAX_DEFAULT_ENVS
+    run: Run, config: EvaluationConfig, *, max_patch_envs: int = MAX_MAP_ENVS
 ) -> tuple[LeggedEnv, FloatArray | None]:
     """Return an environment to evaluate a policy in, and the command of each robot.
 
@@ -179,9 +169,8 @@ def make_evaluation_env(
     """
     device, task = resolve_device(config.device), run.task
     if config.terrain is None and not (is_flat(run) or is_same_terrain(run, run.terrain)):
-        raise ConfigError(
-            f"terrain: {run.terrain} changed after {run.folder} was trained; expected --terrain"
-        )
+        changed = f"{run.terrain} changed after {run.folder} was trained"
+        raise ConfigError(f"terrain: {changed}; expected --terrain")
     # The policy keeps the observations of its training, whatever terrain it walks on.
     scan = uses_height_scan(task, is_flat=is_flat(run))
     collision = task.terrain.collision
@@ -195,17 +184,17 @@ def make_evaluation_env(
         forward = np.array([[0.75 * task.commands.lin_vel_x[1], 0, 0]], np.float32)
         commands = command_grid(task.commands) if terrain.is_flat else forward
     rows, cols = terrain.env_origins.shape[:2]
-    n = config.num_envs
+    n, patches = config.num_envs, rows * cols
     if n is None and commands is not None and len(commands) > 1:
         n = len(commands)
     elif n is None:
-        per_patch = max(1, min(max_patch_envs, MAX_DEFAULT_ENVS // (rows * cols)))
-        n = _PATCH_ENVS if rows * cols == 1 else min(MAX_DEFAULT_ENVS, rows * cols * per_patch)
+        per_patch = max(1, min(max_patch_envs, MAX_MAP_ENVS // patches))
+        n = SINGLE_PATCH_ENVS if patches == 1 else min(MAX_MAP_ENVS, patches * per_patch)
     task = evaluation_task(task, n, seconds=config.seconds, seed=config.seed)
     task = replace(task, terrain=replace(task.terrain, collision=collision, measure_heights=scan))
     env = LeggedEnv(task, run.robot, terrain, device)
-    patches = _assign(rows * cols, n, config.seed)
-    env.curriculum.levels[:], env.curriculum.columns[:] = np.divmod(patches, cols)
+    levels_and_columns = np.divmod(_assign(patches, n, config.seed), cols)
+    env.curriculum.levels[:], env.curriculum.columns[:] = levels_and_columns
     env.reset()
     return env, None if commands is None else commands[_assign(len(commands), n, config.seed)]
 
@@ -217,11 +206,8 @@ def is_flat(run: Run, terrain: str | None = None) -> bool:
     return run.terrain == "plane" or run.task.terrain.collision == "plane"
 
 
-def _assign(count: int, num_envs: int, seed: int) -> Any:
-    """Return one of `count` items for each robot, all equally often, shape (num_envs,).
-
-    With fewer robots than items, the items are sampled without replacement.
-    """
+def _assign(count: int, num_envs: int, seed: int) -> NDArray[np.int64]:
+    """Return an item for each robot, all equally often; a random subset if there are too many."""
     if num_envs < count:
         return np.sort(np.random.default_rng(seed).permutation(count)[:num_envs])
     return np.arange(num_envs) % count
@@ -229,16 +215,15 @@ def _assign(count: int, num_envs: int, seed: int) -> Any:
 
 def evaluation_task(task: Task, num_envs: int, *, seconds: float = 20.0, seed: int = 1) -> Task:
     """Return a task without noise, randomization, pushes, curricula and timeouts in `seconds`."""
-    no_randomization: dict[str, Any] = dict.fromkeys(
-        ["friction", "added_mass", "gains", "motor_strength"]
-    ) | (dict.fromkeys(["com_shift", "joint_offset", "push_interval_s", "max_push_vel_xy"], 0.0))
+    off: dict[str, Any] = dict.fromkeys(["friction", "added_mass", "gains", "motor_strength"])
+    off |= dict.fromkeys(["com_shift", "joint_offset", "push_interval_s", "max_push_vel_xy"], 0.0)
     return replace(
         task,
         env=replace(task.env, num_envs=num_envs, episode_length_s=2 * seconds + 1),
         terrain=replace(task.terrain, curriculum=False),
         init_state=replace(task.init_state, reset_range=(1.0, 1.0), lin_vel=0.0, ang_vel=0.0),
         commands=replace(task.commands, curriculum=False),
-        domain_rand=replace(task.domain_rand, **no_randomization),
+        domain_rand=replace(task.domain_rand, **off),
         noise=replace(task.noise, noise_level=0.0),
         algorithm=replace(task.algorithm, num_mini_batches=1),  # a few robots allow no more
         runner=replace(task.runner, seed=seed),
@@ -248,8 +233,8 @@ def evaluation_task(task: Task, num_envs: int, *, seconds: float = 20.0, seed: i
 def command_grid(commands: Commands) -> FloatArray:
     """Return a grid of commands over the ranges of a task, shape (k, 3); usually 75.
 
-    Forward velocities and yaw rates are the full and half limits and zero, lateral velocities the
-    full limits and zero. Commands below `min_norm` are zero.
+    Forward and yaw velocities are the full and half limits and zero, lateral velocities the full
+    limits and zero. Commands below `min_norm` are zero.
     """
     ranges = (commands.lin_vel_x, commands.lin_vel_y, commands.ang_vel_yaw)
     fractions = ((1.0, 0.5), (1.0,), (1.0, 0.5))
@@ -261,6 +246,135 @@ def command_grid(commands: Commands) -> FloatArray:
     grid[np.hypot(grid[:, 0], grid[:, 1]) < commands.min_norm, :2] = 0
     grid[np.abs(grid[:, 2]) < commands.min_norm, 2] = 0
     return np.unique(grid + np.float32(0), axis=0)  # + 0 turns -0 into 0
+
+
+def rollout(
+    env: LeggedEnv, policy: Policy, schedule: Iterable[FloatArray | None]
+) -> Iterator[tuple[FloatArray, BoolArray]]:
+    """Step the environment with a policy.
+
+    Args:
+        env: The environment.
+        policy: The policy.
+        schedule: The commands of each step, shape (n, 3); None for the task's random commands.
+
+    Yields:
+        After each step, the commands during it, shape (n, 3), and which robots fell, shape (n,).
+    """
+    previous: object = ...  # neither commands nor None, so that the first entry is applied
+    for commands in schedule:
+        if commands is not previous:
+            env.set_commands(commands)
+            previous = commands
+        state = env.state
+        with torch.inference_mode():
+            actions = policy(env.get_observations())
+        _, _, dones, extras = env.step(actions)
+        yield state.commands, (dones & ~extras["time_outs"]).cpu().numpy()
+
+
+def command_schedule(commands: FloatArray | None, num_steps: int) -> list[FloatArray | None]:
+    """Return the commands of each step.
+
+    They are (n, 3), or k of them for equal parts of the time, (k, n, 3); None for random commands.
+    """
+    if commands is None:
+        return [None] * num_steps
+    parts = list(commands.reshape(-1, *commands.shape[-2:]))
+    return [parts[step * len(parts) // num_steps] for step in range(num_steps)]
+
+
+class EvaluationRollout:
+    """A rollout that measures each robot up to its first fall.
+
+    On a map, a robot is measured until it has crossed half a patch: the terrain beyond belongs to
+    another patch. It succeeds if it crosses, or walks half of the commanded distance without a
+    fall. Error sums are in the order of :class:`RolloutMetrics`, shape (4, n).
+    """
+
+    def __init__(self, env: LeggedEnv) -> None:
+        n, dt = env.num_envs, env.cfg.dt
+        self.env, self.start_pos = env, env.start_pos.copy()
+        self.half_patch = np.inf if env.terrain.is_flat else env.terrain.patch_length / 2
+        self.falls, self.crossed = np.zeros(n, bool), np.zeros(n, bool)
+        self.distance, self.commanded_distance = np.zeros(n), np.zeros(n)
+        self.error_sums, self.error_counts = np.zeros((4, n)), np.zeros((4, n), np.int64)
+        self._settling_steps = round(SETTLING_TIME / dt)
+        self._window = max(1, round(AVERAGING_TIME / dt))
+        self._recent_errors = np.zeros((self._window, n, 3), np.float32)  # ring buffer
+        self._last_commands = np.full((n, 3), np.nan, np.float32)
+        self._command_steps = np.zeros(n, np.int64)  # since the command changed
+        self._measured_steps = np.zeros(n, np.int64)  # without interruption
+        self._num_steps = 0
+
+    def run(
+        self,
+        policy: Policy,
+        seconds: float,
+        commands: FloatArray | None = None,
+        progress: Progress = lambda _: None,
+        *,
+        stop_early: bool = True,
+    ) -> None:
+        """Run for some time [s]; see :func:`command_schedule` for `commands`.
+
+        With `stop_early`, it ends once every robot has fallen or crossed half a patch.
+        """
+        steps = max(1, round(seconds / self.env.cfg.dt))
+        schedule = command_schedule(commands, steps)
+        for index, step in enumerate(rollout(self.env, policy, schedule), 1):
+            self._update(*step)
+            progress(index / steps)
+            if stop_early and (self.falls | self.crossed).all():
+                break
+
+    def _update(self, commands: FloatArray, falls: BoolArray) -> None:
+        active = ~(self.falls | self.crossed)
+        self.falls |= active & falls
+        active &= ~falls
+        state = self.env.state
+        velocity = np.column_stack([state.base_lin_vel[:, :2], state.base_ang_vel[:, 2]])
+        self._update_errors(commands, velocity - commands, active)
+        distance = np.linalg.norm(state.base_pos[:, :2] - self.start_pos, axis=1)
+        commanded = np.linalg.norm(self.env.curriculum.commanded, axis=1)
+        self.distance[active] = distance[active]
+        self.commanded_distance[active] = commanded[active]
+        self.crossed |= active & (distance > self.half_patch)
+
+    def _update_errors(self, commands: FloatArray, error: FloatArray, active: BoolArray) -> None:
+        # A heading command changes the yaw velocity at every step, which is no new command.
+        command = self.env.velocity_command
+        axes = 2 if command.heading_command and command.fixed is None else 3
+        same = (commands[:, :axes] == self._last_commands[:, :axes]).all(axis=1)
+        self._command_steps = np.where(same, self._command_steps + 1, 1)
+        self._last_commands[:] = commands
+        settled = active & (self._command_steps > self._settling_steps)
+        self._measured_steps = np.where(settled, self._measured_steps + 1, 0)
+        self._recent_errors[self._num_steps % self._window] = error
+        self._num_steps += 1
+        averaged = self._measured_steps >= self._window
+        mean_error = self._recent_errors.mean(axis=0)
+        for row, (value, mask) in enumerate([(error, settled), (mean_error, averaged)]):
+            self.error_sums[row, mask] += np.hypot(value[mask, 0], value[mask, 1])
+            self.error_sums[row + 2, mask] += np.abs(value[mask, 2])
+            self.error_counts[row::2, mask] += 1
+
+    def metrics(self, mask: BoolArray, **key: Any) -> RolloutMetrics:
+        """Return the metrics of the robots in a mask; each robot has the same weight."""
+        success = self.crossed | (~self.falls & (self.distance >= self.commanded_distance / 2))
+        errors: dict[str, Any] = {}
+        names = "lin_vel_error", "lin_vel_error_1s", "ang_vel_error", "ang_vel_error_1s"
+        for name, total, count in zip(names, self.error_sums, self.error_counts, strict=True):
+            measured = mask & (count > 0)
+            mean = (total[measured] / count[measured]).mean() if measured.any() else None
+            errors[name] = None if mean is None else float(mean)
+        return RolloutMetrics(
+            **key,
+            robots=int(mask.sum()),
+            falls=int(self.falls[mask].sum()),
+            success=None if self.env.terrain.is_flat else float(success[mask].mean()),
+            **errors,
+        )
 
 
 def summarize(
@@ -280,7 +394,7 @@ def summarize(
 
     def add_group(table: str, mask: BoolArray, **key: Any) -> None:
         if mask.any():
-            groups.setdefault(table, []).append(mean_metrics(rollout, mask, **key))
+            groups.setdefault(table, []).append(rollout.metrics(mask, **key))
 
     keys = [] if commands is None else [tuple(round(float(v), 4) for v in c) for c in commands]
     for key in dict.fromkeys(keys):
@@ -298,25 +412,6 @@ def summarize(
         robot=run.robot.spec.name,
         checkpoint=run.checkpoint.name if run.checkpoint is not None else "",
         config=replace(config, terrain=str(config.terrain or run.terrain)),
-        metrics=mean_metrics(rollout, np.ones(env.num_envs, bool)),
+        metrics=rollout.metrics(np.ones(env.num_envs, bool)),
         groups=groups,
-    )
-
-
-def mean_metrics(rollout: EvaluationRollout, mask: BoolArray, **key: Any) -> RolloutMetrics:
-    """Return the metrics of the robots in a mask; each robot has the same weight."""
-    errors: list[float | None] = []
-    for row in range(4):
-        measured = mask & (rollout.error_counts[row] > 0)
-        means = rollout.error_sums[row, measured] / rollout.error_counts[row, measured]
-        errors.append(float(means.mean()) if means.size else None)
-    return RolloutMetrics(
-        **key,
-        robots=int(mask.sum()),
-        falls=int(rollout.falls[mask].sum()),
-        success=None if rollout.env.terrain.is_flat else float(rollout.success[mask].mean()),
-        lin_vel_error=errors[0],
-        lin_vel_error_1s=errors[1],
-        ang_vel_error=errors[2],
-        ang_vel_error_1s=errors[3],
     )

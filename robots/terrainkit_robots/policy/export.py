@@ -3,10 +3,11 @@
 import io
 import json
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import onnx
 import onnxruntime
@@ -14,11 +15,12 @@ import torch
 from numpy.typing import NDArray
 from tensordict import TensorDict
 
-from terrainkit.atomic import atomic_write, check_target
+from terrainkit.atomic_write import atomic_write, check_target
 from terrainkit.errors import ExportError
 from terrainkit_robots.policy.evaluate import evaluation_task
 from terrainkit_robots.policy.load import load_policy
 from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.observations import HEIGHT_SCAN_OFFSET
 from terrainkit_robots.rl.run import Run, read_checkpoint
 from terrainkit_robots.rl.runner import single_torch_thread
 from terrainkit_robots.rl.terrain import load_terrain
@@ -36,11 +38,8 @@ METADATA_KEY = "terrainkit"
 TOLERANCE = 1e-5
 """Largest difference between exported and live actions; relative for actions beyond 1."""
 
-_OPSET = 17
+ONNX_OPSET = 17
 """ONNX opset: old enough for the runtimes on robots."""
-
-_DEPRECATED = r"`torch\.jit\.\w+` is (deprecated|not supported)"
-"""torch's warning about TorchScript, which C++ controllers still load."""
 
 _FORMULAS = {
     "observation": "obs = clip((raw - offset) * scale, -clip, clip), part by part; a part with a "
@@ -49,15 +48,6 @@ _FORMULAS = {
     "torque": "clip(gain * target - stiffness * position - damping * velocity, -effort, effort), "
     "every physics_dt; a new action every policy_dt",
 }
-
-_UNITS = {
-    "commands": ["m/s", "m/s", "rad/s"],
-    "projected_gravity": "1",
-    "base_ang_vel": "rad/s",
-    "actions": "1",
-    "height_scan": "m",
-}
-"""Unit of each observation term without a joint axis, before scaling."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,8 +74,8 @@ def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> ExportR
     The exported policies are verified against the live one before anything is written.
 
     Raises:
-        ConfigError: if the run has no checkpoint.
-        ExportError: if a file exists and `overwrite` is not set, if a file cannot be written, or if
+        ConfigError: If the run has no checkpoint.
+        ExportError: If a file exists and `overwrite` is not set, if a file cannot be written, or if
             an exported policy does not match the live one.
     """
     files = folder / ONNX_FILE, folder / TORCHSCRIPT_FILE, folder / JSON_FILE
@@ -96,20 +86,17 @@ def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> ExportR
     actor = load_policy(run, env)
     iteration = read_checkpoint(run.checkpoint)["iteration"] if run.checkpoint else 0
     text = json.dumps(describe_policy(env) | {"iteration": iteration}, indent=2) + "\n"
-    clip_obs, clip_actions = task.normalization.clip_observations, task.normalization.clip_actions
-    policy = torch.nn.Sequential(
-        torch.nn.Hardtanh(-clip_obs, clip_obs),
-        actor.as_jit(),
-        torch.nn.Hardtanh(-clip_actions, clip_actions),
-    ).eval()
+    limits = task.normalization.clip_observations, task.normalization.clip_actions
+    clip_obs, clip_actions = (torch.nn.Hardtanh(-limit, limit) for limit in limits)
+    policy = torch.nn.Sequential(clip_obs, actor.as_jit(), clip_actions).eval()
     random = torch.randn(100, actor.obs_dim, generator=torch.Generator().manual_seed(0))
     obs = torch.cat([env.get_observations()["policy"], random])
     with warnings.catch_warnings(), torch.no_grad():
-        warnings.simplefilter("ignore", DeprecationWarning)  # of torch's ONNX exporter
-        warnings.filterwarnings("ignore", message=_DEPRECATED)
+        # torch deprecates TorchScript, which C++ controllers load, and its older ONNX exporter.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        warnings.filterwarnings("ignore", message=r"`torch\.jit\.\w+` is (deprecated|not supp)")
         onnx_data, script_data = export_onnx(policy, obs, text), export_torchscript(policy)
-        actions = actor(TensorDict({"policy": obs.clamp(-clip_obs, clip_obs)}, [len(obs)]))
-        actions = actions.clamp(-clip_actions, clip_actions).numpy()
+        actions = clip_actions(actor(TensorDict({"policy": clip_obs(obs)}, [len(obs)]))).numpy()
         script_actions = torch.jit.load(io.BytesIO(script_data))(obs).numpy()
     session = onnxruntime.InferenceSession(onnx_data, providers=["CPUExecutionProvider"])
     onnx_actions = np.asarray(session.run(["actions"], {"obs": obs.numpy()})[0])
@@ -126,10 +113,7 @@ def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> ExportR
         path.with_name(ONNX_FILE).write_bytes(onnx_data)
         path.with_name(TORCHSCRIPT_FILE).write_bytes(script_data)
     return ExportResult(
-        files=files,
-        errors=errors,
-        num_observations=actor.obs_dim,
-        num_actions=env.num_actions,
+        files=files, errors=errors, num_observations=actor.obs_dim, num_actions=env.num_actions
     )
 
 
@@ -141,7 +125,7 @@ def export_onnx(policy: torch.nn.Module, obs: torch.Tensor, metadata: str) -> by
     file, axes = io.BytesIO(), {"obs": {0: "batch"}, "actions": {0: "batch"}}
     names: dict[str, Any] = {"input_names": ["obs"], "output_names": ["actions"]}
     torch.onnx.export(
-        policy, (obs,), file, **names, dynamic_axes=axes, opset_version=_OPSET, dynamo=False
+        policy, (obs,), file, **names, dynamic_axes=axes, opset_version=ONNX_OPSET, dynamo=False
     )
     model = onnx.load_model_from_string(file.getvalue())
     model.metadata_props.add(key=METADATA_KEY, value=metadata)
@@ -160,14 +144,12 @@ def verify_actions(exported: FloatArray, live: FloatArray, name: str) -> float:
     """Return the largest difference between exported and live actions.
 
     Raises:
-        ExportError: if it is larger than the tolerance, or not a number.
+        ExportError: If it is larger than the tolerance, or not a number.
     """
     error = float(np.max(np.abs(exported - live) / np.maximum(1, np.abs(live))))
     if not error <= TOLERANCE:
-        raise ExportError(
-            f"{name}: got actions that differ from the live policy by {error:.2g}; "
-            f"expected at most {TOLERANCE:g}"
-        )
+        expected = f"expected at most {TOLERANCE:g}"
+        raise ExportError(f"{name}: got actions off the live policy by {error:.2g}; {expected}")
     return error
 
 
@@ -179,64 +161,69 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
     """
     from terrainkit import __version__
 
-    task, spec, model = env.cfg, env.robot.spec, env.scene.model
-    scan = None
-    if env.state.height_scan.shape[1]:
-        x, y = task.terrain.measured_points_x, task.terrain.measured_points_y
-        scan = {
-            "frame": "at the base's position, turned by its yaw alone; x forward, y left",
-            "value": "height of the base above the ground at the point",
-            "unit": "m",
-            "points": [[point_x, point_y] for point_x in x for point_y in y],
-        }
+    task, robot, model = env.cfg, env.robot, env.scene.model
+    slide = mujoco.mjtJoint.mjJNT_SLIDE
+    types = [model.joint(name).type[0] for name in robot.spec.joint_order]
+    units = ["m" if each == slide else "rad" for each in types]
     stiffness, damping = -model.actuator_biasprm[:, 1], -model.actuator_biasprm[:, 2]
     drive = np.where(stiffness > 0, "position", "velocity")
     if task.control.control_type == "T":
         drive[:] = "torque"
+    joints = {
+        "default_position": robot.default_pose,
+        "action_offset": env.action_offset,
+        "action_scale": env.action_scale,
+        "gain": model.actuator_gainprm[:, 0],
+        "stiffness": stiffness,
+        "damping": damping,
+        "effort": model.actuator_forcerange[:, 1],
+        "velocity": robot.velocity,
+    }
+    scan_x, scan_y = task.terrain.measured_points_x, task.terrain.measured_points_y
+    scan = {
+        "frame": "at the base's position, turned by its yaw alone; x forward, y left",
+        "value": "height of the base above the ground at the point",
+        "unit": "m",
+        "points": [[x, y] for x in scan_x for y in scan_y],
+    }
+    names = "name", "base", "spawn_height", "base_height_target"
+    dt, decimation = task.sim.dt, task.control.decimation
     return {
         "format_version": FORMAT_VERSION,
         "terrainkit": __version__,
-        "robot": {
-            "name": spec.name,
-            "base": spec.base,
-            "spawn_height": spec.spawn_height,
-            "base_height_target": spec.base_height_target,
-        },
+        "robot": {name: getattr(robot.spec, name) for name in names},
         "files": {"onnx": ONNX_FILE, "torchscript": TORCHSCRIPT_FILE},
         "formulas": _FORMULAS,
-        "timing": {
-            "physics_dt": task.sim.dt,
-            "decimation": task.control.decimation,
-            "policy_dt": task.dt,
-        },
+        "timing": {"physics_dt": dt, "decimation": decimation, "policy_dt": task.dt},
         "observation": {
             "size": env.get_observations()["policy"].shape[1],
             "clip": task.normalization.clip_observations,
-            "parts": _observation_parts(env),
+            "parts": _observation_parts(env, units),
         },
         "action": {"size": env.num_actions, "clip": task.normalization.clip_actions},
         "control_type": task.control.control_type,
         "joints": {
-            "name": list(spec.joint_order),
-            "position_unit": _joint_units(env),
+            "name": list(robot.spec.joint_order),
+            "position_unit": units,
             "drive": drive.tolist(),
-            "default_position": _floats(env.robot.default_pose),
-            "action_offset": _floats(env.action_offset),
-            "action_scale": _floats(env.action_scale),
-            "gain": _floats(model.actuator_gainprm[:, 0]),
-            "stiffness": _floats(stiffness),
-            "damping": _floats(damping),
-            "effort": _floats(model.actuator_forcerange[:, 1]),
-            "velocity": _floats(env.robot.velocity),
+            **{name: _floats(values) for name, values in joints.items()},
         },
-        "height_scan": scan,
+        "height_scan": scan if env.state.height_scan.shape[1] else None,
     }
 
 
-def _observation_parts(env: LeggedEnv) -> list[dict[str, Any]]:
-    """Return slice, unit, offset, scale and clip of each observation term, read off the terms."""
-    units = _UNITS | {"dof_pos": _joint_units(env)}
-    units["dof_vel"] = [f"{unit}/s" for unit in units["dof_pos"]]
+def _observation_parts(env: LeggedEnv, joint_units: list[str]) -> list[dict[str, Any]]:
+    """Return slice, unit, offset, scale and clip of each observation term."""
+    offsets: dict[str, Any] = {"dof_pos": env.robot.default_pose, "height_scan": HEIGHT_SCAN_OFFSET}
+    units = {
+        "commands": ["m/s", "m/s", "rad/s"],
+        "projected_gravity": "1",
+        "base_ang_vel": "rad/s",
+        "dof_pos": joint_units,
+        "dof_vel": [f"{unit}/s" for unit in joint_units],
+        "actions": "1",
+        "height_scan": "m",
+    }
     parts, start = [], 0
     for term in env.obs_groups["policy"]:
         size = term.function(env.state).shape[1]
@@ -245,26 +232,12 @@ def _observation_parts(env: LeggedEnv) -> list[dict[str, Any]]:
             "start": start,
             "stop": start + size,
             "unit": units.get(term.name, ""),
-            "offset": _floats(env.robot.default_pose if term.name == "dof_pos" else np.zeros(size)),
+            "offset": _floats(np.broadcast_to(offsets.get(term.name, 0.0), size)),
             "scale": _floats(np.broadcast_to(term.scale, size)),
         }
-        if term.name == "height_scan":
-            # The term itself is evaluated far below, on and far above the ground.
-            scans = [np.full_like(env.state.height_scan, height) for height in (-1e3, 0.0, 1e3)]
-            low, zero, high = (
-                float(term.function(replace(env.state, height_scan=scan))[0, 0]) for scan in scans
-            )
-            part |= {"offset": _floats(np.full(size, -zero)), "clip": [low, high]}
-        parts.append(part)
+        parts.append(part | ({"clip": [-1.0, 1.0]} if term.name == "height_scan" else {}))
         start += size
     return parts
-
-
-def _joint_units(env: LeggedEnv) -> list[str]:
-    import mujoco
-
-    types = (env.scene.model.joint(name).type[0] for name in env.robot.spec.joint_order)
-    return ["m" if kind == mujoco.mjtJoint.mjJNT_SLIDE else "rad" for kind in types]
 
 
 def _floats(values: Any) -> list[float]:

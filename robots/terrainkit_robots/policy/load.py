@@ -19,17 +19,16 @@ def load_policy(run: Run, env: LeggedEnv) -> MLPModel:
         env: The environment that the policy acts in.
 
     Warns:
-        TerrainkitWarning: if the robot's model changed after training.
+        TerrainkitWarning: If the robot's model changed after training.
 
     Raises:
-        ConfigError: if the run has no checkpoint, or one of another robot or task.
+        ConfigError: If the run has no checkpoint, or one of another robot or task.
     """
     if run.checkpoint is None:
         raise ConfigError(f"run {run.folder}: got no checkpoint; expected a trained run")
     # The run has its own copy of the spec, so only a change of the model matters.
     if files := [name for name in changed_robot_files(run) if name != SPEC_FILE]:
-        changed = f"{' and '.join(files)} of {run.robot_name} changed"
-        message = f"{changed} after the run {run.folder} was trained"
+        message = f"{run.robot_name}: {' and '.join(files)} changed after {run.folder} was trained"
         warnings.warn(message, TerrainkitWarning, stacklevel=2)
     state = read_checkpoint(run.checkpoint)
     check_checkpoint(run.checkpoint, state, env, OBS_GROUPS["actor"])

@@ -16,29 +16,24 @@ from terrainkit.errors import ConfigError
 from terrainkit_robots.policy.evaluate import (
     EvaluationConfig,
     EvaluationResult,
-    is_flat,
-    make_evaluation_env,
-    summarize,
-)
-from terrainkit_robots.policy.load import load_policy
-from terrainkit_robots.policy.rollout import (
     EvaluationRollout,
     FloatArray,
     Progress,
     command_schedule,
+    is_flat,
+    make_evaluation_env,
     rollout,
+    summarize,
 )
+from terrainkit_robots.policy.load import load_policy
 from terrainkit_robots.rendering.video import DEFAULT_SIZE, Shot, VideoSpec
 from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import Run
 from terrainkit_robots.rl.runner import single_torch_thread
 
-DEFAULT_SECONDS, DEFAULT_ROBOTS = 12.0, 4
-"""Default duration [s], and default number of robots that a video of a map follows."""
-
-_FORMATION_ENVS, _MAX_FPS = 9, 25.0
-"""Default number of robots on a plane, and largest frame rate of a video [1/s]."""
+DEFAULT_SECONDS, DEFAULT_ROBOTS, FORMATION_ENVS, MAX_FPS = 12.0, 4, 9, 25.0
+"""Defaults: duration [s], robots that the video of a map follows, robots on a plane, frame rate."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,16 +56,11 @@ def play(
 ) -> PlayResult:
     """Roll out the policy of a run, and record a video.
 
-    Args:
-        run: The run.
-        config: Settings; without a command, the robots on a plane get :func:`demo_commands`.
-        video: Whether to record a video.
-        robots: Number of robots that the video of a map follows in turn.
-        size: Width and height of the video [pixels].
-        progress: Progress callback.
+    On a plane the default commands are those of :func:`demo_commands`. On a map the video follows
+    some `robots` in turn.
 
     Raises:
-        ConfigError: if the run has no policy, or one of another robot; if an option is invalid.
+        ConfigError: If the run has no policy, or one of another robot; if an option is invalid.
     """
     if robots < 1:
         raise ConfigError(f"robots: got {robots}; expected 1 or more")
@@ -83,13 +73,10 @@ def play(
         if video:
             recorder.record()
 
-    evaluation = EvaluationRollout(env)
-    policy = load_policy(run, env)
+    evaluation, policy = EvaluationRollout(env), load_policy(run, env)
     evaluation.run(policy, config.seconds, commands, update, stop_early=not video)
-    return PlayResult(
-        evaluation=summarize(run, config, evaluation),
-        video=recorder.make_video(robots, size) if video else None,
-    )
+    spec = recorder.make_video(robots, size) if video else None
+    return PlayResult(evaluation=summarize(run, config, evaluation), video=spec)
 
 
 @single_torch_thread()
@@ -97,10 +84,9 @@ def view(run: Run, config: EvaluationConfig | None = None) -> None:
     """Show one robot in MuJoCo's viewer in real time, until its window is closed.
 
     Raises:
-        ConfigError: if there is no display, or the run has no policy, or one of another robot.
+        ConfigError: If there is no display, or the run has no policy, or one of another robot.
     """
-    has_display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    if sys.platform == "linux" and not has_display:
+    if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
         raise ConfigError("viewer: got no DISPLAY or WAYLAND_DISPLAY; expected a display")
     import mujoco
     import mujoco.viewer
@@ -135,7 +121,7 @@ def _make_play_env(run: Run, config: EvaluationConfig) -> tuple[LeggedEnv, Float
         return make_evaluation_env(run, config, max_patch_envs=1)
     start = replace(run.task.init_state, position=0.0, yaw=0.0)  # the formation sets them
     run = replace(run, task=replace(run.task, init_state=start))
-    config = replace(config, num_envs=config.num_envs or _FORMATION_ENVS)
+    config = replace(config, num_envs=config.num_envs or FORMATION_ENVS)
     if config.command is not None or config.random_commands:
         return make_evaluation_env(run, config)
     env, _ = make_evaluation_env(run, replace(config, command=(0.0, 0.0, 0.0)))
@@ -143,10 +129,7 @@ def _make_play_env(run: Run, config: EvaluationConfig) -> tuple[LeggedEnv, Float
 
 
 def demo_commands(commands: Commands) -> FloatArray:
-    """Return commands at three quarters of the task's limits, shape (4, 3).
-
-    They are forward, forward in a curve, sideways, and turning in place.
-    """
+    """Return forward, curve, sideways and turn commands at 75 % of the task's limits, (4, 3)."""
     limits = (commands.lin_vel_x, commands.lin_vel_y, commands.ang_vel_yaw)
     x, y, yaw = (0.75 * high for _, high in limits)
     return np.array([[x, 0, 0], [x, 0, yaw], [0, y, 0], [0, 0, -yaw]], np.float32)
@@ -157,7 +140,7 @@ class PoseRecorder:
 
     def __init__(self, env: LeggedEnv) -> None:
         self.env = env
-        self.stride = max(1, round(1 / (env.cfg.dt * _MAX_FPS)))
+        self.stride = max(1, round(1 / (env.cfg.dt * MAX_FPS)))
         self.num_steps = 0
         self.poses: list[FloatArray] = []
         self.commands: list[FloatArray] = []
@@ -174,31 +157,28 @@ class PoseRecorder:
         self.num_steps += 1
 
     def make_video(self, robots: int, size: tuple[int, int]) -> VideoSpec:
-        """Return a video of the formation on a plane, or of some robots in turn on a map."""
-        env, poses = self.env, np.stack(self.poses)
+        """Return a video of the formation on a plane, or of some robots in turn on a map.
+
+        A robot on a map is shown until it falls.
+        """
+        env, terrain, poses, shots = self.env, self.env.terrain, np.stack(self.poses), []
         frames, n = poses.shape[:2]
-        if env.terrain.is_flat:
+        if terrain.is_flat:
             side = int(np.ceil(np.sqrt(n)))
             row, col = np.divmod(np.arange(n), side)
             spacing = 2.4 * max(0.5, float(env.robot.spec.base_height_target or 0.5))
             poses[:, :, :2] += spacing * np.stack([-row, col - (side - 1) / 2], axis=1)
             captions = tuple(_caption(commands[n // 2]) for commands in self.commands)
-            shots = [Shot(robot=n // 2, start=0, stop=frames, captions=captions)]
-        else:
-            tracked = select_tracked_robots(env, robots)
-            shots = [self._make_shot(robot, max(1, frames // len(tracked))) for robot in tracked]
+            shots.append(Shot(robot=n // 2, start=0, stop=frames, captions=captions))
+        tracked, rows = select_tracked_robots(env, robots), len(terrain.env_origins)
+        for robot in tracked if not terrain.is_flat else ():
+            level, column = env.curriculum.levels[robot], env.curriculum.columns[robot]
+            caption = str(terrain.terrain_names[level, column])
+            caption += f", level {level} of {rows - 1}" if rows > 1 else ""
+            stop = int(np.clip(self.first_fall[robot], 1, max(1, frames // len(tracked))))
+            shots.append(Shot(robot=robot, start=0, stop=stop, captions=(caption,) * stop))
         fps = 1 / (env.cfg.dt * self.stride)
         return VideoSpec(model=env.scene.model, poses=poses, shots=tuple(shots), fps=fps, size=size)
-
-    def _make_shot(self, robot: int, length: int) -> Shot:
-        """Return the first frames of a robot, up to its first fall."""
-        env = self.env
-        level, column = env.curriculum.levels[robot], env.curriculum.columns[robot]
-        caption, rows = str(env.terrain.terrain_names[level, column]), len(env.terrain.env_origins)
-        if rows > 1:
-            caption += f", level {level} of {rows - 1}"
-        stop = int(np.clip(self.first_fall[robot], 1, length))
-        return Shot(robot=robot, start=0, stop=stop, captions=(caption,) * stop)
 
 
 def select_tracked_robots(env: LeggedEnv, count: int) -> list[int]:
@@ -215,14 +195,10 @@ def select_tracked_robots(env: LeggedEnv, count: int) -> list[int]:
 
 
 def _caption(command: FloatArray) -> str:
-    axes = (
-        ("forward", "backward", "m/s"),
-        ("left", "right", "m/s"),
-        ("turning left", "turning right", "rad/s"),
-    )
+    words = ("forward", "backward"), ("left", "right"), ("turning left", "turning right")
     parts = [
-        f"{negative if value < 0 else positive} {abs(value):g} {unit}"
-        for value, (positive, negative, unit) in zip(np.round(command, 2), axes, strict=True)
+        f"{names[int(value < 0)]} {abs(value):g} {unit}"
+        for names, value, unit in zip(words, command.round(2), ("m/s", "m/s", "rad/s"), strict=True)
         if value
     ]
     return ", ".join(parts) or "standing"

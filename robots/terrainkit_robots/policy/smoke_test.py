@@ -4,7 +4,7 @@ import gc
 import tempfile
 import tracemalloc
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,14 +13,15 @@ import numpy as np
 import torch
 
 from terrainkit.errors import ConfigError, TerrainkitError
+from terrainkit_robots.onboarding.pipeline import OnboardOptions, is_blocking, onboard
 from terrainkit_robots.policy.evaluate import evaluation_task
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.runner import LeggedRunner, single_torch_thread
 from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.state import State
+from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.simulation.geoms import lowest_point
 
@@ -28,13 +29,9 @@ if TYPE_CHECKING:
     from terrainkit_robots.lint.settings import Settings
 
 NUM_ENVS = 16
-"""Environments of a smoke test."""
 
-MAX_FOOT_HEIGHT, MAX_FOOT_DEPTH = 0.02, 0.001
-"""Limits of a foot above and below the ground at the start of an episode [m]."""
-
-MIN_BASE_HEIGHT = 0.5
-"""Lowest base of a standing robot as a fraction of its target height."""
+MAX_FOOT_HEIGHT, MAX_FOOT_DEPTH, MIN_BASE_HEIGHT = 0.02, 0.001, 0.5
+"""Limits of a foot above and below the ground [m], and of the base, relative to its target."""
 
 MAX_MEMORY_GROWTH = 0.1
 """Limit of the memory growth over `_MEMORY_STEPS` steps [MB]; keeping all states takes 1 MB."""
@@ -64,11 +61,6 @@ class SmokeTestResult:
         """Whether every check passed."""
         return all(check.passed for check in self.checks)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return the result as plain data."""
-        checks = [asdict(check) for check in self.checks]
-        return {"robot": self.robot, "verdict": "pass" if self.passed else "fail", "checks": checks}
-
 
 def smoke_test(
     name: str, *, settings: "Settings | None" = None, spec: Path | None = None
@@ -82,15 +74,13 @@ def smoke_test(
         spec: A robot.toml whose values override those derived from a file.
 
     Raises:
-        TerrainkitError: if the robot does not exist or cannot be read.
+        TerrainkitError: If the robot does not exist or cannot be read.
     """
     if not Path(name).is_file():
         if spec is not None:
             raise ConfigError(f"spec: {name} has its own robot.toml; expected a robot file")
-        task_spec = tasks.get_task(name)
+        task_spec = get_task(name)
         return run_checks(Robot.load(task_spec.folder), task_spec.task)
-    from terrainkit_robots.onboarding.pipeline import OnboardOptions, is_blocking, onboard
-
     with tempfile.TemporaryDirectory() as folder:
         options = OnboardOptions(spec=spec, render_pictures=False)
         options = replace(options, settings=settings or options.settings)
@@ -136,28 +126,20 @@ def check_spawn_height(env: LeggedEnv) -> Check:
     """Check that the feet of the default pose are on the ground at the spawn height."""
     model, spec, scene = env.scene.model, env.robot.spec, env.scene
     data = mujoco.MjData(model)
-    heights: dict[str, float] = {}
     data.qpos[:] = scene.home
     data.qpos[2] = spec.spawn_height or 0.0
     with quiet_mujoco():
         mujoco.mj_kinematics(model, data)
-    for geom in scene.geoms:
-        body = model.body(model.geom_bodyid[geom]).name
-        if body in spec.feet:
-            height = lowest_point(model, data, int(geom))
-            heights[body] = min(height, heights.get(body, height))
-    passed, measured = False, "no foot has a collision shape"
-    if heights:
-        low, high = min(heights, key=heights.__getitem__), max(heights, key=heights.__getitem__)
-        passed = heights[low] >= -MAX_FOOT_DEPTH and heights[high] <= MAX_FOOT_HEIGHT
-        measured = (
-            f"{100 * heights[low] + 0.0:.1f} cm ({low}) to {100 * heights[high] + 0.0:.1f} cm "
-            f"({high}) above the ground, with spawn_height {spec.spawn_height:.4g} m"
-        )
-        if missing := [foot for foot in spec.feet if foot not in heights]:
-            passed, measured = False, f"{measured}; no collision shape: {', '.join(missing)}"
+    passed, measured = True, []
+    for foot in spec.feet:
+        geoms = scene.geoms[model.geom_bodyid[scene.geoms] == model.body(foot).id]
+        height = min((lowest_point(model, data, int(geom)) for geom in geoms), default=np.nan)
+        passed &= -MAX_FOOT_DEPTH <= height <= MAX_FOOT_HEIGHT  # False without a shape
+        known = len(geoms) > 0
+        measured.append(f"{foot} {100 * height + 0.0:.1f} cm" if known else f"{foot} has no shape")
+    above = f"{', '.join(measured)} above the ground, with spawn_height {spec.spawn_height:.4g} m"
     expected = f"every foot within {100 * MAX_FOOT_HEIGHT:.1f} cm of the ground, none below"
-    return Check("spawn height", passed, measured, expected)
+    return Check("spawn height", bool(passed), above, expected)
 
 
 def check_observations(env: LeggedEnv) -> Iterator[Check]:
@@ -175,18 +157,17 @@ def check_observations(env: LeggedEnv) -> Iterator[Check]:
 def check_stand(env: LeggedEnv) -> Check:
     """Check that the robots stand for one second with zero action."""
     env.set_commands(np.zeros((env.num_envs, 3), np.float32))
-    target, fall_time, height = float(env.robot.spec.base_height_target or 1.0), None, np.inf
-    for step in range(round(1 / env.cfg.dt)):
+    target, dt = float(env.robot.spec.base_height_target or 1.0), env.cfg.dt
+    for step in range(round(1 / dt)):
         _, _, dones, extras = env.step(torch.zeros(env.num_envs, env.num_actions))
-        if (dones & ~extras["time_outs"]).any():
-            fall_time = (step + 1) * env.cfg.dt
-            break
         height = float(env.state.base_height.min())
+        fall_time = (step + 1) * dt if (dones & ~extras["time_outs"]).any() else None
+        if fall_time is not None:
+            break
     measured = f"base at {height:.3f} m, {100 * height / target:.0f} % of its height"
-    if fall_time is not None:
-        measured = f"fell after {fall_time:.2f} s"
-    passed = fall_time is None and height >= MIN_BASE_HEIGHT * target
+    measured = measured if fall_time is None else f"fell after {fall_time:.2f} s"
     expected = f"no fall, and the base above {100 * MIN_BASE_HEIGHT:.0f} % of {target:.3f} m"
+    passed = fall_time is None and height >= MIN_BASE_HEIGHT * target
     return Check("stands for 1 s with zero action", passed, measured, expected)
 
 
@@ -200,9 +181,9 @@ def check_rewards(env: LeggedEnv) -> Iterator[Check]:
     commands[::4] = 0  # for the rewards of standing robots
     env.set_commands(commands)
     values: dict[str, list[Any]] = {name: [] for name in env.rewards}
-    for _ in random_steps(env, _RANDOM_STEPS):
+    for state in random_steps(env, _RANDOM_STEPS):
         for name, (reward, _) in env.rewards.items():
-            values[name].append(reward(env.state, env.robot, env.cfg.rewards))
+            values[name].append(reward(state, env.robot, env.cfg.rewards))
     env.set_commands(None)
     state = random_state(env.state, env.cfg.runner.seed)
     for name, (reward, _) in env.rewards.items():
@@ -217,12 +198,12 @@ def check_rewards(env: LeggedEnv) -> Iterator[Check]:
         yield Check(f"reward {name}", passed, measured, expected)
 
 
-def random_steps(env: LeggedEnv, steps: int) -> Iterator[None]:
-    """Step the environment with random actions."""
+def random_steps(env: LeggedEnv, steps: int) -> Iterator[State]:
+    """Step the environment with random actions, and yield the states."""
     generator = torch.Generator().manual_seed(env.cfg.runner.seed)
     for _ in range(steps):
         env.step(torch.randn(env.num_envs, env.num_actions, generator=generator))
-        yield
+        yield env.state
 
 
 def random_state(state: State, seed: int) -> State:
@@ -261,12 +242,7 @@ def check_training(env: LeggedEnv) -> Check:
         torch.manual_seed(env.cfg.runner.seed)
         runner = LeggedRunner(env)
         update = runner.alg.update
-
-        def record_losses() -> dict[str, float]:
-            losses.append(update())
-            return losses[-1]
-
-        runner.alg.update = record_losses
+        runner.alg.update = lambda: losses.append(update()) or losses[-1]  # type: ignore[func-returns-value]
         try:
             runner.learn(_ITERATIONS)
         except (TerrainkitError, RuntimeError, ValueError) as failure:  # not finite

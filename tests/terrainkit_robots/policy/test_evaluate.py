@@ -9,13 +9,13 @@ from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError
 from terrainkit_robots.policy.evaluate import (
     EvaluationConfig,
+    EvaluationRollout,
     command_grid,
     evaluate,
     evaluation_task,
     make_evaluation_env,
     summarize,
 )
-from terrainkit_robots.policy.rollout import EvaluationRollout
 from terrainkit_robots.rl.config import Commands, DomainRand, Task, Terrain
 from terrainkit_robots.rl.run import open_run
 
@@ -110,10 +110,10 @@ def test_policy_keeps_its_observations_on_another_terrain(make_run, map_file):
     [
         ({"seconds": 0.0}, "seconds: got 0"),
         ({"seconds": float("nan")}, "seconds: got nan"),
-        ({"seconds": 1e9}, "at most 3600"),
+        ({"seconds": 1e9}, "<= 3600"),
         ({"num_envs": 0}, "num_envs: got 0"),
         ({"seed": -1}, "seed: got -1"),
-        ({"command": (1.0, float("inf"), 0.0)}, "expected three finite numbers"),
+        ({"command": (1.0, float("inf"), 0.0)}, "expected 3 values"),
         ({"command": (1.0, 0.0, 0.0), "random_commands": True}, "expected one of them"),
     ],
 )

@@ -48,7 +48,7 @@ def test_load_policy_warns_about_a_changed_model(trained, env, tmp_path, name, w
     shutil.copy(trained.checkpoint, folder)
     (robot / name).write_text((robot / name).read_text() + "\n")
     if warns:
-        with pytest.warns(TerrainkitWarning, match=rf"quadruped\.xml of {robot} changed"):
+        with pytest.warns(TerrainkitWarning, match=rf"{robot}: quadruped\.xml changed"):
             load_policy(open_run(folder), env)
     else:
         load_policy(open_run(folder), env)

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import torch
 
-from terrainkit_robots.policy.evaluate import evaluation_task, mean_metrics
-from terrainkit_robots.policy.rollout import (
+from terrainkit_robots.policy.evaluate import (
     SETTLING_TIME,
     EvaluationRollout,
     command_schedule,
+    evaluation_task,
     rollout,
 )
 from terrainkit_robots.rl.config import Commands, Env, Task
@@ -41,10 +41,15 @@ def select(*mask):
 def test_rollout_applies_the_schedule(env):
     forward, left = np.zeros((2, 2, 3), np.float32)
     forward[:, 0], left[:, 1] = 0.5, 0.25
-    steps = list(rollout(env, still, [forward, forward, left]))
-    commands = [commands[0].tolist() for _, commands, _ in steps]
+    observed = []
+
+    def observe(obs):
+        observed.append(obs["policy"][0, :3].tolist())
+        return still(obs)
+
+    steps = list(rollout(env, observe, [forward, forward, left]))
+    commands = [commands[0].tolist() for commands, _ in steps]
     assert commands == [[0.5, 0, 0], [0.5, 0, 0], [0, 0.25, 0]]
-    observed = [obs["policy"][0, :3].tolist() for obs, _, _ in steps]
     assert observed == [[1.0, 0, 0], [1.0, 0, 0], [0, 0.5, 0]]  # scaled by 2
 
 
@@ -61,11 +66,11 @@ def test_rollout_yields_falls_but_not_timeouts(env):
         actions[0] = 100.0
         return actions
 
-    falls = [falls for _, _, falls in rollout(env, collapse, repeat(None, 50))]
+    falls = [falls for _, falls in rollout(env, collapse, repeat(None, 50))]
     assert np.any(falls, axis=0).tolist() == [True, False]
     env.reset()
     env.episode_length_buf[:] = env.max_episode_length - 1
-    ((_, _, falls),) = rollout(env, still, [None])
+    ((_, falls),) = rollout(env, still, [None])
     assert env.steps_since_reset.tolist() == [0, 0]
     assert falls.tolist() == [False, False]
 
@@ -81,12 +86,12 @@ def test_command_schedule_splits_the_time_equally():
 def test_errors_are_measured_after_settling(make_sliding):
     env = make_sliding([[0.6, 0.3, 0.5], [1, 0, 0]])
     measured = run(env, 4.0, np.array([[1, 0, 0.3], [1, 0, 0]], np.float32))
-    first = mean_metrics(measured, select(1, 0))
+    first = measured.metrics(select(1, 0))
     assert first.lin_vel_error == pytest.approx(0.5)
     assert first.lin_vel_error_1s == pytest.approx(0.5)
     assert first.ang_vel_error == pytest.approx(0.2)
     assert first.success is None
-    assert mean_metrics(measured, select(1, 1)).lin_vel_error == pytest.approx(0.25)
+    assert measured.metrics(select(1, 1)).lin_vel_error == pytest.approx(0.25)
     steps = round((4.0 - SETTLING_TIME) / env.cfg.dt)
     assert measured.error_counts.tolist() == [[steps] * 2, [steps - 49] * 2] * 2
 
@@ -100,7 +105,7 @@ def test_averaged_errors_ignore_sway(make_sliding):
         return step(actions)
 
     env.step = sway
-    metrics = mean_metrics(run(env, 4.0, FORWARD), select(1))
+    metrics = run(env, 4.0, FORWARD).metrics(select(1))
     assert metrics.lin_vel_error == pytest.approx(0.4)
     assert metrics.lin_vel_error_1s == pytest.approx(0, abs=1e-6)
 
@@ -128,7 +133,7 @@ def test_fall_ends_the_measurement(make_sliding):
     measured = run(env, 4.0, np.tile(FORWARD, (3, 1)))
     assert measured.falls.tolist() == [False, True, True]
     assert measured.error_counts[0].tolist() == [100, 49, 0]
-    metrics = mean_metrics(measured, select(0, 0, 1))
+    metrics = measured.metrics(select(0, 0, 1))
     assert (metrics.falls, metrics.robots, metrics.lin_vel_error) == (1, 1, None)
 
 
@@ -138,9 +143,10 @@ def test_success_is_half_a_patch_or_half_the_distance(make_sliding, map_terrain)
     env = make_sliding(velocities, fall_times=[0, 3.5, 0, 0, 2.0], terrain=map_terrain)
     measured = run(env, 4.0, np.tile(FORWARD, (5, 1)))
     assert measured.falls.tolist() == [False, False, False, False, True]
-    assert measured.success.tolist() == [True, True, False, True, False]
+    success = [measured.metrics(np.arange(5) == k).success for k in range(5)]
+    assert success == [1, 1, 0, 1, 0]
     assert measured.error_counts[0, 1] == measured.error_counts[0, 0] < 100
-    metrics = mean_metrics(measured, np.ones(5, bool))
+    metrics = measured.metrics(np.ones(5, bool))
     assert (metrics.success, metrics.falls) == (0.6, 1)
 
 
