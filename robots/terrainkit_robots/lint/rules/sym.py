@@ -75,13 +75,13 @@ def mass_asymmetry(robot: Facts) -> Iterator[Violation]:
         The masses of tested robots without defects agree to four digits.
     """
     _check_joint_types(robot)
-    other_rules = _OtherRules(robot, implausible_density, mass_ratio, massless_body)
+    other_checks = _OtherChecks(robot, implausible_density, mass_ratio, massless_body)
     for pair in robot.mirror_pairs:
         left, right = pair.left, pair.right
         difference = _relative_difference(left.body.mass, right.body.mass)
         if not _has_mass(left, right) or difference <= _MAX_MASS_DIFFERENCE:
             continue
-        if other_rules.report(left, right):
+        if other_checks.report(left, right):
             continue
         odd, other = robot.outlier_first(left, right, lambda body: np.array([body.mass]))
         yield _report(
@@ -136,7 +136,7 @@ def com_asymmetry(robot: Facts) -> Iterator[Violation]:
     """
     _check_joint_types(robot)
     _, displaced = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
-    other_rules = _OtherRules(robot, com_outside_body)
+    other_checks = _OtherChecks(robot, com_outside_body)
     for pair in robot.mirror_pairs:
         left, right = pair.left, pair.right
         if pair.indices & displaced or not _has_mass(left, right):
@@ -145,7 +145,7 @@ def com_asymmetry(robot: Facts) -> Iterator[Violation]:
         if _is_merged(left, right) and difference > _MAX_MASS_DIFFERENCE:
             continue  # a heavier part shifts the center of mass of the merged body
         error, limit = _com_error(robot, left, right), _max_com_error(left, right)
-        if error <= limit or other_rules.report(left, right):
+        if error <= limit or other_checks.report(left, right):
             continue
         if _is_same_part(robot, left.body, right.body):
             continue
@@ -153,8 +153,8 @@ def com_asymmetry(robot: Facts) -> Iterator[Violation]:
         yield _report(
             odd.body.name,
             other.body.name,
-            f"center of mass of body {odd.body.name}: got {_format_mm(odd.body.center)} mm, and "
-            f"{_format_mm(other.body.center)} mm for its mirror image {other.body.name}, each in "
+            f"center of mass of body {odd.body.name}: got {_format_point(odd.body.center)} mm, and "
+            f"{_format_point(other.body.center)} mm for its mirror image {other.body.name}, each in "
             f"its own frame: {1000 * error:.3g} mm from mirrored; expected at most "
             f"{1000 * limit:.2g} mm",
             {"gap": error, "allowed": limit},
@@ -209,7 +209,7 @@ def _is_merged(left: MirrorSide, right: MirrorSide) -> bool:
     )
 
 
-def _format_mm(vector: Matrix) -> str:
+def _format_point(vector: Matrix) -> str:
     return "(" + ", ".join(f"{1000 * x + 0.0:.1f}" for x in vector) + ")"
 
 
@@ -239,7 +239,7 @@ def inertia_asymmetry(robot: Facts) -> Iterator[Violation]:
         The principal moments of tested robots without defects agree to 0.1 %.
     """
     _check_joint_types(robot)
-    other_rules = _OtherRules(robot, *_INERTIA_RULES)
+    other_checks = _OtherChecks(robot, *_INERTIA_RULES)
     for pair in robot.mirror_pairs:
         left, right = pair.left, pair.right
         if not _has_mass(left, right) or not _has_same_parts(robot, left, right):
@@ -247,7 +247,7 @@ def inertia_asymmetry(robot: Facts) -> Iterator[Violation]:
         a, b = left.body.principal, right.body.principal
         scaled = b * (left.body.mass / right.body.mass)  # SYM001 reports the difference of masses
         difference = min(_moment_difference(a, b), _moment_difference(a, scaled))
-        if difference <= _MAX_MOMENT_DIFFERENCE or other_rules.report(left, right):
+        if difference <= _MAX_MOMENT_DIFFERENCE or other_checks.report(left, right):
             continue
         digit = max(_precision(left.body), _precision(right.body))
         if digit >= (difference - _MAX_MOMENT_DIFFERENCE) * float(max(a[2], b[2])):
@@ -307,13 +307,13 @@ def limit_asymmetry(robot: Facts) -> Iterator[Violation]:
     Source:
         The limits of tested robots without defects agree exactly.
     """
-    other_rules = _OtherRules(robot, wide_range)
+    other_checks = _OtherChecks(robot, wide_range)
     for pair in robot.mirror_pairs:
         left, right = pair.left, pair.right
         a, b = left.joint.range, right.joint.range
         if pair.sign == 0 or a is None or b is None or limits_match(a, b, pair.sign):
             continue
-        if other_rules.report(left, right):
+        if other_checks.report(left, right):
             continue
         if has_opposite_axes(left, right) and limits_match(a, b, -pair.sign):
             continue  # SYM007 reports the axis
@@ -359,7 +359,7 @@ def effort_asymmetry(robot: Facts) -> Iterator[Violation]:
     Source:
         The limits of tested robots without defects agree exactly.
     """
-    other_rules = _OtherRules(robot, placeholder_limit)
+    other_checks = _OtherChecks(robot, placeholder_limit)
     for pair in robot.mirror_pairs:
         left, right = pair.left, pair.right
         for name, limit_of in (("effort", Facts.effort_limit), ("velocity", _velocity_of)):
@@ -367,7 +367,7 @@ def effort_asymmetry(robot: Facts) -> Iterator[Violation]:
             if a is None or b is None or min(a, b) <= 0:
                 continue
             difference = _relative_difference(a, b)
-            if difference <= _MAX_LIMIT_DIFFERENCE or other_rules.report(left, right):
+            if difference <= _MAX_LIMIT_DIFFERENCE or other_checks.report(left, right):
                 continue
 
             def value(body: Body, limit_of: _LimitOf = limit_of) -> Matrix | None:
@@ -413,7 +413,7 @@ def joint_origin_asymmetry(robot: Facts) -> Iterator[Violation]:
     misalignments, _ = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
     for misalignment in misalignments:
         if not misalignment.is_axis:
-            yield _report_misalignment(robot, misalignment)
+            yield _report_pair(robot, misalignment)
 
 
 @rule("SYM007", "joint-axis-asymmetry", "warning")
@@ -434,7 +434,7 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
     misalignments, _ = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
     for misalignment in misalignments:
         if misalignment.is_axis:
-            yield _report_misalignment(robot, misalignment)
+            yield _report_pair(robot, misalignment)
     reported = {violation.subject for violation in zero_axis(robot)}
     for found in find_reversed_joints(robot.legs, robot.bodies, robot.zero_poses):
         joint = found.joint
@@ -502,7 +502,7 @@ def _format_axis(axis: Matrix) -> str:
     return "(" + ", ".join(f"{x:.3g}" for x in np.round(axis, 3) + 0.0) + ")"
 
 
-def _report_misalignment(robot: Facts, misalignment: Misalignment) -> Violation:
+def _report_pair(robot: Facts, misalignment: Misalignment) -> Violation:
     def position(body: Body) -> Matrix:
         return body.origin[:3, 3]
 
@@ -518,7 +518,7 @@ def _report_misalignment(robot: Facts, misalignment: Misalignment) -> Violation:
     if misalignment.distance:
         message = (
             f"position of joint {name} relative to the joint above it, in the trunk frame: got "
-            f"{_format_mm(odd.offset)} mm, and {_format_mm(other.offset)} mm for its mirror image "
+            f"{_format_point(odd.offset)} mm, and {_format_point(other.offset)} mm for its mirror image "
             f"{mirror}: {1000 * misalignment.distance:.3g} mm from mirrored; expected at most "
             f"{1000 * MAX_POSITION_ERROR:g} mm plus {MAX_RELATIVE_POSITION_ERROR:.0%} of the "
             "distance"
@@ -542,7 +542,7 @@ def _check_joint_types(robot: Facts) -> None:
         raise CannotCheckError(f"the type of joint {violation.subject} is unknown")
 
 
-class _OtherRules:
+class _OtherChecks:
     """Links and joints that other rules report, computed on first use."""
 
     def __init__(self, robot: Facts, *checks: Check) -> None:
