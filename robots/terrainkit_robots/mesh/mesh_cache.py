@@ -11,13 +11,13 @@ import numpy as np
 
 from terrainkit_robots.description.model import MeshFile
 from terrainkit_robots.description.package_resolver import exists
+from terrainkit_robots.files import open_regular
 from terrainkit_robots.mesh.sniff import (
     STL_FACE,
     STL_HEADER,
     Format,
     Header,
     header_of,
-    open_regular,
     read_header,
 )
 from terrainkit_robots.mesh.surface import (

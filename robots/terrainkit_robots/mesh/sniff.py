@@ -6,13 +6,14 @@ Only regular files are opened: reading a pipe would wait for ever, reading a dev
 
 import os
 import re
-import stat
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO, Literal
+from typing import Literal
 
 import numpy as np
+
+from terrainkit_robots.files import SpecialFileError, open_regular
 
 Format = Literal["stl", "ascii-stl", "obj", "dae", "msh", "ply", "glb", "other"]
 
@@ -66,10 +67,6 @@ class Header:
     """What is wrong, as a sentence that lacks its subject; empty if nothing is."""
 
 
-class SpecialFileError(OSError):
-    """Something that is there, and is a folder, a pipe or a device."""
-
-
 def read_header(path: Path) -> Header:
     """Return what a file is; a file that is missing has a header that says so."""
     try:
@@ -91,35 +88,6 @@ def header_of(suffix: str, data: bytes) -> Header:
     """Return what a file would be that has such a name and content."""
     kind = _FORMATS.get(suffix.lower(), "other")
     return _judge(kind, len(data), data[:_END], data[-_END:])
-
-
-def open_regular(path: Path) -> BinaryIO:
-    """Return a regular file, open for reading.
-
-    Raises:
-        SpecialFileError: if it is something else.
-        OSError: if it is not there or must not be read.
-        ValueError: if its name cannot be one.
-    """
-    _refuse_special(path.stat().st_mode)
-    # it may have become a pipe since, and opening one waits for whoever writes to it
-    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | _BINARY)
-    try:
-        _refuse_special(os.fstat(descriptor).st_mode)
-        return os.fdopen(descriptor, "rb")
-    except OSError:
-        os.close(descriptor)
-        raise
-
-
-_BINARY: int = getattr(os, "O_BINARY", 0)
-"""Windows opens as text without it."""
-
-
-def _refuse_special(mode: int) -> None:
-    if not stat.S_ISREG(mode):
-        kinds = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
-        raise SpecialFileError(f"is {kinds.get(stat.S_IFMT(mode), 'a device')}, not a file")
 
 
 def _judge(kind: Format, size: int, head: bytes, tail: bytes) -> Header:

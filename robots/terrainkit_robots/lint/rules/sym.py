@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.bodies.link_sources import inertia_source, mass_source
+from terrainkit_robots.analysis.bodies.link_source import inertia_source, mass_source
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.symmetry.asymmetry import (
@@ -19,10 +19,10 @@ from terrainkit_robots.analysis.symmetry.asymmetry import (
     MAX_RELATIVE_LIMIT_ERROR,
     MAX_RELATIVE_POSITION_ERROR,
     Misalignment,
+    find_flipped_joints,
+    find_flipped_pairs,
     find_misalignments,
-    find_opposed_pairs,
-    find_reversed_joints,
-    has_opposite_axes,
+    has_flipped_axes,
     limits_match,
 )
 from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorSide
@@ -315,7 +315,7 @@ def limit_asymmetry(robot: Facts) -> Iterator[Violation]:
             continue
         if other_checks.report(left, right):
             continue
-        if has_opposite_axes(left, right) and limits_match(a, b, -pair.sign):
+        if has_flipped_axes(left, right) and limits_match(a, b, -pair.sign):
             continue  # SYM007 reports the axis
         odd, other = robot.outlier_first(left, right, _limit_sizes)
         own, mirror = (a, b) if odd is left else (b, a)
@@ -436,7 +436,7 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
         if misalignment.is_axis:
             yield _report_pair(robot, misalignment)
     reported = {violation.subject for violation in zero_axis(robot)}
-    for found in find_reversed_joints(robot.legs, robot.bodies, robot.zero_poses):
+    for found in find_flipped_joints(robot.legs, robot.bodies, robot.zero_poses):
         joint = found.joint
         if joint.name in reported:
             continue
@@ -447,7 +447,7 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
             certainty="likely",
             message=f"axis of joint {joint.name} in the trunk frame: got "
             f"{_format_axis(found.axis)}; expected the direction of the same joint of all "
-            f"{found.others} other legs, such as {_format_axis(found.usual_axis)}, or mirrored "
+            f"{found.others} other legs, such as {_format_axis(found.expected_axis)}, or mirrored "
             "axes on each side",
             measured={"others": found.others},
         )
@@ -458,7 +458,7 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
             continue
         negated = not limits_match(a, b, pair.sign) and limits_match(a, b, -pair.sign)
         known = not reported.isdisjoint({left.joint.name, right.joint.name})
-        if negated and has_opposite_axes(left, right) and not known:
+        if negated and has_flipped_axes(left, right) and not known:
             reported.add(right.joint.name)
             yield _report_axis(
                 left,
@@ -469,7 +469,7 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
                 "expected the negated axis or the negated limits",
                 {"lower": b[0], "upper": b[1], "other_lower": a[0], "other_upper": a[1]},
             )
-    opposed_pairs = find_opposed_pairs(
+    opposed_pairs = find_flipped_pairs(
         robot.legs, robot.mirror, robot.mirror_pairs, robot.leg_bodies
     )
     for pair, others in opposed_pairs:
