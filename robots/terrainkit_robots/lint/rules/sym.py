@@ -154,8 +154,8 @@ def com_asymmetry(robot: Facts) -> Iterator[Violation]:
             odd.body.name,
             other.body.name,
             f"center of mass of body {odd.body.name}: got {_format_point(odd.body.center)} mm, and "
-            f"{_format_point(other.body.center)} mm for its mirror image {other.body.name}, each in "
-            f"its own frame: {1000 * error:.3g} mm from mirrored; expected at most "
+            f"{_format_point(other.body.center)} mm for its mirror image {other.body.name}, each "
+            f"in its own frame: {1000 * error:.3g} mm from mirrored; expected at most "
             f"{1000 * limit:.2g} mm",
             {"gap": error, "allowed": limit},
             mass_source(odd.body.main_link),
@@ -410,10 +410,10 @@ def joint_origin_asymmetry(robot: Facts) -> Iterator[Violation]:
         The joint origins of tested robots without defects agree to 0.1 mm.
     """
     _check_joint_types(robot)
-    misalignments, _ = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
-    for misalignment in misalignments:
-        if not misalignment.is_axis:
-            yield _report_pair(robot, misalignment)
+    errors, _ = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
+    for error in errors:
+        if not error.is_axis:
+            yield _report_pair(robot, error)
 
 
 @rule("SYM007", "joint-axis-asymmetry", "warning")
@@ -431,10 +431,10 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
         Tested robots have either the same axis on all legs, or mirrored axes on all legs.
     """
     _check_joint_types(robot)
-    misalignments, _ = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
-    for misalignment in misalignments:
-        if misalignment.is_axis:
-            yield _report_pair(robot, misalignment)
+    errors, _ = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
+    for error in errors:
+        if error.is_axis:
+            yield _report_pair(robot, error)
     reported = {violation.subject for violation in zero_axis(robot)}
     for found in find_flipped_joints(robot.legs, robot.bodies, robot.zero_poses):
         joint = found.joint
@@ -502,7 +502,7 @@ def _format_axis(axis: Matrix) -> str:
     return "(" + ", ".join(f"{x:.3g}" for x in np.round(axis, 3) + 0.0) + ")"
 
 
-def _report_pair(robot: Facts, misalignment: Misalignment) -> Violation:
+def _report_pair(robot: Facts, error: Misalignment) -> Violation:
     def position(body: Body) -> Matrix:
         return body.origin[:3, 3]
 
@@ -512,28 +512,26 @@ def _report_pair(robot: Facts, misalignment: Misalignment) -> Violation:
     def rotation(body: Body) -> Matrix:
         return body.origin[:3, :3].ravel()
 
-    value = axis if misalignment.is_axis else position if misalignment.distance else rotation
-    odd, other = robot.outlier_first(misalignment.left, misalignment.right, value)
+    value = axis if error.is_axis else position if error.distance else rotation
+    odd, other = robot.outlier_first(error.left, error.right, value)
     name, mirror = odd.joint.name, other.joint.name
-    if misalignment.distance:
+    if error.distance:
         message = (
             f"position of joint {name} relative to the joint above it, in the trunk frame: got "
-            f"{_format_point(odd.offset)} mm, and {_format_point(other.offset)} mm for its mirror image "
-            f"{mirror}: {1000 * misalignment.distance:.3g} mm from mirrored; expected at most "
+            f"{_format_point(odd.offset)} mm, and {_format_point(other.offset)} mm for its mirror "
+            f"image {mirror}: {1000 * error.distance:.3g} mm from mirrored; expected at most "
             f"{1000 * MAX_POSITION_ERROR:g} mm plus {MAX_RELATIVE_POSITION_ERROR:.0%} of the "
             "distance"
         )
     else:
-        part = "axis" if misalignment.is_axis else "frame"
+        part = "axis" if error.is_axis else "frame"
         message = (
             f"angle between the {part} of joint {name} and that of its mirror image {mirror}: got "
-            f"{math.degrees(misalignment.angle):.3g} deg; expected at most "
+            f"{math.degrees(error.angle):.3g} deg; expected at most "
             f"{math.degrees(MAX_AXIS_ERROR):.0f} deg"
         )
-    source = (odd.joint.axis_source if misalignment.is_axis else None) or odd.joint.source
-    return _report(
-        name, mirror, message, {"gap": misalignment.distance, "angle": misalignment.angle}, source
-    )
+    source = (odd.joint.axis_source if error.is_axis else None) or odd.joint.source
+    return _report(name, mirror, message, {"gap": error.distance, "angle": error.angle}, source)
 
 
 def _check_joint_types(robot: Facts) -> None:
