@@ -17,9 +17,9 @@ from isometric import isometric, side_by_side
 
 import terrainkit
 from terrainkit import presets, registry
-from terrainkit.describe import TerrainText, describe
 from terrainkit.grid import Grid
 from terrainkit.preview import write_preview
+from terrainkit.terrain_docs import TerrainDoc, terrain_doc
 from terrainkit_cli.main import COMMANDS
 from terrainkit_robots.description import bundled
 from terrainkit_robots.lint.rule import FAMILIES, Rule, rules
@@ -41,13 +41,15 @@ def terrains_page() -> str:
         "patches of 8 m x 8 m, with holes cut short.\n",
         "| terrain | what it is |\n|---|---|",
     ]
-    parts += [f"| [{n}](#{n}) | {describe(n).text.splitlines()[0]} |" for n in registry.names()]
-    parts += ["", *(terrain_section(describe(name)) for name in registry.names())]
+    parts += [
+        f"| [{n}](#{n}) | {terrain_doc(n).text.splitlines()[0]} |" for n in registry.terrain_names()
+    ]
+    parts += ["", *(terrain_section(terrain_doc(name)) for name in registry.terrain_names())]
     parts += ["## Presets\n", "| preset | columns |\n|---|---|"]
-    for name in presets.names():
+    for name in presets.preset_names():
         mix = ", ".join(
             f"{c.name} x {c.proportion:g}" if c.proportion != 1 else c.name
-            for c in presets.find(name)
+            for c in presets.get_preset(name)
         )
         parts.append(f"| {name} | {mix} |")
     parts += [
@@ -58,7 +60,7 @@ def terrains_page() -> str:
     return "\n".join(parts) + "\n"
 
 
-def terrain_section(about: TerrainText) -> str:
+def terrain_section(about: TerrainDoc) -> str:
     lines = [
         f"## {about.name}\n",
         f"{about.text}\n",
@@ -137,13 +139,13 @@ def help_of(arguments: list[str]) -> str:
 
 def draw_pictures() -> None:
     PICTURES.mkdir(exist_ok=True)
-    plot = Grid(shape=(80, 80), cell=0.1)
-    for name in registry.names():
+    grid = Grid(shape=(80, 80), cell=0.1)
+    for name in registry.terrain_names():
         patches = [
-            registry.find(name).at(difficulty).build(plot, np.random.default_rng(SEED))
+            registry.get_terrain(name).at(difficulty).build(grid, np.random.default_rng(SEED))
             for difficulty in (0.1, 0.5, 1.0)
         ]
-        picture = side_by_side([isometric(heights, plot.cell, scale=24) for heights in patches])
+        picture = side_by_side([isometric(heights, grid.cell, scale=24) for heights in patches])
         cv2.imwrite(str(PICTURES / f"{name}.png"), cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
     terrain_map = terrainkit.generate(terrainkit.MapConfig())
     write_preview(terrain_map, PICTURES / "map.png", width=820, overwrite=True)
@@ -195,7 +197,8 @@ def main() -> int:
     if sys.argv[1:] == ["--check"]:
         stale = [n for n, text in pages.items() if words(written(n)) != words(text)]
         wanted = [
-            f"{name}.png" for name in (*registry.names(), "map", "quadruped", "quadruped_map")
+            f"{name}.png"
+            for name in (*registry.terrain_names(), "map", "quadruped", "quadruped_map")
         ]
         stale += [name for name in wanted if not (PICTURES / name).exists()]
         if stale:

@@ -64,4 +64,4 @@ class SubTerrain(Config):
 
     def at(self, difficulty: float) -> Terrain:
         """Return the terrain at `difficulty`, 0 to 1."""
-        return registry.find(self.terrain).at(difficulty, self.parameters)
+        return registry.get_terrain(self.terrain).at(difficulty, self.parameters)

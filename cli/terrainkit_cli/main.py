@@ -15,7 +15,7 @@ COMMANDS = {
     "info": "terrain_commands",
     "preview": "terrain_commands",
     "export": "export_command",
-    "check": "terrain_commands",
+    "check-map": "terrain_commands",
     "check-robot": "robot_commands",
     "rule": "robot_commands",
     "onboard": "onboard_command",
