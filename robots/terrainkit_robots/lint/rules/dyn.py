@@ -13,7 +13,7 @@ from terrainkit_robots.simulation.drop import DropResult, drop_test
 from terrainkit_robots.simulation.joint_sweep import SweepResult, joint_sweep
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import TIME_STEP, make_sim_model
-from terrainkit_robots.simulation.standing import StandResult, contact_regions, stand_test
+from terrainkit_robots.simulation.standing import StandResult, contact_areas, stand_test
 from terrainkit_robots.simulation.time_step import (
     joint_inertias,
     max_stable_stiffness,
@@ -71,14 +71,14 @@ def unstable_drop(robot: Facts) -> Iterator[Violation]:
     """
     model = make_sim_model(robot)
     drop = drop_test(model, height=_DROP_HEIGHT)
-    if not _is_unstable(drop):
+    if _is_stable(drop):
         return
     without = drop_test(model, height=_DROP_HEIGHT, self_collision=False)
-    stable = not _is_unstable(without)
+    stable = _is_stable(without)
     with_hulls = stable and _has_mesh_collision(robot)
     level = 2 if drop.diverged or drop.max_speed > _MAX_SPEED_ERROR else 1
-    unit, unit_without = (model.units(each.fastest_joint).velocity for each in (drop, without))
-    got = f"{drop.max_speed:.0f} {unit} at {drop.fastest_joint}"
+    unit, unit_without = (model.units(each.max_speed_joint).velocity for each in (drop, without))
+    got = f"{drop.max_speed:.0f} {unit} at {drop.max_speed_joint}"
     if drop.diverged:
         got = f"an unstable state after {drop.seconds:.2f} s"
     start = f"dropped from {_DROP_HEIGHT:g} m" if model.floating else "released"
@@ -102,8 +102,8 @@ def unstable_drop(robot: Facts) -> Iterator[Violation]:
     )
 
 
-def _is_unstable(drop: DropResult) -> bool:
-    return drop.diverged or drop.max_speed > _MAX_SPEED
+def _is_stable(drop: DropResult) -> bool:
+    return not (drop.diverged or drop.max_speed > _MAX_SPEED)
 
 
 def _has_mesh_collision(robot: Facts) -> bool:
@@ -167,7 +167,7 @@ def _stand(robot: Facts, *, locked: bool, self_collision: bool = True) -> StandR
         make_sim_model(robot),
         suggest_gains(robot),
         positions=robot.positions,
-        regions=contact_regions(robot),
+        areas=contact_areas(robot),
         self_collision=self_collision,
         joints_locked=locked,
     )

@@ -7,13 +7,13 @@ import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.bounds import half_diagonal
-from terrainkit_robots.analysis.bodies.link_sources import inertia_source, mass_source
+from terrainkit_robots.analysis.bodies.link_source import inertia_source, mass_source
 from terrainkit_robots.analysis.cached_fact import cached_fact
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.inertia.density import (
+    check_max_density,
+    check_min_density,
     has_derived_mass,
-    max_density_violation,
-    min_density_violation,
     shape_volume,
 )
 from terrainkit_robots.analysis.inertia.physical import (
@@ -574,7 +574,7 @@ def implausible_density(robot: Facts) -> Iterator[Violation]:
             or has_derived_mass(body)
         ):
             continue
-        result = max_density_violation(body, body_bounds) or min_density_violation(
+        result = check_max_density(body, body_bounds) or check_min_density(
             body, body_bounds, robot.meshes
         )
         if result:
