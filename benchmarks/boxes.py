@@ -1,4 +1,4 @@
-"""Boxes of the default map: how many, how much of the ground, against the time of its heights."""
+"""Boxes of the default map: number, covered share of the ground, and relative time."""
 
 from collections.abc import Iterator
 

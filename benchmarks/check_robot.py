@@ -1,4 +1,4 @@
-"""A static check of a robot against importing what it needs."""
+"""Time of a static check of a robot, relative to importing the libraries it needs."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""Timing two things in turn, so that a busy machine slows both."""
+"""Ratios of run times, measured alternately so that other load affects both."""
 
 import statistics
 import subprocess
@@ -7,19 +7,20 @@ from collections.abc import Callable
 from typing import Any
 
 
-def seconds(work: Callable[[], Any]) -> float:
+def seconds(function: Callable[[], Any]) -> float:
+    """Return the run time of `function` [s]."""
     start = time.perf_counter()
-    work()
+    function()
     return time.perf_counter() - start
 
 
-def ratio(work: Callable[[], Any], limit: Callable[[], Any], rounds: int = 9) -> float:
-    """Return the median time of `work` over the median time of `limit`, run in turn."""
-    work(), limit()
-    pairs = [(seconds(work), seconds(limit)) for _ in range(rounds)]
+def ratio(function: Callable[[], Any], reference: Callable[[], Any], num_runs: int = 9) -> float:
+    """Return the median run time of `function` divided by that of `reference`."""
+    function(), reference()
+    pairs = [(seconds(function), seconds(reference)) for _ in range(num_runs)]
     return statistics.median(a for a, _ in pairs) / statistics.median(b for _, b in pairs)
 
 
 def process(command: list[str]) -> Callable[[], Any]:
-    """Return the work of running `command` to its end."""
+    """Return a function that runs `command` to its end."""
     return lambda: subprocess.run(command, check=True, capture_output=True)

@@ -1,4 +1,4 @@
-"""Heights of the default map against a copy of the same array, and of a hundred times as many."""
+"""Time and memory of generating heights, relative to copying the array and per cell."""
 
 import subprocess
 import sys

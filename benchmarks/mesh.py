@@ -1,4 +1,4 @@
-"""The trimesh of the default map: full against a copy of its arrays, merged against full."""
+"""Time of building the mesh of the default map, relative to copying its arrays."""
 
 from collections.abc import Iterator
 

@@ -1,6 +1,7 @@
-"""Bringing a robot in against MuJoCo alone: import, compile the model, simulate the same seconds.
+"""Time of onboarding a robot, relative to MuJoCo alone.
 
-With pictures, MuJoCo alone draws as many of the same size.
+The reference imports MuJoCo, compiles the model and simulates for the same time. With pictures, it
+renders the same number of pictures of the same size.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""Whole processes against `python -c "import numpy"`, and the size of what they write."""
+"""Time of whole processes, relative to `python -c "import numpy"`, and the size of their files."""
 
 import sys
 import tempfile

@@ -1,11 +1,11 @@
-"""Every kind of defect in every healthy robot: how many check-robot finds, and what else it says.
+"""Recall of check-robot: add every kind of defect to every robot, and count those that are found.
 
 python benchmarks/robot_defects.py [--sites N] [--seed N] [--only CODE] [--robots NAME] [--misses N]
 
-A defect counts as found if there is a finding that the healthy robot does not have, with the right
-code, at least as severe as expected, and about the right element: its subject, or named in the
-message of a finding on several. Where a defect is put is drawn at random.
-The robots are the bundled ones and those of TERRAINKIT_ROBOTS (../shared/robots).
+A defect is found if check-robot reports a finding that the original robot does not have, with an
+expected code, at least the expected severity, and the expected element as its subject or in its
+message. The element that gets the defect is random.
+The robots are the bundled ones and those in TERRAINKIT_ROBOTS (../shared/robots).
 """
 
 import argparse
@@ -28,7 +28,7 @@ from pathlib import Path
 from statistics import median
 
 import defects
-from defects.patient import KINDS, Healthy, Kind, NotHereError, Patient
+from defects.mutant import MUTATIONS, Mutant, Mutation, NotApplicableError, SourceRobot
 from lxml import etree
 
 from terrainkit_robots.analysis.facts import Facts
@@ -43,34 +43,38 @@ ROBOTS = Path(
 URDF = ("a1/urdf/a1.urdf", "go2/urdf/go2.urdf", "h1/urdf/h1.urdf", "g1/g1_29dof.urdf")
 MJCF = ("go2_mjcf/go2.xml", "h1/h1.xml", "g1/g1_29dof.xml")
 
-_LONGEST = 60
-"""What takes longer counts as a hang [s]."""
+_MAX_SECONDS = 60
+"""A check that takes longer counts as a crash [s]."""
 
-RANK = {"info": 0, "warning": 1, "error": 2}
+_MAX_MESH_BYTES = 14_000_000
+"""Robots with more mesh data get half as many mutants, since each check is slow."""
+
+_LEVELS = {"info": 0, "warning": 1, "error": 2}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outcome:
-    """What was said about one defect."""
+class MutantResult:
+    """The findings on one mutant."""
 
-    kind: str
+    title: str
     robot: str
-    found: bool
-    said: tuple[str, ...] = ()
-    """Findings that the healthy robot does not have."""
+    is_found: bool
+    findings: tuple[str, ...] = ()
+    """Findings that the original robot does not have."""
 
     names: tuple[str, ...] = ()
-    """What was broken."""
+    """Names of the elements with the defect."""
 
     extra: int = 0
-    """Errors and warnings among them with other codes."""
+    """Number of new errors and warnings with other codes."""
 
-    crash: str = ""
+    error: str = ""
+    """The exception if the check failed."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Clean:
-    """What was said about a robot before anything was broken."""
+class SourceResult:
+    """The findings on a robot without defects."""
 
     robot: str
     findings: tuple[str, ...]
@@ -81,55 +85,56 @@ class Clean:
 
 @dataclass(frozen=True, kw_only=True)
 class Result:
-    """Everything that the benchmark found out."""
+    """The result of the whole benchmark."""
 
-    clean: tuple[Clean, ...]
-    outcomes: tuple[Outcome, ...]
+    sources: tuple[SourceResult, ...]
+    mutants: tuple[MutantResult, ...]
     seconds: float
 
 
 def robots() -> list[Path]:
-    """Return the files of the healthy robots, URDF first."""
-    own = [path for name in bundled.names() if (path := bundled.find(name))]
+    """Return the files of the original robots, URDF first."""
+    bundled_files = [path for name in bundled.names() if (path := bundled.find(name))]
     others = [ROBOTS / name for name in (*URDF, *MJCF)]
-    there = [path for path in others if path.is_file()]
+    existing = [path for path in others if path.is_file()]
     return sorted(
-        [*own, *(path.with_suffix(".xml") for path in own), *there],
+        [*bundled_files, *(path.with_suffix(".xml") for path in bundled_files), *existing],
         key=lambda path: (path.suffix, str(path)),
     )
 
 
-def kinds() -> list[Kind]:
-    """Return every kind of defect."""
+def mutations() -> list[Mutation]:
+    """Return all kinds of defects."""
     for module in pkgutil.iter_modules(defects.__path__):
         importlib.import_module(f"defects.{module.name}")
-    return KINDS
+    return MUTATIONS
 
 
-def _home(path: Path) -> Path:
-    """Return the folder that holds a robot and its meshes."""
+def _robot_folder(path: Path) -> Path:
+    """Return the folder with a robot and its meshes."""
     return path.parents[1] if path.parent.name == "urdf" else path.parent
 
 
-@cache
-def _folder() -> Path:
-    return Path(tempfile.mkdtemp(prefix=f"defects_{os.getpid()}_", dir=_PARENT[0]))
-
-
 _PARENT: list[str] = []
-"""Where the processes put their copies of the robots."""
+"""Folder for the copies of the robots; set in each process."""
 
 
-def _start(parent: str) -> None:
+def _init_process(parent: str) -> None:
     _PARENT[:] = [parent]
 
 
 @cache
-def _healthy(path: Path) -> tuple[Healthy, tuple[Finding, ...], Clean, Meshes]:
-    home = _home(path)
-    folder = _folder() / path.suffix[1:] / home.name
-    shutil.copytree(home, folder, copy_function=_link)
-    file = folder / path.relative_to(home)
+def _process_folder() -> Path:
+    return Path(tempfile.mkdtemp(prefix=f"defects_{os.getpid()}_", dir=_PARENT[0]))
+
+
+@cache
+def _load_source(path: Path) -> tuple[SourceRobot, tuple[Finding, ...], SourceResult, Meshes]:
+    """Copy a robot to the folder of this process, and check it."""
+    source_folder = _robot_folder(path)
+    folder = _process_folder() / path.suffix[1:] / source_folder.name
+    shutil.copytree(source_folder, folder, copy_function=_link)
+    file = folder / path.relative_to(source_folder)
     times: list[float] = []
     while len(times) < 3 and sum(times) < 1:
         meshes = Meshes()
@@ -137,17 +142,17 @@ def _healthy(path: Path) -> tuple[Healthy, tuple[Finding, ...], Clean, Meshes]:
         facts = Facts(load_robot(file), meshes)
         report = lint(facts, simulate=False)
         times.append(time.perf_counter() - start)
-    loud = Counter(finding.severity for finding in report.findings)
-    clean = Clean(
+    counts = Counter(finding.severity for finding in report.findings)
+    result = SourceResult(
         robot=path.name,
-        findings=tuple(_line(f) for f in report.findings if f.severity != "info"),
-        errors=loud["error"],
-        warnings=loud["warning"],
+        findings=tuple(_format(f) for f in report.findings if f.severity != "info"),
+        errors=counts["error"],
+        warnings=counts["warning"],
         seconds=median(times),
     )
     root = etree.parse(file).getroot()
-    healthy = Healthy(label=home.name, file=file, root=root, facts=facts)
-    return healthy, report.findings, clean, meshes
+    source = SourceRobot(label=source_folder.name, file=file, root=root, facts=facts)
+    return source, report.findings, result, meshes
 
 
 def _link(source: str, target: str) -> None:
@@ -157,218 +162,211 @@ def _link(source: str, target: str) -> None:
         shutil.copyfile(source, target)
 
 
-def _line(finding: Finding) -> str:
+def _format(finding: Finding) -> str:
     return f"{finding.code} {finding.severity} {finding.subject}: {finding.message}"
 
 
-def _operate(path: Path, number: int, site: int, seed: int) -> Outcome | None:
-    """Break a robot and check it; None if it has no place for the defect."""
-    healthy, before, clean, meshes = _healthy(path)
-    kind = kinds()[number]
-    rng = random.Random(f"{seed} {path.name} {kind.title} {site}")
-    patient = Patient(healthy, rng, f"made_{number}_{site}")
+def _test_mutant(path: Path, index: int, site: int, seed: int) -> MutantResult | None:
+    """Add a defect to a robot and check it; None if the mutation is not applicable."""
+    source, findings, result, meshes = _load_source(path)
+    mutation = mutations()[index]
+    rng = random.Random(f"{seed} {path.name} {mutation.title} {site}")
+    mutant = Mutant(source, rng, f"mutant_{index}_{site}")
     try:
-        names = tuple(dict.fromkeys(kind.inject(patient)))
-        text = patient.text()
-    except NotHereError:
-        _tidy(patient)
+        names = tuple(dict.fromkeys(mutation.apply(mutant)))
+        return _check(mutant, mutation, result.robot, names, findings, meshes)
+    except NotApplicableError:
         return None
-    try:
-        return _check(patient, kind, clean.robot, names, before, text, meshes)
     finally:
-        _tidy(patient)
+        for file in mutant.files:
+            file.unlink(missing_ok=True)
 
 
-def _too_long(*_: object) -> None:
-    raise TimeoutError(f"longer than {_LONGEST} s")
+def _raise_timeout(*_: object) -> None:
+    raise TimeoutError(f"longer than {_MAX_SECONDS} s")
 
 
 def _check(
-    patient: Patient,
-    kind: Kind,
+    mutant: Mutant,
+    mutation: Mutation,
     robot: str,
     names: tuple[str, ...],
-    before: Sequence[Finding],
-    text: bytes,
+    source_findings: Sequence[Finding],
     meshes: Meshes,
-) -> Outcome:
-    file = patient.folder / patient.file_name
-    known = {(f.code, f.subject, f.severity) for f in before}
-    worded = {(f.code, f.severity, f.message) for f in before}
-    signal.signal(signal.SIGALRM, _too_long)
-    signal.alarm(_LONGEST)
+) -> MutantResult:
+    file, text = mutant.folder / mutant.file_name, mutant.text()
+    known = {(f.code, f.subject, f.severity) for f in source_findings}
+    known_messages = {(f.code, f.severity, f.message) for f in source_findings}
+    signal.signal(signal.SIGALRM, _raise_timeout)
+    signal.alarm(_MAX_SECONDS)
     try:
         model = load_robot(file, contents={file: text})
         findings = lint(Facts(model, meshes), simulate=False).findings
-    except Exception as error:  # a crash or a hang is a miss, and is told
-        crash = f"{type(error).__name__}: {error}"
-        return Outcome(kind=kind.title, robot=robot, found=False, names=names, crash=crash)
+    except Exception as exception:  # a crash or a timeout counts as a miss
+        error = f"{type(exception).__name__}: {exception}"
+        return MutantResult(
+            title=mutation.title, robot=robot, is_found=False, names=names, error=error
+        )
     finally:
         signal.alarm(0)
     new = [f for f in findings if (f.code, f.subject, f.severity) not in known]
-    return Outcome(
-        kind=kind.title,
+    changed = [f for f in findings if (f.code, f.severity, f.message) not in known_messages]
+    return MutantResult(
+        title=mutation.title,
         robot=robot,
-        found=any(_meets(f, kind, names) for f in new)
-        or any(
-            _meets(f, kind, ()) and _mentions(f, names)
-            for f in findings
-            if (f.code, f.severity, f.message) not in worded
-        ),
-        said=tuple(_line(f) for f in new),
+        is_found=any(_is_expected(f, mutation) and _has_subject(f, names) for f in new)
+        or any(_is_expected(f, mutation) and _has_name(f, names) for f in changed),
+        findings=tuple(_format(f) for f in new),
         names=names,
-        extra=sum(f.severity != "info" and f.code not in kind.codes for f in new),
+        extra=sum(f.severity != "info" and f.code not in mutation.codes for f in new),
     )
 
 
-def _meets(finding: Finding, kind: Kind, names: Iterable[str]) -> bool:
-    if finding.code not in kind.codes or RANK[finding.severity] < RANK[kind.severity]:
-        return False
-    wanted = set(names)
-    parts = {finding.subject, *re.split(r" and |, ", finding.subject)}
-    return not wanted or bool(parts & wanted)
+def _is_expected(finding: Finding, mutation: Mutation) -> bool:
+    severe = _LEVELS[finding.severity] >= _LEVELS[mutation.severity]
+    return finding.code in mutation.codes and severe
 
 
-def _mentions(finding: Finding, names: Iterable[str]) -> bool:
-    words = set(re.findall(r"[^\s,;:()]+", finding.message))
-    return not words.isdisjoint(names)
+def _has_subject(finding: Finding, names: Sequence[str]) -> bool:
+    subjects = {finding.subject, *re.split(r" and |, ", finding.subject)}
+    return not names or not subjects.isdisjoint(names)
 
 
-def _tidy(patient: Patient) -> None:
-    for path in patient.written:
-        path.unlink(missing_ok=True)
+def _has_name(finding: Finding, names: Iterable[str]) -> bool:
+    return not set(re.findall(r"[^\s,;:()]+", finding.message)).isdisjoint(names)
 
 
-def _batch(
-    path: Path, numbers: Sequence[int], sites: int, seed: int
-) -> tuple[Clean, list[Outcome]]:
+def _test_robot(
+    path: Path, indices: Sequence[int], sites: int, seed: int
+) -> tuple[SourceResult, list[MutantResult]]:
     start = time.perf_counter()
-    outcomes = [
-        outcome
-        for number in numbers
+    results = [
+        result
+        for index in indices
         for site in range(sites)
-        if (outcome := _operate(path, number, site, seed)) is not None
+        if (result := _test_mutant(path, index, site, seed)) is not None
     ]
-    clean = _healthy(path)[2]
+    source = _load_source(path)[2]
     print(f"{path.name}: {time.perf_counter() - start:.0f} s", file=sys.stderr, flush=True)
-    return clean, outcomes
+    return source, results
 
 
-def _weight(path: Path) -> int:
-    return sum(file.stat().st_size for file in _home(path).rglob("*"))
+def _num_bytes(path: Path) -> int:
+    return sum(file.stat().st_size for file in _robot_folder(path).rglob("*"))
 
 
-def _sites(path: Path, sites: int) -> int:
-    """Return at how many places a robot is broken: half as many if its meshes are large."""
-    return (sites + 1) // 2 if _weight(path) > _HEAVY else sites
+def measure(sites: int = 2, seed: int = 0, only: str = "", robot: str = "") -> Result:
+    """Test every mutation on every robot.
 
-
-_HEAVY = 14_000_000
-"""Meshes of so many bytes make a check slow."""
-
-
-def measure(sites: int = 2, seed: int = 0, only: str = "", named: str = "") -> Result:
-    """Break every robot in every way, at `sites` places each, or half of that."""
+    Args:
+        sites: Number of mutants for each mutation and robot.
+        seed: Seed of the random elements.
+        only: Test only mutations with a code that starts like this.
+        robot: Test only robots whose file name contains this.
+    """
     start = time.perf_counter()
     tasks = []
-    for path in [path for path in robots() if named in path.name]:
+    for path in [path for path in robots() if robot in path.name]:
         format_ = "mjcf" if path.suffix == ".xml" else "urdf"
-        numbers = [
-            number
-            for number, kind in enumerate(kinds())
-            if kind.formats == format_ and any(code.startswith(only) for code in kind.codes)
+        indices = [
+            index
+            for index, mutation in enumerate(mutations())
+            if mutation.format == format_ and any(code.startswith(only) for code in mutation.codes)
         ]
-        tasks.append((path, numbers))
-    tasks.sort(key=lambda task: -_weight(task[0]))  # the longest first, so that none ends last
-    clean: dict[Path, Clean] = {}
-    outcomes: list[Outcome] = []
+        size = _num_bytes(path)
+        tasks.append((size, path, indices, (sites + 1) // 2 if size > _MAX_MESH_BYTES else sites))
+    tasks.sort(key=lambda task: -task[0])  # start the longest first
+    sources: dict[Path, SourceResult] = {}
+    mutants: list[MutantResult] = []
     with (
         tempfile.TemporaryDirectory() as parent,
         ProcessPoolExecutor(
-            len(os.sched_getaffinity(0)), initializer=_start, initargs=(parent,)
+            len(os.sched_getaffinity(0)), initializer=_init_process, initargs=(parent,)
         ) as pool,
     ):
         futures = [
-            (path, pool.submit(_batch, path, part, _sites(path, sites), seed))
-            for path, part in tasks
+            (path, pool.submit(_test_robot, path, indices, count, seed))
+            for _, path, indices, count in tasks
         ]
         for path, future in futures:
-            clean[path], part = future.result()
-            outcomes += part
+            sources[path], results = future.result()
+            mutants += results
     return Result(
-        clean=tuple(clean.values()),
-        outcomes=tuple(outcomes),
+        sources=tuple(sources.values()),
+        mutants=tuple(mutants),
         seconds=time.perf_counter() - start,
     )
 
 
 def _values(result: Result) -> Iterator[tuple[str, float]]:
-    by_kind = _by_kind(result)
-    found = sum(outcome.found for outcome in result.outcomes)
-    shares = [sum(o.found for o in group) / len(group) for group in by_kind.values()]
-    yield "kinds (at least 60)", len(by_kind)
-    yield "robots", len(result.clean)
-    yield "defects", len(result.outcomes)
-    yield "recall (at least 0.97)", found / len(result.outcomes)
-    yield "recall_mean_of_kinds (at least 0.97)", sum(shares) / len(shares)
-    yield "kinds_found_always", sum(share == 1 for share in shares)
-    yield "crashes (at most 0)", sum(bool(outcome.crash) for outcome in result.outcomes)
-    yield "false_alarms (at most 0)", sum(clean.errors for clean in result.clean)
-    yield "warnings_on_clean", sum(clean.warnings for clean in result.clean)
-    yield "extra_findings_per_defect", sum(o.extra for o in result.outcomes) / len(result.outcomes)
-    yield "seconds_per_check", median(clean.seconds for clean in result.clean)
-    yield "seconds_of_slowest_check", max(clean.seconds for clean in result.clean)
+    by_title = _by_title(result)
+    mutants, sources = result.mutants, result.sources
+    recalls = [_recall(group) for group in by_title.values()]
+    yield "kinds (at least 60)", len(by_title)
+    yield "robots", len(sources)
+    yield "defects", len(mutants)
+    yield "recall (at least 0.97)", _recall(mutants)
+    yield "recall_mean_of_kinds (at least 0.97)", sum(recalls) / len(recalls)
+    yield "kinds_found_always", sum(recall == 1 for recall in recalls)
+    yield "crashes (at most 0)", sum(bool(mutant.error) for mutant in mutants)
+    yield "false_alarms (at most 0)", sum(source.errors for source in sources)
+    yield "warnings_on_clean", sum(source.warnings for source in sources)
+    yield "extra_findings_per_defect", sum(mutant.extra for mutant in mutants) / len(mutants)
+    yield "seconds_per_check", median(source.seconds for source in sources)
+    yield "seconds_of_slowest_check", max(source.seconds for source in sources)
 
 
-def _by_kind(result: Result) -> dict[str, list[Outcome]]:
-    groups: dict[str, list[Outcome]] = defaultdict(list)
-    for outcome in result.outcomes:
-        groups[outcome.kind].append(outcome)
+def _recall(mutants: Sequence[MutantResult]) -> float:
+    return sum(mutant.is_found for mutant in mutants) / len(mutants)
+
+
+def _by_title(result: Result) -> dict[str, list[MutantResult]]:
+    groups: dict[str, list[MutantResult]] = defaultdict(list)
+    for mutant in result.mutants:
+        groups[mutant.title].append(mutant)
     return groups
 
 
 def run() -> Iterator[tuple[str, float]]:
-    """Yield the figures; for benchmarks/run.py."""
+    """Yield the values for benchmarks/run.py."""
     yield from _values(measure())
 
 
 def _table(result: Result) -> Iterator[str]:
-    codes = {kind.title: kind for kind in kinds()}
-    rows = []
-    for title, group in _by_kind(result).items():
-        share = sum(o.found for o in group) / len(group)
-        extra = sum(o.extra for o in group) / len(group)
-        rows.append((share, title, len(group), extra))
-    yield f"{'recall':>7} {'of':>4} {'extra':>6}  {'expected':22} kind"
-    for share, title, count, extra in sorted(rows):
-        kind = codes[title]
-        expected = f"{'/'.join(kind.codes)} {kind.severity}"
-        yield f"{share:7.2f} {count:4d} {extra:6.1f}  {expected:22} {title}"
-    for title in sorted(codes.keys() - _by_kind(result).keys()):
-        yield f"{'-':>7} {0:4d} {'-':>6}  {'/'.join(codes[title].codes):22} {title}"
+    by_title = _by_title(result)
+    expected = {m.title: f"{'/'.join(m.codes)} {m.severity}" for m in mutations()}
+    rows = [
+        (_recall(group), title, len(group), sum(mutant.extra for mutant in group) / len(group))
+        for title, group in by_title.items()
+    ]
+    yield f"{'recall':>7} {'of':>4} {'extra':>6}  {'expected':22} defect"
+    for recall, title, count, extra in sorted(rows):
+        yield f"{recall:7.2f} {count:4d} {extra:6.1f}  {expected[title]:22} {title}"
+    for title in sorted(expected.keys() - by_title.keys()):
+        yield f"{'-':>7} {0:4d} {'-':>6}  {expected[title]:22} {title}"
 
 
-def _misses(result: Result, shown: int) -> Iterator[str]:
-    for title, group in sorted(_by_kind(result).items()):
-        for outcome in [o for o in group if not o.found][:shown]:
-            yield f"missed: {title}, in {outcome.robot}: {', '.join(outcome.names)}"
-            yield from (f"    {line}" for line in (outcome.crash, *outcome.said[:6]) if line)
+def _missed(result: Result, count: int) -> Iterator[str]:
+    for title, group in sorted(_by_title(result).items()):
+        for mutant in [each for each in group if not each.is_found][:count]:
+            yield f"missed: {title}, in {mutant.robot}: {', '.join(mutant.names)}"
+            yield from (f"    {line}" for line in (mutant.error, *mutant.findings[:6]) if line)
 
 
 def main() -> None:
-    """Print the table and the figures."""
+    """Print the table and the values."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--sites", type=int, default=2, help="places for each defect and robot")
+    parser.add_argument("--sites", type=int, default=2, help="mutants for each defect and robot")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--only", default="", help="codes that start like this")
-    parser.add_argument("--robots", default="", help="files whose names have this in them")
-    parser.add_argument("--misses", type=int, default=2, help="how many to show of each kind")
+    parser.add_argument("--only", default="", help="only codes that start like this")
+    parser.add_argument("--robots", default="", help="only files whose names contain this")
+    parser.add_argument("--misses", type=int, default=2, help="misses to print for each defect")
     options = parser.parse_args()
     result = measure(options.sites, options.seed, options.only, options.robots)
     print(*_table(result), sep="\n")
-    print(*_misses(result, options.misses), sep="\n")
-    for clean in result.clean:
-        print(f"clean: {clean.robot}: {clean.seconds:.2f} s", *clean.findings, sep="\n    ")
+    print(*_missed(result, options.misses), sep="\n")
+    for source in result.sources:
+        print(f"original: {source.robot}: {source.seconds:.2f} s", *source.findings, sep="\n    ")
     print(f"whole run: {result.seconds:.0f} s")
     for name, value in _values(result):
         print(f"defect_{name} {value:.3g}")

@@ -1,10 +1,9 @@
-"""Run every subject in this folder, or those named, and print `name value` lines.
+"""Run the benchmarks in this folder, or the named ones, and print `name value` lines.
 
-python benchmarks/run.py [SUBJECT ...]
+python benchmarks/run.py [BENCHMARK ...]
 
-Values are ratios, measured in one run against the limit of what is possible (copying the same
-bytes, importing numpy), so that they mean the same on any machine. What each may be at most stands
-beside it.
+Values are ratios to a lower bound that is measured in the same run, such as copying the same bytes
+or importing numpy, so that they do not depend on the machine. Each name includes its limit.
 """
 
 import importlib
@@ -13,14 +12,13 @@ from pathlib import Path
 
 
 def main() -> int:
-    own = {"run", "clock"}
-    found = sorted({path.stem for path in Path(__file__).parent.glob("*.py")} - own)
-    if unknown := [word for word in sys.argv[1:] if word not in found]:
-        print(f"no subject {unknown[0]}; there are: {', '.join(found)}", file=sys.stderr)
+    names = sorted({path.stem for path in Path(__file__).parent.glob("*.py")} - {"run", "clock"})
+    if unknown := [name for name in sys.argv[1:] if name not in names]:
+        print(f"benchmark: got {unknown[0]}; expected {', '.join(names)}", file=sys.stderr)
         return 2
-    for subject in sys.argv[1:] or found:
-        for name, value in importlib.import_module(subject).run():
-            print(f"{subject}.{name} {value:.3g}", flush=True)
+    for benchmark in sys.argv[1:] or names:
+        for name, value in importlib.import_module(benchmark).run():
+            print(f"{benchmark}.{name} {value:.3g}", flush=True)
     return 0
 
 

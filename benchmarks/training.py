@@ -1,8 +1,7 @@
-"""The environment against bare `Batch.step`, and where the time of training goes.
+"""Speed of the environment relative to `Batch.step`, and the parts of the training time.
 
-Each step is taken twice from the same states with the same controls: once by MuJoCo alone, once by
-the environment with its observations, rewards and resets. The speed of the environment as a part of
-MuJoCo's is what is printed.
+Each step is run twice from the same states with the same controls: by MuJoCo alone, and by the
+environment with observations, rewards and resets.
 """
 
 import statistics
@@ -22,60 +21,62 @@ from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import MapTerrain, Plane, Terrain
 
-_ENVS = 512
-_STEPS = 60
-_ITERATIONS = 5
+_NUM_ENVS = 512
+_NUM_STEPS = 60
+_NUM_ITERATIONS = 5
 
 
 def run() -> Iterator[tuple[str, float]]:
-    found = get_task("quadruped")
-    task = replace(found.task, env=replace(found.task.env, num_envs=_ENVS))
-    robot = Robot.load(found.folder)
-    grounds: dict[str, tuple[Terrain, str]] = {
+    spec = get_task("quadruped")
+    task = replace(spec.task, env=replace(spec.task.env, num_envs=_NUM_ENVS))
+    robot = Robot.load(spec.folder)
+    terrains: dict[str, tuple[Terrain, str]] = {
         "plane": (Plane(), "at least 0.75"),
         "default_map": (MapTerrain(terrainkit.generate(terrainkit.MapConfig())), "at least 0.7"),
     }
-    for name, (ground, limit) in grounds.items():
-        env = LeggedEnv(task, robot, ground)
-        yield f"{name} ({limit})", _part_of_bare(env)
-        for part, share in _shares(env):
+    for name, (terrain, limit) in terrains.items():
+        env = LeggedEnv(task, robot, terrain)
+        yield f"{name} ({limit})", _relative_speed(env)
+        for part, share in _time_shares(env):
             yield f"{name}_share_of_{part}", share
 
 
-def _part_of_bare(env: LeggedEnv) -> float:
-    """Return the speed of the environment over that of MuJoCo alone."""
-    draw = torch.Generator().manual_seed(0)
+def _relative_speed(env: LeggedEnv) -> float:
+    """Return the speed of the environment divided by that of MuJoCo alone."""
+    generator = torch.Generator().manual_seed(0)
     batch, count = env.sim.batch, env.cfg.control.decimation
-    bare, whole = [], []
-    for _ in range(_STEPS):
-        actions = 0.3 * torch.randn(env.num_envs, env.num_actions, generator=draw)
+    mujoco_times, env_times = [], []
+    for _ in range(_NUM_STEPS):
+        actions = 0.3 * torch.randn(env.num_envs, env.num_actions, generator=generator)
         before = batch.state.copy()
         env.sim.ctrl[:] = env.to_ctrl(actions.numpy())
-        bare.append(seconds(lambda: batch.step(nstep=count, stage=mujoco.mjtStage.mjSTAGE_VEL)))
+        mujoco_times.append(
+            seconds(lambda: batch.step(nstep=count, stage=mujoco.mjtStage.mjSTAGE_VEL))
+        )
         batch.state[:] = before
-        whole.append(seconds(partial(env.step, actions)))
-    return statistics.median(bare) / statistics.median(whole)
+        env_times.append(seconds(partial(env.step, actions)))
+    return statistics.median(mujoco_times) / statistics.median(env_times)
 
 
-def _shares(env: LeggedEnv) -> Iterator[tuple[str, float]]:
-    """Yield which part of training physics, environment and networks take."""
-    spent = {"physics": 0.0, "step": 0.0}
+def _time_shares(env: LeggedEnv) -> Iterator[tuple[str, float]]:
+    """Yield the shares of physics, environment and networks in the training time."""
+    times = {"physics": 0.0, "step": 0.0}
     runner = LeggedRunner(env)
-    env.sim.step = _timed(env.sim.step, spent, "physics")  # type: ignore[method-assign]
-    env.step = _timed(env.step, spent, "step")  # type: ignore[method-assign]
-    begin = time.perf_counter()
-    runner.learn(_ITERATIONS)
-    total = time.perf_counter() - begin
-    yield "physics", spent["physics"] / total
-    yield "environment", (spent["step"] - spent["physics"]) / total
-    yield "networks", 1 - spent["step"] / total
+    env.sim.step = _timed(env.sim.step, times, "physics")  # type: ignore[method-assign]
+    env.step = _timed(env.step, times, "step")  # type: ignore[method-assign]
+    start = time.perf_counter()
+    runner.learn(_NUM_ITERATIONS)
+    total = time.perf_counter() - start
+    yield "physics", times["physics"] / total
+    yield "environment", (times["step"] - times["physics"]) / total
+    yield "networks", 1 - times["step"] / total
 
 
-def _timed(function, spent, name):  # type: ignore[no-untyped-def]
-    def timed(*arguments):  # type: ignore[no-untyped-def]
-        begin = time.perf_counter()
-        result = function(*arguments)
-        spent[name] += time.perf_counter() - begin
+def _timed(function, times, name):  # type: ignore[no-untyped-def]
+    def timed(*args):  # type: ignore[no-untyped-def]
+        start = time.perf_counter()
+        result = function(*args)
+        times[name] += time.perf_counter() - start
         return result
 
     return timed

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from terrainkit.grid import Grid
 from terrainkit.mesh import full_mesh
-from terrainkit.preview import tints
+from terrainkit.preview import height_colors
 
 PAPER = (250, 249, 246)
 DEEPEST = -1.5
@@ -32,7 +32,7 @@ def isometric(heights: NDArray[np.float32], cell: float, scale: float) -> NDArra
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     shade = 0.45 + 0.6 * np.clip(normal @ (_LIGHT / np.linalg.norm(_LIGHT)), 0, 1)
-    colour = np.clip(tints(corners[..., 2].mean(axis=1)) * shade[:, None], 0, 255)
+    color = np.clip(height_colors(corners[..., 2].mean(axis=1)) * shade[:, None], 0, 255)
 
     across = (corners[..., 0] - corners[..., 1]) * np.cos(np.pi / 6)
     up = (corners[..., 0] + corners[..., 1]) / 2 + corners[..., 2]
@@ -44,7 +44,7 @@ def isometric(heights: NDArray[np.float32], cell: float, scale: float) -> NDArra
     sheet = np.full((size[1], size[0], 3), PAPER, dtype=np.uint8)
     depth = (corners[..., 0] + corners[..., 1]).mean(axis=1) - 0.01 * corners[..., 2].mean(axis=1)
     for k in np.argsort(-depth):
-        cv2.fillConvexPoly(sheet, points[k], colour[k].tolist(), cv2.LINE_AA, _SUBPIXEL)
+        cv2.fillConvexPoly(sheet, points[k], color[k].tolist(), cv2.LINE_AA, _SUBPIXEL)
     return cv2.resize(sheet, (size[0] // 2, size[1] // 2), interpolation=cv2.INTER_AREA)
 
 

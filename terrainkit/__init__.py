@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from terrainkit.curriculum import update_levels
     from terrainkit.errors import TerrainkitError, TerrainkitWarning
     from terrainkit.generation import generate
-    from terrainkit.patch import Patch, tile
+    from terrainkit.patch import Patch, make_patch
     from terrainkit.sub_terrain import SubTerrain
     from terrainkit.terrain_map import TerrainMap
 
@@ -25,7 +25,7 @@ __all__ = [
     "TerrainkitError",
     "TerrainkitWarning",
     "generate",
-    "tile",
+    "make_patch",
     "update_levels",
 ]
 __version__ = "0.1.0"
@@ -38,7 +38,7 @@ _MODULES = {
     "TerrainkitError": "errors",
     "TerrainkitWarning": "errors",
     "generate": "generation",
-    "tile": "patch",
+    "make_patch": "patch",
     "update_levels": "curriculum",
 }
 """Module of each public name, so that only those in use are imported: a robot needs no terrain."""

@@ -1,7 +1,7 @@
-"""The .npz file: arrays by name, written plainly, and read with suspicion.
+"""Read and write .npz archives safely.
 
-Every array's dtype, shape and size is checked from its header, before any of it is decompressed,
-and nothing is ever unpickled.
+The dtype, shape and size of each array are checked from its header before it is decompressed.
+Nothing is unpickled.
 """
 
 import math
@@ -14,21 +14,20 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.capacity import require_memory
 from terrainkit.errors import MapFileError, TerrainkitError
+from terrainkit.memory import check_memory
 
-_LONGEST_HEADER = 10_000
-"""Most that a header may take [bytes]; those of numpy's own take a hundred."""
+MAX_HEADER_BYTES = 10_000
+"""Largest header that is read [bytes]; headers written by numpy take about a hundred."""
 
-LONGEST_TEXT = 64 << 20
-"""Most that a text may take [bytes]."""
+MAX_TEXT_BYTES = 64 << 20
+"""Largest string that is read [bytes]."""
 
 
 def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
     """Write `arrays` by name to the .npz file `path`, as `numpy.savez` does.
 
-    Not savez itself: it adds .npz to a name that ends in .NPZ, and on a full disk numpy 1 says more
-    than the error.
+    `numpy.savez` itself appends .npz to a name that ends in .NPZ.
     """
     with zipfile.ZipFile(path, "w", allowZip64=True) as file:
         for name, array in arrays.items():
@@ -37,45 +36,45 @@ def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
 
 
 @contextmanager
-def opened(name: str | Path) -> Iterator["Archive"]:
-    """Yield the .npz file `name`.
+def open_archive(name: str | Path) -> Iterator["Archive"]:
+    """Open the .npz file `name`.
 
     Raises:
-        MapFileError: if the file is missing, foreign or truncated.
+        MapFileError: if the file is missing, truncated, or not an .npz file.
     """
     path = Path(name)
     try:
-        # A FIFO would block, a device never end.
+        # Reading a FIFO would block, and a device may not end.
         if path.exists() and not path.is_file():
-            raise MapFileError(f"{path} is not a file; wanted a map in .npz")
+            raise MapFileError(f"{path}: got a special file or folder; expected an .npz file")
         file = zipfile.ZipFile(path)
     except FileNotFoundError:
         raise MapFileError(f"no file {path}") from None
     except OSError as error:
         raise MapFileError(f"cannot read {path}: {error.strerror or error}") from error
     except (zipfile.BadZipFile, ValueError, NotImplementedError) as error:
-        raise MapFileError(f"{path} is not an .npz file, or not a whole one: {error}") from error
+        raise MapFileError(f"{path}: not an .npz file, or truncated: {error}") from error
     with file:
         yield Archive(path, file)
 
 
-class _Capped:
-    """The start of a file: numpy reads a header whole, however long it says that it is."""
+class _LimitedReader:
+    """The start of a file. numpy would read a header of any length that the file claims."""
 
-    def __init__(self, file: IO[bytes], most: int) -> None:
+    def __init__(self, file: IO[bytes], limit: int) -> None:
         self._file = file
-        self._left = most
+        self._left = limit
 
     def read(self, size: int) -> bytes:
-        """Return the next `size` bytes, or raise ValueError if they reach too far."""
+        """Return the next `size` bytes, or raise ValueError beyond the limit."""
         if size > self._left:
-            raise ValueError(f"its header is longer than {_LONGEST_HEADER} bytes")
+            raise ValueError(f"its header is longer than {MAX_HEADER_BYTES} bytes")
         self._left -= size
         return self._file.read(size)
 
 
 class Archive:
-    """An open .npz, whose arrays are checked before they are read."""
+    """An open .npz file whose arrays are checked before they are read."""
 
     def __init__(self, path: Path, file: zipfile.ZipFile) -> None:
         self.path = path
@@ -91,10 +90,14 @@ class Archive:
         """Return the array `key`.
 
         Args:
-            key: Its name.
-            kind: What its dtype must be: numpy's letter, with the bytes of an item if they matter.
-            shape: Shape that it must have; None for any length.
-            limit: Most bytes that it may take.
+            key: Name of the array.
+            kind: Required dtype as numpy's code, such as "f4", or "U" for strings of any length.
+            shape: Required shape; None for any length.
+            limit: Largest size [bytes].
+
+        Raises:
+            MapFileError: if the array is missing, damaged, too large, or of another dtype or shape.
+            MemoryLimitError: if it does not fit in memory.
         """
         try:
             with self._file.open(f"{key}.npy") as member:
@@ -105,11 +108,11 @@ class Archive:
             raise MapFileError(f"{self.path} has no {key}") from None
         except TerrainkitError:
             raise
-        # On damaged bytes, zipfile, its decompressors and numpy's parser raise whatever they meet.
+        # On damaged data, zipfile, its decompressors and numpy's parser raise various errors.
         except Exception as error:
-            said = " ".join(str(error).split()) or type(error).__name__
-            raise MapFileError(f"{self.path}: {key} cannot be read: {said}") from error
-        if kind == "U" and not _is_text(array):
+            reason = " ".join(str(error).split()) or type(error).__name__
+            raise MapFileError(f"{self.path}: {key} cannot be read: {reason}") from error
+        if kind == "U" and not _is_unicode(array):
             raise MapFileError(f"{self.path}: {key} contains invalid Unicode")
         return array
 
@@ -121,7 +124,7 @@ class Archive:
         shape: tuple[int | None, ...],
         limit: int | None,
     ) -> None:
-        start: Any = _Capped(member, _LONGEST_HEADER)
+        start: Any = _LimitedReader(member, MAX_HEADER_BYTES)
         version = np.lib.format.read_magic(start)
         read = {
             (1, 0): np.lib.format.read_array_header_1_0,
@@ -135,36 +138,38 @@ class Archive:
             or not dtype.isnative
             or not f"{dtype.kind}{dtype.itemsize}".startswith(kind)
         ):
-            wanted = {"U": "a text", "i": "whole numbers"}.get(kind) or np.dtype(kind)
-            raise MapFileError(f"{self.path}: {key} has dtype {dtype}; wanted {wanted}")
+            expected = {"U": "a string", "i": "integers"}.get(kind) or np.dtype(kind)
+            raise MapFileError(f"{self.path}: {key}: got dtype {dtype}; expected {expected}")
         fits = len(found) == len(shape) and all(
-            wanted in (n, None) for n, wanted in zip(found, shape, strict=True)
+            expected in (n, None) for n, expected in zip(found, shape, strict=True)
         )
         if not fits:
-            raise MapFileError(f"{self.path}: {key} has shape {found}; wanted {_text(shape)}")
+            raise MapFileError(
+                f"{self.path}: {key}: got shape {found}; expected {_shape_text(shape)}"
+            )
         needed = math.prod(found) * dtype.itemsize
         if limit is not None and needed > limit:
-            raise MapFileError(f"{self.path}: {key} takes {needed} bytes; {limit} at most")
-        require_memory(needed, f"{key} in {self.path}")
+            raise MapFileError(f"{self.path}: {key}: got {needed} bytes; expected at most {limit}")
+        check_memory(needed, f"{key} in {self.path}")
 
-    def expect(self, key: str, wanted: float | tuple[float, ...]) -> None:
-        """Raise MapFileError unless the numbers under `key` are those that the config says."""
-        found = self.array(key, "f8", np.shape(wanted))
-        if not np.allclose(found, wanted, rtol=1e-9, atol=1e-9):
+    def check_value(self, key: str, expected: float | tuple[float, ...]) -> None:
+        """Raise MapFileError if the values of `key` differ from those of the config."""
+        found = self.array(key, "f8", np.shape(expected))
+        if not np.allclose(found, expected, rtol=1e-9, atol=1e-9):
             raise MapFileError(
-                f"{self.path}: {key} is {found.tolist()}, but its config says {wanted}"
+                f"{self.path}: {key}: got {found.tolist()}; expected {expected} by its config"
             )
 
-    def text(self, key: str, *, limit: int = LONGEST_TEXT) -> str:
-        """Return the text under `key`, which may take `limit` bytes."""
+    def text(self, key: str, *, limit: int = MAX_TEXT_BYTES) -> str:
+        """Return the string `key` of at most `limit` bytes."""
         return str(self.array(key, "U", (), limit=limit))
 
 
-def _is_text(array: NDArray[np.str_]) -> bool:
-    """Return whether every character is one: within Unicode, and no half of a pair."""
+def _is_unicode(array: NDArray[np.str_]) -> bool:
+    """Return whether all code points are valid: in range, and not surrogates."""
     codes = np.frombuffer(array.tobytes(), dtype=np.uint32)
     return not ((codes > 0x10FFFF) | ((codes >= 0xD800) & (codes < 0xE000))).any()
 
 
-def _text(shape: tuple[int | None, ...]) -> str:
+def _shape_text(shape: tuple[int | None, ...]) -> str:
     return f"({', '.join('any' if n is None else str(n) for n in shape)})"

@@ -126,7 +126,7 @@ class MapConfig(Config):
     @cached_property
     def mix(self) -> tuple[SubTerrain, ...]:
         """The sub-terrains of the map: the custom ones, or those of the preset."""
-        return self.terrains or presets.find(self.preset)
+        return self.terrains or presets.get_preset(self.preset)
 
     @property
     def contact(self) -> dict[str, float]:
@@ -154,7 +154,7 @@ class MapConfig(Config):
     @cached_property
     def border_cells(self) -> int:
         """Cells of the border on each side."""
-        return whole_cells("border", self.border, self.cell, least=0)
+        return whole_cells("border", self.border, self.cell, minimum=0)
 
     @cached_property
     def grid(self) -> Grid:

@@ -22,7 +22,7 @@ class ExportError(TerrainkitError):
     """A map that the wanted format cannot hold, or a target that cannot be written."""
 
 
-class CapacityError(TerrainkitError, MemoryError):
+class MemoryLimitError(TerrainkitError, MemoryError):
     """Work that would not fit in this machine's memory; raised before anything is allocated."""
 
 

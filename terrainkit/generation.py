@@ -1,123 +1,110 @@
-"""Generate: from a MapConfig to a TerrainMap."""
+"""Generate a TerrainMap from a MapConfig."""
 
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from terrainkit import registry
-from terrainkit.capacity import require_memory
 from terrainkit.config import MapConfig
 from terrainkit.errors import TerrainkitWarning, listing
 from terrainkit.layout import assign_patch, terrain_columns
+from terrainkit.memory import check_memory
 from terrainkit.parameter import parameters_of
-from terrainkit.patch import Parameters, build_patch
+from terrainkit.patch import Patch, build_patch
 from terrainkit.terrain_map import TerrainMap
 
 Progress = Callable[[Iterator[tuple[int, int]], int], Iterator[tuple[int, int]]]
-"""Wraps the walk over the patches, of that many, to show how far it has come."""
+"""Wraps the iterator over the patches, given their number, to show a progress bar."""
+
+_BYTES_PER_PATCH = 2000
+"""Memory of the parameters, origin and difficulty of a patch [bytes]."""
 
 
 def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainMap:
-    """Return the map that `config` describes.
+    """Generate the map of `config`.
 
     Args:
-        config: What to make. The same config gives the same bytes on every machine.
-        progress: Wraps the walk over the patches, for a progress bar.
+        config: The configuration. The same config gives the same bytes on every machine.
+        progress: Wraps the iterator over the patches, for a progress bar.
+
+    Returns:
+        The map.
 
     Warns:
-        TerrainkitWarning: if a terrain of a preset gets no column, if the cells are too coarse (or
-            the patches too small) for what was asked, or if a robot cannot start where the terrain
-            would have it.
+        TerrainkitWarning: if a sub-terrain of a preset gets no column, if the cells are too coarse
+            or the patches too small for the requested parameters, or if a spawn origin is not where
+            the terrain places it.
 
     Raises:
-        ConfigError: if a terrain does not fit in a patch, or leaves no room to spawn.
-        CapacityError: if the map would not fit in memory; nothing was allocated.
+        ConfigError: if a terrain does not fit in a patch, or has no place to spawn.
+        MemoryLimitError: if the map would not fit in memory; nothing was allocated.
     """
-    grid, mix = config.grid, config.mix
-    size = (config.rows, config.cols)
-    require_memory(_bytes_needed(config), f"a map of {grid.shape[0]} x {grid.shape[1]} samples")
+    grid, size = config.grid, (config.rows, config.cols)
+    samples = grid.shape[0] * grid.shape[1]
+    check_memory(
+        samples * 4 + config.rows * config.cols * _BYTES_PER_PATCH,
+        f"a map of {grid.shape[0]} x {grid.shape[1]} samples",
+    )
     columns = terrain_columns(config)
     heights = np.zeros(grid.shape, dtype=np.float32)
     origins = np.empty((*size, 3), dtype=np.float32)
-    kinds = np.empty(size, dtype=np.int32)
+    terrain_types = np.empty(size, dtype=np.int32)
     difficulty = np.empty(size, dtype=np.float32)
     parameters = np.empty(size, dtype=object)
-    walk: Iterator[tuple[int, int]] = iter(np.ndindex(size))
-    for row, col in progress(walk, config.rows * config.cols) if progress else walk:
-        kind, level = assign_patch(config, columns, row, col)
-        patch = build_patch(config, mix[kind], level, row, col)
+    deviations: Counter[str] = Counter()
+    moved_spawns: Counter[str] = Counter()
+    indices: Iterator[tuple[int, int]] = iter(np.ndindex(size))
+    for row, col in progress(indices, config.rows * config.cols) if progress else indices:
+        terrain_type, level = assign_patch(config, columns, row, col)
+        sub_terrain = config.mix[terrain_type]
+        patch = build_patch(config, sub_terrain, level, row, col)
         i, j = config.patch_start(row, col)
         heights[i : i + patch.grid.shape[0], j : j + patch.grid.shape[1]] = patch.heights
         origins[row, col] = patch.origin
-        kinds[row, col] = kind
+        terrain_types[row, col] = terrain_type
         difficulty[row, col] = level
         parameters[row, col] = patch.parameters
-    _warn_of_deviations(config, kinds, parameters)
-    _warn_of_moved_spawns(config, kinds, parameters, origins)
+        deviations.update(_deviations(patch, sub_terrain.terrain, config.cell))
+        moved_spawns[sub_terrain.name] += patch.spawn_offset > config.cell
+    _warn(config, deviations, +moved_spawns)
     return TerrainMap(
         config=config,
         grid=grid,
         heights=heights,
         env_origins=origins,
-        terrain_types=kinds,
-        terrain_names=tuple(sub_terrain.name for sub_terrain in mix),
+        terrain_types=terrain_types,
+        terrain_names=tuple(sub_terrain.name for sub_terrain in config.mix),
         difficulty=difficulty,
         parameters=parameters,
     )
 
 
-def _warn_of_deviations(
-    config: MapConfig, kinds: NDArray[np.int32], parameters: NDArray[np.object_]
-) -> None:
-    known = [parameters_of(registry.find(sub_terrain.terrain)) for sub_terrain in config.mix]
-    counts: Counter[str] = Counter()
-    records: list[Parameters] = parameters.ravel().tolist()
-    for kind, record in zip(kinds.flat, records, strict=True):
-        for name, asked in record.requested.items():
-            if known[kind][name].deviates(asked, record.realized[name], config.cell):
-                counts[f"{config.mix[kind].name}.{name}"] += 1
-    if counts:
-        said = listing(f"{name} on {count} patches" for name, count in counts.items())
+def _deviations(patch: Patch, terrain: str, cell: float) -> list[str]:
+    """Return the parameters that differ from the request by more than the grid requires."""
+    declared, record = parameters_of(registry.get_terrain(terrain)), patch.parameters
+    return [
+        f"{patch.terrain}.{name}"
+        for name, requested in record.requested.items()
+        if declared[name].deviates(requested, record.realized[name], cell)
+    ]
+
+
+def _warn(config: MapConfig, deviations: Counter[str], moved_spawns: Counter[str]) -> None:
+    if deviations:
+        names = listing(f"{name} on {count} patches" for name, count in deviations.items())
         warnings.warn(
-            f"cells of {config.cell:g} m, steps of height, or patches are too coarse or small for "
-            f"what was asked: {said}; the map records what was built",
+            f"cells of {config.cell:g} m, height steps or patches are too coarse or too small for "
+            f"the requested parameters: {names}; the map records the realized values",
             TerrainkitWarning,
             stacklevel=3,
         )
-
-
-def _warn_of_moved_spawns(
-    config: MapConfig,
-    kinds: NDArray[np.int32],
-    parameters: NDArray[np.object_],
-    origins: NDArray[np.float32],
-) -> None:
-    """Warn of robots that start elsewhere, which may be beyond what they are to learn."""
-    counts: Counter[str] = Counter()
-    records: list[Parameters] = parameters.ravel().tolist()
-    for (row, col), record in zip(np.ndindex(*kinds.shape), records, strict=True):
-        sub_terrain = config.mix[kinds[row, col]]
-        terrain = registry.find(sub_terrain.terrain)(**record.requested)
-        wanted = terrain.spawn(config.patch_grid(row, col))
-        if np.abs(origins[row, col, :2] - wanted).max() > config.cell:
-            counts[sub_terrain.name] += 1
-    if counts:
-        said = listing(f"{name} on {count} patches" for name, count in counts.items())
+    if moved_spawns:
+        names = listing(f"{name} on {count} patches" for name, count in moved_spawns.items())
         warnings.warn(
-            f"no level disc of radius {config.spawn_radius:g} m where robots should start: {said}; "
-            "they start at the nearest one; wanted a larger platform or a smaller spawn_radius",
+            f"no level disc of radius {config.spawn_radius:g} m at the preferred spawn: {names}; "
+            "the nearest level disc is used; increase the platform or reduce spawn_radius",
             TerrainkitWarning,
             stacklevel=3,
         )
-
-
-def _bytes_needed(config: MapConfig) -> int:
-    samples = config.grid.shape[0] * config.grid.shape[1]
-    return samples * 4 + config.rows * config.cols * _BYTES_PER_PATCH
-
-
-_BYTES_PER_PATCH = 2000
-"""The record of a patch: its parameters, origin and difficulty."""

@@ -1,4 +1,4 @@
-"""The layout: which terrain, at which difficulty, stands on which patch."""
+"""The terrain type and the difficulty of each patch."""
 
 import warnings
 
@@ -8,39 +8,45 @@ from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError, TerrainkitWarning, listing
 
 _LAYOUT_STREAM = (1,)
-"""Sets a patch's layout draws apart from those that its terrain makes from the same numbers."""
+"""Spawn key that separates the layout's random numbers from those of the terrain on the patch."""
 
 
-def apportion(proportions: list[float], seats: int) -> list[int]:
-    """Return how many of `seats` each proportion gets, by largest remainder (Hamilton's method).
+def allocate_columns(proportions: list[float], num_columns: int) -> list[int]:
+    """Distribute columns over proportions by the largest remainder method (Hamilton's method).
 
-    The counts sum to `seats`; each is its exact share rounded down or up. Ties go to the earlier.
+    Args:
+        proportions: Non-negative weights.
+        num_columns: Number of columns.
+
+    Returns:
+        The number of columns of each proportion: its exact share, rounded up or down. They sum to
+        `num_columns`. Ties go to the earlier proportion.
     """
-    shares = np.array(proportions) / sum(proportions) * seats
+    shares = np.array(proportions) / sum(proportions) * num_columns
     counts = np.floor(shares).astype(int)
-    # Rounded, so that remainders that are equal on paper tie and do not hang on the last bit.
+    # Rounded, so that mathematically equal remainders tie regardless of the last bit.
     remainders = np.round(shares - counts, 9)
-    for k in np.argsort(-remainders, kind="stable")[: seats - counts.sum()]:
+    for k in np.argsort(-remainders, kind="stable")[: num_columns - counts.sum()]:
         counts[k] += 1
     return [int(n) for n in counts]
 
 
 def terrain_columns(config: MapConfig) -> list[int]:
-    """Return the terrain of each column, as an index into `config.mix`; length `config.cols`.
+    """Return the terrain type of each column as an index into `config.mix`.
 
     Warns:
-        TerrainkitWarning: if a terrain of a preset gets no column.
+        TerrainkitWarning: if a sub-terrain of a preset gets no column.
 
     Raises:
-        ConfigError: if a terrain of a mix of one's own gets no column.
+        ConfigError: if a custom sub-terrain gets no column.
     """
     mix = config.mix
-    counts = apportion([sub_terrain.proportion for sub_terrain in mix], config.cols)
-    starved = [c.name for c, n in zip(mix, counts, strict=True) if n == 0 and c.proportion > 0]
-    if starved and config.mode != "randomized":
+    counts = allocate_columns([sub_terrain.proportion for sub_terrain in mix], config.cols)
+    missing = [s.name for s, n in zip(mix, counts, strict=True) if n == 0 and s.proportion > 0]
+    if missing and config.mode != "randomized":
         message = (
-            f"{config.cols} columns are too few for {len(mix)} terrains at these proportions: "
-            f"no column for {listing(starved)}"
+            f"{config.cols} columns are too few for {len(mix)} sub-terrains at these proportions: "
+            f"no column for {listing(missing)}"
         )
         if config.terrains:
             raise ConfigError(message)
@@ -49,13 +55,16 @@ def terrain_columns(config: MapConfig) -> list[int]:
 
 
 def assign_patch(config: MapConfig, columns: list[int], row: int, col: int) -> tuple[int, float]:
-    """Return the terrain of patch (row, col), as an index into `config.mix`, and its difficulty.
+    """Return the terrain type and the difficulty of patch (row, col).
 
     Args:
-        config: The map.
-        columns: Result of :func:`terrain_columns` on it.
+        config: The configuration of the map.
+        columns: Result of :func:`terrain_columns` for `config`.
         row: Index along x.
         col: Index along y.
+
+    Returns:
+        Terrain type as an index into `config.mix`, and difficulty, 0 to 1.
     """
     if config.mode == "selected":
         return columns[col], config.selected_difficulty
@@ -63,8 +72,8 @@ def assign_patch(config: MapConfig, columns: list[int], row: int, col: int) -> t
         return columns[col], _row_difficulty(config, row, col)
     rng = _layout_rng(config, row, col)
     weights = np.array([sub_terrain.proportion for sub_terrain in config.mix])
-    kind = rng.choice(len(weights), p=weights / weights.sum())
-    return int(kind), float(rng.choice(config.random_difficulties))
+    terrain_type = rng.choice(len(weights), p=weights / weights.sum())
+    return int(terrain_type), float(rng.choice(config.random_difficulties))
 
 
 def _row_difficulty(config: MapConfig, row: int, col: int) -> float:
@@ -72,10 +81,10 @@ def _row_difficulty(config: MapConfig, row: int, col: int) -> float:
     last = config.rows - 1
     if row in (0, last):
         return high if row > 0 else low
-    place = float(row)
+    position = float(row)
     if config.difficulty_jitter > 0:
-        place += config.difficulty_jitter * _layout_rng(config, row, col).uniform(-1.0, 1.0)
-    return low + (high - low) * place / last
+        position += config.difficulty_jitter * _layout_rng(config, row, col).uniform(-1.0, 1.0)
+    return low + (high - low) * position / last
 
 
 def _layout_rng(config: MapConfig, row: int, col: int) -> "np.random.Generator":

@@ -1,4 +1,4 @@
-"""Noise on a coarse lattice, interpolated to the cells of a patch."""
+"""Value noise: random heights on coarse nodes, interpolated to the cells of a patch."""
 
 import math
 from dataclasses import dataclass
@@ -10,43 +10,43 @@ from terrainkit.grid import Grid
 from terrainkit.parameter import Realized
 
 STEP = 0.005
-"""Heights are multiples of it unless told: Isaac Gym's own vertical scale [m]."""
+"""Default step of the heights [m], the vertical scale of Isaac Gym."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class LatticeNoise:
-    """Uniform noise drawn at the nodes of a lattice, like Isaac Gym's `random_uniform_terrain`.
+class ValueNoise:
+    """Uniform noise at equidistant nodes, like `random_uniform_terrain` of Isaac Gym.
 
-    A whole number of intervals spans the patch, and a whole number of steps the amplitude.
+    The patch is a whole number of intervals, and the amplitude a whole number of steps.
     """
 
     amplitude: float
     """Largest height above or below 0 [m]."""
 
     step: float
-    """Heights drawn are multiples of this [m]; below a micrometre they are any number."""
+    """Step of the sampled heights [m]; below a micrometer, heights are continuous."""
 
     spacing: float
     """Distance between two nodes [m]."""
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.float64]:
-        """Return the noise [m], shape `plot.shape`; interpolated bilinearly between nodes.
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.float64]:
+        """Return the noise [m], shape `grid.shape`, interpolated bilinearly between nodes.
 
-        How many draws it takes, and their pattern, depend on the spacing alone.
+        The number of random numbers depends only on the spacing.
         """
-        x, y = self._intervals(plot)
+        x, y = self._intervals(grid)
         nodes = rng.random((x + 1, y + 1))
         if self._levels is None:
             nodes = (2 * nodes - 1) * self.amplitude
         else:
             nodes = (np.floor(nodes * (2 * self._levels + 1)) - self._levels) * self.step
         for k in (0, 1):
-            nodes = _interpolate(nodes, plot.shape[k], axis=k)
+            nodes = _interpolate(nodes, grid.shape[k], axis=k)
         return nodes
 
-    def realized(self, plot: Grid) -> dict[str, Realized]:
-        """Return amplitude and spacing as they are on `plot`."""
-        counts = zip(plot.size, self._intervals(plot), strict=True)
+    def realized(self, grid: Grid) -> dict[str, Realized]:
+        """Return amplitude and spacing as realized on `grid`."""
+        counts = zip(grid.size, self._intervals(grid), strict=True)
         x, y = (round(extent / count, 9) for extent, count in counts)
         largest = self.amplitude if self._levels is None else round(self._levels * self.step, 9)
         return {"amplitude": largest, "spacing": x if x == y else (x, y)}
@@ -55,12 +55,12 @@ class LatticeNoise:
     def _levels(self) -> int | None:
         if self.step < 1e-6:
             return None
-        return math.floor(self.amplitude / self.step + 1e-9)  # the margin is for 0.05 / 0.005
+        return math.floor(self.amplitude / self.step + 1e-9)  # rounding of 0.05 / 0.005
 
-    def _intervals(self, plot: Grid) -> tuple[int, int]:
-        # Nodes closer than the cells would be drawn and never seen.
-        spacing = max(self.spacing, plot.cell)
-        x, y = (max(1, math.floor(extent / spacing + 0.5 + 1e-9)) for extent in plot.size)
+    def _intervals(self, grid: Grid) -> tuple[int, int]:
+        # Nodes closer than the cells would have no effect.
+        spacing = max(self.spacing, grid.cell)
+        x, y = (max(1, math.floor(extent / spacing + 0.5 + 1e-9)) for extent in grid.size)
         return x, y
 
 

@@ -1,7 +1,7 @@
-"""The parameters of a terrain: what each field of its dataclass may be, and how it snaps to cells.
+"""Declare the parameters of a terrain: their range, and how they snap to the cells.
 
-A terrain's fields are declared with the functions below. Each takes the value at difficulty 0
-and the value at difficulty 1; one value alone holds at every difficulty.
+The fields of a terrain are declared with the functions below. Each takes the value at difficulty 0
+and the value at difficulty 1; a single value is used at every difficulty.
 """
 
 import dataclasses
@@ -31,7 +31,7 @@ MAX_COUNT = 10_000
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
-    """What is known of one field of a terrain beside its type and docstring."""
+    """The declaration of one field of a terrain, besides its type and docstring."""
 
     easy: Value
     """Default at difficulty 0."""
@@ -40,106 +40,106 @@ class Parameter:
     """Default at difficulty 1."""
 
     snap: Snap = "none"
-    """How it meets the cells: as it is, as whole cells, or as a block centered in the patch."""
+    """How the value snaps to the cells: not at all, to whole cells, or to a centered block."""
 
     zero: bool = True
-    """Whether 0 is allowed; below 0 nothing is."""
+    """Whether 0 is allowed. Negative values never are."""
 
     is_grade: bool = False
-    """Whether it is a rise over run, which is no slope any more where it makes walls."""
+    """Whether it is a rise over run, which must stay below the map's slope_threshold."""
 
-    ramps: bool = True
-    """Whether it may be given as a range (easy, hard)."""
+    allows_range: bool = True
+    """Whether the value may be a range (easy, hard)."""
 
-    slack: float = 0.0
-    """How much it may be off, in its own unit: what is made of steps may miss one of their
-    default."""
+    tolerance: float = 0.0
+    """Deviation that is not reported, in the unit of the parameter: values that are a multiple of
+    a step may differ by one default step."""
 
     def at(self, difficulty: float) -> Value:
         """Return the default at `difficulty`, 0 to 1."""
         return at_difficulty((self.easy, self.hard), difficulty)
 
-    def realized(self, value: Value, plot: Grid) -> Realized:
-        """Return what the cells of `plot` make of `value`: a pair (x, y) where the axes differ."""
+    def realized(self, value: Value, grid: Grid) -> Realized:
+        """Return `value` snapped to the cells of `grid`; a pair (x, y) where the axes differ."""
         if self.snap == "cells":
-            return plot.length(plot.cells(value, least=0 if self.zero else 1))
+            return grid.length(grid.cells(value, minimum=0 if self.zero else 1))
         if self.snap == "centered":
-            x, y = (plot.length(count) for count in plot.centered(value))
+            x, y = (grid.length(count) for count in grid.centered(value))
             return x if x == y else (x, y)
         return value
 
-    def deviates(self, asked: Value, built: Realized, cell: float) -> bool:
-        """Return whether `built` differs from `asked` by more than it has to.
+    def deviates(self, requested: Value, realized: Realized, cell: float) -> bool:
+        """Return whether `realized` differs from `requested` by more than snapping requires.
 
-        A length on the cells may be half a cell off, or one to stay centered; any other number 5 %,
-        or its slack if anything was built at all.
+        A length may differ by half a cell, the side of a centered block by one cell. Other values
+        may differ by 5 %, or by `tolerance` unless they became 0.
         """
-        ends = built if isinstance(built, tuple) else (built,)
-        least = {"cells": cell / 2, "centered": cell, "none": 0.05 * asked}[self.snap]
-        allowed = max(least, self.slack if all(ends) else 0.0)
-        return any(abs(end - asked) > allowed + 1e-6 for end in ends)
+        values = realized if isinstance(realized, tuple) else (realized,)
+        snapping = {"cells": cell / 2, "centered": cell, "none": 0.05 * requested}[self.snap]
+        allowed = max(snapping, self.tolerance if all(values) else 0.0)
+        return any(abs(value - requested) > allowed + 1e-6 for value in values)
 
 
 def at_difficulty(value: Value | Range, difficulty: float) -> Value:
-    """Return `value` at `difficulty` 0 to 1: linear from easy to hard, exact at both ends.
+    """Interpolate a range (easy, hard) at `difficulty`, 0 to 1; exact at both ends.
 
-    Every range of every terrain is interpolated here and nowhere else.
+    A single value is returned unchanged. All ranges of all terrains are interpolated here.
     """
     if not isinstance(value, tuple):
         return value
     easy, hard = value
-    # Else 0.31 (1 - d) + 0.31 d would be 0.31000000000000005 here and there.
+    # 0.31 (1 - d) + 0.31 d can round to 0.31000000000000005.
     return easy if easy == hard else easy * (1.0 - difficulty) + hard * difficulty
 
 
-def height(easy: float, hard: float | None = None, *, slack: float = 0.0) -> Any:
-    """Declare a vertical length [m]; heights are floats, so it is met as it is, or to `slack`."""
-    return _field(easy, hard, slack=slack)
+def height(easy: float, hard: float | None = None, *, tolerance: float = 0.0) -> Any:
+    """Declare a vertical length [m], which does not snap to cells."""
+    return _field(easy, hard, tolerance=tolerance)
 
 
 def length(easy: float, hard: float | None = None, *, zero: bool = False) -> Any:
-    """Declare a horizontal length [m]; it snaps to whole cells, one or more unless `zero`."""
+    """Declare a horizontal length [m], which snaps to whole cells: at least one unless `zero`."""
     return _field(easy, hard, snap="cells", zero=zero)
 
 
 def platform(side: float) -> Any:
-    """Declare the side of a square in the middle of the patch [m], kept centered on the cells."""
+    """Declare the side of a square at the center of the patch [m], which stays centered."""
     return _field(side, snap="centered", zero=False)
 
 
 def scalar(easy: float, hard: float | None = None, *, zero: bool = True) -> Any:
-    """Declare a number that the cells leave as it is."""
+    """Declare a number that does not snap to cells."""
     return _field(easy, hard, zero=zero)
 
 
 def grade(easy: float, hard: float) -> Any:
-    """Declare a rise over run; one above the map's slope_threshold would be a wall."""
+    """Declare a rise over run, which must not exceed the map's slope_threshold."""
     return _field(easy, hard, is_grade=True)
 
 
 def count(number: int) -> Any:
-    """Declare a whole number above 0, the same at every difficulty."""
-    return _field(number, zero=False, ramps=False)
+    """Declare a positive integer that does not depend on the difficulty."""
+    return _field(number, zero=False, allows_range=False)
 
 
 def switch(*, default: bool = False) -> Any:
-    """Declare a yes or no, the same at every difficulty."""
-    return _field(default, ramps=False)
+    """Declare a boolean that does not depend on the difficulty."""
+    return _field(default, allows_range=False)
 
 
-def _field(easy: Value, hard: Value | None = None, **rest: Any) -> Any:
+def _field(easy: Value, hard: Value | None = None, **options: Any) -> Any:
     hard = easy if hard is None else hard
-    parameter = Parameter(easy=easy, hard=hard, **rest)
+    parameter = Parameter(easy=easy, hard=hard, **options)
     return dataclasses.field(default=hard, metadata={"parameter": parameter})
 
 
 @cache
 def parameters_of(terrain: type) -> Mapping[str, Parameter]:
-    """Return the parameters of a terrain's class by name, in the order of its fields."""
+    """Return the parameters of a terrain class by name, in the order of its fields."""
     for field in dataclasses.fields(terrain):
         if "parameter" not in field.metadata:
             raise ConfigError(
-                f"{terrain.__name__}: {field.name} is a plain field; wanted one declared with "
+                f"{terrain.__name__}: {field.name} is a plain field; expected one declared with "
                 "parameter.height, length, platform, grade, scalar, count or switch"
             )
     return {f.name: f.metadata["parameter"] for f in dataclasses.fields(terrain)}

@@ -1,4 +1,4 @@
-"""One patch: a terrain, built."""
+"""Patch: one terrain, built on the grid of its place in a map."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters:
-    """The numbers a patch was built from."""
+    """The parameters of a patch."""
 
     requested: Mapping[str, Value]
-    """As asked, at the difficulty of the patch."""
+    """Values at the difficulty of the patch, by name."""
 
     realized: Mapping[str, Realized]
-    """As the cells hold them; (x, y) where the two axes differ."""
+    """Values after snapping to the cells, by name; (x, y) where the two axes differ."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,16 +31,16 @@ class Patch:
     """One patch of a map, in the frame of the map."""
 
     terrain: str
-    """Name of the terrain in the mix."""
+    """Name of the sub-terrain."""
 
     difficulty: float
     """Difficulty, 0 to 1."""
 
     parameters: Parameters
-    """What it was built from."""
+    """Requested and realized parameters."""
 
     grid: Grid
-    """Where the samples stand."""
+    """Positions of the samples."""
 
     heights: NDArray[np.float32]
     """Heights [m], shape `grid.shape`."""
@@ -48,44 +48,55 @@ class Patch:
     origin: NDArray[np.float32]
     """Spawn origin (x, y, z) [m], shape (3,)."""
 
+    spawn_offset: float = 0.0
+    """Largest offset along x or y of the origin from the spawn that the terrain prefers [m]."""
 
-def tile(config: MapConfig, row: int, col: int) -> Patch:
-    """Return patch (row, col) of the map of `config`, without making the rest.
+
+def make_patch(config: MapConfig, row: int, col: int) -> Patch:
+    """Build patch (row, col) of the map of `config` without generating the rest.
 
     Raises:
         IndexError: if there is no such patch.
-        ConfigError: if the terrain does not fit in the patch, or leaves no room to spawn.
+        ConfigError: if the terrain does not fit in the patch, or has no place to spawn.
     """
     config.check_patch(row, col)
-    kind, difficulty = assign_patch(config, terrain_columns(config), row, col)
-    return build_patch(config, config.mix[kind], difficulty, row, col)
+    terrain_type, difficulty = assign_patch(config, terrain_columns(config), row, col)
+    return build_patch(config, config.mix[terrain_type], difficulty, row, col)
 
 
 def build_patch(
     config: MapConfig, sub_terrain: SubTerrain, difficulty: float, row: int, col: int
 ) -> Patch:
-    """Return `sub_terrain` at `difficulty`, built at (row, col).
+    """Build `sub_terrain` at `difficulty` on patch (row, col).
 
-    The draws come from the seed, the row and the column alone, so the patch has the same bytes in
-    whatever order, process or company it is built.
+    The random numbers depend only on the seed, the row and the column. The patch therefore has the
+    same bytes in any order and in any process.
+
+    Raises:
+        ConfigError: if the terrain does not fit in the patch, or has no place to spawn.
     """
-    from terrainkit.spawn import find_spawn, room_error
+    from terrainkit.spawn import find_spawn
 
     terrain = sub_terrain.at(difficulty)
-    _refuse_walls(terrain, config)
+    _check_slopes(terrain, config)
     grid = config.patch_grid(row, col)
     rng = np.random.default_rng(np.random.SeedSequence([config.seed, row, col]))
     heights = terrain.build(grid, rng)
+    preferred = terrain.spawn(grid)
     origin = find_spawn(
         heights,
         grid,
-        terrain.spawn(grid),
+        preferred,
         radius=config.spawn_radius,
         tolerance=config.spawn_tolerance,
         threshold=config.wall_threshold,
     )
     if origin is None:
-        raise room_error(sub_terrain.name, grid, config.spawn_radius, config.spawn_tolerance)
+        raise ConfigError(
+            f"{sub_terrain.name}: no disc of radius {config.spawn_radius:g} m is level within "
+            f"{config.spawn_tolerance:g} m in a patch of {grid.size[0]:g} m x {grid.size[1]:g} m; "
+            "increase the platform or reduce spawn_radius"
+        )
     return Patch(
         terrain=sub_terrain.name,
         difficulty=difficulty,
@@ -93,16 +104,16 @@ def build_patch(
         grid=grid,
         heights=heights,
         origin=np.array(origin, dtype=np.float32),
+        spawn_offset=float(np.abs(np.subtract(origin[:2], preferred)).max()),
     )
 
 
-def _refuse_walls(terrain: Terrain, config: MapConfig) -> None:
-    """Raise ConfigError if a slope is so steep that the map would make it a stack of walls."""
+def _check_slopes(terrain: Terrain, config: MapConfig) -> None:
+    """Raise ConfigError if a slope is so steep that the map would turn it into walls."""
     for name, parameter in parameters_of(type(terrain)).items():
         grade = getattr(terrain, name)
         if parameter.is_grade and grade * config.cell > config.wall_threshold:
             raise ConfigError(
-                f"{terrain.kind()}: {name} {grade:g} is above slope_threshold "
-                f"{config.slope_threshold:g}, so it would be walls; wanted less of one or more of "
-                "the other"
+                f"{terrain.kind()}.{name}: got {grade:g}; expected at most slope_threshold "
+                f"({config.slope_threshold:g}), above which slopes become walls"
             )

@@ -1,4 +1,4 @@
-"""Presets: ready mixes of terrains, by name."""
+"""Presets: named lists of sub-terrains."""
 
 from terrainkit import registry
 from terrainkit.errors import ConfigError
@@ -6,9 +6,9 @@ from terrainkit.parameter import parameters_of
 from terrainkit.sub_terrain import SubTerrain
 from terrainkit.text import known_names
 
-_MIXES = {
-    # legged_gym's columns in its order. What it calls "stairs up" is climbed from the platform
-    # outwards, so it is the inverted pyramid here, and "stairs down" the upright one.
+_PROPORTIONS = {
+    # The columns of legged_gym in its order. Its "stairs up" are climbed from the platform outward,
+    # so they are the inverted pyramid here, and its "stairs down" the upright one.
     "legged_gym": {
         "pyramid_slope_inverted": 1.0,
         "pyramid_slope": 1.0,
@@ -23,39 +23,40 @@ _MIXES = {
     "rough": {"flat": 1.0, "rough": 1.0, "rough_slope": 1.0, "obstacles": 1.0, "wave": 1.0},
     "stairs": {"stairs": 1.0, "pyramid_stairs": 1.0, "pyramid_stairs_inverted": 1.0},
 }
-"""Proportion of each terrain, by preset."""
+"""Proportion of each sub-terrain, by preset."""
 
 
-def names() -> tuple[str, ...]:
-    """Return the name of each preset."""
-    return (*_MIXES, "all")
+def preset_names() -> tuple[str, ...]:
+    """Return the names of the presets."""
+    return (*_PROPORTIONS, "all")
 
 
-def find(name: str) -> tuple[SubTerrain, ...]:
-    """Return the mix called `name`; "all" holds each terrain, upright and inverted, once.
+def get_preset(name: str) -> tuple[SubTerrain, ...]:
+    """Return the sub-terrains of a preset.
+
+    The preset "all" has every terrain once, and once more inverted where that exists.
 
     Raises:
-        ConfigError: if there is none, listing those that exist.
+        ConfigError: if there is no such preset.
     """
-    if name not in names():
-        raise ConfigError(f"no preset {name!r}; {known_names(name, names())}")
-    mix = dict.fromkeys(_all(), 1.0) if name == "all" else _MIXES[name]
-    return tuple(_sub_terrain(terrain, proportion) for terrain, proportion in mix.items())
-
-
-def _all() -> list[str]:
-    mix = []
-    for terrain in registry.names():
-        mix.append(terrain)
-        if "inverted" in parameters_of(registry.find(terrain)):
-            mix.append(terrain + registry.INVERTED)
-    return mix
-
-
-def _sub_terrain(name: str, proportion: float) -> SubTerrain:
-    return SubTerrain(
-        terrain=name.removesuffix(registry.INVERTED),
-        name=name,
-        proportion=proportion,
-        parameters={"inverted": True} if name.endswith(registry.INVERTED) else {},
+    if name not in preset_names():
+        raise ConfigError(f"no preset {name!r}; {known_names(name, preset_names())}")
+    proportions = dict.fromkeys(_all_names(), 1.0) if name == "all" else _PROPORTIONS[name]
+    return tuple(
+        SubTerrain(
+            terrain=name.removesuffix(registry.INVERTED),
+            name=name,
+            proportion=proportion,
+            parameters={"inverted": True} if name.endswith(registry.INVERTED) else {},
+        )
+        for name, proportion in proportions.items()
     )
+
+
+def _all_names() -> list[str]:
+    names = []
+    for name in registry.terrain_names():
+        names.append(name)
+        if "inverted" in parameters_of(registry.get_terrain(name)):
+            names.append(name + registry.INVERTED)
+    return names

@@ -1,4 +1,4 @@
-"""The preview: a shaded relief of a map from above, with its names, levels and spawn origins."""
+"""Preview: a shaded relief of a map with labels and spawn origins."""
 
 import math
 from pathlib import Path
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.atomic import atomic_write
+from terrainkit.atomic_write import atomic_write
 from terrainkit.errors import ExportError
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 Picture = NDArray[np.uint8]
 
-_TINTS = (
+_COLORS = (
     (-10.0, (38, 32, 44)),
     (-1.5, (70, 62, 92)),
     (-0.4, (112, 138, 168)),
@@ -24,22 +24,22 @@ _TINTS = (
     (1.5, (164, 104, 62)),
     (4.0, (116, 66, 46)),
 )
-"""Colour (red, green, blue) of the ground by height [m]: blue below 0, brown above."""
+"""Color (red, green, blue) by height [m]: blue below 0, brown above."""
 
-_INK = (40, 40, 46)
-_SPAWN = (196, 40, 40)
-_PAPER = (250, 249, 246)
+_TEXT_COLOR = (40, 40, 46)
+_SPAWN_COLOR = (196, 40, 40)
+_BACKGROUND = (250, 249, 246)
 _MARGIN = (250, 60, 30, 70)
-"""Paper to the left, below, to the right and above the ground [px]."""
+"""Margin to the left, below, to the right and above the relief [px]."""
 
-_MOST_PIXELS = 10_000
-"""Largest side of the ground in a picture [px]."""
+MAX_PIXELS = 10_000
+"""Largest side of the relief [px]."""
 
-_LINE, _WORD = 18, 80
-"""Room that a label takes, down and across [px]; where patches are smaller, some go without."""
+_LABEL_HEIGHT, _LABEL_WIDTH = 18, 80
+"""Size of a label [px]; where patches are smaller, only some are labeled."""
 
 _LIGHT = np.array([-0.55, 0.45, 0.7])
-"""Where the light comes from: the upper left, as on maps, lest hills look like holes."""
+"""Direction of the light: the upper left, as is usual for shaded maps."""
 
 
 def write_preview(
@@ -49,8 +49,8 @@ def write_preview(
 
     Args:
         terrain_map: The map.
-        path: Where to.
-        width: Least width of the ground in the picture [px].
+        path: Target.
+        width: Minimum width of the relief [px].
         overwrite: Replace an existing file.
 
     Raises:
@@ -60,43 +60,48 @@ def write_preview(
 
     path = Path(path)
     if path.suffix.lower() != ".png":
-        raise ExportError(f"a preview is a .png; got {path}")
-    if not 100 <= width <= _MOST_PIXELS:
-        raise ExportError(f"width is {width}; wanted 100 to {_MOST_PIXELS}")
+        raise ExportError(f"preview: got {path}; expected a .png file")
+    if not 100 <= width <= MAX_PIXELS:
+        raise ExportError(f"width: got {width}; expected 100 to {MAX_PIXELS}")
     terrain_map.require_finite()
     with atomic_write(path, overwrite=overwrite) as temporary:
-        _, data = cv2.imencode(".png", cv2.cvtColor(preview(terrain_map, width), cv2.COLOR_RGB2BGR))
+        _, data = cv2.imencode(
+            ".png", cv2.cvtColor(render_preview(terrain_map, width), cv2.COLOR_RGB2BGR)
+        )
         temporary.write_bytes(data.tobytes())
     return path
 
 
-def preview(terrain_map: "TerrainMap", width: int = 1600) -> Picture:
-    """Return the preview as red, green and blue, shape (height, width, 3): x right, y up."""
+def render_preview(terrain_map: "TerrainMap", width: int = 1600) -> Picture:
+    """Return the preview as an RGB image, shape (height, width, 3): x to the right, y up."""
     heights, crop = _without_border(terrain_map)
     cell = terrain_map.config.cell
     extent = heights.shape[0] * cell
-    # A map that is much higher than wide gets a picture that is narrower than asked.
-    width = max(1, min(width, _MOST_PIXELS * heights.shape[0] // heights.shape[1]))
+    # A tall map is drawn narrower to limit the height of the picture.
+    width = max(1, min(width, MAX_PIXELS * heights.shape[0] // heights.shape[1]))
     if heights.shape[0] > width:
-        heights, cell = _shrunk(heights, width), extent / width
-    # Downwards rows, and every sample a square of whole pixels.
-    factor = max(1, min(-(-width // heights.shape[0]), _MOST_PIXELS // max(heights.shape)))
+        heights, cell = _downsample(heights, width), extent / width
+    # Image rows go down. Each sample is a square of whole pixels.
+    factor = max(1, min(-(-width // heights.shape[0]), MAX_PIXELS // max(heights.shape)))
     ground = (
-        relief(heights, cell).swapaxes(0, 1)[::-1].repeat(factor, axis=0).repeat(factor, axis=1)
+        shaded_relief(heights, cell)
+        .swapaxes(0, 1)[::-1]
+        .repeat(factor, axis=0)
+        .repeat(factor, axis=1)
     )
     scale = ground.shape[1] / extent
     left, below, right, above = _MARGIN
     height, span = ground.shape[:2]
-    sheet = np.full((height + above + below, span + left + right, 3), _PAPER, dtype=np.uint8)
-    sheet[above : above + height, left : left + span] = ground
-    _annotate(sheet, terrain_map, scale, (left - crop[0] * scale, above + height + crop[1] * scale))
-    return sheet
+    image = np.full((height + above + below, span + left + right, 3), _BACKGROUND, dtype=np.uint8)
+    image[above : above + height, left : left + span] = ground
+    _draw_labels(
+        image, terrain_map, scale, (left - crop[0] * scale, above + height + crop[1] * scale)
+    )
+    return image
 
 
-def relief(heights: NDArray[np.float32], cell: float) -> Picture:
-    """Return heights as coloured, shaded ground, shape (nx, ny, 3).
-
-    Shading is Lambert's: the cosine between the ground's normal and the light.
+def shaded_relief(heights: NDArray[np.float32], cell: float) -> Picture:
+    """Return the heights as a colored relief with Lambertian shading, shape (nx, ny, 3).
 
     Args:
         heights: Heights [m], shape (nx, ny).
@@ -108,23 +113,23 @@ def relief(heights: NDArray[np.float32], cell: float) -> Picture:
     light = _LIGHT / np.linalg.norm(_LIGHT)
     steepness = np.sqrt(slope_x**2 + slope_y**2 + 1)
     shade = (light[2] - light[0] * slope_x - light[1] * slope_y) / steepness / light[2]
-    picture: Picture = np.clip(
-        tints(heights) * np.clip(shade, 0.35, 1.25)[..., None], 0, 255
+    relief: Picture = np.clip(
+        height_colors(heights) * np.clip(shade, 0.35, 1.25)[..., None], 0, 255
     ).astype(np.uint8)
-    return picture
+    return relief
 
 
-def tints(heights: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Return the colour (red, green, blue, each 0 to 255) of heights [m], shape (..., 3)."""
-    levels = [level for level, _ in _TINTS]
-    channels = zip(*(colour for _, colour in _TINTS), strict=True)
+def height_colors(heights: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Return the color (red, green, blue, 0 to 255) of heights [m], shape (..., 3)."""
+    levels = [level for level, _ in _COLORS]
+    channels = zip(*(color for _, color in _COLORS), strict=True)
     return np.stack([np.interp(heights, levels, channel) for channel in channels], axis=-1)
 
 
 def _without_border(
     terrain_map: "TerrainMap",
 ) -> tuple[NDArray[np.float32], tuple[float, float]]:
-    """Return the heights with a metre of the border, and the corner where they begin [m]."""
+    """Return the heights with 1 m of the border, and their lower corner [m]."""
     config = terrain_map.config
     cut = max(0, config.border_cells - round(1.0 / config.cell))
     heights = terrain_map.heights[cut : len(terrain_map.heights) - cut, :]
@@ -133,8 +138,8 @@ def _without_border(
     return heights, (lower[0] + cut * config.cell, lower[1] + cut * config.cell)
 
 
-def _shrunk(heights: NDArray[np.float32], width: int) -> NDArray[np.float32]:
-    """Return the heights averaged over fewer samples, `width` along x."""
+def _downsample(heights: NDArray[np.float32], width: int) -> NDArray[np.float32]:
+    """Return the heights averaged to `width` samples along x."""
     import cv2
 
     other = max(1, round(heights.shape[1] * width / heights.shape[0]))
@@ -143,8 +148,8 @@ def _shrunk(heights: NDArray[np.float32], width: int) -> NDArray[np.float32]:
     return np.asarray(shrunk.reshape(width, other), dtype=np.float32)
 
 
-def _annotate(
-    sheet: Picture, terrain_map: "TerrainMap", scale: float, zero: tuple[float, float]
+def _draw_labels(
+    image: Picture, terrain_map: "TerrainMap", scale: float, zero: tuple[float, float]
 ) -> None:
     import cv2
 
@@ -155,25 +160,25 @@ def _annotate(
         return round(zero[0] + x * scale), round(zero[1] - y * scale)
 
     def write(text: str, at: tuple[int, int], size: float = 0.5) -> None:
-        cv2.putText(sheet, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, _INK, 1, cv2.LINE_AA)
+        cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, _TEXT_COLOR, 1, cv2.LINE_AA)
 
     size_x, size_y = config.patch_size
     by_column = config.mode != "randomized"
-    for col in range(0, cols, max(1, math.ceil(_LINE / (size_y * scale)))):
+    for col in range(0, cols, max(1, math.ceil(_LABEL_HEIGHT / (size_y * scale)))):
         _, y = pixel(0, first[1] + (col + 0.5) * size_y)
         name = terrain_map.terrain_names[terrain_map.terrain_types[0, col]] if by_column else ""
         write(f"{col:>3}  {name}", (10, y + 5))
-    for row in range(0, rows, max(1, math.ceil(_WORD / (size_x * scale)))):
+    for row in range(0, rows, max(1, math.ceil(_LABEL_WIDTH / (size_x * scale)))):
         x, _ = pixel(first[0] + (row + 0.5) * size_x, 0)
         low, high = terrain_map.difficulty[row].min(), terrain_map.difficulty[row].max()
         level = f"{low:.2f}" if low == high else f"{low:.2f}-{high:.2f}"
-        write(f"{row}: d {level}", (x - 36, sheet.shape[0] - _MARGIN[1] + 24))
+        write(f"{row}: d {level}", (x - 36, image.shape[0] - _MARGIN[1] + 24))
     write("columns (y): terrain", (10, _MARGIN[3] - 14))
-    write("rows (x): difficulty", (10, sheet.shape[0] - _MARGIN[1] + 24))
+    write("rows (x): difficulty", (10, image.shape[0] - _MARGIN[1] + 24))
     title = f"{rows} x {cols} patches of {size_x:g} m x {size_y:g} m, seed {config.seed}"
     write(title, (_MARGIN[0], 40), 0.7)
     radius = max(2, round(scale * config.spawn_radius))
     for origin in terrain_map.env_origins.reshape(-1, 3).tolist():
-        cv2.circle(sheet, pixel(*origin[:2]), radius, _PAPER, 3, cv2.LINE_AA)
-        cv2.circle(sheet, pixel(*origin[:2]), radius, _SPAWN, 1, cv2.LINE_AA)
-        cv2.circle(sheet, pixel(*origin[:2]), 2, _SPAWN, -1, cv2.LINE_AA)
+        cv2.circle(image, pixel(*origin[:2]), radius, _BACKGROUND, 3, cv2.LINE_AA)
+        cv2.circle(image, pixel(*origin[:2]), radius, _SPAWN_COLOR, 1, cv2.LINE_AA)
+        cv2.circle(image, pixel(*origin[:2]), 2, _SPAWN_COLOR, -1, cv2.LINE_AA)

@@ -1,4 +1,4 @@
-"""Rectangle cover: a shape of cells as few rectangles, which may overlap."""
+"""Cover a set of cells with few rectangles, which may overlap."""
 
 from collections.abc import Iterator
 
@@ -7,19 +7,19 @@ from numpy.typing import NDArray
 
 Mask = NDArray[np.bool_]
 Span = tuple[int, int, int, int]
-"""Cells i0 to i1 and j0 to j1, ends not included."""
+"""Cells i0 to i1 and j0 to j1, ends excluded."""
 
 
-def rectangle_cover(wanted: Mask, allowed: Mask) -> list[Span]:
-    """Return few rectangles that together hold all of `wanted` and nothing outside `allowed`.
+def rectangle_cover(required: Mask, allowed: Mask) -> list[Span]:
+    """Return few rectangles that cover all of `required` and nothing outside of `allowed`.
 
-    The fewest are NP-hard to find; this is the greedy cover, never more than ln(n) + 1 times as
-    many: of the rectangles that cannot grow any more, take the one that holds most of what is still
-    missing, until nothing is. Last, those that the others have made needless are dropped.
+    The minimum cover is NP-hard. This is the greedy cover, which is at most ln(n) + 1 times as
+    large: repeatedly take the maximal rectangle that covers most of the missing cells. Rectangles
+    that became redundant are dropped at the end.
 
     Args:
-        wanted: Cells to cover, shape (nx, ny).
-        allowed: Cells that may be covered, which includes all of `wanted`.
+        required: Cells to cover, shape (nx, ny).
+        allowed: Cells that may be covered, a superset of `required`.
     """
     import cv2
 
@@ -27,7 +27,7 @@ def rectangle_cover(wanted: Mask, allowed: Mask) -> list[Span]:
         allowed.astype(np.uint8), connectivity=4
     )
     spans: list[Span] = []
-    present = np.bincount(labels[wanted], minlength=count) > 0
+    present = np.bincount(labels[required], minlength=count) > 0
     for k in np.flatnonzero(present):
         # OpenCV's x is the second index.
         j0, i0, width, height, area = (int(n) for n in stats[k])
@@ -36,35 +36,35 @@ def rectangle_cover(wanted: Mask, allowed: Mask) -> list[Span]:
             spans.append((i0, i1, j0, j1))
             continue
         inside = labels[i0:i1, j0:j1] == k
-        part = _cover_part(wanted[i0:i1, j0:j1] & inside, inside)
+        part = _cover_component(required[i0:i1, j0:j1] & inside, inside)
         spans += [(i0 + a, i0 + b, j0 + c, j0 + d) for a, b, c, d in part]
     return spans
 
 
-def _cover_part(wanted: Mask, allowed: Mask) -> list[Span]:
-    # Rows and columns that repeat the one before add nothing but work.
-    x, y = _changes(wanted, allowed, axis=0), _changes(wanted, allowed, axis=1)
+def _cover_component(required: Mask, allowed: Mask) -> list[Span]:
+    # Merge rows and columns that equal the previous one.
+    x, y = _changes(required, allowed, axis=0), _changes(required, allowed, axis=1)
     corner = np.ix_(x[:-1], y[:-1])
-    candidates = np.array(list(_largest_rectangles(allowed[corner])))
+    candidates = np.array(list(_maximal_rectangles(allowed[corner])))
     area = np.outer(np.diff(x), np.diff(y))
-    missing = np.where(wanted[corner], area, 0)
+    missing = np.where(required[corner], area, 0)
     chosen: list[NDArray[np.int64]] = []
     while missing.any():
-        i0, i1, j0, j1 = chosen_one = candidates[np.argmax(_sums(missing, candidates))]
+        i0, i1, j0, j1 = best = candidates[np.argmax(_span_sums(missing, candidates))]
         missing[i0:i1, j0:j1] = 0
-        chosen.append(chosen_one)
-    kept = _needed(np.array(chosen), wanted[corner])
+        chosen.append(best)
+    kept = _drop_redundant(np.array(chosen), required[corner])
     return [(int(x[a]), int(x[b]), int(y[c]), int(y[d])) for a, b, c, d in kept]
 
 
-def _changes(wanted: Mask, allowed: Mask, axis: int) -> NDArray[np.int64]:
-    """Return where rows (or columns) differ from the one before, with both ends."""
-    differ = (np.diff(wanted, axis=axis) | np.diff(allowed, axis=axis)).any(axis=1 - axis)
-    return np.concatenate([[0], np.flatnonzero(differ) + 1, [wanted.shape[axis]]])
+def _changes(required: Mask, allowed: Mask, axis: int) -> NDArray[np.int64]:
+    """Return where rows (or columns) differ from the previous one, including both ends."""
+    differ = (np.diff(required, axis=axis) | np.diff(allowed, axis=axis)).any(axis=1 - axis)
+    return np.concatenate([[0], np.flatnonzero(differ) + 1, [required.shape[axis]]])
 
 
-def _largest_rectangles(allowed: Mask) -> Iterator[Span]:
-    """Yield the rectangles within `allowed` that cannot grow in any direction."""
+def _maximal_rectangles(allowed: Mask) -> Iterator[Span]:
+    """Yield the maximal rectangles within `allowed`."""
     rows = len(allowed)
     empty = np.zeros(allowed.shape[1], dtype=bool)
     for i0 in range(rows):
@@ -81,7 +81,7 @@ def _largest_rectangles(allowed: Mask) -> Iterator[Span]:
                     yield i0, i1, int(j0), int(j1)
 
 
-def _sums(values: NDArray[np.int64], spans: NDArray[np.int64]) -> NDArray[np.int64]:
+def _span_sums(values: NDArray[np.int64], spans: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the sum of `values` within each span, from a summed-area table."""
     table = np.zeros((values.shape[0] + 1, values.shape[1] + 1), dtype=np.int64)
     table[1:, 1:] = values.cumsum(axis=0).cumsum(axis=1)
@@ -90,15 +90,15 @@ def _sums(values: NDArray[np.int64], spans: NDArray[np.int64]) -> NDArray[np.int
     return sums
 
 
-def _needed(spans: NDArray[np.int64], wanted: Mask) -> NDArray[np.int64]:
-    """Return the spans without those whose wanted cells others hold, smallest tried first."""
-    depth = np.zeros(wanted.shape, dtype=np.int64)
+def _drop_redundant(spans: NDArray[np.int64], required: Mask) -> NDArray[np.int64]:
+    """Return the spans without those whose required cells others cover, last ones first."""
+    depth = np.zeros(required.shape, dtype=np.int64)
     for i0, i1, j0, j1 in spans:
         depth[i0:i1, j0:j1] += 1
     kept = []
     for span in spans[::-1]:
         i0, i1, j0, j1 = span
-        if (depth[i0:i1, j0:j1][wanted[i0:i1, j0:j1]] > 1).all():
+        if (depth[i0:i1, j0:j1][required[i0:i1, j0:j1]] > 1).all():
             depth[i0:i1, j0:j1] -= 1
         else:
             kept.append(span)

@@ -1,6 +1,7 @@
-"""The registry: every file in `terrainkit/terrains` is a terrain, named as its file is.
+"""The registry of terrains.
 
-Another package brings terrains of its own as entry points of the group `terrainkit.terrains`.
+Each module in `terrainkit/terrains` is one terrain, named after its file. Other packages add
+terrains as entry points of the group `terrainkit.terrains`.
 """
 
 import importlib
@@ -20,55 +21,57 @@ if TYPE_CHECKING:
 ENTRY_POINTS = "terrainkit.terrains"
 
 INVERTED = "_inverted"
-"""Ends the name that a terrain which stands upside down has in a preset, and so in a map."""
+"""Suffix of the name of an inverted terrain in presets and maps."""
 
 
 @cache
-def names() -> tuple[str, ...]:
-    """Return the name of each terrain of ours, in alphabetical order; imports none of them."""
+def terrain_names() -> tuple[str, ...]:
+    """Return the names of the built-in terrains in alphabetical order, without importing them."""
     return tuple(sorted(module.name for module in pkgutil.iter_modules(terrains.__path__)))
 
 
-def plugins() -> dict[str, "EntryPoint"]:
-    """Return the entry point of each terrain that another installed package brings, by name."""
+def plugin_terrains() -> dict[str, "EntryPoint"]:
+    """Return the entry points of terrains from other installed packages, by name."""
     from importlib.metadata import entry_points
 
     return {point.name: point for point in entry_points(group=ENTRY_POINTS)}
 
 
 @cache
-def find(name: str) -> type[Terrain]:
-    """Return the terrain called `name`; ours go before those of other packages.
+def get_terrain(name: str) -> type[Terrain]:
+    """Return the terrain class `name`. Built-in terrains take precedence over plugins.
 
     Raises:
-        ConfigError: if there is none, listing those that exist.
+        ConfigError: if there is no such terrain, or a plugin cannot be loaded.
     """
-    if name in names():
-        return _ours(name)
-    others = plugins()
-    if name not in others:
-        upright = name.removesuffix(INVERTED)
-        if upright != name and upright in names() and "inverted" in parameters_of(find(upright)):
-            raise ConfigError(f"no terrain {name!r}; it is {upright} with inverted = true")
-        raise ConfigError(f"no terrain {name!r}; {known_names(name, [*names(), *others])}")
+    if name in terrain_names():
+        return _builtin_terrain(name)
+    plugins = plugin_terrains()
+    if name not in plugins:
+        base = name.removesuffix(INVERTED)
+        if base in terrain_names() and "inverted" in parameters_of(get_terrain(base)):
+            raise ConfigError(f"no terrain {name!r}; use {base} with inverted = true")
+        raise ConfigError(f"no terrain {name!r}; {known_names(name, [*terrain_names(), *plugins])}")
     try:
-        found = others[name].load()
+        terrain = plugins[name].load()
     except (ImportError, AttributeError) as error:
-        raise ConfigError(f"{name} ({others[name].value}) cannot be loaded: {error}") from error
-    if not (isinstance(found, type) and issubclass(found, Terrain)):
+        raise ConfigError(f"{name} ({plugins[name].value}) cannot be loaded: {error}") from error
+    if not (isinstance(terrain, type) and issubclass(terrain, Terrain)):
         raise ConfigError(
-            f"{name} ({others[name].value}) is {found!r}; wanted a subclass of Terrain"
+            f"{name} ({plugins[name].value}): got {terrain!r}; expected a subclass of Terrain"
         )
-    return found
+    return terrain
 
 
-def _ours(name: str) -> type[Terrain]:
+def _builtin_terrain(name: str) -> type[Terrain]:
     module = importlib.import_module(f"{terrains.__name__}.{name}")
-    found = [
+    classes = [
         value
         for value in vars(module).values()
         if isinstance(value, type) and issubclass(value, Terrain) and value.kind() == name
     ]
-    if len(found) != 1:
-        raise ConfigError(f"{module.__file__} has {len(found)} subclasses of Terrain; wanted one")
-    return found[0]
+    if len(classes) != 1:
+        raise ConfigError(
+            f"{module.__file__}: got {len(classes)} subclasses of Terrain; expected one"
+        )
+    return classes[0]

@@ -1,4 +1,4 @@
-"""The surface: height and slope of the ground at any point."""
+"""Height and gradient of the ground at any point."""
 
 from dataclasses import dataclass
 
@@ -10,41 +10,41 @@ from terrainkit.walls import center_heights
 
 @dataclass(frozen=True, kw_only=True)
 class SurfacePoints:
-    """The ground at n points."""
+    """Height and gradient at n points."""
 
     height: NDArray[np.float64]
     """Height [m], shape (n,)."""
 
     gradient: NDArray[np.float64]
-    """Rise per cell along x and y [m], shape (n, 2)."""
+    """Height difference per cell along x and y [m], shape (n, 2)."""
 
 
 def surface_at(
-    heights: NDArray[np.float32], place: NDArray[np.float64], *, threshold: float
+    heights: NDArray[np.float32], points: NDArray[np.float64], *, threshold: float
 ) -> SurfacePoints:
-    """Return the ground at `place`.
+    """Evaluate the surface at `points`.
 
     Between four samples without a wall the ground is two triangles that share the diagonal from
     (i, j) to (i + 1, j + 1), the one along which MuJoCo splits a cell. A quad with a wall is a fan
-    of triangles around its center; see :mod:`terrainkit.walls`. Beyond the outermost samples the
-    ground goes on level.
+    of triangles around its center; see :mod:`terrainkit.walls`. Beyond the outermost samples
+    the ground continues level.
 
     Args:
         heights: Samples [m], shape (nx, ny).
-        place: Points in units of samples: (0, 0) is at `heights[0, 0]`; shape (n, 2), finite.
-        threshold: Difference between neighbours above which there is a wall [m].
+        points: Finite points in units of samples, shape (n, 2); (0, 0) is at `heights[0, 0]`.
+        threshold: Difference between neighboring samples above which there is a wall [m].
     """
     limit = np.array(heights.shape) - 1
-    beyond = (place < 0) | (place > limit)
-    place = np.clip(place, 0, limit)
-    low = np.minimum(place.astype(np.int64), np.maximum(limit - 1, 0))
+    beyond = (points < 0) | (points > limit)
+    points = np.clip(points, 0, limit)
+    low = np.minimum(points.astype(np.int64), np.maximum(limit - 1, 0))
     i, j = low.T
     i1, j1 = np.minimum(low + 1, limit).T
     samples = np.stack([heights[i, j], heights[i1, j], heights[i1, j1], heights[i, j1]], axis=1)
-    # Compared as float32, as everywhere: a step that is just a wall must be one in every view.
+    # Compare as float32, as everywhere, so that all views agree on which edges are walls.
     walls = np.abs(np.roll(samples, -1, axis=1) - samples) > threshold
     corners = samples.astype(np.float64)
-    u, v = (place - low).T
+    u, v = (points - low).T
     height, gradient = _two_triangles(corners, u, v)
     cut = walls.any(axis=1)
     if cut.any():
@@ -75,7 +75,7 @@ def _fan(
     v: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     n = np.arange(len(u))
-    edge = np.argmin(np.stack([v, 1 - u, 1 - v, u]), axis=0)  # the triangle of which edge
+    edge = np.argmin(np.stack([v, 1 - u, 1 - v, u]), axis=0)  # edge of the triangle
     s = np.choose(edge, [u, v, 1 - u, 1 - v])  # along the edge, 0 to 1
     t = np.choose(edge, [v, 1 - u, 1 - v, u])  # away from it, 0 to 1/2
     start, end = corners[n, edge], corners[n, (edge + 1) % 4]
@@ -83,7 +83,7 @@ def _fan(
     wall = walls[n, edge]
     near = np.where(s < 0.5, start, end)
     own = center[n, np.where(s < 0.5, edge, (edge + 1) % 4)]
-    # On a wall's triangle the ground is level along the edge; on another it joins both ends.
+    # The triangle of a wall is level along the edge; any other interpolates between its ends.
     along = np.where(wall, 0.0, end - start)
     away = np.where(wall, 2 * (own - near), 2 * center[n, edge] - start - end)
     height = np.where(wall, near, start) + along * s + away * t

@@ -1,4 +1,4 @@
-"""TerrainMap: the ground that everything else is a view of."""
+"""TerrainMap: a generated map and the views of its surface."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,20 +17,20 @@ from terrainkit.patch import Patch
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from terrainkit.boxes import BoxCover
+    from terrainkit.box_decomposition import BoxDecomposition
     from terrainkit.mesh import TriMesh
     from terrainkit.surface import SurfacePoints
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class TerrainMap:
-    """A map of rows x cols patches with a border, and the views of its surface."""
+    """A map of rows x cols patches with a border."""
 
     config: MapConfig
-    """What the map was made from."""
+    """The configuration that the map was generated from."""
 
     grid: Grid
-    """Where the samples stand."""
+    """Positions of the samples."""
 
     heights: NDArray[np.float32]
     """Heights [m], shape `grid.shape`: first index x, second y."""
@@ -39,10 +39,10 @@ class TerrainMap:
     """Spawn origin of each patch [m], shape (rows, cols, 3)."""
 
     terrain_types: NDArray[np.int32]
-    """Terrain of each patch, as an index into `terrain_names`, shape (rows, cols)."""
+    """Terrain type of each patch as an index into `terrain_names`, shape (rows, cols)."""
 
     terrain_names: tuple[str, ...]
-    """Names of the terrains in the mix."""
+    """Names of the sub-terrains."""
 
     difficulty: NDArray[np.float32]
     """Difficulty of each patch, 0 to 1, shape (rows, cols)."""
@@ -59,13 +59,13 @@ class TerrainMap:
         """Return the height of the ground [m] at `xy`.
 
         Args:
-            xy: Points [m], shape (..., 2). Beyond the map the ground goes on level.
+            xy: Points [m], shape (..., 2). Beyond the map the ground continues level.
 
         Returns:
-            Heights [m], shape (...). On a wall, that of one of its sides.
+            Heights [m], shape (...). On a wall, the height of one of its sides.
         """
         points, shape = _points(xy)
-        return self._at(points).height.reshape(shape)
+        return self._surface_at(points).height.reshape(shape)
 
     def normal(self, xy: ArrayLike) -> NDArray[np.float64]:
         """Return the upward unit normal of the ground at `xy`.
@@ -74,20 +74,20 @@ class TerrainMap:
             xy: Points [m], shape (..., 2).
 
         Returns:
-            Unit vectors, shape (..., 3). On a wall, that of the ground at one of its sides.
+            Unit vectors, shape (..., 3). On a wall, the normal of the ground on one of its sides.
         """
         points, shape = _points(xy)
-        downhill = 0.0 - self._at(points).gradient / self.grid.cell
+        downhill = 0.0 - self._surface_at(points).gradient / self.grid.cell
         normal = np.column_stack([downhill, np.ones(len(downhill))])
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         return normal.reshape(*shape, 3)
 
     def mesh(self, *, merged: bool = True, closed: bool = False) -> "TriMesh":
-        """Return the surface as triangles; see :mod:`terrainkit.mesh`.
+        """Return the surface as a triangle mesh; see :mod:`terrainkit.mesh`.
 
         Args:
-            merged: Join coplanar faces where nothing is lost; else two triangles for each cell.
-            closed: Add a skirt and a bottom, for a watertight solid.
+            merged: Merge coplanar faces; otherwise two triangles per cell.
+            closed: Add sides and a bottom to make a watertight solid.
         """
         from terrainkit.mesh import closed_mesh, full_mesh, merged_mesh
 
@@ -95,15 +95,15 @@ class TerrainMap:
         mesh = (merged_mesh if merged else full_mesh)(self.heights, self.grid, threshold)
         return closed_mesh(mesh) if closed else mesh
 
-    def boxes(self) -> "BoxCover":
-        """Return the level parts of the ground as boxes; see :mod:`terrainkit.boxes`."""
-        from terrainkit.boxes import box_cover
+    def boxes(self) -> "BoxDecomposition":
+        """Return the level ground as boxes; see :mod:`terrainkit.box_decomposition`."""
+        from terrainkit.box_decomposition import decompose_boxes
 
         config = self.config
-        return box_cover(self.heights, self.grid, config.wall_threshold, self._seams())
+        return decompose_boxes(self.heights, self.grid, config.wall_threshold, self._patch_edges())
 
     def height_field_raw(self, vertical_scale: float = 0.005) -> NDArray[np.int16]:
-        """Return the heights as Isaac Gym's `add_heightfield` wants them.
+        """Return the heights in the format of Isaac Gym's `add_heightfield`.
 
         Args:
             vertical_scale: Height of one unit [m].
@@ -119,37 +119,37 @@ class TerrainMap:
             ExportError: if a height does not fit in 16 bits at this scale.
         """
         if not 0 < vertical_scale < np.inf:
-            raise ConfigError(f"vertical_scale is {vertical_scale:g}; wanted above 0")
+            raise ConfigError(f"vertical_scale: got {vertical_scale:g}; expected a number > 0")
         units = np.rint(self.heights.T / vertical_scale)
         limit = np.iinfo(np.int16)
         low, high = float(units.min()), float(units.max())
         if not (limit.min <= low and high <= limit.max):
-            # A hundredth more, so that it still is enough once it is rounded for the message.
-            least = max(high / limit.max, low / limit.min) * vertical_scale * 1.01
+            # 1 % more, so that the rounded value in the message is sufficient.
+            minimum = max(high / limit.max, low / limit.min) * vertical_scale * 1.01
             raise ExportError(
                 f"heights from {self.heights.min():g} to {self.heights.max():g} m do not fit in "
-                f"int16 at vertical_scale {vertical_scale:g}; wanted {least:.3g} or more"
+                f"int16 at vertical_scale {vertical_scale:g}; expected at least {minimum:.3g}"
             )
         return np.ascontiguousarray(units, dtype=np.int16)
 
     @property
     def first_sample(self) -> tuple[float, float]:
-        """Where `heights[0, 0]` stands, x and y [m]: half a cell inside the corner of the map."""
+        """Position of `heights[0, 0]`, x and y [m]: half a cell inside the corner of the map."""
         return self.grid.lower[0] + self.grid.cell / 2, self.grid.lower[1] + self.grid.cell / 2
 
     def require_finite(self) -> None:
-        """Raise ExportError unless every height and origin is a number that a view can hold."""
+        """Raise ExportError if a height or an origin is not finite or out of range."""
         for name in ("heights", "env_origins"):
             values = getattr(self, name)
             # One pass each: NaN makes both comparisons false.
             if not (values.min() >= -MAX_VALUE and values.max() <= MAX_VALUE):
                 raise ExportError(
-                    f"{name} holds numbers that are not finite, or beyond {MAX_VALUE:g} m; "
-                    "terrainkit check says where"
+                    f"{name} has values that are not finite or beyond {MAX_VALUE:g} m; "
+                    "run terrainkit check-map for details"
                 )
 
-    def tile(self, row: int, col: int) -> Patch:
-        """Return patch (row, col) of this map; :func:`terrainkit.tile` makes one without a map.
+    def patch(self, row: int, col: int) -> Patch:
+        """Return patch (row, col); :func:`terrainkit.make_patch` builds one without a map.
 
         Raises:
             IndexError: if there is no such patch.
@@ -167,7 +167,7 @@ class TerrainMap:
         )
 
     def assign(self, num_envs: int, max_init_level: int | None = None, seed: int = 0) -> Assignment:
-        """Return where `num_envs` environments start; see :mod:`terrainkit.curriculum`."""
+        """Assign patches to `num_envs` environments; see :mod:`terrainkit.curriculum`."""
         rows, cols = self.difficulty.shape
         levels, columns = assign_levels(num_envs, rows, cols, max_init_level, seed)
         return Assignment(
@@ -181,7 +181,7 @@ class TerrainMap:
         self,
         levels: ArrayLike,
         distance: ArrayLike,
-        commanded: ArrayLike,
+        command_distance: ArrayLike,
         *,
         seed: int | Sequence[int],
         top_levels: int = 3,
@@ -190,7 +190,7 @@ class TerrainMap:
         return update_levels(
             levels,
             distance,
-            commanded,
+            command_distance,
             rows=len(self.difficulty),
             patch_length=self.config.patch_size[0],
             seed=seed,
@@ -198,37 +198,37 @@ class TerrainMap:
         )
 
     def save(self, path: "str | Path", *, overwrite: bool = False, **options: Any) -> "Path":
-        """Write the map in the format that `path` ends in; see :mod:`terrainkit.export`."""
+        """Write the map in the format of the suffix of `path`; see :mod:`terrainkit.export`."""
         from terrainkit.export import export
 
         return export(self, path, overwrite=overwrite, **options)
 
     @classmethod
     def load(cls, path: "str | Path") -> Self:
-        """Read a map from a .npz file.
+        """Load a map from a .npz file.
 
         Raises:
-            MapFileError: if the file is missing, foreign, truncated, or not a whole map.
+            MapFileError: if the file is missing, truncated, or not a map.
         """
         from terrainkit.export.npz import read_map
 
         return read_map(cls, path)
 
-    def _seams(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the first cell of each patch along x and y, and the end of the last."""
+    def _patch_edges(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the first cell of each patch along x and y, and the end of the last patch."""
         (rows, cols), border = self.difficulty.shape, self.config.border_cells
         x, y = self.config.patch_shape
         return border + x * np.arange(rows + 1), border + y * np.arange(cols + 1)
 
-    def _at(self, points: NDArray[np.float64]) -> "SurfacePoints":
+    def _surface_at(self, points: NDArray[np.float64]) -> "SurfacePoints":
         from terrainkit.surface import surface_at
 
-        place = (points - self.first_sample) / self.grid.cell
-        return surface_at(self.heights, place, threshold=self.config.wall_threshold)
+        index = (points - self.first_sample) / self.grid.cell
+        return surface_at(self.heights, index, threshold=self.config.wall_threshold)
 
 
 def _points(xy: ArrayLike) -> tuple[NDArray[np.float64], tuple[int, ...]]:
     points = np.asarray(xy, dtype=np.float64)
     if points.shape[-1:] != (2,) or not np.isfinite(points).all():
-        raise ConfigError(f"xy has shape {points.shape}; wanted (..., 2), every number finite")
+        raise ConfigError(f"xy: got shape {points.shape}; expected finite values of shape (..., 2)")
     return points.reshape(-1, 2), points.shape[:-1]

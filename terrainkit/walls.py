@@ -1,7 +1,7 @@
-"""Walls: where the ground between two samples is vertical, and what that does to a quad.
+"""Walls: edges between two samples at which the ground is vertical.
 
-A quad lies between four neighbouring samples. Its corners are counted anticlockwise from the one
-with the smallest x and y, and edge k runs from corner k to corner k + 1:
+A quad is the square between four neighboring samples. Its corners are numbered counterclockwise
+from the one with the smallest x and y. Edge k runs from corner k to corner k + 1:
 
 .. code-block:: text
 
@@ -12,9 +12,9 @@ with the smallest x and y, and edge k runs from corner k to corner k + 1:
     |   0 --0-- 1
     +-----------> x
 
-An edge whose ends differ by more than a threshold is a wall: the ground stays level from either end
-to the middle of the edge and is vertical there. A quad with a wall is cut along its midlines, and
-what its corners have in common at its center follows from the edges that are not walls.
+An edge whose ends differ by more than a threshold is a wall: the ground is level from either end to
+the midpoint of the edge, and vertical there. A quad with a wall is split along its midlines. The
+edges that are not walls determine which corners share a height at its center.
 """
 
 from functools import cache
@@ -28,16 +28,19 @@ _ROWS = 32
 def wall_edges(
     heights: NDArray[np.float32], threshold: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return which edges along x, shape (nx - 1, ny), and along y, (nx, ny - 1), are walls.
+    """Return which edges are walls.
 
     Args:
         heights: Samples [m], shape (nx, ny).
-        threshold: Largest difference that is no wall [m]; infinite for no walls.
+        threshold: Largest difference that is not a wall [m]; infinite for no walls.
+
+    Returns:
+        Masks of the edges along x, shape (nx - 1, ny), and along y, shape (nx, ny - 1).
     """
     nx, ny = heights.shape
     x = np.empty((nx - 1, ny), dtype=bool)
     y = np.empty((nx, ny - 1), dtype=bool)
-    # A few rows at a time: their differences stay in the cache, and no map-sized array is made.
+    # In blocks of rows, so that the differences stay in the cache and no large array is allocated.
     for i in range(0, nx, _ROWS):
         rows = heights[i : i + _ROWS + 1]
         np.greater(np.abs(np.diff(rows, axis=0)), threshold, out=x[i : i + _ROWS])
@@ -45,21 +48,21 @@ def wall_edges(
     return x, y
 
 
-def joined_corners(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which corners of a quad are joined by edges without a wall, shape (n, 4, 4).
+def connected_corners(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which corners of a quad are connected by edges without a wall, shape (n, 4, 4).
 
     Args:
         walls: Whether each edge is a wall, shape (n, 4).
     """
-    joined: NDArray[np.bool_] = _joined_cases()[walls @ _CASE]
+    joined: NDArray[np.bool_] = _connected_cases()[walls @ _CASE]
     return joined
 
 
 def center_heights(corners: NDArray[np.floating], walls: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return the height that each corner of a quad brings to the quad's center, shape (n, 4).
+    """Return the height of the ground of each corner at the center of its quad, shape (n, 4).
 
-    Corners that are joined bring the same height, so that no crack opens; corners with only walls
-    between them bring different ones, and the walls meet there.
+    Connected corners share one height, so the surface has no cracks. Corners that are separated by
+    walls have different heights, and the walls meet at the center.
 
     Args:
         corners: Heights of the corners [m], shape (n, 4).
@@ -69,7 +72,7 @@ def center_heights(corners: NDArray[np.floating], walls: NDArray[np.bool_]) -> N
     return centers
 
 
-def _joined(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _merge_spans(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
     joined = np.eye(4, dtype=bool)
     for _ in range(3):
         for k in range(4):
@@ -82,22 +85,22 @@ def _center_weights(joined: NDArray[np.bool_]) -> NDArray[np.float64]:
     weights = joined.astype(float)
     for k in range(4):
         if joined[k].sum() == 3:
-            # Three corners lie in one plane; at the center it is midway between the outer two.
+            # Three corners define a plane; at the center it is midway between the outer two.
             missing = int(np.flatnonzero(~joined[k])[0])
             weights[k, (missing + 2) % 4] = 0.0
     weights /= weights.sum(axis=1, keepdims=True)
     return weights
 
 
-# There are 16 ways to put walls on four edges; each is a row of these tables.
+# Each row of these tables is one of the 16 combinations of walls on four edges.
 _CASE = np.array([1, 2, 4, 8])
 
 
 @cache
-def _joined_cases() -> NDArray[np.bool_]:
-    return np.array([_joined((case & _CASE) > 0) for case in range(16)])
+def _connected_cases() -> NDArray[np.bool_]:
+    return np.array([_merge_spans((case & _CASE) > 0) for case in range(16)])
 
 
 @cache
 def _center_cases() -> NDArray[np.float64]:
-    return np.array([_center_weights(joined) for joined in _joined_cases()])
+    return np.array([_center_weights(joined) for joined in _connected_cases()])

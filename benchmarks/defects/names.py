@@ -1,9 +1,9 @@
-"""Defects of names."""
+"""Defects of names (NAM)."""
 
-from defects.patient import NotHereError, Patient, Subjects, child, kind, parent
+from defects.mutant import Mutant, NotApplicableError, Subjects, child, mutation, parent
 
 
-def _rename_link(robot: Patient, old: str, new: str) -> None:
+def _rename_link(robot: Mutant, old: str, new: str) -> None:
     robot.link(old).set("name", new)
     for joint in robot.joints():
         for tag, name in (("child", child(joint)), ("parent", parent(joint))):
@@ -11,11 +11,11 @@ def _rename_link(robot: Patient, old: str, new: str) -> None:
                 joint.find(tag).set("link", new)
 
 
-def _typo(robot: Patient, name: str) -> str:
-    """Return a name with one letter of its longest word lost, doubled or swapped."""
+def _misspell(robot: Mutant, name: str) -> str:
+    """Return a name with one letter of its longest word removed, duplicated or swapped."""
     word = max(name.removesuffix("_joint").removesuffix("_link").split("_"), key=len)
     at = robot.rng.randrange(1, len(word) - 1)
-    wrong = robot.choose(
+    wrong = robot.pick(
         [
             word[:at] + word[at + 1 :],
             word[:at] + word[at] + word[at:],
@@ -23,28 +23,28 @@ def _typo(robot: Patient, name: str) -> str:
         ]
     )
     if wrong == word:
-        raise NotHereError
+        raise NotApplicableError
     return name.replace(word, wrong, 1)
 
 
-@kind("NAM001", "warning", "a typo in the name of a joint")
-def joint_typo(robot: Patient) -> Subjects:
-    joint = robot.choose(robot.leg_joints())
-    joint.set("name", _typo(robot, joint.get("name")))
+@mutation("NAM001", "warning", "misspelled joint name")
+def wrong_joint_name(robot: Mutant) -> Subjects:
+    joint = robot.pick(robot.leg_joints())
+    joint.set("name", _misspell(robot, joint.get("name")))
     return [joint.get("name")]
 
 
-@kind("NAM001", "warning", "a typo in the name of a link")
-def link_typo(robot: Patient) -> Subjects:
-    link = robot.choose(robot.leg_links()).get("name")
-    wrong = _typo(robot, link)
+@mutation("NAM001", "warning", "misspelled link name")
+def wrong_link_name(robot: Mutant) -> Subjects:
+    link = robot.pick(robot.leg_links()).get("name")
+    wrong = _misspell(robot, link)
     _rename_link(robot, link, wrong)
     return [wrong]
 
 
-@kind("NAM001", "warning", "other letters in the name of a joint")
-def joint_case(robot: Patient) -> Subjects:
-    joint = robot.choose(robot.leg_joints())
+@mutation("NAM001", "warning", "joint name in the wrong case")
+def joint_case(robot: Mutant) -> Subjects:
+    joint = robot.pick(robot.leg_joints())
     words = joint.get("name").split("_")
     at = robot.rng.randrange(len(words))
     words[at] = words[at].upper() if words[at].islower() else words[at].lower()
@@ -52,44 +52,44 @@ def joint_case(robot: Patient) -> Subjects:
     return [joint.get("name")]
 
 
-@kind("NAM001", "warning", "a word left out of the name of a joint")
-def shorter(robot: Patient) -> Subjects:
-    joint = robot.choose(robot.leg_joints())
+@mutation("NAM001", "warning", "joint name without its suffix")
+def short_name(robot: Mutant) -> Subjects:
+    joint = robot.pick(robot.leg_joints())
     name = joint.get("name").removesuffix("_joint")
     if name in {j.get("name") for j in robot.joints()} or name == joint.get("name"):
-        raise NotHereError
+        raise NotApplicableError
     joint.set("name", name)
     return [name]
 
 
-@kind("NAM002", "warning", "a name that is no identifier")
-def no_identifier(robot: Patient) -> Subjects:
-    joint = robot.choose(robot.moving())
+@mutation("NAM002", "warning", "joint name that is not an identifier")
+def no_identifier(robot: Mutant) -> Subjects:
+    joint = robot.pick(robot.actuated_joints())
     name = joint.get("name")
-    joint.set("name", robot.choose([name.replace("_", " "), name.replace("_", "-"), f"1_{name}"]))
+    joint.set("name", robot.pick([name.replace("_", " "), name.replace("_", "-"), f"1_{name}"]))
     return [joint.get("name")]
 
 
-@kind("NAM002", "warning", "a link whose name has a dot or a slash")
-def dotted(robot: Patient) -> Subjects:
-    link = robot.choose(robot.leg_links()).get("name")
-    wrong = link.replace("_", robot.choose([".", "/", ":"]), 1)
+@mutation("NAM002", "warning", "link name with a dot, slash or colon")
+def special_characters(robot: Mutant) -> Subjects:
+    link = robot.pick(robot.leg_links()).get("name")
+    wrong = link.replace("_", robot.pick([".", "/", ":"]), 1)
     _rename_link(robot, link, wrong)
     return [wrong]
 
 
-@kind("NAM002", "error", "two names that become one")
-def colliding(robot: Patient) -> Subjects:
+@mutation("NAM002", "error", "two names that become equal")
+def name_collision(robot: Mutant) -> Subjects:
     one, other = (link.get("name") for link in robot.rng.sample(robot.leg_links(), 2))
     wrong = one.replace("_", "-", 1)
     _rename_link(robot, other, wrong)
     return [wrong, one]
 
 
-@kind("NAM003", "info", "a sensor on a leg that is named like a foot or the base")
-def trap(robot: Patient) -> Subjects:
-    word = robot.choose(["foot", "base"])
-    host = robot.choose(robot.leg_links()).get("name")
+@mutation("NAM003", "info", "sensor on a leg with the name of a foot or base")
+def sensor_name(robot: Mutant) -> Subjects:
+    word = robot.pick(["foot", "base"])
+    host = robot.pick(robot.leg_links()).get("name")
     name = f"{word}_camera"
     robot.insert(f'<link name="{name}"/>')
     robot.insert(

@@ -1,4 +1,4 @@
-"""Triangles of simple solids, and files of them."""
+"""Meshes of simple solids, and their files."""
 
 from functools import cache
 
@@ -8,7 +8,7 @@ Triangles = np.ndarray
 
 
 def box(lower: np.ndarray, upper: np.ndarray) -> Triangles:
-    """Return the twelve triangles of a box, normals outward, shape (12, 3, 3)."""
+    """Return the triangles of a box with outward normals, shape (12, 3, 3)."""
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
     faces = [face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))]
@@ -16,15 +16,15 @@ def box(lower: np.ndarray, upper: np.ndarray) -> Triangles:
 
 
 @cache
-def sphere(rings: int, sectors: int) -> Triangles:
-    """Return a sphere of radius 1, shape (2 (rings - 1) sectors, 3, 3)."""
+def sphere(rings: int, segments: int) -> Triangles:
+    """Return a sphere of radius 1, shape (2 (rings - 1) segments, 3, 3)."""
     polar = np.linspace(0, np.pi, rings + 1)[:, None]
-    around = np.linspace(0, 2 * np.pi, sectors, endpoint=False)[None]
+    around = np.linspace(0, 2 * np.pi, segments, endpoint=False)[None]
     points = np.stack(
         [
             np.sin(polar) * np.cos(around),
             np.sin(polar) * np.sin(around),
-            np.broadcast_to(np.cos(polar), (rings + 1, sectors)),
+            np.broadcast_to(np.cos(polar), (rings + 1, segments)),
         ],
         axis=-1,
     )
@@ -35,13 +35,13 @@ def sphere(rings: int, sectors: int) -> Triangles:
     return np.concatenate([upper.reshape(-1, 3, 3), lower.reshape(-1, 3, 3)])
 
 
-def cylinder(radius: float, length: float, sectors: int = 24) -> Triangles:
-    """Return a cylinder along z."""
-    angle = np.linspace(0, 2 * np.pi, sectors, endpoint=False)
+def cylinder(radius: float, length: float, segments: int = 24) -> Triangles:
+    """Return the triangles of a cylinder along z."""
+    angle = np.linspace(0, 2 * np.pi, segments, endpoint=False)
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=-1) * radius
-    low = np.column_stack([ring, np.full(sectors, -length / 2)])
-    high = np.column_stack([ring, np.full(sectors, length / 2)])
-    after = np.roll(np.arange(sectors), -1)
+    low = np.column_stack([ring, np.full(segments, -length / 2)])
+    high = np.column_stack([ring, np.full(segments, length / 2)])
+    after = np.roll(np.arange(segments), -1)
     center = np.array([0, 0, length / 2])
     faces = [
         np.stack([low, low[after], high[after]], axis=1),
@@ -53,7 +53,7 @@ def cylinder(radius: float, length: float, sectors: int = 24) -> Triangles:
 
 
 def channel(lower: np.ndarray, upper: np.ndarray) -> Triangles:
-    """Return a U of three boxes within these bounds: its hull has nearly three times its volume."""
+    """Return a U of three boxes; the volume of its convex hull is nearly three times its own."""
     size = upper - lower
     wall = size * [1, 0.1, 1]
     floor = size * [1, 1, 0.1]
@@ -62,7 +62,7 @@ def channel(lower: np.ndarray, upper: np.ndarray) -> Triangles:
     return np.concatenate([left, right, box(lower, lower + floor)])
 
 
-def stl(triangles: Triangles, name: str = "made here") -> bytes:
+def stl(triangles: Triangles, name: str = "mutant") -> bytes:
     """Return a binary STL."""
     records = np.zeros(
         len(triangles), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")]
@@ -84,12 +84,12 @@ def read_stl(data: bytes) -> Triangles:
 
 
 def ascii_stl(triangles: Triangles) -> bytes:
-    lines = ["solid made_here"]
+    lines = ["solid mutant"]
     for corners in triangles:
         lines += ["facet normal 0 0 0", "outer loop"]
         lines += [f"vertex {x:.6g} {y:.6g} {z:.6g}" for x, y, z in corners]
         lines += ["endloop", "endfacet"]
-    return "\n".join([*lines, "endsolid made_here", ""]).encode()
+    return "\n".join([*lines, "endsolid mutant", ""]).encode()
 
 
 def ply(triangles: Triangles) -> bytes:

@@ -119,7 +119,7 @@ class Evaluate(PolicyCommand):
 
     def run(self) -> int:
         """Evaluate, and print or write the result."""
-        from terrainkit.atomic import atomic_write, check_target
+        from terrainkit.atomic_write import atomic_write, check_target
 
         output = Path(self.output) if self.output else None
         if output is not None:

@@ -77,8 +77,8 @@ class CheckRobot(Command):
     spec: Text = ""
     """The robot.toml of the robot to compare with."""
 
-    no_simulation: bool = False
-    """Do not run the rules that simulate the robot (drop test, standing test, joint sweep)."""
+    simulation: bool = True
+    """Run the rules that simulate the robot (drop test, standing test, joint sweep)."""
 
     strict: bool = False
     """Exit with code 1 if there are warnings."""
@@ -122,8 +122,8 @@ class CheckRobot(Command):
             ignore=reasons(self.ignore),
             packages=packages(self.package),
             xacro_arguments=xacro_arguments(self.xacro_arg),
-            strict=self.strict,
-            simulate=not self.no_simulation,
+            strict=self.flag("strict"),
+            simulate=self.flag("simulation"),
         )
         select_rules(settings)
         return settings
@@ -202,7 +202,7 @@ class CheckRobot(Command):
         if output is None:
             render.report(text)
         elif reports:
-            from terrainkit.atomic import atomic_write
+            from terrainkit.atomic_write import atomic_write
 
             _check_output(output, [path for r in reports for path in r.facts.model.sources])
             with atomic_write(output, overwrite=True) as path:
@@ -247,7 +247,7 @@ def _write_fixes(result: "FixResult", *, unsafe: bool) -> "Report":
 
 def _check_output(output: Path, inputs: Sequence[Path]) -> None:
     """Raise an error if the report cannot be written, or would replace a checked file."""
-    from terrainkit.atomic import check_target
+    from terrainkit.atomic_write import check_target
 
     check_target(output, overwrite=True)
     for path in inputs:

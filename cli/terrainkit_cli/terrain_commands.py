@@ -64,7 +64,9 @@ class Generate(ConfigCommand):
 
         config = self.changed_config()
         samples = config.grid.shape[0] * config.grid.shape[1]
-        export.check(self.output, samples, overwrite=self.overwrite)  # fail before generating
+        export.check_export(
+            self.output, samples, overwrite=self.overwrite
+        )  # fail before generating
         terrain_map = generate(config, progress=render.progress)
         terrain_map.save(self.output, overwrite=self.overwrite)
         render.result(written(terrain_map, self.output))
@@ -119,21 +121,22 @@ class List(Command):
 
     def run(self) -> int:
         """Print a table."""
-        from terrainkit.describe import describe, summaries
+        from terrainkit.terrain_docs import terrain_doc, terrain_summaries
 
         if not self.terrain:
-            render.table(list(summaries().items()))
-            if others := registry.plugins():
+            render.table(list(terrain_summaries().items()))
+            if others := registry.plugin_terrains():
                 render.result("\nfrom other packages:")
                 render.table([(f"  {name}", point.value) for name, point in others.items()])
             mixes = (
-                (name, ", ".join(c.name for c in presets.find(name))) for name in presets.names()
+                (name, ", ".join(c.name for c in presets.get_preset(name)))
+                for name in presets.preset_names()
             )
             render.result("\npresets:")
             render.table([(f"  {name}", mix) for name, mix in mixes])
             render.result("\nterrainkit list TERRAIN shows the parameters of one.")
             return 0
-        about = describe(self.terrain)
+        about = terrain_doc(self.terrain)
         render.result(f"{about.name}: {about.text}\n")
         rows = [("parameter", "easy", "hard", "")]
         rows += [(p.name, p.easy, p.hard, p.text) for p in about.parameters]
@@ -169,7 +172,7 @@ class Info(Command):
 
 
 def _print_map(terrain_map: TerrainMap) -> None:
-    from terrainkit.measure import hardness
+    from terrainkit.measured_difficulty import measured_difficulty
 
     config, grid = terrain_map.config, terrain_map.grid
     heights = terrain_map.heights
@@ -185,12 +188,12 @@ def _print_map(terrain_map: TerrainMap) -> None:
     }
     render.table(list(facts.items()))
     render.result("")
-    rows = [("column", "terrain", "difficulty", "hardness")]
+    rows = [("column", "terrain", "difficulty", "measured difficulty")]
     for col in range(config.cols):
-        tiles = [terrain_map.tile(row, col) for row in range(config.rows)]
-        hard = [hardness(t.heights, config.cell, float(t.origin[2])) for t in tiles]
-        names = ", ".join(dict.fromkeys(tile.terrain for tile in tiles))
-        levels = [tile.difficulty for tile in tiles]
+        patches = [terrain_map.patch(row, col) for row in range(config.rows)]
+        hard = [measured_difficulty(t.heights, config.cell, float(t.origin[2])) for t in patches]
+        names = ", ".join(dict.fromkeys(patch.terrain for patch in patches))
+        levels = [patch.difficulty for patch in patches]
         rows.append(
             (
                 str(col),
@@ -204,17 +207,17 @@ def _print_map(terrain_map: TerrainMap) -> None:
 
 def _print_patch(terrain_map: TerrainMap, row: int, col: int) -> None:
     try:
-        tile = terrain_map.tile(row, col)
+        patch = terrain_map.patch(row, col)
     except IndexError as error:
         raise ConfigError(str(error)) from None
-    x, y, z = (float(value) for value in tile.origin)
+    x, y, z = (float(value) for value in patch.origin)
     render.result(
-        f"patch ({row}, {col}): {tile.terrain} at difficulty {tile.difficulty:.3f}, "
+        f"patch ({row}, {col}): {patch.terrain} at difficulty {patch.difficulty:.3f}, "
         f"spawn origin ({x:g}, {y:g}, {z:g})\n"
     )
     rows = [("parameter", "asked", "built")]
-    for name, asked in tile.parameters.requested.items():
-        built = tile.parameters.realized[name]
+    for name, asked in patch.parameters.requested.items():
+        built = patch.parameters.realized[name]
         text = " x ".join(f"{v:g}" for v in built) if isinstance(built, tuple) else f"{built:g}"
         rows.append((name, f"{asked:g}", text))
     render.table(rows)
@@ -247,19 +250,19 @@ class Preview(Command):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Check(Command):
-    """Check that a map keeps every promise: spawns, patches, sizes, difficulty, mesh."""
+class CheckMap(Command):
+    """Validate a map: spawn origins, patches, sizes, difficulty, mesh."""
 
     map: MapFile
     """The map."""
 
     def run(self) -> int:
-        """Print what is wrong, and return 1 if anything is."""
-        from terrainkit.audit import audit
+        """Print the issues, and return 1 if there are any."""
         from terrainkit.export.npz import read_mesh
+        from terrainkit.validate import validate
 
         terrain_map = TerrainMap.load(self.map)
-        findings = audit(terrain_map, read_mesh(self.map))
+        findings = validate(terrain_map, read_mesh(self.map))
         for finding in findings:
             render.result(f"{finding.check}: {finding.message}")
         if findings:

@@ -1,8 +1,8 @@
-"""Export: a map as a file, in the format that the suffix names.
+"""Write a map in the format of the file suffix.
 
-Every file in this folder that has `SUFFIXES` is an exporter; nothing else lists them. Its function
-`export(terrain_map, path, ...)` writes `path` in full; the keyword-only arguments of that function
-are the options of the format. `BYTES_PER_SAMPLE` is the most memory that it takes for each sample.
+Each module in this folder that defines `SUFFIXES` is an exporter. Its function
+`export(terrain_map, path, ...)` writes `path`; the keyword-only arguments of that function are the
+options of the format. `BYTES_PER_SAMPLE` is its peak memory per sample.
 """
 
 import importlib
@@ -13,9 +13,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from terrainkit.atomic import atomic_write, check_target
-from terrainkit.capacity import require_memory
+from terrainkit.atomic_write import atomic_write, check_target
 from terrainkit.errors import ExportError, listing
+from terrainkit.memory import check_memory
 
 if TYPE_CHECKING:
     from terrainkit.terrain_map import TerrainMap
@@ -28,17 +28,17 @@ def export(
 
     Args:
         terrain_map: The map.
-        path: Target; its suffix names the format.
+        path: Target; its suffix selects the format.
         overwrite: Replace an existing file.
-        **options: Options of that format.
+        **options: Options of the format.
 
     Raises:
-        ExportError: if the suffix or an option is unknown, the format cannot hold the map, or the
-            target cannot be written; whatever was there is as it was.
+        ExportError: if the suffix or an option is unknown, the format cannot represent the map, or
+            the target cannot be written; an existing target is unchanged.
     """
     path = Path(path)
-    write = find(path).export
-    known = options_of(path)
+    write = get_exporter(path).export
+    known = export_options(path)
     for name in options:
         if name not in known:
             raise ExportError(f"{path.suffix} has no option {name!r}; it has: {listing(known)}")
@@ -48,16 +48,20 @@ def export(
     return path
 
 
-def check(path: str | Path, samples: int, *, overwrite: bool = False) -> None:
-    """Raise what :func:`export` would for a map of so many samples, before it is made."""
-    exporter = find(Path(path))
+def check_export(path: str | Path, samples: int, *, overwrite: bool = False) -> None:
+    """Raise the errors that :func:`export` would raise for a map of `samples` samples."""
+    exporter = get_exporter(Path(path))
     check_target(Path(path), overwrite=overwrite)
-    require_memory(samples * exporter.BYTES_PER_SAMPLE, f"writing {samples} samples to {path}")
+    check_memory(samples * exporter.BYTES_PER_SAMPLE, f"writing {samples} samples to {path}")
 
 
-def find(path: Path) -> ModuleType:
-    """Return the exporter for the suffix of `path`, or raise the error that lists them."""
-    exporters = suffixes()
+def get_exporter(path: Path) -> ModuleType:
+    """Return the exporter for the suffix of `path`.
+
+    Raises:
+        ExportError: if there is none.
+    """
+    exporters = exporters_by_suffix()
     if path.suffix.lower() not in exporters:
         raise ExportError(
             f"no format for {path.suffix or 'a name without suffix'!r} ({path}); "
@@ -66,15 +70,15 @@ def find(path: Path) -> ModuleType:
     return exporters[path.suffix.lower()]
 
 
-def options_of(path: Path) -> tuple[str, ...]:
-    """Return the names of the options that the format of `path` has."""
-    parameters = inspect.signature(find(path).export).parameters.values()
+def export_options(path: Path) -> tuple[str, ...]:
+    """Return the names of the options of the format of `path`."""
+    parameters = inspect.signature(get_exporter(path).export).parameters.values()
     return tuple(p.name for p in parameters if p.kind is p.KEYWORD_ONLY)
 
 
 @cache
-def suffixes() -> dict[str, ModuleType]:
-    """Return the exporter for each suffix."""
+def exporters_by_suffix() -> dict[str, ModuleType]:
+    """Return the exporters by suffix."""
     modules = (
         importlib.import_module(f"{__name__}.{module.name}")
         for module in pkgutil.iter_modules(__path__)

@@ -1,11 +1,11 @@
-"""The trimesh as a file of triangles; trimesh writes it."""
+"""Write the trimesh with the trimesh library."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terrainkit.mesh.lattice import BYTES_PER_NODE
+from terrainkit.mesh.node_grid import BYTES_PER_NODE
 
 if TYPE_CHECKING:
     from terrainkit.terrain_map import TerrainMap
@@ -22,14 +22,14 @@ def export(
     closed: bool = False,
     y_up: bool = False,
 ) -> None:
-    """Write the surface as triangles. A .glb also carries friction and restitution, as extras.
+    """Write the surface as triangles. A .glb also has friction and restitution as extras.
 
     Args:
         terrain_map: The map.
-        path: Where to.
-        full: Two triangles for each cell, instead of joining coplanar faces.
-        closed: Add a skirt and a bottom, for a watertight solid.
-        y_up: Turn the map so that y is up, as glTF viewers and game engines expect; else z is.
+        path: Target.
+        full: Write two triangles per cell instead of merging coplanar faces.
+        closed: Add sides and a bottom to make a watertight solid.
+        y_up: Rotate the map so that y is up, as glTF viewers expect; by default z is up.
     """
     import trimesh
 

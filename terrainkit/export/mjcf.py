@@ -1,9 +1,9 @@
-"""The map as a MuJoCo model that loads alone or is included into a robot's scene.
+"""Write the map as an MJCF model that loads alone or is included in a scene.
 
-One file with everything inline, since paths in an included file are looked up in the folders that
-the robot's model sets. All geoms are on one static body: MuJoCo pairs bodies first, and a body for
-each patch was measured to cost four times as much. They are of one class that sets everything,
-since the robot's defaults would apply to them otherwise.
+Everything is inline, since paths in an included file are resolved in the folders of the including
+model. All geoms belong to one static body: MuJoCo's broad phase pairs bodies, and one body per
+patch was measured to cost four times as much. All geoms have one class that sets every attribute,
+since the robot's defaults would apply otherwise.
 """
 
 from pathlib import Path
@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.annotations import convert
-from terrainkit.boxes import BoxCover, around, level_cells
-from terrainkit.capacity import require_memory
+from terrainkit.box_decomposition import BoxDecomposition, level_cells, neighborhood
+from terrainkit.memory import check_memory
 from terrainkit.mesh.closed import THICKNESS
 
 if TYPE_CHECKING:
@@ -26,18 +26,18 @@ SUFFIXES = (".xml",)
 Collision = Literal["auto", "hfield", "boxes"]
 
 _QUANTUM = 1e-4
-"""Height of one unit of the elevation data [m]: whole numbers are short to write and to read."""
+"""Height of one unit of the elevation data [m]; integers are short to write and to parse."""
 
 BYTES_PER_SAMPLE = 100
-"""Most that writing holds for each sample: its elevation, as a number and as text."""
+"""Peak memory per sample [bytes]: its elevation as a number and as text."""
 
 _RINGS = 2
-"""Samples around the patches that the heightfield takes in. The ground of the border's first cell
-leans towards the patch, so the heightfield has to reach beyond that cell."""
+"""Samples around the patches that belong to the heightfield. The ground of the border's first cell
+slopes toward the patch, so the heightfield has to extend beyond that cell."""
 
-_FEW_BOXES = 1800
-"""Up to so many boxes cost less than a heightfield with cells of 0.1 m: a step with n boxes was
-measured to cost 1.07 + 0.00035 n of one on a plane, with the heightfield 1.71."""
+MAX_BOXES = 1800
+"""Number of boxes up to which they cost less than a heightfield with cells of 0.1 m. Relative to a
+plane, a step with n boxes was measured to cost 1.07 + 0.00035 n, with a heightfield 1.71."""
 
 
 def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "auto") -> None:
@@ -45,22 +45,22 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
 
     Args:
         terrain_map: The map.
-        path: Where to.
-        collision: hfield: one heightfield, on which walls lean over one cell. boxes: the level
-            ground as boxes with vertical walls, and a heightfield for what is not level, if
-            anything, which leans over one cell where it meets a wall. auto: boxes where they hold
-            all of the ground and are few, else hfield.
+        path: Target.
+        collision: hfield: one heightfield, whose walls are slopes over one cell. boxes: boxes with
+            vertical walls for the level ground, and a heightfield for the rest, if any, whose
+            walls are slopes over one cell. auto: boxes if they cover all of the ground and are
+            few, else hfield.
 
     Raises:
-        ConfigError: if there is no such way of collision.
-        CapacityError: if the map would not fit in memory.
+        ConfigError: if `collision` is invalid.
+        MemoryLimitError: if the map would not fit in memory.
     """
     collision = convert("collision", collision, Collision)
     samples = terrain_map.heights.size
-    require_memory(samples * BYTES_PER_SAMPLE, f"a MuJoCo model of {samples} samples")
-    cover = box_cover_of(terrain_map, collision)
+    check_memory(samples * BYTES_PER_SAMPLE, f"a MuJoCo model of {samples} samples")
+    cover = collision_boxes(terrain_map, collision)
     root = ET.Element("mujoco", model="terrain")
-    _add_class(root, terrain_map)
+    _add_default_class(root, terrain_map)
     asset = ET.SubElement(root, "asset")
     body = ET.SubElement(ET.SubElement(root, "worldbody"), "body", name="terrain")
     if cover is None:
@@ -76,8 +76,8 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
     ET.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
 
 
-def box_cover_of(terrain_map: "TerrainMap", collision: Collision) -> BoxCover | None:
-    """Return the boxes that stand for the ground, or None for a heightfield; see `export`."""
+def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecomposition | None:
+    """Return the boxes that represent the ground, or None for a heightfield; see `export`."""
     if collision == "hfield":
         return None
     if collision == "auto":
@@ -85,13 +85,13 @@ def box_cover_of(terrain_map: "TerrainMap", collision: Collision) -> BoxCover | 
         if not level_cells(terrain_map.heights, terrain_map.grid, threshold).all():
             return None
         cover = terrain_map.boxes()
-        return cover if len(cover.centers) <= _FEW_BOXES else None
+        return cover if len(cover.centers) <= MAX_BOXES else None
     return terrain_map.boxes()
 
 
-def _add_class(root: ET.Element, terrain_map: "TerrainMap") -> None:
+def _add_default_class(root: ET.Element, terrain_map: "TerrainMap") -> None:
     config = terrain_map.config
-    # MuJoCo has one sliding friction and no restitution; the numbers travel along for others.
+    # MuJoCo has one sliding friction and no restitution; keep the values for other readers.
     custom = ET.SubElement(root, "custom")
     for name, value in config.contact.items():
         ET.SubElement(custom, "numeric", name=f"terrain_{name}", data=_numbers(value))
@@ -117,24 +117,24 @@ def _add_class(root: ET.Element, terrain_map: "TerrainMap") -> None:
 def _add_hfield(
     asset: ET.Element, body: ET.Element, terrain_map: "TerrainMap", heights: NDArray[np.float32]
 ) -> None:
-    """Add the patches and `_RINGS` of samples around them; the border beyond is boxes."""
+    """Add a heightfield of the patches and `_RINGS` samples around them."""
     cell, border = terrain_map.config.cell, terrain_map.config.border_cells
-    # Padding gives the rings where there is no border.
+    # Padding provides these samples where there is no border.
     padded = np.pad(heights, _RINGS, mode="edge")
     last = [n - border + 2 * _RINGS for n in heights.shape]
     part = padded[border : last[0], border : last[1]]
     low = float(part.min())
     levels = np.rint((part - low) / _QUANTUM).astype(np.int64)
-    span = max(int(levels.max()), 1) * _QUANTUM  # MuJoCo wants a height above 0 on level ground too
+    span = max(int(levels.max()), 1) * _QUANTUM  # MuJoCo requires a range above 0
     half = [(n - 1) * cell / 2 for n in part.shape]
     ET.SubElement(
         asset,
         "hfield",
         name="terrain",
-        nrow=str(part.shape[1]),  # MuJoCo's rows lie along y, its columns along x
+        nrow=str(part.shape[1]),  # MuJoCo's rows are along y, its columns along x
         ncol=str(part.shape[0]),
         size=_numbers(*half, span, THICKNESS),
-        # Inline elevation starts with the row of highest y.
+        # Inline elevation starts with the row of the largest y.
         elevation="\n".join(" ".join(map(str, row)) for row in levels.T[::-1].tolist()),
     )
     position = _numbers(*terrain_map.grid.center, low)
@@ -144,7 +144,7 @@ def _add_hfield(
 def _border_boxes(
     terrain_map: "TerrainMap",
 ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Return middle and half size of the boxes around the heightfield."""
+    """Return the centers and half sizes of the boxes around the heightfield."""
     grid, config = terrain_map.grid, terrain_map.config
     margin = config.border - (_RINGS - 0.5) * config.cell  # a heightfield ends at a sample
     if margin <= 0:
@@ -163,10 +163,10 @@ def _border_boxes(
     return boxes
 
 
-def without_boxes(heights: NDArray[np.float32], cover: BoxCover) -> NDArray[np.float32]:
-    """Return the heights with those samples sunk into their boxes that have no say elsewhere."""
-    sunk = np.logical_and.reduce(around(cover.covered))
-    return np.where(sunk, heights.min() - np.float32(THICKNESS / 2), heights)
+def without_boxes(heights: NDArray[np.float32], cover: BoxDecomposition) -> NDArray[np.float32]:
+    """Return the heights, lowered at samples that only affect cells covered by boxes."""
+    lowered = np.logical_and.reduce(neighborhood(cover.covered))
+    return np.where(lowered, heights.min() - np.float32(THICKNESS / 2), heights)
 
 
 def _add_box(body: ET.Element, center: NDArray[np.float64], half_size: NDArray[np.float64]) -> None:

@@ -1,4 +1,4 @@
-"""The .npz map, format version 1: what terrainkit reads and writes, and numpy alone can read."""
+"""Read and write maps as .npz files, format version 1."""
 
 import dataclasses
 import json
@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import registry
-from terrainkit.archive import LONGEST_TEXT, Archive, opened, write_arrays
+from terrainkit.archive import MAX_TEXT_BYTES, Archive, open_archive, write_arrays
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError, MapFileError, listing
-from terrainkit.mesh.lattice import BYTES_PER_NODE
+from terrainkit.mesh.node_grid import BYTES_PER_NODE
 from terrainkit.mesh.tri_mesh import TriMesh
 from terrainkit.parameter import MAX_VALUE, Realized, Value, parameters_of
 from terrainkit.patch import Parameters
@@ -26,21 +26,21 @@ SUFFIXES = (".npz",)
 BYTES_PER_SAMPLE = BYTES_PER_NODE
 FORMAT_VERSION = 1
 
-_MOST_FACES = 20
-"""Most triangles, and vertices, that a mesh can have for each sample of its map."""
+MAX_FACES_PER_SAMPLE = 20
+"""Upper bound of the triangles and vertices of a mesh per sample of its map."""
 
-_TEXT_OF_A_PATCH = 8192
-"""Most that the record of the parameters of a patch may take [bytes]."""
+MAX_PATCH_RECORD_BYTES = 8192
+"""Upper bound of the parameters of a patch as JSON [bytes]."""
 
 _Map = TypeVar("_Map", bound="TerrainMap")
 
 
 def export(terrain_map: "TerrainMap", path: Path) -> None:
-    """Write the map with everything in it: heights, trimesh, origins, and its config.
+    """Write the map: heights, trimesh, spawn origins, parameters and config.
 
     Args:
         terrain_map: The map.
-        path: Where to.
+        path: Target.
     """
     config, mesh = terrain_map.config, terrain_map.mesh()
     arrays = {
@@ -66,40 +66,42 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
 
 
 def read_map(cls: type[_Map], path: str | Path) -> _Map:
-    """Return the map in the .npz file `path`, as a `cls`.
+    """Return the map in the .npz file `path` as an instance of `cls`.
 
     Raises:
-        MapFileError: if the file is missing, foreign, truncated, or not a whole map.
-        CapacityError: if what it says it holds would not fit in memory.
+        MapFileError: if the file is missing, truncated, or not a map.
+        MemoryLimitError: if its arrays would not fit in memory.
     """
-    with opened(path) as archive:
+    with open_archive(path) as archive:
         config = _config(archive)
         size, grid = (config.rows, config.cols), config.grid
-        for key, wanted in (
+        for key, expected in (
             ("cell", config.cell),
             ("border", config.border),
             ("patch_size", config.patch_size),
             ("lower", grid.lower),
         ):
-            archive.expect(key, wanted)
-        names = archive.array("terrain_names", "U", (len(config.mix),), limit=LONGEST_TEXT)
-        kinds = archive.array("terrain_types", "i4", size)
-        if kinds.min() < 0 or kinds.max() >= len(names):
-            raise MapFileError(f"{path}: terrain_types points beyond the {len(names)} names")
-        solids = len(archive.array("boxes", "f4", (None, 10), limit=LONGEST_TEXT))
+            archive.check_value(key, expected)
+        names = archive.array("terrain_names", "U", (len(config.mix),), limit=MAX_TEXT_BYTES)
+        terrain_types = archive.array("terrain_types", "i4", size)
+        if terrain_types.min() < 0 or terrain_types.max() >= len(names):
+            raise MapFileError(
+                f"{path}: terrain_types: got an index out of range; expected 0 to {len(names) - 1}"
+            )
+        solids = len(archive.array("boxes", "f4", (None, 10), limit=MAX_TEXT_BYTES))
         if solids:
             raise MapFileError(
-                f"{path} has {solids} solids beside its heights; this terrainkit reads none"
+                f"{path}: got {solids} solids; this version of terrainkit reads none"
             )
         return cls(
             config=config,
             grid=grid,
             heights=archive.array("heights", "f4", grid.shape),
             env_origins=archive.array("env_origins", "f4", (*size, 3)),
-            terrain_types=kinds,
+            terrain_types=terrain_types,
             terrain_names=tuple(str(name) for name in names),
             difficulty=archive.array("difficulty", "f4", size),
-            parameters=_all_parameters(archive, config, kinds),
+            parameters=_all_parameters(archive, config, terrain_types),
         )
 
 
@@ -107,26 +109,28 @@ def read_mesh(path: str | Path) -> TriMesh:
     """Return the trimesh in the .npz file `path`.
 
     Raises:
-        MapFileError: if there is none, or a triangle points beyond the vertices.
-        CapacityError: if what it says it holds would not fit in memory.
+        MapFileError: if there is none, or a vertex index is out of range.
+        MemoryLimitError: if its arrays would not fit in memory.
     """
-    with opened(path) as archive:
-        limit = _MOST_FACES * 12 * math.prod(n + 2 for n in _config(archive).grid.shape)
+    with open_archive(path) as archive:
+        limit = MAX_FACES_PER_SAMPLE * 12 * math.prod(n + 2 for n in _config(archive).grid.shape)
         vertices = archive.array("vertices", "f4", (None, 3), limit=limit)
         triangles = archive.array("triangles", "i4", (None, 3), limit=limit)
     if triangles.size and not (triangles.min() >= 0 and triangles.max() < len(vertices)):
-        raise MapFileError(f"{path}: triangles points beyond the {len(vertices)} vertices")
+        raise MapFileError(
+            f"{path}: triangles: got an index out of range; expected 0 to {len(vertices) - 1}"
+        )
     return TriMesh(vertices=vertices, triangles=triangles)
 
 
 def _config(archive: Archive) -> MapConfig:
-    """Return the config of the map, if this is one, of the version that we read."""
+    """Return the config of the map, after checking the format version."""
     if "format_version" not in archive.names():
-        raise MapFileError(f"{archive.path} is not a map of terrainkit: it has no format_version")
+        raise MapFileError(f"{archive.path}: not a terrainkit map; format_version is missing")
     version = int(archive.array("format_version", "i", ()))
     if version != FORMAT_VERSION:
         raise MapFileError(
-            f"{archive.path} has format version {version}; this terrainkit reads {FORMAT_VERSION}"
+            f"{archive.path}: got format version {version}; expected {FORMAT_VERSION}"
         )
     try:
         return MapConfig.from_toml(archive.text("config"))
@@ -140,24 +144,28 @@ def _parameters_text(terrain_map: "TerrainMap") -> str:
 
 
 def _all_parameters(
-    archive: Archive, config: MapConfig, kinds: NDArray[np.int32]
+    archive: Archive, config: MapConfig, terrain_types: NDArray[np.int32]
 ) -> NDArray[np.object_]:
-    table = np.empty(kinds.shape, dtype=object)
-    wanted = [set(parameters_of(registry.find(sub_terrain.terrain))) for sub_terrain in config.mix]
+    table = np.empty(terrain_types.shape, dtype=object)
+    names = [
+        set(parameters_of(registry.get_terrain(sub_terrain.terrain))) for sub_terrain in config.mix
+    ]
     try:
-        rows = json.loads(archive.text("parameters", limit=(table.size + 16) * _TEXT_OF_A_PATCH))
+        rows = json.loads(
+            archive.text("parameters", limit=(table.size + 16) * MAX_PATCH_RECORD_BYTES)
+        )
         for row, col in np.ndindex(table.shape):
-            table[row, col] = _parameters(rows[row][col], wanted[kinds[row, col]])
+            table[row, col] = _parameters(rows[row][col], names[terrain_types[row, col]])
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise MapFileError(f"{archive.path}: parameters cannot be read: {error}") from error
     return table
 
 
-def _parameters(record: Mapping[str, Mapping[str, Any]], wanted: set[str]) -> Parameters:
+def _parameters(record: Mapping[str, Mapping[str, Any]], names: set[str]) -> Parameters:
     requested = {name: _number(value) for name, value in record["requested"].items()}
     realized = {name: _realized(value) for name, value in record["realized"].items()}
-    if not requested.keys() == realized.keys() == wanted:
-        raise ValueError(f"wanted {listing(sorted(wanted))}, requested and realized")
+    if not requested.keys() == realized.keys() == names:
+        raise ValueError(f"expected {listing(sorted(names))}, requested and realized")
     return Parameters(requested=requested, realized=realized)
 
 
@@ -170,5 +178,5 @@ def _realized(value: Any) -> Realized:
 
 def _number(value: Any) -> Value:
     if not isinstance(value, int | float) or not abs(value) <= MAX_VALUE:
-        raise ValueError("a value is not a number within bounds")
+        raise ValueError("expected numbers in range")
     return value

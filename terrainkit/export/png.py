@@ -1,4 +1,4 @@
-"""The heights as a 16-bit greyscale picture, with its scale in a .json beside it."""
+"""Write the heights as a 16-bit grayscale image with a .json file for its scale."""
 
 import json
 from pathlib import Path
@@ -14,36 +14,37 @@ if TYPE_CHECKING:
 SUFFIXES = (".png",)
 BYTES_PER_SAMPLE = 20
 
-_COARSEST = 0.002
-"""Largest height of a grey level that still holds the ground to a millimetre [m]."""
+MAX_HEIGHT_PER_LEVEL = 0.002
+"""Largest height of a gray level at which heights are accurate to a millimeter [m]."""
 
 
 def export(terrain_map: "TerrainMap", path: Path) -> None:
-    """Write the heights as seen from above: x to the right, y upwards.
+    """Write the heights as seen from above: x to the right, y up.
 
     Args:
         terrain_map: The map.
-        path: Where to; the sidecar has the same name with the suffix .json.
+        path: Target; the sidecar has the same name with the suffix .json.
 
     Raises:
-        ExportError: if the ground spans more height than 16 bits hold to a millimetre.
+        ExportError: if the height range is too large for millimeter accuracy in 16 bits.
     """
     import cv2
 
     heights, config = terrain_map.heights, terrain_map.config
     low = float(heights.min())
     scale = (float(heights.max()) - low) / np.iinfo(np.uint16).max
-    if scale > _COARSEST:
+    if scale > MAX_HEIGHT_PER_LEVEL:
         raise ExportError(
-            f"heights span {heights.max() - low:g} m; a .png holds "
-            f"{_COARSEST * np.iinfo(np.uint16).max:g} m to a millimetre"
+            f"height range: got {heights.max() - low:g} m; expected at most "
+            f"{MAX_HEIGHT_PER_LEVEL * np.iinfo(np.uint16).max:g} m, so that a .png is accurate to "
+            "a millimeter"
         )
-    # Picture rows go down, y goes up.
+    # Image rows go down, y goes up.
     levels = np.rint((heights.T[::-1] - low) / (scale or 1.0)).astype(np.uint16)
     _, data = cv2.imencode(".png", levels)
     path.write_bytes(data.tobytes())
     sidecar = {
-        "about": "height = offset + scale * grey; column 0 is the lowest x, row 0 the highest y",
+        "about": "height = offset + scale * gray; column 0 is the lowest x, row 0 the highest y",
         "scale": scale,
         "offset": low,
         "cell": config.cell,

@@ -1,9 +1,9 @@
-"""The trimesh: the surface as triangles, walls included.
+"""The surface as triangles, including walls.
 
-Three meshes of one surface: :func:`full_mesh` has two triangles for every cell,
-:func:`merged_mesh` joins what is level, :func:`closed_mesh` makes either a watertight solid. All
-are oriented, anticlockwise seen from above, and every edge inside them is shared by exactly two
-triangles, also where merging has left large faces beside small ones.
+There are three meshes of the same surface: :func:`full_mesh` has two triangles per cell,
+:func:`merged_mesh` merges coplanar faces, and :func:`closed_mesh` makes a watertight solid of
+either. Faces are counterclockwise seen from above, and every interior edge is shared by exactly two
+faces, also between large merged faces and small ones.
 """
 
 from terrainkit.mesh.closed import closed_mesh

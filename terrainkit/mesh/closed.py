@@ -1,4 +1,4 @@
-"""The closed mesh: a surface with a skirt and a bottom, a watertight solid."""
+"""The closed mesh: a surface with sides and a bottom."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,14 +6,14 @@ from numpy.typing import NDArray
 from terrainkit.mesh.tri_mesh import TriMesh
 
 THICKNESS = 1.0
-"""Ground below the lowest point of the surface, for every solid that is made of it [m]."""
+"""Thickness of solids below the lowest point of the surface [m]."""
 
 
 def closed_mesh(surface: TriMesh) -> TriMesh:
-    """Return `surface` with vertical sides down to a level bottom, `THICKNESS` below its lowest.
+    """Return `surface` with vertical sides and a level bottom, `THICKNESS` below its lowest point.
 
     Args:
-        surface: A mesh of a whole rectangular map, from this package.
+        surface: A mesh of this package of a rectangular map.
 
     Returns:
         A mesh in which every edge is shared by two faces, once in each direction.
@@ -21,8 +21,8 @@ def closed_mesh(surface: TriMesh) -> TriMesh:
     vertices, triangles = surface.vertices, surface.triangles
     start, end = surface.boundary().T
     vertical = (vertices[start, :2] == vertices[end, :2]).all(axis=1)
-    # Walls that meet the edge of the map bring vertical edges: the ends of a wall, one above the
-    # other. The panel beside the upper end runs through the lower one.
+    # Walls that end at the edge of the map have vertical boundary edges. The side face next to the
+    # upper end also includes the lower end.
     below = np.arange(len(vertices))
     for a, b in ((start[vertical], end[vertical]), (end[vertical], start[vertical])):
         falls = vertices[a, 2] > vertices[b, 2]
@@ -34,7 +34,7 @@ def closed_mesh(surface: TriMesh) -> TriMesh:
     start_foot, end_foot = foot[: len(start)], foot[len(start) :]
     middle = np.full(len(start), len(vertices) + len(rim))
     sides = [
-        *_panels(start, end, start_foot, end_foot, below),
+        *_side_faces(start, end, start_foot, end_foot, below),
         np.column_stack([start_foot, end_foot, middle])[:, ::-1],
     ]
     bottom = float(vertices[:, 2].min()) - THICKNESS
@@ -46,15 +46,15 @@ def closed_mesh(surface: TriMesh) -> TriMesh:
     )
 
 
-def _panels(
+def _side_faces(
     start: NDArray[np.int64],
     end: NDArray[np.int64],
     start_foot: NDArray[np.int64],
     end_foot: NDArray[np.int64],
     below: NDArray[np.int64],
 ) -> list[NDArray[np.int64]]:
-    """Return the faces from the edges start -> end of the surface down to their feet."""
-    # An edge has a wall at one end at most: the other end is a sample. The fan starts there.
+    """Return the faces between the boundary edges start -> end and their feet."""
+    # An edge has a wall at one end at most. The fan starts at the other end, which is a sample.
     bent = below[start] != start
     straight = ~bent
     at_end = straight & (below[end] != end)

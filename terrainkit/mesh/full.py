@@ -1,12 +1,12 @@
-"""The full mesh: two triangles for every quad, and the pieces of those that are cut."""
+"""The full mesh: two triangles per quad, and the faces of quads with walls."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.grid import Grid
-from terrainkit.mesh.cut_quads import cut_quads
-from terrainkit.mesh.lattice import Lattice
+from terrainkit.mesh.node_grid import NodeGrid
 from terrainkit.mesh.tri_mesh import TriMesh
+from terrainkit.mesh.wall_quads import wall_quads
 
 
 def full_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> TriMesh:
@@ -14,35 +14,37 @@ def full_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> Tri
 
     Args:
         heights: Samples [m], shape `grid.shape`.
-        grid: Where they stand.
-        threshold: Difference between neighbours above which there is a wall [m].
+        grid: Positions of the samples.
+        threshold: Difference between neighboring samples above which there is a wall [m].
 
     Raises:
-        CapacityError: if the mesh would not fit in memory; nothing was allocated.
+        MemoryLimitError: if the mesh would not fit in memory; nothing was allocated.
     """
-    lattice = Lattice.of(heights, grid, threshold)
-    fans, centers = cut_quads(lattice, np.flatnonzero(lattice.cut), lattice.vertex_count)
-    plain = np.flatnonzero(~lattice.cut)
+    node_grid = NodeGrid.from_heights(heights, grid, threshold)
+    fans, centers = wall_quads(
+        node_grid, np.flatnonzero(node_grid.has_wall), node_grid.vertex_count
+    )
+    plain = np.flatnonzero(~node_grid.has_wall)
     triangles = np.empty((2 * len(plain) + len(fans), 3), dtype=np.int32)
-    split_quads(lattice, plain, out=triangles[: 2 * len(plain)])
+    split_quads(node_grid, plain, out=triangles[: 2 * len(plain)])
     triangles[2 * len(plain) :] = fans
 
-    n = lattice.z.size
-    vertices = np.empty((lattice.vertex_count + len(centers), 3), dtype=np.float32)
-    nodes = vertices[:n].reshape(*lattice.z.shape, 3)
-    nodes[..., 0], nodes[..., 1], nodes[..., 2] = lattice.x[:, None], lattice.y, lattice.z
-    vertices[n : lattice.vertex_count] = lattice.middles()
-    vertices[lattice.vertex_count :] = centers
+    n = node_grid.z.size
+    vertices = np.empty((node_grid.vertex_count + len(centers), 3), dtype=np.float32)
+    nodes = vertices[:n].reshape(*node_grid.z.shape, 3)
+    nodes[..., 0], nodes[..., 1], nodes[..., 2] = node_grid.x[:, None], node_grid.y, node_grid.z
+    vertices[n : node_grid.vertex_count] = node_grid.midpoints()
+    vertices[node_grid.vertex_count :] = centers
     return TriMesh(vertices=vertices, triangles=triangles)
 
 
-def split_quads(lattice: Lattice, numbers: NDArray[np.int64], out: NDArray[np.int32]) -> None:
+def split_quads(node_grid: NodeGrid, numbers: NDArray[np.int64], out: NDArray[np.int32]) -> None:
     """Write two triangles for each quad in `numbers` to `out`, shape (2 n, 3).
 
-    The diagonal runs from (i, j) to (i + 1, j + 1), as MuJoCo's heightfields have it.
+    The diagonal runs from (i, j) to (i + 1, j + 1), as in MuJoCo's heightfields.
     """
-    ny = lattice.z.shape[1]
-    # A row has one fewer quad than nodes, so a quad's first node is its own number plus its row.
+    ny = node_grid.z.shape[1]
+    # A row has one quad fewer than nodes, so the first node of a quad is its number plus its row.
     corner = (numbers + numbers // (ny - 1)).astype(np.int32)
     pairs = out.reshape(-1, 2, 3)
     pairs[:, 0, 0] = pairs[:, 1, 0] = corner

@@ -1,55 +1,55 @@
-"""The merged mesh: what is level becomes a few large faces, what is not stays as it is.
+"""The merged mesh: coplanar faces merged to large ones.
 
-Level quads are joined to rectangles, quads that are level along one axis to rows, and straight
-walls of one height to panels with a level strip on either side. Each of these keeps the vertices of
-its rim that a neighbour needs, so large and small faces meet vertex by vertex. Nothing moves: the
-merged surface is the full one.
+Level quads are merged to rectangles, quads that are level along one axis to rows, and straight
+walls of constant height to panels with a level strip on both sides. Each polygon keeps the boundary
+vertices that its neighbors use, so large and small faces share all vertices. The surface is exactly
+that of the full mesh.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.grid import Grid
-from terrainkit.mesh.cut_quads import cut_quads
 from terrainkit.mesh.full import split_quads
-from terrainkit.mesh.lattice import Lattice
-from terrainkit.mesh.loops import Ids, Loops, Mask
+from terrainkit.mesh.node_grid import NodeGrid
+from terrainkit.mesh.polygons import Ids, Mask, Polygons
 from terrainkit.mesh.rectangles import Rectangles
 from terrainkit.mesh.tri_mesh import TriMesh
+from terrainkit.mesh.wall_quads import wall_quads
 from terrainkit.mesh.wall_runs import WallRuns
 
 
 def merged_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> TriMesh:
-    """Return the surface with level faces merged.
+    """Return the surface with coplanar faces merged.
 
     Args:
         heights: Samples [m], shape `grid.shape`.
-        grid: Where they stand.
-        threshold: Difference between neighbours above which there is a wall [m].
+        grid: Positions of the samples.
+        threshold: Difference between neighboring samples above which there is a wall [m].
 
     Raises:
-        CapacityError: if the mesh would not fit in memory; nothing was allocated.
+        MemoryLimitError: if the mesh would not fit in memory; nothing was allocated.
     """
-    lattice = Lattice.of(heights, grid, threshold)
-    even_x, even_y = lattice.even_x, lattice.even_y
-    level = even_x & even_y
-    # Where the ground is level along y, walls on both edges across it make one straight wall.
-    walls_x = even_y & lattice.walls_x[:, :-1] & lattice.walls_x[:, 1:]
-    walls_y = even_x & lattice.walls_y[:-1] & lattice.walls_y[1:]
-    rows_y = even_y & ~(level | lattice.cut)
-    rows_x = even_x & ~(level | lattice.cut)
+    node_grid = NodeGrid.from_heights(heights, grid, threshold)
+    level_x, level_y = node_grid.level_x, node_grid.level_y
+    level = level_x & level_y
+    # Where the ground is level along y, walls on both edges along x are one straight wall.
+    walls_x = level_y & node_grid.walls_x[:, :-1] & node_grid.walls_x[:, 1:]
+    walls_y = level_x & node_grid.walls_y[:-1] & node_grid.walls_y[1:]
+    rows_y = level_y & ~(level | node_grid.has_wall)
+    rows_x = level_x & ~(level | node_grid.has_wall)
 
     rectangles = [Rectangles.level(level), Rectangles.along_y(rows_y), Rectangles.along_x(rows_x)]
-    runs = [WallRuns.across_x(lattice, walls_x), WallRuns.across_y(lattice, walls_y)]
+    runs = [WallRuns.normal_x(node_grid, walls_x), WallRuns.normal_y(node_grid, walls_y)]
     single = ~(level | rows_x | rows_y | walls_x | walls_y)
     kept = _corners(single)
     for rectangle in rectangles:
         rectangle.keep_corners(kept)
     for run in runs:
         run.keep_ends(kept)
-    loops = [rectangle.loops(lattice, kept) for rectangle in rectangles]
-    loops += [loop for run in runs for loop in run.strips(kept)]
-    return _assemble(lattice, single, loops, [run.panels() for run in runs])
+    polygons = [rectangle.polygons(node_grid, kept) for rectangle in rectangles]
+    polygons += [loop for run in runs for loop in run.strips(kept)]
+    return _assemble(node_grid, single, polygons, [run.panels() for run in runs])
 
 
 def _corners(quads: Mask) -> Mask:
@@ -61,39 +61,43 @@ def _corners(quads: Mask) -> Mask:
     return nodes
 
 
-def _assemble(lattice: Lattice, single: Mask, loops: list[Loops], panels: list[Ids]) -> TriMesh:
-    """Return the mesh of the quads that stand alone, the loops and the panels between them."""
-    plain = np.flatnonzero(single & ~lattice.cut)
+def _assemble(
+    node_grid: NodeGrid, single: Mask, polygons: list[Polygons], panels: list[Ids]
+) -> TriMesh:
+    """Return the mesh of single quads, polygons and wall panels."""
+    plain = np.flatnonzero(single & ~node_grid.has_wall)
     pairs = np.empty((2 * len(plain), 3), dtype=np.int32)
-    split_quads(lattice, plain, out=pairs)
-    count = lattice.vertex_count
-    faces, added = cut_quads(lattice, np.flatnonzero(single & lattice.cut), count)
+    split_quads(node_grid, plain, out=pairs)
+    count = node_grid.vertex_count
+    faces, added = wall_quads(node_grid, np.flatnonzero(single & node_grid.has_wall), count)
     triangles = [pairs, *(part.astype(np.int32) for part in (faces, *panels))]
-    extra = [lattice.middles(), added]
+    extra = [node_grid.midpoints(), added]
     count += len(added)
-    for loop in loops:
+    for loop in polygons:
         faces, added = loop.triangles(count)
         triangles.append(faces.astype(np.int32))
         extra.append(added)
         count += len(added)
-    return _compact(lattice, np.concatenate(triangles), np.concatenate(extra))
+    return _compact(node_grid, np.concatenate(triangles), np.concatenate(extra))
 
 
-def _compact(lattice: Lattice, triangles: NDArray[np.int32], extra: NDArray[np.float32]) -> TriMesh:
-    """Return the mesh without the vertices that no triangle uses.
+def _compact(
+    node_grid: NodeGrid, triangles: NDArray[np.int32], extra: NDArray[np.float32]
+) -> TriMesh:
+    """Return the mesh without unused vertices.
 
     Args:
-        lattice: Whose nodes are the first vertices.
+        node_grid: Whose nodes are the first vertices.
         triangles: Faces, shape (nf, 3).
         extra: Positions of the vertices after the nodes [m], shape (n, 3).
     """
-    used = np.zeros(lattice.z.size + len(extra), dtype=bool)
+    used = np.zeros(node_grid.z.size + len(extra), dtype=bool)
     used[triangles.ravel()] = True
     old = np.flatnonzero(used)
     number = np.empty(len(used), dtype=np.int32)
     number[old] = np.arange(len(old), dtype=np.int32)
-    nodes = old[: np.searchsorted(old, lattice.z.size)]
+    nodes = old[: np.searchsorted(old, node_grid.z.size)]
     return TriMesh(
-        vertices=np.concatenate([lattice.nodes(nodes), extra[used[lattice.z.size :]]]),
+        vertices=np.concatenate([node_grid.nodes(nodes), extra[used[node_grid.z.size :]]]),
         triangles=number[triangles],
     )

@@ -1,17 +1,17 @@
-"""Rectangles of quads in one plane."""
+"""Rectangles of coplanar quads."""
 
 from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 
-from terrainkit.mesh.lattice import Lattice
-from terrainkit.mesh.loops import Ids, Loops, Mask, laid_out, runs
+from terrainkit.mesh.node_grid import NodeGrid
+from terrainkit.mesh.polygons import Ids, Mask, Polygons, runs, segment_indices
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Rectangles:
-    """Rectangles between the nodes (i0, j0) and (i1, j1), each of shape (n,)."""
+    """Rectangles between the nodes (i0, j0) and (i1, j1), each array of shape (n,)."""
 
     i0: Ids
     i1: Ids
@@ -20,7 +20,7 @@ class Rectangles:
 
     @classmethod
     def level(cls, level: Mask) -> Self:
-        """Return rectangles of level quads; quads not worth one are struck from the mask."""
+        """Return rectangles of level quads; the mask is cleared where there is none."""
         row, start, stop = runs(level)
         # Runs over the same columns in consecutive rows are one rectangle.
         order = np.lexsort((row, stop, start))
@@ -35,7 +35,7 @@ class Rectangles:
 
     @classmethod
     def along_y(cls, tilted: Mask) -> Self:
-        """Return rows of quads that rise along x alone; those not worth one are struck."""
+        """Return rows of quads that slope along x only; the mask is cleared where there is none."""
         row, start, stop = runs(tilted)
         small = stop - start < 3
         tilted[row[small], start[small]] = tilted[row[small], stop[small] - 1] = False
@@ -44,29 +44,29 @@ class Rectangles:
 
     @classmethod
     def along_x(cls, tilted: Mask) -> Self:
-        """Return the same for quads that rise along y alone."""
-        turned = cls.along_y(tilted.T)
-        return cls(i0=turned.j0, i1=turned.j1, j0=turned.i0, j1=turned.i1)
+        """Return rows of quads that slope along y only, like :meth:`along_y`."""
+        rows = cls.along_y(tilted.T)
+        return cls(i0=rows.j0, i1=rows.j1, j0=rows.i0, j1=rows.i1)
 
     def keep_corners(self, kept: Mask) -> None:
         """Mark the nodes at the corners in `kept`."""
         for i in (self.i0, self.i1):
             kept[i, self.j0] = kept[i, self.j1] = True
 
-    def loops(self, lattice: Lattice, kept: Mask) -> Loops:
-        """Return the rims, of those nodes that are `kept`."""
-        ny = lattice.z.shape[1]
+    def polygons(self, node_grid: NodeGrid, kept: Mask) -> Polygons:
+        """Return the boundaries with the nodes that are `kept`."""
+        ny = node_grid.z.shape[1]
         low, high = self.i0 * ny, self.i1 * ny
         # Four sides, each from its first corner to just before the next.
         first = np.stack([low + self.j0, high + self.j0, high + self.j1, low + self.j1], axis=1)
         length = np.tile(np.stack([self.i1 - self.i0, self.j1 - self.j0], axis=1), 2)
-        side, k = laid_out(length.ravel())
+        side, k = segment_indices(length.ravel())
         nodes = first.ravel()[side] + k * np.array([ny, 1, -ny, -1])[side % 4]
         keep = kept.ravel()[nodes]
-        x = (lattice.x[self.i0] + lattice.x[self.i1]) / 2
-        y = (lattice.y[self.j0] + lattice.y[self.j1]) / 2
-        z = (lattice.z[self.i0, self.j0] + lattice.z[self.i1, self.j1]) / 2
-        return Loops(
+        x = (node_grid.x[self.i0] + node_grid.x[self.i1]) / 2
+        y = (node_grid.y[self.j0] + node_grid.y[self.j1]) / 2
+        z = (node_grid.z[self.i0, self.j0] + node_grid.z[self.i1, self.j1]) / 2
+        return Polygons(
             vertices=nodes[keep],
             owner=side[keep] // 4,
             centers=np.column_stack([x, y, z]).astype(np.float32),

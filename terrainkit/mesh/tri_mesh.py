@@ -1,4 +1,4 @@
-"""TriMesh: vertices and the triangles between them."""
+"""TriMesh: vertices and triangles."""
 
 from dataclasses import dataclass
 
@@ -14,14 +14,14 @@ class TriMesh:
     """Positions [m], shape (nv, 3)."""
 
     triangles: NDArray[np.int32]
-    """Three vertices for each face, anticlockwise seen from outside, shape (nf, 3)."""
+    """Vertices of each face, counterclockwise seen from outside, shape (nf, 3)."""
 
     def edges(self) -> NDArray[np.int64]:
-        """Return the three edges of each face as it runs along them, shape (3 nf, 2)."""
+        """Return the three directed edges of each face, shape (3 nf, 2)."""
         return self.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
 
     def boundary(self) -> NDArray[np.int64]:
-        """Return the edges that only one face has, as that face runs along them, shape (n, 2)."""
+        """Return the directed edges that belong to only one face, shape (n, 2)."""
         edges = self.edges()
         number = edges.min(axis=1) * len(self.vertices) + edges.max(axis=1)
         order = np.argsort(number)

@@ -1,1 +1,1 @@
-"""The terrains, one noun a file. A new file here is a new terrain: nothing else lists them."""
+"""The terrains, one per module. The registry lists the modules of this folder."""

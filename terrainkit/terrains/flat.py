@@ -13,6 +13,6 @@ from terrainkit.terrain import Terrain
 class Flat(Terrain):
     """Level ground at height 0, the same at every difficulty."""
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return zeros."""
-        return np.zeros(plot.shape)
+        return np.zeros(grid.shape)

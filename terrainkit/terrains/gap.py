@@ -1,4 +1,4 @@
-"""A moat around a platform."""
+"""A gap around a platform."""
 
 from dataclasses import dataclass
 
@@ -13,26 +13,26 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class Gap(Terrain):
-    """A moat of one width around a central platform, level ground beyond."""
+    """A gap of constant width around a central platform, with level ground beyond it."""
 
     width: float = parameter.length(0.0, 1.0, zero=True)
-    """Width of the moat [m]; where the patch is narrower, its edge ends the moat."""
+    """Width of the gap [m]; it ends at the edge of the patch."""
 
     depth: float = parameter.height(5.0)
-    """Depth of the moat [m]; it has a floor."""
+    """Depth of the gap, which has a floor [m]."""
 
     platform: float = parameter.platform(3.0)
-    """Side of the level square in the middle [m]."""
+    """Side of the level square at the center [m]."""
 
-    def realized(self, plot: Grid) -> dict[str, Realized]:
-        """Return the parameters as built: the width ends where the patch does."""
-        asked, block = plot.cells(self.width, least=0), plot.centered(self.platform)
-        room = ((n - b) // 2 for n, b in zip(plot.shape, block, strict=True))
-        x, y = (plot.length(min(asked, cells)) for cells in room)
-        return super().realized(plot) | {"width": x if x == y else (x, y)}
+    def realized(self, grid: Grid) -> dict[str, Realized]:
+        """Return the realized parameters: the gap ends at the edge of the patch."""
+        width, block = grid.cells(self.width, minimum=0), grid.centered(self.platform)
+        available = ((n - b) // 2 for n, b in zip(grid.shape, block, strict=True))
+        x, y = (grid.length(min(width, cells)) for cells in available)
+        return super().realized(grid) | {"width": x if x == y else (x, y)}
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return 0, and `-depth` in the rings that the moat takes."""
-        rings = plot.rings(plot.centered(self.platform))
-        moat = (rings > 0) & (rings <= plot.cells(self.width, least=0))
-        return np.where(moat, -self.depth, 0.0)
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return 0, and `-depth` in the rings of the gap."""
+        rings = grid.rings(grid.centered(self.platform))
+        gap = (rings > 0) & (rings <= grid.cells(self.width, minimum=0))
+        return np.where(gap, -self.depth, 0.0)

@@ -1,4 +1,4 @@
-"""Scattered blocks."""
+"""Random rectangular obstacles."""
 
 from dataclasses import dataclass
 
@@ -13,40 +13,41 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class Obstacles(Terrain):
-    """Rectangular blocks and trenches at random places, around a platform that is kept free.
+    """Rectangular blocks and trenches at random positions around a free platform.
 
-    Each is as high as `height`, half as high, or as deep; where two meet, the later one stands.
+    The height of each is `height` or half of it, up or down. Later ones overwrite earlier ones.
     """
 
     height: float = parameter.height(0.05, 0.25)
-    """Height of the highest block, and depth of the deepest trench [m]."""
+    """Height of the highest block and depth of the deepest trench [m]."""
 
     number: int = parameter.count(20)
-    """How many are placed."""
+    """Number of obstacles."""
 
     min_width: float = parameter.length(1.0)
-    """Shortest side of a block [m]."""
+    """Minimum side of an obstacle [m]."""
 
     max_width: float = parameter.length(2.0)
-    """Longest side of a block [m]."""
+    """Maximum side of an obstacle [m]."""
 
     platform: float = parameter.platform(3.0)
-    """Side of the level square in the middle [m]."""
+    """Side of the level square at the center [m]."""
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return the blocks, each wholly inside the patch, with the platform cleared after."""
-        narrowest, widest = plot.cells(self.min_width), plot.cells(self.max_width)
-        if not narrowest <= widest <= min(plot.shape):
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the obstacles, each within the patch, with the platform cleared."""
+        narrowest, widest = grid.cells(self.min_width), grid.cells(self.max_width)
+        if not narrowest <= widest <= min(grid.shape):
             raise ConfigError(
-                f"obstacles: min_width {self.min_width:g} m and max_width {self.max_width:g} m do "
-                f"not fit one another or a patch of {plot.size[0]:g} m x {plot.size[1]:g} m"
+                f"obstacles: got min_width {self.min_width:g} m and max_width "
+                f"{self.max_width:g} m; expected min_width <= max_width <= the sides of the patch, "
+                f"{grid.size[0]:g} m x {grid.size[1]:g} m"
             )
         draws = rng.random((self.number, 5))
         sides = narrowest + (draws[:, :2] * (widest - narrowest + 1)).astype(np.int64)
-        starts = (draws[:, 2:4] * (np.array(plot.shape) - sides + 1)).astype(np.int64)
+        starts = (draws[:, 2:4] * (np.array(grid.shape) - sides + 1)).astype(np.int64)
         levels = self.height * np.array([-1.0, -0.5, 0.5, 1.0])[(draws[:, 4] * 4).astype(np.int64)]
-        ground = np.zeros(plot.shape)
+        ground = np.zeros(grid.shape)
         for (i, j), (di, dj), level in zip(starts, sides, levels, strict=True):
             ground[i : i + di, j : j + dj] = level
-        ground[plot.middle(plot.centered(self.platform))] = 0.0
+        ground[grid.centered_slices(grid.centered(self.platform))] = 0.0
         return ground

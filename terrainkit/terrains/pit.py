@@ -12,7 +12,10 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class Pit(Terrain):
-    """A square pit with vertical walls; the robot starts at the bottom and climbs out."""
+    """A square pit with vertical walls.
+
+    The robot is spawned at the bottom and climbs out.
+    """
 
     depth: float = parameter.height(0.0, 1.0)
     """Depth of the pit [m]."""
@@ -20,8 +23,8 @@ class Pit(Terrain):
     side: float = parameter.platform(4.0)
     """Side of the pit [m]."""
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return 0, and `-depth` inside the pit."""
-        ground = np.zeros(plot.shape)
-        ground[plot.middle(plot.centered(self.side))] = -self.depth
+        ground = np.zeros(grid.shape)
+        ground[grid.centered_slices(grid.centered(self.side))] = -self.depth
         return ground

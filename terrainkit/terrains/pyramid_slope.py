@@ -1,4 +1,4 @@
-"""A square pyramid with a level top."""
+"""A pyramid with a level top."""
 
 from dataclasses import dataclass
 
@@ -12,22 +12,22 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class PyramidSlope(Terrain):
-    """Four even slopes around a central platform, of one grade everywhere off it.
+    """Four slopes of constant grade around a central platform.
 
-    The lowest part of the rim is at height 0 (the highest, if inverted).
+    The lowest part of the rim is at height 0; if inverted, the highest.
     """
 
     grade: float = parameter.grade(0.0, 0.4)
     """Rise over run of the sides."""
 
     platform: float = parameter.platform(3.0)
-    """Side of the level square in the middle [m]."""
+    """Side of the level square at the center [m]."""
 
     inverted: bool = parameter.switch()
-    """Turn it upside down: the platform is the bottom, and the robot climbs to leave it."""
+    """Invert the heights: the platform is the lowest part, and the robot climbs to leave it."""
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return the sides, falling by `grade` times a cell from ring to ring."""
-        rings = plot.rings(plot.centered(self.platform))
-        rise: NDArray[np.floating] = self.grade * plot.cell * (rings.max() - rings)
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the slopes, which fall by `grade * cell` from ring to ring."""
+        rings = grid.rings(grid.centered(self.platform))
+        rise: NDArray[np.floating] = self.grade * grid.cell * (rings.max() - rings)
         return -rise if self.inverted else rise

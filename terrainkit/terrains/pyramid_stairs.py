@@ -1,4 +1,4 @@
-"""A square pyramid of stairs."""
+"""A pyramid of stairs."""
 
 from dataclasses import dataclass
 
@@ -13,10 +13,10 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class PyramidStairs(Terrain):
-    """Square steps around a central platform, each of one height and one width.
+    """Square steps of constant height and width around a central platform.
 
-    The outermost tread takes what the steps leave over, so it is never the narrower one; it is at
-    height 0.
+    The outermost tread is at height 0. It is at least as wide as the others, since it takes the
+    remaining cells.
     """
 
     step_height: float = parameter.height(0.05, 0.23)
@@ -26,21 +26,21 @@ class PyramidStairs(Terrain):
     """Run of a step [m]."""
 
     platform: float = parameter.platform(3.0)
-    """Side of the level square in the middle [m]."""
+    """Side of the level square at the center [m]."""
 
     inverted: bool = parameter.switch()
-    """Turn it upside down: the platform is the bottom, and the robot climbs to leave it."""
+    """Invert the heights: the platform is the lowest part, and the robot climbs to leave it."""
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return the treads, counted outwards from the platform."""
-        width = plot.cells(self.step_width)
-        rings = plot.rings(plot.centered(self.platform))
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the treads, counted outward from the platform."""
+        width = grid.cells(self.step_width)
+        rings = grid.rings(grid.centered(self.platform))
         risers = rings.max() // width
         if risers == 0:
             raise ConfigError(
                 f"pyramid_stairs: no step of {self.step_width:g} m fits between the platform of "
                 f"{self.platform:g} m and the edge of a patch of "
-                f"{plot.size[0]:g} m x {plot.size[1]:g} m"
+                f"{grid.size[0]:g} m x {grid.size[1]:g} m"
             )
         rise: NDArray[np.floating] = self.step_height * (
             risers - np.minimum(-(-rings // width), risers)

@@ -7,35 +7,35 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.grid import Grid
-from terrainkit.noise import STEP, LatticeNoise
+from terrainkit.noise import STEP, ValueNoise
 from terrainkit.parameter import Realized
 from terrainkit.terrain import Terrain
 
 
 @dataclass(frozen=True, kw_only=True)
 class Rough(Terrain):
-    """Uniform noise around height 0, with a level platform to start from."""
+    """Uniform noise around height 0, with a level platform at the center."""
 
-    amplitude: float = parameter.height(0.02, 0.1, slack=STEP)
-    """Largest height above or below 0 [m]; of it there are whole steps."""
+    amplitude: float = parameter.height(0.02, 0.1, tolerance=STEP)
+    """Largest height above or below 0 [m], rounded down to whole steps."""
 
     step: float = parameter.height(STEP)
-    """Heights are drawn as multiples of this [m]."""
+    """Step of the random heights [m]."""
 
     spacing: float = parameter.scalar(0.2, zero=False)
-    """Distance between two draws [m]; heights in between are interpolated."""
+    """Distance between two random heights [m]; heights in between are interpolated."""
 
     platform: float = parameter.platform(2.0)
-    """Side of the level square in the middle [m]."""
+    """Side of the level square at the center [m]."""
 
-    def realized(self, plot: Grid) -> dict[str, Realized]:
-        """Return the parameters as built: whole steps, and whole intervals across the patch."""
-        return super().realized(plot) | self._noise().realized(plot)
+    def realized(self, grid: Grid) -> dict[str, Realized]:
+        """Return the realized parameters: whole steps, and whole intervals across the patch."""
+        return super().realized(grid) | self._noise().realized(grid)
 
-    def _noise(self) -> LatticeNoise:
-        return LatticeNoise(amplitude=self.amplitude, step=self.step, spacing=self.spacing)
+    def _noise(self) -> ValueNoise:
+        return ValueNoise(amplitude=self.amplitude, step=self.step, spacing=self.spacing)
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return the noise, fading out over one spacing towards the platform."""
-        noise = self._noise().heights(plot, rng)
-        return noise * plot.fade(plot.centered(self.platform), self.spacing)
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the noise, which fades to 0 at the platform over one spacing."""
+        noise = self._noise().heights(grid, rng)
+        return noise * grid.fade(grid.centered(self.platform), self.spacing)

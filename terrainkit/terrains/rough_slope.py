@@ -1,4 +1,4 @@
-"""A pyramid slope with rough sides."""
+"""A pyramid slope with noise."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.grid import Grid
-from terrainkit.noise import STEP, LatticeNoise
+from terrainkit.noise import STEP, ValueNoise
 from terrainkit.parameter import Realized
 from terrainkit.terrain import Terrain
 from terrainkit.terrains.pyramid_slope import PyramidSlope
@@ -15,36 +15,36 @@ from terrainkit.terrains.pyramid_slope import PyramidSlope
 
 @dataclass(frozen=True, kw_only=True)
 class RoughSlope(Terrain):
-    """A pyramid slope whose sides carry uniform noise; the platform stays level."""
+    """A pyramid slope with uniform noise on its sides; the platform is level."""
 
     grade: float = parameter.grade(0.0, 0.4)
-    """Rise over run of the sides, before the noise."""
+    """Rise over run of the sides without the noise."""
 
-    amplitude: float = parameter.height(0.05, slack=STEP)
-    """Largest height of the noise above or below the slope [m]; of it there are whole steps."""
+    amplitude: float = parameter.height(0.05, tolerance=STEP)
+    """Largest height of the noise above or below the slope [m], rounded down to whole steps."""
 
     step: float = parameter.height(STEP)
-    """Noise is drawn as multiples of this [m]."""
+    """Step of the random heights [m]."""
 
     spacing: float = parameter.scalar(0.2, zero=False)
-    """Distance between two draws [m]; heights in between are interpolated."""
+    """Distance between two random heights [m]; heights in between are interpolated."""
 
     platform: float = parameter.platform(3.0)
-    """Side of the level square in the middle [m]."""
+    """Side of the level square at the center [m]."""
 
     inverted: bool = parameter.switch()
-    """Turn it upside down: the platform is the bottom, and the robot climbs to leave it."""
+    """Invert the heights: the platform is the lowest part, and the robot climbs to leave it."""
 
-    def realized(self, plot: Grid) -> dict[str, Realized]:
-        """Return the parameters as built: whole steps, and whole intervals across the patch."""
-        return super().realized(plot) | self._noise().realized(plot)
+    def realized(self, grid: Grid) -> dict[str, Realized]:
+        """Return the realized parameters: whole steps, and whole intervals across the patch."""
+        return super().realized(grid) | self._noise().realized(grid)
 
-    def _noise(self) -> LatticeNoise:
-        return LatticeNoise(amplitude=self.amplitude, step=self.step, spacing=self.spacing)
+    def _noise(self) -> ValueNoise:
+        return ValueNoise(amplitude=self.amplitude, step=self.step, spacing=self.spacing)
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return the slope plus the noise, which fades out towards the platform."""
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the slope plus noise, which fades to 0 at the platform."""
         slope = PyramidSlope(grade=self.grade, platform=self.platform, inverted=self.inverted)
-        noise = self._noise().heights(plot, rng)
-        fade = plot.fade(plot.centered(self.platform), self.spacing)
-        return slope.heights(plot, rng) + noise * fade
+        noise = self._noise().heights(grid, rng)
+        fade = grid.fade(grid.centered(self.platform), self.spacing)
+        return slope.heights(grid, rng) + noise * fade

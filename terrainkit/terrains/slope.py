@@ -13,33 +13,33 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class Slope(Terrain):
-    """One even slope along x, from a level start to a level landing of the same length.
+    """A slope along x, from a level start to a level landing of the same length.
 
-    The robot starts at low x; both ends span the patch's whole width.
+    The robot is spawned at low x. The slope spans the whole width of the patch.
     """
 
     grade: float = parameter.grade(0.0, 0.4)
     """Rise over run of the slope."""
 
     landing: float = parameter.length(2.0)
-    """Length along x of the level strip at either end [m]."""
+    """Length along x of the level strips at both ends [m]."""
 
     inverted: bool = parameter.switch()
-    """Fall along x instead of rising."""
+    """Descend along x instead of climbing."""
 
-    def spawn(self, plot: Grid) -> tuple[float, float]:
-        """Return the middle of the level start."""
-        return plot.lower[0] + plot.length(plot.cells(self.landing)) / 2, plot.center[1]
+    def spawn(self, grid: Grid) -> tuple[float, float]:
+        """Return the center of the level start."""
+        return grid.lower[0] + grid.length(grid.cells(self.landing)) / 2, grid.center[1]
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return a clipped ramp, the same for every y."""
-        landing = plot.cells(self.landing)
-        run = plot.shape[0] - 2 * landing
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return a clipped ramp, which is constant along y."""
+        landing = grid.cells(self.landing)
+        run = grid.shape[0] - 2 * landing
         if run < 1:
             raise ConfigError(
                 f"slope: two landings of {self.landing:g} m leave no slope in a patch "
-                f"{plot.size[0]:g} m long"
+                f"{grid.size[0]:g} m long"
             )
-        steps = np.clip(np.arange(plot.shape[0]) - landing + 1, 0, run)
-        rise = self.grade * plot.cell * steps
-        return np.broadcast_to((-rise if self.inverted else rise)[:, None], plot.shape)
+        steps = np.clip(np.arange(grid.shape[0]) - landing + 1, 0, run)
+        rise = self.grade * grid.cell * steps
+        return np.broadcast_to((-rise if self.inverted else rise)[:, None], grid.shape)

@@ -13,9 +13,9 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class Stairs(Terrain):
-    """One flight along x, from a level start up to a level landing at least as long.
+    """One flight of stairs along x, from a level start to a level landing at least as long.
 
-    The robot starts at low x; the steps span the patch's whole width.
+    The robot is spawned at low x. The steps span the whole width of the patch.
     """
 
     step_height: float = parameter.height(0.05, 0.23)
@@ -25,25 +25,25 @@ class Stairs(Terrain):
     """Run of a step [m]."""
 
     landing: float = parameter.length(2.0)
-    """Length along x of the level start, and the least of the level end [m]."""
+    """Length along x of the level start, and minimum length of the landing [m]."""
 
     inverted: bool = parameter.switch()
     """Descend along x instead of climbing."""
 
-    def spawn(self, plot: Grid) -> tuple[float, float]:
-        """Return the middle of the level start."""
-        return plot.lower[0] + plot.length(plot.cells(self.landing)) / 2, plot.center[1]
+    def spawn(self, grid: Grid) -> tuple[float, float]:
+        """Return the center of the level start."""
+        return grid.lower[0] + grid.length(grid.cells(self.landing)) / 2, grid.center[1]
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return the treads, one riser at the end of the landing and one every `step_width`."""
-        landing, width = plot.cells(self.landing), plot.cells(self.step_width)
-        run = plot.shape[0] - 2 * landing
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the treads: a riser at the end of the start, and one every `step_width`."""
+        landing, width = grid.cells(self.landing), grid.cells(self.step_width)
+        run = grid.shape[0] - 2 * landing
         if run < 0:
             raise ConfigError(
                 f"stairs: two landings of {self.landing:g} m do not fit in a patch "
-                f"{plot.size[0]:g} m long"
+                f"{grid.size[0]:g} m long"
             )
         risers = run // width + 1
-        treads = np.clip((np.arange(plot.shape[0]) - landing) // width + 1, 0, risers)
+        treads = np.clip((np.arange(grid.shape[0]) - landing) // width + 1, 0, risers)
         rise = self.step_height * treads
-        return np.broadcast_to((-rise if self.inverted else rise)[:, None], plot.shape)
+        return np.broadcast_to((-rise if self.inverted else rise)[:, None], grid.shape)

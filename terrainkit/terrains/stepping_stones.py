@@ -12,9 +12,9 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class SteppingStones(Terrain):
-    """Square stones in rows across x, each row shifted at random, around a platform.
+    """Square stones in rows along y, each row with a random offset, around a platform.
 
-    Stones that meet the edge of the patch are cut by it.
+    Stones are clipped at the edge of the patch.
     """
 
     stone: float = parameter.length(1.575, 0.075)
@@ -24,22 +24,22 @@ class SteppingStones(Terrain):
     """Gap between two stones [m]."""
 
     variation: float = parameter.height(0.0)
-    """Largest height of a stone above or below 0 [m]."""
+    """Maximum height of a stone above or below 0 [m]."""
 
     depth: float = parameter.height(10.0)
     """Depth of the holes [m]."""
 
     platform: float = parameter.platform(4.0)
-    """Side of the level square in the middle [m]."""
+    """Side of the level square at the center [m]."""
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return the stones: a row is `stone` cells deep, and `distance` cells from the next."""
-        stone, distance = plot.cells(self.stone), plot.cells(self.distance)
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the stones; a row is `stone` wide along x, and `distance` from the next."""
+        stone, distance = grid.cells(self.stone), grid.cells(self.distance)
         pitch = stone + distance
-        shifts = (rng.random(plot.shape[0]) * pitch).astype(np.int64)
-        tops = (2 * rng.random(plot.shape) - 1) * self.variation
-        row, x = np.divmod(np.arange(plot.shape[0])[:, None], pitch)
-        column, y = np.divmod(np.arange(plot.shape[1])[None, :] + shifts[row], pitch)
-        ground = np.where((x < stone) & (y < stone), tops[row, column % plot.shape[1]], -self.depth)
-        ground[plot.middle(plot.centered(self.platform))] = 0.0
+        shifts = (rng.random(grid.shape[0]) * pitch).astype(np.int64)
+        tops = (2 * rng.random(grid.shape) - 1) * self.variation
+        row, x = np.divmod(np.arange(grid.shape[0])[:, None], pitch)
+        column, y = np.divmod(np.arange(grid.shape[1])[None, :] + shifts[row], pitch)
+        ground = np.where((x < stone) & (y < stone), tops[row, column % grid.shape[1]], -self.depth)
+        ground[grid.centered_slices(grid.centered(self.platform))] = 0.0
         return ground

@@ -1,4 +1,4 @@
-"""Waves."""
+"""Sine waves."""
 
 from dataclasses import dataclass
 
@@ -14,38 +14,38 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class Wave(Terrain):
-    """Sine waves along x and y, multiplied, with a level platform to start from.
+    """The product of sine waves along x and y, with a level platform at the center.
 
-    A whole number of waves spans the patch, so its rim is at height 0.
+    The patch is a whole number of waves, so its rim is at height 0.
     """
 
     amplitude: float = parameter.height(0.0, 0.2)
-    """Height of a crest above 0, and depth of a trough below [m]."""
+    """Height of a crest above 0 and depth of a trough below 0 [m]."""
 
     number: int = parameter.count(4)
     """Waves along each side of the patch."""
 
     platform: float = parameter.platform(1.5)
-    """Side of the level square in the middle [m]."""
+    """Side of the level square at the center [m]."""
 
-    def realized(self, plot: Grid) -> dict[str, Realized]:
-        """Return the parameters as built: the highest sample is a little beside the crest."""
-        x, y = (np.abs(wave).max() for wave in self._waves(plot))
-        return super().realized(plot) | {"amplitude": round(float(self.amplitude * x * y), 9)}
+    def realized(self, grid: Grid) -> dict[str, Realized]:
+        """Return the realized parameters; the highest sample is slightly off the crest."""
+        x, y = (np.abs(wave).max() for wave in self._waves(grid))
+        return super().realized(grid) | {"amplitude": round(float(self.amplitude * x * y), 9)}
 
-    def _waves(self, plot: Grid) -> list[NDArray[np.float64]]:
-        # Rounded, since the last digits of a sine differ from one C library to another.
-        phases = [2 * np.pi * self.number * (np.arange(n) + 0.5) / n for n in plot.shape]
+    def _waves(self, grid: Grid) -> list[NDArray[np.float64]]:
+        # Rounded, since the last digits of a sine depend on the C library.
+        phases = [2 * np.pi * self.number * (np.arange(n) + 0.5) / n for n in grid.shape]
         return [np.asarray(np.sin(phase).round(9), dtype=np.float64) for phase in phases]
 
-    def heights(self, plot: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return the waves, fading out over a quarter of one towards the platform."""
-        if 4 * self.number > min(plot.shape):
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the waves, which fade to 0 at the platform over a quarter of a wave."""
+        if 4 * self.number > min(grid.shape):
             raise ConfigError(
-                f"wave: {self.number} waves need {4 * self.number} cells a side, four for each; "
-                f"the patch has {plot.shape[0]} x {plot.shape[1]}"
+                f"wave: {self.number} waves need four cells each, {4 * self.number} along both "
+                f"axes; the patch has {grid.shape[0]} x {grid.shape[1]}"
             )
-        x, y = self._waves(plot)
-        quarter = min(plot.size) / (4 * self.number)
-        fade = plot.fade(plot.centered(self.platform), quarter)
+        x, y = self._waves(grid)
+        quarter = min(grid.size) / (4 * self.number)
+        fade = grid.fade(grid.centered(self.platform), quarter)
         return self.amplitude * np.outer(x, y) * fade

@@ -3,7 +3,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from terrainkit.archive import opened
+from terrainkit.archive import open_archive
 from terrainkit.errors import MapFileError
 
 
@@ -23,7 +23,7 @@ def path(tmp_path):
 
 @pytest.fixture
 def archive(path):
-    with opened(path) as archive:
+    with open_archive(path) as archive:
         yield archive
 
 
@@ -56,11 +56,11 @@ def test_values_are_read_as_they_were_written(archive):
 @pytest.mark.parametrize(
     ("key", "kind", "shape", "message"),
     [
-        ("heights", "f8", (2, 3), "heights has dtype float32; wanted float64"),
-        ("heights", "i", (2, 3), "heights has dtype float32; wanted whole numbers"),
-        ("heights", "U", (2, 3), "heights has dtype float32; wanted a text"),
-        ("heights", "f4", (3, 2), r"heights has shape \(2, 3\); wanted \(3, 2\)"),
-        ("heights", "f4", (None,), r"heights has shape \(2, 3\); wanted \(any\)"),
+        ("heights", "f8", (2, 3), "heights: got dtype float32; expected float64"),
+        ("heights", "i", (2, 3), "heights: got dtype float32; expected integers"),
+        ("heights", "U", (2, 3), "heights: got dtype float32; expected a string"),
+        ("heights", "f4", (3, 2), r"heights: got shape \(2, 3\); expected \(3, 2\)"),
+        ("heights", "f4", (None,), r"heights: got shape \(2, 3\); expected \(any\)"),
         ("depths", "f4", (2, 3), "has no depths"),
     ],
 )
@@ -71,23 +71,23 @@ def test_an_array_that_is_not_as_expected_is_refused(archive, key, kind, shape, 
 
 def test_an_array_may_take_its_limit_and_no_more(archive):
     assert archive.array("heights", "f4", (2, 3), limit=24).nbytes == 24
-    with pytest.raises(MapFileError, match="heights takes 24 bytes; 23 at most"):
+    with pytest.raises(MapFileError, match="heights: got 24 bytes; expected at most 23"):
         archive.array("heights", "f4", (2, 3), limit=23)
 
 
 @pytest.mark.parametrize(("key", "wanted"), [("cell", 0.1), ("lower", (-1.0, 2.0))])
 def test_numbers_as_expected_pass(archive, key, wanted):
-    archive.expect(key, wanted)
+    archive.check_value(key, wanted)
 
 
 @pytest.mark.parametrize(("key", "wanted"), [("cell", 0.1001), ("lower", (2.0, -1.0))])
 def test_other_numbers_are_refused(archive, key, wanted):
-    with pytest.raises(MapFileError, match=f"{key} is .*, but its config says"):
-        archive.expect(key, wanted)
+    with pytest.raises(MapFileError, match=f"{key}: got .*; expected .* by its config"):
+        archive.check_value(key, wanted)
 
 
 def test_the_name_of_a_file_may_be_a_text(path):
-    with opened(str(path)) as archive:
+    with open_archive(str(path)) as archive:
         assert archive.path == path
 
 
@@ -98,6 +98,6 @@ def test_a_header_that_claims_to_be_huge_is_not_read(tmp_path):
         file.writestr("heights.npy", header + b" " * 10**6)
     with (
         pytest.raises(MapFileError, match="its header is longer than 10000 bytes"),
-        opened(path) as archive,
+        open_archive(path) as archive,
     ):
         archive.array("heights", "f4", (3,))

@@ -5,9 +5,9 @@ from terrainkit.curriculum import assign_levels, update_levels
 from terrainkit.errors import ConfigError
 
 
-def update(levels, distance, commanded, *, rows=10, seed=0, **options):
+def update(levels, distance, command_distance, *, rows=10, seed=0, **options):
     return update_levels(
-        levels, distance, commanded, rows=rows, patch_length=8.0, seed=seed, **options
+        levels, distance, command_distance, rows=rows, patch_length=8.0, seed=seed, **options
     )
 
 
@@ -50,20 +50,18 @@ def test_levels_are_seeded():
 
 
 def test_a_negative_number_of_environments_is_refused():
-    with pytest.raises(ConfigError, match="num_envs is -1; wanted 0 or more"):
+    with pytest.raises(ConfigError, match="num_envs: got -1; expected 0 or more"):
         assign_levels(-1, 10, 20, None, seed=0)
 
 
 @pytest.mark.parametrize("highest", [-1, 10])
 def test_a_level_that_is_not_on_the_map_is_refused(highest):
-    with pytest.raises(
-        ConfigError, match=f"max_init_level is {highest}; the map has levels 0 to 9"
-    ):
+    with pytest.raises(ConfigError, match=f"max_init_level: got {highest}; expected 0 to 9"):
         assign_levels(8, 10, 20, highest, seed=0)
 
 
 @pytest.mark.parametrize(
-    ("distance", "commanded", "level"),
+    ("distance", "command_distance", "level"),
     [
         (4.1, 8.0, 6),  # over half of the 8 m patch
         (4.0, 8.0, 5),  # just half
@@ -75,8 +73,8 @@ def test_a_level_that_is_not_on_the_map_is_refused(highest):
         (1.0, 2.1, 4),
     ],
 )
-def test_who_walks_far_moves_up_and_who_falls_short_moves_down(distance, commanded, level):
-    assert update([5], [distance], [commanded]).tolist() == [level]
+def test_who_walks_far_moves_up_and_who_falls_short_moves_down(distance, command_distance, level):
+    assert update([5], [distance], [command_distance]).tolist() == [level]
 
 
 def test_each_environment_moves_on_its_own():
@@ -120,7 +118,7 @@ def test_no_environments_have_no_levels():
 
 @pytest.mark.parametrize(
     ("levels", "message"),
-    [([0, 10], "levels go from 0 to 10; wanted 0 to 9"), ([-1, 3], "levels go from -1 to 3")],
+    [([0, 10], "levels: got 0 to 10; expected 0 to 9"), ([-1, 3], "levels: got -1 to 3")],
 )
 def test_levels_off_the_map_are_refused(levels, message):
     with pytest.raises(ConfigError, match=message):
@@ -128,7 +126,7 @@ def test_levels_off_the_map_are_refused(levels, message):
 
 
 def test_top_levels_below_one_are_refused():
-    with pytest.raises(ConfigError, match="top_levels is 0; wanted 1 or more"):
+    with pytest.raises(ConfigError, match="top_levels: got 0; expected 1 or more"):
         update([0], [0.0], [0.0], top_levels=0)
 
 

@@ -6,13 +6,13 @@ from hypothesis import strategies as st
 from terrainkit import MapConfig, SubTerrain, TerrainkitError, generate, registry
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
-from terrainkit.measure import hardness
+from terrainkit.measured_difficulty import measured_difficulty
 from terrainkit.parameter import MAX_VALUE, parameters_of
 
-VARIANTS = [(name, {}) for name in registry.names()] + [
+VARIANTS = [(name, {}) for name in registry.terrain_names()] + [
     (name, {"inverted": True})
-    for name in registry.names()
-    if "inverted" in parameters_of(registry.find(name))
+    for name in registry.terrain_names()
+    if "inverted" in parameters_of(registry.get_terrain(name))
 ]
 every_terrain = pytest.mark.parametrize(
     ("terrain", "given_parameters"),
@@ -20,7 +20,7 @@ every_terrain = pytest.mark.parametrize(
     ids=[f"{name}_inverted" if inverted else name for name, inverted in VARIANTS],
 )
 every_plot = pytest.mark.parametrize(
-    "plot",
+    "grid",
     [
         pytest.param(Grid(shape=(80, 80), cell=0.1), id="8x8"),
         pytest.param(Grid(shape=(80, 40), cell=0.1), id="8x4"),
@@ -34,16 +34,16 @@ DIFFICULTIES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 coarse = pytest.mark.filterwarnings("ignore:cells of:terrainkit.TerrainkitWarning")
 
 
-def at_every_difficulty(terrain, parameters, plot, seed=0):
+def at_every_difficulty(terrain, parameters, grid, seed=0):
     """Return the heights at each difficulty, all from the same draws."""
     choice = SubTerrain(terrain=terrain, parameters=parameters)
-    return [choice.at(d).build(plot, np.random.default_rng(seed)) for d in DIFFICULTIES]
+    return [choice.at(d).build(grid, np.random.default_rng(seed)) for d in DIFFICULTIES]
 
 
-def map_of(terrain, parameters, plot, **rest):
+def map_of(terrain, parameters, grid, **rest):
     """Return a map of one terrain: rows of difficulty 0, 0.5 and 1, and twenty draws of each."""
     choice = SubTerrain(terrain=terrain, parameters=parameters)
-    config = {"rows": 3, "cols": 20, "patch_size": plot.size, "cell": plot.cell, "border": 1.0}
+    config = {"rows": 3, "cols": 20, "patch_size": grid.size, "cell": grid.cell, "border": 1.0}
     return generate(MapConfig(**config | {"terrains": (choice,)} | rest))
 
 
@@ -70,10 +70,10 @@ def assert_spawns_are_inside(terrain_map, radius):
 
 @every_plot
 @every_terrain
-def test_heights_are_finite_float32_of_the_shape_of_the_patch(terrain, given_parameters, plot):
-    for heights in at_every_difficulty(terrain, given_parameters, plot):
+def test_heights_are_finite_float32_of_the_shape_of_the_patch(terrain, given_parameters, grid):
+    for heights in at_every_difficulty(terrain, given_parameters, grid):
         assert heights.dtype == np.float32
-        assert heights.shape == plot.shape
+        assert heights.shape == grid.shape
         assert np.isfinite(heights).all()
 
 
@@ -81,24 +81,24 @@ def test_heights_are_finite_float32_of_the_shape_of_the_patch(terrain, given_par
     ("terrain", "block"),
     [
         (name, field)
-        for name in registry.names()
-        for field, known in parameters_of(registry.find(name)).items()
+        for name in registry.terrain_names()
+        for field, known in parameters_of(registry.get_terrain(name)).items()
         if known.snap == "centered"
     ],
 )
 @pytest.mark.parametrize("size", [4.0, 7.9])
 def test_a_block_as_wide_as_the_patch_is_refused(terrain, block, size):
-    plot = Grid(shape=(round(size / 0.1),) * 2, cell=0.1)
+    grid = Grid(shape=(round(size / 0.1),) * 2, cell=0.1)
     choice = SubTerrain(terrain=terrain, parameters={block: size})
-    with pytest.raises(ConfigError, match=f"{block} {size:g} m leaves nothing of a patch of"):
-        choice.at(0.5).build(plot, np.random.default_rng(0))
+    with pytest.raises(ConfigError, match=f"{block} {size:g} m fills the whole patch of"):
+        choice.at(0.5).build(grid, np.random.default_rng(0))
 
 
 @coarse
 @every_plot
 @every_terrain
-def test_every_spawn_is_a_level_disc_on_the_ground(terrain, given_parameters, plot):
-    terrain_map = map_of(terrain, given_parameters, plot)
+def test_every_spawn_is_a_level_disc_on_the_ground(terrain, given_parameters, grid):
+    terrain_map = map_of(terrain, given_parameters, grid)
     assert_spawns_are_level(terrain_map, 0.5)
     assert_spawns_are_inside(terrain_map, 0.5)
 
@@ -120,18 +120,18 @@ def test_every_spawn_is_level_whatever_the_map(terrain, given_parameters, rest):
 
 @every_terrain
 def test_the_same_draws_make_the_same_bytes(terrain, given_parameters):
-    plot = Grid(shape=(73, 51), cell=0.1)
-    once, again = (at_every_difficulty(terrain, given_parameters, plot, seed=3) for _ in "ab")
+    grid = Grid(shape=(73, 51), cell=0.1)
+    once, again = (at_every_difficulty(terrain, given_parameters, grid, seed=3) for _ in "ab")
     assert [heights.tobytes() for heights in once] == [heights.tobytes() for heights in again]
 
 
 @every_terrain
 def test_a_terrain_that_draws_is_another_with_another_seed(terrain, given_parameters):
-    plot, rng = Grid(shape=(80, 80), cell=0.1), np.random.default_rng(1)
+    grid, rng = Grid(shape=(80, 80), cell=0.1), np.random.default_rng(1)
     one = SubTerrain(terrain=terrain, parameters=given_parameters).at(1.0)
-    heights = one.build(plot, rng)
+    heights = one.build(grid, rng)
     draws = rng.random() != np.random.default_rng(1).random()
-    other = one.build(plot, np.random.default_rng(2))
+    other = one.build(grid, np.random.default_rng(2))
     assert (heights != other).any() == draws
 
 
@@ -148,26 +148,26 @@ def test_heights_do_not_hang_on_where_the_patch_stands(terrain, given_parameters
 
 @every_terrain
 def test_numpys_global_random_state_is_neither_read_nor_changed(terrain, given_parameters):
-    plot = Grid(shape=(80, 80), cell=0.1)
+    grid = Grid(shape=(80, 80), cell=0.1)
     np.random.seed(1)  # noqa: NPY002
-    first = at_every_difficulty(terrain, given_parameters, plot)
+    first = at_every_difficulty(terrain, given_parameters, grid)
     after = np.random.random()  # noqa: NPY002
     assert after == np.random.RandomState(1).random()
-    second = at_every_difficulty(terrain, given_parameters, plot)
+    second = at_every_difficulty(terrain, given_parameters, grid)
     assert np.array_equal(first, second)
 
 
 @every_plot
 @every_terrain
-def test_hardness_does_not_fall_as_the_difficulty_rises(terrain, given_parameters, plot):
-    x, y = registry.find(terrain).at(0.0).spawn(plot)
-    start = int(x / plot.cell), int(y / plot.cell)
+def test_hardness_does_not_fall_as_the_difficulty_rises(terrain, given_parameters, grid):
+    x, y = registry.get_terrain(terrain).at(0.0).spawn(grid)
+    start = int(x / grid.cell), int(y / grid.cell)
     hard = [
-        hardness(heights, plot.cell, heights[start])
-        for heights in at_every_difficulty(terrain, given_parameters, plot)
+        measured_difficulty(heights, grid.cell, heights[start])
+        for heights in at_every_difficulty(terrain, given_parameters, grid)
     ]
     assert np.diff(hard).min() >= -1e-9
-    ramps = [p.easy != p.hard for p in parameters_of(registry.find(terrain)).values()]
+    ramps = [p.easy != p.hard for p in parameters_of(registry.get_terrain(terrain)).values()]
     assert (hard[-1] > hard[0]) == any(ramps)
 
 
@@ -178,14 +178,14 @@ def test_hardness_does_not_fall_as_the_difficulty_rises(terrain, given_parameter
 )
 @every_terrain
 def test_what_is_built_is_within_a_cell_of_what_is_asked(terrain, given_parameters, shape, cell):
-    plot = Grid(shape=shape, cell=cell)
+    grid = Grid(shape=shape, cell=cell)
     for difficulty in DIFFICULTIES:
-        built = registry.find(terrain).at(difficulty, given_parameters)
-        requested, realized = built.requested(), built.realized(plot)
+        built = registry.get_terrain(terrain).at(difficulty, given_parameters)
+        requested, realized = built.requested(), built.realized(grid)
         assert list(realized) == list(requested)
         for name, parameter in parameters_of(type(built)).items():
             if parameter.snap == "none":
-                # Noise keeps to a lattice, and no sample need stand on the crest of a wave.
+                # Noise keeps to a node_grid, and no sample need stand on the crest of a wave.
                 assert np.array(realized[name]) == pytest.approx(requested[name], rel=0.05)
             else:
                 off = np.abs(np.array(realized[name]) - requested[name])
@@ -195,19 +195,23 @@ def test_what_is_built_is_within_a_cell_of_what_is_asked(terrain, given_paramete
 @pytest.mark.parametrize("value", [5e-324, MAX_VALUE, 1e308])
 @pytest.mark.parametrize(
     ("terrain", "parameter"),
-    [(name, key) for name in registry.names() for key in parameters_of(registry.find(name))],
+    [
+        (name, key)
+        for name in registry.terrain_names()
+        for key in parameters_of(registry.get_terrain(name))
+    ],
 )
 def test_a_number_beyond_all_measure_is_built_or_refused(terrain, parameter, value):
-    kind = type(parameters_of(registry.find(terrain))[parameter].easy)
-    plot = Grid(shape=(80, 80), cell=0.1)
+    kind = type(parameters_of(registry.get_terrain(terrain))[parameter].easy)
+    grid = Grid(shape=(80, 80), cell=0.1)
     try:
         choice = SubTerrain(terrain=terrain, parameters={parameter: kind(value)})
         built = choice.at(1.0)
-        heights = built.build(plot, np.random.default_rng(0))
+        heights = built.build(grid, np.random.default_rng(0))
     except TerrainkitError:
         return
     assert np.isfinite(heights).all()
-    assert set(built.realized(plot)) == set(built.requested())
+    assert set(built.realized(grid)) == set(built.requested())
 
 
 @coarse
@@ -221,12 +225,12 @@ def test_a_number_beyond_all_measure_is_built_or_refused(terrain, parameter, val
 )
 def test_any_patch_is_built_with_room_to_start_or_refused(variant, shape, cell, difficulty, radius):
     terrain, parameters = variant
-    plot = Grid(shape=shape, cell=cell)
+    grid = Grid(shape=shape, cell=cell)
     config = MapConfig(
         mode="selected",
         rows=1,
         cols=1,
-        patch_size=plot.size,
+        patch_size=grid.size,
         cell=cell,
         border=0.0,
         selected_difficulty=difficulty,

@@ -9,9 +9,9 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from terrainkit import MapConfig, SubTerrain, TerrainkitWarning, generate, tile
+from terrainkit import MapConfig, SubTerrain, TerrainkitWarning, generate, make_patch
 from terrainkit.config import Mode
-from terrainkit.errors import CapacityError, ConfigError, TerrainkitError
+from terrainkit.errors import ConfigError, MemoryLimitError, TerrainkitError
 
 OBSTACLES, ROUGH, STAIRS = (SubTerrain(terrain=name) for name in ("obstacles", "rough", "stairs"))
 NUMBERS = [field.name for field in fields(MapConfig) if field.type in (float, float | None)]
@@ -71,7 +71,7 @@ def test_the_border_is_level_at_zero():
 
 @pytest.mark.parametrize(("row", "col"), [(0, 0), (1, 2), (2, 0), (2, 3)])
 def test_a_tile_alone_equals_its_slice_of_the_map(row, col):
-    terrain_map, patch = generate(SMALL), tile(SMALL, row, col)
+    terrain_map, patch = generate(SMALL), make_patch(SMALL, row, col)
     i, j = 10 + 80 * row, 10 + 60 * col
     assert patch.heights.tobytes() == terrain_map.heights[i : i + 80, j : j + 60].tobytes()
     assert patch.origin.tobytes() == terrain_map.env_origins[row, col].tobytes()
@@ -91,7 +91,7 @@ def test_editing_one_column_leaves_the_others_identical():
 def test_more_rows_leave_the_draws_of_the_first_ones_alone():
     few = MapConfig(rows=2, cols=2, border=0.0, terrains=(OBSTACLES,))
     many = MapConfig(rows=5, cols=3, border=0.0, terrains=(OBSTACLES,))
-    assert tile(few, 0, 1).heights.tobytes() == tile(many, 0, 1).heights.tobytes()
+    assert make_patch(few, 0, 1).heights.tobytes() == make_patch(many, 0, 1).heights.tobytes()
 
 
 def test_centered_moves_the_map_and_changes_nothing_else():
@@ -114,7 +114,7 @@ def test_every_mode_makes_a_map(mode):
 def test_a_map_too_large_for_memory_says_what_it_needs_before_it_takes_anything():
     config = MapConfig(rows=10_000, cols=10_000, terrains=(STAIRS,))
     tracemalloc.start()
-    with pytest.raises(CapacityError, match="a map of 800500 x 800500 samples needs") as caught:
+    with pytest.raises(MemoryLimitError, match="a map of 800500 x 800500 samples needs") as caught:
         generate(config)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
@@ -169,7 +169,7 @@ def test_progress_sees_every_patch():
 
 def test_a_step_above_the_amplitude_makes_level_ground_which_is_told():
     choice = SubTerrain(terrain="rough", parameters={"amplitude": 0.004})
-    with pytest.warns(TerrainkitWarning, match=r"steps of height, .* rough\.amplitude on 1 patch"):
+    with pytest.warns(TerrainkitWarning, match=r"height steps .* rough\.amplitude on 1 patch"):
         made = generate(MapConfig(rows=1, cols=1, border=0.0, terrains=(choice,)))
     assert not made.heights.any()
 
@@ -185,7 +185,7 @@ def test_a_step_above_the_amplitude_makes_level_ground_which_is_told():
 def test_a_robot_that_cannot_start_where_it_should_is_told(terrain, given):
     choice = SubTerrain(terrain=terrain, parameters=given)
     config = MapConfig(rows=3, cols=1, border=0.0, difficulty_range=(0.5, 1.0), terrains=(choice,))
-    with pytest.warns(TerrainkitWarning, match=f"where robots should start: {terrain} on 3 patch"):
+    with pytest.warns(TerrainkitWarning, match=f"at the preferred spawn: {terrain} on 3 patch"):
         generate(config)
 
 

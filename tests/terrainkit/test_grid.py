@@ -58,7 +58,7 @@ def test_lengths_round_to_the_nearest_cell_and_halves_up(length, cell, count):
 def test_a_length_takes_one_cell_at_least_unless_none_will_do(length):
     grid = Grid(shape=(1, 1), cell=0.1)
     assert grid.cells(length) == 1
-    assert grid.cells(length, least=0) == 0
+    assert grid.cells(length, minimum=0) == 0
 
 
 def test_three_cells_of_a_tenth_are_exactly_three_tenths():
@@ -67,7 +67,7 @@ def test_three_cells_of_a_tenth_are_exactly_three_tenths():
 
 @settings(deadline=None, derandomize=True, max_examples=100)
 @given(count=st.integers(1, 10_000), cell=st.sampled_from([0.01, 0.03, 0.05, 0.1, 0.2, 0.7]))
-def test_a_whole_number_of_cells_survives_metres(count, cell):
+def test_a_whole_number_of_cells_survives_meters(count, cell):
     grid = Grid(shape=(1, 1), cell=cell)
     assert grid.cells(grid.length(count)) == count
 
@@ -95,7 +95,7 @@ def test_a_centered_block_is_within_one_cell_of_its_size_and_leaves_equal_margin
     grid = Grid(shape=(n, n), cell=0.1)
     block = grid.centered(size)
     assert abs(block[0] * 0.1 - size) <= 0.1 + 1e-6
-    middle = grid.middle(block)[0]
+    middle = grid.centered_slices(block)[0]
     assert middle.stop - middle.start == block[0]
     assert middle.start == n - middle.stop
 
@@ -126,7 +126,7 @@ def test_rings_of_a_grid_that_is_longer_along_x():
 def test_middle_indexes_the_cells_of_ring_zero():
     grid = Grid(shape=(9, 6), cell=0.1)
     inside = np.zeros(grid.shape, dtype=bool)
-    inside[grid.middle((3, 2))] = True
+    inside[grid.centered_slices((3, 2))] = True
     assert inside.sum() == 6
     assert (inside == (grid.rings((3, 2)) == 0)).all()
 
@@ -145,24 +145,26 @@ def test_whole_cells_counts_what_divides_on_paper(length, cell, count):
 
 
 def test_whole_cells_may_be_none_where_that_is_the_least():
-    assert whole_cells("border", 0.0, 0.1, least=0) == 0
+    assert whole_cells("border", 0.0, 0.1, minimum=0) == 0
 
 
 @pytest.mark.parametrize("length", [0.0, 0.04])
 def test_whole_cells_are_one_or_more_otherwise(length):
-    with pytest.raises(ConfigError, match=rf"border {length:g} m is not .*: 0\.1 m, 0\.2 m"):
+    with pytest.raises(
+        ConfigError, match=rf"border: got {length:g} m; expected .* 0\.1 m or 0\.2 m"
+    ):
         whole_cells("border", length, 0.1)
 
 
 def test_whole_cells_names_the_lengths_that_would_do():
     with pytest.raises(
         ConfigError,
-        match=r"border 8\.05 m is not a whole number of cells of 0\.1 m; .*: 8 m, 8\.1 m",
+        match=r"border: got 8\.05 m; expected a whole number of cells .* 8 m or 8\.1 m",
     ):
         whole_cells("border", 8.05, 0.1)
 
 
 @pytest.mark.parametrize("length", [math.inf, math.nan, 1e308])
 def test_whole_cells_refuses_what_cannot_be_counted(length):
-    with pytest.raises(ConfigError, match=r"border .* cannot be counted in cells of 0\.1 m"):
+    with pytest.raises(ConfigError, match=r"border .* is too many cells of 0\.1 m"):
         whole_cells("border", length, 0.1)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError, TerrainkitWarning
-from terrainkit.layout import apportion, assign_patch, terrain_columns
+from terrainkit.layout import allocate_columns, assign_patch, terrain_columns
 
 FLAT, GAP, PIT = (SubTerrain(terrain=name) for name in ("flat", "gap", "pit"))
 
@@ -32,7 +32,7 @@ def drawn(config):
 
 
 @pytest.mark.parametrize(
-    ("proportions", "seats", "counts"),
+    ("proportions", "num_columns", "counts"),
     [
         # Shares 4.7, 1.6, 1.58, 1.2, 0.61, 0.31: seven whole ones, then 0.7, 0.61 and 0.6 win.
         ([47, 16, 15.8, 12, 6.1, 3.1], 10, [5, 2, 1, 1, 1, 0]),
@@ -52,18 +52,20 @@ def drawn(config):
         ([1], 7, [7]),
     ],
 )
-def test_seats_go_by_largest_remainder(proportions, seats, counts):
-    assert apportion(proportions, seats) == counts
+def test_seats_go_by_largest_remainder(proportions, num_columns, counts):
+    assert allocate_columns(proportions, num_columns) == counts
 
 
 @settings(deadline=None, derandomize=True)
-@given(weights=st.lists(st.integers(0, 100), min_size=1, max_size=12), seats=st.integers(1, 200))
-def test_every_seat_is_given_and_each_count_is_its_share_rounded(weights, seats):
+@given(
+    weights=st.lists(st.integers(0, 100), min_size=1, max_size=12), num_columns=st.integers(1, 200)
+)
+def test_every_seat_is_given_and_each_count_is_its_share_rounded(weights, num_columns):
     weights[0] += 1
-    counts = apportion([float(w) for w in weights], seats)
-    assert sum(counts) == seats
+    counts = allocate_columns([float(w) for w in weights], num_columns)
+    assert sum(counts) == num_columns
     for weight, n in zip(weights, counts, strict=True):
-        share = Fraction(weight * seats, sum(weights))
+        share = Fraction(weight * num_columns, sum(weights))
         assert math.floor(share) <= n <= math.ceil(share)
 
 
@@ -78,7 +80,7 @@ def test_legged_gyms_ten_columns():
 
 def test_a_terrain_of_ones_own_mix_without_a_column_is_an_error_that_names_it():
     with pytest.raises(
-        ConfigError, match=r"2 columns are too few for 3 terrains .*: no column for pit$"
+        ConfigError, match=r"2 columns are too few for 3 sub-terrains .*: no column for pit$"
     ):
         terrain_columns(MapConfig(cols=2, terrains=(FLAT, GAP, PIT)))
 
@@ -86,7 +88,7 @@ def test_a_terrain_of_ones_own_mix_without_a_column_is_an_error_that_names_it():
 def test_a_terrain_of_a_preset_without_a_column_is_a_warning_that_names_it():
     with pytest.warns(
         TerrainkitWarning,
-        match=r"4 columns are too few for 5 terrains .*: no column for wave \(preset rough\)",
+        match=r"4 columns are too few for 5 sub-terrains .*: no column for wave \(preset rough\)",
     ):
         columns = terrain_columns(MapConfig(cols=4, preset="rough"))
     assert columns == [0, 1, 2, 3]

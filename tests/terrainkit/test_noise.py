@@ -2,17 +2,17 @@ import numpy as np
 import pytest
 
 from terrainkit.grid import Grid
-from terrainkit.noise import LatticeNoise
+from terrainkit.noise import ValueNoise
 
 PLOT = Grid(shape=(60, 40), cell=0.1)
 
 
-def lattice(*, spacing=0.2, amplitude=0.05, step=0.005):
-    return LatticeNoise(spacing=spacing, amplitude=amplitude, step=step)
+def node_grid(*, spacing=0.2, amplitude=0.05, step=0.005):
+    return ValueNoise(spacing=spacing, amplitude=amplitude, step=step)
 
 
-def noise(*, seed=0, plot=PLOT, **fields):
-    return lattice(**fields).heights(plot, np.random.default_rng(seed))
+def noise(*, seed=0, grid=PLOT, **fields):
+    return node_grid(**fields).heights(grid, np.random.default_rng(seed))
 
 
 def test_noise_covers_the_plot():
@@ -50,9 +50,9 @@ def test_a_step_below_a_micrometre_is_none():
     ],
 )
 def test_the_largest_height_is_the_amplitude_in_whole_steps(amplitude, step, largest):
-    plot = Grid(shape=(200, 200), cell=0.1)
-    assert lattice(amplitude=amplitude, step=step).realized(plot)["amplitude"] == largest
-    heights = noise(spacing=0.1, amplitude=amplitude, step=step, plot=plot)
+    grid = Grid(shape=(200, 200), cell=0.1)
+    assert node_grid(amplitude=amplitude, step=step).realized(grid)["amplitude"] == largest
+    heights = noise(spacing=0.1, amplitude=amplitude, step=step, grid=grid)
     assert np.abs(heights).max() <= largest + 1e-9
     assert np.abs(heights).max() >= 0.9 * largest
 
@@ -87,8 +87,8 @@ def test_a_whole_number_of_intervals_spans_the_patch():
     ],
 )
 def test_the_spacing_is_what_whole_intervals_make_of_it(shape, cell, asked, built):
-    plot = Grid(shape=shape, cell=cell)
-    assert lattice(spacing=asked).realized(plot)["spacing"] == built
+    grid = Grid(shape=shape, cell=cell)
+    assert node_grid(spacing=asked).realized(grid)["spacing"] == built
 
 
 def test_amplitude_scales_the_pattern_and_does_not_change_it():
@@ -98,8 +98,8 @@ def test_amplitude_scales_the_pattern_and_does_not_change_it():
 @pytest.mark.parametrize(("amplitude", "step"), [(0.0, 0.0), (0.1, 0.0), (0.1, 0.005)])
 def test_the_number_of_draws_depends_on_neither_amplitude_nor_step(amplitude, step):
     rng, other = np.random.default_rng(3), np.random.default_rng(3)
-    lattice().heights(PLOT, rng)
-    lattice(amplitude=amplitude, step=step).heights(PLOT, other)
+    node_grid().heights(PLOT, rng)
+    node_grid(amplitude=amplitude, step=step).heights(PLOT, other)
     assert rng.random() == other.random()
 
 

@@ -9,11 +9,11 @@ def test_an_unknown_preset_lists_those_that_exist():
     with pytest.raises(
         ConfigError, match=r"'leggedgym'; did you mean 'legged_gym'\? There are: legged_gym, rough"
     ):
-        presets.find("leggedgym")
+        presets.get_preset("leggedgym")
 
 
 def test_legged_gym_has_its_nine_terrains_in_order():
-    assert [(choice.name, choice.proportion) for choice in presets.find("legged_gym")] == [
+    assert [(choice.name, choice.proportion) for choice in presets.get_preset("legged_gym")] == [
         ("pyramid_slope_inverted", 1),
         ("pyramid_slope", 1),
         ("rough_slope", 1),
@@ -26,18 +26,18 @@ def test_legged_gym_has_its_nine_terrains_in_order():
     ]
 
 
-@pytest.mark.parametrize("name", registry.names())
+@pytest.mark.parametrize("name", registry.terrain_names())
 def test_all_holds_every_terrain_and_its_inverse(name):
-    mix = {choice.name: choice for choice in presets.find("all")}
-    assert mix[name].at(1.0) == registry.find(name).at(1.0)
+    mix = {choice.name: choice for choice in presets.get_preset("all")}
+    assert mix[name].at(1.0) == registry.get_terrain(name).at(1.0)
     inverse = mix.get(f"{name}_inverted")
-    if "inverted" in parameters_of(registry.find(name)):
+    if "inverted" in parameters_of(registry.get_terrain(name)):
         assert inverse.at(1.0).inverted
     else:
         assert inverse is None
 
 
-@pytest.mark.parametrize("name", presets.names())
+@pytest.mark.parametrize("name", presets.preset_names())
 def test_every_preset_makes_a_map_with_each_of_its_terrains(name):
     terrain_map = generate(MapConfig(preset=name, rows=2, cols=20, border=0.0))
     assert set(terrain_map.terrain_types.flat) == set(range(len(terrain_map.terrain_names)))

@@ -4,7 +4,7 @@ import pytest
 
 import terrainkit as tk
 from terrainkit.errors import ExportError
-from terrainkit.preview import preview, relief, tints, write_preview
+from terrainkit.preview import height_colors, render_preview, shaded_relief, write_preview
 
 PAPER = (250, 249, 246)
 
@@ -17,7 +17,7 @@ def pits():
 
 
 def test_x_is_to_the_right(pits):
-    picture = preview(pits, 520)  # 26 m along x: 20 px for a metre
+    picture = render_preview(pits, 520)  # 26 m along x: 20 px for a metre
     left, _, _, above = 250, 60, 30, 70
     first, last = (picture[above + 100, left + 20 + row * 160 + 30].astype(int) for row in (0, 2))
     assert np.abs(last - first).max() > 40
@@ -32,47 +32,47 @@ def test_y_is_up():
         difficulty_range=(1.0, 1.0),
         terrains=(tk.SubTerrain(terrain="flat"), bowl),
     )
-    picture = preview(tk.generate(config), 160)
+    picture = render_preview(tk.generate(config), 160)
     top, bottom = (picture[70 + i, 250 + 30].astype(int) for i in (80 + 30, 240 + 30))
-    assert tuple(bottom) == tuple(relief(np.zeros((3, 3), np.float32), 0.1)[1, 1])
+    assert tuple(bottom) == tuple(shaded_relief(np.zeros((3, 3), np.float32), 0.1)[1, 1])
     assert np.abs(top - bottom).max() > 40
 
 
 def test_the_ground_is_at_least_as_wide_as_asked(pits):
     for width in (100, 520, 1000):
-        ground = preview(pits, width).shape[1] - 250 - 30
+        ground = render_preview(pits, width).shape[1] - 250 - 30
         assert width <= ground < 2 * max(width, 260)
 
 
 def test_every_name_is_written_on_the_paper(pits):
-    picture = preview(pits, 520)
+    picture = render_preview(pits, 520)
     assert (picture[:, :250] != PAPER).any()
 
 
 def test_ground_that_faces_the_light_is_brighter():
     x = np.arange(20, dtype=np.float32)[:, None] * np.ones((1, 20), np.float32) * 0.01
-    facing, away = relief(x, 0.1)[10, 10].sum(), relief(x[::-1], 0.1)[10, 10].sum()
+    facing, away = shaded_relief(x, 0.1)[10, 10].sum(), shaded_relief(x[::-1], 0.1)[10, 10].sum()
     assert facing > away
 
 
 def test_low_ground_is_bluer_and_high_ground_redder():
-    low, high = tints(np.array([-1.0, 1.0]))
+    low, high = height_colors(np.array([-1.0, 1.0]))
     assert low[2] > low[0]
     assert high[0] > high[2]
 
 
 def test_it_is_written_whole(pits, tmp_path):
     path = write_preview(pits, tmp_path / "a.png", width=300)
-    assert (cv2.imread(str(path))[..., ::-1] == preview(pits, 300)).all()
+    assert (cv2.imread(str(path))[..., ::-1] == render_preview(pits, 300)).all()
 
 
 @pytest.mark.parametrize(
     ("name", "width", "said"),
     [
-        ("a.jpg", 300, "a preview is a .png; got"),
-        ("a.png", 0, "width is 0; wanted 100 to 10000"),
-        ("a.png", 10**6, "width is 1000000; wanted 100 to 10000"),
-        ("no/a.png", 300, "there is no folder"),
+        ("a.jpg", 300, "expected a .png file"),
+        ("a.png", 0, "width: got 0; expected 100 to 10000"),
+        ("a.png", 10**6, "width: got 1000000; expected 100 to 10000"),
+        ("no/a.png", 300, "does not exist"),
     ],
 )
 def test_bad_input_writes_nothing(pits, tmp_path, name, width, said):
@@ -96,6 +96,6 @@ def test_a_long_map_stays_within_bounds():
     config = tk.MapConfig(
         rows=1, cols=300, patch_size=(2.0, 2.0), cell=0.2, border=0.0, terrains=(flat,)
     )
-    height, width, _ = preview(tk.generate(config), 1600).shape
+    height, width, _ = render_preview(tk.generate(config), 1600).shape
     assert height <= 10_000 + 70 + 60
     assert width < 300 + 10_000 / 300 + 30

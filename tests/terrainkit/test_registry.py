@@ -21,8 +21,8 @@ from terrainkit.terrain import Terrain
 class Moon(Terrain):
     height: float = parameter.height(1.0, 3.0)
 
-    def heights(self, plot, rng):  # noqa: ARG002
-        return np.full(plot.shape, self.height)
+    def heights(self, grid, rng):  # noqa: ARG002
+        return np.full(grid.shape, self.height)
 """
 
 
@@ -31,47 +31,47 @@ def moon(tmp_path, monkeypatch):
     (tmp_path / "moon.py").write_text(MOON)
     monkeypatch.setattr(terrains, "__path__", [*terrains.__path__, str(tmp_path)])
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
-    registry.names.cache_clear()
+    registry.terrain_names.cache_clear()
     yield
-    registry.names.cache_clear()
-    registry.find.cache_clear()
+    registry.terrain_names.cache_clear()
+    registry.get_terrain.cache_clear()
     sys.modules.pop("terrainkit.terrains.moon", None)
 
 
 def test_names_are_the_files_in_alphabetical_order():
     files = Path(terrains.__path__[0]).glob("*.py")
-    assert list(registry.names()) == sorted({file.stem for file in files} - {"__init__"})
+    assert list(registry.terrain_names()) == sorted({file.stem for file in files} - {"__init__"})
 
 
-@pytest.mark.parametrize("name", registry.names())
+@pytest.mark.parametrize("name", registry.terrain_names())
 def test_a_terrain_goes_by_the_name_of_its_file(name):
-    assert registry.find(name).kind() == name
+    assert registry.get_terrain(name).kind() == name
 
 
 def test_a_terrain_that_uses_another_is_still_found_by_its_own_name():
-    assert registry.find("rough_slope").__name__ == "RoughSlope"
+    assert registry.get_terrain("rough_slope").__name__ == "RoughSlope"
 
 
 def test_an_unknown_name_lists_those_that_exist():
     with pytest.raises(ConfigError, match=r"did you mean 'stairs'\? There are: flat, .*, wave$"):
-        registry.find("stair")
+        registry.get_terrain("stair")
 
 
 def test_the_name_of_an_inverted_terrain_says_what_to_ask_for():
-    with pytest.raises(ConfigError, match=r"it is pyramid_stairs with inverted = true$"):
-        registry.find("pyramid_stairs_inverted")
+    with pytest.raises(ConfigError, match=r"use pyramid_stairs with inverted = true$"):
+        registry.get_terrain("pyramid_stairs_inverted")
 
 
 @pytest.mark.parametrize("name", ["flat_inverted", "stair_inverted", "_inverted"])
 def test_what_cannot_be_inverted_is_unknown_as_any_other(name):
     with pytest.raises(ConfigError, match=rf"no terrain '{name}'; there are: flat, gap, .*, wave$"):
-        registry.find(name)
+        registry.get_terrain(name)
 
 
 @pytest.mark.usefixtures("moon")
 def test_a_new_file_is_a_new_terrain():
-    assert "moon" in registry.names()
-    terrain = registry.find("moon").at(0.5)
+    assert "moon" in registry.terrain_names()
+    terrain = registry.get_terrain("moon").at(0.5)
     heights = terrain.build(Grid(shape=(3, 2), cell=0.1), np.random.default_rng(0))
     assert heights.tolist() == [[2, 2], [2, 2], [2, 2]]
 
@@ -80,25 +80,25 @@ def test_a_new_file_is_a_new_terrain():
 class _Careless(Terrain):
     number: int = 3
 
-    def heights(self, plot, rng):  # noqa: ARG002
-        return np.zeros(plot.shape)
+    def heights(self, grid, rng):  # noqa: ARG002
+        return np.zeros(grid.shape)
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Turned(Terrain):
-    def heights(self, plot, rng):  # noqa: ARG002
-        return np.zeros(plot.shape[::-1])
+    def heights(self, grid, rng):  # noqa: ARG002
+        return np.zeros(grid.shape[::-1])
 
 
 def test_a_plain_field_is_named():
     with pytest.raises(
-        ConfigError, match="_Careless: number is a plain field; wanted one declared"
+        ConfigError, match="_Careless: number is a plain field; expected one declared"
     ):
         _Careless()
 
 
 def test_heights_of_another_shape_are_named():
-    with pytest.raises(ConfigError, match=r"shape \(4, 8\); wanted \(8, 4\)"):
+    with pytest.raises(ConfigError, match=r"shape \(4, 8\); expected \(8, 4\)"):
         _Turned().build(Grid(shape=(8, 4), cell=1.0), np.random.default_rng(0))
 
 
@@ -111,14 +111,14 @@ def plugin(monkeypatch):
         found = {registry.ENTRY_POINTS: (point,)}
         monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: found[group])
 
-    registry.find.cache_clear()
+    registry.get_terrain.cache_clear()
     yield install
-    registry.find.cache_clear()
+    registry.get_terrain.cache_clear()
 
 
 def test_a_terrain_of_another_package_is_found_by_its_entry_point(plugin):
     plugin("terrainkit.terrains.wave:Wave")
-    assert registry.find("dunes") is registry.find("wave")
+    assert registry.get_terrain("dunes") is registry.get_terrain("wave")
     dunes = SubTerrain(terrain="dunes", parameters={"amplitude": 0.1})
     assert generate(MapConfig(rows=1, cols=1, border=0.0, terrains=(dunes,))).heights.max() > 0.09
 
@@ -126,19 +126,19 @@ def test_a_terrain_of_another_package_is_found_by_its_entry_point(plugin):
 def test_an_entry_point_that_is_no_terrain_is_named(plugin):
     plugin("math:pi")
     with pytest.raises(
-        ConfigError, match=r"dunes \(math:pi\) is 3\.14.*; wanted a subclass of Terr"
+        ConfigError, match=r"dunes \(math:pi\): got 3\.14.*; expected a subclass of Terr"
     ):
-        registry.find("dunes")
+        registry.get_terrain("dunes")
 
 
 def test_terrains_of_other_packages_are_listed_among_those_there_are(plugin):
     plugin("terrainkit.terrains.wave:Wave")
     with pytest.raises(ConfigError, match=r"there are: flat, .*, wave, dunes"):
-        registry.find("moon")
+        registry.get_terrain("moon")
 
 
 @pytest.mark.parametrize("value", ["no_such_package:Dunes", "math:no_such_name"])
 def test_an_entry_point_that_leads_nowhere_is_named(plugin, value):
     plugin(value)
     with pytest.raises(ConfigError, match=rf"dunes \({value}\) cannot be loaded: "):
-        registry.find("dunes")
+        registry.get_terrain("dunes")

@@ -6,28 +6,28 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from terrainkit.grid import Grid
-from terrainkit.spawn import find_spawn, room_error
+from terrainkit.spawn import find_spawn
 from terrainkit.surface import surface_at
 
 PLOT = Grid(shape=(40, 40), cell=0.1)
 WALL = 0.075
 
 
-def level(height=0.0, plot=PLOT):
-    return np.full(plot.shape, height, dtype=np.float32)
+def level(height=0.0, grid=PLOT):
+    return np.full(grid.shape, height, dtype=np.float32)
 
 
-def spawn(heights, wanted=(2.0, 2.0), *, radius=0.5, tolerance=0.01, threshold=WALL, plot=PLOT):
+def spawn(heights, wanted=(2.0, 2.0), *, radius=0.5, tolerance=0.01, threshold=WALL, grid=PLOT):
     return find_spawn(
-        heights, plot, wanted, radius=radius, tolerance=tolerance, threshold=threshold
+        heights, grid, wanted, radius=radius, tolerance=tolerance, threshold=threshold
     )
 
 
-def disc(heights, origin, *, radius=0.5, threshold=WALL, plot=PLOT):
-    """Return the height of the ground all over the disc around `origin` [m]."""
+def disc(heights, origin, *, radius=0.5, threshold=WALL, grid=PLOT):
+    """Return the height of the ground all over the disc neighborhood `origin` [m]."""
     r, angle = np.meshgrid(np.linspace(0.0, radius, 26), np.linspace(0.0, 2 * math.pi, 121))
     points = np.stack([origin[0] + r * np.cos(angle), origin[1] + r * np.sin(angle)], axis=-1)
-    place = (points.reshape(-1, 2) - plot.lower) / plot.cell - 0.5
+    place = (points.reshape(-1, 2) - grid.lower) / grid.cell - 0.5
     return surface_at(heights, place, threshold=threshold).height
 
 
@@ -36,8 +36,8 @@ def test_on_level_ground_the_origin_is_where_it_is_wanted():
 
 
 def test_the_origin_is_in_the_frame_of_the_plot():
-    plot = Grid(shape=(40, 40), cell=0.1, lower=(-10.0, 5.0))
-    assert spawn(level(plot=plot), (-8.0, 7.0), plot=plot) == (-8.0, 7.0, 0.0)
+    grid = Grid(shape=(40, 40), cell=0.1, lower=(-10.0, 5.0))
+    assert spawn(level(grid=grid), (-8.0, 7.0), grid=grid) == (-8.0, 7.0, 0.0)
 
 
 @pytest.mark.parametrize("wanted", [(0.1, 2.0), (3.95, 2.0), (2.0, 0.3), (4.0, 4.0), (-1.0, 2.0)])
@@ -149,11 +149,3 @@ def test_a_platform_smaller_than_the_disc_does_not_hold_it():
     x, y, z = spawn(heights)
     assert z == -5.0
     assert disc(heights, (x, y)).tolist() == [-5.0] * (26 * 121)
-
-
-def test_the_error_says_what_would_help():
-    error = room_error("rough", Grid(shape=(80, 40), cell=0.1), 0.5, 0.01)
-    assert str(error) == (
-        "rough: no level disc of radius 0.5 m (within 0.01 m) in a patch of 8 m x 4 m; "
-        "wanted a larger platform or a smaller spawn_radius"
-    )

@@ -73,7 +73,9 @@ def test_points_may_be_a_list(terrain_map):
     ],
 )
 def test_points_that_are_none_are_refused(terrain_map, view, xy, shape):
-    with pytest.raises(ConfigError, match=rf"xy has shape {shape}; wanted \(\.\.\., 2\), .*finite"):
+    with pytest.raises(
+        ConfigError, match=rf"xy: got shape {shape}; expected finite values of shape \(\.\.\., 2\)"
+    ):
         getattr(terrain_map, view)(xy)
 
 
@@ -147,7 +149,7 @@ def test_raw_heights_may_take_all_of_16_bits(terrain_map, height, units):
 @pytest.mark.parametrize("height", [163.84, -163.85, 1e6])
 def test_raw_heights_beyond_16_bits_are_an_error(terrain_map, height):
     with pytest.raises(
-        ExportError, match=r"do not fit in int16 at vertical_scale 0\.005; wanted .* or more"
+        ExportError, match=r"do not fit in int16 at vertical_scale 0\.005; expected at least .*"
     ):
         with_heights(terrain_map, height).height_field_raw()
 
@@ -157,19 +159,19 @@ def test_the_vertical_scale_that_the_error_asks_for_is_enough(terrain_map, heigh
     high = with_heights(terrain_map, height)
     with pytest.raises(ExportError) as error:
         high.height_field_raw(vertical_scale=1e-5)
-    wanted = float(re.search(r"wanted (\S+) or more", str(error.value)).group(1))
+    wanted = float(re.search(r"expected at least (\S+)$", str(error.value)).group(1))
     assert high.height_field_raw(wanted)[0, 0] * wanted == pytest.approx(height, abs=wanted)
 
 
 @pytest.mark.parametrize("scale", [0.0, -0.005, np.nan, np.inf])
 def test_a_vertical_scale_must_be_above_0(terrain_map, scale):
-    with pytest.raises(ConfigError, match=f"vertical_scale is {scale:g}; wanted .*above 0"):
+    with pytest.raises(ConfigError, match=f"vertical_scale: got {scale:g}; expected a number > 0"):
         terrain_map.height_field_raw(scale)
 
 
 @pytest.mark.parametrize(("row", "col"), [(0, 0), (1, 0), (0, 1), (1, 2)])
 def test_a_tile_of_the_map_is_the_tile_made_alone(terrain_map, row, col):
-    part, alone = terrain_map.tile(row, col), terrainkit.tile(terrain_map.config, row, col)
+    part, alone = terrain_map.patch(row, col), terrainkit.make_patch(terrain_map.config, row, col)
     assert part.heights.tobytes() == alone.heights.tobytes()
     assert part.origin.tobytes() == alone.origin.tobytes()
     assert (part.terrain, part.difficulty) == (alone.terrain, alone.difficulty)
@@ -178,7 +180,7 @@ def test_a_tile_of_the_map_is_the_tile_made_alone(terrain_map, row, col):
 
 
 def test_a_tile_knows_its_terrain_and_where_it_stands(terrain_map):
-    patch = terrain_map.tile(1, 2)
+    patch = terrain_map.patch(1, 2)
     assert patch.terrain == "rough_slope"
     assert patch.difficulty == 1.0
     assert patch.heights.shape == (80, 40)
@@ -191,7 +193,7 @@ def test_there_is_no_tile_beyond_the_rows_and_columns(terrain_map, row, col):
     with pytest.raises(
         IndexError, match=rf"no patch \({row}, {col}\) in a map of 2 rows and 3 columns"
     ):
-        terrain_map.tile(row, col)
+        terrain_map.patch(row, col)
 
 
 def test_an_environment_starts_on_the_patch_of_its_level_and_column(terrain_map):
@@ -200,7 +202,7 @@ def test_an_environment_starts_on_the_patch_of_its_level_and_column(terrain_map)
     assert set(start.levels.tolist()) == {0, 1}
     assert start.terrain_types.tolist() == start.columns.tolist()
     for origin, level, column in zip(start.env_origins, start.levels, start.columns, strict=True):
-        assert origin.tolist() == terrain_map.tile(level, column).origin.tolist()
+        assert origin.tolist() == terrain_map.patch(level, column).origin.tolist()
 
 
 def test_environments_start_no_higher_than_max_init_level(terrain_map):
@@ -218,7 +220,7 @@ def test_save_writes_and_load_reads(terrain_map, tmp_path):
 
 
 def test_the_map_updates_levels_as_the_pure_function_does(terrain_map):
-    # Patches of 8 m: more than 4 m is up, less than half of what was commanded is down.
+    # Patches of 8 m: more than 4 m is up, less than half of what was command_distance is down.
     after = terrain_map.update_levels([0, 1, 1], [4.5, 1.0, 3.0], [6.0, 6.0, 4.0], seed=1)
     assert after.tolist() == [1, 0, 1]
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit.walls import center_heights, joined_corners, wall_edges
+from terrainkit.walls import center_heights, connected_corners, wall_edges
 
 
 def samples(*rows):
@@ -61,7 +61,7 @@ def walls_on(edges):
     ],
 )
 def test_corners_are_joined_by_edges_without_a_wall(case, groups):
-    joined = joined_corners(walls_on(WALLS[case]))[0]
+    joined = connected_corners(walls_on(WALLS[case]))[0]
     found = {"".join(str(k) for k in np.flatnonzero(row)) for row in joined}
     assert sorted(found) == groups
 

@@ -114,7 +114,9 @@ WIDE_CELLS = ("--rows", 2, "--cell", 1, "--terrain", "pyramid_stairs")
 def test_cells_too_coarse_for_what_was_asked_are_a_warning(terrainkit):
     run = terrainkit("generate", "-o", "a.npz", *WIDE_CELLS)
     assert run.returncode == 0
-    assert "pyramid_stairs.step_width on 20 patches; the map records what was built" in run.stderr
+    assert (
+        "pyramid_stairs.step_width on 20 patches; the map records the realized values" in run.stderr
+    )
     assert run.stderr.count("\n") == 1
 
 
@@ -153,7 +155,7 @@ def test_a_terrain_that_a_preset_has_no_column_for_is_a_warning(terrainkit):
     run = terrainkit("generate", "-o", "a.npz", "--rows", 1, "--cols", 2, "--preset", "stairs")
     assert run.returncode == 0
     assert run.stderr == (
-        "terrainkit: warning: 2 columns are too few for 3 terrains at these proportions: "
+        "terrainkit: warning: 2 columns are too few for 3 sub-terrains at these proportions: "
         "no column for pyramid_stairs_inverted (preset stairs)\n"
     )
 
@@ -195,7 +197,7 @@ def test_a_long_map_shows_a_bar_on_a_terminal_only(tmp_path):
 
 def test_list_names_every_terrain(terrainkit):
     lines = terrainkit("list").stdout.splitlines()
-    for name in registry.names():
+    for name in registry.terrain_names():
         assert any(line.startswith(f"{name} ") for line in lines)
 
 
@@ -250,7 +252,7 @@ def test_an_option_of_another_format_is_an_error(terrainkit, small):
 
 
 def test_check_finds_nothing_wrong_with_a_map_of_ours(terrainkit, small):
-    run = terrainkit("check", small)
+    run = terrainkit("check-map", small)
     assert run.returncode == 0
     assert "no problems found" in run.stdout
 
@@ -259,7 +261,7 @@ def test_check_of_a_broken_map_exits_1_with_what_is_wrong(terrainkit, tmp_path, 
     arrays = dict(np.load(tmp_path / small))
     arrays["env_origins"][1, 2, 2] += 0.2
     np.savez(tmp_path / "broken.npz", **arrays)
-    run = terrainkit("check", "broken.npz")
+    run = terrainkit("check-map", "broken.npz")
     assert run.returncode == 1
     assert "spawn: patch (1, 2): the spawn origin is 0.200 m above the ground" in run.stdout
     assert "broken.npz: 1 findings" in run.stdout

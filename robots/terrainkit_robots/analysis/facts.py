@@ -163,8 +163,8 @@ class Facts:
     def limbs(self) -> tuple[Limb, ...]:
         """Chains from the trunk to each leaf with at least two actuated joints."""
         has_tendons = any(not actuator.joint for actuator in self.model.actuators)
-        drivable = self.joints if has_tendons else self.actuated
-        return detect_limbs(self.tree, self.bodies, drivable, self.zero_poses, self.meshes)
+        actuated = self.joints if has_tendons else self.actuated
+        return detect_limbs(self.tree, self.bodies, actuated, self.zero_poses, self.meshes)
 
     @cached_property
     def legs(self) -> tuple[Leg, ...]:

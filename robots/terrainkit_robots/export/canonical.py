@@ -29,7 +29,7 @@ from terrainkit_robots.description.xml.document import RobotFileError
 from terrainkit_robots.export.base_link import WORLD, with_world_base
 from terrainkit_robots.export.valid_inertia import with_valid_inertia
 from terrainkit_robots.text import free_name, names
-from terrainkit_robots.transforms import Matrix
+from terrainkit_robots.transforms import Matrix, quat_to_matrix
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
@@ -199,9 +199,7 @@ def _with_mesh_inertia(facts: "Facts", links: Sequence[Link]) -> list[Link]:
             body = model.body(link.name)
             origin = np.eye(4)
             origin[:3, 3] = body.ipos
-            turn = np.zeros(9)
-            mujoco.mju_quat2Mat(turn, body.iquat)
-            origin[:3, :3] = turn.reshape(3, 3)
+            origin[:3, :3] = quat_to_matrix(body.iquat)
             inertial = replace(
                 link.inertial,
                 mass=float(body.mass[0]),

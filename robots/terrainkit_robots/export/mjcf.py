@@ -14,7 +14,7 @@ from lxml import etree
 from terrainkit_robots.description.model import Geometry, Inertial, Joint, Link, RobotModel
 from terrainkit_robots.export.actuator import ActuatorConfig
 from terrainkit_robots.text import free_name
-from terrainkit_robots.transforms import Matrix, invert_poses
+from terrainkit_robots.transforms import Matrix, invert_poses, matrix_to_quat
 
 _DIGITS = 10
 """Significant digits of each number: a nanometre on a robot of a metre."""
@@ -278,16 +278,7 @@ def _place(element: Any, pose: Matrix) -> None:
     if np.abs(pose[:3, 3]).max() > 0:
         element.set("pos", _text(pose[:3, 3]))
     if not np.allclose(pose[:3, :3], np.eye(3), rtol=0, atol=1e-12):
-        element.set("quat", _text(quaternion(pose[:3, :3])))
-
-
-def quaternion(turn: Matrix) -> Matrix:
-    """Return the quaternion (w, x, y, z) of a rotation matrix, w not negative, shape (4,)."""
-    import mujoco
-
-    quat = np.zeros(4)
-    mujoco.mju_mat2Quat(quat, np.ascontiguousarray(turn, dtype=float).ravel())
-    return quat if quat[0] >= 0 else -quat
+        element.set("quat", _text(matrix_to_quat(pose[:3, :3])))
 
 
 def _inertial(body: Any, inertial: Inertial) -> None:

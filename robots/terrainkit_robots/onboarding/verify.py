@@ -71,7 +71,7 @@ def verify(source: "Facts", robot: "RobotFiles", folder: Path) -> Verification:
         ExportError: if MuJoCo cannot load the files, or they differ from the source.
     """
     from terrainkit_robots.simulation.sim_model import SimModel
-    from terrainkit_robots.simulation.standing import contact_regions, stand_test
+    from terrainkit_robots.simulation.standing import contact_areas, stand_test
 
     floating = bool(robot.facts.model.floating)
     # MuJoCo releases the interpreter lock while it compiles. The scene includes robot.xml.
@@ -90,7 +90,7 @@ def verify(source: "Facts", robot: "RobotFiles", folder: Path) -> Verification:
             SimModel.from_mujoco(scene.result(), base=robot.facts.bodies[0].top.name),
             _gains(robot.spec),
             positions=robot.facts.positions,
-            regions=contact_regions(robot.facts),
+            areas=contact_areas(robot.facts),
             seconds=_DURATION,
             joints_locked=joints_locked,
         )

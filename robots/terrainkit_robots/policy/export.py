@@ -14,7 +14,7 @@ import onnxruntime
 import torch
 from tensordict import TensorDict
 
-from terrainkit.atomic import atomic_write, check_target
+from terrainkit.atomic_write import atomic_write, check_target
 from terrainkit.errors import ExportError
 from terrainkit_robots.policy.evaluate import FloatArray, evaluation_task
 from terrainkit_robots.policy.load import load_policy

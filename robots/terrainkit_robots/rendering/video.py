@@ -79,7 +79,7 @@ def check_video_path(path: Path, *, overwrite: bool = False) -> None:
         ConfigError: if the suffix is not .mp4.
         ExportError: if the file exists and `overwrite` is False, or cannot be written.
     """
-    from terrainkit.atomic import check_target
+    from terrainkit.atomic_write import check_target
 
     if path.suffix != ".mp4":
         raise ConfigError(f"video file: got {path.name}; expected a name that ends in .mp4")
@@ -96,7 +96,7 @@ def write_video(spec: VideoSpec, path: Path, *, overwrite: bool = False) -> Iter
     """
     from imageio_ffmpeg import count_frames_and_secs, write_frames
 
-    from terrainkit.atomic import atomic_write
+    from terrainkit.atomic_write import atomic_write
     from terrainkit_robots.rendering.child_process import iterate_frames
     from terrainkit_robots.rendering.video_frames import video_frames
 

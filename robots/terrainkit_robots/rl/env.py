@@ -22,7 +22,7 @@ from terrainkit_robots.rl.observations import (
 )
 from terrainkit_robots.rl.rewards import active_rewards
 from terrainkit_robots.rl.scene import Robot, build_scene
-from terrainkit_robots.rl.simulation import Simulation, check_memory
+from terrainkit_robots.rl.simulation import Simulation, check_env_memory
 from terrainkit_robots.rl.state import Sensors, State
 from terrainkit_robots.rl.terminations import terrain_out_of_bounds
 from terrainkit_robots.rl.terrain import Terrain
@@ -41,14 +41,14 @@ class LeggedEnv(VecEnv):
 
         Raises:
             ConfigError: If the robot does not fit the task.
-            CapacityError: If the environments do not fit in memory.
+            MemoryLimitError: If the environments do not fit in memory.
         """
         self.cfg, self.robot, self.terrain, self.device = task, robot, terrain, device
         self.num_envs, self.num_actions = task.env.num_envs, len(robot.default_pose)
         self.max_episode_length = task.max_episode_length
         self.scene = build_scene(robot, terrain, task)
         scan = uses_height_scan(task, is_flat=terrain.is_flat)
-        check_memory(task, robot, scan=scan, ngeom=self.scene.model.ngeom)
+        check_env_memory(task, robot, scan=scan, ngeom=self.scene.model.ngeom)
         self.sim = Simulation(self.scene, self.num_envs, task.env.num_threads)
         self.rng = np.random.default_rng(task.runner.seed)
         self.sensors = Sensors(self.sim, terrain, task, scan=scan)

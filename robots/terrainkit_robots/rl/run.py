@@ -9,6 +9,7 @@ import io
 import re
 import tempfile
 import zipfile
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -18,10 +19,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from terrainkit.atomic import atomic_write
+from terrainkit.atomic_write import atomic_write
 from terrainkit.errors import ConfigError, ExportError, listing
 from terrainkit.toml_text import parse_toml, read_text
-from terrainkit_robots.mesh.sniff import open_regular
+from terrainkit_robots.files import open_regular
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.scene import SPEC_FILE, Robot
@@ -104,13 +105,7 @@ def resolve_robot(robot: str | Path) -> str:
 
 
 def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | Path) -> Run:
-    """Create the folder of a new run.
-
-    Args:
-        folder: The folder; parents are created.
-        task: The task.
-        robot_name: A registered robot, or the folder of an onboarded one.
-        terrain: The terrain, as `load_terrain` takes it.
+    """Create the folder of a new run; `robot_name` is a task's name or an onboarded folder.
 
     Raises:
         ConfigError: If there is no such robot, or the terrain's file cannot be read.
@@ -407,19 +402,15 @@ def policy_state(state: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _to_plain(value: Any) -> Any:
-    """Return a value as dicts, lists, numbers and tensors, which can be read safely."""
+    """Convert to dicts, lists, numbers and tensors, which can be read without executing code."""
     import torch
 
     if isinstance(value, Mapping):
         return {key: _to_plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
+    if isinstance(value, list | tuple | deque):
         return [_to_plain(item) for item in value]
-    if isinstance(value, np.ndarray):
-        return torch.from_numpy(np.ascontiguousarray(value))
-    if isinstance(value, torch.Tensor):
-        return value.detach().to("cpu").clone()  # a view would save its whole storage
-    if isinstance(value, np.generic):
-        return value.item()
+    if isinstance(value, np.ndarray | torch.Tensor):
+        return torch.as_tensor(value).detach().to("cpu").clone()  # without a view's storage
     if value is None or isinstance(value, bool | int | float | str):
         return value
     raise TypeError(f"a checkpoint cannot hold a {type(value).__name__}")

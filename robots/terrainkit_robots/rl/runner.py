@@ -27,10 +27,8 @@ from terrainkit_robots.rl.run import checkpoint_name, read_checkpoint, save_chec
 OBS_GROUPS = {"actor": ["policy"], "critic": ["privileged"]}
 """Observation groups of each network."""
 
-LOGGER_VALUES, LOGGER_BUFFERS = (
-    ("tot_timesteps", "tot_time"),
-    ("cur_reward_sum", "cur_episode_length"),
-)
+LOGGER_VALUES = ("tot_timesteps", "tot_time", "rewbuffer", "lenbuffer")
+LOGGER_BUFFERS = ("cur_reward_sum", "cur_episode_length")
 """Attributes of rsl-rl's logger that are part of a checkpoint."""
 
 SIGNAL_INTERVAL = 1.0
@@ -74,18 +72,10 @@ class MetricsLogger(Logger):
     """rsl-rl's logger without console output; its buffers are part of a checkpoint."""
 
     def __init__(self, runner: "LeggedRunner") -> None:
-        self._runner, env = runner, runner.env
-        self.means: dict[str, float] = {}  # latest mean of each value in the environments' log
-        super().__init__(
-            None,
-            runner.cfg,
-            env.cfg,
-            env.num_envs,
-            runner.is_distributed,
-            runner.gpu_world_size,
-            runner.gpu_global_rank,
-            runner.device,
-        )
+        self._runner, self.means = runner, {}  # latest mean of each value in the env's log
+        world = (runner.is_distributed, runner.gpu_world_size, runner.gpu_global_rank)
+        env = runner.env
+        super().__init__(None, runner.cfg, env.cfg, env.num_envs, *world, runner.device)
 
     def init_logging_writer(self) -> None:
         """Open the log files.
@@ -138,17 +128,13 @@ class MetricsLogger(Logger):
 
     def state_dict(self) -> dict[str, Any]:
         """Return the buffers, for a checkpoint."""
-        return {name: getattr(self, name) for name in (*LOGGER_VALUES, *LOGGER_BUFFERS)} | {
-            "rewbuffer": list(self.rewbuffer),
-            "lenbuffer": list(self.lenbuffer),
-        }
+        return {name: getattr(self, name) for name in (*LOGGER_VALUES, *LOGGER_BUFFERS)}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore the buffers; those per environment only if their number is the same."""
         self.rewbuffer.extend(state["rewbuffer"])
         self.lenbuffer.extend(state["lenbuffer"])
-        for name in LOGGER_VALUES:
-            setattr(self, name, state[name])
+        self.tot_timesteps, self.tot_time = state["tot_timesteps"], state["tot_time"]
         for name in LOGGER_BUFFERS:
             if len(state[name]) == self.num_envs:
                 getattr(self, name).copy_(state[name])
@@ -194,12 +180,7 @@ class LeggedRunner(OnPolicyRunner):
         self.logger = MetricsLogger(self)
 
     def learn(self, num_learning_iterations: int, init_at_random_ep_len: bool = False) -> None:
-        """Train for some iterations.
-
-        Args:
-            num_learning_iterations: Number of iterations from here on.
-            init_at_random_ep_len: Cut the first episodes to random lengths, so that resets do not
-                all happen at once.
+        """Train for some iterations, with the first episodes cut to random lengths if requested.
 
         Raises:
             ConfigError: If training diverges.
@@ -264,13 +245,7 @@ class LeggedRunner(OnPolicyRunner):
 
         By default training continues exactly; with another number of environments, only the
         networks and the curricula do. A checkpoint of a policy alone has only networks.
-
-        Args:
-            path: The checkpoint.
-            load_cfg: Parts to load, instead of everything: `actor`, `critic`, `optimizer`, and
-                `curriculum`, the terrain levels.
-            strict: Whether every weight must be present.
-            map_location: Ignored; weights go to the device of the networks.
+        `load_cfg` selects parts: `actor`, `critic`, `optimizer`, `curriculum` (terrain levels).
 
         Raises:
             ConfigError: If it is no checkpoint, or belongs to another robot, task or map.
@@ -283,12 +258,23 @@ class LeggedRunner(OnPolicyRunner):
             parts = load_cfg or {"actor": True, "critic": True, "optimizer": True}
             optimizer = is_resumable and parts.get("optimizer")
             self.alg.load(state, {**parts, "optimizer": optimizer}, strict)
-            if is_resumable and load_cfg is None:
+            if not is_resumable:
+                return {}
+            processes = state["processes"]  # processes in excess share the last state
+            process = processes[min(self.gpu_global_rank, len(processes) - 1)]
+            if load_cfg is None:
                 self.current_learning_iteration = state["iteration"]
-                self._load_process(state)
-            elif is_resumable and parts.get("curriculum"):
-                env_state = self._process_state(state)["env"]
-                self.env.curriculum.load_state_dict(env_state["curriculum"])
+                self.env.load_state_dict(process["env"])
+                self.logger.load_state_dict(state["logger"])
+                if len(processes) == self.gpu_world_size:
+                    torch.set_rng_state(process["random"]["cpu"])
+                    if self.device != "cpu" and "cuda" in process["random"]:
+                        torch.cuda.set_rng_state(process["random"]["cuda"], self.device)
+                else:  # processes that share a state must sample differently
+                    seed = [self.env.cfg.runner.seed, state["iteration"]]
+                    self.env.rng = np.random.default_rng(seed)
+            elif parts.get("curriculum"):
+                self.env.curriculum.load_state_dict(process["env"]["curriculum"])
                 self.env.reset()
         return {}
 
@@ -297,9 +283,10 @@ class LeggedRunner(OnPolicyRunner):
         process = {"env": self.env.state_dict(), "random": {"cpu": torch.get_rng_state()}}
         if self.device != "cpu":
             process["random"]["cuda"] = torch.cuda.get_rng_state(self.device)
-        processes: list[Any] | None = [process]
+        processes: list[Any] = [process]
         if self.is_distributed:
-            gathered = [None] * self.gpu_world_size if self.is_main_process else None
+            gathered: list[Any] | None = [None] * self.gpu_world_size
+            gathered = gathered if self.is_main_process else None
             torch.distributed.gather_object(process, gathered, dst=0)
             processes = gathered or processes
         return {
@@ -311,22 +298,6 @@ class LeggedRunner(OnPolicyRunner):
             "processes": processes,
             "logger": self.logger.state_dict(),
         }
-
-    def _load_process(self, state: Mapping[str, Any]) -> None:
-        process = self._process_state(state)
-        self.env.load_state_dict(process["env"])
-        if len(state["processes"]) == self.gpu_world_size:
-            torch.set_rng_state(process["random"]["cpu"])
-            if self.device != "cpu" and "cuda" in process["random"]:
-                torch.cuda.set_rng_state(process["random"]["cuda"], self.device)
-        else:  # several processes may share one saved state: their samples must differ
-            self.env.rng = np.random.default_rng([self.env.cfg.runner.seed, state["iteration"]])
-        self.logger.load_state_dict(state["logger"])
-
-    def _process_state(self, state: Mapping[str, Any]) -> Any:
-        """Return this process's part of a checkpoint; processes in excess share the last one."""
-        processes = state["processes"]
-        return processes[min(self.gpu_global_rank, len(processes) - 1)]
 
     def _stop_requested(self) -> bool:
         requested = bool(self._should_stop())
@@ -376,11 +347,8 @@ class LeggedRunner(OnPolicyRunner):
         self.gpu_world_size = torch.distributed.get_world_size()
         self.gpu_global_rank = torch.distributed.get_rank()
         self.gpu_local_rank = int(os.environ.get("LOCAL_RANK", "0"))
-        self.cfg["multi_gpu"] = {
-            "global_rank": self.gpu_global_rank,
-            "local_rank": self.gpu_local_rank,
-            "world_size": self.gpu_world_size,
-        }
+        ranks = {"global_rank": self.gpu_global_rank, "local_rank": self.gpu_local_rank}
+        self.cfg["multi_gpu"] = {**ranks, "world_size": self.gpu_world_size}
 
 
 def runner_config(task: Task) -> dict[str, Any]:
@@ -439,11 +407,7 @@ def observation_widths(env: LeggedEnv) -> dict[str, int]:
 def check_checkpoint(
     path: Path, state: Mapping[str, Any], env: LeggedEnv, groups: Sequence[str]
 ) -> None:
-    """Check that a checkpoint has the environment's joints and observation widths.
-
-    Raises:
-        ConfigError: If it belongs to another robot or task.
-    """
+    """Raise ConfigError unless a checkpoint has the joints and observations of an environment."""
     joints, widths = list(env.robot.spec.joint_order), observation_widths(env)
     if state["joints"] != joints:
         raise ConfigError(
@@ -451,11 +415,11 @@ def check_checkpoint(
             f"{listing(map(str, state['joints']))}; expected {listing(joints)}"
         )
     for name in groups:
-        if state["observed"].get(name) != widths[name]:
+        if (got := state["observed"].get(name)) != widths[name]:
             raise ConfigError(
-                f"{path} belongs to another task: got {state['observed'].get(name)} {name} "
-                f"observations; expected {widths[name]}. To continue on a map after a plane, set "
-                "terrain.measure_heights on both"
+                f"{path} belongs to another task: got {got} {name} observations; expected "
+                f"{widths[name]}. To continue on a map after a plane, set terrain.measure_heights "
+                "on both"
             )
 
 

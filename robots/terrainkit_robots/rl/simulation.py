@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.capacity import require_memory
-from terrainkit.errors import CapacityError, ConfigError
+from terrainkit.errors import ConfigError, MemoryLimitError
+from terrainkit.memory import check_memory
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.scene import Robot, Scene
@@ -83,22 +83,22 @@ class Simulation:
         return values.reshape(len(values), -1, 3)
 
 
-def check_memory(task: Task, robot: Robot, *, scan: bool, ngeom: int) -> None:
+def check_env_memory(task: Task, robot: Robot, *, scan: bool, ngeom: int) -> None:
     """Check that training with the task's environments fits in memory.
 
     Raises:
-        CapacityError: If it does not fit; the message names a number of environments that does.
+        MemoryLimitError: If it does not fit; the message names a number of environments that does.
     """
     num_envs, message = task.env.num_envs, ""
     while num_envs:
         try:
             needed = num_envs * bytes_per_env(task, robot, scan=scan, ngeom=ngeom)
-            require_memory(needed, f"training with {num_envs} environments")
+            check_memory(needed, f"training with {num_envs} environments")
             break
-        except CapacityError as error:
+        except MemoryLimitError as error:
             message, num_envs = message or str(error), num_envs // 2
     if message:
-        raise CapacityError(f"{message}; env.num_envs {num_envs} would fit")
+        raise MemoryLimitError(f"{message}; env.num_envs {num_envs} would fit")
 
 
 def bytes_per_env(task: Task, robot: Robot, *, scan: bool, ngeom: int) -> int:

@@ -74,7 +74,7 @@ class MapTerrain(Terrain):
     """A terrainkit map."""
 
     def __init__(self, terrain_map: "TerrainMap", collision: Any = "auto") -> None:
-        from terrainkit.export.mjcf import box_cover_of, without_boxes
+        from terrainkit.export.mjcf import collision_boxes, without_boxes
 
         self.env_origins = terrain_map.env_origins
         self.terrain_names = np.array(terrain_map.terrain_names)[terrain_map.terrain_types]
@@ -82,7 +82,7 @@ class MapTerrain(Terrain):
         self.lower, self.upper = terrain_map.grid.lower, terrain_map.grid.upper
         self._map, self._collision = terrain_map, collision
         heights, tops = np.ascontiguousarray(terrain_map.heights), None
-        cover = box_cover_of(terrain_map, collision)
+        cover = collision_boxes(terrain_map, collision)
         if cover is not None:
             tops = np.where(cover.covered, heights, np.float32(-np.inf))
             heights = without_boxes(heights, cover)

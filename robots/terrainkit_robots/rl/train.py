@@ -62,7 +62,7 @@ def train(
 
     Raises:
         ConfigError: If the arguments do not fit together, or training diverges.
-        CapacityError: If the environments do not fit in memory.
+        MemoryLimitError: If the environments do not fit in memory.
         ExportError: If the folder exists, or the disk is full.
     """
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # before torch is imported

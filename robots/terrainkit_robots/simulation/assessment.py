@@ -50,14 +50,14 @@ def assess(result: StandResult) -> Assessment:
     if result.diverged:
         failure = f"its simulation diverged after {result.seconds:.2f} s"
         return Assessment(failures=(failure,), degree=2)
-    found = list(_failures(result))
+    found = list(_failed_checks(result))
     return Assessment(
         failures=tuple(text for _, text in found),
         degree=max((degree for degree, _ in found), default=0),
     )
 
 
-def _failures(result: StandResult) -> Iterator[tuple[int, str]]:
+def _failed_checks(result: StandResult) -> Iterator[tuple[int, str]]:
     """Yield the degree and the description of each failed criterion."""
     tilt, length = result.tilt, result.leg_length
     if tilt > _MAX_TILT:

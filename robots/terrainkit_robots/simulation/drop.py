@@ -19,7 +19,7 @@ class DropResult:
     max_speed: float
     """Highest speed of a joint, or of the rotation of the base [rad/s] or [m/s]."""
 
-    fastest_joint: str
+    max_speed_joint: str
     """The joint with that speed; `base` for the base."""
 
     seconds: float
@@ -55,6 +55,6 @@ def drop_test(
     return DropResult(
         diverged=diverged,
         max_speed=float(speeds[fastest]) if len(speeds) else 0.0,
-        fastest_joint=sim.joints[fastest - base] if is_joint else "base",
+        max_speed_joint=sim.joints[fastest - base] if is_joint else "base",
         seconds=steps * float(time_step),
     )

@@ -58,7 +58,7 @@ def suggest_gains(facts: Facts) -> Mapping[str, Gain]:
     leg_targets = {
         key: leg_gain_target(facts, sim, inertias, joints) for key, joints in legs.items()
     }
-    for target in _unify_similar(leg_targets):
+    for target in _merge_similar(leg_targets):
         found |= dict.fromkeys(target.joints, _make_gain(target, target.inertia))
     # Other joints of the same stiffness get the same damping.
     similar: dict[tuple[float, float, JointUnits], list[GainTarget]] = defaultdict(list)
@@ -81,7 +81,7 @@ def _make_gain(target: GainTarget, inertia: float) -> Gain:
         if critical <= limit
         else f"kp / {_MIN_STIFFNESS_RATIO:g}, below critical for a fast response"
     )
-    if target.adds_armature:
+    if target.extra_armature:
         reason += f"; armature for stability at a time step of {1000 * TIME_STEP:g} ms"
     return Gain(
         stiffness=stiffness,
@@ -96,7 +96,7 @@ def _round(value: float) -> float:
     if not 0 < value < math.inf:
         return 0.0
     scale = 10.0 ** math.floor(math.log10(value))
-    best = min(_MANTISSAS, key=lambda mantissa: abs(math.log(mantissa * scale / value)))
+    best = min(_MANTISSAS, key=lambda m: abs(math.log(m * scale / value)))
     return float(f"{best * scale:.2g}")
 
 
@@ -109,14 +109,14 @@ def _group_joints(facts: Facts, joints: Sequence[str]) -> tuple[_Groups, _Groups
         if name in sections:
             legs[sections[name]].append(name)
             continue
-        others[min(name, _mirrored_joint(facts, name, joints) or name), ""].append(name)
+        others[min(name, _mirror_joint(facts, name, joints) or name), ""].append(name)
     return dict(legs), dict(others)
 
 
-def _mirrored_joint(facts: Facts, name: str, joints: Sequence[str]) -> str | None:
+def _mirror_joint(facts: Facts, name: str, joints: Sequence[str]) -> str | None:
     """Return the mirrored joint, if it is of the same type and one of `joints`."""
     body = facts.body_of_joint.get(name)
-    counterpart = facts.mirror.counterpart(body.index) if body is not None else None
+    counterpart = facts.mirror.image_body(body.index) if body is not None else None
     if body is None or body.joint is None or counterpart is None:
         return None
     other = facts.bodies[counterpart[0]].joint
@@ -141,15 +141,15 @@ def _sections(facts: Facts) -> dict[str, tuple[str, str]]:
     return found
 
 
-def _unify_similar(targets: Mapping[tuple[str, str], GainTarget]) -> Iterable[GainTarget]:
+def _merge_similar(targets: Mapping[tuple[str, str], GainTarget]) -> Iterable[GainTarget]:
     """Return targets with one stiffness for all joints of a leg, or of a section, if similar."""
     found = [target for (_, role), target in targets.items() if role == "slide"]
     revolute = {key: target for key, target in targets.items() if key[1] != "slide"}
     if _are_similar(revolute.values()):
-        return [*found, *_unify(revolute.values())]
+        return [*found, *_merge(revolute.values())]
     for section in dict.fromkeys(section for section, _ in revolute):
         part = [target for (of, _), target in revolute.items() if of == section]
-        found += _unify(part) if _are_similar(part) else part
+        found += _merge(part) if _are_similar(part) else part
     return found
 
 
@@ -158,7 +158,7 @@ def _are_similar(targets: Iterable[GainTarget]) -> bool:
     return bool(values) and max(values) <= _MAX_SIMILAR_RATIO * min(values)
 
 
-def _unify(targets: Iterable[GainTarget]) -> list[GainTarget]:
+def _merge(targets: Iterable[GainTarget]) -> list[GainTarget]:
     """Return targets with the same stiffness, armature and inertia."""
     lowest = min(targets, key=lambda target: target.stiffness)
     armature = max(target.armature for target in targets)
@@ -170,7 +170,7 @@ def _unify(targets: Iterable[GainTarget]) -> list[GainTarget]:
             reason=lowest.reason,
             inertia=inertia,
             armature=armature,
-            adds_armature=any(target.adds_armature for target in targets),
+            extra_armature=any(target.extra_armature for target in targets),
         )
         for target in targets
     ]

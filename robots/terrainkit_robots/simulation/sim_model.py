@@ -152,7 +152,7 @@ def make_sim_model(facts: Facts) -> SimModel:
         compiled = _compile(model, extras, assets)
     except ValueError as error:
         try:
-            compiled = _compile(_merge_inertials(model), extras, assets)
+            compiled = _compile(_merge_inertia(model), extras, assets)
         except ValueError:
             reason = _compiler_message(str(error))
             raise CannotCheckError(f"MuJoCo cannot simulate it: {reason}") from None
@@ -177,7 +177,7 @@ def _compile(model: RobotModel, extras: Extras, assets: Mapping[str, bytes]) -> 
         return mujoco.MjModel.from_xml_string(text, assets)
 
 
-def _merge_inertials(model: RobotModel) -> RobotModel:
+def _merge_inertia(model: RobotModel) -> RobotModel:
     """Return a robot whose inertials are merged into the links directly below moving joints.
 
     MuJoCo rejects the inertias of many frames and sensors on fixed joints.

@@ -29,8 +29,8 @@ _FOOT_RADIUS_RATIO = 0.3
 
 
 @dataclass(frozen=True, kw_only=True)
-class ContactRegion:
-    """A region of a body that may touch the ground."""
+class ContactArea:
+    """An area of a body that may touch the ground."""
 
     body: str
     """Name of the body."""
@@ -39,10 +39,10 @@ class ContactRegion:
     """Center of the contact in the standing pose, in the frame of the body [m]."""
 
     radius: float
-    """Radius of the region [m]; infinite if the whole body is a foot."""
+    """Radius of the area [m]; infinite if the whole body is a foot."""
 
     foot: str
-    """Name of the link that is the foot of the leg. A leg may have several regions."""
+    """Name of the link that is the foot of the leg. A leg may have several areas."""
 
     leg_length: float
     """Length of the leg [m]."""
@@ -68,10 +68,10 @@ class StandResult:
     """Horizontal distance that the base moved [m]."""
 
     leg_length: float
-    """Length of the shortest leg [m]; infinite without contact regions."""
+    """Length of the shortest leg [m]; infinite without contact areas."""
 
     other_contacts: tuple[str, ...]
-    """Bodies that touched the ground outside of the contact regions, in the order of the bodies."""
+    """Bodies that touched the ground outside of the contact areas, in the order of the bodies."""
 
     lifted_feet: tuple[str, ...]
     """Feet that did not touch the ground at the end, in the order of the legs."""
@@ -92,7 +92,7 @@ class StandResult:
     """Simulated time [s]; shorter than requested if the simulation diverged."""
 
 
-def contact_regions(facts: "Facts") -> tuple[ContactRegion, ...]:
+def contact_areas(facts: "Facts") -> tuple[ContactArea, ...]:
     """Return where a robot with legs may touch the ground.
 
     A separate foot link may touch it anywhere. If the foot is a part of the shank, only the tip of
@@ -110,7 +110,7 @@ def contact_regions(facts: "Facts") -> tuple[ContactRegion, ...]:
             is_foot = has_ankle or (link.name == leg.foot and link is not body.top)
             x, y, z = (invert_poses(local) @ point)[:3].tolist()
             found.append(
-                ContactRegion(
+                ContactArea(
                     body=link.name,
                     center=(x, y, z),
                     radius=math.inf if is_foot else _FOOT_RADIUS_RATIO * leg.length,
@@ -126,7 +126,7 @@ def stand_test(
     gains: Mapping[str, Gain],
     *,
     positions: Mapping[str, float],
-    regions: Sequence[ContactRegion] = (),
+    areas: Sequence[ContactArea] = (),
     seconds: float = 2.0,
     self_collision: bool = True,
     joints_locked: bool = False,
@@ -137,7 +137,7 @@ def stand_test(
         sim: The robot.
         gains: Gains of each actuated joint.
         positions: Initial position of each joint, and target of its actuator [rad] or [m].
-        regions: Where the robot may touch the ground; nowhere by default.
+        areas: Where the robot may touch the ground; nowhere by default.
         seconds: Time to simulate [s].
         self_collision: Whether the shapes of the robot collide with each other.
         joints_locked: Whether the joints are immovable.
@@ -152,19 +152,19 @@ def stand_test(
         if joints_locked:
             rollout.lock_joints()
         rollout.reset(sim.qpos_at(positions), clearance=0.0)
-        monitor = _Monitor(rollout, positions, regions, seconds)
+        recorder = _Recorder(rollout, positions, areas, seconds)
         for step in rollout.steps(seconds):
-            monitor.update(step)
-        return monitor.result()
+            recorder.update(step)
+        return recorder.result()
 
 
 @dataclass(eq=False)
-class _Monitor:
+class _Recorder:
     """Accumulates the measurements while a robot stands."""
 
     rollout: Rollout
     positions: Mapping[str, float]
-    regions: Sequence[ContactRegion]
+    areas: Sequence[ContactArea]
     seconds: float
     max_tilt: float = 0.0
     other_bodies: set[int] = field(default_factory=set)
@@ -184,11 +184,11 @@ class _Monitor:
         limited = (model.actuator_forcelimited != 0) & (ranges > 0)
         self.efforts = np.where(limited, ranges, np.inf)
         self.saturation = np.zeros(model.nu)
-        self.region_of: dict[int, ContactRegion] = {}
-        for region in self.regions:
-            body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, region.body)
+        self.area_of: dict[int, ContactArea] = {}
+        for area in self.areas:
+            body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, area.body)
             if body >= 0:
-                self.region_of[body] = region
+                self.area_of[body] = area
 
     def update(self, step: int) -> None:
         """Measure the state after a step."""
@@ -207,23 +207,23 @@ class _Monitor:
         return math.acos(np.clip(self.up @ up, -1.0, 1.0))
 
     def _record_contacts(self, *, is_final: bool) -> None:
-        """Record the bodies that touch the floor outside of their region, and the final feet."""
+        """Record the bodies that touch the floor outside of their area, and the final feet."""
         model, data = self.rollout.model, self.rollout.data
         pairs = model.geom_bodyid[data.contact.geom]
         for contact in np.flatnonzero((pairs == 0).any(axis=1)):
             body = int(pairs[contact].max())
-            region = self.region_of.get(body)
-            if region is None or not self._is_within(region, body, data.contact.pos[contact]):
+            area = self.area_of.get(body)
+            if area is None or not self._is_within(area, body, data.contact.pos[contact]):
                 self.other_bodies.add(body)
             elif is_final:
-                self.contact_feet.add(region.foot)
+                self.contact_feet.add(area.foot)
 
-    def _is_within(self, region: ContactRegion, body: int, point: Any) -> bool:
-        if math.isinf(region.radius):
+    def _is_within(self, area: ContactArea, body: int, point: Any) -> bool:
+        if math.isinf(area.radius):
             return True
         data = self.rollout.data
-        center = data.xpos[body] + data.xmat[body].reshape(3, 3) @ region.center
-        return bool(np.linalg.norm(point - center) <= region.radius)
+        center = data.xpos[body] + data.xmat[body].reshape(3, 3) @ area.center
+        return bool(np.linalg.norm(point - center) <= area.radius)
 
     def result(self) -> StandResult:
         """Return the measurements."""
@@ -232,14 +232,14 @@ class _Monitor:
         motion = data.qpos[:3] - self.start
         joint = int(np.argmax(self.saturation)) if len(self.saturation) else 0
         saturation = float(self.saturation[joint]) if len(self.saturation) else 0.0
-        feet = dict.fromkeys(region.foot for region in self.region_of.values())
+        feet = dict.fromkeys(area.foot for area in self.area_of.values())
         return StandResult(
             tilt=self._tilt(),
             max_tilt=max(self.max_tilt, self._tilt()),
             height=float(data.qpos[2]),
             height_loss=-float(motion[2]),
             drift=float(np.hypot(motion[0], motion[1])),
-            leg_length=min((region.leg_length for region in self.regions), default=math.inf),
+            leg_length=min((area.leg_length for area in self.areas), default=math.inf),
             other_contacts=tuple(
                 rollout.model.body(body).name for body in sorted(self.other_bodies)
             ),

@@ -68,12 +68,12 @@ class GainTarget:
 
     units: JointUnits
 
-    adds_armature: bool = False
+    extra_armature: bool = False
     """Whether the armature is added."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Requirement:
+class _RequiredStiffness:
     """A stiffness that a task requires."""
 
     stiffness: float
@@ -95,26 +95,28 @@ def leg_gain_target(
     if units == PRISMATIC:
         stiffness = weight / count / (_MAX_LEG_SAG * length)
         reason = f"to sink by {_MAX_LEG_SAG:.0%} of the leg under the weight = {stiffness:.3g}"
-        required = [_Requirement(stiffness=stiffness, reason=reason, min_error=_MIN_ERROR)]
+        required = [_RequiredStiffness(stiffness=stiffness, reason=reason, min_error=_MIN_ERROR)]
     else:
         stiffness = _UPRIGHT_FACTOR * weight * length / count
         reason = f"{_UPRIGHT_FACTOR:g} x weight x leg length / {count} legs = {stiffness:.3g}"
-        required = [_Requirement(stiffness=stiffness, reason=reason, min_error=_MIN_LEG_ERROR)]
+        required = [
+            _RequiredStiffness(stiffness=stiffness, reason=reason, min_error=_MIN_LEG_ERROR)
+        ]
     if facts.stance is not None and is_statically_stable(facts.legs):
-        required.append(_holding_requirement(facts.stance.torques, sim, units))
+        required.append(_stance_stiffness(facts.stance.torques, sim, units))
     return _make_target(sim, inertias, joints, required)
 
 
-def _holding_requirement(
+def _stance_stiffness(
     torques: Mapping[str, float], sim: SimModel, units: JointUnits
-) -> _Requirement:
+) -> _RequiredStiffness:
     """Return the stiffness for the largest holding torque of the joints with these units."""
     same_units = (name for name in torques if sim.units(name) == units)
     torque = max((abs(torques[name]) for name in same_units), default=0.0)
-    sag = _MAX_LEG_SAG * _lever(units)
+    sag = _MAX_LEG_SAG * _length_scale(units)
     stiffness = torque / sag
     reason = f"to hold {torque:.2g} {units.effort} in the standing pose within {sag:g} "
-    return _Requirement(
+    return _RequiredStiffness(
         stiffness=stiffness,
         reason=f"{reason}{units.position} = {stiffness:.3g}",
         min_error=_MIN_HOLDING_ERROR,
@@ -126,17 +128,17 @@ def other_gain_target(
 ) -> GainTarget:
     """Return the target of a joint that is not part of a leg, and of its mirror image."""
     units = sim.units(joints[0])
-    sag = _MAX_SAG * _lever(units)
+    sag = _MAX_SAG * _length_scale(units)
     load = max(_max_gravity_load(sim, name) for name in joints)
     dynamic = _MIN_FREQUENCY**2 * max(inertias[name].locked for name in joints)
     required = [
-        _Requirement(
+        _RequiredStiffness(
             stiffness=load / sag,
             reason=f"to hold its own {load:.2g} {units.effort} within {sag:g} {units.position} "
             f"= {load / sag:.3g}",
             min_error=_MIN_ERROR,
         ),
-        _Requirement(
+        _RequiredStiffness(
             stiffness=dynamic,
             reason=f"for a natural frequency of {_MIN_FREQUENCY:g} rad/s = {dynamic:.3g}",
             min_error=_MIN_ERROR,
@@ -145,7 +147,7 @@ def other_gain_target(
     return _make_target(sim, inertias, joints, required)
 
 
-def _lever(units: JointUnits) -> float:
+def _length_scale(units: JointUnits) -> float:
     """Return the factor from angles to positions of a joint: [m/rad] or 1."""
     return _LEVER if units == PRISMATIC else 1.0
 
@@ -154,7 +156,7 @@ def _make_target(
     sim: SimModel,
     inertias: Mapping[str, JointInertia],
     joints: Sequence[str],
-    required: Sequence[_Requirement],
+    required: Sequence[_RequiredStiffness],
 ) -> GainTarget:
     """Return the largest required stiffness within the effort limit and the time step."""
     effort = min(sim.effort_limit(name) for name in joints)
@@ -165,8 +167,8 @@ def _make_target(
     inertia = min(inertias[name].free for name in joints)
     armature = max(float(sim.model.joint(name).armature[0]) for name in joints)
     stable = max_stable_stiffness(inertia)
-    adds_armature = stable < _MIN_STIFFNESS_SHARE * stiffness
-    if adds_armature:
+    extra_armature = stable < _MIN_STIFFNESS_SHARE * stiffness
+    if extra_armature:
         added = _round_up(armature + min_stable_inertia(stiffness) - inertia) - armature
         inertia, armature = inertia + added, armature + added
     elif stable < stiffness:
@@ -182,12 +184,14 @@ def _make_target(
         inertia=inertia,
         armature=armature,
         units=units,
-        adds_armature=adds_armature,
+        extra_armature=extra_armature,
     )
 
 
-def _limit_by_effort(required: _Requirement, effort: float, units: JointUnits) -> tuple[float, str]:
-    error = required.min_error * _lever(units)
+def _limit_by_effort(
+    required: _RequiredStiffness, effort: float, units: JointUnits
+) -> tuple[float, str]:
+    error = required.min_error * _length_scale(units)
     limit = effort / error
     if required.stiffness <= limit:
         return required.stiffness, required.reason

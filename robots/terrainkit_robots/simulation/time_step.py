@@ -72,7 +72,7 @@ def max_stable_time_step(sim: SimModel, gains: Mapping[str, Gain]) -> StableTime
 
     With mass, damping and stiffness matrices M, D and K, and semi-implicit integration,
     M (q+ - 2 q + q-) + h D (q - q-) + h^2 K q = 0. For each motion x this is a quadratic equation
-    with positive coefficients. By Jury's criterion its roots are inside the unit circle if and only
+    with positive coefficients. By Jury's matrix its roots are inside the unit circle if and only
     if x'(4 M - 2 h D - h^2 K)x is positive. The time step h is stable if this matrix is positive
     definite.
     """
@@ -86,17 +86,17 @@ def max_stable_time_step(sim: SimModel, gains: Mapping[str, Gain]) -> StableTime
     if not (stiffness.any() or damping.any()):
         return StableTimeStep(seconds=np.inf, joint="")
 
-    def criterion(time_step: float) -> Any:
+    def matrix(time_step: float) -> Any:
         return 4 * mass - np.diag(2 * time_step * damping + time_step**2 * stiffness)
 
     stable, unstable = 0.0, 1.0
     for _ in range(30):
         middle = (stable + unstable) / 2
-        if _is_positive_definite(criterion(middle)):
+        if _is_positive_definite(matrix(middle)):
             stable = middle
         else:
             unstable = middle
-    motion = np.linalg.eigh(criterion(unstable))[1][:, 0]
+    motion = np.linalg.eigh(matrix(unstable))[1][:, 0]
     dof = int(np.argmax((2 * damping + unstable * stiffness) * motion**2))
     return StableTimeStep(seconds=stable, joint=sim.joints[dof - sim.base_dofs])
 

@@ -6,9 +6,15 @@ import numpy as np
 import pytest
 
 from terrainkit.errors import ExportError
-from terrainkit.export import check, export, find, options_of, suffixes
+from terrainkit.export import (
+    check_export,
+    export,
+    export_options,
+    exporters_by_suffix,
+    get_exporter,
+)
 
-every_suffix = pytest.mark.parametrize("suffix", sorted(suffixes()))
+every_suffix = pytest.mark.parametrize("suffix", sorted(exporters_by_suffix()))
 
 
 def names(folder):
@@ -16,12 +22,14 @@ def names(folder):
 
 
 def test_the_formats_of_the_field_are_there():
-    assert set(suffixes()) >= {".npz", ".png", ".stl", ".ply", ".obj", ".glb", ".xml"}
+    assert set(exporters_by_suffix()) >= {".npz", ".png", ".stl", ".ply", ".obj", ".glb", ".xml"}
 
 
 @every_suffix
 def test_an_exporter_takes_a_map_a_path_and_options_by_keyword(suffix):
-    map_, path, *options = inspect.signature(suffixes()[suffix].export).parameters.values()
+    map_, path, *options = inspect.signature(
+        exporters_by_suffix()[suffix].export
+    ).parameters.values()
     assert (map_.name, path.name) == ("terrain_map", "path")
     assert all(option.kind is option.KEYWORD_ONLY for option in options)
 
@@ -63,7 +71,7 @@ def test_an_existing_file_is_kept_unless_told(level_map, tmp_path, suffix):
 def test_an_unknown_suffix_is_an_error_that_lists_those_there_are(level_map, tmp_path, name):
     with pytest.raises(ExportError, match=r"no format for .*; there are: ") as error:
         export(level_map, tmp_path / name)
-    assert all(part in str(error.value) for part in (name, *suffixes()))
+    assert all(part in str(error.value) for part in (name, *exporters_by_suffix()))
     assert names(tmp_path) == []
 
 
@@ -84,22 +92,22 @@ def test_an_unknown_option_is_an_error_that_lists_those_there_are(
 
 
 def test_the_options_of_a_format_are_known_by_name():
-    assert options_of(Path("map.glb")) == ("full", "closed", "y_up")
+    assert export_options(Path("map.glb")) == ("full", "closed", "y_up")
 
 
 def test_formats_of_one_kind_share_an_exporter():
-    assert find(Path("a.stl")) is find(Path("b.OBJ"))
+    assert get_exporter(Path("a.stl")) is get_exporter(Path("b.OBJ"))
 
 
 def test_a_target_is_checked_before_a_map_is_made_for_it(tmp_path):
     path = tmp_path / "map.npz"
-    check(path, 100)
+    check_export(path, 100)
     path.write_text("mine")
-    check(path, 100, overwrite=True)
+    check_export(path, 100, overwrite=True)
     with pytest.raises(ExportError, match=r"map\.npz exists"):
-        check(path, 100)
+        check_export(path, 100)
     with pytest.raises(ExportError, match=r"no format for '\.usd'"):
-        check(tmp_path / "map.usd", 100)
+        check_export(tmp_path / "map.usd", 100)
     assert path.read_text() == "mine"
 
 
@@ -109,6 +117,6 @@ def test_heights_that_no_view_can_hold_are_not_exported(terrain_map, tmp_path, s
     heights = terrain_map.heights.copy()
     heights[3, 4] = height
     broken = dataclasses.replace(terrain_map, heights=heights)
-    with pytest.raises(ExportError, match="heights holds numbers that are not finite, or beyond"):
+    with pytest.raises(ExportError, match="heights has values that are not finite or beyond"):
         broken.save(tmp_path / f"a{suffix}")
     assert list(tmp_path.iterdir()) == []

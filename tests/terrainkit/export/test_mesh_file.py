@@ -56,9 +56,9 @@ def test_y_up_turns_the_map_a_quarter_about_x(ray_down, terrain_map, tmp_path, s
     mesh = saved(terrain_map, tmp_path, suffix, closed=True, y_up=True)
     assert mesh.volume > 0  # turned, not mirrored
     # x stays, z is up as y, and y comes out of the picture as -z.
-    x, up, towards = np.asarray(mesh.vertices).T
+    x, up, toward = np.asarray(mesh.vertices).T
     xy = points(terrain_map)
-    found = ray_down(np.column_stack([x, -towards, up]), mesh.faces, xy)
+    found = ray_down(np.column_stack([x, -toward, up]), mesh.faces, xy)
     np.testing.assert_allclose(found, terrain_map.height(xy), atol=1e-3)
 
 

@@ -78,7 +78,7 @@ def test_ground_below_zero_keeps_its_height(terrain_map, tmp_path):
 
 
 @pytest.mark.parametrize("height", [100.0, 131.0])
-def test_ground_up_to_131_metres_high_is_held_to_a_millimetre(terrain_map, tmp_path, height):
+def test_ground_up_to_131_meters_high_is_held_to_a_millimeter(terrain_map, tmp_path, height):
     rng = np.random.default_rng(0)
     heights = rng.uniform(0, height, terrain_map.heights.shape).astype(np.float32)
     heights[0, :2] = 0.0, height
@@ -88,7 +88,9 @@ def test_ground_up_to_131_metres_high_is_held_to_a_millimetre(terrain_map, tmp_p
 
 
 def test_ground_higher_than_that_is_an_error_and_writes_nothing(terrain_map, tmp_path):
-    with pytest.raises(ExportError, match=r"heights span 131\.2 m; a \.png holds 131\.07 m"):
+    with pytest.raises(
+        ExportError, match=r"height range: got 131\.2 m; expected at most 131\.07 m"
+    ):
         with_heights(terrain_map, -0.1, 131.1).save(tmp_path / "map.png")
     assert list(tmp_path.iterdir()) == []
 

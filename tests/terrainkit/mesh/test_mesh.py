@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from terrainkit.errors import CapacityError
+from terrainkit.errors import MemoryLimitError
 from terrainkit.grid import Grid
 from terrainkit.mesh import full_mesh, merged_mesh
 from terrainkit.surface import surface_at
@@ -132,5 +132,5 @@ def test_faces_and_vertices_are_small_numbers(build):
 @every_mesh
 def test_a_mesh_beyond_the_memory_is_refused_before_it_is_begun(build):
     heights = np.broadcast_to(np.float32(0), (10**6, 10**6))
-    with pytest.raises(CapacityError, match=r"a mesh of 1000000000000 samples needs .* GB"):
+    with pytest.raises(MemoryLimitError, match=r"a mesh of 1000000000000 samples needs .* GB"):
         mesh_of(build, heights, 0.1)

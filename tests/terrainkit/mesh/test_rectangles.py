@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 from terrainkit.grid import Grid
-from terrainkit.mesh.lattice import Lattice
+from terrainkit.mesh.node_grid import NodeGrid
 from terrainkit.mesh.rectangles import Rectangles
 
 MASKS = arrays(bool, array_shapes(min_dims=2, max_dims=2, max_side=8), elements=st.booleans())
@@ -47,17 +47,19 @@ def test_rows_of_sloping_quads_stay_one_quad_deep():
 
 
 @pytest.fixture
-def lattice():
+def node_grid():
     # 4 x 5 nodes at 0, 0.5, 1.5, 2 and 0, 0.5, 1.5, 2.5, 3
-    return Lattice.of(np.zeros((2, 3), dtype=np.float32), Grid(shape=(2, 3), cell=1.0), 0.5)
+    return NodeGrid.from_heights(
+        np.zeros((2, 3), dtype=np.float32), Grid(shape=(2, 3), cell=1.0), 0.5
+    )
 
 
-def test_a_rim_runs_anticlockwise_over_the_nodes_that_are_kept(lattice):
+def test_a_rim_runs_counterclockwise_over_the_nodes_that_are_kept(node_grid):
     rectangle = Rectangles.level(np.ones((3, 4), dtype=bool))
     kept = np.zeros((4, 5), dtype=bool)
     rectangle.keep_corners(kept)
     assert np.argwhere(kept).tolist() == [[0, 0], [0, 4], [3, 0], [3, 4]]
     kept[2, 4] = kept[1, 1] = True  # on the rim, and inside
-    loop = rectangle.loops(lattice, kept)
+    loop = rectangle.polygons(node_grid, kept)
     assert loop.vertices.tolist() == [0, 15, 19, 14, 4]
     assert loop.centers.tolist() == [[1.0, 1.5, 0.0]]

@@ -5,7 +5,7 @@ from terrainkit.grid import Grid
 
 
 @pytest.fixture
-def plot():
+def grid():
     return Grid(shape=(80, 80), cell=0.1)
 
 

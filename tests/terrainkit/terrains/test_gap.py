@@ -16,11 +16,11 @@ def moat(heights):
     )
 
 
-def test_a_gap_of_three_tenths_is_three_cells_wide(plot, rng):
-    heights = Gap(width=0.3, platform=3.0).build(plot, rng)
+def test_a_gap_of_three_tenths_is_three_cells_wide(grid, rng):
+    heights = Gap(width=0.3, platform=3.0).build(grid, rng)
     # The platform takes cells 25 to 54.
     assert moat(heights) == ([22, 23, 24, 55, 56, 57],) * 2
-    assert Gap(width=0.3).realized(plot)["width"] == 0.3
+    assert Gap(width=0.3).realized(grid)["width"] == 0.3
 
 
 def test_the_ground_falls_exactly_where_the_gap_is():
@@ -32,51 +32,51 @@ def test_the_ground_falls_exactly_where_the_gap_is():
     ]  # fmt: skip
 
 
-def test_the_moat_goes_around_the_corners_and_has_a_floor(plot, rng):
-    heights = Gap(width=0.3, platform=3.0, depth=2.0).build(plot, rng)
+def test_the_moat_goes_around_the_corners_and_has_a_floor(grid, rng):
+    heights = Gap(width=0.3, platform=3.0, depth=2.0).build(grid, rng)
     assert np.unique(heights).tolist() == [-2.0, 0.0]
     # A square of 36 cells less one of 30.
     assert np.count_nonzero(heights) == 36**2 - 30**2
 
 
-@pytest.mark.parametrize("metres", [1, 2, 3, 4, 5])
-def test_the_platform_is_as_large_as_asked(metres, plot, rng):
-    x, y = moat(Gap(width=0.3, platform=float(metres)).build(plot, rng))
-    edge = 40 - 5 * metres
+@pytest.mark.parametrize("meters", [1, 2, 3, 4, 5])
+def test_the_platform_is_as_large_as_asked(meters, grid, rng):
+    x, y = moat(Gap(width=0.3, platform=float(meters)).build(grid, rng))
+    edge = 40 - 5 * meters
     assert x == y == [*range(edge - 3, edge), *range(80 - edge, 83 - edge)]
 
 
 @pytest.mark.parametrize(
     ("asked", "built"), [(0.0, 0.0), (0.04, 0.0), (0.05, 0.1), (0.34, 0.3), (0.35, 0.4), (1.0, 1.0)]
 )
-def test_the_width_snaps_to_cells(asked, built, plot, rng):
+def test_the_width_snaps_to_cells(asked, built, grid, rng):
     gap = Gap(width=asked)
     assert gap.requested()["width"] == asked
-    assert gap.realized(plot)["width"] == built
-    assert len(moat(gap.build(plot, rng))[0]) * 0.1 == pytest.approx(2 * built)
+    assert gap.realized(grid)["width"] == built
+    assert len(moat(gap.build(grid, rng))[0]) * 0.1 == pytest.approx(2 * built)
 
 
 def test_an_odd_patch_has_an_odd_platform(rng):
-    plot = Grid(shape=(73, 51), cell=0.1)
+    grid = Grid(shape=(73, 51), cell=0.1)
     # 3.1 m, from cell 21 to 51 along x and from 10 to 40 along y.
-    x, y = moat(Gap(width=0.2, platform=3.0).build(plot, rng))
+    x, y = moat(Gap(width=0.2, platform=3.0).build(grid, rng))
     assert x == [19, 20, 52, 53]
     assert y == [8, 9, 41, 42]
-    assert Gap(platform=3.0).realized(plot)["platform"] == 3.1
+    assert Gap(platform=3.0).realized(grid)["platform"] == 3.1
 
 
 def test_the_edge_of_a_narrow_patch_ends_the_moat_and_the_record_says_so(rng):
-    plot = Grid(shape=(80, 40), cell=0.1)
+    grid = Grid(shape=(80, 40), cell=0.1)
     gap = Gap(width=1.0, platform=3.0)
-    x, y = moat(gap.build(plot, rng))
+    x, y = moat(gap.build(grid, rng))
     assert len(x) == 2 * 10
     assert len(y) == 2 * 5
-    assert gap.realized(plot)["width"] == (1.0, 0.5)
+    assert gap.realized(grid)["width"] == (1.0, 0.5)
 
 
 @pytest.mark.parametrize(("difficulty", "cells"), [(0.0, 0), (0.3, 3), (0.7, 7), (1.0, 10)])
-def test_the_width_grows_with_the_difficulty(difficulty, cells, plot, rng):
-    assert len(moat(Gap.at(difficulty).build(plot, rng))[0]) == 2 * cells
+def test_the_width_grows_with_the_difficulty(difficulty, cells, grid, rng):
+    assert len(moat(Gap.at(difficulty).build(grid, rng))[0]) == 2 * cells
 
 
 def test_a_platform_larger_than_the_patch_is_an_error(rng):

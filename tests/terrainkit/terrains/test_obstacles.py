@@ -8,52 +8,52 @@ from terrainkit.terrains.obstacles import Obstacles
 SEEDS = range(12)
 
 
-def build(plot, seed, **parameters):
-    return Obstacles(**parameters).build(plot, np.random.default_rng(seed))
+def build(grid, seed, **parameters):
+    return Obstacles(**parameters).build(grid, np.random.default_rng(seed))
 
 
 def extent(heights):
-    """Return the rectangle around everything that is not level, in cells: (x, y, nx, ny)."""
+    """Return the rectangle neighborhood everything that is not level, in cells: (x, y, nx, ny)."""
     x, y = (np.flatnonzero(heights.any(axis=axis)) for axis in (1, 0))
     return x[0], y[0], x[-1] - x[0] + 1, y[-1] - y[0] + 1
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_heights_are_whole_or_half_up_or_down(seed, plot):
-    levels = set(build(plot, seed, height=0.2).ravel().tolist())
+def test_heights_are_whole_or_half_up_or_down(seed, grid):
+    levels = set(build(grid, seed, height=0.2).ravel().tolist())
     assert levels <= set(np.float32([-0.2, -0.1, 0.0, 0.1, 0.2]).tolist())
     assert len(levels) > 2
 
 
-def test_every_level_is_drawn(plot):
-    levels = np.concatenate([build(plot, seed, height=0.2).ravel() for seed in SEEDS])
+def test_every_level_is_drawn(grid):
+    levels = np.concatenate([build(grid, seed, height=0.2).ravel() for seed in SEEDS])
     assert np.unique(levels) == pytest.approx([-0.2, -0.1, 0.0, 0.1, 0.2])
 
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_block_is_as_wide_as_asked_and_wholly_inside(seed):
-    plot = Grid(shape=(80, 40), cell=0.1)
-    heights = build(plot, seed, number=1, min_width=1.5, max_width=1.5, platform=0.2)
+    grid = Grid(shape=(80, 40), cell=0.1)
+    heights = build(grid, seed, number=1, min_width=1.5, max_width=1.5, platform=0.2)
     assert extent(heights)[2:] == (15, 15)
     assert 15 * 15 - 4 <= np.count_nonzero(heights) <= 15 * 15
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_sides_lie_between_the_least_and_the_largest(seed, plot):
-    *_, nx, ny = extent(build(plot, seed, number=1, platform=0.2))
+def test_sides_lie_between_the_least_and_the_largest(seed, grid):
+    *_, nx, ny = extent(build(grid, seed, number=1, platform=0.2))
     assert 10 <= nx <= 20
     assert 10 <= ny <= 20
 
 
-def test_sides_take_every_length_between_and_each_axis_its_own(plot):
-    sides = np.array([extent(build(plot, seed, number=1, platform=0.2))[2:] for seed in range(150)])
+def test_sides_take_every_length_between_and_each_axis_its_own(grid):
+    sides = np.array([extent(build(grid, seed, number=1, platform=0.2))[2:] for seed in range(150)])
     assert set(sides.ravel()) == set(range(10, 21))
     assert (sides[:, 0] != sides[:, 1]).any()
 
 
 def test_blocks_reach_every_edge_of_the_patch():
-    plot = Grid(shape=(30, 25), cell=0.1)
-    covered = [build(plot, seed, number=5, platform=0.1) != 0 for seed in range(40)]
+    grid = Grid(shape=(30, 25), cell=0.1)
+    covered = [build(grid, seed, number=5, platform=0.1) != 0 for seed in range(40)]
     reached = np.any(covered, axis=0)
     assert reached[[0, -1]].any(axis=1).all()
     assert reached[:, [0, -1]].any(axis=0).all()
@@ -68,24 +68,24 @@ def test_the_platform_is_kept_free(shape, side, seed):
     assert heights.any()
 
 
-def test_the_pattern_stays_as_the_height_grows(plot):
-    low, high = build(plot, 3, height=0.1), build(plot, 3, height=0.2)
+def test_the_pattern_stays_as_the_height_grows(grid):
+    low, high = build(grid, 3, height=0.1), build(grid, 3, height=0.2)
     assert high == pytest.approx(2 * low)
 
 
-def test_more_blocks_cover_more(plot):
-    few, many = (np.count_nonzero(build(plot, 0, number=number)) for number in (5, 40))
+def test_more_blocks_cover_more(grid):
+    few, many = (np.count_nonzero(build(grid, 0, number=number)) for number in (5, 40))
     assert many > few
 
 
 @pytest.mark.parametrize(("difficulty", "height"), [(0.0, 0.05), (0.5, 0.15), (1.0, 0.25)])
-def test_the_height_grows_with_the_difficulty(difficulty, height, plot):
-    heights = Obstacles.at(difficulty).build(plot, np.random.default_rng(0))
+def test_the_height_grows_with_the_difficulty(difficulty, height, grid):
+    heights = Obstacles.at(difficulty).build(grid, np.random.default_rng(0))
     assert np.abs(heights).max() == pytest.approx(height)
 
 
-def test_widths_snap_to_cells(plot):
-    realized = Obstacles(min_width=1.04, max_width=1.96, platform=3.1).realized(plot)
+def test_widths_snap_to_cells(grid):
+    realized = Obstacles(min_width=1.04, max_width=1.96, platform=3.1).realized(grid)
     assert realized["min_width"] == 1.0
     assert realized["max_width"] == 2.0
     assert realized["platform"] == 3.2
@@ -94,9 +94,9 @@ def test_widths_snap_to_cells(plot):
 @pytest.mark.parametrize(
     ("shape", "widths", "message"),
     [
-        ((80, 80), (2.0, 1.0), r"min_width 2 m and max_width 1 m do not fit one another"),
-        ((80, 80), (1.0, 8.1), r"max_width 8\.1 m do not fit .* a patch of 8 m x 8 m"),
-        ((80, 19), (1.0, 2.0), r"max_width 2 m do not fit .* a patch of 8 m x 1\.9 m"),
+        ((80, 80), (2.0, 1.0), r"min_width 2 m and max_width 1 m; expected min_width <= max_width"),
+        ((80, 80), (1.0, 8.1), r"max_width 8\.1 m; expected .* the patch, 8 m x 8 m"),
+        ((80, 19), (1.0, 2.0), r"max_width 2 m; expected .* the patch, 8 m x 1\.9 m"),
     ],
 )
 def test_blocks_that_do_not_fit_are_an_error(shape, widths, message):

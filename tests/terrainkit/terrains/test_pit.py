@@ -17,18 +17,18 @@ from terrainkit.terrains.pit import Pit
     ],
 )
 def test_the_pit_is_square_centered_and_as_large_as_asked(shape, asked, sides, rng):
-    plot = Grid(shape=shape, cell=0.1)
+    grid = Grid(shape=shape, cell=0.1)
     pit = Pit(depth=0.6, side=asked)
-    low = pit.build(plot, rng) < 0
+    low = pit.build(grid, rng) < 0
     assert (low.any(axis=1).sum(), low.any(axis=0).sum()) == sides
     assert low.sum() == sides[0] * sides[1]
     assert (low == low[::-1, ::-1]).all()
-    assert np.broadcast_to(pit.realized(plot)["side"], 2) == pytest.approx(np.array(sides) * 0.1)
+    assert np.broadcast_to(pit.realized(grid)["side"], 2) == pytest.approx(np.array(sides) * 0.1)
 
 
 @pytest.mark.parametrize(("difficulty", "depth"), [(0.0, 0.0), (0.4, 0.4), (1.0, 1.0)])
-def test_the_pit_deepens_with_the_difficulty(difficulty, depth, plot, rng):
-    heights = Pit.at(difficulty).build(plot, rng)
+def test_the_pit_deepens_with_the_difficulty(difficulty, depth, grid, rng):
+    heights = Pit.at(difficulty).build(grid, rng)
     assert heights[40, 40] == pytest.approx(-depth)
     assert heights.max() == 0.0
 

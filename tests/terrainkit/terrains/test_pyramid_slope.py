@@ -11,8 +11,8 @@ def quads(heights):
     return np.stack([heights[:-1, :-1], heights[1:, :-1], heights[:-1, 1:], heights[1:, 1:]])
 
 
-def test_a_grade_of_0_4_peaks_at_one_metre(plot, rng):
-    heights = PyramidSlope(grade=0.4, platform=3.0).build(plot, rng)
+def test_a_grade_of_0_4_peaks_at_one_metre(grid, rng):
+    heights = PyramidSlope(grade=0.4, platform=3.0).build(grid, rng)
     # From the platform of 3 m to the edge of the 8 m patch are 2.5 m.
     assert heights.max() == pytest.approx(1.0)
     assert heights.min() == 0.0
@@ -39,13 +39,13 @@ def test_the_grade_is_the_one_asked_everywhere_off_the_platform(shape, rng):
     ],
 )
 def test_the_platform_is_level_centered_and_as_large_as_asked(shape, asked, sides, rng):
-    plot = Grid(shape=shape, cell=0.1)
+    grid = Grid(shape=shape, cell=0.1)
     slope = PyramidSlope(grade=0.4, platform=asked)
-    top = slope.build(plot, rng) == slope.build(plot, rng).max()
+    top = slope.build(grid, rng) == slope.build(grid, rng).max()
     assert (top.any(axis=1).sum(), top.any(axis=0).sum()) == sides
     assert top.sum() == sides[0] * sides[1]
     assert (top == top[::-1, ::-1]).all()
-    realized = slope.realized(plot)["platform"]
+    realized = slope.realized(grid)["platform"]
     assert np.broadcast_to(realized, 2) == pytest.approx(np.array(sides) * 0.1)
 
 
@@ -56,25 +56,25 @@ def test_where_the_patch_is_narrower_its_sides_end_higher(rng):
     assert heights[40, 0] == pytest.approx(1.0 - 0.2)
 
 
-def test_all_four_sides_are_alike(plot, rng):
-    heights = PyramidSlope().build(plot, rng)
+def test_all_four_sides_are_alike(grid, rng):
+    heights = PyramidSlope().build(grid, rng)
     assert (heights == heights.T).all()
     assert (heights == heights[::-1]).all()
 
 
-def test_inverted_is_upside_down(plot, rng):
-    upright = PyramidSlope(grade=0.3).build(plot, rng)
-    assert (PyramidSlope(grade=0.3, inverted=True).build(plot, rng) == -upright).all()
+def test_inverted_is_upside_down(grid, rng):
+    upright = PyramidSlope(grade=0.3).build(grid, rng)
+    assert (PyramidSlope(grade=0.3, inverted=True).build(grid, rng) == -upright).all()
 
 
 @pytest.mark.parametrize(("difficulty", "peak"), [(0.0, 0.0), (0.5, 0.5), (1.0, 1.0)])
-def test_the_grade_grows_with_the_difficulty(difficulty, peak, plot, rng):
-    assert PyramidSlope.at(difficulty).build(plot, rng).max() == pytest.approx(peak)
+def test_the_grade_grows_with_the_difficulty(difficulty, peak, grid, rng):
+    assert PyramidSlope.at(difficulty).build(grid, rng).max() == pytest.approx(peak)
 
 
-def test_a_platform_of_the_whole_patch_is_an_error(plot, rng):
-    with pytest.raises(ConfigError, match="platform 8 m leaves nothing of a patch of 8 m x 8"):
-        PyramidSlope(grade=0.4, platform=8.0).build(plot, rng)
+def test_a_platform_of_the_whole_patch_is_an_error(grid, rng):
+    with pytest.raises(ConfigError, match="platform 8 m fills the whole patch of 8 m x 8"):
+        PyramidSlope(grade=0.4, platform=8.0).build(grid, rng)
 
 
 @pytest.mark.parametrize(("shape", "size"), [((80, 80), "8 m x 8 m"), ((90, 80), "9 m x 8 m")])
@@ -85,8 +85,8 @@ def test_a_platform_larger_than_the_patch_is_an_error(shape, size, rng):
         PyramidSlope(platform=8.2).build(Grid(shape=shape, cell=0.1), rng)
 
 
-def test_a_platform_smaller_than_a_cell_is_an_error(plot, rng):
+def test_a_platform_smaller_than_a_cell_is_an_error(grid, rng):
     with pytest.raises(
-        ConfigError, match=r"platform 0\.05 m cannot be held by cells of 0\.1 m; wanted 0\.1 m"
+        ConfigError, match=r"platform 0\.05 m is smaller than a cell; expected at least 0\.1 m"
     ):
-        PyramidSlope(platform=0.05).build(plot, rng)
+        PyramidSlope(platform=0.05).build(grid, rng)

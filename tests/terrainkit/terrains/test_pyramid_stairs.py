@@ -11,27 +11,27 @@ def edges(profile):
     return (np.flatnonzero(np.diff(profile)) + 1).tolist()
 
 
-def test_steps_of_one_height_and_width_up_to_the_platform(plot, rng):
-    heights = PyramidStairs(step_height=0.1, step_width=0.5, platform=3.0).build(plot, rng)
+def test_steps_of_one_height_and_width_up_to_the_platform(grid, rng):
+    heights = PyramidStairs(step_height=0.1, step_width=0.5, platform=3.0).build(grid, rng)
     # 2.5 m from the edge to the platform are five steps of five cells, and five back down.
     up, down = [5, 10, 15, 20, 25], [55, 60, 65, 70, 75]
     assert edges(heights[:, 40]) == edges(heights[40]) == up + down
     assert np.unique(heights) == pytest.approx(0.1 * np.arange(6), abs=1e-6)
 
 
-def test_the_outermost_tread_takes_what_is_left(plot, rng):
-    heights = PyramidStairs(step_height=0.1, step_width=0.3, platform=3.0).build(plot, rng)
+def test_the_outermost_tread_takes_what_is_left(grid, rng):
+    heights = PyramidStairs(step_height=0.1, step_width=0.3, platform=3.0).build(grid, rng)
     # 25 cells hold eight steps of three; the outermost tread is four wide, at height 0.
     assert edges(heights[:40, 40]) == [4, 7, 10, 13, 16, 19, 22, 25]
     assert heights[0, 0] == 0.0
     assert heights[40, 40] == pytest.approx(0.8)
 
 
-def test_the_usual_step_of_31_cm_is_built_as_30_cm(plot, rng):
+def test_the_usual_step_of_31_cm_is_built_as_30_cm(grid, rng):
     stairs = PyramidStairs(step_width=0.31)
     assert stairs.requested()["step_width"] == 0.31
-    assert stairs.realized(plot)["step_width"] == 0.3
-    assert set(np.diff(edges(stairs.build(plot, rng)[:40, 40]))) == {3}
+    assert stairs.realized(grid)["step_width"] == 0.3
+    assert set(np.diff(edges(stairs.build(grid, rng)[:40, 40]))) == {3}
 
 
 @pytest.mark.parametrize(
@@ -45,14 +45,14 @@ def test_the_usual_step_of_31_cm_is_built_as_30_cm(plot, rng):
     ],
 )
 def test_the_platform_is_centered_and_as_large_as_asked(shape, asked, sides, rng):
-    plot = Grid(shape=shape, cell=0.1)
+    grid = Grid(shape=shape, cell=0.1)
     stairs = PyramidStairs(platform=asked)
-    heights = stairs.build(plot, rng)
+    heights = stairs.build(grid, rng)
     top = heights == heights.max()
     assert (top.any(axis=1).sum(), top.any(axis=0).sum()) == sides
     assert top.sum() == sides[0] * sides[1]
     assert (top == top[::-1, ::-1]).all()
-    realized = stairs.realized(plot)["platform"]
+    realized = stairs.realized(grid)["platform"]
     assert np.broadcast_to(realized, 2) == pytest.approx(np.array(sides) * 0.1)
 
 
@@ -65,44 +65,44 @@ def test_where_the_patch_is_narrower_the_edge_cuts_the_steps(rng):
     assert heights[0, 20] == 0.0
 
 
-def test_all_four_sides_are_alike(plot, rng):
-    heights = PyramidStairs().build(plot, rng)
+def test_all_four_sides_are_alike(grid, rng):
+    heights = PyramidStairs().build(grid, rng)
     assert (heights == heights.T).all()
     assert (heights == heights[::-1]).all()
 
 
-def test_inverted_is_upside_down(plot, rng):
-    upright = PyramidStairs().build(plot, rng)
-    assert (PyramidStairs(inverted=True).build(plot, rng) == -upright).all()
+def test_inverted_is_upside_down(grid, rng):
+    upright = PyramidStairs().build(grid, rng)
+    assert (PyramidStairs(inverted=True).build(grid, rng) == -upright).all()
 
 
 @pytest.mark.parametrize(("difficulty", "rise"), [(0.0, 0.05), (0.5, 0.14), (1.0, 0.23)])
-def test_the_step_height_grows_with_the_difficulty(difficulty, rise, plot, rng):
-    profile = PyramidStairs.at(difficulty).build(plot, rng)[:40, 40]
+def test_the_step_height_grows_with_the_difficulty(difficulty, rise, grid, rng):
+    profile = PyramidStairs.at(difficulty).build(grid, rng)[:40, 40]
     assert np.diff(profile).max() == pytest.approx(rise)
 
 
-def test_a_step_narrower_than_a_cell_is_a_cell_wide_and_the_record_says_so(plot, rng):
+def test_a_step_narrower_than_a_cell_is_a_cell_wide_and_the_record_says_so(grid, rng):
     stairs = PyramidStairs(step_width=0.01)
-    assert stairs.realized(plot)["step_width"] == 0.1
-    assert edges(stairs.build(plot, rng)[:40, 40]) == list(range(1, 26))
+    assert stairs.realized(grid)["step_width"] == 0.1
+    assert edges(stairs.build(grid, rng)[:40, 40]) == list(range(1, 26))
 
 
-def test_one_step_is_the_least(plot, rng):
-    heights = PyramidStairs(step_height=0.2, step_width=0.3, platform=7.4).build(plot, rng)
+def test_one_step_is_the_least(grid, rng):
+    heights = PyramidStairs(step_height=0.2, step_width=0.3, platform=7.4).build(grid, rng)
     assert np.unique(heights).tolist() == pytest.approx([0.0, 0.2])
 
 
-def test_no_room_for_a_step_is_an_error(plot, rng):
+def test_no_room_for_a_step_is_an_error(grid, rng):
     with pytest.raises(
         ConfigError,
         match=r"pyramid_stairs: no step of 0\.3 m fits between the platform of 7\.6 m and the edge",
     ):
-        PyramidStairs(step_width=0.3, platform=7.6).build(plot, rng)
+        PyramidStairs(step_width=0.3, platform=7.6).build(grid, rng)
 
 
-def test_a_platform_larger_than_the_patch_is_an_error(plot, rng):
+def test_a_platform_larger_than_the_patch_is_an_error(grid, rng):
     with pytest.raises(
         ConfigError, match="pyramid_stairs: platform 9 m does not fit in a patch of 8 m x 8 m"
     ):
-        PyramidStairs(platform=9.0).build(plot, rng)
+        PyramidStairs(platform=9.0).build(grid, rng)

@@ -7,17 +7,17 @@ from terrainkit.terrains.pyramid_slope import PyramidSlope
 from terrainkit.terrains.rough_slope import RoughSlope
 
 
-def roughness(terrain, plot, seed=0):
+def roughness(terrain, grid, seed=0):
     """Return how far the ground lies above the same slope without noise [m]."""
     slope = PyramidSlope(grade=terrain.grade, platform=terrain.platform, inverted=terrain.inverted)
-    heights = terrain.build(plot, np.random.default_rng(seed)).astype(float)
-    return heights - slope.build(plot, np.random.default_rng(seed))
+    heights = terrain.build(grid, np.random.default_rng(seed)).astype(float)
+    return heights - slope.build(grid, np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize("inverted", [False, True])
-def test_without_noise_it_is_the_pyramid_slope(inverted, plot):
+def test_without_noise_it_is_the_pyramid_slope(inverted, grid):
     terrain = RoughSlope(amplitude=0.0, inverted=inverted)
-    assert not roughness(terrain, plot).any()
+    assert not roughness(terrain, grid).any()
 
 
 @pytest.mark.parametrize("shape", [(80, 80), (80, 40), (73, 51)])
@@ -30,8 +30,8 @@ def test_noise_stays_within_its_amplitude_on_the_sides(shape):
 
 @pytest.mark.parametrize(("shape", "side"), [((80, 80), 30), ((80, 40), 30), ((73, 51), 31)])
 def test_the_platform_is_level_and_the_sides_are_not(shape, side):
-    plot = Grid(shape=shape, cell=0.1)
-    noise = roughness(RoughSlope(platform=3.0), plot)
+    grid = Grid(shape=shape, cell=0.1)
+    noise = roughness(RoughSlope(platform=3.0), grid)
     top = np.zeros(shape, dtype=bool)
     x, y = ((n - side) // 2 for n in shape)
     top[x : x + side, y : y + side] = True
@@ -39,20 +39,20 @@ def test_the_platform_is_level_and_the_sides_are_not(shape, side):
     assert (noise[~top] != 0).mean() > 0.8
 
 
-def test_the_noise_is_the_same_at_every_grade_and_either_way_up(plot):
+def test_the_noise_is_the_same_at_every_grade_and_either_way_up(grid):
     steep, level = RoughSlope(grade=0.4), RoughSlope(grade=0.0)
     below = RoughSlope(grade=0.4, inverted=True)
-    assert roughness(steep, plot) == pytest.approx(roughness(level, plot), abs=1e-6)
-    assert roughness(below, plot) == pytest.approx(roughness(level, plot), abs=1e-6)
+    assert roughness(steep, grid) == pytest.approx(roughness(level, grid), abs=1e-6)
+    assert roughness(below, grid) == pytest.approx(roughness(level, grid), abs=1e-6)
 
 
-def test_another_draw_is_other_noise(plot):
-    assert (roughness(RoughSlope(), plot, 1) != roughness(RoughSlope(), plot, 2)).any()
+def test_another_draw_is_other_noise(grid):
+    assert (roughness(RoughSlope(), grid, 1) != roughness(RoughSlope(), grid, 2)).any()
 
 
 @pytest.mark.parametrize(("difficulty", "peak"), [(0.0, 0.0), (0.5, 0.5), (1.0, 1.0)])
-def test_the_grade_grows_with_the_difficulty(difficulty, peak, plot, rng):
-    assert RoughSlope.at(difficulty).build(plot, rng)[40, 40] == pytest.approx(peak)
+def test_the_grade_grows_with_the_difficulty(difficulty, peak, grid, rng):
+    assert RoughSlope.at(difficulty).build(grid, rng)[40, 40] == pytest.approx(peak)
 
 
 def test_what_is_built_is_recorded():
@@ -68,12 +68,12 @@ def test_what_is_built_is_recorded():
     }
 
 
-def test_a_platform_larger_than_the_patch_is_an_error(plot, rng):
+def test_a_platform_larger_than_the_patch_is_an_error(grid, rng):
     with pytest.raises(ConfigError, match="rough_slope: platform 9 m does not fit in a patch"):
-        RoughSlope(platform=9.0).build(plot, rng)
+        RoughSlope(platform=9.0).build(grid, rng)
 
 
 @pytest.mark.parametrize("spacing", [0.04, 1e-310])
-def test_a_spacing_below_a_cell_is_a_cell(spacing, plot):
+def test_a_spacing_below_a_cell_is_a_cell(spacing, grid):
     fine, cell = RoughSlope(spacing=spacing), RoughSlope(spacing=0.1)
-    assert (roughness(fine, plot) == roughness(cell, plot)).all()
+    assert (roughness(fine, grid) == roughness(cell, grid)).all()

@@ -13,41 +13,41 @@ def runs(line):
     return lengths[::2] if not line[0] else lengths[1::2]
 
 
-def build(plot, seed=0, **parameters):
-    return SteppingStones(**parameters).build(plot, np.random.default_rng(seed))
+def build(grid, seed=0, **parameters):
+    return SteppingStones(**parameters).build(grid, np.random.default_rng(seed))
 
 
-def test_rows_of_stones_are_a_stone_deep_and_a_distance_apart(plot):
-    heights = build(plot, stone=0.5, distance=0.3)
+def test_rows_of_stones_are_a_stone_deep_and_a_distance_apart(grid):
+    heights = build(grid, stone=0.5, distance=0.3)
     holes = (heights[:, :20] < 0).all(axis=1)  # beside the platform, from 2.0 to 6.0 m
     assert np.flatnonzero(~holes).tolist() == [k for k in range(80) if k % 8 < 5]
 
 
-def test_stones_in_a_row_are_as_wide_and_as_far_apart_as_asked(plot):
-    stones = build(plot, stone=0.5, distance=0.3)[:20] == 0
+def test_stones_in_a_row_are_as_wide_and_as_far_apart_as_asked(grid):
+    stones = build(grid, stone=0.5, distance=0.3)[:20] == 0
     for row in (0, 8, 16):
         assert set(runs(stones[row])) == {5}
         assert set(runs(~stones[row])) == {3}
 
 
-def test_a_stone_is_square(plot):
-    stones = build(plot, stone=0.5, distance=0.3)[:20] == 0
+def test_a_stone_is_square(grid):
+    stones = build(grid, stone=0.5, distance=0.3)[:20] == 0
     assert all((stones[k] == stones[0]).all() for k in range(5))
     assert all((stones[8 + k] == stones[8]).all() for k in range(5))
 
 
-def test_each_row_is_shifted_on_its_own(plot):
-    stones = build(plot, stone=0.5, distance=0.3, platform=0.2) == 0
+def test_each_row_is_shifted_on_its_own(grid):
+    stones = build(grid, stone=0.5, distance=0.3, platform=0.2) == 0
     assert len({stones[8 * row].tobytes() for row in range(10)}) > 3
 
 
-def test_stones_are_at_zero_and_holes_at_their_depth(plot):
-    assert np.unique(build(plot, stone=0.5, distance=0.3)).tolist() == [-10.0, 0.0]
-    assert np.unique(build(plot, stone=0.5, distance=0.3, depth=2.5)).tolist() == [-2.5, 0.0]
+def test_stones_are_at_zero_and_holes_at_their_depth(grid):
+    assert np.unique(build(grid, stone=0.5, distance=0.3)).tolist() == [-10.0, 0.0]
+    assert np.unique(build(grid, stone=0.5, distance=0.3, depth=2.5)).tolist() == [-2.5, 0.0]
 
 
-def test_variation_gives_each_stone_its_own_level(plot):
-    heights = build(plot, stone=0.5, distance=0.3, variation=0.1, platform=0.2)
+def test_variation_gives_each_stone_its_own_level(grid):
+    heights = build(grid, stone=0.5, distance=0.3, variation=0.1, platform=0.2)
     tops = heights[heights > -1]
     assert np.abs(tops).max() <= 0.1
     assert np.ptp(tops) > 0.1
@@ -81,26 +81,26 @@ def test_a_platform_as_wide_as_the_patch_bridges_it():
         (1.0, (0.075, 0.1), (0.1, 0.1)),
     ],
 )
-def test_stones_shrink_with_the_difficulty(difficulty, asked, built, plot):
+def test_stones_shrink_with_the_difficulty(difficulty, asked, built, grid):
     terrain = SteppingStones.at(difficulty)
     assert (terrain.stone, terrain.distance) == pytest.approx(asked)
-    realized = terrain.realized(plot)
+    realized = terrain.realized(grid)
     assert (realized["stone"], realized["distance"]) == built
     pitch = round((built[0] + built[1]) / 0.1)
-    rows = (terrain.build(plot, np.random.default_rng(0))[:20, :20] == 0).any(axis=1)
+    rows = (terrain.build(grid, np.random.default_rng(0))[:20, :20] == 0).any(axis=1)
     assert np.flatnonzero(~rows).tolist() == list(range(pitch - 1, 20, pitch))
 
 
 @pytest.mark.parametrize(("stone", "distance"), [(0.01, 0.3), (0.5, 0.01)])
-def test_a_length_below_a_cell_is_a_cell_and_the_record_says_so(stone, distance, plot):
+def test_a_length_below_a_cell_is_a_cell_and_the_record_says_so(stone, distance, grid):
     terrain = SteppingStones(stone=stone, distance=distance)
-    realized = terrain.realized(plot)
+    realized = terrain.realized(grid)
     assert (realized["stone"], realized["distance"]) == (max(stone, 0.1), max(distance, 0.1))
-    stones = build(plot, stone=stone, distance=distance)[:20] == 0
+    stones = build(grid, stone=stone, distance=distance)[:20] == 0
     assert set(runs(stones[0])) == {round(max(stone, 0.1) / 0.1)}
     assert set(runs(~stones[0])) == {round(max(distance, 0.1) / 0.1)}
 
 
-def test_a_platform_larger_than_the_patch_is_an_error(plot):
+def test_a_platform_larger_than_the_patch_is_an_error(grid):
     with pytest.raises(ConfigError, match="stepping_stones: platform 9 m does not fit"):
-        build(plot, platform=9.0)
+        build(grid, platform=9.0)

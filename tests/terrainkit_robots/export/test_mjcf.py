@@ -9,7 +9,7 @@ from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.export.actuator import ActuatorConfig
 from terrainkit_robots.export.canonical import to_canonical
-from terrainkit_robots.export.mjcf import Extras, mjcf_text, quaternion, scene_text
+from terrainkit_robots.export.mjcf import Extras, mjcf_text, scene_text
 from terrainkit_robots.export.sites import foot_sites, imu_site
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 
@@ -181,17 +181,6 @@ def test_the_scene_holds_the_robot_and_a_floor(quadruped, tmp_path):
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "scene.xml"))
     assert model.geom("floor").type[0] == mujoco.mjtGeom.mjGEOM_PLANE
     assert model.body("base").pos[2] == 0.3
-
-
-@pytest.mark.parametrize("angle", [0, 0.5, np.pi, 3.5])
-def test_a_quaternion_turns_as_its_matrix_does(angle):
-    c, s = np.cos(angle), np.sin(angle)
-    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-    quat = quaternion(turn)
-    assert quat[0] >= 0
-    back = np.zeros(9)
-    mujoco.mju_quat2Mat(back, quat)
-    np.testing.assert_allclose(back.reshape(3, 3), turn, atol=1e-12)
 
 
 def test_contacts_of_a_foot_without_mass_are_as_stiff_as_of_one_with_next_to_none(quadruped):

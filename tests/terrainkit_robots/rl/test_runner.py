@@ -89,7 +89,7 @@ def test_resuming_continues_exactly_on_a_map(make, task, tmp_path, map_ground):
 def test_same_seed_learns_same_weights(make, task):
     def learned(seed: int) -> dict[str, Any]:
         runner = make(replace(task, runner=replace(task.runner, seed=seed)), folder=None)
-        runner.learn(10, init_at_random_ep_len=True)
+        runner.learn(3, init_at_random_ep_len=True)
         return runner.state_dict()
 
     first = learned(1)

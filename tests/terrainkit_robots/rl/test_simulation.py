@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from terrainkit.errors import CapacityError, ConfigError
+from terrainkit.errors import ConfigError, MemoryLimitError
 from terrainkit_robots.rl.config import DomainRand, Env, Runner, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.events import RandomizedParams
@@ -294,10 +294,10 @@ def test_memory_estimate_matches_measurement(quadruped, scan):
 
 
 def test_check_memory_names_what_fits(quadruped, monkeypatch):
-    monkeypatch.setattr("terrainkit.capacity._free_memory", lambda: 1 << 30)
+    monkeypatch.setattr("terrainkit.memory._free_memory", lambda: 1 << 30)
     task = Task(env=Env(num_envs=40_000))
     with pytest.raises(
-        CapacityError, match=r"with 40000 environments needs .*; env\.num_envs 5000 would fit"
+        MemoryLimitError, match=r"with 40000 environments needs .*; env\.num_envs 5000 would fit"
     ):
         check_memory(task, quadruped, scan=False, ngeom=50)
     check_memory(Task(env=Env(num_envs=5000)), quadruped, scan=False, ngeom=50)

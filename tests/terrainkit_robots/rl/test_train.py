@@ -13,7 +13,7 @@ import pytest
 import torch
 
 import terrainkit
-from terrainkit.errors import CapacityError, ConfigError, ExportError
+from terrainkit.errors import ConfigError, ExportError, MemoryLimitError
 from terrainkit_robots.rl import runner, tasks
 from terrainkit_robots.rl.config import Algorithm, Env, Policy, Runner, Task, Terrain
 from terrainkit_robots.rl.run import (
@@ -86,7 +86,7 @@ def test_resume_continues_exactly_in_its_folder(task, tmp_path):
     assert open_run(tmp_path / "run").task == task
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_interrupted_run_resumes_exactly(task, tmp_path, number):
     def interrupt(progress: TrainingProgress) -> None:
         if progress.iteration == 2:
@@ -371,7 +371,7 @@ def test_divergence_names_the_last_checkpoint(task, tmp_path):
 
 def test_too_many_environments_write_nothing(task, tmp_path):
     many = replace(task, env=replace(task.env, num_envs=100_000_000))
-    with pytest.raises(CapacityError, match=r"100000000 environments needs .* GB .* would fit"):
+    with pytest.raises(MemoryLimitError, match=r"100000000 environments needs .* GB .* would fit"):
         train("quadruped", "plane", many, folder=tmp_path / "run")
     assert not (tmp_path / "run").exists()
 

@@ -9,7 +9,7 @@ from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.simulation.assessment import assess
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import SimModel, make_sim_model
-from terrainkit_robots.simulation.standing import contact_regions, stand_test
+from terrainkit_robots.simulation.standing import contact_areas, stand_test
 
 
 def test_one_that_stands(stood):
@@ -67,7 +67,7 @@ def quadruped():
 def judged(facts, scene):
     return assess(
         stand_test(
-            scene, suggest_gains(facts), positions=facts.positions, regions=contact_regions(facts)
+            scene, suggest_gains(facts), positions=facts.positions, areas=contact_areas(facts)
         )
     )
 

@@ -13,7 +13,7 @@ from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import make_sim_model
-from terrainkit_robots.simulation.standing import contact_regions, stand_test
+from terrainkit_robots.simulation.standing import contact_areas, stand_test
 
 BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]
 QUADRUPEDS = ["a1/urdf/a1.urdf", "go2/urdf/go2.urdf", "go2_mjcf/go2.xml"]
@@ -31,7 +31,7 @@ def facts_of(name, robot_file):
 
 
 def stand(facts, **keys):
-    keys = {"positions": facts.positions, "regions": contact_regions(facts)} | keys
+    keys = {"positions": facts.positions, "areas": contact_areas(facts)} | keys
     return stand_test(make_sim_model(facts), suggest_gains(facts), **keys)
 
 
@@ -96,7 +96,7 @@ def test_a_stiffer_robot_sinks_less():
         for name, gain in suggest_gains(facts).items()
     }
     standing = stand_test(
-        make_sim_model(facts), stiff, positions=facts.positions, regions=contact_regions(facts)
+        make_sim_model(facts), stiff, positions=facts.positions, areas=contact_areas(facts)
     )
     assert standing.height_loss < 0.5 * stand(facts).height_loss
     largest = max(abs(torque) for torque in facts.stance.torques.values())
@@ -112,7 +112,7 @@ def test_knees_on_the_ground_are_no_feet():
         for name, gain in suggest_gains(facts).items()
     }
     standing = stand_test(
-        make_sim_model(facts), limp, positions=facts.positions, regions=contact_regions(facts)
+        make_sim_model(facts), limp, positions=facts.positions, areas=contact_areas(facts)
     )
     assert standing.height_loss > 0.15
     assert {"FL_calf", "RR_calf"} & set(standing.other_contacts)
@@ -121,12 +121,12 @@ def test_knees_on_the_ground_are_no_feet():
 
 def test_without_footholds_feet_are_told_as_well():
     facts = read(bundled.find("quadruped"))
-    assert "FL_foot" in stand(facts, regions=()).other_contacts
+    assert "FL_foot" in stand(facts, areas=()).other_contacts
 
 
 def test_a_foot_may_touch_anywhere_and_a_shank_with_its_tip():
     facts = read(bundled.find("quadruped"))
-    holds = {hold.body: hold for hold in contact_regions(facts)}
+    holds = {hold.body: hold for hold in contact_areas(facts)}
     assert math.isinf(holds["FL_foot"].radius)
     assert 0.05 < holds["FL_calf"].radius < 0.213
     assert holds["FL_calf"].center == pytest.approx((0, 0, -0.22), abs=0.03)

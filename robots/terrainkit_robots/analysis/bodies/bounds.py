@@ -46,7 +46,7 @@ class BodyBounds:
         )
         """Diagonal of the bounding box of all body frames, all joints at 0 [m]."""
 
-    def box_if(self, body: Body, is_violated: Callable[[Matrix], bool]) -> Matrix | None:
+    def box_if(self, body: Body, fails: Callable[[Matrix], bool]) -> Matrix | None:
         """Return the bounding box of a body if the condition holds for it; otherwise None.
 
         The condition is evaluated on boxes of increasing size, and the first box for which it does
@@ -54,12 +54,12 @@ class BodyBounds:
 
         Args:
             body: The body.
-            is_violated: Condition on the bounding box of the body. If it holds for a box, it holds
+            fails: Condition on the bounding box of the body. If it holds for a box, it holds
                 for every smaller one.
         """
         last = None
         for box in self._boxes(body):
-            if not is_violated(box):
+            if not fails(box):
                 return None
             last = box
         return last

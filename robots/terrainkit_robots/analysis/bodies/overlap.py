@@ -94,7 +94,7 @@ class OverlapScene:
             return
         import mujoco
 
-        model, data = self._compiled
+        model, data = self._model_and_data
         for poses in self._shape_poses(positions, count):
             world = poses @ self._geom_poses
             data.geom_xpos[:] = world[:, :3, 3]
@@ -142,7 +142,7 @@ class OverlapScene:
         yield from ((int(i), int(j)) for i, j in self._pairs[closest[distance[closest] < 0]])
 
     @cached_property
-    def _compiled(self) -> tuple[Any, Any]:
+    def _model_and_data(self) -> tuple[Any, Any]:
         import mujoco
 
         spec = mujoco.MjSpec()
@@ -172,7 +172,7 @@ class OverlapScene:
 
         For a mesh this is not the pose we set: MuJoCo moves its origin to the center of mass.
         """
-        model, _ = self._compiled
+        model, _ = self._model_and_data
         poses = np.tile(np.eye(4), (len(self._shapes), 1, 1))
         poses[:, :3, 3] = model.geom_pos
         poses[:, :3, :3] = [quat_to_matrix(quat) for quat in model.geom_quat]

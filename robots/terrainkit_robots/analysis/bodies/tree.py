@@ -91,18 +91,18 @@ def _parent_joints(
 
 def _detect_cycles(parent_joint: Mapping[str, Joint]) -> list[tuple[str, ...]]:
     """Return the cycles, each from its first link in the file upwards."""
-    visited: set[str] = set()
+    seen: set[str] = set()
     cycles = []
     for start in parent_joint:
         path: dict[str, None] = {}
         link = start
-        while link in parent_joint and link not in visited and link not in path:
+        while link in parent_joint and link not in seen and link not in path:
             path[link] = None
             link = parent_joint[link].parent
         if link in path:
             names = list(path)
             cycles.append(tuple(names[names.index(link) :]))
-        visited.update(path)
+        seen.update(path)
     return cycles
 
 

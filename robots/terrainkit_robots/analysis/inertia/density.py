@@ -25,25 +25,25 @@ def has_derived_mass(body: Body) -> bool:
     return all(link.inertial is None or link.inertial.source == link.source for link in body.links)
 
 
-def max_density_violation(body: Body, body_bounds: BodyBounds) -> tuple[float, float] | None:
+def check_max_density(body: Body, body_bounds: BodyBounds) -> tuple[float, float] | None:
     """Return the volume of the bounding box [m3] and MAX_DENSITY if a body is too heavy for it."""
 
-    def is_too_dense(box: Matrix) -> bool:
+    def has_high_density(box: Matrix) -> bool:
         return body.mass > MAX_DENSITY * _box_volume(box)
 
-    box = body_bounds.box_if(body, is_too_dense)
+    box = body_bounds.box_if(body, has_high_density)
     return None if box is None or _box_volume(box) <= 0 else (_box_volume(box), MAX_DENSITY)
 
 
-def min_density_violation(
+def check_min_density(
     body: Body, body_bounds: BodyBounds, meshes: Meshes
 ) -> tuple[float, float] | None:
     """Return the volume of the largest shape [m3] and MIN_DENSITY if a body is too light for it."""
 
-    def may_be_too_light(length: float) -> bool:
+    def needs_volume(length: float) -> bool:
         return body.mass < _PLAUSIBLE_DENSITY * length**3 / _SLENDERNESS
 
-    box = body_bounds.shape_box(body, may_be_too_light)
+    box = body_bounds.shape_box(body, needs_volume)
     if box is None or body.mass >= _PLAUSIBLE_DENSITY * _box_volume(box):
         return None
     shapes = (*body.collisions, *body.visuals)

@@ -31,7 +31,7 @@ def placeholder_inertias(bodies: Sequence[Body]) -> list[list[Link]]:
 def _are_different(links: Mapping[int, Link], bodies: Sequence[Body]) -> bool:
     """Return whether links with the same inertia are not copies of one part."""
     masses = {link.inertial.mass for link in links.values() if link.inertial}
-    if len(masses) == 1 and not _is_rounded(next(iter(links.values()))):
+    if len(masses) == 1 and not _is_round(next(iter(links.values()))):
         return False
     for index, link in links.items():
         parent = links.get(bodies[index].parent or 0)
@@ -40,7 +40,7 @@ def _are_different(links: Mapping[int, Link], bodies: Sequence[Body]) -> bool:
     return False
 
 
-def _is_rounded(link: Link) -> bool:
+def _is_round(link: Link) -> bool:
     """Return whether an inertia is spherical, or diagonal with at most two digits."""
     assert link.inertial is not None
     assert link.inertial.inertia is not None

@@ -52,7 +52,7 @@ class InertiaRepair:
         if source.element is None or source == link.source:
             return None  # it cannot be edited, or MuJoCo derived it
         for inertia, description in (
-            (self._mirrored(link), "that of its mirror image"),
+            (self._mirror_inertia(link), "that of its mirror image"),
             (self._nearest(link, inertial.inertia), "the nearest physical one"),
             (self._solid_box(link, inertial), "that of a solid box around the body"),
         ):
@@ -73,12 +73,12 @@ class InertiaRepair:
             for index, link in enumerate(body.links)
         }
 
-    def _mirrored(self, link: Link) -> Matrix | None:
+    def _mirror_inertia(self, link: Link) -> Matrix | None:
         """Return the mirrored inertia in the inertial frame of a link, if it is physical."""
         if link.name not in self._location:
             return None
         body, index = self._location[link.name]
-        other_index = self.mirror.counterparts.get(body.index)
+        other_index = self.mirror.image_index.get(body.index)
         if other_index is None or len(self.bodies[other_index].links) != len(body.links):
             return None
         other = self.bodies[other_index].links[index]

@@ -85,7 +85,7 @@ class Limb(Chain):
 def detect_limbs(
     tree: Tree,
     bodies: Sequence[Body],
-    drivable: Sequence[Joint],
+    actuated: Sequence[Joint],
     zero_poses: Sequence[Matrix],
     meshes: Meshes,
 ) -> tuple[Limb, ...]:
@@ -94,11 +94,11 @@ def detect_limbs(
     Args:
         tree: The tree of links.
         bodies: The bodies, parents first.
-        drivable: Joints that an actuator moves, directly or perhaps through a tendon.
+        actuated: Joints that an actuator moves, directly or perhaps through a tendon.
         zero_poses: Poses of the bodies in the frame of the trunk, all joints at 0, each (4, 4) [m].
         meshes: Mesh files.
     """
-    leaves = _leaves(bodies, drivable, zero_poses, meshes)
+    leaves = _leaves(bodies, actuated, zero_poses, meshes)
     if not leaves:
         return ()
     lower, upper = _robot_bounds(bodies, zero_poses, meshes)
@@ -117,8 +117,8 @@ def detect_limbs(
     )
     is_fixed_base = bool(tree.order) and tree.order[0] == bodies[0].top.name == "world"
 
-    def height_score(tip: float) -> float:
-        ratio, is_arm = (tip - ground) / height, tip - rest > _MIN_ARM_HEIGHT * height
+    def height_score(foot: float) -> float:
+        ratio, is_arm = (foot - ground) / height, foot - rest > _MIN_ARM_HEIGHT * height
         return (ratio <= _LOW) / 2 + (ratio <= _NEAR_GROUND) / 2 - is_arm - is_fixed_base / 2
 
     return tuple(
@@ -144,7 +144,7 @@ def is_branch(one: Chain, other: Chain, size: float) -> bool:
     if min(separate) < _MIN_SEPARATE_LENGTH:
         return True
     is_short = 2 * shared >= min(len(one.joints), len(other.joints))
-    return is_short and not _is_mirrored(one, other, size)
+    return is_short and not _is_mirror_image(one, other, size)
 
 
 def _length(limb: Chain, start: int) -> float:
@@ -160,12 +160,12 @@ def _length(limb: Chain, start: int) -> float:
 
 def _leaves(
     bodies: Sequence[Body],
-    drivable: Sequence[Joint],
+    actuated: Sequence[Joint],
     zero_poses: Sequence[Matrix],
     meshes: Meshes,
 ) -> list[Chain]:
     parents = {body.parent for body in bodies}
-    drivable_ids = {id(joint) for joint in drivable}
+    actuated_ids = {id(joint) for joint in actuated}
     leaves = []
     for body in bodies[1:]:
         if body.index in parents:
@@ -174,8 +174,8 @@ def _leaves(
         moving = [i for i in chain if (j := bodies[i].joint) is not None and j.moves]
         joints = [j for i in moving if (j := bodies[i].joint) is not None]
         # A wheel at the end does not bend the limb.
-        bending = joints[:-1] if joints and _is_spinning_wheel(bodies[moving[-1]]) else joints
-        driven = sum(id(joint) in drivable_ids for joint in bending)
+        bending = joints[:-1] if joints and _is_continuous_wheel(bodies[moving[-1]]) else joints
+        driven = sum(id(joint) in actuated_ids for joint in bending)
         if len(joints) <= _MAX_JOINTS and driven >= 2:
             tip = contact_points(body, zero_poses[body.index], meshes).mean(axis=0)
             points = [joint_axis(bodies[i], zero_poses[i])[0] for i in moving]
@@ -185,7 +185,7 @@ def _leaves(
     return sorted(leaves, key=lambda leaf: float(leaf.tip[2]))[:_MAX_LIMBS]
 
 
-def _is_spinning_wheel(body: Body) -> bool:
+def _is_continuous_wheel(body: Body) -> bool:
     """Return whether a body on a continuous joint is balanced on its axis."""
     joint = body.joint
     assert joint is not None
@@ -216,7 +216,9 @@ def _make_limb(
     links = [link.name for i in leaf.chain for link in bodies[i].links]
     leg_names, other_names = _count_names([*links, *(joint.name for joint in leaf.joints)])
     has_mirror_image = any(
-        other is not leaf and _is_mirrored(leaf, other, size) and not is_branch(leaf, other, size)
+        other is not leaf
+        and _is_mirror_image(leaf, other, size)
+        and not is_branch(leaf, other, size)
         for other in leaves
     )
     score += 0.5 * has_mirror_image
@@ -238,7 +240,7 @@ def _count_names(names: Sequence[str]) -> tuple[int, int]:
     return len(separated) - len(rest), sum(bool(_OTHER_NAME.search(name)) for name in rest)
 
 
-def _is_mirrored(one: Chain, other: Chain, size: float) -> bool:
+def _is_mirror_image(one: Chain, other: Chain, size: float) -> bool:
     """Return whether two limbs are mirror images of each other."""
     # One joint of a leg may have become fixed, which is a violation of its own.
     if abs(len(other.joints) - len(one.joints)) > 1:

@@ -36,7 +36,7 @@ class Stance:
     contacts: Matrix
     """Center of each foot's contact in the frame of the trunk, shape (legs, 3) [m]."""
 
-    pressures: Matrix
+    force_points: Matrix
     """Center of pressure of each foot in the frame of the trunk, shape (legs, 3) [m]: the point of
     its sole closest to the center at which the feet balance the robot."""
 
@@ -83,16 +83,16 @@ def compute_stance(robot: LegModel, positions: Mapping[str, float], *, total_mas
     is_known = math.isfinite(total_mass)
     weight = sum(body.mass for body in bodies) * GRAVITY
     forces = ground_forces(contacts[:, :2], center[:2], weight)
-    pressures = _pressure_centers(soles, contacts, forces, center)
+    force_points = _force_points(soles, contacts, forces, center)
     return Stance(
         positions=positions,
         height=-min([*heights, float(contacts[:, 2].min())]),
         contacts=contacts,
-        pressures=pressures,
+        force_points=force_points,
         support=support,
         center=center,
         margin=margin(center[:2], support) if is_known else math.nan,
-        torques=_holding_torques(bodies, legs, poses, pressures, forces) if is_known else {},
+        torques=_static_torques(bodies, legs, poses, force_points, forces) if is_known else {},
     )
 
 
@@ -104,8 +104,8 @@ def is_statically_stable(legs: Sequence[Leg]) -> bool:
     return len(legs) >= _MIN_STABLE_LEGS
 
 
-def _pressure_centers(
-    soles: Sequence[Matrix], contacts: Matrix, forces: Matrix, center: Matrix
+def _force_points(
+    sole_points: Sequence[Matrix], contacts: Matrix, forces: Matrix, center: Matrix
 ) -> Matrix:
     """Return the centers of pressure, shape (n, 3) [m], shifted from the contacts for balance."""
     weight = float(forces.sum())
@@ -114,18 +114,18 @@ def _pressure_centers(
     shift = (center - forces @ contacts / weight) * [1, 1, 0]
     shifted = [
         np.clip(contact + shift, points.min(axis=0), points.max(axis=0))
-        for contact, points in zip(contacts, soles, strict=True)
+        for contact, points in zip(contacts, sole_points, strict=True)
     ]
     return np.array(
         [[*point[:2], contact[2]] for point, contact in zip(shifted, contacts, strict=True)]
     )
 
 
-def _holding_torques(
+def _static_torques(
     bodies: Sequence[Body],
     legs: Sequence[Leg],
     poses: Sequence[Matrix],
-    pressures: Matrix,
+    force_points: Matrix,
     forces: Matrix,
 ) -> dict[str, float]:
     """Return the torque of each joint of the legs that balances gravity and the ground forces."""
@@ -138,7 +138,7 @@ def _holding_torques(
         # A waist carries the loads of all legs below it.
         loads = [
             (point, force * up)
-            for leg, point, force in zip(legs, pressures, forces, strict=True)
+            for leg, point, force in zip(legs, force_points, forces, strict=True)
             if index in leg.limb.chain
         ]
         for descendant in _subtree(bodies, index):

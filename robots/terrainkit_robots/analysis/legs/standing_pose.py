@@ -69,11 +69,11 @@ def solve_standing_pose(robot: LegModel) -> Mapping[str, float]:
     # The center of mass moves with the legs, hence a second pass.
     for _ in range(2 if robot.legs else 0):
         shift = _foot_shift(robot, positions)
-        for leg, mirrored, signs in _leg_pairs(robot):
+        for leg, mirror_leg, signs in _leg_pairs(robot):
             solution = _solve_leg(leg, robot, positions, shift)
             positions |= solution
-            if mirrored is not None:
-                positions |= _mirror_solution(solution, leg, mirrored, signs)
+            if mirror_leg is not None:
+                positions |= _mirror_solution(solution, leg, mirror_leg, signs)
     mimicked = mimic_positions(robot.joints, positions)
     return positions | {name: float(position) for name, position in mimicked.items()}
 
@@ -97,7 +97,7 @@ def _leg_pairs(robot: LegModel) -> list[tuple[Leg, Leg | None, Sequence[int]]]:
     for index, leg in enumerate(legs):
         if index in done:
             continue
-        images = [(i, 1) if uses[i] > 1 else robot.mirror.counterpart(i) for i in leg.limb.chain]
+        images = [(i, 1) if uses[i] > 1 else robot.mirror.image_body(i) for i in leg.limb.chain]
         chain = tuple(image[0] for image in images if image is not None)
         other = next((k for k, o in enumerate(legs) if o.limb.chain == chain), None)
         signs = [image[1] for image in images if image is not None]
@@ -110,12 +110,12 @@ def _leg_pairs(robot: LegModel) -> list[tuple[Leg, Leg | None, Sequence[int]]]:
 
 
 def _mirror_solution(
-    solution: Mapping[str, float], leg: Leg, mirrored: Leg, signs: Sequence[int]
+    solution: Mapping[str, float], leg: Leg, mirror_leg: Leg, signs: Sequence[int]
 ) -> dict[str, float]:
     """Return the positions of the mirrored leg, clipped to its own limits."""
     return {
         other.name: clip_to_limits(other, sign * solution[joint.name])
-        for joint, other, sign in zip(leg.joints, mirrored.joints, signs, strict=False)
+        for joint, other, sign in zip(leg.joints, mirror_leg.joints, signs, strict=False)
         if joint.name in solution
     }
 
@@ -150,7 +150,7 @@ def _hip_point(leg: Leg, robot: LegModel, poses: Sequence[Matrix]) -> Matrix:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _LegProblem:
+class _LegObjective:
     """The cost of one leg as a function of its hip and knee."""
 
     chain: tuple[Body, ...]
@@ -175,7 +175,7 @@ class _LegProblem:
 
     pitch: Matrix
 
-    outward: Matrix
+    penalty_axis: Matrix
     """Direction in which the knee should not bend if both ways are open, shape (3,): forward for a
     front leg and backward for a rear leg of a quadruped, else zero."""
 
@@ -202,7 +202,7 @@ class _LegProblem:
             total = total + 10 * _limit_cost(position, joint) + 1e-3 * np.abs(position)
         if self.ankle is not None:
             total = total + 10 * (positions[self.ankle.name] - self._level_ankle(hip, knee)) ** 2
-        outward = np.clip((knee_point - self.hip_point) @ self.outward, 0, None)
+        outward = np.clip((knee_point - self.hip_point) @ self.penalty_axis, 0, None)
         total = total + _OUTWARD_COST * outward
         low = _MIN_KNEE_HEIGHT * self.length - (knee_point[..., 2] - contact[..., 2])
         return np.asarray(total + 100 * np.clip(low / self.length, 0, None))
@@ -240,16 +240,16 @@ def _solve_leg(
     leg: Leg, robot: LegModel, positions: Mapping[str, float], shift: Matrix
 ) -> dict[str, float]:
     """Return the best positions of hip, knee and ankle. Empty without a hip and a knee."""
-    problem = _make_problem(leg, robot, positions, shift)
-    if problem is None:
+    objective = _make_objective(leg, robot, positions, shift)
+    if objective is None:
         return {}
-    limits = np.array([_search_range(problem.hip), _search_range(problem.knee)])
+    limits = np.array([_search_range(objective.hip), _search_range(objective.knee)])
     axes = np.linspace(limits[:, 0], limits[:, 1], _GRID_SIZE, axis=-1)
-    cost = problem.cost(*np.meshgrid(axes[0], axes[1], indexing="ij"))
+    cost = objective.cost(*np.meshgrid(axes[0], axes[1], indexing="ij"))
     # The knee may bend both ways, and only the refined minima tell which way is better.
     starts = np.array([(axes[0, i], axes[1, j]) for i, j in _local_minima(cost)[:_MAX_STARTS]])
-    hip, knee = _refine(problem, starts, limits)
-    return {name: float(q) for name, q in problem.positions(hip, knee).items()}
+    hip, knee = _minimize(objective, starts, limits)
+    return {name: float(q) for name, q in objective.positions(hip, knee).items()}
 
 
 def _local_minima(cost: Matrix) -> list[tuple[int, int]]:
@@ -260,7 +260,7 @@ def _local_minima(cost: Matrix) -> list[tuple[int, int]]:
     return sorted(indices, key=lambda index: float(cost[index]))
 
 
-def _refine(problem: _LegProblem, starts: Matrix, limits: Matrix) -> Matrix:
+def _minimize(objective: _LegObjective, starts: Matrix, limits: Matrix) -> Matrix:
     """Return the best position of hip and knee near any of the starts, shape (2,)."""
     best, width, rows = starts, np.ptp(limits, axis=1), np.arange(len(starts))
     for _ in range(_ROUNDS):
@@ -268,7 +268,7 @@ def _refine(problem: _LegProblem, starts: Matrix, limits: Matrix) -> Matrix:
         lower, upper = (np.clip(best + side * width / 2, *limits.T) for side in (-1, 1))
         axes = np.linspace(lower, upper, _GRID_SIZE, axis=-1)
         # Broadcasting instead of a full grid computes the motion of each joint only once.
-        cost = problem.cost(axes[:, 0, :, None], axes[:, 1, None, :]).reshape(len(starts), -1)
+        cost = objective.cost(axes[:, 0, :, None], axes[:, 1, None, :]).reshape(len(starts), -1)
         hip, knee = np.divmod(cost.argmin(axis=1), _GRID_SIZE)
         best = np.stack([axes[rows, 0, hip], axes[rows, 1, knee]], axis=1)
     return np.asarray(best[cost.min(axis=1).argmin()])
@@ -279,9 +279,9 @@ def _search_range(joint: Joint) -> tuple[float, float]:
     return (-_DEFAULT_RANGE, _DEFAULT_RANGE) if upper - lower > 4 * np.pi else (lower, upper)
 
 
-def _make_problem(
+def _make_objective(
     leg: Leg, robot: LegModel, positions: Mapping[str, float], shift: Matrix
-) -> _LegProblem | None:
+) -> _LegObjective | None:
     hip, knee = leg.joint("hip"), leg.joint("knee")
     if hip is None or knee is None:
         return None
@@ -298,7 +298,7 @@ def _make_problem(
     contact = contact_points(leaf, foot, robot.meshes).mean(axis=0)
     ratio = _HEIGHT_RATIO.get(len(robot.legs), _DEFAULT_HEIGHT_RATIO)
     hip_point, length = _hip_point(leg, robot, poses), max(leg.length, 1e-6)
-    return _LegProblem(
+    return _LegObjective(
         chain=tuple(chain),
         base_pose=poses[chain[0].parent or 0],
         hip=hip,
@@ -310,12 +310,12 @@ def _make_problem(
         hip_point=hip_point,
         target=shift + np.array([0.0, 0.0, -ratio * leg.length]),
         pitch=leg.pitch,
-        outward=_outward(leg, robot, poses, hip_point) / length,
+        penalty_axis=_penalty_axis(leg, robot, poses, hip_point) / length,
         length=length,
     )
 
 
-def _outward(leg: Leg, robot: LegModel, poses: Sequence[Matrix], hip_point: Matrix) -> Matrix:
+def _penalty_axis(leg: Leg, robot: LegModel, poses: Sequence[Matrix], hip_point: Matrix) -> Matrix:
     """Return the horizontal unit vector in the plane of a leg that points away from the middle.
 
     Zero for robots that do not have four legs, for a leg in the middle, and for a leg that points

@@ -102,9 +102,13 @@ class MeshScales:
         children = self._tree.child_joints.get(use.link.name, ())
         below = max((_offset(joint.origin) for joint in children), default=0.0)
         nearby = max(below, _offset(parent.origin) if parent else 0.0)
-        return self._too_large(use, diagonal, nearby) or self._too_small(use, diagonal, below)
+        return self._check_max_ratio(use, diagonal, nearby) or self._check_min_ratio(
+            use, diagonal, below
+        )
 
-    def _too_large(self, use: MeshUse, diagonal: float, nearby: float) -> ScaleMismatch | None:
+    def _check_max_ratio(
+        self, use: MeshUse, diagonal: float, nearby: float
+    ) -> ScaleMismatch | None:
         # A massless trunk may be the environment of the robot.
         if use.link.name in self._trunk_links and use.link.inertial is None:
             return None
@@ -117,16 +121,16 @@ class MeshScales:
             found = ScaleMismatch(diagonal=diagonal, reference=local, description=_JOINTS)
         return found if found.ratio > MAX_RATIO else None
 
-    def _too_small(self, use: MeshUse, diagonal: float, below: float) -> ScaleMismatch | None:
+    def _check_min_ratio(self, use: MeshUse, diagonal: float, below: float) -> ScaleMismatch | None:
         if diagonal > _MAX_SMALL_SIZE:
             return None
         same, other = use.link.collisions, use.link.visuals
         if use.geometry not in same:
             same, other = other, same
-        largest = self._largest_diagonal(same)
+        largest = self._max_diagonal(same)
         if largest is None or largest > 2 * diagonal:
             return None  # a detail of the part
-        other_shapes = self._largest_diagonal(other) or 0.0
+        other_shapes = self._max_diagonal(other) or 0.0
         if diagonal < MIN_RATIO * max(below, other_shapes):
             reference, description = max((below, _JOINTS), (other_shapes, _OTHER_SHAPES))
             return ScaleMismatch(diagonal=diagonal, reference=reference, description=description)
@@ -134,7 +138,7 @@ class MeshScales:
             return ScaleMismatch(diagonal=diagonal, reference=self.robot_size, description=_ROBOT)
         return None
 
-    def _largest_diagonal(self, shapes: Sequence[Geometry]) -> float | None:
+    def _max_diagonal(self, shapes: Sequence[Geometry]) -> float | None:
         """Return the longest diagonal of the bounding boxes [m]; None if one is unknown."""
         lengths = []
         for shape in shapes:

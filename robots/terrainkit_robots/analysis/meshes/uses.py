@@ -158,7 +158,7 @@ def replace_edits(
     model: RobotModel,
     meshes: Meshes,
     uses: Iterable[MeshUse],
-    ending: str,
+    name_suffix: str,
     content: Callable[[], bytes],
 ) -> tuple[Edit, ...] | None:
     """Return the edits that write a new mesh beside the current one and refer to it instead.
@@ -167,7 +167,7 @@ def replace_edits(
         model: The description.
         meshes: All mesh files.
         uses: Uses of one file.
-        ending: End of the new name, which replaces the suffix of the file: `_hull.stl`.
+        name_suffix: End of the new name, which replaces the suffix of the file: `_hull.stl`.
         content: Returns the content of the new file.
 
     Returns:
@@ -175,7 +175,7 @@ def replace_edits(
     """
     uses = list(uses)
     mesh = uses[0].mesh
-    target = _unused_path(meshes, mesh.path, ending)
+    target = _unused_path(meshes, mesh.path, name_suffix)
     if model.kind == "mjcf":  # names are relative to meshdir, which does not change
         folder = mesh.filename.replace("\\", "/").rpartition("/")
         name = f"{folder[0]}{folder[1]}{target.name}"
@@ -185,12 +185,12 @@ def replace_edits(
     return None if edits is None else (WriteFile(path=target, content=content), *edits)
 
 
-def _unused_path(meshes: Meshes, path: Path, ending: str) -> Path:
+def _unused_path(meshes: Meshes, path: Path, name_suffix: str) -> Path:
     """Return a path beside `path` at which no file exists."""
-    stem, dot, suffix = ending.rpartition(".")
+    stem, dot, suffix = name_suffix.rpartition(".")
     for number in range(1, 100):
         numbered = f"{stem}_{number}" if number > 1 else stem
         target = path.with_name(f"{path.stem}{numbered}{dot}{suffix}")
         if not meshes.exists(target):
             return target
-    return path.with_name(f"{path.stem}{ending}")
+    return path.with_name(f"{path.stem}{name_suffix}")

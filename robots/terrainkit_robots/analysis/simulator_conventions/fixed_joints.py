@@ -58,7 +58,7 @@ class MergedFoot:
     joint: Joint
     """The fixed joint above it."""
 
-    merged_into: Mapping[Simulator, str]
+    merged_body: Mapping[Simulator, str]
     """Name of the merged body, by simulator that merges it."""
 
 
@@ -123,11 +123,11 @@ def find_merged_feet(
         joint = tree.parent_joint.get(leg.foot)
         if joint is None or joint not in fixed or not tree.links[leg.foot].collisions:
             continue
-        merged_into = {
+        merged_body = {
             simulator: merged.body_of[leg.foot]
             for simulator, merged in trees.items()
             if merged.body_of[leg.foot] != leg.foot
         }
-        if merged_into:
-            found.append(MergedFoot(foot=leg.foot, joint=joint, merged_into=merged_into))
+        if merged_body:
+            found.append(MergedFoot(foot=leg.foot, joint=joint, merged_body=merged_body))
     return tuple(found)

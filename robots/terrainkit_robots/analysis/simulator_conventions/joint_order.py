@@ -84,7 +84,7 @@ def simulator_orders(
     robot = _Robot(model=model, tree=tree, bodies=bodies, fixed=fixed)
     found = []
     for simulator in SIMULATORS:
-        joints, bodies_in_order = robot.likely_order(simulator)
+        joints, bodies_in_order = robot.default_order(simulator)
         certain, reason = robot.certainty(simulator)
         found.append(
             SimulatorOrder(
@@ -111,7 +111,7 @@ class _Robot:
     def is_urdf(self) -> bool:
         return self.model.kind != "mjcf"
 
-    def likely_order(self, simulator: Simulator) -> tuple[_Names, _Names]:
+    def default_order(self, simulator: Simulator) -> tuple[_Names, _Names]:
         """Return the likely order of joints and bodies."""
         if not self.bodies:
             return (), ()
@@ -180,12 +180,12 @@ class _Robot:
             tuple(
                 id(joint) for joint in traverse(_sort_siblings(tree, key), tree.base) if joint.moves
             )
-            for tree in self._possible_trees()
+            for tree in self._merge_variants()
             for key in keys
         }
         return len(orders) <= 1
 
-    def _possible_trees(self) -> Iterator[MergedTree]:
+    def _merge_variants(self) -> Iterator[MergedTree]:
         """Yield the tree as importers of different versions merge it.
 
         They merge all fixed joints, only those without dont_collapse, only those above massless
@@ -199,7 +199,7 @@ class _Robot:
             if (i := self.tree.links[joint.child].inertial) is None or not i.mass
         }
         collapsed = {joint for joint in self.fixed if not joint.dont_collapse}
-        for merged in _distinct([set(self.fixed), collapsed, massless, set[Joint]()]):
+        for merged in _unique([set(self.fixed), collapsed, massless, set[Joint]()]):
             yield self._merge(merged)
 
     def _merge(self, merged: AbstractSet[Joint]) -> MergedTree:
@@ -213,7 +213,7 @@ class _Robot:
         return {joint: index for index, joint in enumerate(self.model.joints)}
 
 
-def _distinct(sets: Iterable[set[Joint]]) -> list[set[Joint]]:
+def _unique(sets: Iterable[set[Joint]]) -> list[set[Joint]]:
     found: list[set[Joint]] = []
     for each in sets:
         if each not in found:

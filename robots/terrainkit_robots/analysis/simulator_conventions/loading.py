@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.bodies.tree import Tree
-from terrainkit_robots.description.mjcf.document import MAX_ELEMENTS, is_allowed
+from terrainkit_robots.description.mjcf.tree import MAX_ELEMENTS, is_allowed
 from terrainkit_robots.description.model import RobotModel
 from terrainkit_robots.description.xml.document import RobotFileError, parse_xml, read_bytes
-from terrainkit_robots.mesh.sniff import open_regular
+from terrainkit_robots.files import open_regular
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.text import short
 
@@ -142,14 +142,14 @@ def _read(path: Path) -> bytes:
         raise NotAttemptedError(str(error)) from None
 
 
-def _check_cost(sources: tuple[Path, ...]) -> None:
+def _check_cost(files: tuple[Path, ...]) -> None:
     """Check all files that MuJoCo would open and all objects that it would generate.
 
     Raises:
         NotAttemptedError: if they could be too large.
     """
-    elements, folders, names = 0, {Path()}, set[str]()
-    for source in sources:
+    elements, directories, names = 0, {Path()}, set[str]()
+    for source in files:
         root = parse_xml(source, _read(source)).root
         for element in () if root is None else root.iter():
             if not isinstance(element.tag, str):
@@ -160,15 +160,15 @@ def _check_cost(sources: tuple[Path, ...]) -> None:
                     f"number of elements: expected at most {MAX_ELEMENTS} for MuJoCo"
                 )
             _check_element(element)
-            folders |= {Path(v) for k, v in element.attrib.items() if k in _FOLDER_ATTRIBUTES}
+            directories |= {Path(v) for k, v in element.attrib.items() if k in _FOLDER_ATTRIBUTES}
             names |= {v for k, v in element.attrib.items() if k.startswith("file") and v}
-    source_folders = {source.parent for source in sources}
-    paths = len(names) * len(source_folders) * len(folders)
+    parents = {source.parent for source in files}
+    paths = len(names) * len(parents) * len(directories)
     if paths > _MAX_PATHS:
         raise NotAttemptedError(
             f"number of files and folders: got {paths} paths; expected at most {_MAX_PATHS}"
         )
-    _check_files({path for name in names for path in _candidates(name, source_folders, folders)})
+    _check_files({path for name in names for path in _candidates(name, parents, directories)})
 
 
 def _check_element(element: "etree._Element") -> None:
@@ -200,12 +200,12 @@ def _size(text: str) -> float:
         return float("inf")
 
 
-def _candidates(name: str, sources: set[Path], folders: set[Path]) -> Iterator[Path]:
-    """Yield the paths at which MuJoCo may look for a file, with and without its own folders."""
+def _candidates(name: str, parents: set[Path], directories: set[Path]) -> Iterator[Path]:
+    """Yield the paths at which MuJoCo may look for a file, with and without its own directories."""
     base_name = re.split(r"[/\\]", name)[-1]
     for written in {name, base_name, re.sub(r"^\w+:/+", "", name)}:
-        for folder in folders:
-            yield from (source / folder / written for source in sources)
+        for folder in directories:
+            yield from (source / folder / written for source in parents)
 
 
 def _check_files(paths: set[Path]) -> None:

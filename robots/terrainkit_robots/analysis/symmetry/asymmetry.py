@@ -75,12 +75,12 @@ def find_misalignments(
             displaced |= pair.indices
             continue
         parents = {left.body.parent, right.body.parent}
-        if not parents & displaced and _have_mirrored_parents(pair, mirror):
+        if not parents & displaced and _has_mirror_parents(pair, mirror):
             misalignment = _misalignment(mirror, pair, pair_of.get(left.body.parent or 0))
             if misalignment is None:
                 continue
             displaced |= {misalignment.left.body.index, misalignment.right.body.index}
-            if misalignment.distance and _is_half_turn(left, right):
+            if misalignment.distance and _is_half_rotation(left, right):
                 continue
             # The zero of many arm joints is that of the motor, which differs from left to right.
             if left.body.index in leg_bodies or misalignment.is_axis or misalignment.distance:
@@ -93,7 +93,7 @@ def _has_zero_axis(joint: Joint) -> bool:
     return joint.axis is not None and not np.abs(joint.axis).max() > 1e-6
 
 
-def _is_half_turn(left: MirrorSide, right: MirrorSide) -> bool:
+def _is_half_rotation(left: MirrorSide, right: MirrorSide) -> bool:
     """Return whether one joint is the other rotated by half a turn, as in fingers of a gripper."""
     if left.body.parent != right.body.parent:
         return False
@@ -105,12 +105,12 @@ def _is_half_turn(left: MirrorSide, right: MirrorSide) -> bool:
     )
 
 
-def _have_mirrored_parents(pair: MirrorPair, mirror: Mirror) -> bool:
+def _has_mirror_parents(pair: MirrorPair, mirror: Mirror) -> bool:
     """Return whether the bodies of a pair have the same parent, or mirrored ones."""
     a, b = pair.left.body.parent, pair.right.body.parent
     if a is None or b is None:
         return False
-    return a == b or mirror.counterparts.get(a) == b
+    return a == b or mirror.image_index.get(a) == b
 
 
 def _misalignment(
@@ -154,13 +154,13 @@ def limits_match(a: tuple[float, float], b: tuple[float, float], sign: int) -> b
     return all(abs(x - y) <= tolerance for x, y in zip(a, mirrored, strict=True))
 
 
-def has_opposite_axes(left: MirrorSide, right: MirrorSide) -> bool:
+def has_flipped_axes(left: MirrorSide, right: MirrorSide) -> bool:
     """Return whether two axes point in opposite directions, instead of in the same one."""
     return bool(left.axis @ right.axis < 0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ReversedJoint:
+class FlippedJoint:
     """A joint of a leg whose axis is opposite to that of all other legs."""
 
     joint: Joint
@@ -171,13 +171,13 @@ class ReversedJoint:
     axis: Matrix
     """Its axis in the frame of the trunk, all joints at 0, shape (3,)."""
 
-    usual_axis: Matrix
+    expected_axis: Matrix
     """Axis of the same joint of another leg."""
 
 
-def find_reversed_joints(
+def find_flipped_joints(
     legs: Sequence[Leg], bodies: Sequence[Body], zero_poses: Sequence[Matrix]
-) -> Iterator[ReversedJoint]:
+) -> Iterator[FlippedJoint]:
     """Yield the joints of legs whose axes are opposite to those of all other legs."""
     lengths = {len(leg.limb.chain) for leg in legs}
     if len(legs) < _MIN_LEGS or len(lengths) != 1:
@@ -193,15 +193,15 @@ def find_reversed_joints(
         for minority, majority in ((same, opposite), (opposite, same)):
             joint = joints[minority[0]] if len(minority) == 1 else None
             if joint is not None:
-                yield ReversedJoint(
+                yield FlippedJoint(
                     joint=joint,
                     others=len(majority),
                     axis=axes[minority[0]],
-                    usual_axis=axes[majority[0]],
+                    expected_axis=axes[majority[0]],
                 )
 
 
-def find_opposed_pairs(
+def find_flipped_pairs(
     legs: Sequence[Leg],
     mirror: Mirror,
     pairs: Sequence[MirrorPair],
@@ -230,13 +230,13 @@ def find_opposed_pairs(
             for pair in in_legs
             if (abs(float(pair.left.axis @ mirror.normal)) > _MIN_PARALLEL_COSINE) == bends
         ]
-        opposed = [pair for pair in comparable if has_opposite_axes(pair.left, pair.right)]
+        opposed = [pair for pair in comparable if has_flipped_axes(pair.left, pair.right)]
         others = len(comparable) - len(opposed)
-        if len(opposed) == 1 and others >= _MIN_OTHER_PAIRS and _has_ambiguous_limits(opposed[0]):
+        if len(opposed) == 1 and others >= _MIN_OTHER_PAIRS and _has_symmetric_limits(opposed[0]):
             yield opposed[0], others
 
 
-def _has_ambiguous_limits(pair: MirrorPair) -> bool:
+def _has_symmetric_limits(pair: MirrorPair) -> bool:
     """Return whether the limits of a pair are mirrored for either direction of the axes."""
     a, b = pair.left.joint.range, pair.right.joint.range
     return a is None or b is None or (limits_match(a, b, 1) and limits_match(a, b, -1))

@@ -79,11 +79,11 @@ class Mirror:
         return np.asarray(vectors - 2 * (vectors @ self.normal)[..., None] * self.normal)
 
     @cached_property
-    def counterparts(self) -> Mapping[int, int]:
+    def image_index(self) -> Mapping[int, int]:
         """Index of the mirror image of each body that has one, by index."""
         return {p.left: p.right for p in self.pairs} | {p.right: p.left for p in self.pairs}
 
-    def counterpart(self, index: int) -> tuple[int, Sign] | None:
+    def image_body(self, index: int) -> tuple[int, Sign] | None:
         """Return the index of the mirror image of a body, and the sign of the pair."""
         for pair in self.pairs:
             if index in (pair.left, pair.right):
@@ -124,16 +124,16 @@ def detect_mirror(
     mirror = Mirror(normal=normal, pairs=(), offset=offset)
     points = np.array([pose[:3, 3] - offset * normal for pose in zero_poses]).reshape(-1, 3)
     size = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
-    counterparts: dict[int, int] = {}
+    image_index: dict[int, int] = {}
     for candidates in (
         _pairs_by_position(bodies, mirror, points, MAX_MIRROR_ERROR * size),
         _pairs_by_name(bodies, mirror, points),
     ):
         for a, b in candidates:
-            if a not in counterparts and b not in counterparts:
-                counterparts[a], counterparts[b] = b, a
+            if a not in image_index and b not in image_index:
+                image_index[a], image_index[b] = b, a
     pairs = []
-    for a, b in counterparts.items():
+    for a, b in image_index.items():
         left, right = (a, b) if points[a] @ normal >= points[b] @ normal else (b, a)
         if (left, right) == (a, b):
             sign = _pair_sign(mirror, bodies, zero_poses, left, right)
@@ -168,9 +168,9 @@ def _pairs_by_position(
     bodies: Sequence[Body], mirror: Mirror, points: Matrix, tolerance: float
 ) -> Iterator[tuple[int, int]]:
     """Yield pairs of bodies at mirrored positions, for each body the closest first."""
-    depths: list[int] = []
+    levels: list[int] = []
     for body in bodies:
-        depths.append(0 if body.parent is None else depths[body.parent] + 1)
+        levels.append(0 if body.parent is None else levels[body.parent] + 1)
     images = mirror.image(points)
     lateral = np.abs(points @ mirror.normal) > max(tolerance, 1e-3)
     for body in bodies[1:]:
@@ -182,7 +182,7 @@ def _pairs_by_position(
             bodies[k]
             for k in near
             if k > 0
-            and depths[k] == depths[body.index]
+            and levels[k] == levels[body.index]
             and _joint_kind(bodies[k]) == _joint_kind(body)
         ]
         swapped = swap_sides(body.name)

@@ -37,19 +37,19 @@ def mirror_map(
         joint = body.joint
         if joint is None or joint.name not in names:
             continue
-        counterpart = mirror.counterpart(body.index)
-        if counterpart is None:
-            sign = _own_sign(mirror, body, zero_poses[body.index], tolerance)
+        image = mirror.image_body(body.index)
+        if image is None:
+            sign = _self_sign(mirror, body, zero_poses[body.index], tolerance)
             if sign:
                 found[joint.name] = MirrorJoint(joint=joint.name, sign=sign)
             continue
-        other, sign = bodies[counterpart[0]].joint, counterpart[1]
+        other, sign = bodies[image[0]].joint, image[1]
         if sign and other is not None and other.name in names:
             found[joint.name] = MirrorJoint(joint=other.name, sign=sign)
     return {joint.name: found[joint.name] for joint in actuated if joint.name in found}
 
 
-def _own_sign(mirror: Mirror, body: Body, pose: Matrix, tolerance: float) -> Sign:
+def _self_sign(mirror: Mirror, body: Body, pose: Matrix, tolerance: float) -> Sign:
     """Return how a joint in the mirror plane mirrors itself, 0 for a joint outside of the plane."""
     assert body.joint is not None
     anchor, axis = joint_axis(body, pose)

@@ -92,7 +92,7 @@ def _mirror_joint(
         return None
     parent, parent_pose = bodies[body.parent], zero_poses[body.parent]
     origin = parent_pose[:3, 3] if parent.joint is None else joint_axis(parent, parent_pose)[0]
-    if parent.index not in mirror.counterparts:  # on the mirror plane
+    if parent.index not in mirror.image_index:  # on the mirror plane
         origin = origin - (origin @ mirror.normal - mirror.offset) * mirror.normal
     point, axis = joint_axis(body, pose)
     return MirrorSide(
@@ -126,33 +126,33 @@ def outlier_first(
         legs: The legs of the robot.
         mirror: The mirror plane.
     """
-    comparable = _comparable_bodies(legs, {left.body.index, right.body.index})
+    siblings = _sibling_bodies(legs, {left.body.index, right.body.index})
     left_bodies = {pair.left for pair in mirror.pairs}
     right_bodies = {pair.right for pair in mirror.pairs}
 
-    def deviation(joint: MirrorSide) -> float:
+    def distance(joint: MirrorSide) -> float:
         own, side = value(joint.body), left_bodies if joint is left else right_bodies
         if own is None:
             return np.inf
-        others = [value(bodies[i]) for i in comparable if i in side]
+        others = [value(bodies[i]) for i in siblings if i in side]
         return min((_difference(own, other) for other in others if other is not None), default=0.0)
 
-    return (left, right) if deviation(left) > deviation(right) else (right, left)
+    return (left, right) if distance(left) > distance(right) else (right, left)
 
 
 def _difference(a: Matrix, b: Matrix) -> float:
     return float(np.linalg.norm(np.abs(a) - np.abs(b)) + 0.01 * np.linalg.norm(a - b))
 
 
-def _comparable_bodies(legs: Sequence[Leg], own: set[int]) -> list[int]:
+def _sibling_bodies(legs: Sequence[Leg], exclude: set[int]) -> list[int]:
     """Return the indices of the bodies at the same position of other legs."""
     found = []
     for leg in legs:
-        position = next((k for k, i in enumerate(leg.limb.chain) if i in own), None)
+        position = next((k for k, i in enumerate(leg.limb.chain) if i in exclude), None)
         if position is None:
             continue
         for other in legs:
             chain = other.limb.chain
-            if len(chain) == len(leg.limb.chain) and chain[position] not in own:
+            if len(chain) == len(leg.limb.chain) and chain[position] not in exclude:
                 found.append(chain[position])
     return found

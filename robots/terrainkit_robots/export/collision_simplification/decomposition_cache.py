@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from terrainkit.atomic import atomic_write
+from terrainkit.atomic_write import atomic_write
 from terrainkit.errors import ExportError
 from terrainkit_robots.mesh.surface import Surface
 

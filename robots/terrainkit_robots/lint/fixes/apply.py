@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from terrainkit.atomic import atomic_write
+from terrainkit.atomic_write import atomic_write
 from terrainkit.errors import ExportError, TerrainkitError
 from terrainkit_robots.description.fix import Edit, Fix, InsertChild, ReplaceBytes, WriteFile
 from terrainkit_robots.description.model import RobotModel

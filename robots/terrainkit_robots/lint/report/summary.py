@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from terrainkit_robots.lint.report.grouping import group_findings
 from terrainkit_robots.lint.rule import Severity
 from terrainkit_robots.lint.runner import Finding, Report, Skipped
-from terrainkit_robots.lint.selection import UnusedSuppression
-from terrainkit_robots.text import count as count
-from terrainkit_robots.text import display_path
+from terrainkit_robots.lint.selection import Suppressed, UnusedSuppression
+from terrainkit_robots.text import count, display_path, names
 
 SEVERITY_LABELS: dict[Severity, str] = {"error": "error", "warning": "warning", "info": "note"}
 """Label of each severity, in the order of reports."""
@@ -51,9 +50,20 @@ def format_location(finding: Finding) -> str:
 def group_skipped(skipped: Sequence[Skipped]) -> list[tuple[bool, str, str]]:
     """Return one entry per reason: whether it is a warning, the codes of the rules, the reason.
 
-    An unused suppression comment is a warning.
+    An unused suppression comment is a warning. The findings that one comment suppresses are one
+    entry.
     """
     reasons: dict[tuple[bool, str], dict[str, None]] = {}
+    suppressed: dict[object, list[Suppressed]] = {}
     for each in skipped:
-        reasons.setdefault((isinstance(each, UnusedSuppression), each.reason), {})[each.code] = None
+        if isinstance(each, Suppressed):
+            suppressed.setdefault(each.comment, []).append(each)
+        else:
+            is_warning = isinstance(each, UnusedSuppression)
+            reasons.setdefault((is_warning, each.reason), {})[each.code] = None
+    for members in suppressed.values():
+        subjects = names(each.finding.subject for each in members)
+        reason = f"suppressed for {subjects}: {members[0].comment.reason}"
+        reason = members[0].reason if len(members) == 1 else reason
+        reasons.setdefault((False, reason), {})[members[0].code] = None
     return [(warn, ", ".join(codes), reason) for (warn, reason), codes in reasons.items()]

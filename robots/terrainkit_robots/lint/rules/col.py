@@ -197,7 +197,7 @@ def overlap(robot: Facts) -> Iterator[Violation]:
     """
     if not robot.bodies:
         raise CannotCheckError("there is no tree of links")
-    for pair, deepest in _deepest(robot, robot.overlap_scene.detect(robot.positions)).items():
+    for pair, deepest in _group_by_pair(robot, robot.overlap_scene.detect(robot.positions)).items():
         if deepest.depth <= _MAX_OVERLAP:
             continue
         # Fixed-base arms often disable contacts of pairs that always touch, so no error for them.
@@ -214,13 +214,13 @@ def overlap(robot: Facts) -> Iterator[Violation]:
         )
 
 
-def _deepest(robot: Facts, overlaps: "list[Overlap]") -> "dict[tuple[str, str], Overlap]":
+def _group_by_pair(robot: Facts, overlaps: "list[Overlap]") -> "dict[tuple[str, str], Overlap]":
     """Return the deepest overlap of each pair of bodies."""
-    deepest: dict[tuple[str, str], Overlap] = {}
+    by_pair: dict[tuple[str, str], Overlap] = {}
     for each in overlaps:  # sorted by depth, deepest first
         pair = robot.body_of[each.first.link].name, robot.body_of[each.second.link].name
-        deepest.setdefault(pair, each)
-    return deepest
+        by_pair.setdefault(pair, each)
+    return by_pair
 
 
 @rule("COL006", "overlap-in-range", "info")
@@ -249,7 +249,7 @@ def overlap_in_range(robot: Facts) -> Iterator[Violation]:
         positions[joint.name] = lower + (upper - lower) * samples
     counts: Counter[tuple[str, str]] = Counter()
     for overlaps in robot.overlap_scene.sweep(positions, _NUM_SAMPLES):
-        deepest = _deepest(robot, overlaps)
+        deepest = _group_by_pair(robot, overlaps)
         counts.update(pair for pair, each in deepest.items() if each.depth > _MAX_OVERLAP)
     for pair, number in counts.items():
         share = number / _NUM_SAMPLES

@@ -13,7 +13,7 @@ from terrainkit_robots.simulation.drop import DropResult, drop_test
 from terrainkit_robots.simulation.joint_sweep import SweepResult, joint_sweep
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import TIME_STEP, make_sim_model
-from terrainkit_robots.simulation.standing import StandResult, contact_regions, stand_test
+from terrainkit_robots.simulation.standing import StandResult, contact_areas, stand_test
 from terrainkit_robots.simulation.time_step import (
     joint_inertias,
     max_stable_stiffness,
@@ -39,7 +39,7 @@ _MIN_RANGE_SHARE = 0.1
 _FULL_RANGE_SHARE = 0.99
 """Usable share of the joint range from which a joint reaches its limits."""
 
-_SEVERITIES: tuple[Severity, ...] = ("info", "warning", "error")
+_LEVELS: tuple[Severity, ...] = ("info", "warning", "error")
 
 _MIN_MARGIN = 0.005
 """Distance of the center of mass from the edge of the support that a biped needs to stand with
@@ -71,14 +71,14 @@ def unstable_drop(robot: Facts) -> Iterator[Violation]:
     """
     model = make_sim_model(robot)
     drop = drop_test(model, height=_DROP_HEIGHT)
-    if not _is_unstable(drop):
+    if _is_stable(drop):
         return
     without = drop_test(model, height=_DROP_HEIGHT, self_collision=False)
-    stable = not _is_unstable(without)
+    stable = _is_stable(without)
     with_hulls = stable and _has_mesh_collision(robot)
     level = 2 if drop.diverged or drop.max_speed > _MAX_SPEED_ERROR else 1
-    unit, unit_without = (model.units(each.fastest_joint).velocity for each in (drop, without))
-    got = f"{drop.max_speed:.0f} {unit} at {drop.fastest_joint}"
+    unit, unit_without = (model.units(each.max_speed_joint).velocity for each in (drop, without))
+    got = f"{drop.max_speed:.0f} {unit} at {drop.max_speed_joint}"
     if drop.diverged:
         got = f"an unstable state after {drop.seconds:.2f} s"
     start = f"dropped from {_DROP_HEIGHT:g} m" if model.floating else "released"
@@ -93,7 +93,7 @@ def unstable_drop(robot: Facts) -> Iterator[Violation]:
     yield Violation(
         subject=robot.model.title,
         source=robot.model.source,
-        severity=_SEVERITIES[level - with_hulls],
+        severity=_LEVELS[level - with_hulls],
         certainty="likely" if with_hulls else "proven",
         message=f"largest velocity when {start} without torques: got {got}; expected at most "
         f"{_MAX_SPEED:.0f} {unit}{calm}",
@@ -102,8 +102,8 @@ def unstable_drop(robot: Facts) -> Iterator[Violation]:
     )
 
 
-def _is_unstable(drop: DropResult) -> bool:
-    return drop.diverged or drop.max_speed > _MAX_SPEED
+def _is_stable(drop: DropResult) -> bool:
+    return not (drop.diverged or drop.max_speed > _MAX_SPEED)
 
 
 def _has_mesh_collision(robot: Facts) -> bool:
@@ -146,7 +146,7 @@ def does_not_stand(robot: Facts) -> Iterator[Violation]:
     yield Violation(
         subject=robot.model.title,
         source=robot.model.source,
-        severity=_SEVERITIES[level],
+        severity=_LEVELS[level],
         certainty="likely",
         message=f"standing pose {control}: {', '.join(assessment.failures)}"
         + ("; without self-collision the robot stands" if stands_without else ""),
@@ -167,7 +167,7 @@ def _stand(robot: Facts, *, locked: bool, self_collision: bool = True) -> StandR
         make_sim_model(robot),
         suggest_gains(robot),
         positions=robot.positions,
-        regions=contact_regions(robot),
+        areas=contact_areas(robot),
         self_collision=self_collision,
         joints_locked=locked,
     )
@@ -202,43 +202,43 @@ def unreachable_limits(robot: Facts) -> Iterator[Violation]:
         MuJoCo: 40 positions in the range of each joint, base fixed in the air, contacts deeper than
         1 mm.
     """
-    reaches = joint_sweep(make_sim_model(robot))
-    if not reaches:
+    results = joint_sweep(make_sim_model(robot))
+    if not results:
         raise CannotCheckError("no joint with an actuator has limits")
     sources = {joint.name: joint.source for joint in robot.joints}
-    for reach in reaches:
+    for result in results:
         message = ""
-        if _is_blocked_by_limb(robot, reach):
+        if _has_limb_collision(robot, result):
             message = (
-                f"usable range of {_describe(reach)}; expected at least {_MIN_RANGE_SHARE:.0%} of "
+                f"usable range of {_describe(result)}; expected at least {_MIN_RANGE_SHARE:.0%} of "
                 "its range"
             )
-        elif robot.legs and reach.load > reach.effort:
+        elif robot.legs and result.load > result.effort:
             message = (
-                f"torque of joint {reach.joint} that holds its limb at the default pose: got "
-                f"{reach.load:.3g} {reach.units.effort}; expected at most its effort limit of "
-                f"{reach.effort:.3g} {reach.units.effort}"
+                f"torque of joint {result.joint} that holds its limb at the default pose: got "
+                f"{result.load:.3g} {result.units.effort}; expected at most its effort limit of "
+                f"{result.effort:.3g} {result.units.effort}"
             )
         if message:
             yield Violation(
-                subject=reach.joint,
-                source=sources.get(reach.joint, robot.model.source),
+                subject=result.joint,
+                source=sources.get(result.joint, robot.model.source),
                 severity="warning",
                 certainty="likely",
                 message=message,
-                measured={"share": round(reach.share, 3), "load": round(reach.load, 4)},
+                measured={"share": round(result.share, 3), "load": round(result.load, 4)},
             )
-    blocked = [reach for reach in reaches if reach.share < _FULL_RANGE_SHARE]
-    weak = [reach for reach in reaches if reach.max_load > reach.effort]
-    total, parts = count(len(reaches), "joint"), []
+    blocked = [result for result in results if result.share < _FULL_RANGE_SHARE]
+    weak = [result for result in results if result.max_load > result.effort]
+    total, parts = count(len(results), "joint"), []
     if blocked:
-        worst = min(blocked, key=lambda reach: reach.share)
+        worst = min(blocked, key=lambda result: result.share)
         parts.append(
             "blocked by a collision before their limits, moved one at a time from the default "
             f"pose: {len(blocked)} of {total}; worst {_describe(worst)}"
         )
     if weak:
-        worst = max(weak, key=lambda reach: reach.max_load / reach.effort)
+        worst = max(weak, key=lambda result: result.max_load / result.effort)
         parts.append(
             f"too weak to lift the limb over the whole range: {len(weak)} of {total}; worst "
             f"{worst.joint}: got {worst.max_load:.3g} {worst.units.effort}; expected at most its "
@@ -254,20 +254,20 @@ def unreachable_limits(robot: Facts) -> Iterator[Violation]:
         )
 
 
-def _describe(reach: SweepResult) -> str:
-    first, second = next(pair for pair in reach.blocked if pair is not None)
+def _describe(result: SweepResult) -> str:
+    first, second = next(pair for pair in result.blocked if pair is not None)
     return (
-        f"{reach.joint}: got {reach.reached[0]:.2f} to {reach.reached[1]:.2f} of "
-        f"{reach.limits[0]:.2f} to {reach.limits[1]:.2f} {reach.units.position}, where {first} "
+        f"{result.joint}: got {result.reached[0]:.2f} to {result.reached[1]:.2f} of "
+        f"{result.limits[0]:.2f} to {result.limits[1]:.2f} {result.units.position}, where {first} "
         f"collides with {second}"
     )
 
 
-def _is_blocked_by_limb(robot: Facts, reach: SweepResult) -> bool:
+def _has_limb_collision(robot: Facts, result: SweepResult) -> bool:
     """Return whether both directions are blocked by two bodies of which one carries the other."""
-    if reach.share >= _MIN_RANGE_SHARE:
+    if result.share >= _MIN_RANGE_SHARE:
         return False
-    for pair in reach.blocked:
+    for pair in result.blocked:
         if pair is None:
             return False
         low, high = sorted(robot.body_of[name].index for name in pair)

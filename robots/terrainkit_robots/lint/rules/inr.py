@@ -7,13 +7,13 @@ import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.bounds import half_diagonal
-from terrainkit_robots.analysis.bodies.link_sources import inertia_source, mass_source
+from terrainkit_robots.analysis.bodies.link_source import inertia_source, mass_source
 from terrainkit_robots.analysis.cached_fact import cached_fact
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.inertia.density import (
+    check_max_density,
+    check_min_density,
     has_derived_mass,
-    max_density_violation,
-    min_density_violation,
     shape_volume,
 )
 from terrainkit_robots.analysis.inertia.physical import (
@@ -119,10 +119,10 @@ def massless_body(robot: Facts) -> Iterator[Violation]:
                 message=f"mass of body {body.name} ({parent}): got {mass}; expected more than 0 kg",
                 measured={"mass": body.mass},
             )
-    yield from _massless_links(robot)
+    yield from _links_without_mass(robot)
 
 
-def _massless_links(robot: Facts) -> Iterator[Violation]:
+def _links_without_mass(robot: Facts) -> Iterator[Violation]:
     """Yield violations of massless links that are fixed to a body with mass."""
     massless = [
         (link, _max_inertia(link))
@@ -364,20 +364,20 @@ def inertia_too_large(robot: Facts) -> Iterator[Violation]:
                 measured={"inertia": inertia},
             )
     body_bounds, candidates = robot.body_bounds, []
-    for body, radius in _gyration_radii(robot):
+    for body, radius in _body_radii(robot):
 
-        def is_too_large(box: Matrix, radius: float = radius) -> bool:
+        def is_invalid(box: Matrix, radius: float = radius) -> bool:
             return radius > _MAX_GYRATION * half_diagonal(box)
 
-        box = body_bounds.box_if(body, is_too_large)
+        box = body_bounds.box_if(body, is_invalid)
         if box is not None:
             candidates.append((body, radius, box))
-    reported = _reported_bodies(robot) if candidates else set()
+    reported = _invalid_bodies(robot) if candidates else set()
     for body, radius, box in candidates:
         if body.name not in reported:
             is_error = radius > _MAX_GYRATION_ERROR * half_diagonal(box)
             limit = f"at most {_MAX_GYRATION:g}"
-            yield _gyration_violation(body, radius, box, limit, "error" if is_error else "warning")
+            yield _report_radius(body, radius, box, limit, "error" if is_error else "warning")
 
 
 @rule("INR007", "inertia-too-small", "warning")
@@ -396,28 +396,28 @@ def inertia_too_small(robot: Facts) -> Iterator[Violation]:
         The ratio is 0.58 for a rod, 0.47 for a cube, and 0.36 for a sphere.
     """
     body_bounds, candidates = robot.body_bounds, []
-    for whole, _ in _gyration_radii(robot):
+    for whole, _ in _body_radii(robot):
         index = next(k for k, link in enumerate(whole.links) if link.name == whole.name)
         part = slice(index, index + 1)
         main = replace(whole, links=whole.links[part], poses=whole.poses[part])
         for body in (whole, main):
             radius = gyration_radius(body.principal, body.mass)
 
-            def is_doubtful(length: float, radius: float = radius) -> bool:
+            def needs_mesh(length: float, radius: float = radius) -> bool:
                 return radius < _MIN_GYRATION * length
 
-            box = body_bounds.shape_box(body, is_doubtful) if radius > 0 else None
+            box = body_bounds.shape_box(body, needs_mesh) if radius > 0 else None
             if box is not None and radius < _MIN_GYRATION * half_diagonal(box):
                 candidates.append((body, radius, box))
                 break
-    reported = _reported_bodies(robot) if candidates else set()
+    reported = _invalid_bodies(robot) if candidates else set()
     for body, radius, box in candidates:
         if body.name not in reported:
             limit = f"at least {_MIN_GYRATION:g}"
-            yield _gyration_violation(body, radius, box, limit, "warning")
+            yield _report_radius(body, radius, box, limit, "warning")
 
 
-def _gyration_violation(
+def _report_radius(
     body: Body, radius: float, box: Matrix, limit: str, severity: Severity
 ) -> Violation:
     half = half_diagonal(box)
@@ -433,7 +433,7 @@ def _gyration_violation(
 
 
 @cached_fact
-def _reported_bodies(robot: Facts) -> set[str]:
+def _invalid_bodies(robot: Facts) -> set[str]:
     """Return the bodies whose mass or inertia is reported by another rule."""
     reported = {link.name for links in placeholder_inertias(robot.bodies) for link in links}
     for check in (not_positive_definite, triangle_inequality):
@@ -443,7 +443,7 @@ def _reported_bodies(robot: Facts) -> set[str]:
     return reported
 
 
-def _gyration_radii(robot: Facts) -> Iterator[tuple[Body, float]]:
+def _body_radii(robot: Facts) -> Iterator[tuple[Body, float]]:
     """Yield each body with a valid inertia, and its radius of gyration [m]."""
     for body in robot.bodies:
         if body.virtual or not _has_valid_mass(body) or body.mass <= MIN_INERTIA:
@@ -475,10 +475,10 @@ def com_outside_body(robot: Facts) -> Iterator[Violation]:
         if body.virtual or not _has_valid_mass(body) or body.mass <= MIN_INERTIA:
             continue
 
-        def is_outside(box: Matrix, center: Matrix = body.center) -> bool:
+        def is_invalid(box: Matrix, center: Matrix = body.center) -> bool:
             return _distance(center, box) > _max_distance(box)
 
-        box = body_bounds.box_if(body, is_outside)
+        box = body_bounds.box_if(body, is_invalid)
         if box is None:
             continue
         distance, limit = _distance(body.center, box), _max_distance(box)
@@ -574,7 +574,7 @@ def implausible_density(robot: Facts) -> Iterator[Violation]:
             or has_derived_mass(body)
         ):
             continue
-        result = max_density_violation(body, body_bounds) or min_density_violation(
+        result = check_max_density(body, body_bounds) or check_min_density(
             body, body_bounds, robot.meshes
         )
         if result:

@@ -124,7 +124,7 @@ def continuous_leg_joint(robot: Facts) -> Iterator[Violation]:
 
     A continuous knee can rotate through the thigh. Limits keep a policy away from poses that damage
     the robot, and the standing pose and the reset range are computed from them. Wheels at the end
-    of a leg are not reported.
+    of a leg are not checked.
 
     Fix:
         Make the joint revolute, with the limits of the real joint.
@@ -133,7 +133,7 @@ def continuous_leg_joint(robot: Facts) -> Iterator[Violation]:
         legged_gym and Isaac Lab compute soft limits from the URDF; a continuous joint has none.
     """
     if robot.model.kind == "mjcf":
-        return  # reported by JNT017
+        return  # checked by JNT017
     bodies = robot.body_of_joint
     for joint in robot.leg_joints:
         if joint.kind == "continuous" and not robot.is_wheel(bodies[joint.name]):
@@ -241,17 +241,17 @@ def missing_limit(robot: Facts) -> Iterator[Violation]:
     """
     unparsed = UnparsedNumbers(robot.model)
     for joint in robot.model.joints:
-        problem = _limit_problem(joint, robot.model.kind == "mjcf")
-        if problem and not unparsed.has(joint.name, "lower", "upper", "range"):
+        error = _limit_error(joint, robot.model.kind == "mjcf")
+        if error and not unparsed.has(joint.name, "lower", "upper", "range"):
             yield Violation(
                 subject=joint.name,
                 source=joint.limit.source if joint.limit else joint.source,
-                message=f"limits of {joint.kind} joint {joint.name}: got {problem}; expected lower "
+                message=f"limits of {joint.kind} joint {joint.name}: got {error}; expected lower "
                 "< upper",
             )
 
 
-def _limit_problem(joint: Joint, mjcf: bool) -> str:
+def _limit_error(joint: Joint, mjcf: bool) -> str:
     """Return why a joint has no range; empty if it has one, or needs none."""
     if joint.kind not in ("revolute", "prismatic"):
         return ""
@@ -265,7 +265,7 @@ def _limit_problem(joint: Joint, mjcf: bool) -> str:
     if lower == upper:
         return f"lower = upper = {lower:g} {joint.unit}"
     if not missing or lower > upper:
-        return ""  # reported by JNT007
+        return ""  # checked by JNT007
     given = "upper" if missing == ["lower"] else "lower"
     value = f"{getattr(limit, given):g} {joint.unit}"
     return f"{given} = {value} without {missing[0]}, which MuJoCo treats as no limit"
@@ -413,7 +413,7 @@ def placeholder_limit(robot: Facts) -> Iterator[Violation]:
     """An effort or velocity limit is a placeholder.
 
     An effort of 1000 N m on a quadruped of 15 kg limits nothing: the policy learns jumps that
-    overload the motor. An effort that can hold the whole robot at arm's length is not reported, nor
+    overload the motor. An effort that can hold the whole robot at arm's length is not checked, nor
     a force of up to ten times the robot's weight.
 
     Fix:
@@ -509,13 +509,13 @@ def invalid_mimic(robot: Facts) -> Iterator[Violation]:
         Tested with MuJoCo 4.0: "<mimic> on joint ignored".
     """
     joints = {joint.name: joint for joint in reversed(robot.model.joints)}
-    reported: set[str] = set()
+    checked: set[str] = set()
     for joint in robot.model.joints:
-        if joint.mimic is None or not joint.moves or joint.name in reported:
+        if joint.mimic is None or not joint.moves or joint.name in checked:
             continue
         target = joints.get(joint.mimic.joint)
         cycle = _mimic_cycle(joint, joints)
-        reported.update(cycle)
+        checked.update(cycle)
         if target is None:
             got = f"{joint.mimic.joint!r}, which does not exist"
         elif not target.moves:
@@ -627,8 +627,8 @@ def missing_actuator(robot: Facts) -> Iterator[Violation]:
 
     The joint is passive, and an environment made from the file has one action less. Joints that
     mimic others, joints that carry the trunk of a planar model, and files with tendons or other
-    transmissions are not reported. A robot without legs may be passive by design, and mjlab and
-    Genesis add actuators to a file without any: both are only reported as information.
+    transmissions are not checked. A robot without legs may be passive by design, and mjlab and
+    Genesis add actuators to a file without any: both are only checked as information.
 
     Fix:
         Add a <motor> or <position> actuator for the joint.
@@ -668,7 +668,7 @@ def unlimited_joint(robot: Facts) -> Iterator[Violation]:
 
     The joint turns without end, so that a leg can rotate through the trunk. MuJoCo needs a range,
     and either limited="true" or autolimits, which is the default. Wheels and propellers are not
-    reported. On a robot without legs this is only information, since joints of arms may turn
+    checked. On a robot without legs this is only information, since joints of arms may turn
     without end.
 
     Fix:

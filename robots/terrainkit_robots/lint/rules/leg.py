@@ -236,13 +236,13 @@ def forward_axis(robot: Facts) -> Iterator[Violation]:
         )
 
 
-def _leg_positions(robot: Facts, words: set[str], axis: int) -> list[float]:
+def _leg_positions(robot: Facts, labels: set[str], axis: int) -> list[float]:
     """Return where legs with one of the words in their names start along an axis [m]."""
     positions = []
     for leg in robot.legs:
         leg_names = [robot.bodies[leg.limb.chain[-1]].name, leg.foot, leg.joints[-1].name]
         tokens = {t.lower() for name in leg_names for t in re.findall(r"[A-Z]?[a-z]+|[A-Z]+", name)}
-        if tokens & words:
+        if tokens & labels:
             positions.append(float(leg.limb.points[0][axis]))
     return positions
 
@@ -331,7 +331,7 @@ def _spec_and_stance(robot: Facts) -> tuple[RobotSpec, Stance]:
     return spec, stance
 
 
-def _height_violation(
+def _report_height(
     robot: Facts, message: str, measured: Mapping[str, float], severity: Severity | None = None
 ) -> Violation:
     trunk = robot.bodies[0].top
@@ -372,7 +372,7 @@ def spec_spawn_height(robot: Facts) -> Iterator[Violation]:
         f"{_MAX_DROP:g} m more"
     )
     measured = {"spawn_height": spec.spawn_height, "contact_height": stance.height}
-    yield _height_violation(robot, message, measured, None if gap < 0 else "warning")
+    yield _report_height(robot, message, measured, None if gap < 0 else "warning")
 
 
 @rule("LEG009", "spec-target-height", "warning", needs=("spec", "legs"))
@@ -400,7 +400,7 @@ def spec_target_height(robot: Facts) -> Iterator[Violation]:
             f"base_height_target: got {target:.4f} m, {error:.3f} m from the standing height of "
             f"{stance.height:.4f} m at the default pose; expected at most {limit:.3f} m"
         )
-        yield _height_violation(robot, message, {"target": target, "standing": stance.height})
+        yield _report_height(robot, message, {"target": target, "standing": stance.height})
 
 
 @rule("LEG010", "spec-reset-range", "warning", needs=("spec", "legs"))
@@ -420,7 +420,7 @@ def spec_reset_range(robot: Facts) -> Iterator[Violation]:
     spec = robot.spec
     assert spec is not None
     joints = {joint.name: joint for joint in robot.actuated}
-    excess: dict[str, float] = {}
+    distances: dict[str, float] = {}
     for name, position in match_joints(spec.default_pose, list(joints)).values.items():
         limits = joints[name].range
         if limits is None:
@@ -430,16 +430,18 @@ def spec_reset_range(robot: Facts) -> Iterator[Violation]:
         ends = [factor * position for factor in spec.reset_range]
         distance = max(limits[0] - min(ends), max(ends) - limits[1])
         if distance > _LIMIT_TOLERANCE:
-            excess[name] = distance
-    if not excess:
+            distances[name] = distance
+    if not distances:
         return
-    largest = max(excess, key=lambda name: excess[name])
-    listed = names(f"{name} by {value:.3g} {joints[name].unit}" for name, value in excess.items())
+    largest = max(distances, key=lambda name: distances[name])
+    listed = names(
+        f"{name} by {value:.3g} {joints[name].unit}" for name, value in distances.items()
+    )
     lower, upper = spec.reset_range
     yield Violation(
         subject=largest,
         source=joints[largest].source,
         message=f"reset_range: got {lower:g} to {upper:g} times the default pose, which exceeds "
-        f"the limits of {len(excess)} joints ({listed}); expected positions within the limits",
-        measured={"joints": len(excess), "farthest": round(excess[largest], 5)},
+        f"the limits of {len(distances)} joints ({listed}); expected positions within the limits",
+        measured={"joints": len(distances), "farthest": round(distances[largest], 5)},
     )

@@ -114,8 +114,8 @@ def merged_feet(robot: Facts) -> Iterator[Violation]:
     if not merges:
         return
     first = merges[0]
-    by = [s for s in SIMULATORS if any(s in merge.merged_into for merge in merges)]
-    into = next(iter(first.merged_into.values()))
+    by = [s for s in SIMULATORS if any(s in merge.merged_body for merge in merges)]
+    into = next(iter(first.merged_body.values()))
     example = f"{first.foot} into {into}" + (", ..." if len(merges) > 1 else "")
     yield Violation(
         subject=first.foot,

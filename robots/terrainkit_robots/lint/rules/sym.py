@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.bodies.link_sources import inertia_source, mass_source
+from terrainkit_robots.analysis.bodies.link_source import inertia_source, mass_source
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.symmetry.asymmetry import (
@@ -19,10 +19,10 @@ from terrainkit_robots.analysis.symmetry.asymmetry import (
     MAX_RELATIVE_LIMIT_ERROR,
     MAX_RELATIVE_POSITION_ERROR,
     Misalignment,
+    find_flipped_joints,
+    find_flipped_pairs,
     find_misalignments,
-    find_opposed_pairs,
-    find_reversed_joints,
-    has_opposite_axes,
+    has_flipped_axes,
     limits_match,
 )
 from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorSide
@@ -75,16 +75,16 @@ def mass_asymmetry(robot: Facts) -> Iterator[Violation]:
         The masses of tested robots without defects agree to four digits.
     """
     _check_joint_types(robot)
-    reported = _Reported(robot, implausible_density, mass_ratio, massless_body)
+    other_checks = _OtherChecks(robot, implausible_density, mass_ratio, massless_body)
     for pair in robot.mirror_pairs:
         left, right = pair.left, pair.right
         difference = _relative_difference(left.body.mass, right.body.mass)
-        if not _have_masses(left, right) or difference <= _MAX_MASS_DIFFERENCE:
+        if not _has_mass(left, right) or difference <= _MAX_MASS_DIFFERENCE:
             continue
-        if reported.has(left, right):
+        if other_checks.report(left, right):
             continue
         odd, other = robot.outlier_first(left, right, lambda body: np.array([body.mass]))
-        yield _violation(
+        yield _report(
             odd.body.name,
             other.body.name,
             f"mass of body {odd.body.name}: got {odd.body.mass:.4g} kg, {difference:.1%} from the "
@@ -95,7 +95,7 @@ def mass_asymmetry(robot: Facts) -> Iterator[Violation]:
         )
 
 
-def _have_masses(left: MirrorSide, right: MirrorSide) -> bool:
+def _has_mass(left: MirrorSide, right: MirrorSide) -> bool:
     """Return whether both bodies have valid masses; the INR rules report the others."""
     inertials = [link.inertial for joint in (left, right) for link in joint.body.links]
     masses = [inertial.mass for inertial in inertials if inertial is not None]
@@ -108,7 +108,7 @@ def _relative_difference(a: float, b: float) -> float:
     return abs(a - b) / largest if largest > 0 else 0.0
 
 
-def _violation(
+def _report(
     name: str, mirror_image: str, message: str, measured: Measured, source: Source
 ) -> Violation:
     return Violation(
@@ -136,26 +136,26 @@ def com_asymmetry(robot: Facts) -> Iterator[Violation]:
     """
     _check_joint_types(robot)
     _, displaced = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
-    reported = _Reported(robot, com_outside_body)
+    other_checks = _OtherChecks(robot, com_outside_body)
     for pair in robot.mirror_pairs:
         left, right = pair.left, pair.right
-        if pair.indices & displaced or not _have_masses(left, right):
+        if pair.indices & displaced or not _has_mass(left, right):
             continue
         difference = _relative_difference(left.body.mass, right.body.mass)
         if _is_merged(left, right) and difference > _MAX_MASS_DIFFERENCE:
             continue  # a heavier part shifts the center of mass of the merged body
         error, limit = _com_error(robot, left, right), _max_com_error(left, right)
-        if error <= limit or reported.has(left, right):
+        if error <= limit or other_checks.report(left, right):
             continue
         if _is_same_part(robot, left.body, right.body):
             continue
         odd, other = robot.outlier_first(left, right, lambda body: body.center)
-        yield _violation(
+        yield _report(
             odd.body.name,
             other.body.name,
-            f"center of mass of body {odd.body.name}: got {_format_mm(odd.body.center)} mm, and "
-            f"{_format_mm(other.body.center)} mm for its mirror image {other.body.name}, each in "
-            f"its own frame: {1000 * error:.3g} mm from mirrored; expected at most "
+            f"center of mass of body {odd.body.name}: got {_format_point(odd.body.center)} mm, and "
+            f"{_format_point(other.body.center)} mm for its mirror image {other.body.name}, each "
+            f"in its own frame: {1000 * error:.3g} mm from mirrored; expected at most "
             f"{1000 * limit:.2g} mm",
             {"gap": error, "allowed": limit},
             mass_source(odd.body.main_link),
@@ -182,22 +182,22 @@ def _is_same_part(robot: Facts, a: Body, b: Body) -> bool:
     return (
         bool(np.abs(a.center - b.center).max() < _MAX_COM_ERROR)
         and bool(a.collisions or a.visuals)
-        and _features(robot, a) == _features(robot, b)
+        and _signature(robot, a) == _signature(robot, b)
     )
 
 
-def _features(robot: Facts, body: Body) -> Counter[tuple[object, ...]]:
-    """Return the shapes and child bodies of a body with their poses, rounded to 1 mm."""
+def _signature(robot: Facts, body: Body) -> Counter[tuple[object, ...]]:
+    """Return the shapes and child bodies of a body with their poses, key to 1 mm."""
 
-    def rounded(pose: Matrix) -> tuple[float, ...]:
+    def key(pose: Matrix) -> tuple[float, ...]:
         return tuple(float(x) for x in np.round(pose[:3], 3).ravel() + 0.0)
 
     shapes = [
-        (g.shape, g.size, (g.mesh.filename, g.mesh.scale) if g.mesh else None, rounded(placed.pose))
+        (g.shape, g.size, (g.mesh.filename, g.mesh.scale) if g.mesh else None, key(placed.pose))
         for placed in (*body.collisions, *body.visuals)
         for g in (placed.geometry,)
     ]
-    mounts = [rounded(other.origin) for other in robot.bodies if other.parent == body.index]
+    mounts = [key(other.origin) for other in robot.bodies if other.parent == body.index]
     return Counter([*shapes, *mounts])
 
 
@@ -209,7 +209,7 @@ def _is_merged(left: MirrorSide, right: MirrorSide) -> bool:
     )
 
 
-def _format_mm(vector: Matrix) -> str:
+def _format_point(vector: Matrix) -> str:
     return "(" + ", ".join(f"{1000 * x + 0.0:.1f}" for x in vector) + ")"
 
 
@@ -239,21 +239,21 @@ def inertia_asymmetry(robot: Facts) -> Iterator[Violation]:
         The principal moments of tested robots without defects agree to 0.1 %.
     """
     _check_joint_types(robot)
-    reported = _Reported(robot, *_INERTIA_RULES)
+    other_checks = _OtherChecks(robot, *_INERTIA_RULES)
     for pair in robot.mirror_pairs:
         left, right = pair.left, pair.right
-        if not _have_masses(left, right) or not _has_comparable_parts(robot, left, right):
+        if not _has_mass(left, right) or not _has_same_parts(robot, left, right):
             continue
         a, b = left.body.principal, right.body.principal
         scaled = b * (left.body.mass / right.body.mass)  # SYM001 reports the difference of masses
         difference = min(_moment_difference(a, b), _moment_difference(a, scaled))
-        if difference <= _MAX_MOMENT_DIFFERENCE or reported.has(left, right):
+        if difference <= _MAX_MOMENT_DIFFERENCE or other_checks.report(left, right):
             continue
-        digit = max(_last_digit(left.body), _last_digit(right.body))
+        digit = max(_precision(left.body), _precision(right.body))
         if digit >= (difference - _MAX_MOMENT_DIFFERENCE) * float(max(a[2], b[2])):
             continue  # rounding explains the difference
         odd, other = robot.outlier_first(left, right, lambda body: body.principal)
-        yield _violation(
+        yield _report(
             odd.body.name,
             other.body.name,
             f"principal moments of body {odd.body.name}: got {_format(odd.body.principal)} kg m2, "
@@ -265,7 +265,7 @@ def inertia_asymmetry(robot: Facts) -> Iterator[Violation]:
         )
 
 
-def _has_comparable_parts(robot: Facts, left: MirrorSide, right: MirrorSide) -> bool:
+def _has_same_parts(robot: Facts, left: MirrorSide, right: MirrorSide) -> bool:
     """Return whether merged bodies agree in mass and center of mass; else moments must differ."""
     if not _is_merged(left, right):
         return True
@@ -279,7 +279,7 @@ def _moment_difference(a: Matrix, b: Matrix) -> float:
     return float(np.abs(a - b).max()) / largest if largest > 0 else 0.0
 
 
-def _last_digit(body: Body) -> float:
+def _precision(body: Body) -> float:
     """Return the value of the last decimal digit of a body's inertia [kg m2]."""
     inertial = body.main_link.inertial
     if inertial is None or inertial.inertia is None:
@@ -307,22 +307,22 @@ def limit_asymmetry(robot: Facts) -> Iterator[Violation]:
     Source:
         The limits of tested robots without defects agree exactly.
     """
-    reported = _Reported(robot, wide_range)
+    other_checks = _OtherChecks(robot, wide_range)
     for pair in robot.mirror_pairs:
         left, right = pair.left, pair.right
         a, b = left.joint.range, right.joint.range
         if pair.sign == 0 or a is None or b is None or limits_match(a, b, pair.sign):
             continue
-        if reported.has(left, right):
+        if other_checks.report(left, right):
             continue
-        if has_opposite_axes(left, right) and limits_match(a, b, -pair.sign):
+        if has_flipped_axes(left, right) and limits_match(a, b, -pair.sign):
             continue  # SYM007 reports the axis
         odd, other = robot.outlier_first(left, right, _limit_sizes)
         own, mirror = (a, b) if odd is left else (b, a)
         expected = mirror if pair.sign > 0 else (-mirror[1], -mirror[0])
         unit, name = odd.joint.unit, other.joint.name
         kind = "" if pair.sign > 0 else "negated "
-        yield _violation(
+        yield _report(
             odd.joint.name,
             name,
             f"limits of joint {odd.joint.name}: got {_format_limits(own)} {unit}; expected "
@@ -359,7 +359,7 @@ def effort_asymmetry(robot: Facts) -> Iterator[Violation]:
     Source:
         The limits of tested robots without defects agree exactly.
     """
-    reported = _Reported(robot, placeholder_limit)
+    other_checks = _OtherChecks(robot, placeholder_limit)
     for pair in robot.mirror_pairs:
         left, right = pair.left, pair.right
         for name, limit_of in (("effort", Facts.effort_limit), ("velocity", _velocity_of)):
@@ -367,7 +367,7 @@ def effort_asymmetry(robot: Facts) -> Iterator[Violation]:
             if a is None or b is None or min(a, b) <= 0:
                 continue
             difference = _relative_difference(a, b)
-            if difference <= _MAX_LIMIT_DIFFERENCE or reported.has(left, right):
+            if difference <= _MAX_LIMIT_DIFFERENCE or other_checks.report(left, right):
                 continue
 
             def value(body: Body, limit_of: _LimitOf = limit_of) -> Matrix | None:
@@ -378,7 +378,7 @@ def effort_asymmetry(robot: Facts) -> Iterator[Violation]:
             own, mirror = (b, a) if odd is right else (a, b)
             joint = odd.joint
             unit = joint.effort_unit if name == "effort" else joint.speed_unit
-            yield _violation(
+            yield _report(
                 joint.name,
                 other.joint.name,
                 f"{name} limit of joint {joint.name}: got {own:g} {unit}, {difference:.1%} from "
@@ -410,10 +410,10 @@ def joint_origin_asymmetry(robot: Facts) -> Iterator[Violation]:
         The joint origins of tested robots without defects agree to 0.1 mm.
     """
     _check_joint_types(robot)
-    misalignments, _ = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
-    for misalignment in misalignments:
-        if not misalignment.is_axis:
-            yield _misalignment_violation(robot, misalignment)
+    errors, _ = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
+    for error in errors:
+        if not error.is_axis:
+            yield _report_pair(robot, error)
 
 
 @rule("SYM007", "joint-axis-asymmetry", "warning")
@@ -431,12 +431,12 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
         Tested robots have either the same axis on all legs, or mirrored axes on all legs.
     """
     _check_joint_types(robot)
-    misalignments, _ = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
-    for misalignment in misalignments:
-        if misalignment.is_axis:
-            yield _misalignment_violation(robot, misalignment)
+    errors, _ = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
+    for error in errors:
+        if error.is_axis:
+            yield _report_pair(robot, error)
     reported = {violation.subject for violation in zero_axis(robot)}
-    for found in find_reversed_joints(robot.legs, robot.bodies, robot.zero_poses):
+    for found in find_flipped_joints(robot.legs, robot.bodies, robot.zero_poses):
         joint = found.joint
         if joint.name in reported:
             continue
@@ -447,7 +447,7 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
             certainty="likely",
             message=f"axis of joint {joint.name} in the trunk frame: got "
             f"{_format_axis(found.axis)}; expected the direction of the same joint of all "
-            f"{found.others} other legs, such as {_format_axis(found.usual_axis)}, or mirrored "
+            f"{found.others} other legs, such as {_format_axis(found.expected_axis)}, or mirrored "
             "axes on each side",
             measured={"others": found.others},
         )
@@ -458,9 +458,9 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
             continue
         negated = not limits_match(a, b, pair.sign) and limits_match(a, b, -pair.sign)
         known = not reported.isdisjoint({left.joint.name, right.joint.name})
-        if negated and has_opposite_axes(left, right) and not known:
+        if negated and has_flipped_axes(left, right) and not known:
             reported.add(right.joint.name)
-            yield _axis_violation(
+            yield _report_axis(
                 left,
                 right,
                 f"got {_format_axis(right.axis)} with limits {_format_limits(b)} "
@@ -469,13 +469,13 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
                 "expected the negated axis or the negated limits",
                 {"lower": b[0], "upper": b[1], "other_lower": a[0], "other_upper": a[1]},
             )
-    opposed_pairs = find_opposed_pairs(
+    opposed_pairs = find_flipped_pairs(
         robot.legs, robot.mirror, robot.mirror_pairs, robot.leg_bodies
     )
     for pair, others in opposed_pairs:
         left, right = pair.left, pair.right
         if right.joint.name not in reported:
-            yield _axis_violation(
+            yield _report_axis(
                 left,
                 right,
                 f"got {_format_axis(right.axis)}, opposite to {_format_axis(left.axis)} of its "
@@ -485,11 +485,11 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
             )
 
 
-def _axis_violation(
+def _report_axis(
     left: MirrorSide, right: MirrorSide, message: str, measured: Measured
 ) -> Violation:
     joint = right.joint
-    return _violation(
+    return _report(
         joint.name,
         left.joint.name,
         f"axis of joint {joint.name} in the trunk frame: {message}",
@@ -502,7 +502,7 @@ def _format_axis(axis: Matrix) -> str:
     return "(" + ", ".join(f"{x:.3g}" for x in np.round(axis, 3) + 0.0) + ")"
 
 
-def _misalignment_violation(robot: Facts, misalignment: Misalignment) -> Violation:
+def _report_pair(robot: Facts, error: Misalignment) -> Violation:
     def position(body: Body) -> Matrix:
         return body.origin[:3, 3]
 
@@ -512,28 +512,26 @@ def _misalignment_violation(robot: Facts, misalignment: Misalignment) -> Violati
     def rotation(body: Body) -> Matrix:
         return body.origin[:3, :3].ravel()
 
-    value = axis if misalignment.is_axis else position if misalignment.distance else rotation
-    odd, other = robot.outlier_first(misalignment.left, misalignment.right, value)
+    value = axis if error.is_axis else position if error.distance else rotation
+    odd, other = robot.outlier_first(error.left, error.right, value)
     name, mirror = odd.joint.name, other.joint.name
-    if misalignment.distance:
+    if error.distance:
         message = (
             f"position of joint {name} relative to the joint above it, in the trunk frame: got "
-            f"{_format_mm(odd.offset)} mm, and {_format_mm(other.offset)} mm for its mirror image "
-            f"{mirror}: {1000 * misalignment.distance:.3g} mm from mirrored; expected at most "
+            f"{_format_point(odd.offset)} mm, and {_format_point(other.offset)} mm for its mirror "
+            f"image {mirror}: {1000 * error.distance:.3g} mm from mirrored; expected at most "
             f"{1000 * MAX_POSITION_ERROR:g} mm plus {MAX_RELATIVE_POSITION_ERROR:.0%} of the "
             "distance"
         )
     else:
-        part = "axis" if misalignment.is_axis else "frame"
+        part = "axis" if error.is_axis else "frame"
         message = (
             f"angle between the {part} of joint {name} and that of its mirror image {mirror}: got "
-            f"{math.degrees(misalignment.angle):.3g} deg; expected at most "
+            f"{math.degrees(error.angle):.3g} deg; expected at most "
             f"{math.degrees(MAX_AXIS_ERROR):.0f} deg"
         )
-    source = (odd.joint.axis_source if misalignment.is_axis else None) or odd.joint.source
-    return _violation(
-        name, mirror, message, {"gap": misalignment.distance, "angle": misalignment.angle}, source
-    )
+    source = (odd.joint.axis_source if error.is_axis else None) or odd.joint.source
+    return _report(name, mirror, message, {"gap": error.distance, "angle": error.angle}, source)
 
 
 def _check_joint_types(robot: Facts) -> None:
@@ -542,7 +540,7 @@ def _check_joint_types(robot: Facts) -> None:
         raise CannotCheckError(f"the type of joint {violation.subject} is unknown")
 
 
-class _Reported:
+class _OtherChecks:
     """Links and joints that other rules report, computed on first use."""
 
     def __init__(self, robot: Facts, *checks: Check) -> None:
@@ -554,7 +552,7 @@ class _Reported:
         violations = (violation for check in self._checks for violation in check(self._robot))
         return {violation.subject for violation in violations if violation.severity != "info"}
 
-    def has(self, left: MirrorSide, right: MirrorSide) -> bool:
+    def report(self, left: MirrorSide, right: MirrorSide) -> bool:
         """Return whether a link or joint of one of two bodies is reported."""
         names = {link.name for joint in (left, right) for link in joint.body.links}
         return not self._names.isdisjoint(names | {left.joint.name, right.joint.name})

@@ -55,18 +55,18 @@ _JointPair = tuple[Joint, Joint]
 
 
 @cached_fact
-def _optional_pairing(robot: Facts) -> "RobotPairs | None":
+def _pair_robots(robot: Facts) -> "RobotPairs | None":
     from terrainkit_robots.lint.compare.robot_pairs import pair_robots
 
     return pair_robots(robot, _other(robot))
 
 
-def _pairing(robot: Facts) -> "RobotPairs":
-    pairing = _optional_pairing(robot)
-    if pairing is None:
+def _robot_pairs(robot: Facts) -> "RobotPairs":
+    pairs = _pair_robots(robot)
+    if pairs is None:
         empty = robot if not robot.links else _other(robot)
         raise CannotCheckError(f"{short(empty.model.file.name)} has no links")
-    return pairing
+    return pairs
 
 
 def _joint_pairs(robot: Facts) -> tuple[_JointPair, ...]:
@@ -75,12 +75,12 @@ def _joint_pairs(robot: Facts) -> tuple[_JointPair, ...]:
     Raises:
         CannotCheckError: If there is none.
     """
-    pairing = _pairing(robot)
+    pairs = _robot_pairs(robot)
     if not robot.joints or not _other(robot).joints:
         raise CannotCheckError("one of the two has no joints with one degree of freedom")
-    if not pairing.joints:
+    if not pairs.joints:
         raise CannotCheckError(f"no joint of {_other_name(robot)} has the name of a joint here")
-    return pairing.joints
+    return pairs.joints
 
 
 def _other(robot: Facts) -> Facts:
@@ -114,8 +114,8 @@ def compare_joint_sets(robot: Facts) -> Iterator[Violation]:
         Joints with one degree of freedom are matched by name; case and a suffix such as _joint are
         ignored.
     """
-    pairing, other, there = _pairing(robot), _other(robot), _other_name(robot)
-    joint_names = pairing.joint_names
+    pairs, other, there = _robot_pairs(robot), _other(robot), _other_name(robot)
+    joint_names = pairs.joint_names
     ours = [joint for joint in robot.joints if joint.name in joint_names.only_first]
     theirs = [joint for joint in other.joints if joint.name in joint_names.only_second]
     counts = {"here": len(robot.joints), "there": len(other.joints)}
@@ -172,13 +172,13 @@ def compare_joints(robot: Facts) -> Iterator[Violation]:
     """
     there = _other_name(robot)
     for one, other in _joint_pairs(robot):
-        quantity, difference, severity = _difference(robot, one, other)
-        if quantity:
+        label, difference, severity = _difference(robot, one, other)
+        if label:
             yield Violation(
                 subject=one.name,
                 source=one.source,
                 severity=severity,
-                message=f"{quantity} of joint {_joint_name(one, other)}: got {difference} "
+                message=f"{label} of joint {_joint_name(one, other)}: got {difference} "
                 f"({there}, line {other.source.line})",
             )
 
@@ -204,7 +204,7 @@ def _mimic_difference(robot: Facts, one: Joint, other: Joint) -> tuple[str, str,
     if ours is None or theirs is None:
         texts = [f"a mimic of {short(m.joint)}" if m else "none" for m in (ours, theirs)]
         return "mimic", f"{texts[0]} here and {texts[1]} there; expected the same", "warning"
-    partner = dict(_pairing(robot).joint_names.pairs)
+    partner = dict(_robot_pairs(robot).joint_names.pairs)
     same = partner.get(ours.joint, ours.joint) == theirs.joint
     close = relative_difference(ours.multiplier, theirs.multiplier) <= _MAX_EFFORT_DIFFERENCE
     if same and close and abs(ours.offset - theirs.offset) <= _limit_tolerance(one):
@@ -222,7 +222,7 @@ def _axis_angle(robot: Facts, one: Joint, other: Joint) -> float:
     own = _angle(one.direction, other.direction)
     if own <= _MAX_AXIS_ANGLE:
         return own
-    base = _pairing(robot).base
+    base = _robot_pairs(robot).base
     ours = _axis_in_link(base[0], robot, one)
     return min(own, _angle(ours, _axis_in_link(base[1], _other(robot), other)))
 
@@ -247,7 +247,7 @@ def _limit_tolerance(joint: Joint) -> float:
     return _MAX_SLIDE_ERROR if joint.kind == "prismatic" else _MAX_HINGE_ERROR
 
 
-def _comparable_joints(robot: Facts) -> list[_JointPair]:
+def _matching_joints(robot: Facts) -> list[_JointPair]:
     """Return the pairs of joints with the same motion, whose numbers can be compared."""
     return [(a, b) for a, b in _joint_pairs(robot) if _difference(robot, a, b)[2] != "error"]
 
@@ -266,11 +266,11 @@ def compare_limits(robot: Facts) -> Iterator[Violation]:
         MuJoCo reads both formats; the tolerance is 0.002 rad, 0.5 mm, and 1 % of a velocity.
     """
     there = _other_name(robot)
-    pairs = _comparable_joints(robot)
+    pairs = _matching_joints(robot)
     for group in _grouped(pairs, _range_difference):
         one, other = group[0]
         unit = one.unit
-        yield _group_violation(
+        yield _report_group(
             group,
             "limits",
             f"{_format_range(one)} here and {_format_range(other)} in {there}; expected a "
@@ -280,7 +280,7 @@ def compare_limits(robot: Facts) -> Iterator[Violation]:
         one, other = group[0]
         assert one.limit is not None
         assert other.limit is not None
-        yield _group_violation(
+        yield _report_group(
             group,
             "velocity limit",
             f"{one.limit.velocity:.6g} {one.speed_unit} here and {other.limit.velocity:.6g} "
@@ -324,8 +324,8 @@ def _grouped(
     yield from groups.values()
 
 
-def _group_violation(
-    group: Sequence[_JointPair], quantity: str, difference: str, severity: Severity | None = None
+def _report_group(
+    group: Sequence[_JointPair], label: str, difference: str, severity: Severity | None = None
 ) -> Violation:
     one, other = group[0]
     listed = names(_joint_name(a, b) for a, b in group)
@@ -334,7 +334,7 @@ def _group_violation(
         subject=one.name,
         source=(one.limit or one).source,
         severity=severity,
-        message=f"{quantity} of {joints}: got {difference} "
+        message=f"{label} of {joints}: got {difference} "
         f"(line {(other.limit or other).source.line} there)",
         measured={"joints": len(group)},
     )
@@ -356,7 +356,7 @@ def compare_joint_order(robot: Facts) -> Iterator[Violation]:
     """
     pairs, other, there = _joint_pairs(robot), _other(robot), _other_name(robot)
     ours = {one.name: two.name for one, two in pairs}
-    theirs = [name for name in (joint.name for joint in other.joints) if name in ours.values()]
+    theirs = [joint.name for joint in other.joints if joint.name in ours.values()]
     indices = permutation(list(ours.values()), theirs)
     if indices is None or not is_reordered(indices):
         return
@@ -366,12 +366,12 @@ def compare_joint_order(robot: Facts) -> Iterator[Violation]:
         source=robot.model.source,
         message=f"order of the {f'{len(pairs)} common ' if subset else ''}joints: got "
         f"{names(ours, most=4)} here and {names(theirs, most=4)} in {there}; "
-        f"{_format_permutation('theirs', 'ours', indices)}",
+        f"{_format_order('theirs', 'ours', indices)}",
         measured={"permutation": str(indices), "back": str(_inverse(indices))},
     )
 
 
-def _format_permutation(target: str, source: str, indices: Sequence[int]) -> str:
+def _format_order(target: str, source: str, indices: Sequence[int]) -> str:
     """Return a permutation and its inverse as two expressions that can be pasted into code."""
     inverse = _inverse(indices)
     return f"{target} = {source}[{list(indices)}] and {source} = {target}[{inverse}]"
@@ -396,7 +396,7 @@ def compare_actuator_order(robot: Facts) -> Iterator[Violation]:
         Go2 the right legs come first in the actuators and last in the joints.
     """
     other, there = _other(robot), _other_name(robot)
-    partner = dict(_pairing(robot).joint_names.pairs)
+    partner = dict(_robot_pairs(robot).joint_names.pairs)
     ours = [partner[name] for name in robot.actuator_order if name in partner]
     theirs = other.actuator_order
     common = [name for name in theirs if name in ours]
@@ -410,31 +410,31 @@ def compare_actuator_order(robot: Facts) -> Iterator[Violation]:
         if difference
     ]
     if not common:  # at most one of the files is an MJCF with actuators
-        yield from (_actuator_violation(robot, message) for message in within)
+        yield from (_report_actuators(robot, message) for message in within)
     elif indices and is_reordered(indices):
         between = (
             f"actuator order: got another order than in {there}; "
-            f"{_format_permutation('theirs', 'ours', indices)}"
+            f"{_format_order('theirs', 'ours', indices)}"
         )
-        yield _actuator_violation(robot, "; ".join([between, *within]))
+        yield _report_actuators(robot, "; ".join([between, *within]))
     elif within:
-        yield _actuator_violation(robot, "; ".join(["both files agree", *within]), "info")
+        yield _report_actuators(robot, "; ".join(["both files agree", *within]), "info")
 
 
 def _actuator_difference(robot: Facts) -> str:
     """Return the permutation between the actuators and joints of a file; empty if they agree."""
     actuated = robot.actuator_order
-    joints = [name for name in (joint.name for joint in robot.joints) if name in actuated]
+    joints = [joint.name for joint in robot.joints if joint.name in actuated]
     indices = permutation(joints, actuated)
     if indices is None or not is_reordered(indices):
         return ""
     return (
-        f"{_format_permutation('ctrl', 'joints', indices)}, where joints has the order "
+        f"{_format_order('ctrl', 'joints', indices)}, where joints has the order "
         f"{names(joints, most=4)} and ctrl the order {names(actuated, most=4)}"
     )
 
 
-def _actuator_violation(robot: Facts, message: str, severity: Severity | None = None) -> Violation:
+def _report_actuators(robot: Facts, message: str, severity: Severity | None = None) -> Violation:
     first = next((actuator.source for actuator in robot.model.actuators), robot.model.source)
     return Violation(subject=robot.model.title, source=first, message=message, severity=severity)
 
@@ -453,7 +453,7 @@ def compare_effort(robot: Facts) -> Iterator[Violation]:
         effort in URDF; in MJCF the largest force of the joint's actuators, and actuatorfrcrange.
     """
     other, there = _other(robot), _other_name(robot)
-    pairs = _comparable_joints(robot)
+    pairs = _matching_joints(robot)
     efforts = {a.name: (robot.effort_limit(a), other.effort_limit(b)) for a, b in pairs}
 
     def difference(one: Joint, _: Joint) -> tuple[object, ...] | None:
@@ -469,7 +469,7 @@ def compare_effort(robot: Facts) -> Iterator[Violation]:
     for group in _grouped(pairs, difference):
         one, unit = group[0][0], group[0][0].effort_unit
         a, b = (effort or 0.0 for effort in efforts[one.name])
-        yield _group_violation(
+        yield _report_group(
             group,
             "effort limit",
             f"{a:.5g} {unit} here and {b:.5g} {unit} in {there}, "
@@ -480,7 +480,7 @@ def compare_effort(robot: Facts) -> Iterator[Violation]:
         bare = other if limited else robot
         has_actuators = bool(bare.model.actuators) or bare.model.kind != "mjcf"
         without, note = there if limited else "this file", ", which has no actuators"
-        yield _group_violation(
+        yield _report_group(
             group,
             "effort limit",
             f"none in {without}{'' if has_actuators else note}; expected the limit of "
@@ -504,7 +504,7 @@ def compare_total_mass(robot: Facts) -> Iterator[Violation]:
         Declared masses; in MJCF also those that MuJoCo computes from shapes. MuJoCo 4.0 drops the
         mass of the trunk of a URDF without a floating joint, since it welds the trunk to the world.
     """
-    pairing, other, there = _pairing(robot), _other(robot), _other_name(robot)
+    pairs, other, there = _robot_pairs(robot), _other(robot), _other_name(robot)
     a, b = robot.total_mass, other.total_mass
     for each, mass in ((robot, a), (other, b)):
         if math.isnan(mass):
@@ -512,7 +512,7 @@ def compare_total_mass(robot: Facts) -> Iterator[Violation]:
             raise CannotCheckError(f"masses of {file} are computed from mesh files")
     difference = relative_difference(a, b)
     if difference > _MAX_MASS_DIFFERENCE:
-        bodies = sorted(pairing.bodies, key=lambda pair: -abs(pair[0].mass - pair[1].mass))
+        bodies = sorted(pairs.bodies, key=lambda pair: -abs(pair[0].mass - pair[1].mass))
         causes = [
             f"{short(one.name)} {one.mass:.4g} and {two.mass:.4g} kg"
             for one, two in bodies[:_MAX_LISTED_BODIES]
@@ -527,10 +527,10 @@ def compare_total_mass(robot: Facts) -> Iterator[Violation]:
             f"{f'; largest differences: {names(causes)}' if causes else ''}",
             measured={"here": a, "there": b, "share": difference},
         )
-    yield from _dropped_masses(robot, other)
+    yield from _missing_mass(robot, other)
 
 
-def _dropped_masses(robot: Facts, other: Facts) -> Iterator[Violation]:
+def _missing_mass(robot: Facts, other: Facts) -> Iterator[Violation]:
     """Yield the mass that MuJoCo drops from a URDF whose MJCF has a floating base."""
     for urdf, mjcf in ((robot, other), (other, robot)):
         floating = any(joint.kind == "floating" for joint in mjcf.model.joints)
@@ -591,7 +591,7 @@ def compare_kinematics(robot: Facts) -> Iterator[Violation]:
     )
 
 
-def _kinematics_message(gap: "LinkPoseDifference", there: str) -> str:
+def _kinematics_message(gap: "LinkPoseDifference", other: str) -> str:
     from terrainkit_robots.lint.compare.link_poses import MAX_ANGLE, MAX_DISTANCE
 
     ours, theirs = gap.base
@@ -600,18 +600,18 @@ def _kinematics_message(gap: "LinkPoseDifference", there: str) -> str:
     expected = f"expected at most {1000 * MAX_DISTANCE:g} mm and {math.degrees(MAX_ANGLE):.1g} deg"
     if gap.is_base_offset:
         return (
-            f"frame of {base} on the trunk: got a difference to {there} of "
+            f"frame of {base} on the trunk: got a difference to {other} of "
             f"{1000 * gap.distance:.4g} mm and {angle}, the same for all {gap.links} links; "
             f"{expected}"
         )
     if gap.is_rotation_only:
         return (
-            f"rotation of link frames against those of {there}: got up to {angle} at {gap.link}, "
+            f"rotation of link frames against those of {other}: got up to {angle} at {gap.link}, "
             f"the same in every pose, first at {gap.first}; {expected}; all origins agree to "
             f"{1000 * gap.distance:.2g} mm"
         )
     return (
-        f"position of link {gap.link} relative to {base}: got a difference to {there} of "
+        f"position of link {gap.link} relative to {base}: got a difference to {other} of "
         f"{1000 * gap.distance:.4g} mm and up to {angle} in pose {gap.pose} of {gap.poses} (seed "
         f"{gap.seed}); {expected}; the first of {gap.links} links that differs is {gap.first}"
     )
@@ -632,14 +632,14 @@ def compare_inertia(robot: Facts) -> Iterator[Violation]:
         Links that are connected by fixed joints count as one body, as simulators merge them. Only
         bodies with the same joints in both files are compared.
     """
-    pairing, other, there = _pairing(robot), _other(robot), _other_name(robot)
+    pairs, other, there = _robot_pairs(robot), _other(robot), _other_name(robot)
     total_differs = relative_difference(robot.total_mass, other.total_mass) > _MAX_MASS_DIFFERENCE
-    for one, two in pairing.bodies:
+    for one, two in pairs.bodies:
         if min(one.mass, two.mass) < _MIN_MASS:
             continue
         if not (has_valid_inertial(one) and has_valid_inertial(two)):
             continue
-        gap, body, message = body_difference(robot, other, pairing, one, two), short(one.name), ""
+        gap, body, message = body_difference(robot, other, pairs, one, two), short(one.name), ""
         if gap.mass > _MAX_MASS_DIFFERENCE:
             if not total_differs:  # else reported by XRF007
                 message = (

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from terrainkit_robots.analysis.bodies.joint_order import is_reordered, permutation
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint
-from terrainkit_robots.lint.rule import Certainty, Violation, rule
+from terrainkit_robots.lint.rule import Violation, rule
 from terrainkit_robots.spec.per_joint import match_joints
 from terrainkit_robots.text import closest, names, short
 
@@ -39,26 +39,27 @@ def _joints_by_name(robot: Facts) -> dict[str, Joint]:
     return {joint.name: joint for joint in robot.model.joints}
 
 
-def _violation(
+def _report(
     robot: Facts,
-    subject: str,
+    name: str,
     message: str,
     measured: Mapping[str, float] | None = None,
-    certainty: Certainty = "proven",
+    *,
+    likely: bool = False,
 ) -> Violation:
     """Return a violation at the joint or link of that name, or at the robot."""
-    element = _joints_by_name(robot).get(subject) or robot.tree.links.get(subject)
+    element = _joints_by_name(robot).get(name) or robot.tree.links.get(name)
     return Violation(
-        subject=short(subject) or robot.model.title,
+        subject=short(name) or robot.model.title,
         source=element.source if element is not None else robot.model.source,
         message=message,
-        certainty=certainty,
+        certainty="likely" if likely else "proven",
         measured=measured or {},
     )
 
 
-def _suggestion(name: str, known: Sequence[str]) -> str:
-    near = closest(name, known, _MIN_SIMILARITY)
+def _suggest(name: str, candidates: Sequence[str]) -> str:
+    near = closest(name, candidates, _MIN_SIMILARITY)
     return f"; did you mean {near}?" if near else ""
 
 
@@ -85,11 +86,11 @@ def spec_joints(robot: Facts) -> Iterator[Violation]:
         got = f"{short(name)}, which has no actuator"
         if name not in _joints_by_name(robot):
             misspelled.add(closest(name, unlisted, _MIN_SIMILARITY))
-            got = f"{short(name)}, which is not a joint of the robot{_suggestion(name, unlisted)}"
-        yield _violation(robot, name, f"joint_order: got {got}")
+            got = f"{short(name)}, which is not a joint of the robot{_suggest(name, unlisted)}"
+        yield _report(robot, name, f"joint_order: got {got}")
     missing = [name for name in unlisted if name not in misspelled]
     if missing:
-        yield _violation(
+        yield _report(
             robot,
             missing[0],
             f"joint_order: got {len(actuated) - len(missing)} of {len(actuated)} actuated joints; "
@@ -146,7 +147,7 @@ def spec_tables(robot: Facts) -> Iterator[Violation]:
     for table in (*JOINT_TABLES, "soft_limits"):
         matching = match_joints(getattr(_spec(robot), table), joints)
         for clash in matching.clashes(table, partial=table == "soft_limits"):
-            yield _violation(robot, clash.subject, clash.message)
+            yield _report(robot, clash.subject, clash.message)
 
 
 @rule("XRF013", "spec-feet", "error", needs=("spec", "legs"))
@@ -179,14 +180,14 @@ def spec_feet(robot: Facts) -> Iterator[Violation]:
         else:
             used[index] = name
             continue
-        yield _violation(robot, name, message, certainty="likely")
+        yield _report(robot, name, message, likely=True)
     missing = [leg.foot for leg in robot.legs if leg.limb.chain[-1] not in used]
     if missing:
         count = len(robot.legs)
         message = (
             f"feet: got {count - len(missing)} of {count} feet; expected also {names(missing)}"
         )
-        yield _violation(robot, missing[0], message, certainty="likely")
+        yield _report(robot, missing[0], message, likely=True)
 
 
 @rule("XRF014", "spec-bodies", "error", needs=("spec",))
@@ -215,9 +216,9 @@ def spec_bodies(robot: Facts) -> Iterator[Violation]:
     for field, bodies in fields.items():
         for name in bodies:
             if name not in robot.body_of:
-                near = _suggestion(name, known)
+                near = _suggest(name, known)
                 message = f"{field}: got {short(name)}, which is not a link of the robot{near}"
-                yield _violation(robot, name, message)
+                yield _report(robot, name, message)
     for field in ("shanks", "thighs"):
         bodies = fields[field]
         if len(bodies) != len(spec.feet):
@@ -231,7 +232,7 @@ def spec_bodies(robot: Facts) -> Iterator[Violation]:
                     f"{field}: got {short(name)}, the parent of {names(carried)}, at the index of "
                     f"{short(foot)}; expected the order of feet"
                 )
-                yield _violation(robot, name, message)
+                yield _report(robot, name, message)
 
 
 def _is_ancestor(robot: Facts, name: str, foot: str) -> bool:
@@ -267,7 +268,7 @@ def spec_pose(robot: Facts) -> Iterator[Violation]:
                 f"outside of the limits; expected {limits[0]:.4g} to {limits[1]:.4g} {unit}"
             )
             limit = limits[1] if position > limits[1] else limits[0]
-            yield _violation(robot, name, message, {"position": position, "limit": limit})
+            yield _report(robot, name, message, {"position": position, "limit": limit})
 
 
 @rule("XRF016", "spec-motor-limits", "warning", needs=("spec",))
@@ -283,13 +284,13 @@ def spec_motor_limits(robot: Facts) -> Iterator[Violation]:
     Source:
         Limits of the description, and the force ranges of an MJCF's actuators.
     """
-    yield from _exceeded(robot, "effort", lambda j: robot.effort_limit(j), lambda j: j.effort_unit)
-    yield from _exceeded(
+    yield from _check_limits(robot, "effort", robot.effort_limit, lambda j: j.effort_unit)
+    yield from _check_limits(
         robot, "velocity", lambda j: j.limit.velocity if j.limit else None, lambda j: j.speed_unit
     )
 
 
-def _exceeded(
+def _check_limits(
     robot: Facts,
     table: str,
     limit_of: Callable[[Joint], float | None],
@@ -304,7 +305,7 @@ def _exceeded(
                 f"{table} of {short(name)}: got {value:.4g} {unit}, {value / limit:.3g} times the "
                 f"limit of {robot.model.file.name}; expected at most {limit:.4g} {unit}"
             )
-            yield _violation(robot, name, message, {table: value, "declared": limit})
+            yield _report(robot, name, message, {table: value, "declared": limit})
 
 
 @rule("XRF017", "spec-mirror", "error", needs=("spec",))
@@ -329,17 +330,17 @@ def spec_mirror(robot: Facts) -> Iterator[Violation]:
         got = f"{short(image.joint)} with sign {image.sign:+d}"
         if unknown is not None:
             message = f"mirror: got {short(unknown)}, which is not an actuated joint"
-            yield _violation(robot, unknown, message + _suggestion(unknown, known))
+            yield _report(robot, unknown, message + _suggest(unknown, known))
         elif back is None or back.joint != name or back.sign != image.sign:
             text = "no entry" if back is None else f"{short(back.joint)} with sign {back.sign:+d}"
             message = (
                 f"mirror of {short(name)}: got {got}, but {text} for {short(image.joint)}; "
                 "expected both to agree"
             )
-            yield _violation(robot, name, message)
+            yield _report(robot, name, message)
         elif own is not None and own.joint == image.joint and own.sign != image.sign:
             message = (
                 f"mirror of {short(name)}: got {got}; expected sign {own.sign:+d}, as their axes "
                 "require"
             )
-            yield _violation(robot, name, message)
+            yield _report(robot, name, message)

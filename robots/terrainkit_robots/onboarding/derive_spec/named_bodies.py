@@ -81,7 +81,7 @@ def _is_upper_body(robot: Facts, body: Body) -> bool:
     """
     if body.index in robot.leg_bodies or body.virtual or not body.collisions:
         return False
-    if robot.mirror.counterpart(body.index) is not None:
+    if robot.mirror.image_body(body.index) is not None:
         return False
     subtree = _subtree(robot, body.index)
     pairs = robot.mirror.pairs

@@ -4,14 +4,11 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from terrainkit_robots.analysis.bodies.kinematics import ancestors, body_poses, joint_axis
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.transforms import axis_angle_to_matrix
 
 BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]
 URDFS = [
@@ -148,44 +145,6 @@ def test_a_chain_of_thousands_of_joints_is_walked():
     bodies = facts(f'<robot name="r">{links}{joints}</robot>').bodies
     assert body_poses(bodies, {})[-1][2, 3] == pytest.approx(0.001 * (count - 1))
     assert len(ancestors(bodies, count - 1)) == count - 1
-
-
-# Rotations
-
-
-def test_a_quarter_turn_about_each_axis():
-    quarter = np.float64(np.pi / 2)
-    np.testing.assert_allclose(
-        axis_angle_to_matrix(np.eye(3)[0], quarter)[:, 1], [0, 0, 1], atol=1e-15
-    )
-    np.testing.assert_allclose(
-        axis_angle_to_matrix(np.eye(3)[1], quarter)[:, 2], [1, 0, 0], atol=1e-15
-    )
-    np.testing.assert_allclose(
-        axis_angle_to_matrix(np.eye(3)[2], quarter)[:, 0], [0, 1, 0], atol=1e-15
-    )
-
-
-UNIT = st.floats(-1, 1)
-
-
-@given(st.tuples(UNIT, UNIT, UNIT).filter(lambda v: np.linalg.norm(v) > 0.1), st.floats(-7, 7))
-def test_rotations_are_as_mujoco_turns(axis, angle):
-    axis = np.array(axis) / np.linalg.norm(axis)
-    quaternion, wanted = np.zeros(4), np.zeros(9)
-    mujoco.mju_axisAngle2Quat(quaternion, axis, angle)
-    mujoco.mju_quat2Mat(wanted, quaternion)
-    ours = axis_angle_to_matrix(axis, np.float64(angle))
-    np.testing.assert_allclose(ours, wanted.reshape(3, 3), atol=1e-14)
-    np.testing.assert_allclose(ours @ ours.T, np.eye(3), atol=1e-14)
-
-
-def test_many_angles_at_once():
-    angles = np.linspace(-3, 3, 12).reshape(3, 4)
-    many = axis_angle_to_matrix(np.array([0, 0.6, 0.8]), angles)
-    assert many.shape == (3, 4, 3, 3)
-    one = axis_angle_to_matrix(np.array([0, 0.6, 0.8]), angles[1, 2])
-    np.testing.assert_allclose(many[1, 2], one, atol=1e-15)
 
 
 # Against yourdfpy

@@ -118,7 +118,7 @@ def same_torques(facts, model):
     weight = facts.total_mass * GRAVITY
     pushes = ground_forces(stance.contacts[:, :2], stance.center[:2], weight)
     needed = data.qfrc_bias.copy()
-    for leg, place, push in zip(facts.legs, stance.pressures, pushes, strict=True):
+    for leg, place, push in zip(facts.legs, stance.force_points, pushes, strict=True):
         foot = data.body(facts.bodies[leg.limb.chain[-1]].top.name).id
         jacobian = np.zeros((3, model.nv))
         mujoco.mj_jac(model, data, jacobian, None, place, foot)
@@ -355,7 +355,7 @@ def test_feet_are_pushed_within_their_soles(name, robot_file):
     facts = read(path_of(name, robot_file))
     stance = facts.stance
     poses = body_poses(facts.bodies, stance.positions)
-    for leg, place in zip(facts.legs, stance.pressures, strict=True):
+    for leg, place in zip(facts.legs, stance.force_points, strict=True):
         foot = leg.limb.chain[-1]
         points = contact_points(facts.bodies[foot], poses[foot], facts.meshes)[:, :2]
         assert (points.min(axis=0) - 1e-9 <= place[:2]).all()

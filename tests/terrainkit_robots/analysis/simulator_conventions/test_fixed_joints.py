@@ -57,14 +57,14 @@ def test_feet_are_merged_into_shanks_where_nothing_keeps_them(name):
         return
     assert [each.foot for each in merges] == ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]
     assert all(each.joint.dont_collapse for each in merges)
-    assert dict(merges[0].merged_into) == {"MuJoCo": "FL_calf", "Genesis": "FL_calf"}
+    assert dict(merges[0].merged_body) == {"MuJoCo": "FL_calf", "Genesis": "FL_calf"}
 
 
 def test_feet_without_the_attribute_are_merged_everywhere(tmp_path):
     text = bundled.find("quadruped").read_text().replace('dont_collapse="true"', "")
     (tmp_path / "robot.urdf").write_text(text)
     merges = merged_feet(Facts(load_robot(tmp_path / "robot.urdf")))
-    assert {simulator for each in merges for simulator in each.merged_into} == set(SIMULATORS)
+    assert {simulator for each in merges for simulator in each.merged_body} == set(SIMULATORS)
 
 
 def test_feet_that_are_the_last_body_are_never_merged():

@@ -151,10 +151,10 @@ def test_mirrored_positions_look_mirrored(name, robot_file):
 def test_the_twin_of_a_body(robot_file):
     robot = load("go2/urdf/go2.urdf", robot_file)
     index = {body.top.name: body.index for body in robot.bodies}
-    assert robot.mirror.counterpart(index["FL_hip"]) == (index["FR_hip"], -1)
-    assert robot.mirror.counterpart(index["FR_hip"]) == (index["FL_hip"], -1)
-    assert robot.mirror.counterpart(index["RL_calf"]) == (index["RR_calf"], 1)
-    assert robot.mirror.counterpart(0) is None
+    assert robot.mirror.image_body(index["FL_hip"]) == (index["FR_hip"], -1)
+    assert robot.mirror.image_body(index["FR_hip"]) == (index["FL_hip"], -1)
+    assert robot.mirror.image_body(index["RL_calf"]) == (index["RR_calf"], 1)
+    assert robot.mirror.image_body(0) is None
 
 
 # Pairs, by hand

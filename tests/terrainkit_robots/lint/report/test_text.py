@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 
 from terrainkit_robots.lint.report.text import format_lines, format_reports
+from terrainkit_robots.lint.selection import Suppressed
 
 
 def test_rules_are_headings_sorted_by_severity(report):
@@ -81,6 +82,12 @@ def test_skipped_rules_are_grouped_by_reason(report):
     assert "skipped: SYM001, SYM002: no legs detected\n" in text
     assert "skipped: INR002: suppressed: so\n" in text
     assert "warning: INR999: comment at robot.urdf:3: unknown rule\n" in text
+
+
+def test_findings_of_one_suppression_are_one_line(report):
+    (suppressed,) = [each for each in report.skipped if isinstance(each, Suppressed)]
+    text = format_reports([dataclasses.replace(report, skipped=(suppressed, suppressed))])
+    assert "skipped: INR002: suppressed for hatch, hatch: so\n" in text
 
 
 def test_last_line_has_counts_and_fixes(report):

@@ -1,4 +1,4 @@
-"""Descriptions of the terrains and their parameters, read from their docstrings."""
+"""Descriptions of terrains and their parameters, read from their docstrings."""
 
 import inspect
 from dataclasses import dataclass
@@ -9,58 +9,57 @@ from terrainkit.schema import field_docs
 
 
 @dataclass(frozen=True, kw_only=True)
-class ParameterText:
-    """A parameter, in words."""
+class ParameterDoc:
+    """The documentation of one parameter."""
 
     name: str
-    """Its name."""
+    """Name of the parameter."""
 
     easy: str
     """Default at difficulty 0."""
 
     hard: str
-    """Default at difficulty 1; empty if it is the same at every difficulty."""
+    """Default at difficulty 1; empty if it equals `easy`."""
 
     text: str
-    """What it is, with its unit."""
+    """Description with unit."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class TerrainText:
-    """A terrain, in words."""
+class TerrainDoc:
+    """The documentation of one terrain."""
 
     name: str
-    """Its name."""
+    """Name of the terrain."""
 
     text: str
-    """What it is: one paragraph or more."""
+    """Description, one paragraph or more."""
 
-    parameters: tuple[ParameterText, ...]
+    parameters: tuple[ParameterDoc, ...]
     """Its parameters, in order."""
 
 
-def summaries() -> dict[str, str]:
-    """Return the first sentence about each terrain, by name."""
-    return {name: _summary(name) for name in registry.names()}
+def terrain_summaries() -> dict[str, str]:
+    """Return the first line of each terrain's description, by name."""
+    return {
+        name: (inspect.getdoc(registry.get_terrain(name)) or "").partition("\n")[0]
+        for name in registry.terrain_names()
+    }
 
 
-def _summary(name: str) -> str:
-    return (inspect.getdoc(registry.find(name)) or "").partition("\n")[0]
-
-
-def describe(name: str) -> TerrainText:
-    """Return all that there is to say of the terrain `name`.
+def terrain_doc(name: str) -> TerrainDoc:
+    """Return the documentation of the terrain `name`.
 
     Raises:
-        ConfigError: if there is no such terrain, listing those that exist.
+        ConfigError: if there is no such terrain.
     """
-    terrain = registry.find(name)
+    terrain = registry.get_terrain(name)
     texts = field_docs(terrain)
-    return TerrainText(
+    return TerrainDoc(
         name=name,
         text=inspect.getdoc(terrain) or "",
         parameters=tuple(
-            ParameterText(
+            ParameterDoc(
                 name=name,
                 easy=_text(parameter.easy),
                 hard=_text(parameter.hard) if parameter.hard != parameter.easy else "",

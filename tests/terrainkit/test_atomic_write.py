@@ -1,10 +1,12 @@
 import errno
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
-from terrainkit.atomic import atomic_write
+from terrainkit.atomic_write import atomic_write, make_temporary_folder
 from terrainkit.errors import ExportError
 
 
@@ -124,7 +126,7 @@ def test_a_folder_is_no_target(target, overwrite):
 
 
 def test_a_missing_folder_is_not_made(tmp_path):
-    with pytest.raises(ExportError, match=r"cannot write .*: there is no folder .*nowhere"):
+    with pytest.raises(ExportError, match=r"cannot write .*: the folder .*nowhere does not exist"):
         write(tmp_path / "nowhere" / "map.npz")
     assert names(tmp_path) == []
 
@@ -139,7 +141,7 @@ def test_a_file_is_no_folder(target):
 @pytest.mark.parametrize("overwrite", [False, True])
 def test_a_fifo_is_no_target(target, overwrite):
     os.mkfifo(target)
-    with pytest.raises(ExportError, match="it is there, and not a plain file"):
+    with pytest.raises(ExportError, match="it exists and is not a regular file"):
         write(target, overwrite=overwrite)
     assert target.is_fifo()
 
@@ -147,7 +149,7 @@ def test_a_fifo_is_no_target(target, overwrite):
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
 def test_a_device_is_no_target(target):
     target.symlink_to("/dev/full")
-    with pytest.raises(ExportError, match="it is there, and not a plain file"):
+    with pytest.raises(ExportError, match="it exists and is not a regular file"):
         write(target, overwrite=True)
     assert target.is_char_device()
 
@@ -195,3 +197,19 @@ def test_others_may_read_what_is_written_as_the_umask_says(target):
     write(target)
     os.umask(before)
     assert target.stat().st_mode & 0o777 == 0o644
+
+
+def test_atomic_write_removes_folders_of_killed_processes(tmp_path):
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    own = make_temporary_folder(tmp_path)
+    stale = own.with_name(own.name.replace(f"-{os.getpid()}-", f"-{dead.pid}-"))
+    stale.mkdir()
+    (stale / "map.npz").write_text("half")
+    foreign = tmp_path / ".terrainkit-otherhost-1-abc"
+    foreign.mkdir()
+    with atomic_write(tmp_path / "a.txt") as path:
+        path.write_text("whole")
+    assert sorted(each.name for each in tmp_path.iterdir()) == sorted(
+        ["a.txt", foreign.name, own.name]
+    )

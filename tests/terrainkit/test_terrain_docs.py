@@ -3,15 +3,15 @@ from dataclasses import dataclass
 import pytest
 
 from terrainkit import parameter, registry
-from terrainkit.describe import describe, summaries
 from terrainkit.errors import ConfigError
+from terrainkit.terrain_docs import terrain_doc, terrain_summaries
 
 
-@pytest.mark.parametrize("name", registry.names())
+@pytest.mark.parametrize("name", registry.terrain_names())
 def test_every_terrain_and_parameter_has_words_and_a_unit(name):
-    about = describe(name)
+    about = terrain_doc(name)
     assert about.text.partition("\n")[0].endswith(".")
-    assert [p.name for p in about.parameters] == list(registry.find(name).at(0).requested())
+    assert [p.name for p in about.parameters] == list(registry.get_terrain(name).at(0).requested())
     unitless = {"grade", "number", "inverted"}
     for each in about.parameters:
         assert each.text.endswith(".")
@@ -19,29 +19,29 @@ def test_every_terrain_and_parameter_has_words_and_a_unit(name):
 
 
 def test_a_range_has_two_ends_and_a_value_one():
-    step_height, step_width, *_ = describe("pyramid_stairs").parameters
+    step_height, step_width, *_ = terrain_doc("pyramid_stairs").parameters
     assert (step_height.easy, step_height.hard) == ("0.05", "0.23")
     assert (step_width.easy, step_width.hard) == ("0.31", "")
 
 
 def test_a_terrain_of_others_has_the_words_of_its_parent_and_none_are_needed(monkeypatch):
     @dataclass(frozen=True, kw_only=True)
-    class Hurdles(registry.find("stairs")):
+    class Hurdles(registry.get_terrain("stairs")):
         """Hurdles."""
 
         number: int = parameter.count(3)
 
-    monkeypatch.setattr(registry, "find", lambda _: Hurdles)
-    words = {each.name: each.text for each in describe("hurdles").parameters}
+    monkeypatch.setattr(registry, "get_terrain", lambda _: Hurdles)
+    words = {each.name: each.text for each in terrain_doc("hurdles").parameters}
     assert words["step_height"] == "Rise of a step [m]."
     assert words["number"] == ""
 
 
 def test_summaries_are_one_sentence_each():
-    assert list(summaries()) == list(registry.names())
-    assert all(text.count(". ") == 0 for text in summaries().values())
+    assert list(terrain_summaries()) == list(registry.terrain_names())
+    assert all(text.count(". ") == 0 for text in terrain_summaries().values())
 
 
 def test_a_terrain_that_there_is_not():
     with pytest.raises(ConfigError, match="no terrain 'moon'; there are: flat, gap"):
-        describe("moon")
+        terrain_doc("moon")

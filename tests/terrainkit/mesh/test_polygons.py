@@ -4,11 +4,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from terrainkit.mesh.loops import Loops, laid_out, runs
+from terrainkit.mesh.polygons import Polygons, runs, segment_indices
 
 
-def loops(*rings, clockwise=False):
-    return Loops(
+def polygons(*rings, clockwise=False):
+    return Polygons(
         vertices=np.array([vertex for ring in rings for vertex in ring]),
         owner=np.repeat(np.arange(len(rings)), [len(ring) for ring in rings]),
         centers=np.array([[k, 0, 0] for k in range(len(rings))], dtype=np.float32),
@@ -17,26 +17,28 @@ def loops(*rings, clockwise=False):
 
 
 def test_a_loop_of_four_vertices_is_cut_along_a_diagonal():
-    triangles, centers = loops([3, 4, 6, 5]).triangles(first=10)
+    triangles, centers = polygons([3, 4, 6, 5]).triangles(first=10)
     assert triangles.tolist() == [[3, 4, 6], [3, 6, 5]]
     assert len(centers) == 0
 
 
 def test_a_loop_with_more_is_a_fan_around_its_center():
-    triangles, centers = loops([0, 1, 2, 3, 4]).triangles(first=10)
+    triangles, centers = polygons([0, 1, 2, 3, 4]).triangles(first=10)
     assert triangles.tolist() == [[0, 1, 10], [1, 2, 10], [2, 3, 10], [3, 4, 10], [4, 0, 10]]
     assert centers.tolist() == [[0, 0, 0]]
 
 
 def test_only_fans_take_a_center():
-    triangles, centers = loops([0, 1, 2, 3], [4, 5, 6, 7, 8], [5, 6, 7, 8, 9]).triangles(first=10)
+    triangles, centers = polygons([0, 1, 2, 3], [4, 5, 6, 7, 8], [5, 6, 7, 8, 9]).triangles(
+        first=10
+    )
     assert centers[:, 0].tolist() == [1, 2]
     assert np.unique(triangles[triangles >= 10]).tolist() == [10, 11]
     assert len(triangles) == 2 + 5 + 5
 
 
 def test_clockwise_loops_are_turned():
-    triangles, _ = loops([3, 4, 6, 5], clockwise=True).triangles(first=10)
+    triangles, _ = polygons([3, 4, 6, 5], clockwise=True).triangles(first=10)
     assert triangles.tolist() == [[6, 4, 3], [5, 6, 3]]
 
 
@@ -49,7 +51,7 @@ def test_clockwise_loops_are_turned():
     ],
 )
 def test_items_are_laid_end_to_end(lengths, owner, place):
-    found = laid_out(np.array(lengths, dtype=np.int64))
+    found = segment_indices(np.array(lengths, dtype=np.int64))
     assert [each.tolist() for each in found] == [owner, place]
 
 

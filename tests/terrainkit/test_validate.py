@@ -5,8 +5,8 @@ import pytest
 
 import terrainkit as tk
 from terrainkit import presets
-from terrainkit.audit import audit
 from terrainkit.mesh import TriMesh
+from terrainkit.validate import validate
 
 
 @pytest.fixture(scope="module")
@@ -15,7 +15,7 @@ def sound():
 
 
 def found(terrain_map, mesh=None):
-    return [(finding.check, finding.message) for finding in audit(terrain_map, mesh)]
+    return [(finding.check, finding.message) for finding in validate(terrain_map, mesh)]
 
 
 def changed(terrain_map, name, index, value):
@@ -42,7 +42,7 @@ def test_a_map_of_ours_has_nothing_wrong(config):
     assert found(terrain_map, terrain_map.mesh(merged=False)) == []
 
 
-@pytest.mark.parametrize("preset", presets.names())
+@pytest.mark.parametrize("preset", presets.preset_names())
 def test_no_preset_builds_something_else_than_it_asks_for(preset):
     terrain_map = tk.generate(tk.MapConfig(rows=10, cols=17, border=0.0, preset=preset))
     assert found(terrain_map) == []
@@ -51,7 +51,7 @@ def test_no_preset_builds_something_else_than_it_asks_for(preset):
 def test_a_disc_wider_than_a_patch_is_one_line_in_bounded_time(sound):
     config = dataclasses.replace(sound.config, spawn_radius=1e6)
     messages = found(dataclasses.replace(sound, config=config))
-    assert ("spawn", "no disc of radius 1e+06 m lies in a patch of 8 m x 8 m") in messages
+    assert ("spawn", "no disc of radius 1e+06 m fits in a patch of 8 m x 8 m") in messages
     assert not any("border" in message for _, message in messages)
 
 
@@ -73,7 +73,9 @@ def test_an_origin_on_uneven_ground(sound):
     origin = [x + 2.0, y, sound.height([x + 2.0, y])]
     ((check, message),) = found(changed(sound, "env_origins", (2, 5), origin))
     assert check == "spawn"
-    assert message.startswith("patch (2, 5): the spawn origin stands on ground that differs by 0.")
+    assert message.startswith(
+        "patch (2, 5): the spawn origin is not on level ground: heights within 0.5 m differ by 0."
+    )
 
 
 def test_an_origin_of_another_patch(sound):
@@ -85,17 +87,17 @@ def test_a_patch_that_was_edited(sound):
     i, j = sound.config.patch_start(1, 6)
     findings = found(changed(sound, "heights", (i + 1, j + 1), 3.0))
     assert [check for check, _ in findings] == ["patches"]
-    assert findings[0][1].startswith("patch (1, 6) is up to 3.")
+    assert findings[0][1].startswith("patch (1, 6): heights differ by up to 3.")
 
 
 def test_swapped_axes():
     square = tk.generate(tk.MapConfig(rows=10, border=1.0, preset="legged_gym"))
     findings = found(dataclasses.replace(square, heights=square.heights.T.copy()))
-    assert any("with its axes swapped" in message for _, message in findings)
+    assert any("with axes swapped" in message for _, message in findings)
 
 
 def test_a_border_that_is_not_level(sound):
-    assert ("patches", "the border is not level at height 0") in found(
+    assert ("patches", "the border is not flat at height 0") in found(
         changed(sound, "heights", (0, 0), 0.01)
     )
 
@@ -103,23 +105,23 @@ def test_a_border_that_is_not_level(sound):
 def test_a_curriculum_that_never_reaches_its_end(sound):
     stale = sound.difficulty * np.float32(0.9)
     findings = found(dataclasses.replace(sound, difficulty=stale))
-    assert ("difficulty", "row 2 has difficulty 0.9; wanted exactly 1") in findings
+    assert ("difficulty", "row 2: got difficulty 0.9; expected exactly 1") in findings
 
 
 def test_a_difficulty_that_falls(sound):
     messages = found(changed(sound, "difficulty", (1, 3), 1.5))
-    assert ("difficulty", "difficulty falls from row 1 to row 2 in column 3") in messages
+    assert ("difficulty", "difficulty decreases from row 1 to row 2 in column 3") in messages
 
 
 def test_a_width_that_the_patch_cannot_hold_is_named():
-    # A moat of 1 m around a platform of 3 m: a patch of 8 m x 4 m has 0.5 m for it along y.
+    # A moat of 1 m neighborhood a platform of 3 m: a patch of 8 m x 4 m has 0.5 m for it along y.
     config = tk.MapConfig(
         rows=2, cols=1, patch_size=(8.0, 4.0), terrains=(tk.SubTerrain(terrain="gap"),)
     )
     with pytest.warns(tk.TerrainkitWarning, match="gap.width on 1 patches; the map records"):
         terrain_map = tk.generate(config)
     assert found(terrain_map) == [
-        ("realized", "patch (1, 0), gap: width is (1.0, 0.5) where 1 was asked")
+        ("realized", "patch (1, 0), gap: width is (1.0, 0.5); requested 1")
     ]
 
 
@@ -127,7 +129,7 @@ def test_a_mesh_with_a_hole(sound):
     mesh = sound.mesh()
     holed = TriMesh(vertices=mesh.vertices, triangles=mesh.triangles[100:])
     messages = " ".join(message for _, message in found(sound, holed))
-    assert "edges have a face on one side only" in messages
+    assert "edges have only one face" in messages
     assert "the mesh covers" in messages
 
 
@@ -136,15 +138,15 @@ def test_a_mesh_with_a_face_turned_over(sound):
     turned = mesh.triangles.copy()
     turned[0] = turned[0, ::-1]
     messages = [m for _, m in found(sound, TriMesh(vertices=mesh.vertices, triangles=turned))]
-    assert "1 faces look down" in messages
-    assert any("or by faces turned over" in message for message in messages)
+    assert "1 faces point downward" in messages
+    assert any("or by faces of opposite winding" in message for message in messages)
 
 
 def test_a_mesh_of_another_map(sound):
     lifted = sound.mesh().vertices + np.float32([0, 0, 0.25])
     findings = found(sound, TriMesh(vertices=lifted, triangles=sound.mesh().triangles))
     assert [check for check, _ in findings] == ["mesh"]
-    assert findings[0][1].startswith("the mesh is up to 0.250 m off the heights")
+    assert findings[0][1].startswith("the mesh differs from the heights by up to 0.250 m")
 
 
 def test_a_mesh_without_faces(sound):

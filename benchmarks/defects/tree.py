@@ -1,46 +1,46 @@
-"""Defects of the tree of links and joints."""
+"""Defects of the tree of links and joints (TRE)."""
 
 import copy
 
-from defects.patient import NotHereError, Patient, Subjects, child, kind, parent
+from defects.mutant import Mutant, NotApplicableError, Subjects, child, mutation, parent
 
 
-@kind("TRE001", "error", "two links of one name")
-def duplicate_link(robot: Patient) -> Subjects:
-    link = robot.choose(robot.links())
+@mutation("TRE001", "error", "two links with the same name")
+def duplicate_link(robot: Mutant) -> Subjects:
+    link = robot.pick(robot.links())
     robot.root.append(copy.deepcopy(link))
     return [link.get("name")]
 
 
-@kind("TRE001", "error", "two joints of one name")
-def duplicate_joint(robot: Patient) -> Subjects:
-    one, other = robot.rng.sample(robot.moving(), 2)
+@mutation("TRE001", "error", "two joints with the same name")
+def duplicate_joint(robot: Mutant) -> Subjects:
+    one, other = robot.rng.sample(robot.actuated_joints(), 2)
     other.set("name", one.get("name"))
     return [one.get("name")]
 
 
-@kind("TRE002", "error", "a joint to a link that is not there")
-def unknown_child(robot: Patient) -> Subjects:
-    joint = robot.choose(robot.joints())
+@mutation("TRE002", "error", "joint with an unknown child")
+def unknown_child(robot: Mutant) -> Subjects:
+    joint = robot.pick(robot.joints())
     lost = child(joint) + "_old"
     joint.find("child").set("link", lost)
     return [joint.get("name"), lost]
 
 
-@kind("TRE002", "error", "a joint from a link that is not there")
-def unknown_parent(robot: Patient) -> Subjects:
-    joint = robot.choose(robot.joints())
+@mutation("TRE002", "error", "joint with an unknown parent")
+def unknown_parent(robot: Mutant) -> Subjects:
+    joint = robot.pick(robot.joints())
     lost = parent(joint).swapcase()
     joint.find("parent").set("link", lost)
     return [joint.get("name"), lost]
 
 
-@kind("TRE003", "error", "a link with two parents")
-def two_parents(robot: Patient) -> Subjects:
+@mutation("TRE003", "error", "link with two parents")
+def two_parents(robot: Mutant) -> Subjects:
     one, other = robot.rng.sample(robot.leg_links(), 2)
     names = one.get("name"), other.get("name")
     if robot.facts.body_of[names[0]].parent == robot.facts.body_of[names[1]].index:
-        raise NotHereError
+        raise NotApplicableError
     robot.insert(
         '<joint name="closing_joint" type="revolute"><origin xyz="0 0 -0.1"/><axis xyz="0 1 0"/>'
         f'<parent link="{names[0]}"/><child link="{names[1]}"/>'
@@ -49,18 +49,18 @@ def two_parents(robot: Patient) -> Subjects:
     return [*names, "closing_joint"]
 
 
-@kind("TRE004 TRE003", "error", "a loop within a leg")
-def loop(robot: Patient) -> Subjects:
-    joint = robot.choose(robot.knees())
+@mutation("TRE004 TRE003", "error", "loop within a leg")
+def loop(robot: Mutant) -> Subjects:
+    joint = robot.pick(robot.knee_joints())
     lower, upper = child(joint), parent(joint)
-    above = robot.above(upper)
+    above = robot.parent_joint(upper)
     above.find("parent").set("link", lower)
     return [lower, upper, joint.get("name"), above.get("name")]
 
 
-@kind("TRE004", "error", "the root hangs below a foot")
-def rootless(robot: Patient) -> Subjects:
-    root, foot = robot.facts.tree.order[0], robot.choose(robot.feet())
+@mutation("TRE004", "error", "root as the child of a foot")
+def root_loop(robot: Mutant) -> Subjects:
+    root, foot = robot.facts.tree.order[0], robot.pick(robot.feet())
     robot.insert(
         '<joint name="home_joint" type="fixed">'
         f'<parent link="{foot}"/><child link="{root}"/></joint>'
@@ -68,8 +68,8 @@ def rootless(robot: Patient) -> Subjects:
     return ()
 
 
-@kind("TRE005", "error", "a link that hangs nowhere")
-def orphan(robot: Patient) -> Subjects:
+@mutation("TRE005", "error", "link without joint")
+def free_link(robot: Mutant) -> Subjects:
     robot.insert(
         '<link name="payload"><inertial><mass value="1"/>'
         '<inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial>'
@@ -78,40 +78,40 @@ def orphan(robot: Patient) -> Subjects:
     return ["payload"]
 
 
-@kind("TRE005", "error", "a joint was taken out")
-def detached(robot: Patient) -> Subjects:
-    joint = robot.choose(robot.leg_joints())
+@mutation("TRE005", "error", "missing joint")
+def missing_joint(robot: Mutant) -> Subjects:
+    joint = robot.pick(robot.leg_joints())
     robot.root.remove(joint)
-    return robot.body(child(joint))
+    return robot.body_names(child(joint))
 
 
-@kind("TRE006", "error", "no links")
-def empty(robot: Patient) -> Subjects:
+@mutation("TRE006", "error", "robot without links")
+def empty(robot: Mutant) -> Subjects:
     for element in robot.links() + robot.joints():
         robot.root.remove(element)
     return ()
 
 
-@kind("TRE008", "error", "a floating joint inside")
-def floating(robot: Patient) -> Subjects:
-    joint = robot.choose(robot.leg_joints())
+@mutation("TRE008", "error", "floating joint in a leg")
+def floating(robot: Mutant) -> Subjects:
+    joint = robot.pick(robot.leg_joints())
     joint.set("type", "floating")
     return [joint.get("name")]
 
 
-@kind("TRE008", "error", "a planar joint inside")
-def planar(robot: Patient) -> Subjects:
-    joint = robot.choose(robot.leg_joints())
+@mutation("TRE008", "error", "planar joint in a leg")
+def planar(robot: Mutant) -> Subjects:
+    joint = robot.pick(robot.leg_joints())
     joint.set("type", "planar")
     return [joint.get("name")]
 
 
-@kind("TRE009", "info", "an empty link above the trunk")
-def dummy_root(robot: Patient) -> Subjects:
+@mutation("TRE009", "info", "empty link above the trunk")
+def dummy_root(robot: Mutant) -> Subjects:
     root = robot.facts.tree.order[0]
     if robot.facts.tree.links[root].inertial is None:
-        raise NotHereError
-    name = robot.choose(["base_footprint", "dummy", "world"])
+        raise NotApplicableError
+    name = robot.pick(["base_footprint", "dummy", "world"])
     robot.insert(f'<link name="{name}"/>')
     robot.insert(
         f'<joint name="{name}_joint" type="fixed"><origin xyz="0 0 0.3"/>'

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 from terrainkit import MapConfig, SubTerrain, generate
-from terrainkit.boxes import box_cover, level_cells
+from terrainkit.box_decomposition import decompose_boxes, level_cells
 from terrainkit.grid import Grid
 from terrainkit.surface import surface_at
 
@@ -29,8 +29,8 @@ def points_in_cells(cells, cell, lower):
 
 
 def cover_of(heights, threshold):
-    seams = tuple(np.array([0, n // 2, n]) for n in heights.shape)
-    return box_cover(heights, Grid(shape=heights.shape, cell=1.0), threshold, seams)
+    patch_edges = tuple(np.array([0, n // 2, n]) for n in heights.shape)
+    return decompose_boxes(heights, Grid(shape=heights.shape, cell=1.0), threshold, patch_edges)
 
 
 def level_of(heights, threshold):
@@ -78,7 +78,7 @@ def test_a_step_that_is_no_wall_leaves_the_cells_on_both_sides_to_a_heightfield(
     assert not cover_of(heights, 2.0).complete
 
 
-def test_a_level_map_is_met_to_a_millimetre_everywhere(level_map):
+def test_a_level_map_is_met_to_a_millimeter_everywhere(level_map):
     cover = level_map.boxes()
     assert cover.complete
     place = points_in_cells(cover.covered, level_map.config.cell, level_map.grid.lower)
@@ -144,7 +144,7 @@ def test_a_slope_is_boxes_under_its_level_ends_alone():
 def test_many_heights_are_covered_too():
     # 60 columns of cells, each a level of its own: more than are searched over the whole block.
     heights = np.repeat(np.arange(60, dtype=np.float32)[:, None], 20, axis=1)
-    cover = box_cover(
+    cover = decompose_boxes(
         heights, Grid(shape=(60, 20), cell=0.1), 0.075, (np.array([0, 60]), np.array([0, 20]))
     )
     assert cover.complete

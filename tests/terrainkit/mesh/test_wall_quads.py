@@ -2,25 +2,25 @@ import numpy as np
 import pytest
 
 from terrainkit.grid import Grid
-from terrainkit.mesh.cut_quads import cut_quads
-from terrainkit.mesh.lattice import Lattice
+from terrainkit.mesh.node_grid import NodeGrid
+from terrainkit.mesh.wall_quads import wall_quads
 
 CELL = 0.1
 
 
 def lattice_of(rows, threshold=0.1):
     heights = np.array(rows, dtype=np.float32)
-    return Lattice.of(heights, Grid(shape=heights.shape, cell=CELL), threshold)
+    return NodeGrid.from_heights(heights, Grid(shape=heights.shape, cell=CELL), threshold)
 
 
 def center_quad(corners, first=100):
     low_left, low_right, high_right, high_left = corners
-    lattice = lattice_of([[low_left, high_left], [low_right, high_right]])
-    return cut_quads(lattice, np.array([4]), first)  # the middle one of 3 x 3
+    node_grid = lattice_of([[low_left, high_left], [low_right, high_right]])
+    return wall_quads(node_grid, np.array([4]), first)  # the middle one of 3 x 3
 
 
 def test_no_quads_are_no_faces():
-    triangles, vertices = cut_quads(lattice_of([[0, 0]]), np.array([], dtype=np.int64), 7)
+    triangles, vertices = wall_quads(lattice_of([[0, 0]]), np.array([], dtype=np.int64), 7)
     assert triangles.shape == (0, 3)
     assert vertices.shape == (0, 3)
 
@@ -51,8 +51,8 @@ def test_two_high_corners_that_meet_in_a_point_are_kept_apart(corners):
     assert len(places) == 2
     assert 0 < np.abs(places - CELL).max() < 0.001
     high = vertices[vertices[:, 2] == max(corners)]
-    towards = (np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) - 0.5)[np.argmax(corners)]
-    assert ((high[:, :2] - CELL) * towards > 0).all(axis=1).any()
+    toward = (np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) - 0.5)[np.argmax(corners)]
+    assert ((high[:, :2] - CELL) * toward > 0).all(axis=1).any()
 
 
 @pytest.mark.parametrize("corners", [(1, 0, 1, 0), (3, 0, 2, 1)])

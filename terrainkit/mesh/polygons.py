@@ -1,4 +1,4 @@
-"""Loops: rectangles as rings of vertices, many at a time, and their triangles."""
+"""Polygons: rectangles with additional vertices on their sides, and their triangles."""
 
 from dataclasses import dataclass
 
@@ -10,29 +10,32 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Loops:
-    """Flat rectangles, each with all the vertices that its rim needs."""
+class Polygons:
+    """Flat rectangles with all vertices of their boundaries."""
 
     vertices: Ids
-    """Vertices of all loops one after the other, in order around each, shape (v,)."""
+    """Vertices of all polygons, one polygon after the other, in order, shape (v,)."""
 
     owner: Ids
-    """Which loop each vertex belongs to, ascending, shape (v,)."""
+    """Index of the polygon of each vertex, ascending, shape (v,)."""
 
     centers: NDArray[np.float32]
-    """Middle of each loop [m], shape (n, 3)."""
+    """Center of each polygon [m], shape (n, 3)."""
 
     clockwise: bool = False
-    """Whether the order is clockwise, seen from above."""
+    """Whether the vertices are in clockwise order, seen from above."""
 
     def triangles(self, first: int) -> tuple[Ids, NDArray[np.float32]]:
-        """Return the triangles, shape (t, 3), and the centers that they use [m], shape (c, 3).
+        """Triangulate the polygons.
 
-        A loop with nothing but its corners is cut along a diagonal; any other is a fan from its
-        center, since a fan from a corner would have faces without area.
+        A polygon with four vertices is split along a diagonal. Others are fans around their center,
+        since a fan around a corner would have degenerate faces.
 
         Args:
-            first: Number that the first center takes.
+            first: Vertex number of the first center.
+
+        Returns:
+            Triangles, shape (t, 3), and centers that they use [m], shape (c, 3).
         """
         sizes = np.bincount(self.owner, minlength=len(self.centers))
         starts = np.cumsum(sizes) - sizes
@@ -49,14 +52,14 @@ class Loops:
         return triangles[:, ::-1] if self.clockwise else triangles, self.centers[~bare]
 
 
-def laid_out(lengths: Ids) -> tuple[Ids, Ids]:
-    """Return the owner and the place within it of items laid end to end, `lengths` of each."""
+def segment_indices(lengths: Ids) -> tuple[Ids, Ids]:
+    """Return segment and index within the segment of the items of consecutive segments."""
     owner = np.repeat(np.arange(len(lengths)), lengths)
     return owner, np.arange(len(owner)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
 
 
 def runs(mask: Mask) -> tuple[Ids, Ids, Ids]:
-    """Return row, start and end of every run of True along the second axis, in order."""
+    """Return row, start and end of each run of True along the second axis, in order."""
     padded = np.zeros((mask.shape[0], mask.shape[1] + 2), dtype=bool)
     padded[:, 1:-1] = mask
     flat = padded.ravel()

@@ -1,8 +1,8 @@
-"""The lattice that a mesh is built on: nodes, the quads between them, and which of those are cut.
+"""The nodes of a mesh, the quads between them, and the walls.
 
-The nodes are the samples, plus a rim at the edge of the map that repeats the outermost samples, so
-that the mesh covers the map and not only the samples' centers. Node (i, j) has the number
-`i * ny + j`; the vertices in the middle of walls follow, two for each.
+The nodes are the samples, and a rim at the edge of the map that repeats the outermost samples, so
+that the mesh covers the whole map. Node (i, j) has the number `i * ny + j`. The vertices at the
+midpoints of walls follow, two for each wall.
 """
 
 from dataclasses import dataclass
@@ -11,16 +11,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.capacity import require_memory
 from terrainkit.grid import Grid
+from terrainkit.memory import check_memory
 from terrainkit.walls import wall_edges
 
 BYTES_PER_NODE = 120
-"""Most that building a mesh holds for each node: its faces, and what they are made from."""
+"""Peak memory of building a mesh per node [bytes]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Lattice:
+class NodeGrid:
     """Nodes of shape (nx, ny) and the quads between them, of shape (nx - 1, ny - 1)."""
 
     x: NDArray[np.float64]
@@ -39,16 +39,16 @@ class Lattice:
     """Whether the edge from (i, j) to (i, j + 1) is a wall, shape (nx, ny - 1)."""
 
     @classmethod
-    def of(cls, heights: NDArray[np.float32], grid: Grid, threshold: float) -> "Lattice":
-        """Return the lattice of a heightfield; a step above `threshold` [m] is a wall."""
-        require_memory(heights.size * BYTES_PER_NODE, f"a mesh of {heights.size} samples")
+    def from_heights(cls, heights: NDArray[np.float32], grid: Grid, threshold: float) -> "NodeGrid":
+        """Return the nodes of a heightfield; a difference above `threshold` [m] is a wall."""
+        check_memory(heights.size * BYTES_PER_NODE, f"a mesh of {heights.size} samples")
         z = np.pad(heights, 1, mode="edge")
         walls_x, walls_y = wall_edges(z, threshold)
         x, y = (np.concatenate([[grid.lower[k]], grid.axis(k), [grid.upper[k]]]) for k in (0, 1))
         return cls(x=x, y=y, z=z, walls_x=walls_x, walls_y=walls_y)
 
     @cached_property
-    def cut(self) -> NDArray[np.bool_]:
+    def has_wall(self) -> NDArray[np.bool_]:
         """Whether each quad has a wall."""
         either = self.walls_x[:, :-1] | self.walls_x[:, 1:]
         either |= self.walls_y[:-1]
@@ -56,21 +56,21 @@ class Lattice:
         return either
 
     @cached_property
-    def even_x(self) -> NDArray[np.bool_]:
-        """Whether each quad is level along x, on both of its sides."""
+    def level_x(self) -> NDArray[np.bool_]:
+        """Whether both edges of each quad along x are level."""
         same = self.z[:-1] == self.z[1:]
-        even: NDArray[np.bool_] = same[:, :-1] & same[:, 1:]
-        return even
+        level: NDArray[np.bool_] = same[:, :-1] & same[:, 1:]
+        return level
 
     @cached_property
-    def even_y(self) -> NDArray[np.bool_]:
-        """Whether each quad is level along y, on both of its sides."""
+    def level_y(self) -> NDArray[np.bool_]:
+        """Whether both edges of each quad along y are level."""
         same = self.z[:, :-1] == self.z[:, 1:]
-        even: NDArray[np.bool_] = same[:-1] & same[1:]
-        return even
+        level: NDArray[np.bool_] = same[:-1] & same[1:]
+        return level
 
     def corners(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the numbers of the four corners of each quad (i, j), anticlockwise, (n, 4)."""
+        """Return the numbers of the four corners of each quad (i, j), counterclockwise, (n, 4)."""
         ny = self.z.shape[1]
         first = i * ny + j
         return np.stack([first, first + ny, first + ny + 1, first + 1], axis=1)
@@ -92,22 +92,22 @@ class Lattice:
 
     @property
     def vertex_count(self) -> int:
-        """How many numbers the nodes and the middles of the walls take."""
+        """How many numbers the nodes and the midpoints of the walls take."""
         return int(self.z.size + 2 * (self.edges_x.size + self.edges_y.size))
 
-    def middle_x(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the vertex in the middle of each wall (i, j)-(i + 1, j), on the side of (i, j).
+    def midpoint_x(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the vertex at the midpoint of each wall (i, j)-(i + 1, j), on the side of (i, j).
 
-        The vertex on the other side has the next number. Where there is no wall, it is any number.
+        The vertex on the other side has the next number. Without a wall, the result is undefined.
         """
-        place = np.searchsorted(self.edges_x, i * self.walls_x.shape[1] + j)
-        vertex: NDArray[np.int64] = self.z.size + 2 * place
+        index = np.searchsorted(self.edges_x, i * self.walls_x.shape[1] + j)
+        vertex: NDArray[np.int64] = self.z.size + 2 * index
         return vertex
 
-    def middle_y(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the same for the walls (i, j)-(i, j + 1)."""
-        place = self.edges_x.size + np.searchsorted(self.edges_y, i * self.walls_y.shape[1] + j)
-        vertex: NDArray[np.int64] = self.z.size + 2 * place
+    def midpoint_y(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the vertex at the midpoint of each wall (i, j)-(i, j + 1), like `midpoint_x`."""
+        index = self.edges_x.size + np.searchsorted(self.edges_y, i * self.walls_y.shape[1] + j)
+        vertex: NDArray[np.int64] = self.z.size + 2 * index
         return vertex
 
     def nodes(self, numbers: NDArray[np.int64]) -> NDArray[np.float32]:
@@ -115,8 +115,8 @@ class Lattice:
         i, j = np.divmod(numbers, self.z.shape[1])
         return _positions(self.x[i], self.y[j], self.z.ravel()[numbers])
 
-    def middles(self) -> NDArray[np.float32]:
-        """Return the positions of all vertices in the middle of walls [m], in their order."""
+    def midpoints(self) -> NDArray[np.float32]:
+        """Return the positions of all midpoints of walls [m], in the order of their numbers."""
         i, j = np.divmod(self.edges_x, self.walls_x.shape[1])
         x = (self.x[i] + self.x[i + 1]) / 2
         along_x = [_positions(x, self.y[j], self.z[i + side, j]) for side in (0, 1)]

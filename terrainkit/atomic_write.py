@@ -1,0 +1,94 @@
+"""Write files atomically: completely or not at all."""
+
+import os
+import shutil
+import socket
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from terrainkit.errors import ExportError
+
+_PREFIX = ".terrainkit-"
+
+
+@contextmanager
+def atomic_write(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
+    """Yield a temporary path to write to, and move it to `path` when the block ends.
+
+    Files that the block writes beside the temporary path, such as a sidecar, are moved as well. If
+    the block raises, nothing changes. Temporary folders of killed processes are removed.
+
+    Raises:
+        ExportError: if a target exists and `overwrite` is not set, or cannot be written.
+    """
+    check_target(path, overwrite=overwrite)
+    name = path.name
+    try:
+        if path.is_symlink():
+            path = path.resolve()  # keep the link, replace its target
+    except (OSError, RuntimeError) as error:  # before Python 3.13 a loop is a RuntimeError
+        raise ExportError(f"cannot write {path}: {error}") from error
+    if path.is_symlink():
+        raise ExportError(f"cannot write {path}: the link points to itself")
+    remove_stale_folders(path.parent)
+    try:
+        # On the same file system as the target, so that moving is a rename.
+        folder = make_temporary_folder(path.parent)
+    except OSError as error:
+        raise ExportError(f"cannot write {path}: {error.strerror or error}") from error
+    try:
+        yield folder / name  # the suffix may select the format
+        if name != path.name:
+            (folder / name).rename(folder / path.name)
+        written = sorted(folder.iterdir())
+        for file in written:
+            check_target(path.with_name(file.name), overwrite=overwrite)
+        for file in written:
+            file.replace(path.with_name(file.name))
+    except OSError as error:
+        raise ExportError(f"cannot write {path}: {error.strerror or error}") from error
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def check_target(path: Path, *, overwrite: bool) -> None:
+    """Raise ExportError if `path` cannot be written, or exists and may not be replaced."""
+    try:
+        if path.is_dir():
+            raise ExportError(f"cannot write {path}: it is a folder")
+        if path.exists() and not path.is_file():
+            raise ExportError(f"cannot write {path}: it exists and is not a regular file")
+        if path.exists() and not overwrite:
+            raise ExportError(
+                f"{path} exists; choose another name, or use --overwrite (overwrite=True)"
+            )
+        if not path.parent.is_dir():
+            raise ExportError(f"cannot write {path}: the folder {path.parent} does not exist")
+    except OSError as error:
+        raise ExportError(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def make_temporary_folder(parent: Path) -> Path:
+    """Create a temporary folder in `parent`, whose name records the host and the process."""
+    return Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{_host()}-{os.getpid()}-", dir=parent))
+
+
+def remove_stale_folders(parent: Path) -> None:
+    """Remove the temporary folders in `parent` that killed processes of this host have left."""
+    prefix = f"{_PREFIX}{_host()}-"
+    for folder in parent.glob(f"{prefix}*-*"):
+        pid = folder.name.removeprefix(prefix).partition("-")[0]
+        if pid.isdecimal() and not _is_running(int(pid)):
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _host() -> str:
+    return "".join(c for c in socket.gethostname() if c.isalnum())
+
+
+def _is_running(pid: int) -> bool:
+    import psutil
+
+    return bool(psutil.pid_exists(pid))

@@ -1,0 +1,37 @@
+"""Measure the difficulty of a patch from its heights."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+STEP_LENGTH = 0.3
+"""Longest step of a robot [m]."""
+
+MAX_STEP_HEIGHT = 0.5
+"""Height difference at which the measure saturates, since no leg bridges it [m]."""
+
+
+def measured_difficulty(heights: NDArray[np.float32], cell: float, start: float) -> float:
+    r"""Return the difficulty of a patch [m]: 0 for level ground.
+
+    .. math:: H = \operatorname{mean}_{p, \delta} \min(|h(p + \delta) - h(p)|, L)
+                + \operatorname{mean}_p \min(|h(p) - h_0|, L)
+
+    over all samples p and steps :math:`\delta` along x and y of up to `STEP_LENGTH`, with
+    L = `MAX_STEP_HEIGHT`. The first term measures slopes, risers and edges within one step. The
+    second measures the height to climb and the depth of holes. The measure is our own.
+
+    Args:
+        heights: Heights of a patch [m], shape (nx, ny).
+        cell: Distance between two samples [m].
+        start: Height of the spawn origin [m].
+    """
+    total, count = 0.0, 0
+    for n in range(1, max(1, round(STEP_LENGTH / cell)) + 1):
+        for step in (heights[n:] - heights[:-n], heights[:, n:] - heights[:, :-n]):
+            total, count = total + _clipped_sum(step), count + step.size
+    away = _clipped_sum(heights - np.float32(start)) / heights.size
+    return (total / count if count else 0.0) + away
+
+
+def _clipped_sum(change: NDArray[np.float32]) -> float:
+    return float(np.minimum(np.abs(change), MAX_STEP_HEIGHT).sum(dtype=np.float64))
