@@ -148,7 +148,7 @@ def does_not_stand(robot: Facts) -> Iterator[Violation]:
         source=robot.model.source,
         severity=_LEVELS[level],
         certainty="likely",
-        message=f"standing pose {control}: {', '.join(assessment.failures)}"
+        message=f"standing pose {control}: {'; '.join(assessment.failures)}"
         + ("; without self-collision the robot stands" if stands_without else ""),
         hint=_OVERLAP_HINT if stands_without else "",
         measured={
