@@ -21,7 +21,7 @@ def test_one_that_stands(stood):
 @pytest.mark.parametrize(
     ("changes", "fault", "degree"),
     [
-        ({"tilt": math.radians(3.6)}, "it tilts by 3.6 degrees; expected at most 3", 0),
+        ({"tilt": math.radians(3.6)}, "it tilts by 3.6 deg (expected at most 3 deg)", 0),
         ({"tilt": math.radians(12)}, "it tilts by 12.0 deg (expected at most 3 deg)", 1),
         ({"tilt": math.radians(90)}, "it tilts by 90.0 deg (expected at most 3 deg)", 2),
         ({"height_loss": 0.15}, "its base sinks by 0.150 m (expected at most 0.100 m)", 1),
