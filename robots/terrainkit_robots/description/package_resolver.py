@@ -16,6 +16,8 @@ from pathlib import Path
 from typing import Literal
 from urllib.parse import unquote
 
+from terrainkit_robots.files import open_regular
+
 FoundBy = Literal["path", "package", "search", "nothing"]
 
 _PACKAGE = re.compile(
@@ -370,13 +372,10 @@ def _path_variable(name: str) -> list[Path]:
 
 
 def _read_package_name(path: Path) -> str | None:
-    mode = _mode(path)
-    if mode is None or not stat.S_ISREG(mode):
-        return None
     try:
-        with path.open("rb") as stream:
+        with open_regular(path) as stream:
             text = stream.read(_MAX_BYTES)
-    except OSError:
+    except (OSError, ValueError):
         return None
     match = re.search(rb"<name>\s*([^<\s]+)\s*</name>", text)
     return match[1].decode("utf-8", "replace") if match else None

@@ -22,7 +22,7 @@ import numpy as np
 from terrainkit.atomic_write import atomic_write
 from terrainkit.errors import ConfigError, ExportError, listing
 from terrainkit.toml_text import parse_toml, read_text
-from terrainkit_robots.mesh.sniff import open_regular
+from terrainkit_robots.files import open_regular
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.scene import SPEC_FILE, Robot

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from terrainkit_robots.description.mjcf.document import Node
+from terrainkit_robots.description.mjcf.tree import Node
 from terrainkit_robots.description.model import Actuator, Mimic, Source
 
 if TYPE_CHECKING:

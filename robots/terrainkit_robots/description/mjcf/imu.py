@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from terrainkit_robots.description.mjcf.document import Node
 from terrainkit_robots.description.mjcf.shapes import Scale
+from terrainkit_robots.description.mjcf.tree import Node
 
 if TYPE_CHECKING:
     import mujoco

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from typing import TYPE_CHECKING
 
-from terrainkit_robots.description.mjcf.document import MjcfDocument, Node, is_allowed, limit_size
+from terrainkit_robots.description.mjcf.tree import MjcfTree, Node, is_allowed, limit_size
 from terrainkit_robots.description.model import Problem
 from terrainkit_robots.description.xml.numbers import parse_numbers, replace_commas
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -76,42 +76,40 @@ _DEFAULTS = {"mass": "0", "pos": "0 0 0"}
 _ORIENTATIONS = ("quat", "axisangle", "xyaxes", "zaxis", "euler", "fullinertia")
 
 
-def parse_mjcf(document: MjcfDocument) -> tuple["mujoco.MjSpec | None", list[Node]]:
-    """Parse a document with MuJoCo.
+def parse_mjcf(tree: MjcfTree) -> tuple["mujoco.MjSpec | None", list[Node]]:
+    """Parse a tree with MuJoCo.
 
-    Rejected elements are removed from the document and reported as problems.
+    Rejected elements are removed from the tree and reported as problems.
 
     Returns:
-        The spec and the node of each line. The spec is None if MuJoCo still rejects the document
+        The spec and the node of each line. The spec is None if MuJoCo still rejects the tree
         after many repairs.
     """
     import mujoco
 
-    for node in list(document.nodes()):
-        _check_numbers(document, node)
+    for node in list(tree.nodes()):
+        _check_numbers(tree, node)
     began, message = time.monotonic(), ""
     for _ in range(_MAX_ATTEMPTS):
-        limit_size(document)
-        text, attached, lines = document.write()
+        limit_size(tree)
+        text, attached, lines = tree.write()
         try:
             with quiet_mujoco():
                 return mujoco.MjSpec.from_string(text, include=attached or None), lines
         except (ValueError, RuntimeError, mujoco.FatalError, mujoco.UnexpectedError) as error:
-            document.complete, message = False, _clean_message(str(error))
-            if not _repair(document, lines, str(error)):
+            tree.complete, message = False, _clean_message(str(error))
+            if not _repair(tree, lines, str(error)):
                 return None, lines
         if time.monotonic() - began > _MAX_SECONDS:
             break
     reason = f"MuJoCo still rejects the file without the reported elements ({message}); "
-    add_problem(document, document.root, "XML011", reason + "the robot is not checked")
+    report(tree, tree.root, "XML011", reason + "the robot is not checked")
     return None, []
 
 
-def add_problem(
-    document: MjcfDocument, node: Node, code: str, message: str, **details: str
-) -> None:
+def report(tree: MjcfTree, node: Node, code: str, message: str, **details: str) -> None:
     """Add a problem at a node."""
-    document.problems.append(
+    tree.problems.append(
         Problem(code=code, message=message, source=node.source, subject=node.owner, details=details)
     )
 
@@ -119,7 +117,7 @@ def add_problem(
 # Numbers
 
 
-def _check_numbers(document: MjcfDocument, node: Node) -> None:
+def _check_numbers(tree: MjcfTree, node: Node) -> None:
     """Report attributes that are not numbers, and repair or remove them.
 
     MuJoCo reports only one at a time, and accepts NaN.
@@ -138,8 +136,8 @@ def _check_numbers(document: MjcfDocument, node: Node) -> None:
             continue
         repaired = next((r for n in counts if (r := replace_commas(text, n))), "")
         expected = "a number" if counts[0] == 1 else f"{counts[0]} numbers"
-        add_problem(
-            document,
+        report(
+            tree,
             node,
             "XML006",
             f"{name} of <{node.tag}>: got {short(text, 40)!r}; expected {expected}"
@@ -156,20 +154,20 @@ def _check_numbers(document: MjcfDocument, node: Node) -> None:
 # Repairs
 
 
-def _repair(document: MjcfDocument, lines: list[Node], error: str) -> bool:
+def _repair(tree: MjcfTree, lines: list[Node], error: str) -> bool:
     """Report and remove what MuJoCo rejects; return False if its message does not name it."""
     message = _clean_message(error)
     place = re.search(r"Element '[^']*', line (\d+)", error)
     line = int(place[1]) if place else 0
     if not 1 <= line <= len(lines):
-        add_problem(document, document.root, "XML011", f"MuJoCo rejects the file: {message}")
+        report(tree, tree.root, "XML011", f"MuJoCo rejects the file: {message}")
         return False
     node = lines[line - 1]
     for pattern, repair in _REPAIRS:
         match = re.search(pattern, message)
-        if match and repair(document, node, match):
+        if match and repair(tree, node, match):
             return True
-    _report_rejected(document, node, message)
+    _report_rejected(tree, node, message)
     return _remove(node)
 
 
@@ -187,18 +185,18 @@ def _remove(node: Node) -> bool:
     return True
 
 
-def _report_rejected(document: MjcfDocument, node: Node, message: str) -> None:
-    add_problem(document, node, "XML011", f"MuJoCo rejects <{node.tag}>: {message}")
+def _report_rejected(tree: MjcfTree, node: Node, message: str) -> None:
+    report(tree, node, "XML011", f"MuJoCo rejects <{node.tag}>: {message}")
 
 
 def _similar_nodes(
-    document: MjcfDocument, node: Node, *, attribute: str = "", value: str = ""
+    tree: MjcfTree, node: Node, *, attribute: str = "", value: str = ""
 ) -> list[Node]:
     """Return all nodes with the same error: same tag, same parent tag, same attribute and value."""
     place = node.parent.tag if node.parent else ""
     duplicates = [
         other
-        for other in document.nodes()
+        for other in tree.nodes()
         if other is not node
         and other.tag == node.tag
         and (other.parent.tag if other.parent else "") == place
@@ -214,17 +212,17 @@ def _count_suffix(nodes: list[Node]) -> str:
     return f" ({len(nodes)} times, next on line {nodes[1].source.line})"
 
 
-def _unknown_attribute(document: MjcfDocument, node: Node, match: re.Match[str]) -> bool:
+def _unknown_attribute(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     name = match[1]
     if name not in node.attributes:
         return False
-    nodes = _similar_nodes(document, node, attribute=name)
+    nodes = _similar_nodes(tree, node, attribute=name)
     suggestion = closest(
         name, _schema().get(node.tag, frozenset()) - node.attributes.keys(), _MIN_SIMILARITY
     )
     what = f"attribute {name} of <{node.tag}> is unknown to {_mujoco()}, which rejects the file"
-    add_problem(
-        document,
+    report(
+        tree,
         node,
         "XML007",
         what + _count_suffix(nodes) + (f"; did you mean {suggestion}?" if suggestion else ""),
@@ -240,17 +238,17 @@ def _unknown_attribute(document: MjcfDocument, node: Node, match: re.Match[str])
     return True
 
 
-def _unknown_element(document: MjcfDocument, node: Node, match: re.Match[str]) -> bool:
+def _unknown_element(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     del match
     if node.parent is None:
         return False
-    nodes = _similar_nodes(document, node)
+    nodes = _similar_nodes(tree, node)
     suggestion = closest(
         node.tag, _allowed_children().get(node.parent.tag, frozenset(_schema())), _MIN_SIMILARITY
     )
     what = f"<{node.tag}> in <{node.parent.tag}> is unknown to {_mujoco()}, which rejects the file"
-    add_problem(
-        document,
+    report(
+        tree,
         node,
         "XML007",
         what + _count_suffix(nodes) + (f"; did you mean <{suggestion}>?" if suggestion else ""),
@@ -277,7 +275,7 @@ def _mujoco() -> str:
     return f"MuJoCo {mujoco.__version__}"
 
 
-def _invalid_number(document: MjcfDocument, node: Node, match: re.Match[str]) -> bool:
+def _invalid_number(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     name = match["name"]
     if name not in node.attributes:
         return False
@@ -289,15 +287,15 @@ def _invalid_number(document: MjcfDocument, node: Node, match: re.Match[str]) ->
     else:
         expected = f"{counts[0]} numbers" if counts[0] > 1 else "a number"
     message = f"{name} of <{node.tag}>: got {short(text, 40)!r}; expected {expected}"
-    add_problem(document, node, "XML006", message, attribute=name, repaired="")
+    report(tree, node, "XML006", message, attribute=name, repaired="")
     return True
 
 
-def _missing_attribute(document: MjcfDocument, node: Node, match: re.Match[str]) -> bool:
+def _missing_attribute(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     name = match[1]
     if name not in node.written and (node.tag, name) != ("inertial", "mass"):  # reported by INR001
         message = f"<{node.tag}> has no {name}; MuJoCo rejects the file"
-        add_problem(document, node, "XML013", message, attribute=name)
+        report(tree, node, "XML013", message, attribute=name)
     if name in _DEFAULTS and name not in node.attributes:
         node.attributes[name] = _DEFAULTS[name]
         node.defaults.add(name)
@@ -305,7 +303,7 @@ def _missing_attribute(document: MjcfDocument, node: Node, match: re.Match[str])
     return _remove(node)
 
 
-def _repeated_name(document: MjcfDocument, node: Node, match: re.Match[str]) -> bool:
+def _repeated_name(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     name, kind = match["name"], match["kind"]
     if "name" not in node.attributes and node.tag != "mesh":  # a mesh is named after its file
         return False
@@ -319,74 +317,74 @@ def _repeated_name(document: MjcfDocument, node: Node, match: re.Match[str]) -> 
         where = f"also on line {same[0].source.line}" if is_first_known else "the name is taken"
         more = f" and {len(duplicates) - 1} more times" if len(duplicates) > 1 else ""
         message = f"duplicate {kind} {name}: {where}{more}; MuJoCo rejects the file"
-        add_problem(document, duplicates[0], "TRE001", message)
+        report(tree, duplicates[0], "TRE001", message)
     else:
-        _report_rejected(document, node, match[0])
-    taken = {n.attributes.get("name") for n in document.nodes()}
+        _report_rejected(tree, node, match[0])
+    taken = {n.attributes.get("name") for n in tree.nodes()}
     numbers = itertools.count(2)
     for each in duplicates:
         each.attributes["name"] = next(new for k in numbers if (new := f"{name}_{k}") not in taken)
     return True
 
 
-def _invalid_value(document: MjcfDocument, node: Node, match: re.Match[str]) -> bool:
+def _invalid_value(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     """Remove an attribute with an invalid value from all similar nodes."""
     value = match[1]
     name = next((k for k, v in node.attributes.items() if v == value and k != "name"), None)
     if name is None:
         return False
-    nodes = _similar_nodes(document, node, attribute=name, value=value)
-    _report_rejected(document, node, f"{match[0]} in {name}{_count_suffix(nodes)}")
+    nodes = _similar_nodes(tree, node, attribute=name, value=value)
+    _report_rejected(tree, node, f"{match[0]} in {name}{_count_suffix(nodes)}")
     for each in nodes:
         del each.attributes[name]
     return True
 
 
-def _invalid_attribute(document: MjcfDocument, node: Node, match: re.Match[str]) -> bool:
+def _invalid_attribute(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     """Remove the attribute that MuJoCo's message names."""
     name = match[1]
     if name not in node.attributes:
         return False
-    _report_rejected(document, node, match.string)
+    _report_rejected(tree, node, match.string)
     del node.attributes[name]
     return True
 
 
-def _exclusive_attributes(document: MjcfDocument, node: Node, match: re.Match[str]) -> bool:
+def _exclusive_attributes(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     """Keep the first of several mutually exclusive attributes."""
     named = re.findall(r"'(\w+)'", match.string) or _ORIENTATIONS
     given = [name for name in node.attributes if name in named]
     if len(given) < 2:
         return False
-    _report_rejected(document, node, match.string)
+    _report_rejected(tree, node, match.string)
     for name in given[1:]:
         del node.attributes[name]
     return True
 
 
-def _not_unique(document: MjcfDocument, node: Node, match: re.Match[str]) -> bool:
+def _not_unique(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     """Keep the first of several children of which only one is allowed."""
     children = [child for child in node.children if child.tag == match[1]]
     if len(children) < 2:
         return False
-    _report_rejected(document, children[1], match.string)
+    _report_rejected(tree, children[1], match.string)
     for child in children[1:]:
         child.remove()
     return True
 
 
-def _unknown_childclass(document: MjcfDocument, node: Node, match: re.Match[str]) -> bool:
+def _unknown_childclass(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     value = node.attributes.get("childclass", "")
     if not value:
         return False
-    nodes = _similar_nodes(document, node, attribute="childclass", value=value)
-    _report_rejected(document, node, f"{match[0]} {value!r}{_count_suffix(nodes)}")
+    nodes = _similar_nodes(tree, node, attribute="childclass", value=value)
+    _report_rejected(tree, node, f"{match[0]} {value!r}{_count_suffix(nodes)}")
     for each in nodes:
         del each.attributes["childclass"]
     return True
 
 
-def _renamed_default(document: MjcfDocument, node: Node, match: re.Match[str]) -> bool:
+def _renamed_default(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     """Replace the class of the top-level default by the main class.
 
     MuJoCo 2 did the same.
@@ -394,24 +392,24 @@ def _renamed_default(document: MjcfDocument, node: Node, match: re.Match[str]) -
     name = node.attributes.pop("class", "")
     if not name:
         return False
-    _report_rejected(document, node, match.string)
-    for other in document.nodes():
+    _report_rejected(tree, node, match.string)
+    for other in tree.nodes():
         for attribute in ("class", "childclass"):
             if other.attributes.get(attribute) == name:
                 other.attributes[attribute] = "main"
     return True
 
 
-def _zero_quaternion(document: MjcfDocument, node: Node, match: re.Match[str]) -> bool:
+def _zero_quaternion(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     name = next((k for k in node.attributes if "quat" in k), None)
     if name is None:
         return False
-    _report_rejected(document, node, match.string)
+    _report_rejected(tree, node, match.string)
     del node.attributes[name]
     return True
 
 
-_Repair = Callable[[MjcfDocument, Node, "re.Match[str]"], bool]
+_Repair = Callable[[MjcfTree, Node, "re.Match[str]"], bool]
 
 _REPAIRS: tuple[tuple[str, _Repair], ...] = (
     (r"unrecognized attribute: '(.+)'", _unknown_attribute),

@@ -22,10 +22,9 @@ from terrainkit_robots.description.mjcf.actuators import (
     read_actuators,
     read_mimics,
 )
-from terrainkit_robots.description.mjcf.document import MjcfDocument, Node, read_document
 from terrainkit_robots.description.mjcf.imu import BodySite, find_imu
 from terrainkit_robots.description.mjcf.inertia import Solid, make_solid, sum_solids
-from terrainkit_robots.description.mjcf.parser import add_problem, parse_mjcf
+from terrainkit_robots.description.mjcf.parser import parse_mjcf, report
 from terrainkit_robots.description.mjcf.references import dangling_references
 from terrainkit_robots.description.mjcf.shapes import (
     SIZES,
@@ -41,6 +40,7 @@ from terrainkit_robots.description.mjcf.shapes import (
     resolve_orientation,
     scale_solid,
 )
+from terrainkit_robots.description.mjcf.tree import MjcfTree, Node, read_tree
 from terrainkit_robots.description.model import (
     Actuator,
     Geometry,
@@ -80,27 +80,25 @@ def read_mjcf(document: XmlDocument, *, contents: Mapping[Path, bytes] | None = 
             problems=document.problems,
             sources=(file,),
         )
-    tree = read_document(document, contents or {})
-    spec, lines = parse_mjcf(tree)
+    mjcf = read_tree(document, contents or {})
+    spec, lines = parse_mjcf(mjcf)
     robot = RobotModel(
-        name=tree.root.written.get("model", "").strip(),
+        name=mjcf.root.written.get("model", "").strip(),
         kind="mjcf",
         file=file,
-        source=tree.root.source,
-        sources=tree.sources,
+        source=mjcf.root.source,
+        sources=mjcf.sources,
     )
     if spec is not None:
-        robot = _Reader(tree, spec, lines).fill(robot)
-    return replace(robot, problems=tuple(tree.problems))
+        robot = _Reader(mjcf, spec, lines).fill(robot)
+    return replace(robot, problems=tuple(mjcf.problems))
 
 
 class _Reader:
     """Convert a parsed MuJoCo spec to links and joints, and collect problems."""
 
-    def __init__(
-        self, document: MjcfDocument, spec: "mujoco.MjSpec", lines: Sequence[Node]
-    ) -> None:
-        self._document = document
+    def __init__(self, mjcf: MjcfTree, spec: "mujoco.MjSpec", lines: Sequence[Node]) -> None:
+        self._mjcf = mjcf
         self._spec = spec
         self._lines = lines
         self._meshes = {mesh_name(mesh): mesh for mesh in spec.meshes}
@@ -123,7 +121,7 @@ class _Reader:
         compiler = self._spec.compiler
         bounds = float(compiler.boundmass), float(compiler.boundinertia)
         links = [replace(each, inertial=_apply_minimums(each, *bounds)) for each in links]
-        dangling_references(self._document, self._spec)
+        dangling_references(self._mjcf, self._spec)
         return replace(
             robot,
             links=_scale_to_total_mass(links, float(compiler.settotalmass)),
@@ -144,13 +142,13 @@ class _Reader:
         line = int(match[1]) if match else 0
         if 1 <= line <= len(self._lines):
             return self._lines[line - 1]
-        return default or self._document.root
+        return default or self._mjcf.root
 
-    def _add_problem(self, node: Node, message: str) -> None:
+    def _report(self, node: Node, message: str) -> None:
         """Report what MuJoCo's compiler would reject, each message once."""
         if message not in self._reported:
             self._reported.add(message)
-            add_problem(self._document, node, "XML011", message)
+            report(self._mjcf, node, "XML011", message)
 
     def _scaled_actuators(self, joints: Sequence[Joint]) -> tuple[Actuator, ...]:
         most = {joint.name: joint.limit.effort for joint in joints if joint.limit is not None}
@@ -184,13 +182,11 @@ class _Reader:
         try:
             pose, scale = pose_and_scale(element, outer, self._spec)
         except ValueError as error:
-            self._add_problem(
-                node, f"<{node.tag}> has no orientation: {error}; MuJoCo rejects the file"
-            )
+            self._report(node, f"<{node.tag}> has no orientation: {error}; MuJoCo rejects the file")
             pose, scale = np.eye(4), outer
             pose[:3, 3] = np.asarray(element.pos) * outer.length
         if not scale.uniform:
-            self._add_problem(
+            self._report(
                 node, "scale of <frame>: got different factors; their mean is used for all axes"
             )
         return pose, scale
@@ -253,9 +249,7 @@ class _Reader:
         try:
             return resolve_orientation(body.iquat, body.ialt, body.compiler, self._spec)
         except ValueError as error:
-            self._add_problem(
-                node, f"<inertial> has no orientation: {error}; MuJoCo rejects the file"
-            )
+            self._report(node, f"<inertial> has no orientation: {error}; MuJoCo rejects the file")
             return np.eye(3)
 
     def _imu(self) -> tuple[str, Matrix] | None:
@@ -271,7 +265,7 @@ class _Reader:
             pose, _ = fromto_pose(ends)
             return found.link, apply_frames(pose, found.site.frame, found.scale, self._spec)[0]
         except ValueError as error:
-            self._add_problem(node, f"<{node.tag}>: {error}; MuJoCo rejects the file")
+            self._report(node, f"<{node.tag}>: {error}; MuJoCo rejects the file")
             return None
 
     # Shapes
@@ -289,7 +283,7 @@ class _Reader:
                 flat = shape in ("ellipsoid", "box")
                 size = np.array([size[0], size[0] if flat else half, half])
             except ValueError as error:
-                self._add_problem(node, f"<{node.tag}>: {error}; MuJoCo rejects the file")
+                self._report(node, f"<{node.tag}>: {error}; MuJoCo rejects the file")
         size = size[: SIZES.get(shape, 0)]
         fitted = bool(geom.meshname) and shape in SIZES
         shell = geom.typeinertia == mujoco.mjtGeomInertia.mjINERTIA_SHELL
@@ -379,9 +373,7 @@ class _Reader:
         try:
             at, scale = apply_frames(at, joint.frame, outer, self._spec)
         except ValueError as error:
-            self._add_problem(
-                node, f"a <frame> has no orientation: {error}; MuJoCo rejects the file"
-            )
+            self._report(node, f"a <frame> has no orientation: {error}; MuJoCo rejects the file")
             scale = outer
         bare = Joint(name=name, source=node.source, kind="ball", parent="", child="")
         if joint.type == kinds.mjJNT_FREE:
@@ -418,7 +410,7 @@ class _Reader:
             return None
         written = low != 0 or high != 0 or "range" in node.attributes
         if joint.limited == limited.mjLIMITED_AUTO and written and not joint.compiler.autolimits:
-            self._add_problem(
+            self._report(
                 node,
                 f"joint {node.owner} has a range but no limited, and autolimits is off; "
                 "MuJoCo rejects the file",
@@ -434,8 +426,8 @@ class _Reader:
             if not positions:
                 continue
             if len(positions) != expected:
-                if self._document.complete:
-                    self._add_problem(
+                if self._mjcf.complete:
+                    self._report(
                         self._node(key),
                         f"qpos of <key>: got {len(positions)} numbers; expected {expected}; "
                         "MuJoCo rejects the file",

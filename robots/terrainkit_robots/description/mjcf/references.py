@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from terrainkit_robots.description.mjcf.document import MjcfDocument, Node
 from terrainkit_robots.description.mjcf.shapes import mesh_name
+from terrainkit_robots.description.mjcf.tree import MjcfTree, Node
 from terrainkit_robots.description.model import Problem
 
 if TYPE_CHECKING:
@@ -39,13 +39,13 @@ _NAMED: Mapping[str, str] = {
 _SECTIONS = frozenset({"worldbody", "contact", "tendon", "equality", "actuator", "sensor"})
 
 
-def dangling_references(document: MjcfDocument, spec: "mujoco.MjSpec") -> None:
+def dangling_references(tree: MjcfTree, spec: "mujoco.MjSpec") -> None:
     """Add a problem for each reference to a name that does not exist.
 
     Nothing is reported where the element may be elsewhere: in incomplete documents, in documents
     without bodies, which others include, and for contacts with the ground of a scene.
     """
-    if not document.complete or len(spec.bodies) < 2:
+    if not tree.complete or len(spec.bodies) < 2:
         return
     names = {
         "joint": {each.name for each in spec.joints},
@@ -57,7 +57,7 @@ def dangling_references(document: MjcfDocument, spec: "mujoco.MjSpec") -> None:
         "material": {each.name for each in spec.materials},
     }
     has_ground = len(spec.worldbody.geoms) > 0
-    for node in _iter_references(document, has_ground):
+    for node in _iter_references(tree, has_ground):
         for attribute, value in node.attributes.items():
             kind = _NAMED.get(attribute)
             if kind is None or value in names[kind] or not value:
@@ -66,14 +66,14 @@ def dangling_references(document: MjcfDocument, spec: "mujoco.MjSpec") -> None:
                 f"{attribute} of <{node.tag}>: got {value!r}; expected the name of a {kind}; "
                 "MuJoCo rejects the file"
             )
-            document.problems.append(
+            tree.problems.append(
                 Problem(code="XML011", message=message, source=node.source, subject=value)
             )
 
 
-def _iter_references(document: MjcfDocument, has_ground: bool) -> Iterator[Node]:
+def _iter_references(tree: MjcfTree, has_ground: bool) -> Iterator[Node]:
     """Yield the nodes of the model that may refer to other elements."""
-    for section in document.root.children:
+    for section in tree.root.children:
         if section.tag not in _SECTIONS or (section.tag == "sensor" and not has_ground):
             continue
         for node in section.walk():

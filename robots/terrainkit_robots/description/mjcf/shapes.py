@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from terrainkit_robots.description.mjcf.document import Node
 from terrainkit_robots.description.mjcf.inertia import Solid
+from terrainkit_robots.description.mjcf.tree import Node
 from terrainkit_robots.description.model import Geometry, MeshFile, ShapeKind
 from terrainkit_robots.description.package_resolver import resolve_in
 from terrainkit_robots.transforms import Matrix, quat_to_matrix

@@ -58,7 +58,7 @@ class _Reader:
         assert root is not None
         source = self._document.source(root)
         if not root.get("name", "").strip():
-            self._add_problem("XML003", root, "the robot has no name; expected <robot name=...>")
+            self._report("XML003", root, "the robot has no name; expected <robot name=...>")
         self._check_names(root)
         self._colors = named_colors(root)
         links = tuple(self._link(element) for element in root.iterchildren("link"))
@@ -74,7 +74,7 @@ class _Reader:
             sources=(self._document.file,),
         )
 
-    def _add_problem(
+    def _report(
         self, code: str, element: "etree._Element", message: str, subject: str = "", **details: str
     ) -> None:
         self._problems.append(
@@ -90,11 +90,11 @@ class _Reader:
     def _check_names(self, root: "etree._Element") -> None:
         """Report unexpanded xacro and misspelled names."""
         for element, what in unexpanded_xacro(root):
-            self._add_problem("XML004", element, f"{what} is xacro that was not expanded")
+            self._report("XML004", element, f"{what} is xacro that was not expanded")
         for element, attribute, known in misspelled_names(root):
             what = f"attribute {attribute} of <{element.tag}>" if attribute else f"<{element.tag}>"
             message = f"{what} is unknown and ignored; did you mean {known}?"
-            self._add_problem("XML007", element, message, attribute=attribute, known=known)
+            self._report("XML007", element, message, attribute=attribute, known=known)
 
     # Numbers
 
@@ -111,7 +111,7 @@ class _Reader:
         repaired = replace_commas(text, count)
         expected = "a number" if count == 1 else f"{count} numbers"
         hint = ", with decimal points and separated by spaces" if repaired else ""
-        self._add_problem(
+        self._report(
             "XML006",
             element,
             f"{name} of <{element.tag}>: got {short(text, 40)!r}; expected {expected}{hint}",
@@ -132,7 +132,7 @@ class _Reader:
         if value is None or not value.strip():
             tag = parent.tag if element is None else element.tag
             at = parent if element is None else element
-            self._add_problem("XML013", at, f"<{tag}> has no {name}")
+            self._report("XML013", at, f"<{tag}> has no {name}")
         return value or ""
 
     def _origin(self, parent: "etree._Element") -> Matrix:
@@ -163,13 +163,13 @@ class _Reader:
             text = short(origin.get("quat_xyzw", ""), 40)
             message = f"quat_xyzw of <origin>: got {text!r}; expected a nonzero quaternion"
         if message:
-            self._add_problem("XML006", origin, message, attribute="quat_xyzw")
+            self._report("XML006", origin, message, attribute="quat_xyzw")
             return None
         rotation = quat_to_matrix(np.roll(quat, 1))
         rpy = place_text(matrix_to_rpy(rotation))
         if rpy != "0 0 0":
             message = f'simulators ignore quat_xyzw of <origin>; expected rpy="{rpy}"'
-            self._add_problem("XML014", origin, message, rpy=rpy)
+            self._report("XML014", origin, message, rpy=rpy)
         return rotation
 
     # Links
@@ -207,7 +207,7 @@ class _Reader:
     def _geometries(self, link: "etree._Element", tag: str) -> Iterator[Geometry]:
         for element in link.iterchildren(tag):
             for extra in element.findall("material")[1:]:
-                self._add_problem("XML008", extra, f"<{tag}> has two materials; expected one")
+                self._report("XML008", extra, f"<{tag}> has two materials; expected one")
             geometry = self._geometry(element)
             color = color_of(element, self._colors) if tag == "visual" else None
             yield geometry if color is None else replace(geometry, color=color)
@@ -218,7 +218,7 @@ class _Reader:
         geometry = element.find("geometry")
         shape = None if geometry is None else next(geometry.iterchildren(etree.Element), None)
         if shape is None:
-            self._add_problem("XML013", element, f"<{element.tag}> has no shape in a <geometry>")
+            self._report("XML013", element, f"<{element.tag}> has no shape in a <geometry>")
             return Geometry(source=source, name=name, shape="unknown", origin=origin)
         size_source = self._document.source(shape)
         if shape.tag == "mesh":
@@ -238,7 +238,7 @@ class _Reader:
                 return Geometry(source=source, name=name, shape="unknown", origin=origin)
         if size is None and not set(shape.keys()) >= _SIZES[shape.tag]:
             missing = ", ".join(sorted(_SIZES[shape.tag] - set(shape.keys())))
-            self._add_problem("XML013", shape, f"<{shape.tag}> has no {missing}")
+            self._report("XML013", shape, f"<{shape.tag}> has no {missing}")
         return Geometry(
             source=source,
             name=name,

@@ -6,7 +6,6 @@ where a tag starts, so it parses well-formed documents a second time.
 
 import itertools
 import re
-import stat
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from lxml import etree
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots.description.fix import Fix, ReplaceBytes
 from terrainkit_robots.description.model import Problem, Source
+from terrainkit_robots.files import SpecialFileError, open_regular
 
 MAX_BYTES = 32 * 2**20
 """Maximum size of a robot file."""
@@ -42,13 +42,10 @@ def read_bytes(path: Path) -> bytes:
         RobotFileError: If the file does not exist, is not a regular file, or cannot be read.
     """
     try:
-        status = path.stat()
-        if stat.S_ISDIR(status.st_mode):
-            raise RobotFileError(f"cannot read {path}: got a folder; expected a robot file")
-        if not stat.S_ISREG(status.st_mode):
-            raise RobotFileError(f"cannot read {path}: not a regular file")
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             return file.read(MAX_BYTES + 1)
+    except SpecialFileError as error:
+        raise RobotFileError(f"cannot read {path}: it {error}") from None
     except FileNotFoundError:
         raise RobotFileError(f"there is no file {path}") from None
     except (OSError, ValueError) as error:  # ValueError: a NUL character in the name

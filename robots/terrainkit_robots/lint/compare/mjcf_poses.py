@@ -11,8 +11,8 @@ import numpy as np
 
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.mjcf.document import MjcfDocument, Node, read_document
 from terrainkit_robots.description.mjcf.parser import parse_mjcf
+from terrainkit_robots.description.mjcf.tree import MjcfTree, Node, read_tree
 from terrainkit_robots.description.xml.document import RobotFileError, parse_xml, read_bytes
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.transforms import Matrix
@@ -84,7 +84,7 @@ def _compile(robot: Facts) -> "mujoco.MjModel":
         raise CannotCheckError(str(error)) from error
     if document.root is None:
         raise _changed_file(robot)
-    tree = read_document(document, {})
+    tree = read_tree(document, {})
     _remove_other_elements(tree)
     spec, _ = parse_mjcf(tree)
     if spec is None:
@@ -98,7 +98,7 @@ def _compile(robot: Facts) -> "mujoco.MjModel":
         raise CannotCheckError(f"MuJoCo cannot compile {file.name}: {why}") from error
 
 
-def _remove_other_elements(tree: MjcfDocument) -> None:
+def _remove_other_elements(tree: MjcfTree) -> None:
     """Remove all elements that do not affect kinematics."""
     for root in tree.roots():
         root.children[:] = [section for section in root.children if section.tag in _SECTIONS]

@@ -12,8 +12,8 @@ import pytest
 from terrainkit_robots.analysis.bodies.bodies import merge_bodies
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.bodies.tree import build_tree
-from terrainkit_robots.description.mjcf.document import MAX_ELEMENTS
 from terrainkit_robots.description.mjcf.reader import read_mjcf
+from terrainkit_robots.description.mjcf.tree import MAX_ELEMENTS
 from terrainkit_robots.description.model import Geometry, Joint, Link, Problem, RobotModel
 from terrainkit_robots.description.xml.document import parse_xml
 from terrainkit_robots.transforms import Matrix

@@ -329,19 +329,19 @@ def test_a_file_that_is_not_there(file):
 
 
 def test_a_folder_is_no_robot(tmp_path):
-    with pytest.raises(RobotFileError, match="got a folder"):
+    with pytest.raises(RobotFileError, match="it is a folder"):
         read_bytes(tmp_path)
 
 
 def test_a_pipe_is_not_waited_for(file):
     os.mkfifo(file)
-    with pytest.raises(RobotFileError, match="not a regular file"):
+    with pytest.raises(RobotFileError, match="not a file"):
         read_bytes(file)
 
 
 def test_a_device_is_no_robot(file):
     file.symlink_to("/dev/zero")
-    with pytest.raises(RobotFileError, match="not a regular file"):
+    with pytest.raises(RobotFileError, match="not a file"):
         read_bytes(file)
 
 

@@ -99,7 +99,7 @@ class Node:
 
 
 @dataclass(eq=False)
-class MjcfDocument:
+class MjcfTree:
     """Trees of a model and of the models that it attaches."""
 
     root: Node
@@ -137,7 +137,7 @@ class MjcfDocument:
         return text, attached, lines
 
 
-def read_document(document: XmlDocument, contents: Mapping[Path, bytes]) -> MjcfDocument:
+def read_tree(document: XmlDocument, contents: Mapping[Path, bytes]) -> MjcfTree:
     """Return a document with the files that it includes and attaches.
 
     Args:
@@ -151,7 +151,7 @@ def read_document(document: XmlDocument, contents: Mapping[Path, bytes]) -> Mjcf
         message = f"root element: got <{root.tag}>, a part of a model; expected <mujoco>"
         reader.problems.append(Problem(code="XML002", message=message, source=root.source))
         root.tag = "mujoco"
-    complete = MjcfDocument(
+    complete = MjcfTree(
         root=root,
         attached=reader.attached,
         problems=reader.problems,
@@ -256,10 +256,10 @@ class _Reader:
         source, name = document.source(element), (element.get("file") or "").strip()
         chain = (*included[_real_path(document.file)], _real_path(document.file))
         if not name:
-            self._add_problem(source, "<include> has no file", "")
+            self._report(source, "<include> has no file", "")
             return None
         if len(element):
-            self._add_problem(
+            self._report(
                 source, f"<include file={name!r}> has children; MuJoCo rejects the file", name
             )
         path = folder / name
@@ -268,14 +268,14 @@ class _Reader:
             path = sibling
         if _real_path(path) in included:
             how = "by itself" if _real_path(path) in chain else "twice"
-            self._add_problem(source, f"{name} is included {how}; MuJoCo rejects the file", name)
+            self._report(source, f"{name} is included {how}; MuJoCo rejects the file", name)
             return None
         part = self._read(path, source, name)
         if part is not None and part.root is not None:
             included[_real_path(path)] = chain
             self.files.append(path)
             if not len(part.root):
-                self._add_problem(source, f"{name} is empty; expected elements to include", name)
+                self._report(source, f"{name} is empty; expected elements to include", name)
         return part
 
     def _exists(self, path: Path) -> bool:
@@ -283,20 +283,20 @@ class _Reader:
 
     def _read(self, path: Path, source: Source, name: str) -> XmlDocument | None:
         if len(self.files) >= _MAX_FILES or self._bytes > MAX_BYTES:
-            self._add_problem(
+            self._report(
                 source, f"{name} is not read: too many included files, or too much data", name
             )
             return None
         try:
             data = self._contents[path] if path in self._contents else read_bytes(path)
         except RobotFileError as error:
-            self._add_problem(source, f"{name}: {error}", name)
+            self._report(source, f"{name}: {error}", name)
             return None
         self._bytes += len(data)
         part = parse_xml(path, data)
         self.problems += part.problems
         if part.root is None:
-            self._add_problem(source, f"{name} could not be parsed", name)
+            self._report(source, f"{name} could not be parsed", name)
             return None
         return part
 
@@ -306,18 +306,18 @@ class _Reader:
             return True
         name = node.written.get("file", "")
         if not name:
-            self._add_problem(node.source, "<model> has no file", "")
+            self._report(node.source, "<model> has no file", "")
             return False
         path = node.folder / name
         if _real_path(path) in map(_real_path, parents):
-            self._add_problem(node.source, f"{name} attaches itself", name)
+            self._report(node.source, f"{name} attaches itself", name)
             return False
         part = self._read(path, node.source, name)
         if part is None or part.root is None:
             return False
         if part.root.tag != "mujoco":
             message = f"root element of {name}: got <{part.root.tag}>; expected <mujoco>"
-            self._add_problem(node.source, message, name)
+            self._report(node.source, message, name)
             return False
         key = f"attached_{len(self.attached)}.xml"
         self.attached[key] = Node(tag="mujoco", source=node.source, folder=path.parent)
@@ -325,7 +325,7 @@ class _Reader:
         self.attached[key] = self.tree(part, parents)
         return True
 
-    def _add_problem(self, source: Source, message: str, subject: str) -> None:
+    def _report(self, source: Source, message: str, subject: str) -> None:
         self.problems.append(
             Problem(code="XML012", message=message, source=source, subject=subject)
         )
@@ -360,51 +360,51 @@ def _real_path(path: Path) -> Path:
         return path
 
 
-def limit_size(document: MjcfDocument) -> None:
+def limit_size(tree: MjcfTree) -> None:
     """Keep the model small: remove replicas or, if that is not enough, everything."""
-    if sum(1 for _ in document.nodes()) <= MAX_ELEMENTS:
-        if _total_size(document) <= MAX_ELEMENTS:
+    if sum(1 for _ in tree.nodes()) <= MAX_ELEMENTS:
+        if _total_size(tree) <= MAX_ELEMENTS:
             return
-        replicas = [node for node in document.nodes() if node.tag == "replicate"]
+        replicas = [node for node in tree.nodes() if node.tag == "replicate"]
         for node in replicas:
             node.attributes["count"] = "1"
-        if replicas and _total_size(document) <= MAX_ELEMENTS:
-            _report_size(document, replicas[0], "replicas are not created")
-            document.complete = False
+        if replicas and _total_size(tree) <= MAX_ELEMENTS:
+            _report_size(tree, replicas[0], "replicas are not created")
+            tree.complete = False
             return
-    _report_size(document, document.root, "the model is not read")
-    document.root.children.clear()
-    document.attached.clear()
-    document.complete = False
+    _report_size(tree, tree.root, "the model is not read")
+    tree.root.children.clear()
+    tree.attached.clear()
+    tree.complete = False
 
 
-def _report_size(document: MjcfDocument, node: Node, what: str) -> None:
+def _report_size(tree: MjcfTree, node: Node, what: str) -> None:
     message = (
         f"number of elements: more than {MAX_ELEMENTS}, long attributes count as several; {what}, "
         "because MuJoCo's parser needs quadratic time"
     )
-    document.problems.append(
+    tree.problems.append(
         Problem(code="XML011", message=message, source=node.source, subject=node.owner)
     )
 
 
-def _total_size(document: MjcfDocument) -> int:
+def _total_size(tree: MjcfTree) -> int:
     """Return the number of elements after replication, each attached copy counted.
 
     Long attributes count as further elements.
     """
     sizes: dict[str, int] = {}
-    for key in reversed(document.attached):  # attached models follow the models that name them
-        sizes[key] = _tree_size(document, document.attached[key], sizes)
-    return _tree_size(document, document.root, sizes)
+    for key in reversed(tree.attached):  # attached models follow the models that name them
+        sizes[key] = _tree_size(tree, tree.attached[key], sizes)
+    return _tree_size(tree, tree.root, sizes)
 
 
-def _tree_size(document: MjcfDocument, root: Node, models: Mapping[str, int]) -> int:
+def _tree_size(tree: MjcfTree, root: Node, models: Mapping[str, int]) -> int:
     nodes = list(root.walk())
     files = {
-        node.attributes.get("name") or document.attached[file].attributes.get("model", ""): file
+        node.attributes.get("name") or tree.attached[file].attributes.get("model", ""): file
         for node in nodes
-        if node.tag == "model" and (file := node.attributes.get("file")) in document.attached
+        if node.tag == "model" and (file := node.attributes.get("file")) in tree.attached
     }
     sizes: dict[Node, int] = {}
     for node in reversed(nodes):  # children before their parents
