@@ -119,8 +119,8 @@ def test_check_robot_formats_several_files(here):
             "there is no file none.urdf, nor is a bundled robot called so; there are:",
         ),
         ((".",), "cannot read .: it is a folder, not a file"),
-        (("fifo",), "fifo is not a plain file"),
-        (("good.urdf", "--select", "XYZ1"), "no rule 'XYZ1'; wanted a code"),
+        (("fifo",), "it is a pipe, not a file"),
+        (("good.urdf", "--select", "XYZ1"), "no rule 'XYZ1'; expected a code"),
         (("good.urdf", "--ignore", "INR002"), "--ignore 'INR002'; wanted CODES=REASON"),
         (("good.urdf", "--ignore", "INR002="), "--ignore 'INR002='; wanted CODES=REASON"),
         (("good.urdf", "--ignore", "XYZ1=why"), "no rule 'XYZ1'"),
@@ -128,11 +128,11 @@ def test_check_robot_formats_several_files(here):
         (("good.urdf", "--package", "mine"), "--package 'mine'; wanted NAME=DIR"),
         (
             ("good.urdf", "--package", "mine=none"),
-            "package mine is to be in none, where there is no",
+            "package mine: got none; expected an existing",
         ),
         (("good.urdf", "--xacro-arg", "a=1"), "--xacro-arg 'a=1'; wanted NAME:=VALUE"),
         (("good.urdf", "--diff", "--format", "json"), "--diff prints a diff"),
-        (("good.urdf", "-o", "nowhere/a.txt"), "there is no folder nowhere"),
+        (("good.urdf", "-o", "nowhere/a.txt"), "the folder nowhere does not exist"),
         (("good.urdf", "-o", "."), "it is a folder"),
         (("good.urdf", "-o", "/proc/report.txt"), "cannot write /proc/report.txt"),
         (("good.urdf", "-o", "good.urdf"), "would replace the checked file good.urdf"),
@@ -236,7 +236,7 @@ def test_check_robot_options_override_settings_file(here, folder):
     (folder / "pyproject.toml").write_text("[tool.terrainkit.check-robot]\nselekt=[]\n")
     run = here("check-robot", "sub/bad.urdf")
     assert run.returncode == 2
-    assert "pyproject.toml: no key 'selekt'; there are: select, ignore" in run.stderr
+    assert "no key 'selekt'; did you mean 'select'? It has: select, ignore" in run.stderr
 
 
 def test_check_robot_escapes_unencodable_names(terrainkit, folder, monkeypatch):
