@@ -88,13 +88,8 @@ def test_assess_reports_lifted_feet(quadruped):
     for geom in range(model.ngeom):
         if model.body(model.geom_bodyid[geom]).name in ("RR_calf", "RR_foot"):
             model.geom_contype[geom] = model.geom_conaffinity[geom] = 0
-<<<<<<< HEAD
-    faults = judged(quadruped, SimModel.from_mujoco(model, base="base")).failures
-    assert "FL_foot, RR_foot do not touch the ground (expected all feet)" in faults
-=======
     faults = stand(quadruped, SimModel.from_mujoco(model, base="base")).failures
-    assert "FL_foot, RR_foot do not touch the ground; expected all feet" in faults
->>>>>>> main
+    assert "FL_foot, RR_foot do not touch the ground (expected all feet)" in faults
 
 
 def test_assess_accepts_bundled_quadruped(quadruped):
