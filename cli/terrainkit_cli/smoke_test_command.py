@@ -107,6 +107,7 @@ class SmokeTest(Command):
 
     def _smoke_test(self, name: str) -> "SmokeTestResult":
         from terrainkit_robots.lint.settings import Settings
+        from terrainkit_robots.onboarding.pipeline import OnboardOptions
         from terrainkit_robots.policy.smoke_test import smoke_test
 
         settings = Settings(
@@ -114,7 +115,8 @@ class SmokeTest(Command):
             packages=parse_packages(self.package),
             xacro_arguments=parse_xacro_arguments(self.xacro_arg),
         )
-        return smoke_test(name, settings=settings, spec=Path(self.spec) if self.spec else None)
+        spec = Path(self.spec) if self.spec else None
+        return smoke_test(name, OnboardOptions(settings=settings, spec=spec))
 
 
 def summary(result: "SmokeTestResult") -> str:
