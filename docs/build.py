@@ -32,7 +32,7 @@ from terrainkit_cli.main import COMMANDS
 from terrainkit_robots.description import bundled
 from terrainkit_robots.lint.rule import FAMILIES, Rule, rules
 from terrainkit_robots.lint.settings import Settings
-from terrainkit_robots.rendering.robot_pictures import render_robot
+from terrainkit_robots.rendering.robot_images import render_robot
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
