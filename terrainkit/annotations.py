@@ -61,7 +61,8 @@ def parse_annotation(annotation: Any) -> Parsed:
     if get_origin(annotation) in (typing.Union, types.UnionType):
         parts = tuple(part for part in get_args(annotation) if part is not types.NoneType)
         is_optional = types.NoneType in get_args(annotation)
-    (kind,), constraints = parts, {}
+    (kind,) = parts
+    constraints: dict[str, Any] = {}
     if get_origin(kind) is Annotated:
         names = (*_LIMITS, "min_length", "description")
         for meta in kind.__metadata__:
@@ -148,7 +149,7 @@ def describe(annotation: Any) -> str:
     """Return in words what an annotation accepts, such as `an integer from 1 to 10`."""
     kind, origin, args, constraints, is_optional = parse_annotation(annotation)
     if "description" in constraints:
-        text = constraints["description"]
+        text = str(constraints["description"])
     elif origin is Literal:
         text = f"one of: {', '.join(map(str, args))}"
     elif origin is tuple:

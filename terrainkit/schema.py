@@ -5,7 +5,7 @@ import typing
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Self, TypeVar
+from typing import Any, Self
 
 from terrainkit.annotations import NONE, convert, describe, is_table, parse_annotation
 from terrainkit.errors import ConfigError
@@ -32,7 +32,7 @@ class Config:
         Raises:
             ConfigError: if a value has the wrong type or is out of range.
         """
-        cls = type(self)
+        cls: Any = type(self)
         if "__dataclass_fields__" not in vars(cls):
             raise ConfigError(f"{cls.__name__} lacks @dataclass(frozen=True, kw_only=True)")
         annotations = field_types(cls)
@@ -53,8 +53,8 @@ class Config:
         Raises:
             ConfigError: if a key is unknown or missing, or a value is invalid.
         """
-        cls = cls if default is None else type(default)
-        annotations, names = field_types(cls), field_keys(cls)
+        kind: Any = cls if default is None else type(default)
+        annotations, names = field_types(kind), field_keys(kind)
         for key in table:
             if key not in names:
                 nested = (k for k, _ in flatten(default or ()) if k.endswith(f".{key}"))
@@ -69,14 +69,12 @@ class Config:
             )
             for key, value in table.items()
         }
-        for field in dataclasses.fields(cls) if default is None else ():
+        for field in dataclasses.fields(kind) if default is None else ():
             if field.name not in values and is_required(field):
                 expected = describe(annotations[field.name])
                 raise ConfigError(f"{path}{field.name}: missing; expected {expected}")
-        if default is not None:
-            return replace(path, default, values)
         try:
-            return cls(**values)
+            return cls(**values) if default is None else dataclasses.replace(default, **values)
         except ConfigError as error:
             raise ConfigError(f"{path}{error}") from error
 
@@ -104,14 +102,12 @@ class Config:
 
     def to_table(self) -> dict[str, Any]:
         """Return the values that a TOML file holds, by key."""
-        return {name: getattr(self, name) for name in field_types(type(self))}
+        kind: Any = type(self)
+        return {name: getattr(self, name) for name in field_types(kind)}
 
     def to_toml(self) -> str:
         """Return the config as TOML with comments; :meth:`from_toml` restores it."""
         return "\n".join([*_toml_lines("", self), ""])
-
-
-_C = TypeVar("_C", bound=Config)
 
 
 @cache
@@ -146,29 +142,13 @@ def is_required(field: "dataclasses.Field[Any]") -> bool:
 
 def flatten(config: Any, path: str = "") -> Iterator[tuple[str, Any]]:
     """Yield name and value of each field, those of nested configs included ("env.num_envs")."""
-    for name in field_types(type(config)) if isinstance(config, Config) else ():
+    kind: Any = type(config)
+    for name in field_types(kind) if isinstance(config, Config) else ():
         value = getattr(config, name)
         if isinstance(value, Config):
             yield from flatten(value, f"{path}{name}.")
         else:
             yield path + name, value
-
-
-def replace(path: str, config: _C, values: Mapping[str, Any]) -> _C:
-    """Return a copy of a config with other values.
-
-    Args:
-        path: Prefix of the names in error messages, such as "rewards.".
-        config: The config.
-        values: New values by name.
-
-    Raises:
-        ConfigError: if a value is invalid.
-    """
-    try:
-        return dataclasses.replace(config, **values)
-    except ConfigError as error:
-        raise ConfigError(f"{path}{error}") from error
 
 
 def _with_configs(path: str, value: Any, annotation: Any, default: Any = None) -> Any:
@@ -190,7 +170,8 @@ def _with_configs(path: str, value: Any, annotation: Any, default: Any = None) -
 
 def _toml_lines(path: str, config: Config) -> Iterator[str]:
     """Yield the lines of a config: values first, then a table for each nested config."""
-    docs, tables = field_docs(type(config)), []
+    kind: Any = type(config)
+    docs, tables = field_docs(kind), []
     for key, value in config.to_table().items():
         if isinstance(value, tuple) and value and isinstance(value[0], Config):
             tables += [(f"[[{path}{key}]]", each) for each in value]

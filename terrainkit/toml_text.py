@@ -87,7 +87,8 @@ def value_text(value: Any, width: int = LINE_LENGTH) -> str:
         return (
             line if len(line) <= width else "".join(["[\n", *(f"    {t},\n" for t in texts), "]"])
         )
-    return tomlkit.item(value).as_string()
+    text: str = tomlkit.item(value).as_string()
+    return text
 
 
 def line_text(key: str, value: Any, *comments: str) -> str:

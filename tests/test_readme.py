@@ -220,12 +220,12 @@ def test_the_comment_and_the_settings_of_the_example_ignore_what_they_say(my_rob
 
 
 def onboard_part():
-    return README.partition("## Bring a robot in")[2].partition("\n## ")[0]
+    return README.partition("## Onboard a robot")[2].partition("\n## ")[0]
 
 
 @pytest.fixture
 def healthy_robots():
-    """Write the robots of the lines that bring one in: each is the quadruped that comes along."""
+    """Write the robot files of the examples; each is the bundled quadruped."""
     from terrainkit_robots.description import bundled
 
     path = bundled.find("quadruped")
@@ -236,7 +236,7 @@ def healthy_robots():
 
 
 @pytest.mark.usefixtures("healthy_robots")
-def test_the_lines_that_bring_a_robot_in_run(capsys):
+def test_onboard_commands_run(capsys):
     (lines,) = re.findall(r"```sh\n(.*?)```", onboard_part(), re.DOTALL)
     for line in lines.splitlines():
         words = shlex.split(line, comments=True)
@@ -251,14 +251,14 @@ def test_the_lines_that_bring_a_robot_in_run(capsys):
 
 
 @pytest.mark.usefixtures("healthy_robots")
-def test_the_example_of_a_robot_brought_in_is_what_is_printed(capsys):
+def test_onboard_example_matches_output(capsys):
     (example,) = re.findall(r"```text\n(.*?)```", onboard_part(), re.DOTALL)
     main(["onboard", "my_robot.urdf", "-o", "my_robot"])
     printed = [line.split() for line in capsys.readouterr().out.splitlines()]
     for line in example.splitlines():
-        # Numbers of the last digit, and whether there are pictures, depend on the machine.
+        # Rounding errors and the availability of pictures depend on the machine.
         first = line.split()[0]
         same = [words for words in printed if words[:1] == [first]]
         assert same
-        if first not in ("agrees", "pictures"):
+        if first not in ("compared", "pictures"):
             assert line.split() in same

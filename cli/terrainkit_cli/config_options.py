@@ -14,7 +14,7 @@ import tyro
 
 from terrainkit.annotations import NONE, convert, parse_annotation
 from terrainkit.errors import ConfigError
-from terrainkit.schema import Config, field_docs, field_types, replace
+from terrainkit.schema import Config, field_docs, field_types
 from terrainkit_cli.parse import Command, UsageError, check_options, option_names, parse, value_of
 from terrainkit_cli.robot_options import Text
 
@@ -32,6 +32,9 @@ _NOT_GIVEN = object()
 @dataclass(frozen=True, kw_only=True)
 class ConfigCommand(Command):
     """A command with an option for each value of a config."""
+
+    defaults: ClassVar[Config]
+    """The config whose values the options change."""
 
     @abstractmethod
     def default_config(self) -> Config:
@@ -146,12 +149,16 @@ def with_values(config: _C, values: Mapping[str, Any], path: str = "") -> _C:
         else value
         for name, value in values.items()
     }
-    return replace(path, config, changed) if changed else config
+    try:
+        return dataclasses.replace(config, **changed)
+    except ConfigError as error:
+        raise ConfigError(f"{path}{error}") from error
 
 
 def _given(path: str, config: Config, options: object) -> dict[str, Any]:
     values: dict[str, Any] = {}
-    annotations = field_types(type(config))
+    kind: Any = type(config)
+    annotations = field_types(kind)
     for name, words in vars(options).items():
         default = getattr(config, name)
         if isinstance(default, Config):
@@ -181,7 +188,8 @@ def _from_words(name: str, annotation: Any, words: list[str]) -> Any:
 
 def _options_class(config: Config, omit: Sequence[str], aliases: Mapping[str, str]) -> type[Any]:
     """Return a dataclass with a field for each option, for tyro."""
-    annotations, docs = field_types(type(config)), field_docs(type(config))
+    kind: Any = type(config)
+    annotations, docs = field_types(kind), field_docs(kind)
     options: list[Any] = []
     for name, annotation in annotations.items():
         value = getattr(config, name)
@@ -199,8 +207,8 @@ def _options_class(config: Config, omit: Sequence[str], aliases: Mapping[str, st
             if annotation is bool:
                 options.append((name, Annotated[bool, about], field(default=value)))
             else:
-                kind = Annotated[object, _words_spec(annotation), about]
-                options.append((name, kind, field(default=_NOT_GIVEN)))
+                words = Annotated[object, _words_spec(annotation), about]
+                options.append((name, words, field(default=_NOT_GIVEN)))
     namespace = {"__doc__": inspect.getdoc(config)}
     name = f"{type(config).__name__}Options"
     return dataclasses.make_dataclass(name, options, frozen=True, kw_only=True, namespace=namespace)

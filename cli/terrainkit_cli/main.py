@@ -15,7 +15,7 @@ COMMANDS = {
     "info": "terrain_commands",
     "preview": "terrain_commands",
     "export": "export_command",
-    "check": "terrain_commands",
+    "check-map": "terrain_commands",
     "check-robot": "robot_commands",
     "rule": "robot_commands",
     "onboard": "onboard_command",
@@ -37,8 +37,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     warnings.showwarning = render.show_warning
     from terrainkit.errors import TerrainkitError
 
-    # So that what is half written is cleaned up when a scheduler ends the process.
+    # Temporary files are removed when a scheduler or a closed terminal ends the process.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
+        signal.signal(signal.SIGHUP, lambda *_: sys.exit(129))
     try:
         code = _run(arguments)
         sys.stdout.flush()

@@ -74,8 +74,8 @@ class Onboard(Command):
     overwrite: bool = False
     """Replace the folder if it contains an onboarded robot."""
 
-    no_pictures: bool = False
-    """Do not render pictures."""
+    pictures: bool = True
+    """Render pictures."""
 
     ignore: Annotated[Words, *repeated("CODES=REASON")] = field(default_factory=list)
     """Ignore these rules; the reason is written to the report."""
@@ -129,7 +129,7 @@ class Onboard(Command):
             unsafe_fixes=self.unsafe_fixes,
             force=self.force,
             overwrite=self.overwrite,
-            render_pictures=not self.no_pictures,
+            render_pictures=self.pictures,
             cache_dir=cache_folder(),
             progress=partial(steps.bar, of="collision meshes"),
             on_step=steps.say,

@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, get_type_hints
 
 from terrainkit.errors import TerrainkitError
 from terrainkit.text import nearest, shorten
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 class Command(ABC):
     """A command of `terrainkit`: its fields are the options."""
 
+    arguments: ClassVar[tuple[str, ...]] = ()
+    """The words on the command line."""
+
     @classmethod
     def options(cls, arguments: Sequence[str]) -> "type[Self]":
         """Return the command with all its options, which may depend on the arguments.
@@ -29,7 +32,14 @@ class Command(ABC):
             UsageError: if an option is unknown.
         """
         check_options(cls, arguments)
-        return cls
+        return type(cls.__name__, (cls,), {"arguments": tuple(arguments), "__doc__": cls.__doc__})
+
+    def flag(self, name: str) -> bool | None:
+        """Return the value of a flag; None if it is not on the command line."""
+        option = name.replace("_", "-")
+        given = {word.replace("_", "-") for word in self.arguments}
+        is_given = given & {f"--{option}", f"--no-{option}"}
+        return bool(getattr(self, name)) if is_given else None
 
     @abstractmethod
     def run(self) -> int:

@@ -39,8 +39,8 @@ class Play(PolicyCommand):
     ] = (640, 360)
     """Size of the video [pixels]."""
 
-    no_video: bool = False
-    """Only print the table."""
+    video: bool = True
+    """Write a video, not only print the table."""
 
     viewer: bool = False
     """Show one robot in MuJoCo's viewer until its window is closed, and write nothing."""
@@ -50,9 +50,9 @@ class Play(PolicyCommand):
 
     def run(self) -> int:
         """Roll out the policy, print the table, and write the video."""
-        if self.viewer and (self.no_video or self.output):
+        if self.viewer and (self.output or not self.video):
             raise ConfigError("--viewer: got --output or --no-video too; expected it alone")
-        if not (self.viewer or self.no_video):
+        if self.video and not self.viewer:
             require_training("imageio_ffmpeg")  # before the rollout
         run = self.load_run()
         target = Path(self.output or f"{run.folder.resolve().name}.mp4")
@@ -63,14 +63,14 @@ class Play(PolicyCommand):
         if self.viewer:
             view(run, config)
             return 0
-        if not self.no_video:
+        if self.video:
             check_video_size(self.size)
             check_video_path(target, overwrite=self.overwrite)  # before the rollout
         with render.steps() as steps:
             result = play(
                 run,
                 config,
-                video=not self.no_video,
+                video=self.video,
                 robots=self.robots,
                 size=self.size,
                 progress=lambda done: steps.say(f"rollout: {done:.0%} of {self.seconds:g} s"),

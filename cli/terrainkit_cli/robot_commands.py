@@ -77,8 +77,8 @@ class CheckRobot(Command):
     spec: Text = ""
     """The robot.toml of the robot to compare with."""
 
-    no_simulation: bool = False
-    """Do not run the rules that simulate the robot (drop test, standing test, joint sweep)."""
+    simulation: bool = True
+    """Run the rules that simulate the robot (drop test, standing test, joint sweep)."""
 
     strict: bool = False
     """Exit with code 1 if there are warnings."""
@@ -122,8 +122,8 @@ class CheckRobot(Command):
             ignore=reasons(self.ignore),
             packages=packages(self.package),
             xacro_arguments=xacro_arguments(self.xacro_arg),
-            strict=self.strict,
-            simulate=not self.no_simulation,
+            strict=self.flag("strict"),
+            simulate=self.flag("simulation"),
         )
         select_rules(settings)
         return settings

@@ -250,14 +250,14 @@ class Preview(Command):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Check(Command):
-    """Check that a map keeps every promise: spawns, patches, sizes, difficulty, mesh."""
+class CheckMap(Command):
+    """Validate a map: spawn origins, patches, sizes, difficulty, mesh."""
 
     map: MapFile
     """The map."""
 
     def run(self) -> int:
-        """Print what is wrong, and return 1 if anything is."""
+        """Print the issues, and return 1 if there are any."""
         from terrainkit.export.npz import read_mesh
         from terrainkit.validate import validate
 

@@ -91,7 +91,7 @@ def test_every_command_has_help_for_every_option(terrainkit, name):
         (("list", "moon"), "no terrain 'moon'; there are: flat, gap"),
         (("info", "none.npz"), "no file none.npz"),
         (("info", "none.npz", "--patch", 3), "Expected 2 values"),
-        (("check", "."), "is not a file"),
+        (("check-map", "."), "is not a file"),
         (("preview", "none.npz", "-o", "a.png"), "no file none.npz"),
         (("export", "none.npz", "-o", "a.stl"), "no file none.npz"),
     ],

@@ -359,3 +359,14 @@ def test_check_robot_offers_every_format():
     from terrainkit_robots.lint.report import FORMATS
 
     assert typing.get_args(typing.get_type_hints(CheckRobot)["format"]) == FORMATS
+
+
+def test_check_robot_flags_override_settings(here, folder):
+    (folder / "terrainkit.toml").write_text("[check-robot]\nstrict = true\nsimulation = false\n")
+    assert here("check-robot", "unnamed.urdf").returncode == 1
+    assert here("check-robot", "unnamed.urdf", "--no-strict").returncode == 0
+    static, simulated = (
+        here("check-robot", "good.urdf", "--format", "json", *words).stdout
+        for words in ((), ("--simulation",))
+    )
+    assert static != simulated

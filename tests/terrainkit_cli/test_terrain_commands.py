@@ -252,7 +252,7 @@ def test_an_option_of_another_format_is_an_error(terrainkit, small):
 
 
 def test_check_finds_nothing_wrong_with_a_map_of_ours(terrainkit, small):
-    run = terrainkit("check", small)
+    run = terrainkit("check-map", small)
     assert run.returncode == 0
     assert "no problems found" in run.stdout
 
@@ -261,7 +261,7 @@ def test_check_of_a_broken_map_exits_1_with_what_is_wrong(terrainkit, tmp_path, 
     arrays = dict(np.load(tmp_path / small))
     arrays["env_origins"][1, 2, 2] += 0.2
     np.savez(tmp_path / "broken.npz", **arrays)
-    run = terrainkit("check", "broken.npz")
+    run = terrainkit("check-map", "broken.npz")
     assert run.returncode == 1
     assert "spawn: patch (1, 2): the spawn origin is 0.200 m above the ground" in run.stdout
     assert "broken.npz: 1 findings" in run.stdout

@@ -62,9 +62,10 @@ def lint_selected(
         ConfigError: if the settings name an unknown rule.
     """
     selected, ignored = select_rules(settings)
+    simulate = settings.simulate is not False
     if not settings.select:
-        selected = tuple(r for r in selected if is_applicable(r, facts, simulate=settings.simulate))
-    report = lint(facts, selected, simulate=settings.simulate)
+        selected = tuple(r for r in selected if is_applicable(r, facts, simulate=simulate))
+    report = lint(facts, selected, simulate=simulate)
     comments = [
         comment
         for file in facts.model.sources

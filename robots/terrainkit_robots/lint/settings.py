@@ -50,11 +50,11 @@ class Settings(Config):
     xacro_arguments: Mapping[str, str] = field(default_factory=dict, metadata={"key": "xacro-arg"})
     """Value of each xacro argument."""
 
-    strict: bool = False
-    """Whether warnings count as errors in the exit code."""
+    strict: bool | None = None
+    """Whether warnings count as errors in the exit code; none: no."""
 
-    simulate: bool = field(default=True, metadata={"key": "simulation"})
-    """Whether to run the rules that simulate."""
+    simulate: bool | None = field(default=None, metadata={"key": "simulation"})
+    """Whether to run the rules that simulate; none: yes."""
 
     @classmethod
     def from_table(
@@ -76,8 +76,8 @@ class Settings(Config):
             ignore={**other.ignore, **self.ignore},
             packages={**other.packages, **self.packages},
             xacro_arguments={**other.xacro_arguments, **self.xacro_arguments},
-            strict=self.strict or other.strict,
-            simulate=self.simulate and other.simulate,
+            strict=other.strict if self.strict is None else self.strict,
+            simulate=other.simulate if self.simulate is None else self.simulate,
         )
 
 

@@ -1,1 +1,1 @@
-"""Mesh files: what is in them, each opened only when something asks."""
+"""Read and measure mesh files."""

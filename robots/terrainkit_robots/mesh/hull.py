@@ -1,4 +1,4 @@
-"""Convex hulls, which is what most simulators make of a collision mesh."""
+"""Compute convex hulls of meshes."""
 
 import numpy as np
 
@@ -10,40 +10,43 @@ from terrainkit_robots.mesh.surface import (
 )
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 
-_MOST_POINTS = 30_000
-"""Of more points the hull is taken of the outermost in each cell of a grid, to bound the time."""
+_MAX_POINTS = 30_000
+"""Maximum number of points of an exact hull. Of more points, one extreme point per grid cell is
+used."""
 
 _CELLS = 96
-"""Cells of that grid on each side: the hull is off by about a hundredth of the size."""
+"""Cells of that grid along each axis; the hull is accurate to about one percent."""
 
 
-def convex_hull(points: Points, most_points: int | None = None) -> Surface:
-    """Return the convex hull of points, in their units.
+def convex_hull(points: Points, max_vertices: int | None = None) -> Surface:
+    """Return the convex hull of points.
 
     Args:
-        points: Different ones, shape (n, 3), finite.
-        most_points: Corners that it may have; of more, it is the hull of those that lie farthest
-            out in as many directions.
+        points: Finite points without duplicates, shape (n, 3).
+        max_vertices: Maximum number of vertices; a larger hull is reduced to extreme points in that
+            many directions.
 
     Raises:
-        MeshError: if there is none, because they lie in a plane.
+        MeshError: If the points lie in a plane.
     """
     if is_flat(points):
-        raise MeshError(f"is flat, and has no hull: its {len(points):,} corners lie in a plane")
-    if len(points) > _MOST_POINTS:
-        points = _outermost_in_cells(points)
-    hull = _quickhull(points)
-    if most_points is not None and len(hull.points) > most_points:
-        hull = _quickhull(hull.points[_outermost_in_directions(hull.points, most_points)])
+        raise MeshError(
+            f"is flat and has no convex hull: its {len(points):,} vertices lie in a plane"
+        )
+    if len(points) > _MAX_POINTS:
+        points = _extreme_points_per_cell(points)
+    hull = _mujoco_hull(points)
+    if max_vertices is not None and len(hull.points) > max_vertices:
+        hull = _mujoco_hull(hull.points[_extreme_points_per_direction(hull.points, max_vertices)])
     return hull
 
 
-def _quickhull(points: Points) -> Surface:
-    """Return the hull as MuJoCo finds it, which is how the robot will be simulated."""
+def _mujoco_hull(points: Points) -> Surface:
+    """Return the hull that MuJoCo computes, which is the one that is simulated."""
     import mujoco
 
     lower, sides = points.min(axis=0), np.ptp(points, axis=0)
-    unit = ((points - lower) / sides).astype(np.float32)  # a hull stays one under affine maps
+    unit = ((points - lower) / sides).astype(np.float32)  # a hull is invariant under affine maps
     spec = mujoco.MjSpec()
     spec.add_mesh(name="mesh", uservert=unit.ravel().tolist())
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="mesh")
@@ -51,35 +54,35 @@ def _quickhull(points: Points) -> Surface:
         with quiet_mujoco():
             graph = spec.compile().mesh_graph
     except ValueError as error:
-        raise MeshError(f"has no hull: {str(error).splitlines()[0]}") from None
-    corners, faces = int(graph[0]), int(graph[1])
-    # in the graph: two counts, where the edges of each corner begin, which point each corner is,
-    # the edges, and the faces by points
-    which = np.array(graph[2 + corners : 2 + 2 * corners])
+        raise MeshError(f"has no convex hull: {str(error).splitlines()[0]}") from None
+    n_vertices, faces = int(graph[0]), int(graph[1])
+    # graph: the numbers of vertices and faces, start of the edges of each vertex, point index of
+    # each vertex, edges, faces by point index
+    vertex_indices = np.array(graph[2 + n_vertices : 2 + 2 * n_vertices])
     triangles = np.array(graph[-3 * faces :]).reshape(-1, 3)
-    place = np.zeros(len(points), np.int64)
-    place[which] = np.arange(corners)
-    return Surface(points=points[which], faces=place[triangles])
+    new_index = np.zeros(len(points), np.int64)
+    new_index[vertex_indices] = np.arange(n_vertices)
+    return Surface(points=points[vertex_indices], faces=new_index[triangles])
 
 
-def _outermost_in_cells(points: Points) -> Points:
-    """Return, of the points in each cell of a grid, the one farthest from the middle of all."""
+def _extreme_points_per_cell(points: Points) -> Points:
+    """Return, for each grid cell, the point farthest from the center of all points."""
     lower, sides = points.min(axis=0), np.ptp(points, axis=0)
     unit = (points - lower) / sides
-    place = np.minimum(unit * _CELLS, _CELLS - 1).astype(np.int64)
-    key = (place[:, 0] * _CELLS + place[:, 1]) * _CELLS + place[:, 2]
+    cell_index = np.minimum(unit * _CELLS, _CELLS - 1).astype(np.int64)
+    key = (cell_index[:, 0] * _CELLS + cell_index[:, 1]) * _CELLS + cell_index[:, 2]
     order = np.lexsort((-((unit - 0.5) ** 2).sum(axis=1), key))
     _, first = np.unique(key[order], return_index=True)
     return points[order[first]]
 
 
-def _outermost_in_directions(
+def _extreme_points_per_direction(
     points: Points, count: int
 ) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-    """Return which points lie farthest out in directions spread evenly over a sphere."""
+    """Return the indices of extreme points in directions distributed evenly on a sphere."""
     k = np.arange(count) + 0.5
     z = 1 - 2 * k / count
-    around = np.pi * (1 + 5**0.5) * k  # turned by the golden angle each
+    around = np.pi * (1 + 5**0.5) * k  # multiples of the golden angle
     radius = np.sqrt(1 - z**2)
     directions = np.stack([radius * np.cos(around), radius * np.sin(around), z])
     return np.unique((points @ directions).argmax(axis=0))

@@ -1,4 +1,4 @@
-"""Mesh files: what a rule asks of them, each opened once and only then."""
+"""Read each mesh file once and cache what is computed from it."""
 
 import os
 import re
@@ -38,89 +38,93 @@ __all__ = ["MeshError", "Meshes", "TooLargeError"]
 
 _T = TypeVar("_T")
 
-_MOST_BYTES: dict[Format, int] = {"ply": 4 * 2**20, "glb": 16 * 2**20}
-_MOST_BYTES_ELSE = 64 * 2**20
-"""Of a longer file the data is not read; readers differ in what they make of a byte."""
+_MAX_BYTES_BY_FORMAT: dict[Format, int] = {"ply": 4 * 2**20, "glb": 16 * 2**20}
+_DEFAULT_MAX_BYTES = 64 * 2**20
+"""Maximum size of a mesh file; parsers differ in memory per byte."""
 
-_MOST_BYTES_IN_ALL = 256 * 2**20
-_MOST_WORDS_IN_ALL = 6_000_000
-"""Of a robot with more data, or more numbers written as text, in its meshes, what comes last is not
-read: a second is gone for each million of numbers."""
+_MAX_TOTAL_BYTES = 256 * 2**20
+_MAX_TOTAL_WORDS = 6_000_000
+"""Limits on the data, and on the numbers in text files, of all meshes of a robot. Parsing a million
+numbers takes about a second."""
 
-_MOST_FACES_WELDED = 500_000
-"""Of more faces the corners are not compared; it takes some seconds for each million."""
+_MAX_WELDED_FACES = 500_000
+"""Maximum number of faces whose vertices are merged; a million takes some seconds."""
 
-_LARGEST = 1e6
-"""A robot whose mesh reaches farther is not measured [m]."""
+_MAX_COORDINATE = 1e6
+"""Maximum coordinate of a mesh [m]."""
 
-_SAMPLE = 32 * 2**10
-"""Bytes of a file that are read to see how large the mesh is about."""
+_SAMPLE_BYTES = 32 * 2**10
+"""Bytes of a file that are read to estimate the size of a mesh."""
 
 
 class Meshes:
-    """Mesh files of a run."""
+    """Mesh files and cached results."""
 
     def __init__(self, contents: Mapping[Path, bytes] | None = None) -> None:
-        """Read from disk; `contents` are read instead of the files of these paths."""
+        """Create a cache.
+
+        Args:
+            contents: File contents by path, which are used instead of the files on disk.
+        """
         self._contents = contents or {}
         self.opened: Counter[Path] = Counter()
-        """How often each file was opened: once for its header, and once for its data."""
+        """Number of times each file was opened: once for its header, and once for its data."""
 
-        self._answers: dict[Hashable, Any] = {}
+        self._cache: dict[Hashable, Any] = {}
         self._bytes = self._words = 0
 
     def header(self, path: Path) -> Header:
-        """Return what a file is, missing ones included, without reading its data."""
+        """Return the header of a file, which may be missing."""
 
         def read() -> Header:
-            held = self._held(path)
-            if held is not None:
-                return header_of(path.suffix, held)
+            contents = self._given_contents(path)
+            if contents is not None:
+                return header_of(path.suffix, contents)
             header = read_header(path)
             if header.state not in ("missing", "special", "closed"):
                 self.opened[path] += 1
             return header
 
-        return self._once(("header", path), read)
+        return self._cached(("header", path), read)
 
     def has_contents(self, path: Path) -> bool:
-        """Return whether something else is read instead of the file, such as what a fix makes."""
-        return self._held(path) is not None
+        """Return whether content was given for the file, so that it is not read from disk."""
+        return self._given_contents(path) is not None
 
     def exists(self, path: Path) -> bool:
-        """Return whether there is something under that name, be it a mesh or not; opens nothing."""
+        """Return whether the file exists, without opening it."""
         return self.has_contents(path) or exists(path)
 
     def data(self, path: Path) -> bytes:
         """Return the content of a file.
 
         Raises:
-            MeshError: if it cannot be read.
+            MeshError: If it cannot be read.
         """
         return self._bytes_of(path, self.header(path).size)
 
     def with_contents(self, contents: Mapping[Path, bytes]) -> "Meshes":
-        """Return the same files and others that are not on disk."""
+        """Return a new cache with more file contents."""
         return Meshes({**self._contents, **contents})
 
     def surface(self, path: Path) -> Surface:
-        """Return the triangles, as they are in the file.
+        """Return the triangles of a file, without scale.
 
         Raises:
-            MeshError: if there are none to be had.
+            MeshError: If the file cannot be read or has no triangles.
         """
-        return self._once(("surface", path), lambda: self._read(path))
+        return self._cached(("surface", path), lambda: self._read(path))
 
     def vertices(self, mesh: MeshFile) -> Matrix:
-        """Return the corners of the triangles, scaled, shape (n, 3) [m]; they may repeat.
+        """Return the scaled vertices, which may repeat, shape (n, 3) [m].
 
         Raises:
-            MeshError: if the file cannot be read, or is larger than anything.
+            MeshError: If the file cannot be read, or a coordinate is too large.
         """
-        return self._once(("vertices", mesh.path, mesh.scale), lambda: self._scaled(mesh))
+        return self._cached(("vertices", mesh.path, mesh.scale), lambda: self._scaled(mesh))
 
     def is_readable(self, mesh: MeshFile) -> bool:
-        """Return whether the vertices can be had."""
+        """Return whether the vertices can be read."""
         try:
             self.vertices(mesh)
         except MeshError:
@@ -128,34 +132,34 @@ class Meshes:
         return True
 
     def diagonal(self, mesh: MeshFile) -> float:
-        """Return the diagonal of the box around the mesh along its axes, scaled [m].
+        """Return the diagonal of the scaled bounding box [m].
 
         Raises:
-            MeshError: if it cannot be read.
+            MeshError: If the file cannot be read.
         """
         key = ("diagonal", mesh.path, mesh.scale)
-        return self._once(key, lambda: float(np.linalg.norm(np.ptp(self.vertices(mesh), axis=0))))
+        return self._cached(key, lambda: float(np.linalg.norm(np.ptp(self.vertices(mesh), axis=0))))
 
     def partial_diagonal(self, mesh: MeshFile) -> float | None:
-        """Return the diagonal of a part of the mesh, scaled [m], from the beginning of its file.
+        """Return the scaled diagonal of the first part of a mesh [m].
 
-        The whole is at least as large, unless the file itself scales it, or begins with points that
-        are a corner of nothing. None where the beginning
-        does not tell, and where the whole was read already.
+        It is a lower bound of the diagonal, unless the file applies a scale or starts with unused
+        vertices. Only the first part of the file is read. None if the diagonal cannot be estimated,
+        or if the whole mesh was read already.
         """
-        if ("surface", mesh.path) in self._answers:
+        if ("surface", mesh.path) in self._cache:
             return None
-        sample = self._once(("glance", mesh.path), lambda: self._sample(mesh.path))
+        sample = self._cached(("partial_diagonal", mesh.path), lambda: self._sample(mesh.path))
         if sample is None:
             return None
-        with np.errstate(all="ignore"):  # of a scale that is none; the whole mesh tells
+        with np.errstate(all="ignore"):  # an invalid scale is reported with the whole mesh
             return float(np.linalg.norm(np.ptp(sample * mesh.scale, axis=0)))
 
     def faces(self, path: Path) -> int:
-        """Return the number of triangles, from the header if that says it.
+        """Return the number of triangles, from the header if possible.
 
         Raises:
-            MeshError: if the file cannot be read.
+            MeshError: If the file cannot be read.
         """
         header = self.header(path)
         if header.state == "fine" and header.faces is not None:
@@ -163,12 +167,12 @@ class Meshes:
         return len(self.surface(path).faces)
 
     def volume(self, mesh: MeshFile) -> float:
-        """Return the volume, scaled [m3]: that of the solid if it is closed, else of its hull.
+        """Return the scaled volume of the mesh, or of its hull if it is not closed [m3].
 
-        That of a flat mesh is 0.
+        A flat mesh has volume 0.
 
         Raises:
-            MeshError: if it cannot be read.
+            MeshError: If the file cannot be read.
         """
         solid = self.solid_volume(mesh)
         if solid is not None:
@@ -176,14 +180,14 @@ class Meshes:
         try:
             return self.hull_volume(mesh)
         except MeshError:
-            self.vertices(mesh)  # so that the error is about the file, if it is its fault
+            self.vertices(mesh)  # raises the error of the file, if there is one
             return 0.0
 
     def solid_volume(self, mesh: MeshFile) -> float | None:
-        """Return what the mesh encloses, scaled [m3]; None if it is not closed.
+        """Return the scaled volume of a closed mesh [m3]; None if it is not closed.
 
         Raises:
-            MeshError: if it cannot be read.
+            MeshError: If the file cannot be read.
         """
 
         def measure() -> float | None:
@@ -191,71 +195,77 @@ class Meshes:
             return abs(signed_volume(surface)) if is_closed(surface) else None
 
         self.vertices(mesh)
-        volume = self._once(("volume", mesh.path), measure)
-        return volume if volume is None else volume * _factor(mesh)
+        volume = self._cached(("volume", mesh.path), measure)
+        return volume if volume is None else volume * _volume_factor(mesh)
 
     def hull_volume(self, mesh: MeshFile) -> float:
-        """Return the volume of the convex hull, scaled [m3].
+        """Return the scaled volume of the convex hull [m3].
 
         Raises:
-            MeshError: if the mesh cannot be read, or is flat.
+            MeshError: If the file cannot be read or the mesh is flat.
         """
         self.vertices(mesh)
         hull = self.hull(mesh.path)
-        volume = self._once(("hull volume", mesh.path), lambda: abs(signed_volume(hull)))
-        return volume * _factor(mesh)
+        volume = self._cached(("hull volume", mesh.path), lambda: abs(signed_volume(hull)))
+        return volume * _volume_factor(mesh)
 
-    def hull(self, path: Path, most_corners: int | None = None) -> Surface:
-        """Return the convex hull, as large as in the file, and of so many corners if told.
+    def hull(self, path: Path, max_vertices: int | None = None) -> Surface:
+        """Return the convex hull without scale.
+
+        Args:
+            path: Mesh file.
+            max_vertices: Maximum number of vertices of the hull.
 
         Raises:
-            MeshError: if the mesh cannot be read, or is flat.
+            MeshError: If the file cannot be read or the mesh is flat.
         """
         from terrainkit_robots.mesh.hull import convex_hull
 
         def make() -> Surface:
             surface = self.surface(path)
-            few = len(surface.faces) <= _MOST_FACES_WELDED
-            return convex_hull((self.welded(path) if few else surface).points, most_corners)
+            small = len(surface.faces) <= _MAX_WELDED_FACES
+            return convex_hull((self.welded(path) if small else surface).points, max_vertices)
 
-        return self._once(("hull", path, most_corners), make)
+        return self._cached(("hull", path, max_vertices), make)
 
     def is_flat(self, mesh: MeshFile) -> bool:
-        """Return whether the mesh, scaled, lies in a plane, and so has no hull.
+        """Return whether the scaled mesh lies in a plane.
 
         Raises:
-            MeshError: if it cannot be read.
+            MeshError: If the file cannot be read.
         """
         key = ("flat", mesh.path, mesh.scale)
-        return self._once(key, lambda: is_flat(self.vertices(mesh)))
+        return self._cached(key, lambda: is_flat(self.vertices(mesh)))
 
     def welded(self, path: Path) -> Surface:
-        """Return the triangles with each corner only once, as large as in the file.
+        """Return the triangles with duplicate vertices merged, without scale.
 
         Raises:
-            MeshError: if there are none to be had, or too many to be compared.
+            MeshError: If the file cannot be read or has too many faces.
         """
 
         def weld() -> Surface:
             surface = self.surface(path)
-            if len(surface.faces) > _MOST_FACES_WELDED:
-                raise TooLargeError(f"has {len(surface.faces):,} faces, too many to be compared")
+            if len(surface.faces) > _MAX_WELDED_FACES:
+                raise TooLargeError(
+                    f"has {len(surface.faces):,} faces; expected at most {_MAX_WELDED_FACES:,}"
+                )
             return welded(surface)
 
-        return self._once(("welded", path), weld)
+        return self._cached(("welded", path), weld)
 
-    def _once(self, key: Hashable, make: Callable[[], _T]) -> _T:
-        """Return what was made for this key before; an error is kept as well."""
-        if key not in self._answers:
+    def _cached(self, key: Hashable, make: Callable[[], _T]) -> _T:
+        """Return the cached result of a key; errors are cached as well."""
+        if key not in self._cache:
             try:
-                self._answers[key] = make()
+                self._cache[key] = make()
             except MeshError as error:
-                self._answers[key] = error
-        answer = self._answers[key]
-        if isinstance(answer, MeshError):
-            raise type(answer)(*answer.args)
-        made: _T = answer
-        return made
+                self._cache[key] = error
+        cached = self._cache[key]
+        if isinstance(cached, MeshError):
+            raise type(cached)(*cached.args)
+        result: _T = cached
+        return result
 
     def _read(self, path: Path) -> Surface:
         from terrainkit_robots.mesh.reader import read_mesh
@@ -263,29 +273,29 @@ class Meshes:
         header = self.header(path)
         if header.problem:
             raise MeshError(header.problem)
-        most = _MOST_BYTES.get(header.format, _MOST_BYTES_ELSE)
-        if header.size > most:
-            raise TooLargeError(f"has {header.size:,} bytes; of more than {most:,} nothing is read")
-        if self._bytes + header.size > _MOST_BYTES_IN_ALL:
+        max_bytes = _MAX_BYTES_BY_FORMAT.get(header.format, _DEFAULT_MAX_BYTES)
+        if header.size > max_bytes:
+            raise TooLargeError(f"has {header.size:,} bytes; expected at most {max_bytes:,}")
+        if self._bytes + header.size > _MAX_TOTAL_BYTES:
             raise TooLargeError(
-                f"comes after {self._bytes:,} bytes of other meshes; that is enough"
+                f"exceeds the limit of {_MAX_TOTAL_BYTES:,} bytes for all meshes of a robot"
             )
         data = self._bytes_of(path, header.size)
         self._bytes += len(data)
         if header.format not in ("stl", "msh", "glb"):
             self._words += data.count(b" ") + data.count(b"\n")
-            if self._words > _MOST_WORDS_IN_ALL:
+            if self._words > _MAX_TOTAL_WORDS:
                 raise TooLargeError(
-                    f"brings the numbers in meshes of text over {_MOST_WORDS_IN_ALL:,}; they are "
-                    "not read"
+                    f"exceeds the limit of {_MAX_TOTAL_WORDS:,} numbers in all text meshes of a "
+                    "robot"
                 )
-        with np.errstate(all="ignore"):  # what overflows is found out after
+        with np.errstate(all="ignore"):  # overflow is checked below
             return read_mesh(header.format, data)
 
     def _bytes_of(self, path: Path, size: int) -> bytes:
-        held = self._held(path)
-        if held is not None:
-            return held[:size]
+        contents = self._given_contents(path)
+        if contents is not None:
+            return contents[:size]
         self.opened[path] += 1
         try:
             with open_regular(path) as stream:
@@ -293,8 +303,8 @@ class Meshes:
         except (OSError, ValueError) as error:
             raise MeshError(f"cannot be read: {error}") from None
 
-    def _held(self, path: Path) -> bytes | None:
-        """Return what is to be read instead of the file."""
+    def _given_contents(self, path: Path) -> bytes | None:
+        """Return the content that was given for a file, or None."""
         if not self._contents or path in self._contents:
             return self._contents.get(path)
         return self._contents.get(Path(os.path.realpath(path)))
@@ -303,43 +313,43 @@ class Meshes:
         points = self.surface(mesh.path).points
         with np.errstate(all="ignore"):
             scaled = points.astype(np.float64) * np.array(mesh.scale, np.float64)
-        if not (np.abs(scaled) < _LARGEST).all():
-            raise MeshError(f"reaches farther than {_LARGEST:,.0f} m, or is scaled by no number")
+        if not (np.abs(scaled) < _MAX_COORDINATE).all():
+            raise MeshError(f"has coordinates beyond {_MAX_COORDINATE:,.0f} m, or an invalid scale")
         return scaled
 
     def _sample(self, path: Path) -> Points | None:
         header = self.header(path)
         if header.problem or header.format not in ("stl", "obj", "dae"):
             return None
-        head = self._bytes_of(path, _SAMPLE)
+        head = self._bytes_of(path, _SAMPLE_BYTES)
         try:
-            points = _first_points(header.format, head)
+            points = _sample_points(header.format, head)
         except MeshError:
             return None
-        return points if len(points) > _FEWEST and np.isfinite(points).all() else None
+        return points if len(points) > _MIN_SAMPLE_POINTS and np.isfinite(points).all() else None
 
 
-_FEWEST = 20
-"""Of a mesh with fewer corners in its beginning the beginning does not tell."""
+_MIN_SAMPLE_POINTS = 20
+"""Minimum number of vertices of a sample."""
 
 
-def _first_points(kind: Format, head: bytes) -> Points:
-    """Return the corners in the beginning of a file."""
-    if kind == "stl":
+def _sample_points(mesh_format: Format, head: bytes) -> Points:
+    """Return the vertices in the first part of a file."""
+    if mesh_format == "stl":
         faces = (len(head) - STL_HEADER) // STL_FACE
         return np.frombuffer(head, STL_RECORD, faces, STL_HEADER)["corners"].reshape(-1, 3)
-    if kind == "obj":
+    if mesh_format == "obj":
         lines = re.findall(rb"^v[ \t]+(\S+[ \t]+\S+[ \t]+\S+)", head, re.MULTILINE)
         return parse_float_list(b" ".join(lines[:-1])).reshape(-1, 3)
     array = re.search(rb"<float_array[^>]*>([^<]*)", head)
     if array is None:
         return np.zeros((0, 3))
     unit = re.search(rb"<unit[^>]*\bmeter=[\"']([0-9.eE+-]+)[\"']", head)
-    values = parse_float_list(array[1].rpartition(b" ")[0])  # the last number may be cut off
+    values = parse_float_list(array[1].rpartition(b" ")[0])  # the last number may be truncated
     factor = float(parse_float_list(unit[1])[0]) if unit else 1.0
     return values[: values.size // 3 * 3].reshape(-1, 3) * factor
 
 
-def _factor(mesh: MeshFile) -> float:
-    """Return by how much the scale multiplies a volume."""
+def _volume_factor(mesh: MeshFile) -> float:
+    """Return the factor of the scale on the volume."""
     return abs(mesh.scale[0] * mesh.scale[1] * mesh.scale[2])

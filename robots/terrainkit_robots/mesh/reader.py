@@ -1,4 +1,4 @@
-"""Reading mesh files: points and triangles as they are in the file, without the robot's scale."""
+"""Read the vertices and triangles of mesh files, without the scale of the robot file."""
 
 import re
 from collections.abc import Callable
@@ -20,32 +20,32 @@ from terrainkit_robots.mesh.surface import (
 )
 
 
-def read_mesh(kind: Format, data: bytes) -> Surface:
-    """Return the triangles in a file, without the points that are a corner of none.
+def read_mesh(mesh_format: Format, data: bytes) -> Surface:
+    """Return the triangles of a mesh file, without unused vertices.
 
     Raises:
-        MeshError: if it holds none, or is not what it claims to be.
+        MeshError: If the file is malformed or has no triangles.
     """
-    reader = _READERS.get(kind)
+    reader = _READERS.get(mesh_format)
     if reader is None:
-        raise MeshError("is in a format that is not read")
+        raise MeshError("has an unsupported format")
     surface = reader(data)
     points, faces = surface.points, surface.faces
     if not len(points) or not len(faces):
-        raise MeshError("holds no triangles")
+        raise MeshError("has no triangles")
     if faces.min() < 0 or faces.max() >= len(points):
-        wrong = faces.min() if faces.min() < 0 else faces.max()
-        raise MeshError(f"has {len(points):,} corners, and names number {wrong}, counted from 0")
-    surface = _used(surface)
+        index = faces.min() if faces.min() < 0 else faces.max()
+        raise MeshError(f"has a face with vertex index {index}; expected 0 to {len(points) - 1:,}")
+    surface = _remove_unused_points(surface)
     finite = np.isfinite(surface.points).all(axis=1)
     if not finite.all():
-        raise MeshError(f"has {np.count_nonzero(~finite):,} corners that are not numbers")
+        raise MeshError(f"has {np.count_nonzero(~finite):,} vertices that are not finite")
     return surface
 
 
-def _used(surface: Surface) -> Surface:
+def _remove_unused_points(surface: Surface) -> Surface:
     if len(surface.points) == surface.faces.size:
-        return surface  # corners of their own for each triangle, as in STL
+        return surface  # no shared vertices, as in STL
     used = np.bincount(surface.faces.ravel(), minlength=len(surface.points)) > 0
     place = np.cumsum(used) - 1
     return Surface(points=surface.points[used], faces=place[surface.faces])
@@ -54,18 +54,20 @@ def _used(surface: Surface) -> Surface:
 def _binary_stl(data: bytes) -> Surface:
     count = (len(data) - STL_HEADER) // STL_FACE
     corners = np.frombuffer(data, STL_RECORD, count, STL_HEADER)["corners"].reshape(-1, 3)
-    return _loose(corners)
+    return _triangle_soup(corners)
 
 
 def _ascii_stl(data: bytes) -> Surface:
     lines = re.findall(rb"vertex[ \t]([^\r\n]*)", data, re.IGNORECASE)
     corners = parse_float_list(b" ".join(lines))
     if corners.size != 3 * len(lines) or len(lines) % 3:
-        raise MeshError("is an ASCII STL whose corners are not three numbers each, three a face")
-    return _loose(corners.reshape(-1, 3))
+        raise MeshError(
+            "is an ASCII STL with invalid vertices; expected three per face, three numbers each"
+        )
+    return _triangle_soup(corners.reshape(-1, 3))
 
 
-def _loose(corners: Points) -> Surface:
+def _triangle_soup(corners: Points) -> Surface:
     return Surface(points=corners, faces=np.arange(len(corners)).reshape(-1, 3))
 
 
@@ -73,7 +75,7 @@ def _obj(data: bytes) -> Surface:
     lines = re.sub(rb"\\\r?\n", b" ", data).splitlines()
     points = obj_points([line for line in lines if line[:2] in (b"v ", b"v\t")])
     faces = [line[2:] for line in lines if line[:2] in (b"f ", b"f\t")]
-    # only the first of the three indices is a corner's: 7/1/3 -> 7
+    # only the first of the three indices is a vertex: 7/1/3 -> 7
     corners = re.sub(rb"/\S*", b"", b"\n".join(faces))
     counts = np.array([len(face.split()) for face in corners.split(b"\n")])
     indices = parse_int_list(corners)
@@ -82,13 +84,13 @@ def _obj(data: bytes) -> Surface:
 
 
 def obj_points(lines: list[bytes]) -> Points:
-    """Return the corners in the `v` lines of an OBJ, which may have a weight or a color as well."""
+    """Return the vertices of the `v` lines of an OBJ, without weights and colors."""
     if not lines:
-        raise MeshError("holds no corners")
+        raise MeshError("has no vertices")
     values = parse_float_list(b" ".join(line[2:] for line in lines))
     width, rest = divmod(values.size, len(lines))
     if rest or width < 3:
-        raise MeshError("has corners that are not three numbers each")
+        raise MeshError("has vertices that are not three numbers each")
     return values.reshape(-1, width)[:, :3]
 
 
@@ -96,32 +98,32 @@ def _msh(data: bytes) -> Surface:
     vertices, normals, textures, faces = (int(n) for n in np.frombuffer(data, "<i4", 4))
     parts = 12 * vertices, 12 * normals, 8 * textures, 12 * faces
     if min(parts) < 0 or 16 + sum(parts) > len(data):
-        raise MeshError(f"claims more than the {len(data):,} bytes that it has")
+        raise MeshError(f"is truncated: its header declares more than {len(data):,} bytes")
     points = np.frombuffer(data, "<f4", 3 * vertices, 16).reshape(-1, 3)
     if not faces:
-        return _without_faces(points)
+        return _hull_of_points(points)
     start = 16 + 12 * vertices + 12 * normals + 8 * textures
     return Surface(points=points, faces=np.frombuffer(data, "<i4", 3 * faces, start).reshape(-1, 3))
 
 
-def _without_faces(points: Points) -> Surface:
-    """Return the hull, which is what MuJoCo takes for a mesh of nothing but points."""
+def _hull_of_points(points: Points) -> Surface:
+    """Return the convex hull, which MuJoCo uses for meshes without faces."""
     from terrainkit_robots.mesh.hull import convex_hull
 
     if not np.isfinite(points).all():
-        raise MeshError("has corners that are not numbers")
+        raise MeshError("has vertices that are not finite")
     return convex_hull(unique_points(points)[0])
 
 
-def _through_trimesh(kind: str) -> Callable[[bytes], Surface]:
+def _trimesh_reader(mesh_format: str) -> Callable[[bytes], Surface]:
     def read(data: bytes) -> Surface:
         import trimesh
 
         try:
-            # without a resolver it follows no name of another file
-            mesh = trimesh.load(BytesIO(data), file_type=kind, force="mesh", process=False)
+            # without a resolver, no other files are opened
+            mesh = trimesh.load(BytesIO(data), file_type=mesh_format, force="mesh", process=False)
             return Surface(points=np.asarray(mesh.vertices), faces=np.asarray(mesh.faces))
-        except Exception as error:  # a reader of many authors raises whatever it likes
+        except Exception as error:  # trimesh raises many types
             raise MeshError(f"cannot be read: {type(error).__name__}: {error}") from None
 
     return read
@@ -133,6 +135,6 @@ _READERS: dict[Format, Callable[[bytes], Surface]] = {
     "obj": _obj,
     "dae": read_dae,
     "msh": _msh,
-    "ply": _through_trimesh("ply"),
-    "glb": _through_trimesh("glb"),
+    "ply": _trimesh_reader("ply"),
+    "glb": _trimesh_reader("glb"),
 }

@@ -1,7 +1,6 @@
-"""What a mesh file is, from its two ends and its size: enough to see most of what is wrong.
+"""Classify mesh files by their first and last bytes and their size.
 
-None of this reads the data, so that a visual mesh of many megabytes costs as little as a small one.
-Only regular files are opened: reading a pipe would wait for ever, reading a device never end.
+The data itself is not read, so that a large visual mesh costs as little as a small one.
 """
 
 import os
@@ -18,20 +17,20 @@ from terrainkit_robots.files import SpecialFileError, open_regular
 Format = Literal["stl", "ascii-stl", "obj", "dae", "msh", "ply", "glb", "other"]
 
 MUJOCO_SUFFIXES = (".stl", ".obj", ".msh")
-"""Ends of names, in small letters, for which MuJoCo has a decoder."""
+"""Suffixes that MuJoCo can decode, in lower case."""
 
 STL_HEADER = 84
 """Bytes of a binary STL before its faces."""
 
 STL_FACE = 50
-"""Bytes of each face of a binary STL."""
+"""Bytes per face of a binary STL."""
 
 State = Literal["missing", "special", "closed", "empty", "lfs", "broken", "fine"]
 
-_END = 4096
-"""Bytes that are looked at from either end."""
+_SAMPLE_BYTES = 4096
+"""Bytes that are read from either end."""
 
-_LFS = b"version https://git-lfs"
+_LFS_PREFIX = b"version https://git-lfs"
 
 _FORMATS: dict[str, Format] = {
     ".stl": "stl",
@@ -47,92 +46,94 @@ _FORMATS: dict[str, Format] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Header:
-    """What is known of a mesh file without its data."""
+    """Properties of a mesh file that do not require its data."""
 
     format: Format = "other"
-    """By the name, as every simulator goes by it, and for STL also by the content."""
+    """Format by suffix, as simulators choose it; for STL also by content."""
 
     size: int = 0
-    """Length of the file [bytes]."""
+    """File size [bytes]."""
 
     faces: int | None = None
-    """Number of triangles; None where only the data tells. A binary STL that is broken has one if
-    all its faces are there, and more after them."""
+    """Number of triangles; None if only the data contains it. A broken binary STL has it if all its
+    faces exist and more data follows."""
 
     state: State = "fine"
-    """Missing; special, which is a folder, a pipe or a device; closed to this user; empty; a Git
-    LFS pointer; broken; or fine as far as this shows."""
+    """missing; special (a folder, pipe or device); closed (no permission); empty; lfs (a Git LFS
+    pointer); broken; or fine, as far as the header shows."""
 
     problem: str = ""
-    """What is wrong, as a sentence that lacks its subject; empty if nothing is."""
+    """What is wrong, as a sentence without its subject; empty if nothing is."""
 
 
 def read_header(path: Path) -> Header:
-    """Return what a file is; a file that is missing has a header that says so."""
+    """Return the header of a file, which may be missing."""
     try:
         with open_regular(path) as stream:
             size = os.fstat(stream.fileno()).st_size
-            head = stream.read(_END)
-            stream.seek(max(0, size - _END))
-            tail = stream.read(_END)
+            head = stream.read(_SAMPLE_BYTES)
+            stream.seek(max(0, size - _SAMPLE_BYTES))
+            tail = stream.read(_SAMPLE_BYTES)
     except SpecialFileError as error:
         return Header(state="special", problem=str(error))
     except PermissionError:
         return Header(state="closed", problem="cannot be opened: permission denied")
-    except (OSError, ValueError):  # not there, a loop of links, a name that cannot be one
+    except (OSError, ValueError):  # missing, a cycle of symbolic links, an invalid name
         return Header(state="missing", problem="does not exist")
-    return _judge(_FORMATS.get(path.suffix.lower(), "other"), size, head, tail)
+    return _classify(_FORMATS.get(path.suffix.lower(), "other"), size, head, tail)
 
 
 def header_of(suffix: str, data: bytes) -> Header:
-    """Return what a file would be that has such a name and content."""
-    kind = _FORMATS.get(suffix.lower(), "other")
-    return _judge(kind, len(data), data[:_END], data[-_END:])
+    """Return the header of a file with this suffix and content."""
+    mesh_format = _FORMATS.get(suffix.lower(), "other")
+    return _classify(mesh_format, len(data), data[:_SAMPLE_BYTES], data[-_SAMPLE_BYTES:])
 
 
-def _judge(kind: Format, size: int, head: bytes, tail: bytes) -> Header:
+def _classify(mesh_format: Format, size: int, head: bytes, tail: bytes) -> Header:
     if size == 0:
-        return Header(format=kind, state="empty", problem="is empty: it has 0 bytes")
-    if head.startswith(_LFS):
+        return Header(format=mesh_format, state="empty", problem="is empty: it has 0 bytes")
+    if head.startswith(_LFS_PREFIX):
         real = re.search(rb"^size (\d{1,20})", head, re.MULTILINE)
         length = f" of {int(real[1]):,} bytes" if real else ""
-        problem = f"is a Git LFS pointer of {size} bytes, not the mesh{length} that it stands for"
-        return Header(format=kind, size=size, state="lfs", problem=problem)
+        problem = f"is a Git LFS pointer of {size} bytes instead of the mesh{length}"
+        return Header(format=mesh_format, size=size, state="lfs", problem=problem)
     if re.match(rb"\s*<(?:!doctype html|html)\b", head, re.IGNORECASE):
-        return Header(format=kind, size=size, state="broken", problem="is a web page, not a mesh")
-    judge = _JUDGES.get(kind)
-    return judge(size, head, tail) if judge else Header(format=kind, size=size)
+        return Header(
+            format=mesh_format, size=size, state="broken", problem="is an HTML page, not a mesh"
+        )
+    classify = _CLASSIFIERS.get(mesh_format)
+    return classify(size, head, tail) if classify else Header(format=mesh_format, size=size)
 
 
 def _stl(size: int, head: bytes, tail: bytes) -> Header:
-    claimed = int(np.frombuffer(head, "<u4", 1, 80)[0]) if len(head) >= STL_HEADER else None
-    if claimed and size == STL_HEADER + STL_FACE * claimed:
-        return Header(format="stl", size=size, faces=claimed)
+    declared = int(np.frombuffer(head, "<u4", 1, 80)[0]) if len(head) >= STL_HEADER else None
+    if declared and size == STL_HEADER + STL_FACE * declared:
+        return Header(format="stl", size=size, faces=declared)
     if head.lstrip()[:5].lower() == b"solid" and _is_text(head):
         return _ascii_stl(size, head, tail)
-    if claimed is None:
-        problem = f"has {size} bytes, and the header of a binary STL alone takes {STL_HEADER}"
+    if declared is None:
+        problem = f"has {size} bytes; the header of a binary STL has {STL_HEADER}"
     elif _is_text(head):
-        problem = "is text, and not an STL: that would start with the word solid"
-    elif claimed == 0:
-        problem = "has no faces: its header says 0"
+        problem = "is a text file, but not an ASCII STL, which starts with solid"
+    elif declared == 0:
+        problem = "has no faces: the number of faces in its header is 0"
     else:
         problem = (
-            f"claims {claimed:,} faces, which take {STL_HEADER + STL_FACE * claimed:,} bytes, "
-            f"and has {size:,} bytes"
+            f"has {size:,} bytes; its header declares {declared:,} faces, which need "
+            f"{STL_HEADER + STL_FACE * declared:,} bytes"
         )
-    whole = claimed if claimed and size > STL_HEADER + STL_FACE * claimed else None
-    return Header(format="stl", size=size, faces=whole, state="broken", problem=problem)
+    complete_faces = declared if declared and size > STL_HEADER + STL_FACE * declared else None
+    return Header(format="stl", size=size, faces=complete_faces, state="broken", problem=problem)
 
 
 def _ascii_stl(size: int, head: bytes, tail: bytes) -> Header:
     problem = ""
     if b"facet" not in head.lower() and size > len(head):
-        problem = f"starts as an ASCII STL and has no facet in its first {len(head)} bytes"
+        problem = f"starts like an ASCII STL, but has no facet in its first {len(head)} bytes"
     elif b"facet" not in head.lower():
-        problem = "is an ASCII STL without a single facet"
+        problem = "is an ASCII STL without facets"
     elif b"endsolid" not in tail.lower():
-        problem = "is an ASCII STL that was cut off: it does not end with endsolid"
+        problem = "is a truncated ASCII STL: it does not end with endsolid"
     state: State = "broken" if problem else "fine"
     return Header(format="ascii-stl", size=size, state=state, problem=problem)
 
@@ -141,32 +142,32 @@ def _obj(size: int, head: bytes, tail: bytes) -> Header:
     if _is_text(head) and _is_text(tail):
         return Header(format="obj", size=size)
     return Header(
-        format="obj", size=size, state="broken", problem="is not an OBJ: it is not of text"
+        format="obj", size=size, state="broken", problem="is not an OBJ: it is not a text file"
     )
 
 
 def _dae(size: int, head: bytes, tail: bytes) -> Header:
     problem = ""
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
-        pass  # UTF-16, which only the XML reader can tell
+        pass  # UTF-16; the XML parser checks it
     elif b"<COLLADA" not in head:
         problem = "is not a COLLADA file: it does not start with a COLLADA element"
     elif re.search(rb"</COLLADA\s*>", tail) is None:
-        problem = "was cut off: it does not end with </COLLADA>"
+        problem = "is truncated: it does not end with </COLLADA>"
     return Header(format="dae", size=size, state="broken" if problem else "fine", problem=problem)
 
 
-def _msh(size: int, head: bytes, tail: bytes) -> Header:  # noqa: ARG001 - one of the judges
+def _msh(size: int, head: bytes, tail: bytes) -> Header:  # noqa: ARG001 - signature of _CLASSIFIERS
     counts = [int(n) for n in np.frombuffer(head, "<i4", 4)] if len(head) >= 16 else [-1] * 4
     vertices, normals, textures, faces = counts
     expected = 16 + 12 * vertices + 12 * normals + 8 * textures + 12 * faces
     if min(counts) >= 0 and vertices > 0 and size == expected:
         return Header(format="msh", size=size, faces=faces or None)
-    problem = f"is not a MuJoCo mesh: the counts in its header do not fit its {size:,} bytes"
+    problem = f"is not a MuJoCo mesh: the counts in its header do not match its {size:,} bytes"
     return Header(format="msh", size=size, state="broken", problem=problem)
 
 
-def _ply(size: int, head: bytes, tail: bytes) -> Header:  # noqa: ARG001 - one of the judges
+def _ply(size: int, head: bytes, tail: bytes) -> Header:  # noqa: ARG001 - signature of _CLASSIFIERS
     if not head.startswith(b"ply"):
         problem = "is not a PLY: it does not start with ply"
         return Header(format="ply", size=size, state="broken", problem=problem)
@@ -174,15 +175,15 @@ def _ply(size: int, head: bytes, tail: bytes) -> Header:  # noqa: ARG001 - one o
     return Header(format="ply", size=size, faces=int(count[1]) if count else None)
 
 
-def _glb(size: int, head: bytes, tail: bytes) -> Header:  # noqa: ARG001 - one of the judges
+def _glb(size: int, head: bytes, tail: bytes) -> Header:  # noqa: ARG001 - signature of _CLASSIFIERS
     fits = len(head) >= 12 and int(np.frombuffer(head, "<u4", 1, 8)[0]) == size
     if head.startswith(b"glTF") and fits:
         return Header(format="glb", size=size)
-    problem = f"is not a GLB: its header does not fit its {size:,} bytes"
+    problem = f"is not a GLB: its header does not match its {size:,} bytes"
     return Header(format="glb", size=size, state="broken", problem=problem)
 
 
-_JUDGES: dict[Format, Callable[[int, bytes, bytes], Header]] = {
+_CLASSIFIERS: dict[Format, Callable[[int, bytes, bytes], Header]] = {
     "stl": _stl,
     "obj": _obj,
     "dae": _dae,

@@ -46,6 +46,9 @@ def test_command_line_overrides_file(tmp_path):
         strict=True,
     )
     assert Settings().over(theirs) == theirs
+    assert Settings(strict=False, simulate=True).over(Settings(strict=True, simulate=False)) == (
+        Settings(strict=False, simulate=True)
+    )
 
 
 TABLE = """

@@ -35,7 +35,7 @@ def test_a_thin_sheet_has_a_hull():
     ],
 )
 def test_what_is_flat_has_none(points, capfd):
-    with pytest.raises(MeshError, match="is flat, and has no hull"):
+    with pytest.raises(MeshError, match="is flat and has no convex hull"):
         convex_hull(points)
     assert capfd.readouterr() == ("", "")
 

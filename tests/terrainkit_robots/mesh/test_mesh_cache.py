@@ -50,7 +50,7 @@ class TestVertices:
     def test_larger_than_anything(self, mesh, factor):
         use = mesh(scale=(factor, 1, 1))
         assert not Meshes().is_readable(use)
-        with pytest.raises(MeshError, match="reaches farther than 1,000,000 m"):
+        with pytest.raises(MeshError, match="coordinates beyond 1,000,000 m"):
             Meshes().vertices(use)
         Meshes().partial_diagonal(use)  # nor does it warn
 
@@ -164,24 +164,24 @@ class TestGlance:
 
 class TestLimits:
     def test_a_long_file(self, mesh, monkeypatch):
-        monkeypatch.setattr(module, "_MOST_BYTES_ELSE", 100)
-        with pytest.raises(TooLargeError, match="has 684 bytes; of more than 100 nothing is read"):
+        monkeypatch.setattr(module, "_DEFAULT_MAX_BYTES", 100)
+        with pytest.raises(TooLargeError, match="has 684 bytes; expected at most 100"):
             Meshes().vertices(mesh())
 
     def test_many_files(self, mesh, monkeypatch):
-        monkeypatch.setattr(module, "_MOST_BYTES_IN_ALL", 1000)
+        monkeypatch.setattr(module, "_MAX_TOTAL_BYTES", 1000)
         meshes = Meshes()
         meshes.vertices(mesh())
-        with pytest.raises(TooLargeError, match="comes after 684 bytes"):
+        with pytest.raises(TooLargeError, match="limit of 1,000 bytes"):
             meshes.vertices(mesh(name="b.stl"))
 
     def test_many_numbers(self, mesh, monkeypatch):
-        monkeypatch.setattr(module, "_MOST_WORDS_IN_ALL", 100)
-        with pytest.raises(TooLargeError, match="numbers in meshes of text over 100"):
+        monkeypatch.setattr(module, "_MAX_TOTAL_WORDS", 100)
+        with pytest.raises(TooLargeError, match="limit of 100 numbers"):
             Meshes().vertices(mesh(b"v 0 0 0\n" * 50, "a.obj"))
 
     def test_many_faces(self, mesh, monkeypatch):
-        monkeypatch.setattr(module, "_MOST_FACES_WELDED", 10)
+        monkeypatch.setattr(module, "_MAX_WELDED_FACES", 10)
         with pytest.raises(TooLargeError, match="12 faces"):
             Meshes().solid_volume(mesh())
         assert Meshes().hull_volume(mesh()) == pytest.approx(6.0)

@@ -106,15 +106,15 @@ class TestObj:
         ("text", "problem"),
         [
             pytest.param(POINTS, "no triangles", id="no faces"),
-            pytest.param(b"f 1 2 3\n", "no corners", id="no points"),
-            pytest.param(POINTS + b"f 1 2 5\n", "has 4 corners, and names number 4", id="beyond"),
-            pytest.param(POINTS + b"f 1 2 -5\n", "names number -1", id="before"),
-            pytest.param(POINTS + b"f 0 1 2\n", "names number -1", id="counted from 0"),
+            pytest.param(b"f 1 2 3\n", "no vertices", id="no points"),
+            pytest.param(POINTS + b"f 1 2 5\n", "vertex index 4; expected 0 to 3", id="beyond"),
+            pytest.param(POINTS + b"f 1 2 -5\n", "vertex index -1", id="before"),
+            pytest.param(POINTS + b"f 0 1 2\n", "vertex index -1", id="counted from 0"),
             pytest.param(POINTS + b"f 1 2 1e300\n", "index", id="far beyond"),
-            pytest.param(POINTS + b"f one two three\n", "text where numbers", id="words"),
+            pytest.param(POINTS + b"f one two three\n", "text instead of numbers", id="words"),
             pytest.param(b"v 0 0\nv 1 1\nf 1 2 1\n", "three numbers", id="two numbers"),
             pytest.param(b"v 0 0 0\nv 1 1\nf 1 2 1\n", "three numbers", id="once two numbers"),
-            pytest.param(b"v nan 0 0\nv 1e999 1 1\nf 1 2 1\n", "2 corners that are not", id="nan"),
+            pytest.param(b"v nan 0 0\nv 1e999 1 1\nf 1 2 1\n", "2 vertices that are not", id="nan"),
         ],
     )
     def test_broken(self, text, problem):
@@ -125,13 +125,13 @@ class TestObj:
 @pytest.mark.parametrize(
     ("kind", "data", "problem"),
     [
-        pytest.param("ascii-stl", b"vertex 0 0 0\n" * 2, "three a face", id="two corners"),
-        pytest.param("ascii-stl", b"vertex 0 0 x\n" * 3, "text where", id="a word"),
+        pytest.param("ascii-stl", b"vertex 0 0 0\n" * 2, "three per face", id="two corners"),
+        pytest.param("ascii-stl", b"vertex 0 0 x\n" * 3, "text instead of numbers", id="a word"),
         pytest.param("ascii-stl", b"facet\n", "no triangles", id="none"),
         pytest.param("stl", bytes(84), "no triangles", id="no faces"),
-        pytest.param("stl", bytes(84) + b"\xff" * 50, "3 corners that are not numbers", id="NaN"),
-        pytest.param("msh", msh(TETRAHEDRON, [[0, 1, 4]]), "names number 4", id="beyond"),
-        pytest.param("other", b"", "format that is not read", id="another format"),
+        pytest.param("stl", bytes(84) + b"\xff" * 50, "3 vertices that are not finite", id="NaN"),
+        pytest.param("msh", msh(TETRAHEDRON, [[0, 1, 4]]), "vertex index 4", id="beyond"),
+        pytest.param("other", b"", "unsupported format", id="another format"),
         pytest.param("ply", b"ply\n", "cannot be read", id="an empty PLY"),
         pytest.param(
             "ply",

@@ -39,25 +39,23 @@ def test_sound_files(suffix, data, kind, faces):
 @pytest.mark.parametrize(
     ("suffix", "data", "problem"),
     [
-        pytest.param(".stl", stl(2)[:-1], "claims 2 faces, which take 184 bytes", id="cut off"),
-        pytest.param(".stl", stl(2) + b"\0", "and has 185 bytes", id="too long"),
+        pytest.param(".stl", stl(2)[:-1], "declares 2 faces, which need 184 bytes", id="cut off"),
+        pytest.param(".stl", stl(2) + b"\0", "has 185 bytes", id="too long"),
         pytest.param(".stl", stl(0), "has no faces", id="no faces"),
-        pytest.param(".stl", stl(2**32 - 1, b""), "claims 4,294,967,295 faces", id="4 billion"),
-        pytest.param(
-            ".stl", b"\0" * 10, "has 10 bytes, and the header", id="shorter than a header"
-        ),
-        pytest.param(".stl", b"v 0 0 0\n" * 20, "is text, and not an STL", id="an OBJ"),
-        pytest.param(".stl", b"solid x\nendsolid x\n", "without a single facet", id="solid air"),
+        pytest.param(".stl", stl(2**32 - 1, b""), "declares 4,294,967,295 faces", id="4 billion"),
+        pytest.param(".stl", b"\0" * 10, "has 10 bytes; the header", id="shorter than a header"),
+        pytest.param(".stl", b"v 0 0 0\n" * 20, "is a text file, but not", id="an OBJ"),
+        pytest.param(".stl", b"solid x\nendsolid x\n", "without facets", id="solid air"),
         pytest.param(".stl", ASCII[:-12], "does not end with endsolid", id="ASCII, cut off"),
-        pytest.param(".obj", stl(1), "is not of text", id="an STL as OBJ"),
-        pytest.param(".dae", DAE[:-4], "was cut off", id="COLLADA, cut off"),
+        pytest.param(".obj", stl(1), "is not a text file", id="an STL as OBJ"),
+        pytest.param(".dae", DAE[:-4], "is truncated", id="COLLADA, cut off"),
         pytest.param(".dae", b"<robot/>", "does not start with a COLLADA", id="other XML"),
-        pytest.param(".msh", struct.pack("<4i", 9, 0, 0, 0), "do not fit its 16 bytes", id="MSH"),
-        pytest.param(".msh", struct.pack("<4i", -1, 1, 0, 0), "do not fit", id="negative MSH"),
+        pytest.param(".msh", struct.pack("<4i", 9, 0, 0, 0), "do not match its 16 bytes", id="MSH"),
+        pytest.param(".msh", struct.pack("<4i", -1, 1, 0, 0), "do not match", id="negative MSH"),
         pytest.param(".msh", b"", "is empty: it has 0 bytes", id="empty"),
         pytest.param(".ply", b"plx\n", "does not start with ply", id="PLY"),
-        pytest.param(".glb", b"glTF" + bytes(90), "does not fit its 94 bytes", id="GLB"),
-        pytest.param(".stl", b"\n <!DOCTYPE html>\n<html>", "is a web page", id="a web page"),
+        pytest.param(".glb", b"glTF" + bytes(90), "does not match its 94 bytes", id="GLB"),
+        pytest.param(".stl", b"\n <!DOCTYPE html>\n<html>", "is an HTML page", id="a web page"),
     ],
 )
 def test_broken_files(suffix, data, problem):

@@ -43,7 +43,7 @@ class TestNumbers:
 
     @pytest.mark.parametrize("text", [b"1 two 3", b"1,2", b"0x10", b"1 2 -"])
     def test_text(self, text):
-        with pytest.raises(MeshError, match="text where numbers"):
+        with pytest.raises(MeshError, match="text instead of numbers"):
             parse_float_list(text)
 
     @pytest.mark.parametrize("text", [b"nan", b"1e300", b"-inf"])

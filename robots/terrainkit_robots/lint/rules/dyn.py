@@ -71,10 +71,10 @@ def unstable_drop(robot: Facts) -> Iterator[Violation]:
     """
     model = make_sim_model(robot)
     drop = drop_test(model, height=_DROP_HEIGHT)
-    if not _is_unstable(drop):
+    if _is_stable(drop):
         return
     without = drop_test(model, height=_DROP_HEIGHT, self_collision=False)
-    stable = not _is_unstable(without)
+    stable = _is_stable(without)
     with_hulls = stable and _has_mesh_collision(robot)
     level = 2 if drop.diverged or drop.max_speed > _MAX_SPEED_ERROR else 1
     unit, unit_without = (model.units(each.max_speed_joint).velocity for each in (drop, without))
@@ -102,8 +102,8 @@ def unstable_drop(robot: Facts) -> Iterator[Violation]:
     )
 
 
-def _is_unstable(drop: DropResult) -> bool:
-    return drop.diverged or drop.max_speed > _MAX_SPEED
+def _is_stable(drop: DropResult) -> bool:
+    return not (drop.diverged or drop.max_speed > _MAX_SPEED)
 
 
 def _has_mesh_collision(robot: Facts) -> bool:

@@ -75,13 +75,13 @@ def mass_asymmetry(robot: Facts) -> Iterator[Violation]:
         The masses of tested robots without defects agree to four digits.
     """
     _check_joint_types(robot)
-    other_rules = _OtherRules(robot, implausible_density, mass_ratio, massless_body)
+    other_checks = _OtherChecks(robot, implausible_density, mass_ratio, massless_body)
     for pair in robot.mirror_pairs:
         left, right = pair.left, pair.right
         difference = _relative_difference(left.body.mass, right.body.mass)
         if not _has_mass(left, right) or difference <= _MAX_MASS_DIFFERENCE:
             continue
-        if other_rules.report(left, right):
+        if other_checks.report(left, right):
             continue
         odd, other = robot.outlier_first(left, right, lambda body: np.array([body.mass]))
         yield _report(
@@ -136,7 +136,7 @@ def com_asymmetry(robot: Facts) -> Iterator[Violation]:
     """
     _check_joint_types(robot)
     _, displaced = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
-    other_rules = _OtherRules(robot, com_outside_body)
+    other_checks = _OtherChecks(robot, com_outside_body)
     for pair in robot.mirror_pairs:
         left, right = pair.left, pair.right
         if pair.indices & displaced or not _has_mass(left, right):
@@ -145,7 +145,7 @@ def com_asymmetry(robot: Facts) -> Iterator[Violation]:
         if _is_merged(left, right) and difference > _MAX_MASS_DIFFERENCE:
             continue  # a heavier part shifts the center of mass of the merged body
         error, limit = _com_error(robot, left, right), _max_com_error(left, right)
-        if error <= limit or other_rules.report(left, right):
+        if error <= limit or other_checks.report(left, right):
             continue
         if _is_same_part(robot, left.body, right.body):
             continue
@@ -153,9 +153,9 @@ def com_asymmetry(robot: Facts) -> Iterator[Violation]:
         yield _report(
             odd.body.name,
             other.body.name,
-            f"center of mass of body {odd.body.name}: got {_format_mm(odd.body.center)} mm, and "
-            f"{_format_mm(other.body.center)} mm for its mirror image {other.body.name}, each in "
-            f"its own frame: {1000 * error:.3g} mm from mirrored; expected at most "
+            f"center of mass of body {odd.body.name}: got {_format_point(odd.body.center)} mm, and "
+            f"{_format_point(other.body.center)} mm for its mirror image {other.body.name}, each "
+            f"in its own frame: {1000 * error:.3g} mm from mirrored; expected at most "
             f"{1000 * limit:.2g} mm",
             {"gap": error, "allowed": limit},
             mass_source(odd.body.main_link),
@@ -209,7 +209,7 @@ def _is_merged(left: MirrorSide, right: MirrorSide) -> bool:
     )
 
 
-def _format_mm(vector: Matrix) -> str:
+def _format_point(vector: Matrix) -> str:
     return "(" + ", ".join(f"{1000 * x + 0.0:.1f}" for x in vector) + ")"
 
 
@@ -239,7 +239,7 @@ def inertia_asymmetry(robot: Facts) -> Iterator[Violation]:
         The principal moments of tested robots without defects agree to 0.1 %.
     """
     _check_joint_types(robot)
-    other_rules = _OtherRules(robot, *_INERTIA_RULES)
+    other_checks = _OtherChecks(robot, *_INERTIA_RULES)
     for pair in robot.mirror_pairs:
         left, right = pair.left, pair.right
         if not _has_mass(left, right) or not _has_same_parts(robot, left, right):
@@ -247,7 +247,7 @@ def inertia_asymmetry(robot: Facts) -> Iterator[Violation]:
         a, b = left.body.principal, right.body.principal
         scaled = b * (left.body.mass / right.body.mass)  # SYM001 reports the difference of masses
         difference = min(_moment_difference(a, b), _moment_difference(a, scaled))
-        if difference <= _MAX_MOMENT_DIFFERENCE or other_rules.report(left, right):
+        if difference <= _MAX_MOMENT_DIFFERENCE or other_checks.report(left, right):
             continue
         digit = max(_precision(left.body), _precision(right.body))
         if digit >= (difference - _MAX_MOMENT_DIFFERENCE) * float(max(a[2], b[2])):
@@ -307,13 +307,13 @@ def limit_asymmetry(robot: Facts) -> Iterator[Violation]:
     Source:
         The limits of tested robots without defects agree exactly.
     """
-    other_rules = _OtherRules(robot, wide_range)
+    other_checks = _OtherChecks(robot, wide_range)
     for pair in robot.mirror_pairs:
         left, right = pair.left, pair.right
         a, b = left.joint.range, right.joint.range
         if pair.sign == 0 or a is None or b is None or limits_match(a, b, pair.sign):
             continue
-        if other_rules.report(left, right):
+        if other_checks.report(left, right):
             continue
         if has_flipped_axes(left, right) and limits_match(a, b, -pair.sign):
             continue  # SYM007 reports the axis
@@ -359,7 +359,7 @@ def effort_asymmetry(robot: Facts) -> Iterator[Violation]:
     Source:
         The limits of tested robots without defects agree exactly.
     """
-    other_rules = _OtherRules(robot, placeholder_limit)
+    other_checks = _OtherChecks(robot, placeholder_limit)
     for pair in robot.mirror_pairs:
         left, right = pair.left, pair.right
         for name, limit_of in (("effort", Facts.effort_limit), ("velocity", _velocity_of)):
@@ -367,7 +367,7 @@ def effort_asymmetry(robot: Facts) -> Iterator[Violation]:
             if a is None or b is None or min(a, b) <= 0:
                 continue
             difference = _relative_difference(a, b)
-            if difference <= _MAX_LIMIT_DIFFERENCE or other_rules.report(left, right):
+            if difference <= _MAX_LIMIT_DIFFERENCE or other_checks.report(left, right):
                 continue
 
             def value(body: Body, limit_of: _LimitOf = limit_of) -> Matrix | None:
@@ -410,10 +410,10 @@ def joint_origin_asymmetry(robot: Facts) -> Iterator[Violation]:
         The joint origins of tested robots without defects agree to 0.1 mm.
     """
     _check_joint_types(robot)
-    misalignments, _ = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
-    for misalignment in misalignments:
-        if not misalignment.is_axis:
-            yield _report_misalignment(robot, misalignment)
+    errors, _ = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
+    for error in errors:
+        if not error.is_axis:
+            yield _report_pair(robot, error)
 
 
 @rule("SYM007", "joint-axis-asymmetry", "warning")
@@ -431,10 +431,10 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
         Tested robots have either the same axis on all legs, or mirrored axes on all legs.
     """
     _check_joint_types(robot)
-    misalignments, _ = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
-    for misalignment in misalignments:
-        if misalignment.is_axis:
-            yield _report_misalignment(robot, misalignment)
+    errors, _ = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
+    for error in errors:
+        if error.is_axis:
+            yield _report_pair(robot, error)
     reported = {violation.subject for violation in zero_axis(robot)}
     for found in find_flipped_joints(robot.legs, robot.bodies, robot.zero_poses):
         joint = found.joint
@@ -502,7 +502,7 @@ def _format_axis(axis: Matrix) -> str:
     return "(" + ", ".join(f"{x:.3g}" for x in np.round(axis, 3) + 0.0) + ")"
 
 
-def _report_misalignment(robot: Facts, misalignment: Misalignment) -> Violation:
+def _report_pair(robot: Facts, error: Misalignment) -> Violation:
     def position(body: Body) -> Matrix:
         return body.origin[:3, 3]
 
@@ -512,28 +512,26 @@ def _report_misalignment(robot: Facts, misalignment: Misalignment) -> Violation:
     def rotation(body: Body) -> Matrix:
         return body.origin[:3, :3].ravel()
 
-    value = axis if misalignment.is_axis else position if misalignment.distance else rotation
-    odd, other = robot.outlier_first(misalignment.left, misalignment.right, value)
+    value = axis if error.is_axis else position if error.distance else rotation
+    odd, other = robot.outlier_first(error.left, error.right, value)
     name, mirror = odd.joint.name, other.joint.name
-    if misalignment.distance:
+    if error.distance:
         message = (
             f"position of joint {name} relative to the joint above it, in the trunk frame: got "
-            f"{_format_mm(odd.offset)} mm, and {_format_mm(other.offset)} mm for its mirror image "
-            f"{mirror}: {1000 * misalignment.distance:.3g} mm from mirrored; expected at most "
+            f"{_format_point(odd.offset)} mm, and {_format_point(other.offset)} mm for its mirror "
+            f"image {mirror}: {1000 * error.distance:.3g} mm from mirrored; expected at most "
             f"{1000 * MAX_POSITION_ERROR:g} mm plus {MAX_RELATIVE_POSITION_ERROR:.0%} of the "
             "distance"
         )
     else:
-        part = "axis" if misalignment.is_axis else "frame"
+        part = "axis" if error.is_axis else "frame"
         message = (
             f"angle between the {part} of joint {name} and that of its mirror image {mirror}: got "
-            f"{math.degrees(misalignment.angle):.3g} deg; expected at most "
+            f"{math.degrees(error.angle):.3g} deg; expected at most "
             f"{math.degrees(MAX_AXIS_ERROR):.0f} deg"
         )
-    source = (odd.joint.axis_source if misalignment.is_axis else None) or odd.joint.source
-    return _report(
-        name, mirror, message, {"gap": misalignment.distance, "angle": misalignment.angle}, source
-    )
+    source = (odd.joint.axis_source if error.is_axis else None) or odd.joint.source
+    return _report(name, mirror, message, {"gap": error.distance, "angle": error.angle}, source)
 
 
 def _check_joint_types(robot: Facts) -> None:
@@ -542,7 +540,7 @@ def _check_joint_types(robot: Facts) -> None:
         raise CannotCheckError(f"the type of joint {violation.subject} is unknown")
 
 
-class _OtherRules:
+class _OtherChecks:
     """Links and joints that other rules report, computed on first use."""
 
     def __init__(self, robot: Facts, *checks: Check) -> None:
