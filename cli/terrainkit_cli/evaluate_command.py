@@ -10,7 +10,7 @@ import tyro
 from terrainkit.errors import ConfigError
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
-from terrainkit_cli.robot_options import NO_NUMBER, Checkpoint, Output, number_given, plain
+from terrainkit_cli.robot_options import UNSET, Checkpoint, Output, optional_number, text_option
 
 if TYPE_CHECKING:
     from terrainkit_robots.policy.evaluate import (
@@ -34,7 +34,7 @@ class PolicyCommand(Command):
     """A folder written by terrainkit train, a checkpoint in one, or a robot with a bundled
     policy."""
 
-    terrain: Annotated[str, plain("MAP")] = ""
+    terrain: Annotated[str, text_option("MAP")] = ""
     """Terrain: plane, a map (.npz), a map config (.toml), or a MuJoCo model (.xml); by default the
     terrain of the training."""
 
@@ -49,10 +49,10 @@ class PolicyCommand(Command):
 
     num_envs: Annotated[
         int, tyro.conf.arg(metavar="INT", help_behavior_hint="(default: depends on the terrain)")
-    ] = NO_NUMBER
+    ] = UNSET
     """Number of robots."""
 
-    checkpoint: Checkpoint = NO_NUMBER
+    checkpoint: Checkpoint = UNSET
     """The checkpoint to load."""
 
     seed: int = 1
@@ -74,7 +74,7 @@ class PolicyCommand(Command):
         require_training()
         from terrainkit_robots.rl.run import open_run
 
-        return open_run(self.policy, number_given(self.checkpoint))
+        return open_run(self.policy, optional_number(self.checkpoint))
 
     def evaluation_config(self, seconds: float) -> "EvaluationConfig":
         """Return the settings of the rollout.
@@ -87,7 +87,7 @@ class PolicyCommand(Command):
         return EvaluationConfig(
             seconds=seconds,
             terrain=self.terrain or None,
-            num_envs=number_given(self.num_envs),
+            num_envs=optional_number(self.num_envs),
             command=None if self.command == _NO_COMMAND else self.command,
             random_commands=self.random_commands,
             seed=self.seed,

@@ -10,7 +10,7 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit.terrain_map import TerrainMap
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
-from terrainkit_cli.robot_options import NO_NUMBER, Checkpoint, number_given, plain
+from terrainkit_cli.robot_options import UNSET, Checkpoint, optional_number, text_option
 from terrainkit_cli.terrain_commands import written
 
 
@@ -34,7 +34,7 @@ class Export(Command):
     ] = ""
     """The map or the run."""
 
-    output: Annotated[str, plain("PATH", "-o")] = ""
+    output: Annotated[str, text_option("PATH", "-o")] = ""
     """Where to write. For a map, a file whose suffix names the format. For a policy, a folder; by
     default `exported` in the folder of the run, or ROBOT_policy for a bundled policy."""
 
@@ -54,7 +54,7 @@ class Export(Command):
     y_up: bool = False
     """For meshes: rotate the map so that y is up, as glTF viewers and game engines expect."""
 
-    checkpoint: Checkpoint = NO_NUMBER
+    checkpoint: Checkpoint = UNSET
     """For a run: the checkpoint to export."""
 
     overwrite: bool = False
@@ -80,7 +80,7 @@ class Export(Command):
         return {name: value for name, value in given.items() if value is not None}
 
     def _export_map(self) -> None:
-        if self.checkpoint != NO_NUMBER:
+        if self.checkpoint != UNSET:
             raise ConfigError(f"--checkpoint: got the map {self.subject}; expected a run")
         terrain_map = TerrainMap.load(self.subject)
         if not self.output:
@@ -106,7 +106,7 @@ class Export(Command):
         from terrainkit_robots.policy.export import export_policy
         from terrainkit_robots.rl.run import is_shipped, open_run
 
-        run = open_run(self.subject, number_given(self.checkpoint))
+        run = open_run(self.subject, optional_number(self.checkpoint))
         default = run.folder / "exported"
         if is_shipped(run):
             default = Path(f"{run.folder.name}_policy")
