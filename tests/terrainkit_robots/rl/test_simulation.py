@@ -94,7 +94,7 @@ class TestUnstable:
             assert not sim.step(4).any()
 
     def test_reported_after_a_reset(self, sim):
-        # A reset sets the counts of warnings back too.
+        # A reset also resets the warning counters.
         for _ in range(3):
             sim.qvel[1, 7] = np.nan
             assert sim.step(4).tolist() == [False, True, False]
@@ -223,7 +223,7 @@ class TestApplyParamsToEnv:
             )
 
     def test_negative_base_mass_is_rejected(self, cart, calm, tmp_path, monkeypatch):
-        # It weighs 4 kg.
+        # The base weighs 4 kg.
         monkeypatch.chdir(tmp_path)
         with pytest.raises(ConfigError, match="added_mass") as caught:
             LeggedEnv(calm(2, domain_rand=DomainRand(added_mass=(-6.0, -5.0))), cart, Plane())
