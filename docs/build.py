@@ -1,13 +1,16 @@
-"""Build what is generated in docs/: terrains.md, rules.md, cli.md and the pictures.
+"""Build what is generated in docs/: terrains.md, rules.md, config.md, cli.md and the pictures.
 
 python docs/build.py            writes them
 python docs/build.py --check    exits 1 if a text is out of date or a picture is missing
 """
 
+import dataclasses
+import inspect
 import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -17,13 +20,21 @@ from isometric import isometric, side_by_side
 
 import terrainkit
 from terrainkit import presets, registry
+from terrainkit.annotations import NONE, describe, is_table, parse_annotation
+from terrainkit.config import MapConfig
 from terrainkit.grid import Grid
 from terrainkit.preview import write_preview
+from terrainkit.schema import Config, field_docs, field_keys, field_types, is_required
+from terrainkit.sub_terrain import SubTerrain
 from terrainkit.terrain_docs import TerrainDoc, terrain_doc
+from terrainkit.toml_text import value_text
 from terrainkit_cli.main import COMMANDS
 from terrainkit_robots.description import bundled
 from terrainkit_robots.lint.rule import FAMILIES, Rule, rules
+from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.rendering.robot_pictures import render_robot
+from terrainkit_robots.rl.config import Task
+from terrainkit_robots.spec.robot_spec import RobotSpec
 
 DOCS = Path(__file__).parent
 PICTURES = DOCS / "pictures"
@@ -37,7 +48,7 @@ def terrains_page() -> str:
         NOTE,
         "Each terrain with its parameters. A parameter with two values is a range from difficulty",
         "0 to difficulty 1; give one value, or a range of your own, in a",
-        "[config](conventions.md) or with `--set`. The pictures show difficulty 0.1, 0.5 and 1 on",
+        "[config](config.md) or with `--set`. The pictures show difficulty 0.1, 0.5 and 1 on",
         "patches of 8 m x 8 m, with holes cut short.\n",
         "| terrain | what it is |\n|---|---|",
     ]
@@ -97,6 +108,15 @@ def rules_page() -> str:
     return "\n".join(parts)
 
 
+CONFIGS = {
+    "Map: terrainkit generate --config": MapConfig,
+    "Sub-terrain of a map: [[terrains]]": SubTerrain,
+    "Robot: robot.toml": RobotSpec,
+    "Training: task.toml, terrainkit train --config": Task,
+    "Lint settings: [check-robot] in terrainkit.toml": Settings,
+}
+"""Config class of each TOML file."""
+
 FIXED = {"safe": "`--fix`", "unsafe": "`--unsafe-fixes`", "no": ""}
 SEVERITY = {"error": "An error", "warning": "A warning", "info": "A note"}
 
@@ -120,6 +140,34 @@ def markup(text: str) -> str:
         for part in parts[::2]
     ]
     return "".join(parts)
+
+
+def config_page() -> str:
+    parts = [
+        "# Configuration files\n",
+        NOTE,
+        "The keys of each TOML file. An unknown key or an invalid value is an error that names it.",
+        'The string "none" stands for no value.\n',
+    ]
+    for title, config in CONFIGS.items():
+        parts += [f"## {title}\n", f"{inspect.getdoc(config).splitlines()[0]}\n"]
+        parts += ["| key | value | default | |\n|---|---|---|---|", *config_rows(config), ""]
+    return "\n".join(parts)
+
+
+def config_rows(config: type[Config], prefix: str = "") -> Iterator[str]:
+    annotations, docs = field_types(config), field_docs(config)
+    fields = {field.name: field for field in dataclasses.fields(config)}
+    for key, name in field_keys(config).items():
+        field, kind = fields[name], parse_annotation(annotations[name]).kind
+        if is_table(kind):
+            yield from config_rows(kind, f"{prefix}{key}.")
+            continue
+        default = "required" if is_required(field) else ""
+        if field.default is not dataclasses.MISSING:
+            default = f"`{value_text(NONE if field.default is None else field.default, 1000)}`"
+        about = f"{describe(annotations[name])} | {default} | {docs.get(name, '')}"
+        yield f"| `{prefix}{key}` | {about.replace('>=', '≥').replace('<=', '≤')} |"
 
 
 def cli_page() -> str:
@@ -193,7 +241,12 @@ def main() -> int:
     if sys.argv[1:] not in ([], ["--check"]):
         print(f"{' '.join(sys.argv[1:])} is not known; wanted --check or nothing", file=sys.stderr)
         return 2
-    pages = {"terrains.md": terrains_page(), "rules.md": rules_page(), "cli.md": cli_page()}
+    pages = {
+        "terrains.md": terrains_page(),
+        "rules.md": rules_page(),
+        "config.md": config_page(),
+        "cli.md": cli_page(),
+    }
     if sys.argv[1:] == ["--check"]:
         stale = [n for n, text in pages.items() if words(written(n)) != words(text)]
         wanted = [

@@ -163,7 +163,7 @@ def describe(annotation: Any) -> str:
     elif is_table(kind):
         text = f"a table ({kind.__name__})"
     else:
-        text = _NAMES.get(kind, f"a {kind.__name__}")
+        text = _NAMES.get(kind, f"a {kind.__name__.lower()}")
     limits = {name: _number(value) for name, value in constraints.items() if name in _LIMITS}
     if {"ge", "le"} <= set(limits):
         text += f" from {limits['ge']} to {limits['le']}"

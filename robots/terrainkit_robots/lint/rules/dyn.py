@@ -148,7 +148,7 @@ def does_not_stand(robot: Facts) -> Iterator[Violation]:
         source=robot.model.source,
         severity=_LEVELS[level],
         certainty="likely",
-        message=f"standing pose {control}: {', '.join(assessment.failures)}"
+        message=f"standing pose {control}: {'; '.join(assessment.failures)}"
         + ("; without self-collision the robot stands" if stands_without else ""),
         hint=_OVERLAP_HINT if stands_without else "",
         measured={
@@ -207,18 +207,7 @@ def unreachable_limits(robot: Facts) -> Iterator[Violation]:
         raise CannotCheckError("no joint with an actuator has limits")
     sources = {joint.name: joint.source for joint in robot.joints}
     for result in results:
-        message = ""
-        if _has_limb_collision(robot, result):
-            message = (
-                f"usable range of {_describe(result)}; expected at least {_MIN_RANGE_SHARE:.0%} of "
-                "its range"
-            )
-        elif robot.legs and result.load > result.effort:
-            message = (
-                f"torque of joint {result.joint} that holds its limb at the default pose: got "
-                f"{result.load:.3g} {result.units.effort}; expected at most its effort limit of "
-                f"{result.effort:.3g} {result.units.effort}"
-            )
+        message = _joint_message(robot, result)
         if message:
             yield Violation(
                 subject=result.joint,
@@ -252,6 +241,22 @@ def unreachable_limits(robot: Facts) -> Iterator[Violation]:
             message="; ".join(parts),
             measured={"short": len(blocked), "weak": len(weak)},
         )
+
+
+def _joint_message(robot: Facts, result: SweepResult) -> str:
+    """Return why a joint cannot move or hold its limb; empty if it can."""
+    if _has_limb_collision(robot, result):
+        return (
+            f"usable range of {_describe(result)}; expected at least {_MIN_RANGE_SHARE:.0%} of its "
+            "range"
+        )
+    if robot.legs and result.load > result.effort:
+        return (
+            f"torque of joint {result.joint} that holds its limb at the default pose: got "
+            f"{result.load:.3g} {result.units.effort}; expected at most its effort limit of "
+            f"{result.effort:.3g} {result.units.effort}"
+        )
+    return ""
 
 
 def _describe(result: SweepResult) -> str:

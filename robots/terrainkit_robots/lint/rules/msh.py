@@ -671,7 +671,7 @@ def nonconvex_collision(robot: Facts) -> Iterator[Violation]:
 
 
 def _describe(used: UsedMesh) -> str:
-    return f"mesh {used.name} ({used.role})"
+    return f"{used.name} ({used.role})"
 
 
 def _relative_fix(robot: Facts, used: UsedMesh, safety: Literal["safe", "unsafe"]) -> Fix | None:
