@@ -18,10 +18,10 @@ from terrainkit_cli.robot_options import (
     Words,
     XacroArguments,
     find_robot,
-    listed,
+    ignored_rules,
     packages,
-    reasons,
     repeated,
+    split_names,
     xacro_arguments,
 )
 
@@ -118,12 +118,12 @@ class Onboard(Command):
 
         return OnboardOptions(
             settings=Settings(
-                ignore=reasons(self.ignore),
+                ignore=ignored_rules(self.ignore),
                 packages=packages(self.package),
                 xacro_arguments=xacro_arguments(self.xacro_arg),
             ),
             collision=self.collision,
-            frameworks=tuple(word for words in self.config for word in listed(words)),
+            frameworks=tuple(word for words in self.config for word in split_names(words)),
             floating={"auto": None, "floating": True, "fixed": False}[self.base],
             spec=Path(self.spec) if self.spec else None,
             unsafe_fixes=self.unsafe_fixes,

@@ -18,10 +18,10 @@ from terrainkit_cli.robot_options import (
     Words,
     XacroArguments,
     find_robot,
-    listed,
+    ignored_rules,
     packages,
-    reasons,
     repeated,
+    split_names,
     xacro_arguments,
 )
 
@@ -118,8 +118,8 @@ class CheckRobot(Command):
         from terrainkit_robots.lint.settings import Settings
 
         settings = Settings(
-            select=tuple(word for words in self.select for word in listed(words)),
-            ignore=reasons(self.ignore),
+            select=tuple(word for words in self.select for word in split_names(words)),
+            ignore=ignored_rules(self.ignore),
             packages=packages(self.package),
             xacro_arguments=xacro_arguments(self.xacro_arg),
             strict=self.flag("strict"),

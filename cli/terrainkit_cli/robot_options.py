@@ -48,6 +48,7 @@ def number_given(number: int) -> int | None:
 
 def find_robot(name: str) -> Path:
     """Return the file of that name, or else the bundled robot."""
+    from terrainkit.text import expected_names
     from terrainkit_robots.description import bundled
 
     path = Path(name)
@@ -57,50 +58,50 @@ def find_robot(name: str) -> Path:
         found = bundled.find(name)
         if found is None and not path.exists():
             raise ConfigError(
-                f"there is no file {name}, nor is a bundled robot called so; "
-                f"there are: {', '.join(bundled.names())}"
+                f"no file or bundled robot {name!r}; "
+                f"{expected_names(name, bundled.names(), 'bundled robots are')}"
             )
     except OSError as error:
         raise ConfigError(f"cannot read {name}: {error.strerror or error}") from error
     return found or path
 
 
-def listed(words: str) -> list[str]:
-    """Return the words between commas."""
-    return [word.strip() for word in words.split(",") if word.strip()]
+def split_names(text: str) -> list[str]:
+    """Return the names between commas."""
+    return [word.strip() for word in text.split(",") if word.strip()]
 
 
-def reasons(words: Sequence[str]) -> dict[str, str]:
-    """Return the reason for each rule that is not asked."""
-    found = pairs("--ignore", words, "=", "CODES=REASON")
-    return {code: reason for codes, reason in found.items() for code in listed(codes)}
+def ignored_rules(args: Sequence[str]) -> dict[str, str]:
+    """Return the reason for each ignored rule of --ignore CODES=REASON."""
+    found = pairs("--ignore", args, "=", "CODES=REASON")
+    return {code: reason for codes, reason in found.items() for code in split_names(codes)}
 
 
-def pairs(option: str, words: Sequence[str], sign: str, wanted: str) -> dict[str, str]:
-    """Return names and their values, as NAME=VALUE writes them.
+def pairs(option: str, args: Sequence[str], separator: str, expected: str) -> dict[str, str]:
+    """Return the values of NAME=VALUE arguments by name.
 
     Raises:
-        ConfigError: if one is written otherwise, or twice.
+        ConfigError: if an argument has another form, or a name occurs twice.
     """
     found_pairs: dict[str, str] = {}
-    for word in words:
-        name, found, value = (part.strip() for part in word.partition(sign))
-        if not name or not found or not (value or sign == ":="):
-            raise ConfigError(f"{option} {word!r}; wanted {wanted}")
+    for arg in args:
+        name, found, value = (part.strip() for part in arg.partition(separator))
+        if not name or not found or not (value or separator == ":="):
+            raise ConfigError(f"{option}: got {arg!r}; expected {expected}")
         if name in found_pairs:
-            raise ConfigError(f"{option} has {name} twice; wanted it once")
+            raise ConfigError(f"{option}: got {name} twice; expected it once")
         found_pairs[name] = value
     return found_pairs
 
 
-def packages(words: Sequence[str]) -> dict[str, Path]:
-    """Return the folder of each package, as NAME=DIR writes them."""
+def packages(args: Sequence[str]) -> dict[str, Path]:
+    """Return the folder of each package of --package NAME=DIR."""
     from terrainkit_robots.lint.settings import package_folder
 
-    found = pairs("--package", words, "=", "NAME=DIR")
+    found = pairs("--package", args, "=", "NAME=DIR")
     return {name: package_folder(name, Path(folder)) for name, folder in found.items()}
 
 
-def xacro_arguments(words: Sequence[str]) -> dict[str, str]:
-    """Return the value of each xacro argument, as NAME:=VALUE writes them."""
-    return pairs("--xacro-arg", words, ":=", "NAME:=VALUE")
+def xacro_arguments(args: Sequence[str]) -> dict[str, str]:
+    """Return the value of each argument of --xacro-arg NAME:=VALUE."""
+    return pairs("--xacro-arg", args, ":=", "NAME:=VALUE")

@@ -16,8 +16,8 @@ from terrainkit_cli.robot_options import (
     Text,
     Words,
     XacroArguments,
+    ignored_rules,
     packages,
-    reasons,
     repeated,
     xacro_arguments,
 )
@@ -111,7 +111,7 @@ class SmokeTest(Command):
         from terrainkit_robots.policy.smoke_test import smoke_test
 
         settings = Settings(
-            ignore=reasons(self.ignore),
+            ignore=ignored_rules(self.ignore),
             packages=packages(self.package),
             xacro_arguments=xacro_arguments(self.xacro_arg),
         )

@@ -81,7 +81,7 @@ def test_check_robot_continues_after_missing_file(here):
     run = here("check-robot", "none.urdf", "bad.urdf", "--format", "json")
     assert json.loads(run.stdout)["file"] == "bad.urdf"
     assert run.stderr.count("\n") == 1
-    assert run.stderr.startswith("terrainkit: error: there is no file none.urdf")
+    assert run.stderr.startswith("terrainkit: error: no file or bundled robot")
 
 
 @pytest.mark.parametrize("name", bundled.names())
@@ -116,21 +116,21 @@ def test_check_robot_formats_several_files(here):
         ((), "FILE is missing"),
         (
             ("none.urdf",),
-            "there is no file none.urdf, nor is a bundled robot called so; there are:",
+            "no file or bundled robot 'none.urdf'; bundled robots are: ",
         ),
         ((".",), "cannot read .: it is a folder, not a file"),
         (("fifo",), "it is a pipe, not a file"),
         (("good.urdf", "--select", "XYZ1"), "no rule 'XYZ1'; expected a code"),
-        (("good.urdf", "--ignore", "INR002"), "--ignore 'INR002'; wanted CODES=REASON"),
-        (("good.urdf", "--ignore", "INR002="), "--ignore 'INR002='; wanted CODES=REASON"),
+        (("good.urdf", "--ignore", "INR002"), "--ignore: got 'INR002'; expected CODES=REASON"),
+        (("good.urdf", "--ignore", "INR002="), "--ignore: got 'INR002='; expected CODES=REASON"),
         (("good.urdf", "--ignore", "XYZ1=why"), "no rule 'XYZ1'"),
-        (("good.urdf", "--ignore", "INR=a", "--ignore", "INR=b"), "--ignore has INR twice"),
-        (("good.urdf", "--package", "mine"), "--package 'mine'; wanted NAME=DIR"),
+        (("good.urdf", "--ignore", "INR=a", "--ignore", "INR=b"), "--ignore: got INR twice"),
+        (("good.urdf", "--package", "mine"), "--package: got 'mine'; expected NAME=DIR"),
         (
             ("good.urdf", "--package", "mine=none"),
             "package mine: got none; expected an existing",
         ),
-        (("good.urdf", "--xacro-arg", "a=1"), "--xacro-arg 'a=1'; wanted NAME:=VALUE"),
+        (("good.urdf", "--xacro-arg", "a=1"), "--xacro-arg: got 'a=1'; expected NAME:=VALUE"),
         (("good.urdf", "--diff", "--format", "json"), "--diff prints a diff"),
         (("good.urdf", "-o", "nowhere/a.txt"), "the folder nowhere does not exist"),
         (("good.urdf", "-o", "."), "it is a folder"),
