@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 from terrainkit.errors import ConfigError
 from terrainkit_cli import render
 from terrainkit_cli.config_options import TaskCommand
-from terrainkit_cli.robot_options import plain
+from terrainkit_cli.robot_options import text_option
 from terrainkit_cli.training_extra import require_training
 
 if TYPE_CHECKING:
@@ -36,19 +36,19 @@ class Train(TaskCommand):
         "runner.seed": "--seed",
     }
 
-    terrain: Annotated[str, plain("TERRAIN")] = ""
+    terrain: Annotated[str, text_option("TERRAIN")] = ""
     """A map (.npz), a map config (.toml), a MuJoCo model (.xml), or plane, which is the default."""
 
-    log_dir: Annotated[str, plain("FOLDER")] = ""
+    log_dir: Annotated[str, text_option("FOLDER")] = ""
     """Folder of the run, which must be empty; the default is logs/ROBOT/DATE-TIME."""
 
-    resume: Annotated[str, plain("RUN")] = ""
+    resume: Annotated[str, text_option("RUN")] = ""
     """Resume a run: its folder, or one of its checkpoints. Robot, terrain and task are those of
     the run unless given. Training continues in the same folder, exactly as without interruption.
     With another terrain or task, a new run starts with the networks of the run and, unless
     --algorithm.learning-rate or .schedule differ, its last learning rate."""
 
-    device: Annotated[str, plain("DEVICE")] = "cpu"
+    device: Annotated[str, text_option("DEVICE")] = "cpu"
     """Device of the networks: cpu, cuda, cuda:1. The physics runs on the CPU."""
 
     def default_config(self) -> "Task":

@@ -103,7 +103,7 @@ def test_onboard_does_not_suggest_force_without_robot(here, tmp_path):
     ("words", "message"),
     [
         ([], "FILE is missing"),
-        (["nothing.urdf"], "there is no file nothing.urdf"),
+        (["nothing.urdf"], "robot file: got nothing.urdf"),
         (["arm.urdf", "-o", "no/where"], "the folder no does not exist"),
         (["arm.urdf", "-o", "arm.urdf"], "is not a folder"),
         (["arm.urdf", "--config", "gym"], "framework: got 'gym'; expected "),

@@ -81,7 +81,7 @@ def test_check_robot_continues_after_missing_file(here):
     run = here("check-robot", "none.urdf", "bad.urdf", "--format", "json")
     assert json.loads(run.stdout)["file"] == "bad.urdf"
     assert run.stderr.count("\n") == 1
-    assert run.stderr.startswith("terrainkit: error: no file or bundled robot")
+    assert run.stderr.startswith("terrainkit: error: robot file: got none.urdf")
 
 
 @pytest.mark.parametrize("name", bundled.names())
@@ -116,10 +116,10 @@ def test_check_robot_formats_several_files(here):
         ((), "FILE is missing"),
         (
             ("none.urdf",),
-            "no file or bundled robot 'none.urdf'; bundled robots are: ",
+            "robot file: got none.urdf, which does not exist; bundled robots are: ",
         ),
         ((".",), "cannot read .: it is a folder, not a file"),
-        (("fifo",), "it is a pipe, not a file"),
+        (("fifo",), "cannot read fifo: it is a pipe"),
         (("good.urdf", "--select", "XYZ1"), "no rule 'XYZ1'; expected a code"),
         (("good.urdf", "--ignore", "INR002"), "--ignore: got 'INR002'; expected CODES=REASON"),
         (("good.urdf", "--ignore", "INR002="), "--ignore: got 'INR002='; expected CODES=REASON"),
@@ -128,7 +128,7 @@ def test_check_robot_formats_several_files(here):
         (("good.urdf", "--package", "mine"), "--package: got 'mine'; expected NAME=DIR"),
         (
             ("good.urdf", "--package", "mine=none"),
-            "package mine: got none; expected an existing",
+            "package mine: got none; expected an existing folder",
         ),
         (("good.urdf", "--xacro-arg", "a=1"), "--xacro-arg: got 'a=1'; expected NAME:=VALUE"),
         (("good.urdf", "--diff", "--format", "json"), "--diff prints a diff"),
@@ -236,7 +236,7 @@ def test_check_robot_options_override_settings_file(here, folder):
     (folder / "pyproject.toml").write_text("[tool.terrainkit.check-robot]\nselekt=[]\n")
     run = here("check-robot", "sub/bad.urdf")
     assert run.returncode == 2
-    assert "no key 'selekt'; did you mean 'select'? It has: select, ignore" in run.stderr
+    assert "pyproject.toml: config has no key 'selekt'; did you mean 'select'?" in run.stderr
 
 
 def test_check_robot_escapes_unencodable_names(terrainkit, folder, monkeypatch):

@@ -109,11 +109,11 @@ class EvaluationResult:
     def as_json(self) -> str:
         """Return the result as JSON; equal evaluations give equal bytes."""
         config, settling = self.config, {"settling_seconds": SETTLING_TIME}
-        document: dict[str, Any] = {"robot": self.robot, "checkpoint": self.checkpoint}
-        document |= {"terrain": config.terrain, "seconds": config.seconds, **settling}
-        document |= {"seed": config.seed, "all": self.metrics.as_dict()}
-        document |= {k: [group.as_dict() for group in v] for k, v in self.groups.items()}
-        return json.dumps(document, indent=2) + "\n"
+        result: dict[str, Any] = {"robot": self.robot, "checkpoint": self.checkpoint}
+        result |= {"terrain": config.terrain, "seconds": config.seconds, **settling}
+        result |= {"seed": config.seed, "all": self.metrics.as_dict()}
+        result |= {k: [group.as_dict() for group in v] for k, v in self.groups.items()}
+        return json.dumps(result, indent=2) + "\n"
 
 
 @single_torch_thread()

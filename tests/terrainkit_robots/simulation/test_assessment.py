@@ -21,21 +21,21 @@ def test_assess_accepts_standing_robot(stood):
 @pytest.mark.parametrize(
     ("changes", "fault", "degree"),
     [
-        ({"tilt": math.radians(3.6)}, "it tilts by 3.6 degrees; expected at most 3", 0),
-        ({"tilt": math.radians(12)}, "it tilts by 12.0 degrees; expected at most 3", 1),
-        ({"tilt": math.radians(90)}, "it tilts by 90.0 degrees; expected at most 3", 2),
-        ({"height_loss": 0.15}, "its base sinks by 0.150 m; expected at most 0.100", 1),
-        ({"height_loss": 9.0}, "its base sinks by 9.000 m; expected at most 0.100", 2),
-        ({"drift": 0.2}, "it drifts by 0.200 m; expected at most 0.100", 1),
-        ({"other_contacts": ("calf",)}, "calf touches the ground; expected only feet", 1),
+        ({"tilt": math.radians(3.6)}, "it tilts by 3.6 deg (expected at most 3 deg)", 0),
+        ({"tilt": math.radians(12)}, "it tilts by 12.0 deg (expected at most 3 deg)", 1),
+        ({"tilt": math.radians(90)}, "it tilts by 90.0 deg (expected at most 3 deg)", 2),
+        ({"height_loss": 0.15}, "its base sinks by 0.150 m (expected at most 0.100 m)", 1),
+        ({"height_loss": 9.0}, "its base sinks by 9.000 m (expected at most 0.100 m)", 2),
+        ({"drift": 0.2}, "it drifts by 0.200 m (expected at most 0.100 m)", 1),
+        ({"other_contacts": ("calf",)}, "calf touches the ground (expected only feet)", 1),
         (
             {"other_contacts": tuple("abcdef")},
-            "a, b, c, d and 2 more touch the ground; expected only",
+            "a, b, c, d and 2 more touch the ground (expected only",
             1,
         ),
-        ({"lifted_feet": ("toe",)}, "toe does not touch the ground; expected all feet", 1),
-        ({"lifted_feet": ("a", "b")}, "a, b do not touch the ground; expected all feet", 1),
-        ({"saturation": 0.98}, "knee gives 98% of its effort; expected at most 95%", 1),
+        ({"lifted_feet": ("toe",)}, "toe does not touch the ground (expected all feet)", 1),
+        ({"lifted_feet": ("a", "b")}, "a, b do not touch the ground (expected all feet)", 1),
+        ({"saturation": 0.98}, "knee needs 98% of its effort limit (expected at most 95%)", 1),
         ({"diverged": True, "seconds": 0.5}, "its simulation diverged after 0.50 s", 2),
     ],
 )
@@ -89,7 +89,7 @@ def test_assess_reports_lifted_feet(quadruped):
         if model.body(model.geom_bodyid[geom]).name in ("RR_calf", "RR_foot"):
             model.geom_contype[geom] = model.geom_conaffinity[geom] = 0
     faults = stand(quadruped, SimModel.from_mujoco(model, base="base")).failures
-    assert "FL_foot, RR_foot do not touch the ground; expected all feet" in faults
+    assert "FL_foot, RR_foot do not touch the ground (expected all feet)" in faults
 
 
 def test_assess_accepts_bundled_quadruped(quadruped):

@@ -139,7 +139,11 @@ def merge_bodies(tree: Tree) -> tuple[Body, ...]:
     """
     if not tree.order:
         return ()
-    order = tree.order[_base_index(tree) :]
+    root, joints = tree.links[tree.order[0]], tree.child_joints[tree.order[0]]
+    is_empty = root.inertial is None and not root.collisions
+    # An empty root above a floating joint is the world, not the base.
+    has_world = is_empty and len(joints) == 1 and joints[0].kind == "floating"
+    order = tree.order[1:] if has_world else tree.order
     index_of: dict[str, int] = {order[0]: 0}
     frames: list[dict[str, Matrix]] = [{order[0]: np.eye(4)}]
     edges: list[tuple[int | None, Joint | None, Matrix]] = [(None, None, np.eye(4))]
@@ -167,14 +171,6 @@ def merge_bodies(tree: Tree) -> tuple[Body, ...]:
         )
         for index, (parent, joint, origin) in enumerate(edges)
     )
-
-
-def _base_index(tree: Tree) -> int:
-    """Return 1 if the first link is an empty root with a floating joint, which is not the base."""
-    root = tree.links[tree.order[0]]
-    joints = tree.child_joints[root.name]
-    empty = root.inertial is None and not root.collisions
-    return int(empty and len(joints) == 1 and joints[0].kind == "floating")
 
 
 def physical_parent(bodies: Sequence[Body], body: Body) -> Body | None:

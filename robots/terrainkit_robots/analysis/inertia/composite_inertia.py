@@ -37,17 +37,12 @@ def composite_inertias(bodies: Sequence[Body], zero_poses: Sequence[Matrix]) -> 
             mass, first, second = masses[index], firsts[index], seconds[index]
             # Shifted from the origin of the trunk to the axis, neither of which is the center of
             # mass, hence the cross terms.
-            about_axis = second - _cross_terms(first, point) + parallel_axis(mass, point)
+            cross_terms = 2 * (first @ point) * np.eye(3)
+            cross_terms -= np.outer(first, point) + np.outer(point, first)
+            about_axis = second - cross_terms + parallel_axis(mass, point)
             inertias[index] = mass if joint.kind == "prismatic" else float(axis @ about_axis @ axis)
         if body.parent is not None:
             masses[body.parent] += masses[index]
             firsts[body.parent] = firsts[body.parent] + firsts[index]
             seconds[body.parent] = seconds[body.parent] + seconds[index]
     return inertias
-
-
-def _cross_terms(first: Matrix, point: Matrix) -> Matrix:
-    """Return the cross terms of sum m |r - p|^2, with `first` the sum of m r."""
-    return np.asarray(
-        2 * (first @ point) * np.eye(3) - np.outer(first, point) - np.outer(point, first)
-    )

@@ -214,7 +214,13 @@ def _make_limb(
     leaf: Chain, leaves: Sequence[Chain], bodies: Sequence[Body], size: float, score: float
 ) -> Limb:
     links = [link.name for i in leaf.chain for link in bodies[i].links]
-    leg_names, other_names = _count_names([*links, *(joint.name for joint in leaf.joints)])
+    names = [
+        re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
+        for name in (*links, *(joint.name for joint in leaf.joints))
+    ]
+    rest = [name for name in names if not _LEG_NAME.search(name)]
+    leg_names = len(names) - len(rest)
+    other_names = sum(bool(_OTHER_NAME.search(name)) for name in rest)
     has_mirror_image = any(
         other is not leaf
         and _is_mirror_image(leaf, other, size)
@@ -231,13 +237,6 @@ def _make_limb(
         score=score,
         has_leg_names=leg_names > other_names,
     )
-
-
-def _count_names(names: Sequence[str]) -> tuple[int, int]:
-    """Return how many names suggest a leg, and how many suggest another limb."""
-    separated = [re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower() for name in names]
-    rest = [name for name in separated if not _LEG_NAME.search(name)]
-    return len(separated) - len(rest), sum(bool(_OTHER_NAME.search(name)) for name in rest)
 
 
 def _is_mirror_image(one: Chain, other: Chain, size: float) -> bool:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.linalg import norm
 
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.kinematics import joint_axis
@@ -135,13 +136,16 @@ def outlier_first(
         if own is None:
             return np.inf
         others = [value(bodies[i]) for i in siblings if i in side]
-        return min((_difference(own, other) for other in others if other is not None), default=0.0)
+        return min(
+            (
+                float(norm(np.abs(own) - np.abs(other)) + 0.01 * norm(own - other))
+                for other in others
+                if other is not None
+            ),
+            default=0.0,
+        )
 
     return (left, right) if distance(left) > distance(right) else (right, left)
-
-
-def _difference(a: Matrix, b: Matrix) -> float:
-    return float(np.linalg.norm(np.abs(a) - np.abs(b)) + 0.01 * np.linalg.norm(a - b))
 
 
 def _sibling_bodies(legs: Sequence[Leg], exclude: set[int]) -> list[int]:

@@ -345,7 +345,7 @@ def compare_joint_order(robot: Facts) -> Iterator[Violation]:
     """The order of the joints differs between the files.
 
     Simulators number joints in the order of the file. The actions and observations of a policy
-    trained on one file then belong to other joints of the other file, without a message.
+    trained on one file then silently belong to other joints of the other file.
 
     Fix:
         Permute actions and observations with the lists in the message, or reorder one of the files.
