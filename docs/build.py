@@ -20,7 +20,6 @@ from isometric import isometric, side_by_side
 
 import terrainkit
 from terrainkit import presets, registry
-from terrainkit.annotations import NONE, describe, is_table, parse_annotation
 from terrainkit.config import MapConfig
 from terrainkit.grid import Grid
 from terrainkit.preview import write_preview
@@ -28,6 +27,7 @@ from terrainkit.schema import Config, field_docs, field_keys, field_types, is_re
 from terrainkit.sub_terrain import SubTerrain
 from terrainkit.terrain_docs import TerrainDoc, terrain_doc
 from terrainkit.toml_text import value_text
+from terrainkit.type_hint import NONE, describe, is_table, parse_hint
 from terrainkit_cli.main import COMMANDS
 from terrainkit_robots.description import bundled
 from terrainkit_robots.lint.rule import FAMILIES, Rule, rules
@@ -173,7 +173,7 @@ def config_rows(config: type[Config], prefix: str = "") -> Iterator[str]:
     annotations, docs = field_types(config), field_docs(config)
     fields = {field.name: field for field in dataclasses.fields(config)}
     for key, name in field_keys(config).items():
-        field, kind = fields[name], parse_annotation(annotations[name]).kind
+        field, kind = fields[name], parse_hint(annotations[name]).kind
         if is_table(kind):
             yield from config_rows(kind, f"{prefix}{key}.")
             continue
