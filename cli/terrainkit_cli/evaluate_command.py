@@ -34,7 +34,7 @@ class PolicyCommand(Command):
     """A folder written by terrainkit train, a checkpoint in one, or a robot with a bundled
     policy."""
 
-    terrain: Annotated[str, text_option("MAP")] = ""
+    terrain: Annotated[str, text_option("TERRAIN")] = ""
     """Terrain: plane, a map (.npz), a map config (.toml), or a MuJoCo model (.xml); by default the
     terrain of the training."""
 
@@ -42,7 +42,7 @@ class PolicyCommand(Command):
         tuple[float, float, float],
         tyro.conf.arg(metavar="VX VY YAW", help_behavior_hint=""),
     ] = _NO_COMMAND
-    """Command for all robots: forward and left velocity [m/s], yaw rate [rad/s]."""
+    """Command for all robots: forward and left velocity [m/s], yaw velocity [rad/s]."""
 
     random_commands: bool = False
     """Sample commands as in training."""
@@ -131,12 +131,12 @@ class Evaluate(PolicyCommand):
             result = evaluate(
                 run,
                 self.evaluation_config(self.seconds),
-                lambda done: steps.say(f"rollout: {done:.0%} of {self.seconds:g} s"),
+                lambda fraction: steps.say(f"rollout: {fraction:.0%} of {self.seconds:g} s"),
             )
         if self.format == "json" and output is None:
             render.report(result.as_json())
             return 0
-        render.result(headline(result))
+        render.result(summary_line(result))
         render.table(result_rows(result))
         if output is not None:
             with atomic_write(output, overwrite=self.overwrite) as path:
@@ -145,7 +145,7 @@ class Evaluate(PolicyCommand):
         return 0
 
 
-def headline(result: "EvaluationResult") -> str:
+def summary_line(result: "EvaluationResult") -> str:
     """Return the metrics of all robots as one line."""
     whole = result.metrics
     success = "" if whole.success is None else f", {_percent(whole.success)} success"

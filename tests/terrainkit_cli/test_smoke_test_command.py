@@ -139,7 +139,7 @@ def test_file_options_are_passed_on(here, calls, tmp_path):
         (("a", "b", "--xacro-arg", "arm:=false"), "--xacro-arg: got no robot file among a, b"),
         (("a", "--ignore", "MSH=no meshes"), "--ignore: got no robot file"),
         (("a", "--spec", "a.toml"), "--spec: got no robot file"),
-        (("a", "-o", "nowhere/a.txt"), "there is no folder nowhere"),
+        (("a", "-o", "nowhere/a.txt"), "the folder nowhere does not exist"),
         (("a", "-o", "."), "it is a folder"),
     ],
 )

@@ -12,9 +12,9 @@ from msgspec import Meta
 from numpy.typing import NDArray
 from tensordict import TensorDict
 
-from terrainkit.annotations import PositiveInt
 from terrainkit.errors import ConfigError
 from terrainkit.schema import Config
+from terrainkit.type_hint import PositiveInt
 from terrainkit_robots.policy.load import load_policy
 from terrainkit_robots.rl.config import Commands, Task
 from terrainkit_robots.rl.env import LeggedEnv
@@ -109,11 +109,11 @@ class EvaluationResult:
     def as_json(self) -> str:
         """Return the result as JSON; equal evaluations give equal bytes."""
         config, settling = self.config, {"settling_seconds": SETTLING_TIME}
-        document: dict[str, Any] = {"robot": self.robot, "checkpoint": self.checkpoint}
-        document |= {"terrain": config.terrain, "seconds": config.seconds, **settling}
-        document |= {"seed": config.seed, "all": self.metrics.as_dict()}
-        document |= {k: [group.as_dict() for group in v] for k, v in self.groups.items()}
-        return json.dumps(document, indent=2) + "\n"
+        result: dict[str, Any] = {"robot": self.robot, "checkpoint": self.checkpoint}
+        result |= {"terrain": config.terrain, "seconds": config.seconds, **settling}
+        result |= {"seed": config.seed, "all": self.metrics.as_dict()}
+        result |= {k: [group.as_dict() for group in v] for k, v in self.groups.items()}
+        return json.dumps(result, indent=2) + "\n"
 
 
 @single_torch_thread()

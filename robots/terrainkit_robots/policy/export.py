@@ -175,7 +175,7 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
             "name": list(robot.spec.joint_order),
             "position_unit": units,
             "drive": drive.tolist(),
-            **{name: _floats(values) for name, values in joints.items()},
+            **{name: _to_list(values) for name, values in joints.items()},
         },
         "height_scan": scan if env.state.height_scan.shape[1] else None,
     }
@@ -195,8 +195,8 @@ def _observation_parts(env: LeggedEnv, joint_units: list[str]) -> list[dict[str,
         size = term.function(env.state).shape[1]
         part: dict[str, Any] = {"name": term.name, "start": start, "stop": start + size}
         part["unit"] = units.get(term.name, "")
-        part["offset"] = _floats(np.broadcast_to(offsets.get(term.name, 0.0), size))
-        part["scale"] = _floats(np.broadcast_to(term.scale, size))
+        part["offset"] = _to_list(np.broadcast_to(offsets.get(term.name, 0.0), size))
+        part["scale"] = _to_list(np.broadcast_to(term.scale, size))
         if term.name == "height_scan":
             part["clip"] = [-1.0, 1.0]
         parts.append(part)
@@ -204,6 +204,6 @@ def _observation_parts(env: LeggedEnv, joint_units: list[str]) -> list[dict[str,
     return parts
 
 
-def _floats(values: Any) -> list[float]:
+def _to_list(values: Any) -> list[float]:
     """Return numbers with the digits of single precision: float32(0.1) becomes 0.1."""
     return [float(f"{value + 0.0:.7g}") for value in np.asarray(values, float)]

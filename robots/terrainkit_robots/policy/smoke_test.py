@@ -71,7 +71,7 @@ def smoke_test(name: str, options: OnboardOptions | None = None) -> SmokeTestRes
     if not Path(name).is_file():
         task_spec = get_task(name)
         return run_checks(Robot.load(task_spec.folder), task_spec.task)
-    options = replace(options or OnboardOptions(), render_pictures=False)
+    options = replace(options or OnboardOptions(), render_images=False)
     with tempfile.TemporaryDirectory() as folder:
         onboarded = onboard(Path(name), Path(folder) / "robot", options)
         codes = [finding.code for finding in onboarded.report.findings if is_blocking(finding)]
@@ -219,19 +219,19 @@ def check_memory(env: LeggedEnv) -> Check:
 
 def check_training(env: LeggedEnv) -> Check:
     """Check that a policy can be updated a few times, with finite losses."""
-    losses: list[dict[str, float]] = []
+    history: list[dict[str, float]] = []
     error = ""
     with torch.random.fork_rng(devices=()):
         torch.manual_seed(env.cfg.runner.seed)
         runner = LeggedRunner(env)
         update = runner.alg.update
-        runner.alg.update = lambda: losses.append(update()) or losses[-1]  # type: ignore[func-returns-value]
+        runner.alg.update = lambda: history.append(update()) or history[-1]  # type: ignore[func-returns-value]
         try:
             runner.learn(ITERATIONS)
         except (TerrainkitError, RuntimeError, ValueError) as failure:  # not finite
             error = " ".join(str(failure).split())
-    values = [list(loss.values()) for loss in losses]
-    passed = not error and len(losses) == ITERATIONS and bool(np.isfinite(values).all())
-    last = ", ".join(f"{name} {value:.3g}" for name, value in (losses[-1:] or [{}])[0].items())
+    values = [list(loss.values()) for loss in history]
+    passed = not error and len(history) == ITERATIONS and bool(np.isfinite(values).all())
+    last = ", ".join(f"{name} {value:.3g}" for name, value in (history[-1:] or [{}])[0].items())
     name = f"trains for {ITERATIONS} iterations"
     return Check(name, passed, error or f"losses: {last}", "finite losses")

@@ -29,7 +29,7 @@ from terrainkit_robots.rl.train import train
 
 @pytest.fixture
 def task() -> Task:
-    """Return a task of short episodes, so that many end, and of small networks."""
+    """Return a task with short episodes and small networks."""
     return Task(
         env=Env(num_envs=4, num_threads=1, episode_length_s=0.3),
         policy=Policy(actor_hidden_dims=(16,), critic_hidden_dims=(16,)),
@@ -38,7 +38,7 @@ def task() -> Task:
     )
 
 
-def lasting(task: Task, iterations: int) -> Task:
+def with_iterations(task: Task, iterations: int) -> Task:
     return replace(task, runner=replace(task.runner, max_iterations=iterations))
 
 
@@ -52,7 +52,7 @@ def same_weights(a: Path, b: Path) -> bool:
 
 @contextmanager
 def full_disk(size: int) -> Iterator[None]:
-    """Let no file grow beyond a size [bytes]."""
+    """Limit the size of files [bytes]."""
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
     try:
@@ -71,14 +71,14 @@ def test_train_writes_a_run(task, tmp_path):
 
 def test_train_names_the_default_folder(task, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    folder = train("quadruped", "plane", lasting(task, 1)).folder
+    folder = train("quadruped", "plane", with_iterations(task, 1)).folder
     assert folder.parent == Path("logs/quadruped")
     assert (folder / "model_1.pt").exists()
 
 
 def test_resume_continues_exactly_in_its_folder(task, tmp_path):
     train("quadruped", "plane", task, folder=tmp_path / "whole")
-    train("quadruped", "plane", lasting(task, 2), folder=tmp_path / "run")
+    train("quadruped", "plane", with_iterations(task, 2), folder=tmp_path / "run")
     done = train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
     assert done.folder == tmp_path / "run"
     assert same_weights(tmp_path / "whole" / "model_4.pt", tmp_path / "run" / "model_4.pt")
@@ -141,7 +141,7 @@ def test_train_runs_in_a_thread(task, tmp_path):
     trained: list[Any] = []
     work = threading.Thread(
         target=lambda: trained.append(
-            train("quadruped", "plane", lasting(task, 1), folder=tmp_path / "run")
+            train("quadruped", "plane", with_iterations(task, 1), folder=tmp_path / "run")
         )
     )
     work.start()
@@ -150,8 +150,8 @@ def test_train_runs_in_a_thread(task, tmp_path):
 
 
 def test_resume_accepts_other_num_envs(task, tmp_path):
-    train("quadruped", "plane", lasting(task, 1), folder=tmp_path / "run")
-    more = lasting(replace(task, env=replace(task.env, num_envs=6)), 2)
+    train("quadruped", "plane", with_iterations(task, 1), folder=tmp_path / "run")
+    more = with_iterations(replace(task, env=replace(task.env, num_envs=6)), 2)
     done = train("quadruped", "plane", more, resume=open_run(tmp_path / "run"))
     assert (done.folder, done.iteration) == (tmp_path / "run", 2)
     assert open_run(tmp_path / "run").task.env.num_envs == 6
@@ -162,7 +162,7 @@ def test_tensorboard_has_each_iteration_once_after_a_crash(task, tmp_path):
 
     task = replace(task, runner=replace(task.runner, save_interval=2))
     train("quadruped", "plane", task, folder=tmp_path / "run")
-    (tmp_path / "run" / "model_4.pt").unlink()  # as if it had been killed before
+    (tmp_path / "run" / "model_4.pt").unlink()  # as after a crash
     train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
     curves = EventAccumulator(str(tmp_path / "run")).Reload()
     assert [event.step for event in curves.Scalars("Loss/value")] == [1, 2, 3, 4]
@@ -187,21 +187,23 @@ def test_resume_from_earlier_checkpoint_overwrites_nothing(task, tmp_path):
 def test_resume_rejects_a_modified_robot(task, tmp_path, name):
     mine, run = tmp_path / "mine", tmp_path / "run"
     shutil.copytree(tasks.get_task("quadruped").folder, mine)
-    train(mine, "plane", lasting(task, 1), folder=run)
+    train(mine, "plane", with_iterations(task, 1), folder=run)
     (mine / name).write_text((mine / name).read_text() + "\n")
     with pytest.raises(ConfigError, match=rf"{name} of .*mine changed since .*run was trained"):
         train(mine, "plane", task, resume=open_run(run))
     assert list(checkpoints(run)) == [1]
     other = tmp_path / "other"
     shutil.copytree(mine, other)
-    done = train(other, "plane", lasting(task, 1), resume=open_run(run), folder=tmp_path / "new")
+    done = train(
+        other, "plane", with_iterations(task, 1), resume=open_run(run), folder=tmp_path / "new"
+    )
     assert list(checkpoints(done.folder)) == [1]
 
 
 def test_resume_with_other_task_starts_new_run(task, tmp_path, mixed_map):
     run = tmp_path / "run"
     train("quadruped", "plane", task, folder=run)
-    other = lasting(replace(task, rewards=replace(task.rewards, base_height=-1.0)), 1)
+    other = with_iterations(replace(task, rewards=replace(task.rewards, base_height=-1.0)), 1)
     seen: list[int] = []
     done = train(
         "quadruped",
@@ -217,7 +219,7 @@ def test_resume_with_other_task_starts_new_run(task, tmp_path, mixed_map):
     done = train(
         "quadruped",
         path,
-        lasting(replace(task, terrain=blind), 1),
+        with_iterations(replace(task, terrain=blind), 1),
         resume=open_run(run),
         folder=tmp_path / "map",
     )
@@ -225,7 +227,7 @@ def test_resume_with_other_task_starts_new_run(task, tmp_path, mixed_map):
 
 
 def test_new_run_keeps_optimizer_unless_rates_differ(task, tmp_path):
-    """With Adam begun anew, at the first step's rate, one update undoes what was learned."""
+    """With a new optimizer and the initial rate, one update could undo the training."""
     train("quadruped", "plane", task, folder=tmp_path / "run")
     run = open_run(tmp_path / "run")
     before = read_checkpoint(run.checkpoint)
@@ -237,10 +239,10 @@ def test_new_run_keeps_optimizer_unless_rates_differ(task, tmp_path):
         ("rate", replace(task.algorithm, learning_rate=2e-4), 2e-4, 0),
         ("schedule", replace(task.algorithm, schedule="fixed"), 1e-3, 0),
     ):
-        other = lasting(replace(task, algorithm=algorithm), 1)
+        other = with_iterations(replace(task, algorithm=algorithm), 1)
         train("quadruped", "plane", other, resume=run, folder=tmp_path / name)
         after = read_checkpoint(open_run(tmp_path / name).checkpoint)["optimizer_state_dict"]
-        # 2 epochs of 2 batches, each of which may change the rate by half
+        # 2 epochs of 2 batches, each of which may change the rate by a factor of 1.5
         assert after["param_groups"][0]["lr"] == pytest.approx(rate, rel=1.5**4 - 1)
         assert int(after["state"][0]["step"]) == done + 4
 
@@ -250,7 +252,7 @@ def test_new_run_keeps_levels_on_same_map(task, tmp_path, mixed_map):
     mixed_map.save(path)
     mixed_map.save(copied)
     terrainkit.generate(replace(mixed_map.config, seed=mixed_map.config.seed + 1)).save(other)
-    task = lasting(replace(task, terrain=Terrain(curriculum=False, max_init_level=0)), 1)
+    task = with_iterations(replace(task, terrain=Terrain(curriculum=False, max_init_level=0)), 1)
     train("quadruped", path, task, folder=tmp_path / "run")
     run = open_run(tmp_path / "run")
     before = read_checkpoint(run.checkpoint)
@@ -271,7 +273,7 @@ def test_resume_switches_between_plane_and_map(task, tmp_path, mixed_map, before
     path = mixed_map.save(tmp_path / "map.npz")
     after = {"plane": "auto", "auto": "plane"}[before]
     first, second = (
-        lasting(replace(task, terrain=Terrain(collision=touched, measure_heights=True)), 1)
+        with_iterations(replace(task, terrain=Terrain(collision=touched, measure_heights=True)), 1)
         for touched in (before, after)
     )
     train("quadruped", path, first, folder=tmp_path / "run")
@@ -283,7 +285,7 @@ def test_resume_switches_between_plane_and_map(task, tmp_path, mixed_map, before
 def test_resume_from_renamed_checkpoint_starts_new_run(task, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run = tmp_path / "run"
-    train("quadruped", "plane", lasting(task, 1), folder=run)
+    train("quadruped", "plane", with_iterations(task, 1), folder=run)
     (run / "model_1.pt").rename(run / "best.pt")
     done = train("quadruped", "plane", task, resume=open_run(run / "best.pt"))
     assert done.folder.parent == Path("logs/quadruped")
@@ -292,7 +294,7 @@ def test_resume_from_renamed_checkpoint_starts_new_run(task, tmp_path, monkeypat
 
 def test_resume_from_policy_starts_new_run(task, tmp_path):
     run = tmp_path / "run"
-    train("quadruped", "plane", lasting(task, 1), folder=run)
+    train("quadruped", "plane", with_iterations(task, 1), folder=run)
     path = run / "model_1.pt"
     save_checkpoint(path, policy_state(read_checkpoint(path)))
     done = train("quadruped", "plane", task, resume=open_run(run), folder=tmp_path / "more")
@@ -309,7 +311,7 @@ def test_resume_rejects_a_completed_run(task, tmp_path):
 
 
 def test_resume_rejects_another_robot(task, tmp_path):
-    train("quadruped", "plane", lasting(task, 1), folder=tmp_path / "run")
+    train("quadruped", "plane", with_iterations(task, 1), folder=tmp_path / "run")
     with pytest.raises(ConfigError, match="belongs to another robot, quadruped"):
         train("biped", "plane", task, resume=open_run(tmp_path / "run"), folder=tmp_path / "b")
     assert not (tmp_path / "b").exists()
@@ -364,9 +366,9 @@ def test_full_disk_for_logs_is_one_error(task, tmp_path, capfd):
 
 def test_divergence_names_the_last_checkpoint(task, tmp_path):
     algorithm = replace(task.algorithm, learning_rate=1e30, schedule="fixed")
-    mad = replace(task, algorithm=algorithm)
+    diverging = replace(task, algorithm=algorithm)
     with pytest.raises(ConfigError, match=r"networks have diverged.*; there is no checkpoint"):
-        train("quadruped", "plane", mad, folder=tmp_path / "run")
+        train("quadruped", "plane", diverging, folder=tmp_path / "run")
 
 
 def test_too_many_environments_write_nothing(task, tmp_path):
@@ -414,5 +416,5 @@ def test_train_rejects_a_mismatched_spec(task, tmp_path):
 
 def test_train_sets_passive_wait_policy(task, tmp_path, monkeypatch):
     monkeypatch.delenv("OMP_WAIT_POLICY", raising=False)
-    train("quadruped", "plane", lasting(task, 1), folder=tmp_path / "run")
+    train("quadruped", "plane", with_iterations(task, 1), folder=tmp_path / "run")
     assert os.environ["OMP_WAIT_POLICY"] == "PASSIVE"
