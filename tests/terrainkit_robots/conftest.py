@@ -41,7 +41,7 @@ def onboarded(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path], Onbo
     @cache
     def run(file: Path) -> OnboardResult:
         options = OnboardOptions(
-            frameworks=framework_names(), unsafe_fixes=True, render_pictures=False
+            frameworks=framework_names(), unsafe_fixes=True, render_images=False
         )
         return onboard(file, tmp_path_factory.mktemp("onboarded") / "robot", options)
 

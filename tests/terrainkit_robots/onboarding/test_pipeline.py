@@ -49,7 +49,7 @@ ARM = """<robot name="arm">
 
 
 def options(**changes):
-    return OnboardOptions(**{"render_pictures": False, "unsafe_fixes": True} | changes)
+    return OnboardOptions(**{"render_images": False, "unsafe_fixes": True} | changes)
 
 
 @pytest.mark.parametrize("name", REAL)
@@ -127,8 +127,8 @@ def test_onboard_writes_expected_files(onboarded):
 
 def test_onboard_renders_pictures(tmp_path):
     result = onboard(QUADRUPED, tmp_path / "robot")
-    assert result.pictures or result.pictures_error
-    for name in result.pictures:
+    assert result.images or result.images_error
+    for name in result.images:
         assert (result.folder / name).read_bytes().startswith(b"\x89PNG")
         assert name in (result.folder / "report.md").read_text()
 
@@ -143,7 +143,7 @@ def test_onboard_is_deterministic(onboarded, tmp_path):
 def test_onboard_accepts_its_own_output(onboarded, tmp_path):
     first = onboarded(QUADRUPED)
     for name in ("robot.urdf", "robot.xml"):
-        again = onboard(first.folder / name, tmp_path / name, OnboardOptions(render_pictures=False))
+        again = onboard(first.folder / name, tmp_path / name, OnboardOptions(render_images=False))
         assert again.verification.is_stable
         assert again.robot.spec.joint_order == first.robot.spec.joint_order
         assert again.report.verdict == "pass"
@@ -276,7 +276,7 @@ def test_onboard_converts_mesh_of_other_format(tmp_path):
     mesh = '<mesh filename="../../upper.ply"/></geometry></collision></link>\n  <joint'
     before, after = ARM.split('<box size="0.05 0.05 0.3"/>')
     file.write_text(before + mesh + after.split("<joint", 1)[1])
-    result = onboard(file, tmp_path / "robot", OnboardOptions(render_pictures=False))
+    result = onboard(file, tmp_path / "robot", OnboardOptions(render_images=False))
     assert "MSH005" in {f.code for f in result.fixed}
     assert result.report.verdict != "fail"
     assert (result.folder / "meshes/upper.stl").exists()

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from terrainkit_robots.description import bundled
-from terrainkit_robots.rendering import robot_pictures
+from terrainkit_robots.rendering import robot_images
 from terrainkit_robots.rendering.child_process import RenderError
-from terrainkit_robots.rendering.robot_pictures import (
+from terrainkit_robots.rendering.robot_images import (
     DEFAULT_RGBA,
     FIELD_OF_VIEW,
     VIEWS,
@@ -219,4 +219,4 @@ def test_fit_camera_of_point_keeps_distance():
 
 @pytest.mark.parametrize(("radius", "cell"), [(0.25, 0.1), (0.5, 0.2), (1.3, 0.5), (25, 10)])
 def test_grid_spacing_is_round_number(radius, cell):
-    assert robot_pictures.grid_spacing(radius) == cell
+    assert robot_images.grid_spacing(radius) == cell
