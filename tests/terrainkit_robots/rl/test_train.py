@@ -3,7 +3,7 @@ import resource
 import shutil
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +27,7 @@ from terrainkit_robots.rl.runner import TrainingProgress
 from terrainkit_robots.rl.train import train
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def task() -> Task:
     """Return a task with short episodes and small networks."""
     return Task(
@@ -36,6 +36,30 @@ def task() -> Task:
         algorithm=Algorithm(num_learning_epochs=2, num_mini_batches=2),
         runner=Runner(num_steps_per_env=8, max_iterations=4),
     )
+
+
+@pytest.fixture(scope="module")
+def trained_once(task: Task, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a run of four iterations with a checkpoint of each; tests use copies of it."""
+    each = replace(task, runner=replace(task.runner, save_interval=1))
+    folder = tmp_path_factory.mktemp("trained") / "run"
+    train("quadruped", "plane", each, folder=folder)
+    return folder
+
+
+@pytest.fixture
+def run_after(trained_once: Path, tmp_path: Path) -> Callable[..., Path]:
+    """Return a function that copies the run with the checkpoints of some iterations."""
+
+    def copy(*iterations: int, name: str = "run") -> Path:
+        folder = tmp_path / name
+        shutil.copytree(trained_once, folder)
+        for iteration, path in checkpoints(folder).items():
+            if iteration not in iterations:
+                path.unlink()
+        return folder
+
+    return copy
 
 
 def with_iterations(task: Task, iterations: int) -> Task:
@@ -76,9 +100,9 @@ def test_train_names_the_default_folder(task, tmp_path, monkeypatch):
     assert (folder / "model_1.pt").exists()
 
 
-def test_resume_continues_exactly_in_its_folder(task, tmp_path):
-    train("quadruped", "plane", task, folder=tmp_path / "whole")
-    train("quadruped", "plane", with_iterations(task, 2), folder=tmp_path / "run")
+def test_resume_continues_exactly_in_its_folder(task, tmp_path, run_after):
+    run_after(4, name="whole")
+    run_after(2)
     done = train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
     assert done.folder == tmp_path / "run"
     assert same_weights(tmp_path / "whole" / "model_4.pt", tmp_path / "run" / "model_4.pt")
@@ -87,13 +111,13 @@ def test_resume_continues_exactly_in_its_folder(task, tmp_path):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_interrupted_run_resumes_exactly(task, tmp_path, number):
+def test_interrupted_run_resumes_exactly(task, tmp_path, run_after, number):
     def interrupt(progress: TrainingProgress) -> None:
         if progress.iteration == 2:
             signal.raise_signal(number)
 
     before = [signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)]
-    train("quadruped", "plane", task, folder=tmp_path / "whole")
+    run_after(4, name="whole")
     stopped = train(
         "quadruped", "plane", task, folder=tmp_path / "run", progress_callback=interrupt
     )
@@ -149,8 +173,8 @@ def test_train_runs_in_a_thread(task, tmp_path):
     assert trained[0].iteration == 1
 
 
-def test_resume_accepts_other_num_envs(task, tmp_path):
-    train("quadruped", "plane", with_iterations(task, 1), folder=tmp_path / "run")
+def test_resume_accepts_other_num_envs(task, tmp_path, run_after):
+    run_after(1)
     more = with_iterations(replace(task, env=replace(task.env, num_envs=6)), 2)
     done = train("quadruped", "plane", more, resume=open_run(tmp_path / "run"))
     assert (done.folder, done.iteration) == (tmp_path / "run", 2)
@@ -168,14 +192,8 @@ def test_tensorboard_has_each_iteration_once_after_a_crash(task, tmp_path):
     assert [event.step for event in curves.Scalars("Loss/value")] == [1, 2, 3, 4]
 
 
-def test_resume_from_earlier_checkpoint_overwrites_nothing(task, tmp_path):
-    run, branch = tmp_path / "run", tmp_path / "branch"
-    train(
-        "quadruped",
-        "plane",
-        replace(task, runner=replace(task.runner, save_interval=2)),
-        folder=run,
-    )
+def test_resume_from_earlier_checkpoint_overwrites_nothing(task, tmp_path, run_after):
+    run, branch = run_after(2, 4), tmp_path / "branch"
     before = (run / "model_4.pt").read_bytes()
     done = train("quadruped", "plane", task, resume=open_run(run, 2), folder=branch)
     assert done.folder == branch
@@ -200,9 +218,8 @@ def test_resume_rejects_a_modified_robot(task, tmp_path, name):
     assert list(checkpoints(done.folder)) == [1]
 
 
-def test_resume_with_other_task_starts_new_run(task, tmp_path, mixed_map):
-    run = tmp_path / "run"
-    train("quadruped", "plane", task, folder=run)
+def test_resume_with_other_task_starts_new_run(task, run_after, tmp_path, mixed_map):
+    run = run_after(4)
     other = with_iterations(replace(task, rewards=replace(task.rewards, base_height=-1.0)), 1)
     seen: list[int] = []
     done = train(
@@ -226,9 +243,9 @@ def test_resume_with_other_task_starts_new_run(task, tmp_path, mixed_map):
     assert open_run(done.folder).terrain == str(path)
 
 
-def test_new_run_keeps_optimizer_unless_rates_differ(task, tmp_path):
+def test_new_run_keeps_optimizer_unless_rates_differ(task, tmp_path, run_after):
     """With a new optimizer and the initial rate, one update could undo the training."""
-    train("quadruped", "plane", task, folder=tmp_path / "run")
+    run_after(4)
     run = open_run(tmp_path / "run")
     before = read_checkpoint(run.checkpoint)
     before["optimizer_state_dict"]["param_groups"][0]["lr"] = 3e-5
@@ -282,19 +299,17 @@ def test_resume_switches_between_plane_and_map(task, tmp_path, mixed_map, before
     assert done.iteration == 1
 
 
-def test_resume_from_renamed_checkpoint_starts_new_run(task, tmp_path, monkeypatch):
+def test_resume_from_renamed_checkpoint_starts_new_run(task, run_after, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    run = tmp_path / "run"
-    train("quadruped", "plane", with_iterations(task, 1), folder=run)
+    run = run_after(1)
     (run / "model_1.pt").rename(run / "best.pt")
     done = train("quadruped", "plane", task, resume=open_run(run / "best.pt"))
     assert done.folder.parent == Path("logs/quadruped")
     assert [path.name for path in run.glob("*.pt")] == ["best.pt"]
 
 
-def test_resume_from_policy_starts_new_run(task, tmp_path):
-    run = tmp_path / "run"
-    train("quadruped", "plane", with_iterations(task, 1), folder=run)
+def test_resume_from_policy_starts_new_run(task, run_after, tmp_path):
+    run = run_after(1)
     path = run / "model_1.pt"
     save_checkpoint(path, policy_state(read_checkpoint(path)))
     done = train("quadruped", "plane", task, resume=open_run(run), folder=tmp_path / "more")
@@ -302,16 +317,16 @@ def test_resume_from_policy_starts_new_run(task, tmp_path):
     assert list(checkpoints(run)) == [1]
 
 
-def test_resume_rejects_a_completed_run(task, tmp_path):
-    train("quadruped", "plane", task, folder=tmp_path / "run")
+def test_resume_rejects_a_completed_run(task, tmp_path, run_after):
+    run_after(4)
     with pytest.raises(
         ConfigError, match=r"runner\.max_iterations: got 4; expected more than the 4"
     ):
         train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
 
 
-def test_resume_rejects_another_robot(task, tmp_path):
-    train("quadruped", "plane", with_iterations(task, 1), folder=tmp_path / "run")
+def test_resume_rejects_another_robot(task, tmp_path, run_after):
+    run_after(1)
     with pytest.raises(ConfigError, match="belongs to another robot, quadruped"):
         train("biped", "plane", task, resume=open_run(tmp_path / "run"), folder=tmp_path / "b")
     assert not (tmp_path / "b").exists()
