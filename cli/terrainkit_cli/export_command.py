@@ -8,7 +8,7 @@ import tyro
 
 from terrainkit.errors import ConfigError
 from terrainkit.terrain_map import TerrainMap
-from terrainkit.text import known_names, shorten
+from terrainkit.text import expected_names, truncate
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import UNSET, Checkpoint, optional_number, text_option
@@ -142,6 +142,6 @@ def is_run(source: str) -> bool:
     from terrainkit_robots.rl import tasks
 
     if source not in tasks.task_names():
-        known = known_names(source, tasks.task_names(), "robots are")
-        raise ConfigError(f"no map, run or robot {shorten(source)}; {known}")
+        known = expected_names(source, tasks.task_names(), "robots are")
+        raise ConfigError(f"no map, run or robot {truncate(source)}; {known}")
     return True

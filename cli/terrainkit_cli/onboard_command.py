@@ -129,7 +129,7 @@ class Onboard(Command):
             unsafe_fixes=self.unsafe_fixes,
             force=self.force,
             overwrite=self.overwrite,
-            render_pictures=self.pictures,
+            render_images=self.pictures,
             cache_dir=cache_folder(),
             progress=partial(steps.bar, of="collision meshes"),
             on_step=steps.say,

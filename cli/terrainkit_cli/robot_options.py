@@ -51,6 +51,7 @@ def find_robot(name: str) -> Path:
     Raises:
         ConfigError: if neither exists, or the file cannot be accessed.
     """
+    from terrainkit.text import expected_names
     from terrainkit_robots.description import bundled
 
     path = Path(name)
@@ -59,8 +60,8 @@ def find_robot(name: str) -> Path:
             return path
         bundled_path = bundled.find(name)
         if bundled_path is None and not path.exists():
-            names = ", ".join(bundled.names())
-            raise ConfigError(f"robot file: got {name}, which does not exist; bundled: {names}")
+            expected = expected_names(name, bundled.names(), "bundled robots are")
+            raise ConfigError(f"robot file: got {name}, which does not exist; {expected}")
     except OSError as error:
         raise ConfigError(f"cannot read {name}: {error.strerror or error}") from error
     return bundled_path or path

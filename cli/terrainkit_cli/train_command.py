@@ -56,7 +56,7 @@ class Train(TaskCommand):
         from terrainkit_robots.rl.config import Task
         from terrainkit_robots.rl.tasks import get_task
 
-        run = self._resumed
+        run = self._resume_run
         task = get_task(self._robot(None)).task if run is None else run.task
         return Task.load(self.config, task) if self.config else task
 
@@ -65,7 +65,7 @@ class Train(TaskCommand):
         require_training()
         from terrainkit_robots.rl.train import train
 
-        run = self._resumed
+        run = self._resume_run
         robot, terrain, task = self._robot(run), self._terrain(run), self.changed_config()
         with render.training() as show_progress:
             trained = train(
@@ -77,11 +77,11 @@ class Train(TaskCommand):
                 device=self.device,
                 progress_callback=show_progress,
             )
-        _tell(trained, task)
+        _print_result(trained, task)
         return 128 + trained.signal if trained.signal else 0
 
     @cached_property  # read once, or a checkpoint that is written meanwhile would count for a part
-    def _resumed(self) -> "Run | None":
+    def _resume_run(self) -> "Run | None":
         from terrainkit_robots.rl.run import open_run
 
         return open_run(self.resume) if self.resume else None
@@ -101,7 +101,7 @@ class Train(TaskCommand):
         return self.terrain or ("plane" if run is None else run.terrain)
 
 
-def _tell(trained: "TrainResult", task: "Task") -> None:
+def _print_result(trained: "TrainResult", task: "Task") -> None:
     """Say what was done, and what can be done with it."""
     if trained.folder is None:  # the first of several processes says it
         return

@@ -116,7 +116,7 @@ def test_check_robot_formats_several_files(here):
         ((), "FILE is missing"),
         (
             ("none.urdf",),
-            "robot file: got none.urdf, which does not exist; bundled: ",
+            "robot file: got none.urdf, which does not exist; bundled robots are: ",
         ),
         ((".",), "cannot read .: it is a folder, not a file"),
         (("fifo",), "cannot read fifo: it is a pipe"),

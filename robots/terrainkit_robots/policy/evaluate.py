@@ -12,9 +12,9 @@ from msgspec import Meta
 from numpy.typing import NDArray
 from tensordict import TensorDict
 
-from terrainkit.annotations import PositiveInt
 from terrainkit.errors import ConfigError
 from terrainkit.schema import Config
+from terrainkit.type_hint import PositiveInt
 from terrainkit_robots.policy.load import load_policy
 from terrainkit_robots.rl.config import Commands, Task
 from terrainkit_robots.rl.env import LeggedEnv

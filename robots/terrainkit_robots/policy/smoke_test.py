@@ -71,7 +71,7 @@ def smoke_test(name: str, options: OnboardOptions | None = None) -> SmokeTestRes
     if not Path(name).is_file():
         task_spec = get_task(name)
         return run_checks(Robot.load(task_spec.folder), task_spec.task)
-    options = replace(options or OnboardOptions(), render_pictures=False)
+    options = replace(options or OnboardOptions(), render_images=False)
     with tempfile.TemporaryDirectory() as folder:
         onboarded = onboard(Path(name), Path(folder) / "robot", options)
         codes = [finding.code for finding in onboarded.report.findings if is_blocking(finding)]

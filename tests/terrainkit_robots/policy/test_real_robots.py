@@ -21,7 +21,7 @@ TASK = Task(
 )
 def test_real_robot_is_onboarded_trained_exported(robot_file, tmp_path, name, joints, width):
     folder = tmp_path / "robot"
-    onboard(robot_file(name), folder, OnboardOptions(render_pictures=False))
+    onboard(robot_file(name), folder, OnboardOptions(render_images=False))
     robot = Robot.load(folder)
     assert len(robot.spec.joint_order) == joints
     run = create_run(tmp_path / "run", TASK, folder, "plane")
