@@ -13,7 +13,7 @@ format:        ## put the code in shape
 bench:         ## ratios of speed and memory
 	python benchmarks/run.py
 
-docs:          ## docs/terrains.md, docs/cli.md and the pictures
+docs:          ## the generated pages of docs/ and the pictures
 	python docs/build.py
 
 wheel:         ## what pip installs

@@ -1,13 +1,16 @@
-"""Build what is generated in docs/: terrains.md, rules.md, cli.md and the pictures.
+"""Build the generated docs: terrains.md, rules.md, config.md, cli.md, the README's table, pictures.
 
-python docs/build.py            writes them
-python docs/build.py --check    exits 1 if a text is out of date or a picture is missing
+python docs/build.py            write them
+python docs/build.py --check    exit with 1 if a text is out of date or a picture is missing
 """
 
+import dataclasses
+import inspect
 import os
 import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -17,16 +20,25 @@ from isometric import isometric, side_by_side
 
 import terrainkit
 from terrainkit import presets, registry
+from terrainkit.config import MapConfig
 from terrainkit.grid import Grid
 from terrainkit.preview import write_preview
+from terrainkit.schema import Config, field_docs, field_keys, field_types, is_required
+from terrainkit.sub_terrain import SubTerrain
 from terrainkit.terrain_docs import TerrainDoc, terrain_doc
+from terrainkit.toml_text import value_text
+from terrainkit.type_hint import NONE, describe, is_table, parse_hint
 from terrainkit_cli.main import COMMANDS
 from terrainkit_robots.description import bundled
 from terrainkit_robots.lint.rule import FAMILIES, Rule, rules
-from terrainkit_robots.rendering.robot_pictures import render_robot
+from terrainkit_robots.lint.settings import Settings
+from terrainkit_robots.rendering.robot_images import render_robot
+from terrainkit_robots.rl.config import Task
+from terrainkit_robots.spec.robot_spec import RobotSpec
 
 DOCS = Path(__file__).parent
 PICTURES = DOCS / "pictures"
+README = DOCS.parent / "README.md"
 NOTE = "<!-- Written by docs/build.py: change the docstrings, not this file. -->\n"
 SEED = 3
 
@@ -36,13 +48,10 @@ def terrains_page() -> str:
         "# Terrains\n",
         NOTE,
         "Each terrain with its parameters. A parameter with two values is a range from difficulty",
-        "0 to difficulty 1; give one value, or a range of your own, in a",
-        "[config](conventions.md) or with `--set`. The pictures show difficulty 0.1, 0.5 and 1 on",
-        "patches of 8 m x 8 m, with holes cut short.\n",
-        "| terrain | what it is |\n|---|---|",
-    ]
-    parts += [
-        f"| [{n}](#{n}) | {terrain_doc(n).text.splitlines()[0]} |" for n in registry.terrain_names()
+        "0 to difficulty 1. Replace it by one value or another range in a",
+        "[configuration file](conventions.md#configuration-files) or with `--set`. The pictures",
+        "show difficulty 0.1, 0.5 and 1 on patches of 8 m x 8 m, with holes truncated.\n",
+        terrain_table("#"),
     ]
     parts += ["", *(terrain_section(terrain_doc(name)) for name in registry.terrain_names())]
     parts += ["## Presets\n", "| preset | columns |\n|---|---|"]
@@ -54,10 +63,26 @@ def terrains_page() -> str:
         parts.append(f"| {name} | {mix} |")
     parts += [
         "",
-        'What legged_gym calls "stairs up" is climbed from the platform outwards: here it is',
-        '`pyramid_stairs_inverted`, and "stairs down" is `pyramid_stairs`.',
+        'legged_gym\'s "stairs up", which a robot climbs from the platform outward, are',
+        '`pyramid_stairs_inverted` here. Its "stairs down" are `pyramid_stairs`.',
     ]
     return "\n".join(parts) + "\n"
+
+
+def terrain_table(link: str) -> str:
+    rows = ["| terrain | range | description |", "|---|---|---|"]
+    for name in registry.terrain_names():
+        about = terrain_doc(name)
+        ranges = ", ".join(f"{p.name} {p.easy} to {p.hard}" for p in about.parameters if p.hard)
+        rows.append(f"| [{name}]({link}{name}) | {ranges} | {about.text.splitlines()[0]} |")
+    return "\n".join(rows)
+
+
+def readme() -> str:
+    text = README.read_text()
+    before, start, rest = text.partition("<!-- terrains -->\n")
+    _, end, after = rest.partition("<!-- /terrains -->")
+    return before + start + terrain_table("docs/terrains.md#") + "\n" + end + after
 
 
 def terrain_section(about: TerrainDoc) -> str:
@@ -97,6 +122,15 @@ def rules_page() -> str:
     return "\n".join(parts)
 
 
+CONFIGS = {
+    "Map: terrainkit generate --config": MapConfig,
+    "Sub-terrain of a map: [[terrains]]": SubTerrain,
+    "Robot: robot.toml": RobotSpec,
+    "Training: task.toml, terrainkit train --config": Task,
+    "Lint settings: [check-robot] in terrainkit.toml": Settings,
+}
+"""Config class of each TOML file."""
+
 FIXED = {"safe": "`--fix`", "unsafe": "`--unsafe-fixes`", "no": ""}
 SEVERITY = {"error": "An error", "warning": "A warning", "info": "A note"}
 
@@ -113,13 +147,41 @@ def rule_section(rule: Rule) -> str:
 
 
 def markup(text: str) -> str:
-    """Return words of a docstring as Markdown, in which `code` stays what it is."""
+    """Return the text of a docstring as Markdown; `code` is unchanged."""
     parts = re.split(r"(`[^`]*`)", text)
     parts[::2] = [
         re.sub(r"([\\*\[\]|~]|\b_|_\b)", r"\\\1", part).replace("<", "&lt;").replace(">", "&gt;")
         for part in parts[::2]
     ]
     return "".join(parts)
+
+
+def config_page() -> str:
+    parts = [
+        "# Configuration files\n",
+        NOTE,
+        "The keys of each TOML file. An unknown key or an invalid value is an error that names it.",
+        'The string "none" stands for no value.\n',
+    ]
+    for title, config in CONFIGS.items():
+        parts += [f"## {title}\n", f"{inspect.getdoc(config).splitlines()[0]}\n"]
+        parts += ["| key | value | default | |\n|---|---|---|---|", *config_rows(config), ""]
+    return "\n".join(parts)
+
+
+def config_rows(config: type[Config], prefix: str = "") -> Iterator[str]:
+    annotations, docs = field_types(config), field_docs(config)
+    fields = {field.name: field for field in dataclasses.fields(config)}
+    for key, name in field_keys(config).items():
+        field, kind = fields[name], parse_hint(annotations[name]).kind
+        if is_table(kind):
+            yield from config_rows(kind, f"{prefix}{key}.")
+            continue
+        default = "required" if is_required(field) else ""
+        if field.default is not dataclasses.MISSING:
+            default = f"`{value_text(NONE if field.default is None else field.default, 1000)}`"
+        about = f"{describe(annotations[name])} | {default} | {docs.get(name, '')}"
+        yield f"| `{prefix}{key}` | {about.replace('>=', '≥').replace('<=', '≤')} |"
 
 
 def cli_page() -> str:
@@ -162,7 +224,7 @@ def draw_robot(name: str) -> None:
 
 
 def draw_walk(policy: str) -> None:
-    """Film a policy on stairs, and put moments of it side by side."""
+    """Record a policy on stairs, and write three frames side by side."""
     up = terrainkit.SubTerrain(terrain="pyramid_stairs", parameters={"inverted": True})
     stairs = terrainkit.MapConfig(
         rows=1, cols=1, border=4, mode="selected", selected_difficulty=0.33, terrains=(up,)
@@ -185,27 +247,34 @@ def written(name: str) -> str:
 
 
 def words(text: str) -> list[str]:
-    # Not the frames and line breaks: tyro may draw its help otherwise in its next version.
+    # Ignore frames and line breaks, since the next version of tyro may change them.
     return re.findall(r"[\w.:/*-]*\w", text)
 
 
 def main() -> int:
     if sys.argv[1:] not in ([], ["--check"]):
-        print(f"{' '.join(sys.argv[1:])} is not known; wanted --check or nothing", file=sys.stderr)
+        print(f"got {' '.join(sys.argv[1:])}; expected --check or nothing", file=sys.stderr)
         return 2
-    pages = {"terrains.md": terrains_page(), "rules.md": rules_page(), "cli.md": cli_page()}
+    pages = {
+        "terrains.md": terrains_page(),
+        "rules.md": rules_page(),
+        "config.md": config_page(),
+        "cli.md": cli_page(),
+    }
     if sys.argv[1:] == ["--check"]:
         stale = [n for n, text in pages.items() if words(written(n)) != words(text)]
-        wanted = [
+        stale += ["README.md"] if README.read_text() != readme() else []
+        pictures = [
             f"{name}.png"
             for name in (*registry.terrain_names(), "map", "quadruped", "quadruped_map")
         ]
-        stale += [name for name in wanted if not (PICTURES / name).exists()]
+        stale += [name for name in pictures if not (PICTURES / name).exists()]
         if stale:
             print(f"out of date: {', '.join(stale)}; run python docs/build.py")
         return 1 if stale else 0
     for name, text in pages.items():
         (DOCS / name).write_text(text)
+    README.write_text(readme())
     draw_pictures()
     return 0
 

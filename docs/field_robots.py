@@ -118,7 +118,7 @@ def onboard_in_subprocess(robot: Robot, folders: Sequence[Path]) -> Outcome:
 def onboard_robot(file: Path, target: Path) -> Outcome:
     """Onboard a robot without pictures, and return the result."""
     try:
-        done = onboard(file, target, OnboardOptions(unsafe_fixes=True, render_pictures=False))
+        done = onboard(file, target, OnboardOptions(unsafe_fixes=True, render_images=False))
     except TerrainkitError as error:
         return Outcome(result=f"rejected: {str(error).replace(f'{file}: ', '')}")
     errors = {f"{f.code} {f.name}": None for f in done.report.findings if f.severity == "error"}

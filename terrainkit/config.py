@@ -9,12 +9,12 @@ from typing import Annotated, Any, Literal, Self
 from msgspec import Meta
 
 from terrainkit import presets
-from terrainkit.annotations import SORTED, Fraction
 from terrainkit.errors import ConfigError, listing
 from terrainkit.grid import Grid, whole_cells
 from terrainkit.parameter import MAX_VALUE
 from terrainkit.schema import Config
 from terrainkit.sub_terrain import SubTerrain
+from terrainkit.type_hint import SORTED, Fraction
 
 MAX_CELLS = 10**6
 """Largest number of cells along a side of a map; memory would not hold more."""

@@ -12,9 +12,9 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
-from terrainkit.annotations import convert
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
+from terrainkit.type_hint import convert
 
 Snap = Literal["none", "cells", "centered"]
 Value = float | int | bool

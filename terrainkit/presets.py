@@ -4,7 +4,7 @@ from terrainkit import registry
 from terrainkit.errors import ConfigError
 from terrainkit.parameter import parameters_of
 from terrainkit.sub_terrain import SubTerrain
-from terrainkit.text import known_names
+from terrainkit.text import expected_names
 
 _PROPORTIONS = {
     # The columns of legged_gym in its order. Its "stairs up" are climbed from the platform outward,
@@ -40,7 +40,7 @@ def get_preset(name: str) -> tuple[SubTerrain, ...]:
         ConfigError: if there is no such preset.
     """
     if name not in preset_names():
-        raise ConfigError(f"no preset {name!r}; {known_names(name, preset_names())}")
+        raise ConfigError(f"no preset {name!r}; {expected_names(name, preset_names())}")
     proportions = dict.fromkeys(_all_names(), 1.0) if name == "all" else _PROPORTIONS[name]
     return tuple(
         SubTerrain(

@@ -13,7 +13,7 @@ from terrainkit import terrains
 from terrainkit.errors import ConfigError
 from terrainkit.parameter import parameters_of
 from terrainkit.terrain import Terrain
-from terrainkit.text import known_names
+from terrainkit.text import expected_names
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -51,7 +51,8 @@ def get_terrain(name: str) -> type[Terrain]:
         base = name.removesuffix(INVERTED)
         if base in terrain_names() and "inverted" in parameters_of(get_terrain(base)):
             raise ConfigError(f"no terrain {name!r}; use {base} with inverted = true")
-        raise ConfigError(f"no terrain {name!r}; {known_names(name, [*terrain_names(), *plugins])}")
+        expected = expected_names(name, [*terrain_names(), *plugins])
+        raise ConfigError(f"no terrain {name!r}; {expected}")
     try:
         terrain = plugins[name].load()
     except (ImportError, AttributeError) as error:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Self
 
-from terrainkit.annotations import NONE, convert, describe, is_table, parse_annotation
 from terrainkit.errors import ConfigError
-from terrainkit.text import known_names, shorten
+from terrainkit.text import expected_names, truncate
 from terrainkit.toml_text import key_text, line_text, parse_toml, read_text
+from terrainkit.type_hint import NONE, convert, describe, is_table, parse_hint
 
 if typing.TYPE_CHECKING:
     from pathlib import Path
@@ -35,9 +35,9 @@ class Config:
         cls: Any = type(self)
         if "__dataclass_fields__" not in vars(cls):
             raise ConfigError(f"{cls.__name__} lacks @dataclass(frozen=True, kw_only=True)")
-        annotations = field_types(cls)
+        hints = field_types(cls)
         for key, name in field_keys(cls).items():
-            object.__setattr__(self, name, convert(key, getattr(self, name), annotations[name]))
+            object.__setattr__(self, name, convert(key, getattr(self, name), hints[name]))
 
     @classmethod
     def from_table(
@@ -54,24 +54,24 @@ class Config:
             ConfigError: if a key is unknown or missing, or a value is invalid.
         """
         kind: Any = cls if default is None else type(default)
-        annotations, names = field_types(kind), field_keys(kind)
+        hints, names = field_types(kind), field_keys(kind)
         for key in table:
             if key not in names:
                 nested = (k for k, _ in flatten(default or ()) if k.endswith(f".{key}"))
-                known = known_names(key, names, "it has", next(nested, ""))
+                known = expected_names(key, names, "it has", next(nested, ""))
                 owner = path.removesuffix(".") or "config"
                 is_nested = isinstance(table[key], Mapping) and path
-                hint = " (a key with a dot needs quotes)" if is_nested else ""
-                raise ConfigError(f"{owner} has no key {shorten(repr(key))}{hint}; {known}")
+                note = " (a key with a dot needs quotes)" if is_nested else ""
+                raise ConfigError(f"{owner} has no key {truncate(repr(key))}{note}; {known}")
         values = {
-            names[key]: _with_configs(
-                path + key_text(key), value, annotations[names[key]], getattr(default, key, None)
+            names[key]: _nested_values(
+                path + key_text(key), value, hints[names[key]], getattr(default, key, None)
             )
             for key, value in table.items()
         }
         for field in dataclasses.fields(kind) if default is None else ():
             if field.name not in values and is_required(field):
-                expected = describe(annotations[field.name])
+                expected = describe(hints[field.name])
                 raise ConfigError(f"{path}{field.name}: missing; expected {expected}")
         try:
             return cls(**values) if default is None else dataclasses.replace(default, **values)
@@ -85,7 +85,7 @@ class Config:
             return cls.from_table(parse_toml(text), default)
         except ConfigError as error:
             message = " ".join(str(error).split())
-            raise ConfigError(shorten(message, _MAX_MESSAGE)) from error
+            raise ConfigError(truncate(message, _MAX_MESSAGE)) from error
 
     @classmethod
     def load(cls, path: "str | Path", default: Self | None = None) -> Self:
@@ -113,8 +113,8 @@ class Config:
 @cache
 def field_types(cls: type[Any]) -> dict[str, Any]:
     """Return the annotation of each field of a dataclass, by name."""
-    annotations = typing.get_type_hints(cls, include_extras=True)
-    return {field.name: annotations[field.name] for field in dataclasses.fields(cls)}
+    hints = typing.get_type_hints(cls, include_extras=True)
+    return {field.name: hints[field.name] for field in dataclasses.fields(cls)}
 
 
 @cache
@@ -151,20 +151,20 @@ def flatten(config: Any, path: str = "") -> Iterator[tuple[str, Any]]:
             yield path + name, value
 
 
-def _with_configs(path: str, value: Any, annotation: Any, default: Any = None) -> Any:
+def _nested_values(path: str, value: Any, hint: Any, default: Any = None) -> Any:
     """Return a value from TOML, with a Config for each table where one is expected."""
-    kind, origin, args, _, is_optional = parse_annotation(annotation)
+    kind, origin, args, _, is_optional = parse_hint(hint)
     if value == NONE and is_optional:
         return None
     if is_table(kind) and isinstance(value, Mapping):
         return kind.from_table(value, default, f"{path}.")
     if origin is Mapping and is_table(args[1]) and isinstance(value, Mapping):
         return {
-            key: _with_configs(f"{path}.{key_text(key)}", item, args[1])
+            key: _nested_values(f"{path}.{key_text(key)}", item, args[1])
             for key, item in value.items()
         }
     if origin is tuple and is_table(args[0]) and isinstance(value, list):
-        return tuple(_with_configs(f"{path}[{i}]", item, args[0]) for i, item in enumerate(value))
+        return tuple(_nested_values(f"{path}[{i}]", item, args[0]) for i, item in enumerate(value))
     return value
 
 

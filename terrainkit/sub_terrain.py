@@ -30,8 +30,11 @@ class SubTerrain(Config):
     name: str = ""
     """Name in the map; defaults to the name of the terrain."""
 
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    """Parameters that replace the defaults: a value, or a range (easy, hard)."""
+    parameters: Mapping[str, Annotated[Any, Meta(description="a value or a range")]] = field(
+        default_factory=dict
+    )
+    """Parameters that replace the defaults: a value, or a range (easy, hard). In TOML they are keys
+    of the table itself."""
 
     def __post_init__(self) -> None:
         try:

@@ -8,7 +8,6 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.annotations import show
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.parameter import (
@@ -20,7 +19,8 @@ from terrainkit.parameter import (
     convert_parameter,
     parameters_of,
 )
-from terrainkit.text import known_names
+from terrainkit.text import expected_names
+from terrainkit.type_hint import show
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,9 +66,8 @@ class Terrain(ABC):
         known = parameters_of(cls)
         for name in values:
             if name not in known:
-                raise ConfigError(
-                    f"{cls.kind()} has no parameter {name!r}; {known_names(name, known, 'it has')}"
-                )
+                expected = expected_names(name, known, "it has")
+                raise ConfigError(f"{cls.kind()} has no parameter {name!r}; {expected}")
         return cls(**{name: cls._value(name, p, values, difficulty) for name, p in known.items()})
 
     @classmethod

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar, ge
 
 import tyro
 
-from terrainkit.annotations import NONE, convert, parse_annotation
 from terrainkit.errors import ConfigError
 from terrainkit.schema import Config, field_docs, field_types
+from terrainkit.type_hint import NONE, convert, parse_hint
 from terrainkit_cli.parse import Command, UsageError, check_options, option_names, parse, value_of
 from terrainkit_cli.robot_options import Text
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _C = TypeVar("_C", bound=Config)
 _HELP = ("-h", "--help")
-_NOT_GIVEN = object()
+_UNSET = object()
 """Value of an option that is not on the command line."""
 
 
@@ -46,16 +46,16 @@ class ConfigCommand(Command):
 
     @classmethod
     def with_options(
-        cls, config: Config, omit: Sequence[str] = (), aliases: Mapping[str, str] | None = None
+        cls, config: Config, exclude: Sequence[str] = (), aliases: Mapping[str, str] | None = None
     ) -> "type[Self]":
         """Return this command with an option for each value of `config`.
 
         Args:
             config: The config, whose values are the defaults.
-            omit: Names of fields without an option.
+            exclude: Names of fields without an option.
             aliases: Shorter option of a nested value: {"env.num_envs": "--num-envs"}.
         """
-        values = _options_class(config, omit, aliases or {})
+        values = _options_class(config, exclude, aliases or {})
         annotation = Annotated[values, tyro.conf.arg(name="")]  # type: ignore[valid-type]
         command = dataclasses.make_dataclass(
             cls.__name__,
@@ -68,13 +68,13 @@ class ConfigCommand(Command):
         command.__doc__ = inspect.getdoc(cls)
         return command
 
-    def given(self) -> dict[str, Any]:
+    def overrides(self) -> dict[str, Any]:
         """Return the values on the command line by field name; those of sections are nested.
 
         Raises:
             ConfigError: if a value is invalid.
         """
-        return _given("", self.defaults, self.values) if hasattr(self, "values") else {}
+        return _overrides("", self.defaults, self.values) if hasattr(self, "values") else {}
 
     def changed_config(self) -> Any:
         """Return the config with the values on the command line.
@@ -83,7 +83,7 @@ class ConfigCommand(Command):
             ConfigError: as :meth:`default_config`, or if a value is invalid.
         """
         config = self.defaults if hasattr(self, "values") else self.default_config()
-        return with_values(config, self.given())
+        return with_values(config, self.overrides())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,7 +112,7 @@ class TaskCommand(ConfigCommand):
         from terrainkit_robots.rl.config import Task
 
         flags = option_names(_options_class(Task(), (), {}), flags_only=True)
-        own = _own_words(arguments, [*option_names(cls), *_HELP], flags)
+        own = _filter_args(arguments, [*option_names(cls), *_HELP], flags)
         words = [word for word in own if word not in _HELP]
         try:
             command = parse(cls, "", words)
@@ -155,84 +155,84 @@ def with_values(config: _C, values: Mapping[str, Any], path: str = "") -> _C:
         raise ConfigError(f"{path}{error}") from error
 
 
-def _given(path: str, config: Config, options: object) -> dict[str, Any]:
+def _overrides(path: str, config: Config, options: object) -> dict[str, Any]:
+    """Return the values of the options that are on the command line; sections are nested."""
     values: dict[str, Any] = {}
     kind: Any = type(config)
-    annotations = field_types(kind)
-    for name, words in vars(options).items():
+    hints = field_types(kind)
+    for name, args in vars(options).items():
         default = getattr(config, name)
         if isinstance(default, Config):
-            if nested := _given(f"{path}{name}.", default, words):
+            if nested := _overrides(f"{path}{name}.", default, args):
                 values[name] = nested
-        elif isinstance(words, bool):
-            if words != default:
-                values[name] = words
-        elif words is not _NOT_GIVEN:
-            values[name] = _from_words(
-                f"--{path}{name}".replace("_", "-"), annotations[name], words
-            )
+        elif isinstance(args, bool):
+            if args != default:
+                values[name] = args
+        elif args is not _UNSET:
+            option = f"--{path}{name}".replace("_", "-")
+            values[name] = _parse_args(option, hints[name], args)
     return values
 
 
-def _from_words(name: str, annotation: Any, words: list[str]) -> Any:
-    """Return the value that the words of an option stand for."""
-    kind, origin, args, _, is_optional = parse_annotation(annotation)
-    if words == [NONE] and is_optional:
+def _parse_args(name: str, hint: Any, args: list[str]) -> Any:
+    """Return the value of the arguments of an option."""
+    parsed = parse_hint(hint)
+    if args == [NONE] and parsed.is_optional:
         return None
-    several = origin is tuple
-    item = parse_annotation(args[0]).kind if several else kind
+    several = parsed.origin is tuple
+    item = parse_hint(parsed.args[0]).kind if several else parsed.kind
     is_text = item is str or get_origin(item) is Literal
-    values = words if is_text else [value_of(word) for word in words]
-    return convert(name, values if several else values[0], annotation)
+    values = args if is_text else [value_of(arg) for arg in args]
+    return convert(name, values if several else values[0], hint)
 
 
-def _options_class(config: Config, omit: Sequence[str], aliases: Mapping[str, str]) -> type[Any]:
+def _options_class(config: Config, exclude: Sequence[str], aliases: Mapping[str, str]) -> type[Any]:
     """Return a dataclass with a field for each option, for tyro."""
     kind: Any = type(config)
-    annotations, docs = field_types(kind), field_docs(kind)
+    hints, docs = field_types(kind), field_docs(kind)
     options: list[Any] = []
-    for name, annotation in annotations.items():
+    for name, hint in hints.items():
         value = getattr(config, name)
         if isinstance(value, Config):
             prefix = f"{name}."
             inner = {k.removeprefix(prefix): v for k, v in aliases.items() if k.startswith(prefix)}
             nested = _options_class(value, (), inner)
             options.append((name, nested, field(default_factory=nested)))
-        elif name not in omit:
+        elif name not in exclude:
             about = tyro.conf.arg(
                 help=docs.get(name, ""),
-                help_behavior_hint=f"(default: {_shown(value)})",
+                help_behavior_hint=f"(default: {_format_value(value)})",
                 aliases=[aliases[name]] if name in aliases else None,
             )
-            if annotation is bool:
+            if hint is bool:
                 options.append((name, Annotated[bool, about], field(default=value)))
             else:
-                words = Annotated[object, _words_spec(annotation), about]
-                options.append((name, words, field(default=_NOT_GIVEN)))
+                kind = Annotated[object, _arg_spec(hint), about]
+                options.append((name, kind, field(default=_UNSET)))
     namespace = {"__doc__": inspect.getdoc(config)}
     name = f"{type(config).__name__}Options"
     return dataclasses.make_dataclass(name, options, frozen=True, kw_only=True, namespace=namespace)
 
 
-def _words_spec(annotation: Any) -> Any:
+def _arg_spec(hint: Any) -> Any:
     """Return how tyro reads an option: as words, which are converted after parsing.
 
     tyro would read a tuple or a union through typeguard, whose import is slow.
     """
-    parsed = parse_annotation(annotation)
+    parsed = parse_hint(hint)
     args = parsed.args if parsed.origin is tuple else ()
     any_number = Ellipsis in args or (args and parsed.is_optional)
     return tyro.constructors.PrimitiveConstructorSpec(
         nargs="*" if any_number else len(args) or 1,
-        metavar=_metavar(annotation),
-        instance_from_str=lambda words: words,
+        metavar=_metavar(hint),
+        instance_from_str=lambda args: args,
         is_instance=lambda _: True,
         str_from_instance=lambda _: [],
     )
 
 
-def _metavar(annotation: Any) -> str:
-    kind, origin, args, _, is_optional = parse_annotation(annotation)
+def _metavar(hint: Any) -> str:
+    kind, origin, args, _, is_optional = parse_hint(hint)
     if origin is Literal:
         text = "{" + ",".join(map(str, args)) + "}"
     elif origin is tuple:
@@ -242,19 +242,19 @@ def _metavar(annotation: Any) -> str:
     return f"{text}|{NONE}" if is_optional else text
 
 
-def _shown(value: object) -> str:
+def _format_value(value: object) -> str:
     """Return a value as it is written on the command line."""
     if isinstance(value, tuple):
-        return " ".join(map(_shown, value))
+        return " ".join(map(_format_value, value))
     if isinstance(value, bool) or value is None:
         return str(value).lower()
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else f"{value}"
 
 
-def _own_words(
-    arguments: Sequence[str], own_options: Sequence[str], flags: Sequence[str]
+def _filter_args(
+    arguments: Sequence[str], options: Sequence[str], flags: Sequence[str]
 ) -> list[str]:
-    """Return `arguments` without options that are not in `own_options`, and their values.
+    """Return `arguments` without options that are not in `options`, and their values.
 
     How many values an unknown option has is not known yet: the next word, and then all numbers.
     """
@@ -263,7 +263,7 @@ def _own_words(
         word = words.pop(0)
         name, equals, _ = word.partition("=")
         name = name.replace("_", "-")
-        if not name.startswith("--") or name in own_options:
+        if not name.startswith("--") or name in options:
             own.append(word)
             continue
         first = not equals and name not in flags

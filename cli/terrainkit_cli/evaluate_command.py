@@ -10,7 +10,7 @@ import tyro
 from terrainkit.errors import ConfigError
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
-from terrainkit_cli.robot_options import NO_NUMBER, Checkpoint, Output, number_given, plain
+from terrainkit_cli.robot_options import UNSET, Checkpoint, Output, optional_number, text_option
 
 if TYPE_CHECKING:
     from terrainkit_robots.policy.evaluate import (
@@ -34,7 +34,7 @@ class PolicyCommand(Command):
     """A folder written by terrainkit train, a checkpoint in one, or a robot with a bundled
     policy."""
 
-    terrain: Annotated[str, plain("MAP")] = ""
+    terrain: Annotated[str, text_option("TERRAIN")] = ""
     """Terrain: plane, a map (.npz), a map config (.toml), or a MuJoCo model (.xml); by default the
     terrain of the training."""
 
@@ -42,17 +42,17 @@ class PolicyCommand(Command):
         tuple[float, float, float],
         tyro.conf.arg(metavar="VX VY YAW", help_behavior_hint=""),
     ] = _NO_COMMAND
-    """Command for all robots: forward and left velocity [m/s], yaw rate [rad/s]."""
+    """Command for all robots: forward and left velocity [m/s], yaw velocity [rad/s]."""
 
     random_commands: bool = False
     """Sample commands as in training."""
 
     num_envs: Annotated[
         int, tyro.conf.arg(metavar="INT", help_behavior_hint="(default: depends on the terrain)")
-    ] = NO_NUMBER
+    ] = UNSET
     """Number of robots."""
 
-    checkpoint: Checkpoint = NO_NUMBER
+    checkpoint: Checkpoint = UNSET
     """The checkpoint to load."""
 
     seed: int = 1
@@ -74,7 +74,7 @@ class PolicyCommand(Command):
         require_training()
         from terrainkit_robots.rl.run import open_run
 
-        return open_run(self.policy, number_given(self.checkpoint))
+        return open_run(self.policy, optional_number(self.checkpoint))
 
     def evaluation_config(self, seconds: float) -> "EvaluationConfig":
         """Return the settings of the rollout.
@@ -87,7 +87,7 @@ class PolicyCommand(Command):
         return EvaluationConfig(
             seconds=seconds,
             terrain=self.terrain or None,
-            num_envs=number_given(self.num_envs),
+            num_envs=optional_number(self.num_envs),
             command=None if self.command == _NO_COMMAND else self.command,
             random_commands=self.random_commands,
             seed=self.seed,
@@ -131,12 +131,12 @@ class Evaluate(PolicyCommand):
             result = evaluate(
                 run,
                 self.evaluation_config(self.seconds),
-                lambda done: steps.say(f"rollout: {done:.0%} of {self.seconds:g} s"),
+                lambda fraction: steps.say(f"rollout: {fraction:.0%} of {self.seconds:g} s"),
             )
         if self.format == "json" and output is None:
             render.report(result.as_json())
             return 0
-        render.result(headline(result))
+        render.result(summary_line(result))
         render.table(result_rows(result))
         if output is not None:
             with atomic_write(output, overwrite=self.overwrite) as path:
@@ -145,7 +145,7 @@ class Evaluate(PolicyCommand):
         return 0
 
 
-def headline(result: "EvaluationResult") -> str:
+def summary_line(result: "EvaluationResult") -> str:
     """Return the metrics of all robots as one line."""
     whole = result.metrics
     success = "" if whole.success is None else f", {_percent(whole.success)} success"

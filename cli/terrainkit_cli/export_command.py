@@ -6,11 +6,12 @@ from typing import Annotated, Literal
 
 import tyro
 
-from terrainkit.errors import ConfigError, listing
+from terrainkit.errors import ConfigError
 from terrainkit.terrain_map import TerrainMap
+from terrainkit.text import expected_names, truncate
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
-from terrainkit_cli.robot_options import NO_NUMBER, Checkpoint, number_given, plain
+from terrainkit_cli.robot_options import UNSET, Checkpoint, optional_number, text_option
 from terrainkit_cli.terrain_commands import written
 
 
@@ -27,14 +28,14 @@ class Export(Command):
     the checkpoint.
     """
 
-    subject: Annotated[
+    source: Annotated[
         str,
         tyro.conf.Positional,
         tyro.conf.arg(metavar="MAP.npz|RUN", help_behavior_hint=""),
     ] = ""
     """The map or the run."""
 
-    output: Annotated[str, plain("PATH", "-o")] = ""
+    output: Annotated[str, text_option("PATH", "-o")] = ""
     """Where to write. For a map, a file whose suffix names the format. For a policy, a folder; by
     default `exported` in the folder of the run, or ROBOT_policy for a bundled policy."""
 
@@ -54,7 +55,7 @@ class Export(Command):
     y_up: bool = False
     """For meshes: rotate the map so that y is up, as glTF viewers and game engines expect."""
 
-    checkpoint: Checkpoint = NO_NUMBER
+    checkpoint: Checkpoint = UNSET
     """For a run: the checkpoint to export."""
 
     overwrite: bool = False
@@ -62,9 +63,9 @@ class Export(Command):
 
     def run(self) -> int:
         """Export the map or the policy."""
-        if not self.subject:
+        if not self.source:
             raise ConfigError("MAP or RUN is missing; expected a map, a run, or a robot's name")
-        if is_run(self.subject):
+        if is_run(self.source):
             self._export_policy()
         else:
             self._export_map()
@@ -80,9 +81,9 @@ class Export(Command):
         return {name: value for name, value in given.items() if value is not None}
 
     def _export_map(self) -> None:
-        if self.checkpoint != NO_NUMBER:
-            raise ConfigError(f"--checkpoint: got the map {self.subject}; expected a run")
-        terrain_map = TerrainMap.load(self.subject)
+        if self.checkpoint != UNSET:
+            raise ConfigError(f"--checkpoint: got the map {self.source}; expected a run")
+        terrain_map = TerrainMap.load(self.source)
         if not self.output:
             raise ConfigError(
                 "--output is missing; expected a file, whose suffix names the format of the map"
@@ -99,14 +100,14 @@ class Export(Command):
     def _export_policy(self) -> None:
         if options := self._map_options():
             name = next(iter(options)).replace("_", "-")
-            raise ConfigError(f"--{name}: got the run {self.subject}; expected a map")
+            raise ConfigError(f"--{name}: got the run {self.source}; expected a map")
         from terrainkit_cli.training_extra import require_training
 
         require_training("onnx", "onnxruntime")
         from terrainkit_robots.policy.export import export_policy
         from terrainkit_robots.rl.run import is_shipped, open_run
 
-        run = open_run(self.subject, number_given(self.checkpoint))
+        run = open_run(self.source, optional_number(self.checkpoint))
         default = run.folder / "exported"
         if is_shipped(run):
             default = Path(f"{run.folder.name}_policy")
@@ -122,13 +123,13 @@ class Export(Command):
         render.result(f"verified: largest difference from the checkpoint: {differences}")
 
 
-def is_run(subject: str) -> bool:
-    """Return whether a subject is a run or a robot, and not a map.
+def is_run(source: str) -> bool:
+    """Return whether a source is a run or a robot, and not a map.
 
     Raises:
         ConfigError: if it is none of them.
     """
-    path = Path(subject)
+    path = Path(source)
     try:
         if path.suffix == ".npz":
             return False
@@ -137,12 +138,10 @@ def is_run(subject: str) -> bool:
         if path.exists():
             return False
     except OSError as error:
-        raise ConfigError(f"cannot read {subject}: {error.strerror or error}") from error
+        raise ConfigError(f"cannot read {source}: {error.strerror or error}") from error
     from terrainkit_robots.rl import tasks
 
-    if subject not in tasks.task_names():
-        raise ConfigError(
-            f"no map, run or robot {subject}; expected a map (.npz), a run, a checkpoint, or "
-            f"one of: {listing(tasks.task_names())}"
-        )
+    if source not in tasks.task_names():
+        known = expected_names(source, tasks.task_names(), "robots are")
+        raise ConfigError(f"no map, run or robot {truncate(source)}; {known}")
     return True

@@ -33,12 +33,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     0: done. 1: a check found something. 2: bad input; one line on stderr says what and why.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
-    _put_aside(DRAWING)
+    _rename_env(DRAWING)
     warnings.showwarning = render.show_warning
     from terrainkit.errors import TerrainkitError
 
-    # So that what is half written is cleaned up when a scheduler ends the process.
+    # Temporary files are removed when a scheduler or a closed terminal ends the process.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
+        signal.signal(signal.SIGHUP, lambda *_: sys.exit(129))
     try:
         code = _run(arguments)
         sys.stdout.flush()
@@ -65,7 +67,7 @@ DRAWING = "MUJOCO_GL"
 """The graphics library that MuJoCo draws with."""
 
 
-def _put_aside(name: str) -> None:
+def _rename_env(name: str) -> None:
     """Move a variable of the environment out of MuJoCo's sight.
 
     MuJoCo asks for the graphics library when it is imported, and fails where there is none, even
@@ -77,7 +79,7 @@ def _put_aside(name: str) -> None:
 
 def _run(arguments: list[str]) -> int:
     from terrainkit import __version__
-    from terrainkit.text import known_names, shorten
+    from terrainkit.text import expected_names, truncate
 
     name = arguments[0] if arguments else "--help"
     if name in ("-h", "--help"):
@@ -87,7 +89,8 @@ def _run(arguments: list[str]) -> int:
         render.result(f"terrainkit {__version__}")
         return 0
     if name not in COMMANDS:
-        raise parse.UsageError(f"no command {shorten(repr(name))}; {known_names(name, COMMANDS)}")
+        expected = expected_names(name, COMMANDS)
+        raise parse.UsageError(f"no command {truncate(repr(name))}; {expected}")
     options = command(name).options(arguments[1:])
     parsed = parse.parse(options, f"terrainkit {name}", arguments[1:])
     return parsed.run()

@@ -14,15 +14,15 @@ from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import (
     Output,
     Packages,
+    StringList,
     Text,
-    Words,
     XacroArguments,
     find_robot,
-    listed,
-    packages,
-    reasons,
-    repeated,
-    xacro_arguments,
+    parse_ignore,
+    parse_packages,
+    parse_xacro_arguments,
+    repeatable,
+    split_commas,
 )
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class Onboard(Command):
     """Simplify collision meshes: keep them; replace them by their convex hulls; decompose
     nonconvex meshes into convex parts with CoACD; or fit a box, cylinder, capsule or sphere."""
 
-    config: Annotated[Words, *repeated("FRAMEWORK")] = field(default_factory=list)
+    config: Annotated[StringList, *repeatable("FRAMEWORK")] = field(default_factory=list)
     """Also write a configuration for: legged_gym, leggedgym_ex, isaaclab, mjlab, genesis."""
 
     base: Literal["auto", "floating", "fixed"] = "auto"
@@ -77,7 +77,7 @@ class Onboard(Command):
     pictures: bool = True
     """Render pictures."""
 
-    ignore: Annotated[Words, *repeated("CODES=REASON")] = field(default_factory=list)
+    ignore: Annotated[StringList, *repeatable("CODES=REASON")] = field(default_factory=list)
     """Ignore these rules; the reason is written to the report."""
 
     package: Packages = field(default_factory=list)
@@ -118,18 +118,18 @@ class Onboard(Command):
 
         return OnboardOptions(
             settings=Settings(
-                ignore=reasons(self.ignore),
-                packages=packages(self.package),
-                xacro_arguments=xacro_arguments(self.xacro_arg),
+                ignore=parse_ignore(self.ignore),
+                packages=parse_packages(self.package),
+                xacro_arguments=parse_xacro_arguments(self.xacro_arg),
             ),
             collision=self.collision,
-            frameworks=tuple(word for words in self.config for word in listed(words)),
+            frameworks=tuple(word for words in self.config for word in split_commas(words)),
             floating={"auto": None, "floating": True, "fixed": False}[self.base],
             spec=Path(self.spec) if self.spec else None,
             unsafe_fixes=self.unsafe_fixes,
             force=self.force,
             overwrite=self.overwrite,
-            render_pictures=self.pictures,
+            render_images=self.pictures,
             cache_dir=cache_folder(),
             progress=partial(steps.bar, of="collision meshes"),
             on_step=steps.say,

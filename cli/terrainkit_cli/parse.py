@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, get_type_hints
 
 from terrainkit.errors import TerrainkitError
-from terrainkit.text import nearest, shorten
+from terrainkit.text import closest, truncate
 
 if TYPE_CHECKING:
     from typing import Self
@@ -53,7 +53,7 @@ class UsageError(TerrainkitError):
 _Command = TypeVar("_Command", bound=Command)
 
 
-def parse(command: type[_Command], program: str, arguments: list[str]) -> _Command:
+def parse(command: type[_Command], prog: str, arguments: list[str]) -> _Command:
     """Return the `command` that `arguments` describe; `--help` prints its help and exits.
 
     Raises:
@@ -64,11 +64,11 @@ def parse(command: type[_Command], program: str, arguments: list[str]) -> _Comma
     stderr = io.StringIO()
     try:
         with contextlib.redirect_stderr(stderr):
-            return tyro.cli(command, prog=program, args=arguments)
+            return tyro.cli(command, prog=prog, args=arguments)
     except SystemExit as end:
         if end.code in (0, None):
             raise
-        raise UsageError(f"{_one_line(stderr.getvalue())}; see {program} --help") from None
+        raise UsageError(f"{_one_line(stderr.getvalue())}; see {prog} --help") from None
 
 
 def value_of(word: str) -> str | float | bool | None:
@@ -114,9 +114,9 @@ def check_options(command: type[Command], arguments: Sequence[str]) -> None:
     for word in arguments:
         name = word.partition("=")[0]
         if name.startswith("--") and name.replace("_", "-") not in known:
-            near = nearest(name.replace("_", "-"), known)
+            near = closest(name.replace("_", "-"), known)
             meant = f"; did you mean {near}?" if near else ""
-            raise UsageError(f"no option {shorten(name)}{meant}; --help lists the options")
+            raise UsageError(f"no option {truncate(name)}{meant}; --help lists the options")
 
 
 def _one_line(box: str) -> str:

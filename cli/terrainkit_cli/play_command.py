@@ -8,7 +8,7 @@ import tyro
 
 from terrainkit.errors import ConfigError
 from terrainkit_cli import render
-from terrainkit_cli.evaluate_command import PolicyCommand, headline, result_rows
+from terrainkit_cli.evaluate_command import PolicyCommand, result_rows, summary_line
 from terrainkit_cli.robot_options import Output
 from terrainkit_cli.training_extra import require_training
 
@@ -73,9 +73,11 @@ class Play(PolicyCommand):
                 video=self.video,
                 robots=self.robots,
                 size=self.size,
-                progress=lambda done: steps.say(f"rollout: {done:.0%} of {self.seconds:g} s"),
+                progress=lambda fraction: steps.say(
+                    f"rollout: {fraction:.0%} of {self.seconds:g} s"
+                ),
             )
-        render.result(headline(result.evaluation))
+        render.result(summary_line(result.evaluation))
         render.table(result_rows(result.evaluation))
         if result.video is not None:
             self._write(result.video, target)

@@ -14,15 +14,15 @@ from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import (
     Output,
     Packages,
+    StringList,
     Text,
-    Words,
     XacroArguments,
     find_robot,
-    listed,
-    packages,
-    reasons,
-    repeated,
-    xacro_arguments,
+    parse_ignore,
+    parse_packages,
+    parse_xacro_arguments,
+    repeatable,
+    split_commas,
 )
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class CheckRobot(Command):
     """
 
     files: Annotated[
-        Words,
+        StringList,
         tyro.conf.Positional,
         tyro.conf.arg(metavar="FILE [FILE ...]", help_behavior_hint=""),
     ] = field(default_factory=list)
@@ -59,10 +59,10 @@ class CheckRobot(Command):
     output: Output = ""
     """Write the report to this file. An existing file is replaced."""
 
-    select: Annotated[Words, *repeated("CODES")] = field(default_factory=list)
+    select: Annotated[StringList, *repeatable("CODES")] = field(default_factory=list)
     """Run only these rules: comma-separated codes, prefixes of codes, or names."""
 
-    ignore: Annotated[Words, *repeated("CODES=REASON")] = field(default_factory=list)
+    ignore: Annotated[StringList, *repeatable("CODES=REASON")] = field(default_factory=list)
     """Do not run these rules; the reason is printed in the report."""
 
     package: Packages = field(default_factory=list)
@@ -118,10 +118,10 @@ class CheckRobot(Command):
         from terrainkit_robots.lint.settings import Settings
 
         settings = Settings(
-            select=tuple(word for words in self.select for word in listed(words)),
-            ignore=reasons(self.ignore),
-            packages=packages(self.package),
-            xacro_arguments=xacro_arguments(self.xacro_arg),
+            select=tuple(word for words in self.select for word in split_commas(words)),
+            ignore=parse_ignore(self.ignore),
+            packages=parse_packages(self.package),
+            xacro_arguments=parse_xacro_arguments(self.xacro_arg),
             strict=self.flag("strict"),
             simulate=self.flag("simulation"),
         )

@@ -1,4 +1,4 @@
-"""Options that the commands for robots share."""
+"""Options that several robot commands have."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,98 +9,106 @@ import tyro
 from terrainkit.errors import ConfigError
 
 if TYPE_CHECKING:
-    Words = list[str]
+    StringList = list[str]
 else:
-    # tyro would look at list[str] through typeguard, whose import takes a quarter of the time of a
-    # whole `terrainkit check-robot`.
-    Words = list
+    # For list[str], tyro imports typeguard, which takes a quarter of the time of check-robot.
+    StringList = list
 
 
-def repeated(metavar: str) -> tuple[object, ...]:
-    """Return the markers of an option that may be given several times."""
+def repeatable(metavar: str) -> tuple[object, ...]:
+    """Return the annotations of an option that can be repeated."""
     hint = "(may be repeated)"
     return tyro.conf.UseAppendAction, tyro.conf.arg(metavar=metavar, help_behavior_hint=hint)
 
 
-def plain(metavar: str, *aliases: str) -> object:
-    """Return the marker of an option that is a text, and empty unless given."""
+def text_option(metavar: str, *aliases: str) -> object:
+    """Return the annotation of a text option whose default is an empty text."""
     return tyro.conf.arg(metavar=metavar, aliases=list(aliases), help_behavior_hint="")
 
 
-Packages = Annotated[Words, *repeated("NAME=DIR")]
-XacroArguments = Annotated[Words, *repeated("NAME:=VALUE")]
-Text = Annotated[str, plain("PATH")]
-Output = Annotated[str, plain("PATH", "-o")]
+Packages = Annotated[StringList, *repeatable("NAME=DIR")]
+XacroArguments = Annotated[StringList, *repeatable("NAME:=VALUE")]
+Text = Annotated[str, text_option("PATH")]
+Output = Annotated[str, text_option("PATH", "-o")]
 
-NO_NUMBER = -1
-"""No number was given; not None, since tyro's errors about a union name its members."""
+UNSET = -1
+"""Default of optional numbers; with None, tyro would print the types of a union in errors."""
 
 Checkpoint = Annotated[
     int, tyro.conf.arg(metavar="ITERATION", help_behavior_hint="(default: the last)")
 ]
-"""A checkpoint of a run, `NO_NUMBER` unless given."""
+"""Iteration of a checkpoint; the default is UNSET."""
 
 
-def number_given(number: int) -> int | None:
-    """Return what an option was given; None for nothing."""
-    return None if number == NO_NUMBER else number
+def optional_number(number: int) -> int | None:
+    """Return the value of a numeric option, or None if it is UNSET."""
+    return None if number == UNSET else number
 
 
 def find_robot(name: str) -> Path:
-    """Return the file of that name, or else the bundled robot."""
+    """Return the path of a robot file, or of a bundled robot.
+
+    Raises:
+        ConfigError: if neither exists, or the file cannot be accessed.
+    """
+    from terrainkit.text import expected_names
     from terrainkit_robots.description import bundled
 
     path = Path(name)
     try:
         if path.is_file():
             return path
-        found = bundled.find(name)
-        if found is None and not path.exists():
-            raise ConfigError(
-                f"there is no file {name}, nor is a bundled robot called so; "
-                f"there are: {', '.join(bundled.names())}"
-            )
+        bundled_path = bundled.find(name)
+        if bundled_path is None and not path.exists():
+            expected = expected_names(name, bundled.names(), "bundled robots are")
+            raise ConfigError(f"robot file: got {name}, which does not exist; {expected}")
     except OSError as error:
         raise ConfigError(f"cannot read {name}: {error.strerror or error}") from error
-    return found or path
+    return bundled_path or path
 
 
-def listed(words: str) -> list[str]:
-    """Return the words between commas."""
-    return [word.strip() for word in words.split(",") if word.strip()]
+def split_commas(text: str) -> list[str]:
+    """Return the comma-separated words of a text."""
+    return [word.strip() for word in text.split(",") if word.strip()]
 
 
-def reasons(words: Sequence[str]) -> dict[str, str]:
-    """Return the reason for each rule that is not asked."""
-    found = pairs("--ignore", words, "=", "CODES=REASON")
-    return {code: reason for codes, reason in found.items() for code in listed(codes)}
+def parse_ignore(texts: Sequence[str]) -> dict[str, str]:
+    """Return the reason for each ignored rule, from texts such as `INR001,INR002=REASON`."""
+    parsed = parse_pairs("--ignore", texts, "=", "CODES=REASON")
+    return {code: reason for codes, reason in parsed.items() for code in split_commas(codes)}
 
 
-def pairs(option: str, words: Sequence[str], sign: str, wanted: str) -> dict[str, str]:
-    """Return names and their values, as NAME=VALUE writes them.
-
-    Raises:
-        ConfigError: if one is written otherwise, or twice.
-    """
-    found_pairs: dict[str, str] = {}
-    for word in words:
-        name, found, value = (part.strip() for part in word.partition(sign))
-        if not name or not found or not (value or sign == ":="):
-            raise ConfigError(f"{option} {word!r}; wanted {wanted}")
-        if name in found_pairs:
-            raise ConfigError(f"{option} has {name} twice; wanted it once")
-        found_pairs[name] = value
-    return found_pairs
-
-
-def packages(words: Sequence[str]) -> dict[str, Path]:
-    """Return the folder of each package, as NAME=DIR writes them."""
+def parse_packages(texts: Sequence[str]) -> dict[str, Path]:
+    """Return the folder of each package, from texts such as `NAME=DIR`."""
     from terrainkit_robots.lint.settings import package_folder
 
-    found = pairs("--package", words, "=", "NAME=DIR")
-    return {name: package_folder(name, Path(folder)) for name, folder in found.items()}
+    parsed = parse_pairs("--package", texts, "=", "NAME=DIR")
+    return {name: package_folder(name, Path(folder)) for name, folder in parsed.items()}
 
 
-def xacro_arguments(words: Sequence[str]) -> dict[str, str]:
-    """Return the value of each xacro argument, as NAME:=VALUE writes them."""
-    return pairs("--xacro-arg", words, ":=", "NAME:=VALUE")
+def parse_xacro_arguments(texts: Sequence[str]) -> dict[str, str]:
+    """Return the value of each xacro argument, from texts such as `NAME:=VALUE`."""
+    return parse_pairs("--xacro-arg", texts, ":=", "NAME:=VALUE")
+
+
+def parse_pairs(option: str, texts: Sequence[str], separator: str, expected: str) -> dict[str, str]:
+    """Return the values of an option that assigns values to names.
+
+    Args:
+        option: Name of the option.
+        texts: Its values.
+        separator: Text between a name and a value.
+        expected: The expected format, for error messages.
+
+    Raises:
+        ConfigError: if a text has another format, or a name is repeated.
+    """
+    pairs: dict[str, str] = {}
+    for text in texts:
+        name, found, value = (part.strip() for part in text.partition(separator))
+        if not name or not found or not (value or separator == ":="):
+            raise ConfigError(f"{option}: got {text!r}; expected {expected}")
+        if name in pairs:
+            raise ConfigError(f"{option}: got {name} twice; expected each name once")
+        pairs[name] = value
+    return pairs

@@ -13,13 +13,13 @@ from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import (
     Output,
     Packages,
+    StringList,
     Text,
-    Words,
     XacroArguments,
-    packages,
-    reasons,
-    repeated,
-    xacro_arguments,
+    parse_ignore,
+    parse_packages,
+    parse_xacro_arguments,
+    repeatable,
 )
 from terrainkit_cli.training_extra import require_training
 
@@ -39,7 +39,7 @@ class SmokeTest(Command):
     """
 
     robots: Annotated[
-        Words,
+        StringList,
         tyro.conf.Positional,
         tyro.conf.arg(metavar="ROBOT [ROBOT ...]", help_behavior_hint=""),
     ] = field(default_factory=list)
@@ -51,7 +51,7 @@ class SmokeTest(Command):
     output: Output = ""
     """Write the report to this file; an existing file is replaced."""
 
-    ignore: Annotated[Words, *repeated("CODES=REASON")] = field(default_factory=list)
+    ignore: Annotated[StringList, *repeatable("CODES=REASON")] = field(default_factory=list)
     """For robot files: rules to ignore, with the reason."""
 
     package: Packages = field(default_factory=list)
@@ -107,14 +107,16 @@ class SmokeTest(Command):
 
     def _smoke_test(self, name: str) -> "SmokeTestResult":
         from terrainkit_robots.lint.settings import Settings
+        from terrainkit_robots.onboarding.pipeline import OnboardOptions
         from terrainkit_robots.policy.smoke_test import smoke_test
 
         settings = Settings(
-            ignore=reasons(self.ignore),
-            packages=packages(self.package),
-            xacro_arguments=xacro_arguments(self.xacro_arg),
+            ignore=parse_ignore(self.ignore),
+            packages=parse_packages(self.package),
+            xacro_arguments=parse_xacro_arguments(self.xacro_arg),
         )
-        return smoke_test(name, settings=settings, spec=Path(self.spec) if self.spec else None)
+        spec = Path(self.spec) if self.spec else None
+        return smoke_test(name, OnboardOptions(settings=settings, spec=spec))
 
 
 def summary(result: "SmokeTestResult") -> str:

@@ -49,7 +49,7 @@ class Generate(ConfigCommand):
         """Return this command with an option for each value of the config."""
         path = word_after("--config", arguments)
         config = _load_config(path) if path else MapConfig()
-        command = cls.with_options(config, omit=("terrains",))
+        command = cls.with_options(config, exclude=("terrains",))
         check_options(command, arguments)
         return command
 
@@ -78,19 +78,19 @@ class Generate(ConfigCommand):
             )
         return 0
 
-    def given(self) -> dict[str, Any]:
+    def overrides(self) -> dict[str, Any]:
         """Return the values on the command line by field name."""
-        given = super().given()
-        if self.terrain and "preset" in given:
+        values = super().overrides()
+        if self.terrain and "preset" in values:
             raise ConfigError("--terrain, --preset: got both; expected one of them")
         if self.set and not self.terrain:
             raise ConfigError("--set: got parameters without a terrain; expected --terrain")
         if self.terrain:
             parameters = _parameters(self.set)
-            given["terrains"] = (SubTerrain(terrain=self.terrain, parameters=parameters),)
-        elif "preset" in given:
-            given["terrains"] = ()
-        return given
+            values["terrains"] = (SubTerrain(terrain=self.terrain, parameters=parameters),)
+        elif "preset" in values:
+            values["terrains"] = ()
+        return values
 
 
 def _load_config(path: str) -> MapConfig:
@@ -177,9 +177,9 @@ def _print_map(terrain_map: TerrainMap) -> None:
     config, grid = terrain_map.config, terrain_map.grid
     heights = terrain_map.heights
     facts = {
-        "patches": f"{config.rows} x {config.cols} of {_metres(*config.patch_size)}",
+        "patches": f"{config.rows} x {config.cols} of {_size_text(*config.patch_size)}",
         "samples": f"{grid.shape[0]} x {grid.shape[1]}, one every {config.cell:g} m",
-        "extent": f"{_metres(*grid.size)}, from ({grid.lower[0]:g}, {grid.lower[1]:g})",
+        "extent": f"{_size_text(*grid.size)}, from ({grid.lower[0]:g}, {grid.lower[1]:g})",
         "border": f"{config.border:g} m",
         "heights": f"{heights.min():g} to {heights.max():g} m",
         "mode": f"{config.mode}, seed {config.seed}",
@@ -276,10 +276,10 @@ def written(terrain_map: TerrainMap, path: Path) -> str:
     """Return what to say of a map that was written."""
     config, grid = terrain_map.config, terrain_map.grid
     return (
-        f"wrote {path}: {config.rows} x {config.cols} patches of {_metres(*config.patch_size)}, "
+        f"wrote {path}: {config.rows} x {config.cols} patches of {_size_text(*config.patch_size)}, "
         f"{grid.shape[0]} x {grid.shape[1]} samples, {path.stat().st_size / 1e6:.1f} MB"
     )
 
 
-def _metres(x: float, y: float) -> str:
+def _size_text(x: float, y: float) -> str:
     return f"{x:g} m x {y:g} m"

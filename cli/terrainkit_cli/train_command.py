@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 from terrainkit.errors import ConfigError
 from terrainkit_cli import render
 from terrainkit_cli.config_options import TaskCommand
-from terrainkit_cli.robot_options import plain
+from terrainkit_cli.robot_options import text_option
 from terrainkit_cli.training_extra import require_training
 
 if TYPE_CHECKING:
@@ -36,19 +36,19 @@ class Train(TaskCommand):
         "runner.seed": "--seed",
     }
 
-    terrain: Annotated[str, plain("TERRAIN")] = ""
+    terrain: Annotated[str, text_option("TERRAIN")] = ""
     """A map (.npz), a map config (.toml), a MuJoCo model (.xml), or plane, which is the default."""
 
-    log_dir: Annotated[str, plain("FOLDER")] = ""
+    log_dir: Annotated[str, text_option("FOLDER")] = ""
     """Folder of the run, which must be empty; the default is logs/ROBOT/DATE-TIME."""
 
-    resume: Annotated[str, plain("RUN")] = ""
+    resume: Annotated[str, text_option("RUN")] = ""
     """Resume a run: its folder, or one of its checkpoints. Robot, terrain and task are those of
     the run unless given. Training continues in the same folder, exactly as without interruption.
     With another terrain or task, a new run starts with the networks of the run and, unless
     --algorithm.learning-rate or .schedule differ, its last learning rate."""
 
-    device: Annotated[str, plain("DEVICE")] = "cpu"
+    device: Annotated[str, text_option("DEVICE")] = "cpu"
     """Device of the networks: cpu, cuda, cuda:1. The physics runs on the CPU."""
 
     def default_config(self) -> "Task":
@@ -56,7 +56,7 @@ class Train(TaskCommand):
         from terrainkit_robots.rl.config import Task
         from terrainkit_robots.rl.tasks import get_task
 
-        run = self._resumed
+        run = self._resume_run
         task = get_task(self._robot(None)).task if run is None else run.task
         return Task.load(self.config, task) if self.config else task
 
@@ -65,7 +65,7 @@ class Train(TaskCommand):
         require_training()
         from terrainkit_robots.rl.train import train
 
-        run = self._resumed
+        run = self._resume_run
         robot, terrain, task = self._robot(run), self._terrain(run), self.changed_config()
         with render.training() as show_progress:
             trained = train(
@@ -77,11 +77,11 @@ class Train(TaskCommand):
                 device=self.device,
                 progress_callback=show_progress,
             )
-        _tell(trained, task)
+        _print_result(trained, task)
         return 128 + trained.signal if trained.signal else 0
 
     @cached_property  # read once, or a checkpoint that is written meanwhile would count for a part
-    def _resumed(self) -> "Run | None":
+    def _resume_run(self) -> "Run | None":
         from terrainkit_robots.rl.run import open_run
 
         return open_run(self.resume) if self.resume else None
@@ -101,7 +101,7 @@ class Train(TaskCommand):
         return self.terrain or ("plane" if run is None else run.terrain)
 
 
-def _tell(trained: "TrainResult", task: "Task") -> None:
+def _print_result(trained: "TrainResult", task: "Task") -> None:
     """Say what was done, and what can be done with it."""
     if trained.folder is None:  # the first of several processes says it
         return

@@ -3,8 +3,8 @@
 from collections.abc import Container, Iterable
 from pathlib import Path
 
-from terrainkit.text import nearest as closest
-from terrainkit.text import shorten as short
+from terrainkit.text import closest
+from terrainkit.text import truncate as short
 
 __all__ = ["closest", "count", "display_path", "free_name", "names", "one_line", "short"]
 

@@ -13,10 +13,10 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.annotations import convert
 from terrainkit.box_decomposition import BoxDecomposition, level_cells, neighborhood
 from terrainkit.memory import check_memory
 from terrainkit.mesh.closed import THICKNESS
+from terrainkit.type_hint import convert
 
 if TYPE_CHECKING:
     from terrainkit.terrain_map import TerrainMap

@@ -5,9 +5,9 @@ from typing import Annotated
 import numpy as np
 import pytest
 
-from terrainkit.annotations import UNIQUE, Interval, PositiveFloat, PositiveInt
 from terrainkit.errors import ConfigError
 from terrainkit.schema import Config, field_docs, flatten
+from terrainkit.type_hint import UNIQUE, Interval, PositiveFloat, PositiveInt
 
 
 @dataclass(frozen=True, kw_only=True)

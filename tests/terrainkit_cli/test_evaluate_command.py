@@ -6,7 +6,7 @@ import pytest
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit_cli import training_extra
-from terrainkit_cli.evaluate_command import headline, result_rows
+from terrainkit_cli.evaluate_command import result_rows, summary_line
 from terrainkit_robots.policy.evaluate import EvaluationConfig, EvaluationResult, RolloutMetrics
 from terrainkit_robots.rl import run as run_module
 
@@ -113,7 +113,7 @@ def test_evaluate_bundled_policy_by_name(here):
         (("walk", "--command", "1", "0"), "--command"),
         (("walk", "--command", "nan", "0", "0"), "command: got [nan, 0.0, 0.0]; expected 3 values"),
         (("walk", "--command", "1", "0", "0", "--random-commands"), "expected one of them"),
-        (("walk", "-o", "nowhere/result.json"), "there is no folder nowhere"),
+        (("walk", "-o", "nowhere/result.json"), "the folder nowhere does not exist"),
     ],
 )
 def test_evaluate_rejects_invalid_input(here, words, message):
@@ -148,11 +148,11 @@ def make_result(metrics, **groups):
 
 
 def test_headline_shows_missing_errors():
-    assert headline(make_result(make_metrics())) == (
+    assert summary_line(make_result(make_metrics())) == (
         "hare, model_1.pt, on hill.npz: 4 robots, 4 fell, 25% success; "
         "error not measured: no robot walked longer than 2 s after a command"
     )
-    line = headline(make_result(make_metrics(lin_vel_error=0.12345)))
+    line = summary_line(make_result(make_metrics(lin_vel_error=0.12345)))
     assert "error 0.123 m/s (- averaged over 1 s)" in line
 
 

@@ -127,8 +127,7 @@ def test_export_map(here, tmp_path):
     ("words", "said"),
     [
         ((), "MAP or RUN is missing"),
-        (("unicorn",), "no map, run or robot unicorn; expected a map (.npz), a run"),
-        (("unicorn",), "or one of: biped, quadruped"),
+        (("unicorn",), "no map, run or robot unicorn; robots are: biped"),
         (("none.npz", "-o", "a.stl"), "no file none.npz"),
         (("none.pt",), "run: got none.pt"),
         (("empty",), "empty has no run.toml"),
@@ -142,7 +141,7 @@ def test_export_map(here, tmp_path):
         (("run", "--y-up"), "--y-up: got the run run; expected a map"),
         (("run", "--checkpoint", 7), "run: got checkpoint 7; expected one of: 1, 2"),
         (("run", "--checkpoint", -7), "run: got checkpoint -7"),
-        (("run", "-o", "nowhere/policy"), "there is no folder nowhere"),
+        (("run", "-o", "nowhere/policy"), "the folder nowhere does not exist"),
         (("run", "-o", "text.txt"), "text.txt exists"),
         (("x" * 5000,), "cannot read"),
     ],

@@ -81,7 +81,7 @@ def test_check_robot_continues_after_missing_file(here):
     run = here("check-robot", "none.urdf", "bad.urdf", "--format", "json")
     assert json.loads(run.stdout)["file"] == "bad.urdf"
     assert run.stderr.count("\n") == 1
-    assert run.stderr.startswith("terrainkit: error: there is no file none.urdf")
+    assert run.stderr.startswith("terrainkit: error: robot file: got none.urdf")
 
 
 @pytest.mark.parametrize("name", bundled.names())
@@ -116,23 +116,23 @@ def test_check_robot_formats_several_files(here):
         ((), "FILE is missing"),
         (
             ("none.urdf",),
-            "there is no file none.urdf, nor is a bundled robot called so; there are:",
+            "robot file: got none.urdf, which does not exist; bundled robots are: ",
         ),
         ((".",), "cannot read .: it is a folder, not a file"),
-        (("fifo",), "fifo is not a plain file"),
-        (("good.urdf", "--select", "XYZ1"), "no rule 'XYZ1'; wanted a code"),
-        (("good.urdf", "--ignore", "INR002"), "--ignore 'INR002'; wanted CODES=REASON"),
-        (("good.urdf", "--ignore", "INR002="), "--ignore 'INR002='; wanted CODES=REASON"),
+        (("fifo",), "cannot read fifo: it is a pipe"),
+        (("good.urdf", "--select", "XYZ1"), "no rule 'XYZ1'; expected a code"),
+        (("good.urdf", "--ignore", "INR002"), "--ignore: got 'INR002'; expected CODES=REASON"),
+        (("good.urdf", "--ignore", "INR002="), "--ignore: got 'INR002='; expected CODES=REASON"),
         (("good.urdf", "--ignore", "XYZ1=why"), "no rule 'XYZ1'"),
-        (("good.urdf", "--ignore", "INR=a", "--ignore", "INR=b"), "--ignore has INR twice"),
-        (("good.urdf", "--package", "mine"), "--package 'mine'; wanted NAME=DIR"),
+        (("good.urdf", "--ignore", "INR=a", "--ignore", "INR=b"), "--ignore: got INR twice"),
+        (("good.urdf", "--package", "mine"), "--package: got 'mine'; expected NAME=DIR"),
         (
             ("good.urdf", "--package", "mine=none"),
-            "package mine is to be in none, where there is no",
+            "package mine: got none; expected an existing folder",
         ),
-        (("good.urdf", "--xacro-arg", "a=1"), "--xacro-arg 'a=1'; wanted NAME:=VALUE"),
+        (("good.urdf", "--xacro-arg", "a=1"), "--xacro-arg: got 'a=1'; expected NAME:=VALUE"),
         (("good.urdf", "--diff", "--format", "json"), "--diff prints a diff"),
-        (("good.urdf", "-o", "nowhere/a.txt"), "there is no folder nowhere"),
+        (("good.urdf", "-o", "nowhere/a.txt"), "the folder nowhere does not exist"),
         (("good.urdf", "-o", "."), "it is a folder"),
         (("good.urdf", "-o", "/proc/report.txt"), "cannot write /proc/report.txt"),
         (("good.urdf", "-o", "good.urdf"), "would replace the checked file good.urdf"),
@@ -236,7 +236,7 @@ def test_check_robot_options_override_settings_file(here, folder):
     (folder / "pyproject.toml").write_text("[tool.terrainkit.check-robot]\nselekt=[]\n")
     run = here("check-robot", "sub/bad.urdf")
     assert run.returncode == 2
-    assert "pyproject.toml: no key 'selekt'; there are: select, ignore" in run.stderr
+    assert "pyproject.toml: config has no key 'selekt'; did you mean 'select'?" in run.stderr
 
 
 def test_check_robot_escapes_unencodable_names(terrainkit, folder, monkeypatch):

@@ -27,7 +27,7 @@ def calls(monkeypatch):
     """Derive the result of a robot from its name, and return the calls."""
     calls = []
 
-    def smoke_test(name, **options):
+    def smoke_test(name, options):
         calls.append((name, options))
         if name.startswith("none"):
             raise ConfigError(f"there is no {name}")
@@ -123,10 +123,10 @@ def test_file_options_are_passed_on(here, calls, tmp_path):
     words = ("--package", "my=meshes", "--xacro-arg", "arm:=false", "--ignore", "MSH=no meshes")
     assert here("a", *words, "--spec", "a.toml").returncode == 0
     (_, options) = calls[0]
-    assert str(options["spec"]) == "a.toml"
-    assert options["settings"].packages["my"].name == "meshes"
-    assert options["settings"].xacro_arguments == {"arm": "false"}
-    assert options["settings"].ignore == {"MSH": "no meshes"}
+    assert str(options.spec) == "a.toml"
+    assert options.settings.packages["my"].name == "meshes"
+    assert options.settings.xacro_arguments == {"arm": "false"}
+    assert options.settings.ignore == {"MSH": "no meshes"}
 
 
 @pytest.mark.parametrize(
@@ -139,7 +139,7 @@ def test_file_options_are_passed_on(here, calls, tmp_path):
         (("a", "b", "--xacro-arg", "arm:=false"), "--xacro-arg: got no robot file among a, b"),
         (("a", "--ignore", "MSH=no meshes"), "--ignore: got no robot file"),
         (("a", "--spec", "a.toml"), "--spec: got no robot file"),
-        (("a", "-o", "nowhere/a.txt"), "there is no folder nowhere"),
+        (("a", "-o", "nowhere/a.txt"), "the folder nowhere does not exist"),
         (("a", "-o", "."), "it is a folder"),
     ],
 )

@@ -81,10 +81,12 @@ def test_a_run_is_gone_on_with(train, tmp_path, capsys):
     assert (task.runner.seed, task.env.num_envs, task.env.episode_length_s) == (3, 4, 0.3)
     capsys.readouterr()
     assert train("--resume", "run", quick=()) == 2
-    assert capsys.readouterr().err.endswith("runner.max_iterations is 2, wanted more\n")
+    assert capsys.readouterr().err.endswith("than the 2 iterations that are completed\n")
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
+)
 def test_interrupting_writes_a_checkpoint_and_says_how_to_go_on(
     train, tmp_path, capsys, monkeypatch, number, code
 ):
@@ -133,13 +135,13 @@ def without_origins(folder: Path) -> None:
     [
         ((), "ROBOT: missing; expected a folder of terrainkit onboard, or one of: biped,"),
         (("rover",), "no task or robot folder 'rover'"),
-        (("quadruped", "--terrain", "moon"), "terrain 'moon'; wanted plane, a map (.npz)"),
+        (("quadruped", "--terrain", "moon"), "terrain: got 'moon'; expected plane, a map (.npz)"),
         (("quadruped", "--terrain", "gone.npz"), "no file gone.npz"),
         (("quadruped", "--num-envs", "many"), "--env.num-envs: got 'many'; expected an integer"),
         (("quadruped", "--num-envs", "0"), "--env.num-envs: got 0; expected an integer >= 1"),
         (("quadruped", "--num-envs", "100000000"), "would fit"),
-        (("quadruped", "--device", "tpu"), "device 'tpu'; here there is: cpu"),
-        (("quadruped", "--resume", "nowhere"), "no run nowhere"),
+        (("quadruped", "--device", "tpu"), "device: got 'tpu'; expected one of: cpu"),
+        (("quadruped", "--resume", "nowhere"), "run: got nowhere"),
         (("quadruped", "--rewards.torque", "1"), "did you mean --rewards.torques?"),
         (
             ("quadruped", "--rewards.torques", "much"),
@@ -198,10 +200,10 @@ def test_a_task_file_comes_before_options(train, tmp_path):
 PROGRESS = TrainingProgress(
     folder=Path("logs/rover"),
     iteration=20,
-    last=400,
+    max_iterations=400,
     steps_per_second=1234.4,
-    learning=0.25,
-    remaining=3723.0,
+    learning_fraction=0.25,
+    eta=3723.0,
     reward=-1.5,
     episode_length=4.25,
     noise_std=0.875,
@@ -214,7 +216,9 @@ PROGRESS = TrainingProgress(
 def test_without_a_terminal_progress_is_a_line_now_and_then(capsys):
     with render.training() as watch:
         for iteration in range(1, 24):
-            watch(TrainingProgress(**{**vars(PROGRESS), "iteration": iteration, "last": 23}))
+            watch(
+                TrainingProgress(**{**vars(PROGRESS), "iteration": iteration, "max_iterations": 23})
+            )
     out, err = capsys.readouterr()
     assert out == ""
     assert [line.split(":")[0] for line in err.splitlines()] == [

@@ -1,7 +1,7 @@
 from terrainkit_robots.text import count, free_name, names, one_line
 
 
-def test_of_many_names_the_first_are_listed():
+def test_names_lists_the_first_words():
     assert names([]) == ""
     assert names(["a"]) == "a"
     assert names("abcdef") == "a, b, c, d, e, f"
@@ -11,14 +11,14 @@ def test_of_many_names_the_first_are_listed():
     assert names(["x" * 1000, "y"]) == "x" * 97 + "..., y"
 
 
-def test_one_is_no_plural():
+def test_count_uses_plural():
     assert [count(n, "leg") for n in (0, 1, 2, 4000)] == ["0 legs", "1 leg", "2 legs", "4,000 legs"]
 
 
-def test_one_line_holds_what_can_be_printed():
+def test_one_line_keeps_printable_characters():
     assert one_line("a\n\t b\u202e ") == "a b"
 
 
-def test_a_name_that_is_taken_gets_a_number():
+def test_free_name_appends_number():
     assert free_name("a", ()) == "a"
     assert free_name("a", {"a", "a_2"}) == "a_3"

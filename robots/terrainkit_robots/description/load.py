@@ -10,7 +10,7 @@ XACRO = "xacro"
 
 
 def load_robot(
-    path: Path,
+    path: str | Path,
     *,
     packages: Mapping[str, Path] | None = None,
     xacro_arguments: Mapping[str, str] | None = None,
@@ -32,7 +32,7 @@ def load_robot(
     Raises:
         RobotFileError: If the file cannot be opened.
     """
-    packages, contents = packages or {}, contents or {}
+    path, packages, contents = Path(path), packages or {}, contents or {}
     data = contents[path] if path in contents else read_bytes(path)
     document = parse_xml(path, data)
     if document.root is None:

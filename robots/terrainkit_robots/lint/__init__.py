@@ -1,1 +1,1 @@
-"""Check robots against rules."""
+"""Check robots: rules, findings, reports, fixes and comparisons."""

@@ -28,7 +28,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Literal
 
 from terrainkit.errors import ConfigError
-from terrainkit.text import known_names, nearest
+from terrainkit.text import closest, expected_names
 from terrainkit_robots.description.fix import Fix
 from terrainkit_robots.description.model import Source
 
@@ -201,6 +201,6 @@ def get_rule(code_or_name: str) -> Rule:
     found = known.get(code_or_name.lower())
     if found is None:
         codes = [rule.code for rule in rules()]
-        suggestion = known_names(code_or_name, codes, meant=nearest(code_or_name, known))
+        suggestion = expected_names(code_or_name, codes, closest_name=closest(code_or_name, known))
         raise ConfigError(f"no rule {code_or_name!r}; {suggestion}")
     return found

@@ -23,16 +23,33 @@ class Finding:
     """A violation together with the rule that found it, as shown in reports."""
 
     code: str
+    """Code of the rule, such as `INR002`."""
+
     name: str
+    """Name of the rule, such as `negative-mass`."""
+
     severity: Severity
     certainty: Certainty
+    """`likely` if the finding depends on a heuristic, such as leg detection."""
+
     subject: str
+    """Name of the link, joint, mesh or file."""
+
     message: str
+    """One sentence with the measured value, its unit and the threshold."""
+
     hint: str
+    """How to correct it."""
+
     file: Path
     line: int
+    """Line of the element, or 0 for the whole file."""
+
     measured: Measured = field(default_factory=dict)
+    """The numbers in the message, by name."""
+
     fix: Fix | None = None
+    """The edits that correct it, if it can be corrected automatically."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,6 +57,8 @@ class Skipped:
     """A rule that could not run or was ignored."""
 
     code: str
+    """Code of the rule."""
+
     reason: str
 
 
@@ -52,6 +71,7 @@ class Report:
     """Findings sorted by severity, then by file and line."""
 
     skipped: tuple[Skipped, ...] = ()
+    """Rules that could not run or were ignored, and suppressed findings."""
 
     simulated: bool = False
     """Whether rules were allowed to simulate the robot."""

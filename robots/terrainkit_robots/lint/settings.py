@@ -18,11 +18,11 @@ from typing import Annotated, Any, Self
 
 from msgspec import Meta
 
-from terrainkit.annotations import show
 from terrainkit.errors import ConfigError, listing
 from terrainkit.schema import Config
-from terrainkit.text import nearest
+from terrainkit.text import closest
 from terrainkit.toml_text import parse_toml, read_text
+from terrainkit.type_hint import show
 from terrainkit_robots.lint.rule import FAMILIES, Rule, rules
 
 Reason = Annotated[str, Meta(pattern=r"\S", description="a reason, as a string")]
@@ -90,7 +90,7 @@ def matching(word: str) -> tuple[Rule, ...]:
     code, name = word.strip().upper(), word.strip().lower()
     found = tuple(r for r in rules() if code and (r.code.startswith(code) or r.name == name))
     if not found:
-        near = nearest(name, [rule.name for rule in rules()])
+        near = closest(name, [rule.name for rule in rules()])
         meant = f"did you mean {near}? Expected" if near else "expected"
         raise ConfigError(
             f"no rule {word!r}; {meant} a code, a prefix of one, or a name, of the families "
@@ -117,17 +117,17 @@ def read_settings(folder: Path) -> Settings:
             table: Any = parse_toml(text)
             *outer, last = _FILES[path.name]
             for key in outer:
-                table = _subtable(table, key)
+                table = _nested_table(table, key)
             if unknown := [key for key in table if key != last]:
                 raise ConfigError(f"no key {unknown[0]!r}; expected {last}")
             if last in table:
-                return _settings(_subtable(table, last), path.parent)
+                return _settings(_nested_table(table, last), path.parent)
         except ConfigError as error:
             raise ConfigError(f"{path}: {error}") from error
     return Settings()
 
 
-def _subtable(table: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+def _nested_table(table: Mapping[str, Any], key: str) -> Mapping[str, Any]:
     value = table.get(key, {})
     if not isinstance(value, Mapping):
         raise ConfigError(f"{key}: got {show(value)}; expected a table")

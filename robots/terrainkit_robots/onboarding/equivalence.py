@@ -55,7 +55,7 @@ class Equivalence:
     angle: float
     """Largest orientation error of a link frame [rad]."""
 
-    rotated_link: str
+    angle_link: str
     """The link with the largest orientation error."""
 
     @property
@@ -64,7 +64,7 @@ class Equivalence:
         checks = {
             f"the position of {self.link} is off by {1000 * self.distance:.3g} mm": self.distance
             <= _MAX_DISTANCE,
-            f"the orientation of {self.rotated_link} is off by "
+            f"the orientation of {self.angle_link} is off by "
             f"{math.degrees(self.angle):.3g} degrees": self.angle <= _MAX_ANGLE,
             f"the mass is off by {self.mass:.2%}": abs(self.mass) <= _MAX_RELATIVE_MASS,
             f"the inertia about {self.joint} is off by {self.inertia:.2%}": self.inertia
@@ -89,7 +89,7 @@ class ReferenceKinematics:
     link_poses: Mapping[str, Matrix]
     """Pose of each link in the base frame, shape (NUM_POSES, 4, 4) [m]."""
 
-    inertias: Mapping[str, float]
+    inertia: Mapping[str, float]
     """Inertia about each joint axis with all joints at 0, by written name [kg m2] or [kg]."""
 
 
@@ -108,9 +108,7 @@ def reference_kinematics(source: "Facts", written: "Facts") -> ReferenceKinemati
     }
     inertias = {
         body.joint.name: inertia
-        for body, inertia in zip(
-            source.bodies, composite_inertias(source.bodies, source.zero_poses), strict=True
-        )
+        for body, inertia in zip(source.bodies, composite_inertias(source.bodies), strict=True)
         if body.joint is not None and math.isfinite(inertia) and inertia > 0
     }
     positions = _random_positions(written)
@@ -126,7 +124,7 @@ def reference_kinematics(source: "Facts", written: "Facts") -> ReferenceKinemati
         base=written.bodies[0].top.name,
         positions=positions,
         link_poses=link_poses,
-        inertias={n: inertias[name] for n, name in renamed.items() if name in inertias},
+        inertia={n: inertias[name] for n, name in renamed.items() if name in inertias},
     )
 
 
@@ -156,17 +154,17 @@ def _random_positions(facts: "Facts") -> dict[str, Matrix]:
 def _compare(file: str, model: Any, reference: ReferenceKinematics) -> Equivalence:
     link_poses = _mujoco_link_poses(model, reference)
     inertias = {
-        name: abs(inertia / reference.inertias[name] - 1)
-        for name, inertia in _mujoco_inertias(model, list(reference.positions)).items()
-        if name in reference.inertias
+        name: abs(inertia / reference.inertia[name] - 1)
+        for name, inertia in _mujoco_joint_inertia(model, list(reference.positions)).items()
+        if name in reference.inertia
     }
     expected = reference.link_poses
     distances = {
         name: float(np.linalg.norm(expected[name][:, :3, 3] - pose[:, :3, 3], axis=1).max())
         for name, pose in link_poses.items()
     }
-    angles = {name: _largest_angle(expected[name], pose) for name, pose in link_poses.items()}
-    link, rotated_link, joint = (
+    angles = {name: _max_angle(expected[name], pose) for name, pose in link_poses.items()}
+    link, angle_link, joint = (
         max(errors, key=errors.__getitem__, default="") for errors in (distances, angles, inertias)
     )
     mass = float(model.body_mass.sum())
@@ -177,8 +175,8 @@ def _compare(file: str, model: Any, reference: ReferenceKinematics) -> Equivalen
         joint=joint,
         distance=distances.get(link, 0.0),
         link=link,
-        angle=angles.get(rotated_link, 0.0),
-        rotated_link=rotated_link,
+        angle=angles.get(angle_link, 0.0),
+        angle_link=angle_link,
     )
 
 
@@ -210,7 +208,7 @@ def _mujoco_link_poses(model: Any, reference: ReferenceKinematics) -> dict[str, 
     return {name: poses[:, index] for index, name in enumerate([*bodies, *sites])}
 
 
-def _mujoco_inertias(model: Any, joints: list[str]) -> dict[str, float]:
+def _mujoco_joint_inertia(model: Any, joints: list[str]) -> dict[str, float]:
     """Return the inertia about each joint axis without armature, with all joints at 0."""
     import mujoco
 
@@ -226,7 +224,7 @@ def _mujoco_inertias(model: Any, joints: list[str]) -> dict[str, float]:
     return inertias
 
 
-def _largest_angle(one: Matrix, other: Matrix) -> float:
+def _max_angle(one: Matrix, other: Matrix) -> float:
     """Return the largest angle between similar rotations, shapes (..., 4, 4) [rad]."""
     relative = np.swapaxes(one[..., :3, :3], -1, -2) @ other[..., :3, :3]
     # The sine of a small angle is accurate; its cosine is dominated by rounding.

@@ -45,9 +45,7 @@ def check_folder(target: Path, *, overwrite: bool) -> None:
         )
     editable = _editable_files()
     foreign = [
-        name
-        for name in contents
-        if name not in _GENERATED and _without_backup_suffix(name) not in editable
+        name for name in contents if name not in _GENERATED and _original_name(name) not in editable
     ]
     if foreign:
         raise ExportError(
@@ -64,11 +62,11 @@ def _editable_files() -> frozenset[str]:
     return frozenset({SPEC, *file_names})
 
 
-def _without_backup_suffix(name: str) -> str:
+def _original_name(name: str) -> str:
     return name.partition(_BACKUP_SUFFIX)[0]
 
 
-def edited_backups(target: Path, files: Mapping[str, bytes]) -> dict[str, bytes]:
+def find_edits(target: Path, files: Mapping[str, bytes]) -> dict[str, bytes]:
     """Return backups of the edited files in a folder that will be replaced, by file name.
 
     A file is backed up if it differs from the new file of its name. Earlier backups are kept.
@@ -85,15 +83,15 @@ def edited_backups(target: Path, files: Mapping[str, bytes]) -> dict[str, bytes]
         existing = {
             path.name: path.read_bytes()
             for path in (sorted(target.iterdir()) if target.is_dir() else ())
-            if _without_backup_suffix(path.name) in editable
+            if _original_name(path.name) in editable
         }
     except OSError as error:
         raise ExportError(f"cannot read {target}: {error.strerror or error}") from error
-    backups = {name: data for name, data in existing.items() if name not in editable}
+    edits = {name: data for name, data in existing.items() if name not in editable}
     for name in sorted(existing.keys() & editable):
-        if existing[name] not in (files.get(name), *backups.values()):
-            backups[free_name(f"{name}{_BACKUP_SUFFIX}", backups)] = existing[name]
-    return backups
+        if existing[name] not in (files.get(name), *edits.values()):
+            edits[free_name(f"{name}{_BACKUP_SUFFIX}", edits)] = existing[name]
+    return edits
 
 
 @contextmanager

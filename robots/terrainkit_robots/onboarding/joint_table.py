@@ -34,7 +34,7 @@ def joint_table(facts: "Facts", spec: "RobotSpec") -> list[tuple[str, ...]]:
     """
     joints = {joint.name: joint for joint in facts.joints}
     order = spec.joint_order
-    kinds = {joints[name].kind for name in order if name in joints}
+    joint_types = {joints[name].kind for name in order if name in joints}
     values = {name: match_joints(getattr(spec, name), order).values for name in _COLUMNS}
     roles = {
         joint.name: role
@@ -42,7 +42,7 @@ def joint_table(facts: "Facts", spec: "RobotSpec") -> list[tuple[str, ...]]:
         for joint, role in zip(leg.joints, leg.roles, strict=True)
     }
     torques = {} if facts.stance is None else facts.stance.torques
-    rows = [_header(kinds, has_legs=bool(facts.legs))]
+    rows = [_header(joint_types, has_legs=bool(facts.legs))]
     for index, name in enumerate(order):
         joint = joints.get(name)
         cells = [str(index), name]
@@ -56,10 +56,10 @@ def joint_table(facts: "Facts", spec: "RobotSpec") -> list[tuple[str, ...]]:
     return rows
 
 
-def _header(kinds: set[str], *, has_legs: bool) -> tuple[str, ...]:
+def _header(joint_types: set[str], *, has_legs: bool) -> tuple[str, ...]:
     def with_unit(title: str, revolute_unit: str, prismatic_unit: str) -> str:
-        units = [revolute_unit] * bool(kinds - {"prismatic"})
-        units += [prismatic_unit] * ("prismatic" in kinds)
+        units = [revolute_unit] * bool(joint_types - {"prismatic"})
+        units += [prismatic_unit] * ("prismatic" in joint_types)
         return f"{title} [{' or '.join(units)}]" if units else title
 
     titles = ["#", "joint", *["role"] * has_legs, with_unit("limits", "rad", "m")]

@@ -13,7 +13,7 @@ from terrainkit_robots.lint.runner import Finding, Report
 from terrainkit_robots.lint.settings import Settings, read_settings
 from terrainkit_robots.onboarding.folder import (
     check_folder,
-    edited_backups,
+    find_edits,
     new_folder,
     write_files,
 )
@@ -71,7 +71,7 @@ class OnboardOptions:
     overwrite: bool = False
     """Whether to replace a folder that contains an onboarded robot."""
 
-    render_pictures: bool = True
+    render_images: bool = True
     """Whether to render pictures for the report."""
 
     cache_dir: Path | None = None
@@ -106,13 +106,13 @@ class OnboardResult:
     configs: tuple[str, ...] = ()
     """Names of the framework configurations."""
 
-    pictures: tuple[str, ...] = ()
+    images: tuple[str, ...] = ()
     """Names of the picture files."""
 
-    pictures_error: str = ""
+    images_error: str = ""
     """The reason why there are no pictures."""
 
-    backups: tuple[str, ...] = ()
+    edits: tuple[str, ...] = ()
     """Names of the files that keep user edits of the replaced folder."""
 
 
@@ -175,17 +175,17 @@ def onboard(
         file: robot_config_text(name, robot.facts, robot.spec).encode()
         for name, file in config_names.items()
     }
-    backups = edited_backups(target, {**robot.files, **configs})
+    edits = find_edits(target, {**robot.files, **configs})
     with new_folder(target, overwrite=options.overwrite) as folder:
         options.on_step("simulating the standing pose")
         write_files(folder, {**robot.files, **configs})
         # The pictures are rendered by another process at the same time.
         with ThreadPoolExecutor(1) as executor:
-            pictures_job = executor.submit(_render_pictures, folder, options.render_pictures)
+            images_job = executor.submit(_render_images, folder, options.render_images)
             verification = verify(report.facts, robot, folder)
             options.on_step("rendering pictures")
-        pictures, pictures_error = pictures_job.result()
-        write_files(folder, {**pictures, **backups})
+        images, images_error = images_job.result()
+        write_files(folder, {**images, **edits})
         result = OnboardResult(
             report=report,
             fixed=fixed,
@@ -193,9 +193,9 @@ def onboard(
             robot=robot,
             verification=verification,
             configs=tuple(configs),
-            pictures=tuple(pictures),
-            pictures_error=pictures_error,
-            backups=tuple(backups),
+            images=tuple(images),
+            images_error=images_error,
+            edits=tuple(edits),
         )
         write_files(folder, {"report.md": report_markdown(result).encode()})
     return result
@@ -224,15 +224,15 @@ def _fix_in_memory(path: Path, options: OnboardOptions) -> tuple[Report, tuple[F
     return replace(report, findings=remaining), fixed
 
 
-def _render_pictures(folder: Path, enabled: bool) -> tuple[dict[str, bytes], str]:
+def _render_images(folder: Path, enabled: bool) -> tuple[dict[str, bytes], str]:
     """Return pictures by file name, and the reason if there are none."""
     from terrainkit_robots.rendering.child_process import RenderError
-    from terrainkit_robots.rendering.robot_pictures import render_robot
+    from terrainkit_robots.rendering.robot_images import render_robot
 
     if not enabled:
         return {}, "disabled"
     try:
-        pictures = render_robot(folder / MJCF)
+        images = render_robot(folder / MJCF)
     except RenderError as error:
         return {}, str(error)
-    return {f"report/{name}.png": data for name, data in pictures.items()}, ""
+    return {f"report/{name}.png": data for name, data in images.items()}, ""

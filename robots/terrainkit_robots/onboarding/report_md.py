@@ -35,9 +35,9 @@ def report_markdown(result: "OnboardResult") -> str:
         _overview(result, robot),
         _changes(result, robot),
         _standing(verification, robot),
-        _equivalence(verification),
+        _comparison(verification),
         _joints(robot),
-        _joint_orders(robot),
+        _simulators(robot),
         _findings(result),
         _next_steps(result, robot),
     )
@@ -55,14 +55,14 @@ def _table(rows: Sequence[Sequence[str]]) -> Iterator[str]:
 
 def _overview(result: "OnboardResult", robot: "RobotFiles") -> Iterator[str]:
     yield f"# {cell(robot.spec.name)}\n"
-    if result.pictures:
-        titles = [PurePath(name).stem for name in result.pictures]
+    if result.images:
+        titles = [PurePath(name).stem for name in result.images]
         yield f"| {' | '.join(map(cell, titles))} |"
         yield "|---" * len(titles) + "|"
-        images = [f"![{cell(t)}]({n})" for t, n in zip(titles, result.pictures, strict=True)]
+        images = [f"![{cell(t)}]({n})" for t, n in zip(titles, result.images, strict=True)]
         yield f"| {' | '.join(images)} |\n"
-    elif result.pictures_error:
-        yield f"No pictures: {cell(result.pictures_error)}.\n"
+    elif result.images_error:
+        yield f"No pictures: {cell(result.images_error)}.\n"
     yield " ".join(_properties(robot)) + "\n"
 
 
@@ -74,7 +74,7 @@ def _properties(robot: "RobotFiles") -> Iterator[str]:
     bodies = f"{num_bodies:,} rigid {'body' if num_bodies == 1 else 'bodies'}"
     mass = (
         f"weighs {format_number(facts.total_mass, 4)} kg and "
-        if _is_known(facts.total_mass)
+        if _is_finite(facts.total_mass)
         else ""
     )
     yield f"{cell(spec.name)} {mass}has {bodies} and {joints}."
@@ -87,7 +87,7 @@ def _properties(robot: "RobotFiles") -> Iterator[str]:
         )
         return
     feet = ", ".join(map(cell, spec.feet))
-    length = f", {format_number(spec.leg_length)} m long" if _is_known(spec.leg_length) else ""
+    length = f", {format_number(spec.leg_length)} m long" if _is_finite(spec.leg_length) else ""
     yield f"It stands on {count(len(facts.legs), 'leg')}{length}: {feet}."
     height = facts.stance.height if facts.stance is not None else None
     measures = (
@@ -95,12 +95,12 @@ def _properties(robot: "RobotFiles") -> Iterator[str]:
         ("its spawn height is {} m", spec.spawn_height),
         ("its feet are {} m apart", spec.stance_width),
     )
-    known = [text.format(format_number(value)) for text, value in measures if _is_known(value)]
+    known = [text.format(format_number(value)) for text, value in measures if _is_finite(value)]
     if known:
         yield f"At the default pose, {', '.join(known)}."
 
 
-def _is_known(value: float | None) -> bool:
+def _is_finite(value: float | None) -> bool:
     return value is not None and math.isfinite(value)
 
 
@@ -160,7 +160,7 @@ def _standing_rows(
     yield "largest joint position error", f"{format_number(standing.joint_error, 2)} {unit}"
 
 
-def _equivalence(verification: "Verification | None") -> Iterator[str]:
+def _comparison(verification: "Verification | None") -> Iterator[str]:
     if verification is None or not verification.equivalences:
         return
     yield "## Comparison with the source\n"
@@ -170,7 +170,7 @@ def _equivalence(verification: "Verification | None") -> Iterator[str]:
             f"{round(each.mass, 5) + 0.0:+.3%}",
             f"{each.inertia:.3%} at {each.joint}" if each.joint else "",
             f"{1000 * each.distance:.2g} mm at {each.link}",
-            f"{math.degrees(each.angle):.2g} deg at {each.rotated_link}",
+            f"{math.degrees(each.angle):.2g} deg at {each.angle_link}",
         )
         for each in verification.equivalences
     ]
@@ -196,7 +196,7 @@ def _joints(robot: "RobotFiles") -> Iterator[str]:
         yield f"Not actuated: {cell(', '.join(others))}.\n"
 
 
-def _joint_orders(robot: "RobotFiles") -> Iterator[str]:
+def _simulators(robot: "RobotFiles") -> Iterator[str]:
     orders = robot.facts.simulator_orders
     if not robot.spec.joint_order or not any(order.joints for order in orders):
         return

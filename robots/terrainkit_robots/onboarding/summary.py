@@ -22,17 +22,17 @@ def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
         yield "fixed", f"{count(len(result.fixed), 'finding')}: {names(codes)}"
     if result.robot is None or result.verification is None:
         return
-    yield "wrote", _summarize_files(result.robot)
-    yield "compared", _summarize_equivalence(result.verification)
-    yield "standing", _summarize_standing(result.verification, result.robot)
+    yield "wrote", _list_files(result.robot)
+    yield "compared", _compare_files(result.verification)
+    yield "standing", _assess_standing(result.verification, result.robot)
     if result.configs:
         yield "configs", names(result.configs)
-    pictures = f"{count(len(result.pictures), 'picture')} in report.md"
-    yield "pictures", pictures if result.pictures else f"none: {result.pictures_error}"
-    if result.backups:
+    pictures = f"{count(len(result.images), 'picture')} in report.md"
+    yield "pictures", pictures if result.images else f"none: {result.images_error}"
+    if result.edits:
         yield (
             "backups",
-            f"your edits are in {names(result.backups)}; use --spec to apply the values of a spec",
+            f"your edits are in {names(result.edits)}; use --spec to apply the values of a spec",
         )
     num_missing = sum(finding.code == "MSH001" for finding in result.report.findings)
     if num_missing:
@@ -45,7 +45,7 @@ def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
         yield "notes", f"{count(len(result.robot.notes), 'change')} listed in report.md"
 
 
-def _summarize_files(robot: "RobotFiles") -> str:
+def _list_files(robot: "RobotFiles") -> str:
     meshes = [data for name, data in robot.files.items() if "/" in name]
     texts = [name for name in robot.files if "/" not in name]
     size = sum(map(len, meshes)) / 1e6
@@ -53,7 +53,7 @@ def _summarize_files(robot: "RobotFiles") -> str:
     return f"{names(texts)}{more}"
 
 
-def _summarize_equivalence(verification: "Verification") -> str:
+def _compare_files(verification: "Verification") -> str:
     equivalences = verification.equivalences
     distance = max(each.distance for each in equivalences)
     mass = max(abs(each.mass) for each in equivalences)
@@ -64,7 +64,7 @@ def _summarize_equivalence(verification: "Verification") -> str:
     )
 
 
-def _summarize_standing(verification: "Verification", robot: "RobotFiles") -> str:
+def _assess_standing(verification: "Verification", robot: "RobotFiles") -> str:
     standing = verification.standing
     if verification.error:
         return f"not simulated: {verification.error}"

@@ -77,7 +77,7 @@ def verify(source: "Facts", robot: "RobotFiles", folder: Path) -> Verification:
     # MuJoCo releases the interpreter lock while it compiles. The scene includes robot.xml.
     with quiet_mujoco(), ThreadPoolExecutor(2) as executor:
         urdf, scene = (executor.submit(_load_model, folder / name) for name in (URDF, SCENE))
-        reference = reference_kinematics(_rooted_source(source, floating), robot.facts)
+        reference = reference_kinematics(_source_with_base(source, floating), robot.facts)
     equivalences = compare_models(reference, {URDF: urdf.result(), MJCF: scene.result()})
     for each in equivalences:
         if each.failures:
@@ -99,7 +99,7 @@ def verify(source: "Facts", robot: "RobotFiles", folder: Path) -> Verification:
     return Verification(equivalences=equivalences, standing=standing, joints_locked=joints_locked)
 
 
-def _rooted_source(source: "Facts", floating: bool) -> "Facts":
+def _source_with_base(source: "Facts", floating: bool) -> "Facts":
     """Return the source with a base link, and with the masses that are computed from meshes."""
     from terrainkit_robots.analysis.facts import Facts
 

@@ -21,8 +21,7 @@ def bundle_policy(run: runs.Run, folder: Path) -> runs.Run:
     if run.checkpoint is None:
         raise ConfigError(f"run {run.folder}: got no checkpoint; expected a trained run")
     if run.robot_name not in task_names():
-        known = listing(task_names())
-        raise ConfigError(f"robot: got {run.robot_name}; expected a registered robot: {known}")
+        raise ConfigError(f"robot: got {run.robot_name}; expected one of {listing(task_names())}")
     is_plane = run.terrain == "plane"
     names = [runs.TASK_FILE, SPEC_FILE] + [runs.MAP_FILE] * (not is_plane)
     if not (run.folder / names[-1]).is_file():

@@ -1,8 +1,4 @@
-"""Evaluate a policy: velocity errors, falls, and success by terrain and level.
-
-There is no noise, no push and no domain randomization; only the start positions are random. On a
-plane each robot gets a command of a grid, on a map each robot walks forward from a patch.
-"""
+"""Evaluate a policy without noise and randomization: velocity errors, falls and success."""
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -16,9 +12,9 @@ from msgspec import Meta
 from numpy.typing import NDArray
 from tensordict import TensorDict
 
-from terrainkit.annotations import PositiveInt
 from terrainkit.errors import ConfigError
 from terrainkit.schema import Config
+from terrainkit.type_hint import PositiveInt
 from terrainkit_robots.policy.load import load_policy
 from terrainkit_robots.rl.config import Commands, Task
 from terrainkit_robots.rl.env import LeggedEnv
@@ -34,8 +30,7 @@ Progress = Callable[[float], object]
 """Called after each step with the completed fraction of the time, 0 to 1."""
 
 SETTLING_TIME, AVERAGING_TIME = 2.0, 1.0
-"""Time after the start and after each new command without measurements, and time over which
-velocities are averaged for the errors ending in `_1s` [s]."""
+"""Time without measurements after each new command, and time of averaged velocities [s]."""
 
 MAX_MAP_ENVS, SINGLE_PATCH_ENVS = 512, 16
 """Default numbers of robots: at most on a map, and for one command on a single patch."""
@@ -74,20 +69,10 @@ class EvaluationConfig(Config):
 class RolloutMetrics:
     """Metrics of all robots, or of a group with the same command, terrain or level.
 
-    Errors are means over robots of the mean over the robot's measured steps; None if no robot was
-    measured.
-
-    Attributes:
-        command: Command of the group.
-        terrain: Terrain of the group.
-        level: Level of the group.
-        robots: Number of robots.
-        falls: Number of robots that fell.
-        success: Fraction of robots that succeeded on a map; see :class:`EvaluationRollout`.
-        lin_vel_error: Norm of the horizontal velocity error [m/s].
-        lin_vel_error_1s: The same for velocities averaged over 1 s, without the sway of a gait.
-        ang_vel_error: Absolute yaw velocity error [rad/s].
-        ang_vel_error_1s: The same for yaw velocities averaged over 1 s.
+    Errors are means over robots of the mean over the robot's measured steps: the norm of the
+    horizontal velocity error [m/s] and the absolute yaw velocity error [rad/s]. Those ending in
+    `_1s` are of velocities averaged over 1 s, without the sway of a gait. They are None if no robot
+    was measured, and `success`, the fraction of successful robots, is None on a plane.
     """
 
     command: tuple[float, ...] | None = None
@@ -103,21 +88,16 @@ class RolloutMetrics:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the metrics as a dict, without the keys that do not define the group."""
-        keys = {"command", "terrain", "level"}
-        return {k: v for k, v in asdict(self).items() if v is not None or k not in keys}
+        empty = {k for k in ("command", "terrain", "level") if getattr(self, k) is None}
+        return {k: v for k, v in asdict(self).items() if k not in empty}
 
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluationResult:
-    """Result of an evaluation.
+    """Result of an evaluation; `config` names the terrain of the training if none was given.
 
-    Attributes:
-        robot: Name of the robot.
-        checkpoint: File name of the checkpoint.
-        config: Settings, with the terrain of the training if none was given.
-        metrics: Metrics of all robots.
-        groups: Metrics of groups: `by_command` on a plane; `by_terrain`, `by_level` and
-            `by_terrain_and_level` on a map.
+    Groups are `by_command` on a plane, and `by_terrain`, `by_level` and `by_terrain_and_level` on a
+    map.
     """
 
     robot: str
@@ -129,11 +109,11 @@ class EvaluationResult:
     def as_json(self) -> str:
         """Return the result as JSON; equal evaluations give equal bytes."""
         config, settling = self.config, {"settling_seconds": SETTLING_TIME}
-        document: dict[str, Any] = {"robot": self.robot, "checkpoint": self.checkpoint}
-        document |= {"terrain": config.terrain, "seconds": config.seconds, **settling}
-        document |= {"seed": config.seed, "all": self.metrics.as_dict()}
-        document |= {k: [group.as_dict() for group in v] for k, v in self.groups.items()}
-        return json.dumps(document, indent=2) + "\n"
+        result: dict[str, Any] = {"robot": self.robot, "checkpoint": self.checkpoint}
+        result |= {"terrain": config.terrain, "seconds": config.seconds, **settling}
+        result |= {"seed": config.seed, "all": self.metrics.as_dict()}
+        result |= {k: [group.as_dict() for group in v] for k, v in self.groups.items()}
+        return json.dumps(result, indent=2) + "\n"
 
 
 @single_torch_thread()
@@ -157,15 +137,10 @@ def evaluate(
 def make_evaluation_env(
     run: Run, config: EvaluationConfig, *, max_patch_envs: int = MAX_MAP_ENVS
 ) -> tuple[LeggedEnv, FloatArray | None]:
-    """Return an environment to evaluate a policy in, and the command of each robot.
+    """Return an environment to evaluate a policy in, and commands of shape (n, 3).
 
-    Args:
-        run: The run.
-        config: Settings.
-        max_patch_envs: Largest default number of robots on a patch of a map.
-
-    Returns:
-        The environment, and commands of shape (n, 3); None for the task's random commands.
+    Commands are None for the task's random ones. By default there are at most `max_patch_envs`
+    robots on a patch of a map.
     """
     device, task = resolve_device(config.device), run.task
     if config.terrain is None and not (is_flat(run) or is_same_terrain(run, run.terrain)):
@@ -251,12 +226,7 @@ def command_grid(commands: Commands) -> FloatArray:
 def rollout(
     env: LeggedEnv, policy: Policy, schedule: Iterable[FloatArray | None]
 ) -> Iterator[tuple[FloatArray, BoolArray]]:
-    """Step the environment with a policy.
-
-    Args:
-        env: The environment.
-        policy: The policy.
-        schedule: The commands of each step, shape (n, 3); None for the task's random commands.
+    """Step the environment with a policy; None in the schedule is for the task's random commands.
 
     Yields:
         After each step, the commands during it, shape (n, 3), and which robots fell, shape (n,).
@@ -276,7 +246,7 @@ def rollout(
 def command_schedule(commands: FloatArray | None, num_steps: int) -> list[FloatArray | None]:
     """Return the commands of each step.
 
-    They are (n, 3), or k of them for equal parts of the time, (k, n, 3); None for random commands.
+    Commands of shape (k, n, 3) are k parts of equal length; None is for the task's random commands.
     """
     if commands is None:
         return [None] * num_steps
@@ -366,8 +336,8 @@ class EvaluationRollout:
         names = "lin_vel_error", "lin_vel_error_1s", "ang_vel_error", "ang_vel_error_1s"
         for name, total, count in zip(names, self.error_sums, self.error_counts, strict=True):
             measured = mask & (count > 0)
-            mean = (total[measured] / count[measured]).mean() if measured.any() else None
-            errors[name] = None if mean is None else float(mean)
+            means = total[measured] / count[measured]
+            errors[name] = float(means.mean()) if means.size else None
         return RolloutMetrics(
             **key,
             robots=int(mask.sum()),
@@ -383,10 +353,7 @@ def summarize(
     rollout: EvaluationRollout,
     commands: FloatArray | None = None,
 ) -> EvaluationResult:
-    """Return the metrics of a rollout, on a map by terrain and level.
-
-    With commands of shape (n, 3), the metrics on a plane are grouped by command.
-    """
+    """Return the metrics of a rollout: by commands (n, 3), or on a map by terrain and level."""
     env = rollout.env
     groups: dict[str, list[RolloutMetrics]] = {}
     levels, names = env.curriculum.levels, env.terrain.terrain_names

@@ -12,12 +12,11 @@ import numpy as np
 import onnx
 import onnxruntime
 import torch
-from numpy.typing import NDArray
 from tensordict import TensorDict
 
 from terrainkit.atomic_write import atomic_write, check_target
 from terrainkit.errors import ExportError
-from terrainkit_robots.policy.evaluate import evaluation_task
+from terrainkit_robots.policy.evaluate import FloatArray, evaluation_task
 from terrainkit_robots.policy.load import load_policy
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import HEIGHT_SCAN_OFFSET
@@ -25,21 +24,13 @@ from terrainkit_robots.rl.run import Run, read_checkpoint
 from terrainkit_robots.rl.runner import single_torch_thread
 from terrainkit_robots.rl.terrain import load_terrain
 
-FloatArray = NDArray[np.float32]
-
 ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE = "policy.onnx", "policy.pt", "policy.json"
 
-FORMAT_VERSION = 1
-"""Version of the JSON; it changes when a key changes its meaning or is removed."""
-
-METADATA_KEY = "terrainkit"
-"""Key of the ONNX metadata that holds the JSON."""
+FORMAT_VERSION, METADATA_KEY, ONNX_OPSET = 1, "terrainkit", 17
+"""Version of the JSON, its key in the ONNX metadata, and an opset that runtimes on robots know."""
 
 TOLERANCE = 1e-5
 """Largest difference between exported and live actions; relative for actions beyond 1."""
-
-ONNX_OPSET = 17
-"""ONNX opset: old enough for the runtimes on robots."""
 
 _FORMULAS = {
     "observation": "obs = clip((raw - offset) * scale, -clip, clip), part by part; a part with a "
@@ -52,14 +43,7 @@ _FORMULAS = {
 
 @dataclass(frozen=True, kw_only=True)
 class ExportResult:
-    """An exported policy.
-
-    Attributes:
-        files: The ONNX, TorchScript and JSON files.
-        errors: Largest difference from the live actions, of the ONNX and the TorchScript file.
-        num_observations: Size of an observation.
-        num_actions: Size of an action.
-    """
+    """The ONNX, TorchScript and JSON files of a policy, and the action errors of the first two."""
 
     files: tuple[Path, Path, Path]
     errors: tuple[float, float]
@@ -79,8 +63,8 @@ def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> ExportR
             an exported policy does not match the live one.
     """
     files = folder / ONNX_FILE, folder / TORCHSCRIPT_FILE, folder / JSON_FILE
-    for file in files if folder.is_dir() else (folder,):
-        check_target(file, overwrite=overwrite and folder.is_dir())
+    for file in files if folder.is_dir() else [folder]:
+        check_target(file, overwrite=overwrite and file != folder)
     task = evaluation_task(run.task, num_envs=8)
     env = LeggedEnv(task, run.robot, load_terrain(run.terrain, task.terrain.collision))
     actor = load_policy(run, env)
@@ -95,35 +79,31 @@ def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> ExportR
         # torch deprecates TorchScript, which C++ controllers load, and its older ONNX exporter.
         warnings.simplefilter("ignore", DeprecationWarning)
         warnings.filterwarnings("ignore", message=r"`torch\.jit\.\w+` is (deprecated|not supp)")
-        onnx_data, script_data = export_onnx(policy, obs, text), export_torchscript(policy)
+        onnx_data, script_file = export_onnx(policy, obs, text), io.BytesIO()
+        torch.jit.save(torch.jit.script(policy), script_file)
         actions = clip_actions(actor(TensorDict({"policy": clip_obs(obs)}, [len(obs)]))).numpy()
-        script_actions = torch.jit.load(io.BytesIO(script_data))(obs).numpy()
+        script_actions = torch.jit.load(io.BytesIO(script_file.getvalue()))(obs).numpy()
     session = onnxruntime.InferenceSession(onnx_data, providers=["CPUExecutionProvider"])
     onnx_actions = np.asarray(session.run(["actions"], {"obs": obs.numpy()})[0])
-    errors = (
-        verify_actions(onnx_actions, actions, ONNX_FILE),
-        verify_actions(script_actions, actions, TORCHSCRIPT_FILE),
-    )
+    onnx_error = verify_actions(onnx_actions, actions, ONNX_FILE)
+    errors = onnx_error, verify_actions(script_actions, actions, TORCHSCRIPT_FILE)
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
         raise ExportError(f"cannot write {folder}: {error.strerror or error}") from error
-    with atomic_write(folder / JSON_FILE, overwrite=overwrite) as path:
+    with atomic_write(files[2], overwrite=overwrite) as path:
         path.write_text(text, encoding="utf-8")
         path.with_name(ONNX_FILE).write_bytes(onnx_data)
-        path.with_name(TORCHSCRIPT_FILE).write_bytes(script_data)
-    return ExportResult(
-        files=files, errors=errors, num_observations=actor.obs_dim, num_actions=env.num_actions
-    )
+        path.with_name(TORCHSCRIPT_FILE).write_bytes(script_file.getvalue())
+    sizes = {"num_observations": actor.obs_dim, "num_actions": env.num_actions}
+    return ExportResult(files=files, errors=errors, **sizes)
 
 
 def export_onnx(policy: torch.nn.Module, obs: torch.Tensor, metadata: str) -> bytes:
-    """Return a policy as an ONNX file with metadata, traced with observations of shape (n, k).
-
-    torch's older exporter takes 0.1 s where the newer one takes 5 s.
-    """
+    """Return a policy as an ONNX file with metadata, traced with observations of shape (n, k)."""
     file, axes = io.BytesIO(), {"obs": {0: "batch"}, "actions": {0: "batch"}}
     names: dict[str, Any] = {"input_names": ["obs"], "output_names": ["actions"]}
+    # With `dynamo`, the export takes 5 s instead of 0.1 s.
     torch.onnx.export(
         policy, (obs,), file, **names, dynamic_axes=axes, opset_version=ONNX_OPSET, dynamo=False
     )
@@ -133,19 +113,8 @@ def export_onnx(policy: torch.nn.Module, obs: torch.Tensor, metadata: str) -> by
     return bytes(model.SerializeToString())
 
 
-def export_torchscript(policy: torch.nn.Module) -> bytes:
-    """Return a policy as a TorchScript file."""
-    file = io.BytesIO()
-    torch.jit.save(torch.jit.script(policy), file)
-    return file.getvalue()
-
-
 def verify_actions(exported: FloatArray, live: FloatArray, name: str) -> float:
-    """Return the largest difference between exported and live actions.
-
-    Raises:
-        ExportError: If it is larger than the tolerance, or not a number.
-    """
+    """Return the largest difference from live actions; raise ExportError if it is too large."""
     error = float(np.max(np.abs(exported - live) / np.maximum(1, np.abs(live))))
     if not error <= TOLERANCE:
         expected = f"expected at most {TOLERANCE:g}"
@@ -206,7 +175,7 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
             "name": list(robot.spec.joint_order),
             "position_unit": units,
             "drive": drive.tolist(),
-            **{name: _floats(values) for name, values in joints.items()},
+            **{name: _to_list(values) for name, values in joints.items()},
         },
         "height_scan": scan if env.state.height_scan.shape[1] else None,
     }
@@ -215,31 +184,26 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
 def _observation_parts(env: LeggedEnv, joint_units: list[str]) -> list[dict[str, Any]]:
     """Return slice, unit, offset, scale and clip of each observation term."""
     offsets: dict[str, Any] = {"dof_pos": env.robot.default_pose, "height_scan": HEIGHT_SCAN_OFFSET}
-    units = {
-        "commands": ["m/s", "m/s", "rad/s"],
-        "projected_gravity": "1",
-        "base_ang_vel": "rad/s",
+    units: dict[str, Any] = {
         "dof_pos": joint_units,
         "dof_vel": [f"{unit}/s" for unit in joint_units],
-        "actions": "1",
-        "height_scan": "m",
     }
+    units |= {"commands": ["m/s", "m/s", "rad/s"], "base_ang_vel": "rad/s", "height_scan": "m"}
+    units |= {"projected_gravity": "1", "actions": "1"}
     parts, start = [], 0
     for term in env.obs_groups["policy"]:
         size = term.function(env.state).shape[1]
-        part = {
-            "name": term.name,
-            "start": start,
-            "stop": start + size,
-            "unit": units.get(term.name, ""),
-            "offset": _floats(np.broadcast_to(offsets.get(term.name, 0.0), size)),
-            "scale": _floats(np.broadcast_to(term.scale, size)),
-        }
-        parts.append(part | ({"clip": [-1.0, 1.0]} if term.name == "height_scan" else {}))
+        part: dict[str, Any] = {"name": term.name, "start": start, "stop": start + size}
+        part["unit"] = units.get(term.name, "")
+        part["offset"] = _to_list(np.broadcast_to(offsets.get(term.name, 0.0), size))
+        part["scale"] = _to_list(np.broadcast_to(term.scale, size))
+        if term.name == "height_scan":
+            part["clip"] = [-1.0, 1.0]
+        parts.append(part)
         start += size
     return parts
 
 
-def _floats(values: Any) -> list[float]:
+def _to_list(values: Any) -> list[float]:
     """Return numbers with the digits of single precision: float32(0.1) becomes 0.1."""
     return [float(f"{value + 0.0:.7g}") for value in np.asarray(values, float)]

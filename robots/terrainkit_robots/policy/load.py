@@ -12,11 +12,7 @@ from terrainkit_robots.rl.scene import SPEC_FILE
 
 
 def load_policy(run: Run, env: LeggedEnv) -> MLPModel:
-    """Return the actor network of a run: a deterministic policy in evaluation mode.
-
-    Args:
-        run: A run with a checkpoint.
-        env: The environment that the policy acts in.
+    """Return the actor network of a run: a deterministic policy for `env`, in evaluation mode.
 
     Warns:
         TerrainkitWarning: If the robot's model changed after training.

@@ -1,8 +1,4 @@
-"""Play a policy: measure it as an evaluation does, and record a video or open a viewer.
-
-On a map there is one robot per patch, and the video follows some of them on different terrains. On
-a plane the robots walk in formation through a sequence of commands.
-"""
+"""Play a policy: measure it as an evaluation does, and record a video or open a viewer."""
 
 import os
 import sys
@@ -56,8 +52,8 @@ def play(
 ) -> PlayResult:
     """Roll out the policy of a run, and record a video.
 
-    On a plane the default commands are those of :func:`demo_commands`. On a map the video follows
-    some `robots` in turn.
+    On a plane the robots walk in formation; :func:`demo_commands` are the default commands. On a
+    map there is one robot per patch, and the video follows some `robots` in turn.
 
     Raises:
         ConfigError: If the run has no policy, or one of another robot; if an option is invalid.
@@ -86,9 +82,8 @@ def view(run: Run, config: EvaluationConfig | None = None) -> None:
     Raises:
         ConfigError: If there is no display, or the run has no policy, or one of another robot.
     """
-    if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
+    if sys.platform == "linux" and not any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))):
         raise ConfigError("viewer: got no DISPLAY or WAYLAND_DISPLAY; expected a display")
-    import mujoco
     import mujoco.viewer
 
     config = replace(config or EvaluationConfig(), num_envs=1)
@@ -190,8 +185,7 @@ def select_tracked_robots(env: LeggedEnv, count: int) -> list[int]:
     queues = [queue for queue in by_terrain.values() if queue]
     if count < len(queues):
         queues = [queues[round(k)] for k in np.linspace(0, len(queues) - 1, count)]
-    turns = zip_longest(*queues)
-    return [robot for turn in turns for robot in turn if robot is not None][:count]
+    return [robot for turn in zip_longest(*queues) for robot in turn if robot is not None][:count]
 
 
 def _caption(command: FloatArray) -> str:

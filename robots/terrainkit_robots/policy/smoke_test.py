@@ -6,13 +6,13 @@ import tracemalloc
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import mujoco
 import numpy as np
 import torch
 
-from terrainkit.errors import ConfigError, TerrainkitError
+from terrainkit.errors import TerrainkitError
 from terrainkit_robots.onboarding.pipeline import OnboardOptions, is_blocking, onboard
 from terrainkit_robots.policy.evaluate import evaluation_task
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -25,18 +25,13 @@ from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.simulation.geoms import lowest_point
 
-if TYPE_CHECKING:
-    from terrainkit_robots.lint.settings import Settings
-
-NUM_ENVS = 16
-
 MAX_FOOT_HEIGHT, MAX_FOOT_DEPTH, MIN_BASE_HEIGHT = 0.02, 0.001, 0.5
 """Limits of a foot above and below the ground [m], and of the base, relative to its target."""
 
-MAX_MEMORY_GROWTH = 0.1
-"""Limit of the memory growth over `_MEMORY_STEPS` steps [MB]; keeping all states takes 1 MB."""
+NUM_ENVS, RANDOM_STEPS, WARM_UP_STEPS, MEMORY_STEPS, ITERATIONS = 16, 100, 10, 60, 3
 
-_RANDOM_STEPS, _WARM_UP_STEPS, _MEMORY_STEPS, _ITERATIONS = 100, 10, 60, 3
+MAX_MEMORY_GROWTH = 0.1
+"""Limit of the memory growth over `MEMORY_STEPS` steps [MB]; keeping all states takes 1 MB."""
 
 
 @dataclass(frozen=True)
@@ -62,28 +57,22 @@ class SmokeTestResult:
         return all(check.passed for check in self.checks)
 
 
-def smoke_test(
-    name: str, *, settings: "Settings | None" = None, spec: Path | None = None
-) -> SmokeTestResult:
+def smoke_test(name: str, options: OnboardOptions | None = None) -> SmokeTestResult:
     """Check whether a robot can be trained for its task on a plane.
 
     Args:
         name: A registered robot, an onboarded folder, or a URDF, xacro or MJCF file, which is
             onboarded into a temporary folder.
-        settings: Lint settings for onboarding a file.
-        spec: A robot.toml whose values override those derived from a file.
+        options: Options for onboarding a file.
 
     Raises:
         TerrainkitError: If the robot does not exist or cannot be read.
     """
     if not Path(name).is_file():
-        if spec is not None:
-            raise ConfigError(f"spec: {name} has its own robot.toml; expected a robot file")
         task_spec = get_task(name)
         return run_checks(Robot.load(task_spec.folder), task_spec.task)
+    options = replace(options or OnboardOptions(), render_images=False)
     with tempfile.TemporaryDirectory() as folder:
-        options = OnboardOptions(spec=spec, render_pictures=False)
-        options = replace(options, settings=settings or options.settings)
         onboarded = onboard(Path(name), Path(folder) / "robot", options)
         codes = [finding.code for finding in onboarded.report.findings if is_blocking(finding)]
         measured = f"{len(codes)} errors: {', '.join(dict.fromkeys(codes))}" if codes else "yes"
@@ -99,10 +88,9 @@ def smoke_test(
 def run_checks(robot: Robot, task: Task) -> SmokeTestResult:
     """Check whether a robot can be trained for a task on a plane."""
     mini_batches = min(task.algorithm.num_mini_batches, NUM_ENVS)
+    algorithm = replace(task.algorithm, num_mini_batches=mini_batches)
     task = replace(
-        task,
-        env=replace(task.env, num_envs=NUM_ENVS, num_threads=1),
-        algorithm=replace(task.algorithm, num_mini_batches=mini_batches),
+        task, env=replace(task.env, num_envs=NUM_ENVS, num_threads=1), algorithm=algorithm
     )
     name, expected = "environment initializes", "no error"
     try:
@@ -135,8 +123,8 @@ def check_spawn_height(env: LeggedEnv) -> Check:
         geoms = scene.geoms[model.geom_bodyid[scene.geoms] == model.body(foot).id]
         height = min((lowest_point(model, data, int(geom)) for geom in geoms), default=np.nan)
         passed &= -MAX_FOOT_DEPTH <= height <= MAX_FOOT_HEIGHT  # False without a shape
-        known = len(geoms) > 0
-        measured.append(f"{foot} {100 * height + 0.0:.1f} cm" if known else f"{foot} has no shape")
+        distance = f"{100 * height + 0.0:.1f} cm" if len(geoms) else "has no shape"
+        measured.append(f"{foot} {distance}")
     above = f"{', '.join(measured)} above the ground, with spawn_height {spec.spawn_height:.4g} m"
     expected = f"every foot within {100 * MAX_FOOT_HEIGHT:.1f} cm of the ground, none below"
     return Check("spawn height", bool(passed), above, expected)
@@ -161,27 +149,22 @@ def check_stand(env: LeggedEnv) -> Check:
     for step in range(round(1 / dt)):
         _, _, dones, extras = env.step(torch.zeros(env.num_envs, env.num_actions))
         height = float(env.state.base_height.min())
-        fall_time = (step + 1) * dt if (dones & ~extras["time_outs"]).any() else None
-        if fall_time is not None:
+        measured = f"base at {height:.3f} m, {100 * height / target:.0f} % of its height"
+        passed = height >= MIN_BASE_HEIGHT * target
+        if (dones & ~extras["time_outs"]).any():
+            passed, measured = False, f"fell after {(step + 1) * dt:.2f} s"
             break
-    measured = f"base at {height:.3f} m, {100 * height / target:.0f} % of its height"
-    measured = measured if fall_time is None else f"fell after {fall_time:.2f} s"
     expected = f"no fall, and the base above {100 * MIN_BASE_HEIGHT:.0f} % of {target:.3f} m"
-    passed = fall_time is None and height >= MIN_BASE_HEIGHT * target
     return Check("stands for 1 s with zero action", passed, measured, expected)
 
 
 def check_rewards(env: LeggedEnv) -> Iterator[Check]:
-    """Check that each reward is finite, and not zero in every state.
-
-    A reward that stays zero under random actions may be for events that did not happen: it is also
-    computed for random states.
-    """
+    """Check that each reward is finite, and not zero in all states of a rollout and random ones."""
     commands = env.commands.copy()
     commands[::4] = 0  # for the rewards of standing robots
     env.set_commands(commands)
     values: dict[str, list[Any]] = {name: [] for name in env.rewards}
-    for state in random_steps(env, _RANDOM_STEPS):
+    for state in random_steps(env, RANDOM_STEPS):
         for name, (reward, _) in env.rewards.items():
             values[name].append(reward(state, env.robot, env.cfg.rewards))
     env.set_commands(None)
@@ -222,34 +205,33 @@ def check_memory(env: LeggedEnv) -> Check:
     """Check that steps do not keep memory, as Python and NumPy allocate it."""
     sizes = []
     tracemalloc.start()
-    for steps in (_WARM_UP_STEPS, _MEMORY_STEPS):
+    for steps in (WARM_UP_STEPS, MEMORY_STEPS):
         for _ in random_steps(env, steps):
             pass
         gc.collect()
         sizes.append(tracemalloc.get_traced_memory()[0] / 1e6)
     tracemalloc.stop()
     growth = max(0.0, sizes[1] - sizes[0])
-    measured = f"{growth:.2f} MB more after {_MEMORY_STEPS} steps"
+    measured = f"{growth:.2f} MB more after {MEMORY_STEPS} steps"
     passed, expected = growth <= MAX_MEMORY_GROWTH, f"at most {MAX_MEMORY_GROWTH:g} MB"
     return Check("memory is bounded", passed, measured, expected)
 
 
 def check_training(env: LeggedEnv) -> Check:
     """Check that a policy can be updated a few times, with finite losses."""
-    losses: list[dict[str, float]] = []
+    history: list[dict[str, float]] = []
     error = ""
     with torch.random.fork_rng(devices=()):
         torch.manual_seed(env.cfg.runner.seed)
         runner = LeggedRunner(env)
         update = runner.alg.update
-        runner.alg.update = lambda: losses.append(update()) or losses[-1]  # type: ignore[func-returns-value]
+        runner.alg.update = lambda: history.append(update()) or history[-1]  # type: ignore[func-returns-value]
         try:
-            runner.learn(_ITERATIONS)
+            runner.learn(ITERATIONS)
         except (TerrainkitError, RuntimeError, ValueError) as failure:  # not finite
             error = " ".join(str(failure).split())
-    finite = all(np.isfinite(list(loss.values())).all() for loss in losses)
-    last = losses[-1] if losses else {}
-    measured = "losses: " + ", ".join(f"{name} {value:.3g}" for name, value in last.items())
-    passed = not error and finite and len(losses) == _ITERATIONS
-    name = f"trains for {_ITERATIONS} iterations"
-    return Check(name, passed, error or measured, "finite losses")
+    values = [list(loss.values()) for loss in history]
+    passed = not error and len(history) == ITERATIONS and bool(np.isfinite(values).all())
+    last = ", ".join(f"{name} {value:.3g}" for name, value in (history[-1:] or [{}])[0].items())
+    name = f"trains for {ITERATIONS} iterations"
+    return Check(name, passed, error or f"losses: {last}", "finite losses")

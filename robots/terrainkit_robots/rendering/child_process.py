@@ -28,7 +28,7 @@ class RenderError(TerrainkitError):
     """Rendering failed; the message gives the reason in one line."""
 
 
-def iterate_frames(render: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
+def stream_frames(render: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
     """Yield the frames that a function renders in a child process.
 
     The backends of `gl_backend.backends()` are tried in order until one renders a frame.

@@ -97,7 +97,7 @@ def write_video(spec: VideoSpec, path: Path, *, overwrite: bool = False) -> Iter
     from imageio_ffmpeg import count_frames_and_secs, write_frames
 
     from terrainkit.atomic_write import atomic_write
-    from terrainkit_robots.rendering.child_process import iterate_frames
+    from terrainkit_robots.rendering.child_process import stream_frames
     from terrainkit_robots.rendering.video_frames import video_frames
 
     check_video_path(path, overwrite=overwrite)
@@ -114,7 +114,7 @@ def write_video(spec: VideoSpec, path: Path, *, overwrite: bool = False) -> Iter
         )
         try:
             encoder.send(None)
-            for index, frame in enumerate(iterate_frames(partial(video_frames, spec))):
+            for index, frame in enumerate(stream_frames(partial(video_frames, spec))):
                 encoder.send(frame)
                 yield index
             encoder.close()

@@ -40,7 +40,7 @@ COPLANAR_OFFSET = 0.001
 
 def video_frames(spec: VideoSpec) -> Iterator[Frame]:
     """Yield the frames of all shots of a video."""
-    separate_box_tops(spec.model)
+    offset_box_tops(spec.model)
     for shot in spec.shots:
         yield from _shot_frames(spec, shot)
 
@@ -59,7 +59,7 @@ def _shot_frames(spec: VideoSpec, shot: Shot) -> Iterator[Frame]:
     angles = np.radians(AZIMUTH + (half_width + AZIMUTH_SWING) * np.linspace(-1, 1, 5))
     rays = distance * np.column_stack([np.cos(angles), np.sin(angles)])
     view = np.concatenate([-1.2 * rays, FOG[1] * rays])
-    model = crop_heightfields(spec.model, (targets[:, None, :2] + view).reshape(-1, 2))
+    model = cut_heightfields(spec.model, (targets[:, None, :2] + view).reshape(-1, 2))
 
     data, other_data, unchanged = mujoco.MjData(model), mujoco.MjData(model), mujoco.MjvPerturb()
     max_geom = MAX_OTHER_ROBOTS * int(robot_geoms.sum())
@@ -136,7 +136,7 @@ def _static_geoms(model: Any, geom_type: int) -> tuple[NDArray[np.int64], FloatA
     return geoms, data.geom_xpos[geoms]
 
 
-def crop_heightfields(model: Any, points: FloatArray) -> Any:
+def cut_heightfields(model: Any, points: FloatArray) -> Any:
     """Return a copy of a model whose heightfields cover only the bounding box of some points.
 
     Without a GPU, most of the time would be spent on the triangles of a large heightfield.
@@ -167,7 +167,7 @@ def crop_heightfields(model: Any, points: FloatArray) -> Any:
     return model
 
 
-def separate_box_tops(model: Any) -> None:
+def offset_box_tops(model: Any) -> None:
     """Lower boxes of the terrain by millimeters until overlapping boxes have no coplanar tops.
 
     OpenGL adds the light of a coplanar surface twice, which makes the corners of stairs too bright.

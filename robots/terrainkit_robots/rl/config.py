@@ -10,7 +10,9 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from terrainkit.annotations import (
+from terrainkit.errors import ConfigError
+from terrainkit.schema import Config
+from terrainkit.type_hint import (
     Fraction,
     Interval,
     NonNegativeFloat,
@@ -18,8 +20,6 @@ from terrainkit.annotations import (
     PositiveFloat,
     PositiveInt,
 )
-from terrainkit.errors import ConfigError
-from terrainkit.schema import Config
 
 MAX_SCAN_POINTS = 10_000
 """Largest number of points of the height scan."""

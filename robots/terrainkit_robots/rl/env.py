@@ -78,22 +78,19 @@ class LeggedEnv(VecEnv):
         self.joint_offset = np.zeros((n, joints), np.float32)
         self.rewards = active_rewards(task.rewards)
         self.episode_sums = {name: np.zeros(n, np.float32) for name in self.rewards}
-        self.commands = self.velocity_command.commands  # live, like the next two
-        self.air_time, self.push_vel = self.sensors.air_time, self.pushes.velocity
+        self.commands = self.velocity_command.commands  # live
 
         # A motor receives offset + scale * action.
         kind, scale = task.control.control_type, task.control.action_scale
         stiff = np.array(list(robot.spec.per_joint("stiffness").values())) > 0
         if task.control.stiffness is not None:
             stiff &= task.control.stiffness > 0
-        self.is_position_controlled = stiff & (kind == "P")
+        self.is_position_controlled = positional = stiff & (kind == "P")
         spec_scale = np.array(list(robot.spec.per_joint("action_scale").values()))
         default = {"P": spec_scale, "V": robot.velocity, "T": robot.effort}[kind]
         scales = default if scale is None else np.full(joints, scale)
         self.action_scale = scales.astype(np.float32)
-        self.action_offset = np.where(
-            self.is_position_controlled, robot.default_pose, np.float32(0)
-        )
+        self.action_offset = np.where(positional, robot.default_pose, np.float32(0))
 
     @property
     def episode_length_buf(self) -> torch.Tensor:
@@ -195,7 +192,7 @@ class LeggedEnv(VecEnv):
             last_actions=self.actions[1, rows].copy(),
             last_last_actions=self.actions[2, rows].copy(),
             commands=self.commands[rows].copy(),
-            push_vel=self.push_vel[rows].copy(),
+            push_vel=self.pushes.velocity[rows].copy(),
             friction=self.params.friction[rows].copy(),
             added_mass=self.params.added_mass[rows].copy(),
             com_shift=self.params.com_shift[rows].copy(),
@@ -340,9 +337,9 @@ class LeggedEnv(VecEnv):
             "actions": self.actions,
             "last_dof_vel": self.sensors.last_dof_vel,
             "joint_offset": self.joint_offset,
-            "push_vel": self.push_vel,
+            "push_vel": self.pushes.velocity,
             "steps_until_push": self.pushes.steps_until_push,
-            "air_time": self.air_time,
+            "air_time": self.sensors.air_time,
             "steps_since_reset": self.steps_since_reset,
             "start_pos": self.start_pos,
             "tracking": self.velocity_command.tracking,

@@ -427,7 +427,7 @@ def _robot_digests(folder: Path) -> dict[str, str]:
 def _sha256(path: Path) -> str:
     try:
         with open_regular(path) as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+            return hashlib.sha256(file.read()).hexdigest()
     except OSError as error:
         raise ConfigError(f"cannot read {path}: {error.strerror or error}") from error
 

@@ -71,8 +71,11 @@ ProgressCallback = Callable[[TrainingProgress], object]
 class MetricsLogger(Logger):
     """rsl-rl's logger without console output; its buffers are part of a checkpoint."""
 
+    writer: Any
+
     def __init__(self, runner: "LeggedRunner") -> None:
-        self._runner, self.means = runner, {}  # latest mean of each value in the env's log
+        self._runner = runner
+        self.means: dict[str, float] = {}  # latest mean of each value in the env's log
         world = (runner.is_distributed, runner.gpu_world_size, runner.gpu_global_rank)
         env = runner.env
         super().__init__(None, runner.cfg, env.cfg, env.num_envs, *world, runner.device)
@@ -112,7 +115,7 @@ class MetricsLogger(Logger):
             raise ConfigError(f"rewards are not finite: {listing(names) or 'of robots that fell'}")
         super().process_env_step(rewards, *args, **kwargs)
 
-    def log(self, **values: Any) -> None:  # type: ignore[override]
+    def log(self, **values: Any) -> None:
         """Log an iteration, and finish it."""
         self._runner.check_weights()
         for key in dict.fromkeys(key for log in self.ep_extras for key in log):

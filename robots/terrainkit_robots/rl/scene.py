@@ -93,8 +93,6 @@ class Robot:
         Raises:
             ConfigError: If there is no robot.toml, or it is incomplete.
         """
-        if not (folder / SPEC_FILE).exists():
-            raise ConfigError(f"{folder}: got no {SPEC_FILE}; expected an onboarded robot's folder")
         return cls.from_spec(RobotSpec.load(folder / SPEC_FILE), folder)
 
 

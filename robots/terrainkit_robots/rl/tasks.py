@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from terrainkit.errors import ConfigError
-from terrainkit.text import known_names, shorten
+from terrainkit.text import expected_names, truncate
 from terrainkit_robots.description import bundled
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.scene import SPEC_FILE
@@ -102,10 +102,10 @@ def get_task(name_or_folder: str | Path) -> TaskSpec:
             spec = RobotSpec.load(folder / SPEC_FILE)
             return TaskSpec(name=spec.name, folder=folder.absolute(), task=Task())
     except OSError as error:
-        raise ConfigError(f"cannot read {shorten(name)}: {error.strerror or error}") from error
+        raise ConfigError(f"cannot read {truncate(name)}: {error.strerror or error}") from error
     raise ConfigError(
-        f"no task or robot folder {shorten(repr(name))}; "
-        f"{known_names(name, task_names(), 'tasks are')}"
+        f"no task or robot folder {truncate(repr(name))}; "
+        f"{expected_names(name, task_names(), 'tasks are')}"
     )
 
 

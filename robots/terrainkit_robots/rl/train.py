@@ -53,10 +53,9 @@ def train(
         terrain: `plane`, a map, the config of a map, or a MuJoCo model.
         task: The task; by default the one the robot is registered with.
         folder: Folder of the run; by default `logs/<robot>/<date-time>`.
-        resume: A run to continue. With the same robot, terrain and task (the number of
-            environments and `runner` may differ) it continues exactly, by default in its own
-            folder. Otherwise a new run starts with its networks; with its optimizer if the learning
-            rate and schedule are the same; and with its terrain levels if the map is.
+        resume: A run to continue. With the same robot, terrain and task (`env.num_envs` and
+            `runner` may differ) it continues exactly. Otherwise a new run starts with its networks,
+            its optimizer if the learning rate is the same, and its terrain levels if the map is.
         device: Device of the networks: `cpu`, `cuda`, `cuda:1`. The physics runs on the CPU.
         progress_callback: Called after each iteration.
 

@@ -63,29 +63,30 @@ def _failed_checks(result: StandResult) -> Iterator[tuple[int, str]]:
     if tilt > _MAX_TILT:
         yield (
             (tilt > _MAX_LEANING_TILT) + (tilt > _MAX_RECOVERABLE_TILT),
-            f"it tilts by {math.degrees(tilt):.1f} degrees; expected at most "
-            f"{math.degrees(_MAX_TILT):g}",
+            f"it tilts by {math.degrees(tilt):.1f} deg (expected at most "
+            f"{math.degrees(_MAX_TILT):g} deg)",
         )
     if result.height_loss > _MAX_HEIGHT_LOSS * length:
         yield (
             1 + (result.height_loss > _MAX_RECOVERABLE_HEIGHT_LOSS * length),
-            f"its base sinks by {result.height_loss:.3f} m; expected at most "
-            f"{_MAX_HEIGHT_LOSS * length:.3f}",
+            f"its base sinks by {result.height_loss:.3f} m (expected at most "
+            f"{_MAX_HEIGHT_LOSS * length:.3f} m)",
         )
     if result.drift > _MAX_DRIFT * length:
         yield (
             1,
-            f"it drifts by {result.drift:.3f} m; expected at most {_MAX_DRIFT * length:.3f}",
+            f"it drifts by {result.drift:.3f} m (expected at most {_MAX_DRIFT * length:.3f} m)",
         )
     if result.other_contacts:
         verb = "touches" if len(result.other_contacts) == 1 else "touch"
-        yield 1, f"{_join(result.other_contacts)} {verb} the ground; expected only feet"
+        yield 1, f"{_join(result.other_contacts)} {verb} the ground (expected only feet)"
     if result.lifted_feet:
         verb = "does" if len(result.lifted_feet) == 1 else "do"
-        yield 1, f"{_join(result.lifted_feet)} {verb} not touch the ground; expected all feet"
+        yield 1, f"{_join(result.lifted_feet)} {verb} not touch the ground (expected all feet)"
     if result.saturation > _MAX_SATURATION:
-        share = f"{result.saturation:.0%} of its effort; expected at most {_MAX_SATURATION:.0%}"
-        yield 1, f"{result.saturated_joint} gives {share}"
+        limit = f"(expected at most {_MAX_SATURATION:.0%})"
+        effort = f"{result.saturation:.0%} of its effort limit"
+        yield 1, f"{result.saturated_joint} needs {effort} {limit}"
 
 
 def _join(bodies: tuple[str, ...]) -> str:

@@ -169,7 +169,10 @@ def _make_target(
     stable = max_stable_stiffness(inertia)
     extra_armature = stable < _MIN_STIFFNESS_SHARE * stiffness
     if extra_armature:
-        added = _round_up(armature + min_stable_inertia(stiffness) - inertia) - armature
+        required_armature = armature + min_stable_inertia(stiffness) - inertia
+        scale = 10.0 ** math.floor(math.log10(required_armature))
+        rounded_up = (s * scale for s in (1, 2, 3, 5, 10) if s * scale >= 0.999 * required_armature)
+        added = float(f"{next(rounded_up):.1g}") - armature
         inertia, armature = inertia + added, armature + added
     elif stable < stiffness:
         stiffness = stable
@@ -219,9 +222,3 @@ def _max_gravity_load(sim: SimModel, name: str) -> float:
         lever = distance[index] + float(np.linalg.norm(model.body_ipos[index]))
         total += float(model.body_mass[index]) * lever
     return total * GRAVITY
-
-
-def _round_up(value: float) -> float:
-    """Return the next number that starts with 1, 2, 3 or 5."""
-    scale = 10.0 ** math.floor(math.log10(value))
-    return next(float(f"{s * scale:.1g}") for s in (1, 2, 3, 5, 10) if s * scale >= 0.999 * value)

@@ -13,10 +13,10 @@ from typing import Annotated, Any, Literal, Self, get_args, get_origin
 
 from msgspec import Meta
 
-from terrainkit.annotations import SORTED, UNIQUE, parse_annotation
 from terrainkit.errors import ConfigError, listing
 from terrainkit.schema import Config, field_docs, field_types
 from terrainkit.toml_text import LINE_LENGTH, comment_text, line_text
+from terrainkit.type_hint import SORTED, UNIQUE, parse_hint
 from terrainkit_robots.spec.per_joint import by_joint
 
 FORMAT_VERSION = 1
@@ -240,8 +240,8 @@ def unit_of(name: str) -> str:
     return next(_units(field_types(RobotSpec)[name]), "")
 
 
-def _units(annotation: Any) -> Iterator[str]:
-    parsed = parse_annotation(annotation)
+def _units(hint: Any) -> Iterator[str]:
+    parsed = parse_hint(hint)
     if "unit" in parsed.constraints:
         yield parsed.constraints["unit"]
     for part in parsed.args if parsed.origin is not Literal else ():
@@ -251,6 +251,6 @@ def _units(annotation: Any) -> Iterator[str]:
 JOINT_TABLES = tuple(
     name
     for name, annotation in field_types(RobotSpec).items()
-    if get_origin(annotation) is Mapping and parse_annotation(get_args(annotation)[1]).kind is float
+    if get_origin(annotation) is Mapping and parse_hint(get_args(annotation)[1]).kind is float
 )
 """Tables that have a value for every joint."""

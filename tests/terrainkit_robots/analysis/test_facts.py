@@ -41,7 +41,7 @@ ROBOT = (
 )
 
 
-def test_facts_of_a_small_robot():
+def test_facts_of_small_robot():
     robot = facts(ROBOT)
     assert [body.name for body in robot.bodies] == ["b", "c", "d"]
     assert [each.name for each in robot.links] == ["a", "b", "c", "d"]
@@ -54,34 +54,32 @@ def test_facts_of_a_small_robot():
         "c": 1,
         "d": 2,
     }
-    assert len(robot.zero_poses) == 3
     assert robot.limbs == robot.legs == ()
     assert robot.stance is None
     assert robot.positions["bc"] == 0.2
 
 
-def test_facts_of_nothing():
+def test_facts_of_empty_robot():
     robot = facts('<robot name="r"/>')
     assert robot.bodies == robot.links == robot.joints == robot.actuated == ()
     assert robot.body_of == robot.positions == {}
     assert robot.total_mass == 0
-    assert robot.zero_poses == robot.limbs == robot.legs == robot.mirror.pairs == ()
+    assert robot.limbs == robot.legs == robot.mirror.pairs == ()
     assert robot.stance is None
     assert robot.overlap_scene.detect({}) == []
 
 
-def test_what_is_no_robot_has_no_facts():
+def test_facts_of_malformed_file():
     robot = facts("nothing of the kind")
     assert robot.bodies == robot.legs == ()
     assert robot.model.problems
 
 
-def test_each_fact_is_worked_out_once():
+def test_facts_are_cached():
     robot = facts(ROBOT)
     for name in (
         "tree",
         "bodies",
-        "zero_poses",
         "limbs",
         "legs",
         "mirror",
@@ -91,18 +89,18 @@ def test_each_fact_is_worked_out_once():
         assert getattr(robot, name) is getattr(robot, name)
 
 
-def test_only_what_hangs_together_is_the_robot():
+def test_facts_exclude_disconnected_links():
     robot = facts(ROBOT.replace("</robot>", link("stray", 100) + "</robot>"))
     assert robot.total_mass == 10
     assert "stray" not in robot.body_of
 
 
 @pytest.mark.parametrize("mass", ["", "x", "1e308"])
-def test_a_mass_that_is_not_known_counts_as_none(mass):
+def test_total_mass_ignores_invalid_masses(mass):
     assert facts(ROBOT.replace('<mass value="4"/>', f'<mass value="{mass}"/>')).total_mass == 6
 
 
-def test_a_mass_that_hangs_on_a_mesh_is_not_known():
+def test_total_mass_derived_from_mesh_is_nan():
     text = (
         '<mujoco><asset><mesh name="m" file="lost.stl"/></asset><worldbody><body name="a">'
         '<freejoint/><geom size="0.1" mass="2"/><body name="b"><joint name="j"/>'
@@ -112,7 +110,7 @@ def test_a_mass_that_hangs_on_a_mesh_is_not_known():
     assert facts(text.replace('type="mesh" mesh="m"', 'size="0.1" mass="1"'), MJCF).total_mass == 3
 
 
-# Motors of MJCF
+# Actuators of MJCF
 
 
 def mjcf(actuators):
@@ -134,11 +132,11 @@ def mjcf(actuators):
         ('<motor tendon="t"/><motor joint="i"/>', ["i"]),
     ],
 )
-def test_joints_that_a_motor_drives(actuators, driven):
+def test_actuated_joints_of_mjcf(actuators, driven):
     assert [each.name for each in facts(mjcf(actuators), MJCF).actuated] == driven
 
 
-def test_the_positions_of_a_keyframe_are_where_the_robot_starts():
+def test_positions_equal_keyframe():
     path = bundled.find("quadruped").with_suffix(".xml")
     robot = Facts(load_robot(path))
     assert robot.positions == {each.name: robot.model.home[each.name] for each in robot.joints}
@@ -148,16 +146,15 @@ def test_the_positions_of_a_keyframe_are_where_the_robot_starts():
 # Meshes
 
 
-def test_no_mesh_is_opened_before_one_is_needed(robot_file):
+def test_facts_open_no_mesh_early(robot_file):
     meshes = Meshes()
     robot = Facts(load_robot(robot_file("g1/g1_29dof.urdf")), meshes)
     assert len(robot.bodies) == 30
     assert robot.total_mass > 30
-    assert len(robot.zero_poses) == 30
     assert not meshes.opened
 
 
-def test_a_mesh_is_opened_twice_at_most(robot_file):
+def test_facts_open_each_mesh_twice_at_most(robot_file):
     meshes = Meshes()
     robot = Facts(load_robot(robot_file("g1/g1_29dof.urdf")), meshes)
     assert robot.stance is not None
@@ -168,8 +165,8 @@ def test_a_mesh_is_opened_twice_at_most(robot_file):
 # Size
 
 
-def test_a_robot_of_thousands_of_links_is_no_trouble():
-    # Two chains of 1,000 links beside each other, with shapes: limbs, mirrors and overlaps of them.
+def test_facts_of_thousands_of_links():
+    # Two mirrored chains of 1,000 links with shapes.
     parts = [link("trunk")]
     for side, y in (("left", 0.01), ("right", -0.01)):
         at = "trunk"
@@ -191,7 +188,7 @@ def test_a_robot_of_thousands_of_links_is_no_trouble():
 
 @pytest.mark.parametrize("value", ["1e29", "-1e29", "1e-300", "0"])
 @pytest.mark.parametrize("attribute", ["mass value", "xyz", "rpy", "radius", "lower", "ixx"])
-def test_numbers_without_measure_break_no_fact_and_no_rule(value, attribute):
+def test_facts_and_rules_survive_extreme_numbers(value, attribute):
     text = bundled.find("quadruped").read_text()
     name = attribute.split()[-1]
     start = text.index(f"<mass {name}=" if " " in attribute else f"{name}=", text.index("<joint"))

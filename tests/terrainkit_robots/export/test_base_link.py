@@ -34,7 +34,7 @@ def facts(tmp_path, text):
 def brought_in(tmp_path, text, **options):
     robot = facts(tmp_path, text)
     folder = tmp_path / "robot"
-    done = onboard(robot.model.file, folder, OnboardOptions(render_pictures=False, **options))
+    done = onboard(robot.model.file, folder, OnboardOptions(render_images=False, **options))
     return done, RobotSpec.load(folder / "robot.toml")
 
 

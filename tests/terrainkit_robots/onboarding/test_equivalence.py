@@ -71,7 +71,7 @@ def test_compare_models_reports_rotated_link(source, written):
     (result,) = compare_models(
         reference_kinematics(source, written), compiled(text.replace(before, turned))
     )
-    assert result.rotated_link == "RR_foot"
+    assert result.angle_link == "RR_foot"
     assert result.angle == pytest.approx(0.04, rel=1e-3)
     assert result.failures == ("the orientation of RR_foot is off by 2.29 degrees",)
 

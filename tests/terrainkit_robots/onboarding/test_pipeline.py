@@ -20,6 +20,7 @@ from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
 from terrainkit_robots.onboarding.summary import summarize
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.spec.robot_spec import RobotSpec
+from tests.robots import ARM, QUADRUPED
 
 REAL = [
     "a1/urdf/a1.urdf",
@@ -32,24 +33,10 @@ REAL = [
     "anymal_c/urdf/anymal_c.urdf",
 ]
 COMPARISON_RULES = [rule for rule in rules() if {"against", "spec"} & set(rule.needs)]
-QUADRUPED = bundled.find("quadruped")
-
-ARM = """<robot name="arm">
-  <link name="stand"><inertial><mass value="5"/>
-    <inertia ixx="0.05" iyy="0.05" izz="0.05" ixy="0" ixz="0" iyz="0"/></inertial>
-    <collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>
-  <link name="upper"><inertial><origin xyz="0 0 0.15"/><mass value="1"/>
-    <inertia ixx="0.01" iyy="0.01" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial>
-    <collision><origin xyz="0 0 0.16"/><geometry><box size="0.05 0.05 0.3"/></geometry></collision>
-  </link>
-  <joint name="shoulder" type="revolute"><parent link="stand"/><child link="upper"/>
-    <origin xyz="0 0 0.11"/><axis xyz="0 1 0"/>
-    <limit lower="-1.5" upper="1.5" effort="30" velocity="3"/></joint>
-</robot>"""
 
 
 def options(**changes):
-    return OnboardOptions(**{"render_pictures": False, "unsafe_fixes": True} | changes)
+    return OnboardOptions(**{"render_images": False, "unsafe_fixes": True} | changes)
 
 
 @pytest.mark.parametrize("name", REAL)
@@ -127,8 +114,8 @@ def test_onboard_writes_expected_files(onboarded):
 
 def test_onboard_renders_pictures(tmp_path):
     result = onboard(QUADRUPED, tmp_path / "robot")
-    assert result.pictures or result.pictures_error
-    for name in result.pictures:
+    assert result.images or result.images_error
+    for name in result.images:
         assert (result.folder / name).read_bytes().startswith(b"\x89PNG")
         assert name in (result.folder / "report.md").read_text()
 
@@ -143,7 +130,7 @@ def test_onboard_is_deterministic(onboarded, tmp_path):
 def test_onboard_accepts_its_own_output(onboarded, tmp_path):
     first = onboarded(QUADRUPED)
     for name in ("robot.urdf", "robot.xml"):
-        again = onboard(first.folder / name, tmp_path / name, OnboardOptions(render_pictures=False))
+        again = onboard(first.folder / name, tmp_path / name, OnboardOptions(render_images=False))
         assert again.verification.is_stable
         assert again.robot.spec.joint_order == first.robot.spec.joint_order
         assert again.report.verdict == "pass"
@@ -276,7 +263,7 @@ def test_onboard_converts_mesh_of_other_format(tmp_path):
     mesh = '<mesh filename="../../upper.ply"/></geometry></collision></link>\n  <joint'
     before, after = ARM.split('<box size="0.05 0.05 0.3"/>')
     file.write_text(before + mesh + after.split("<joint", 1)[1])
-    result = onboard(file, tmp_path / "robot", OnboardOptions(render_pictures=False))
+    result = onboard(file, tmp_path / "robot", OnboardOptions(render_images=False))
     assert "MSH005" in {f.code for f in result.fixed}
     assert result.report.verdict != "fail"
     assert (result.folder / "meshes/upper.stl").exists()

@@ -50,7 +50,7 @@ def equivalence(file, *, mass=0.0, distance=1e-6, link="FL_foot"):
         distance=distance,
         link=link,
         angle=1e-5,
-        rotated_link="RR_foot",
+        angle_link="RR_foot",
     )
 
 
@@ -132,7 +132,7 @@ def test_report_tables_have_rows_of_equal_length(quadruped):
     verification = Verification(equivalences=(), standing=STOOD)
     report = Report(facts=quadruped.robot.facts, findings=(finding(),))
     text = report_markdown(
-        replace(quadruped, verification=verification, report=report, pictures=("report/a.png",))
+        replace(quadruped, verification=verification, report=report, images=("report/a.png",))
     )
     tables = re.findall(r"(?:^\|.*\|\n)+", text, re.MULTILINE)
     assert len(tables) == 5
@@ -152,11 +152,11 @@ def test_report_overview(quadruped):
 
 def test_report_shows_pictures_or_reason(quadruped):
     shots = ("report/front.png", "report/side.png")
-    text = report_markdown(replace(quadruped, pictures=shots))
+    text = report_markdown(replace(quadruped, images=shots))
     assert (
         "| front | side |\n|---|---|\n| ![front](report/front.png) | ![side](report/side.png) |\n"
     ) in text
-    without = report_markdown(replace(quadruped, pictures_error="MuJoCo cannot render here"))
+    without = report_markdown(replace(quadruped, images_error="MuJoCo cannot render here"))
     assert "\nNo pictures: MuJoCo cannot render here.\n" in without
     assert "![" not in without
 
@@ -292,7 +292,7 @@ def test_report_escapes_names(quadruped):
         verification=verification,
         fixed=(finding(subject=NASTY, message=NASTY),),
         configs=(NASTY,),
-        pictures_error=NASTY,
+        images_error=NASTY,
     )
     text = report_markdown(result)
     for wrong in ("<b>", "@me", "\x1b", "\r", "\u202e", "\n# title"):

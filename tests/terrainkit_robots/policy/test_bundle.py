@@ -52,7 +52,7 @@ def test_bundle_policy_rejects_local_terrains_and_robots(quadruped, trained, tmp
     xml.write_text("<mujoco><worldbody><geom type='plane' size='5 5 1'/></worldbody></mujoco>")
     for robot, terrain, message in (
         ("quadruped", xml, r"ground\.xml; expected plane or a map"),
-        (quadruped.mjcf.parent, "plane", "expected a registered robot: biped, quadruped"),
+        (quadruped.mjcf.parent, "plane", "expected one of biped, quadruped"),
     ):
         run = create_run(tmp_path / f"run {terrain == xml}", trained.task, robot, terrain)
         (run.folder / "model_2.pt").write_bytes(trained.checkpoint.read_bytes())

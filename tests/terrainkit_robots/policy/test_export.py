@@ -230,19 +230,19 @@ def test_export_policy_overwrites_only_if_told(trained, exported, tmp_path):
     assert sorted(path.name for path in folder.iterdir()) == ["notes.txt", *FILES]
 
 
-@pytest.mark.parametrize("name", ["export_onnx", "export_torchscript"])
-def test_export_policy_rejects_other_actions(trained, tmp_path, monkeypatch, name):
-    export = getattr(module, name)
+@pytest.mark.parametrize(("owner", "name"), [(module, "export_onnx"), (torch.jit, "save")])
+def test_export_policy_rejects_other_actions(trained, tmp_path, monkeypatch, owner, name):
+    export = getattr(owner, name)
 
     def export_wrong(policy, *rest):
         with torch.no_grad():
             policy[1].mlp[-1].bias += 1e-3
-        data = export(policy, *rest)
+        result = export(policy, *rest)
         with torch.no_grad():
             policy[1].mlp[-1].bias -= 1e-3
-        return data
+        return result
 
-    monkeypatch.setattr(module, name, export_wrong)
+    monkeypatch.setattr(owner, name, export_wrong)
     with pytest.raises(ExportError, match=r"off the live policy by 0\.001"):
         export_policy(trained, tmp_path / "policy")
     assert list(tmp_path.iterdir()) == []
@@ -256,6 +256,6 @@ def test_export_policy_requires_a_checkpoint(make_run, tmp_path):
 
 def test_export_policy_rejects_invalid_folders(trained, tmp_path):
     (tmp_path / "file").write_text("")
-    for folder, message in ((tmp_path / "file", "exists"), (tmp_path / "a" / "b", "no folder")):
+    for folder, message in ((tmp_path / "file", "exists"), (tmp_path / "a" / "b", "not exist")):
         with pytest.raises(ExportError, match=message):
             export_policy(trained, folder)

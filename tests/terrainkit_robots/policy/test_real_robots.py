@@ -22,7 +22,7 @@ TASK = Task(
 def test_real_robot_is_onboarded_and_trained(robot_file, tmp_path, name, joints, observed):
     """Twenty updates show no walking: that nothing breaks, and that all numbers stay numbers."""
     folder = tmp_path / "robot"
-    done = onboard(robot_file(name), folder, OnboardOptions(render_pictures=False))
+    done = onboard(robot_file(name), folder, OnboardOptions(render_images=False))
     assert done.folder == folder
     robot = Robot.load(folder)
     assert len(robot.spec.joint_order) == joints

@@ -254,8 +254,6 @@ def test_smoke_test_of_a_folder_uses_its_spec(tmp_path):
     assert check.measured.startswith("FL_foot 31.0 cm")
 
 
-def test_smoke_test_rejects_unknown_names_and_unused_specs(tmp_path):
+def test_smoke_test_rejects_unknown_names():
     with pytest.raises(ConfigError, match="biped, quadruped"):
         smoke_test("unicorn")
-    with pytest.raises(ConfigError, match=r"has its own robot\.toml"):
-        smoke_test("quadruped", spec=tmp_path / "robot.toml")

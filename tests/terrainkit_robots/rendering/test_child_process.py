@@ -8,7 +8,7 @@ import pytest
 
 from terrainkit_robots import gl_backend
 from terrainkit_robots.rendering import child_process
-from terrainkit_robots.rendering.child_process import RenderError, iterate_frames
+from terrainkit_robots.rendering.child_process import RenderError, stream_frames
 
 # Pickled by reference: the child process imports numpy and calls these.
 TWO_FRAMES = partial(np.zeros, (2, 4, 6, 3), np.uint8)
@@ -21,50 +21,50 @@ def backends(monkeypatch):
     monkeypatch.setattr(gl_backend, "backends", lambda: ("egl", "osmesa"))
 
 
-def test_iterate_frames_yields_frames_of_child():
-    frames = list(iterate_frames(TWO_FRAMES))
+def test_stream_frames_yields_frames_of_child():
+    frames = list(stream_frames(TWO_FRAMES))
     assert [(frame.shape, frame.dtype) for frame in frames] == 2 * [((4, 6, 3), np.uint8)]
 
 
-def test_iterate_frames_ignores_prints_of_libraries():
+def test_stream_frames_ignores_prints_of_libraries():
     # print() returns None, which is not an iterator of frames: the error arrives unharmed.
     with pytest.raises(RenderError, match=r"egl: TypeError: .*; osmesa: "):
-        list(iterate_frames(partial(print, "x" * 100_000)))
+        list(stream_frames(partial(print, "x" * 100_000)))
 
 
-def test_iterate_frames_reports_every_backend():
+def test_stream_frames_reports_every_backend():
     with pytest.raises(RenderError, match=r"\(egl: ValueError: .*; osmesa: .*\); install EGL"):
-        list(iterate_frames(partial(int, "one")))
+        list(stream_frames(partial(int, "one")))
 
 
-def test_iterate_frames_reports_invalid_backend(monkeypatch):
+def test_stream_frames_reports_invalid_backend(monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "nonsense")
     monkeypatch.setattr(gl_backend, "backends", lambda: ("nonsense",))
     with pytest.raises(RenderError, match=r"cannot render here \(nonsense: .*unset it") as caught:
-        list(iterate_frames(TWO_FRAMES))
+        list(stream_frames(TWO_FRAMES))
     assert "\n" not in str(caught.value)
 
 
-def test_iterate_frames_reports_crash():
+def test_stream_frames_reports_crash():
     with pytest.raises(RenderError, match=r"egl: the process crashed \(exit code 3\)"):
-        list(iterate_frames(partial(os._exit, 3)))
+        list(stream_frames(partial(os._exit, 3)))
 
 
-def test_iterate_frames_limits_length_of_reasons():
+def test_stream_frames_limits_length_of_reasons():
     with pytest.raises(RenderError) as caught:
-        list(iterate_frames(partial(int, "\n long " * 1000)))
+        list(stream_frames(partial(int, "\n long " * 1000)))
     assert len(str(caught.value)) < 600
 
 
-def test_iterate_frames_stops_slow_child(monkeypatch):
+def test_stream_frames_stops_slow_child(monkeypatch):
     monkeypatch.setattr(child_process, "FRAME_TIMEOUT", 0.5)
     start = time.monotonic()
     with pytest.raises(RenderError, match=r"no frame within 0\.5 s"):
-        list(iterate_frames(partial(time.sleep, 60)))
+        list(stream_frames(partial(time.sleep, 60)))
     assert time.monotonic() - start < 30
 
 
-def test_iterate_frames_closed_early_ends_child(monkeypatch):
+def test_stream_frames_closed_early_ends_child(monkeypatch):
     processes = []
     popen = child_process.subprocess.Popen
     monkeypatch.setattr(
@@ -72,7 +72,7 @@ def test_iterate_frames_closed_early_ends_child(monkeypatch):
         "Popen",
         lambda *args, **options: processes.append(popen(*args, **options)) or processes[-1],
     )
-    frames = iterate_frames(TWO_FRAMES)
+    frames = stream_frames(TWO_FRAMES)
     next(frames)
     frames.close()
     assert processes[0].returncode is not None

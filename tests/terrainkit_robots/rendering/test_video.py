@@ -147,7 +147,7 @@ def test_write_video_without_backend_leaves_no_file(spec, tmp_path, monkeypatch)
 def gray_frames(monkeypatch):
     """Replace the rendered frames by gray ones."""
     frames = [np.full((SIZE[1], SIZE[0], 3), 100, np.uint8)] * 8
-    monkeypatch.setattr(child_process, "iterate_frames", lambda _: iter(frames))
+    monkeypatch.setattr(child_process, "stream_frames", lambda _: iter(frames))
 
 
 # imageio_ffmpeg leaves the pipe of a failed process to the garbage collector.

@@ -4,8 +4,8 @@ import pytest
 
 from terrainkit import MapConfig, generate
 from terrainkit_robots.rendering.video_frames import (
-    crop_heightfields,
-    separate_box_tops,
+    cut_heightfields,
+    offset_box_tops,
     smooth_path,
 )
 
@@ -47,12 +47,12 @@ def ground_heights(model, xy):
 
 @pytest.mark.parametrize("attributes", ["", 'pos="0.3 -0.2 0.5"'])
 @pytest.mark.parametrize("body", ["{}", '<body pos="0.2 0.1 0">{}</body>'])
-def test_crop_heightfields_keeps_heights(attributes, body):
+def test_cut_heightfields_keeps_heights(attributes, body):
     model = make_hfield(attributes, body)
     points = np.random.default_rng(0).uniform((-0.9, -0.5), (1.1, 1.3), (100, 2))
     before = ground_heights(model, points)
     assert not np.isnan(before).any()
-    cropped = crop_heightfields(model, points)
+    cropped = cut_heightfields(model, points)
     np.testing.assert_allclose(ground_heights(cropped, points), before, atol=1e-6)
     assert cropped.hfield_ncol[0] < 15
     assert cropped.hfield_nrow[0] < 15
@@ -60,10 +60,10 @@ def test_crop_heightfields_keeps_heights(attributes, body):
     assert (model.hfield_nrow[0], model.hfield_ncol[0]) == (ROWS, COLS)
 
 
-def test_crop_heightfields_of_everything_changes_nothing():
+def test_cut_heightfields_of_everything_changes_nothing():
     model = make_hfield()
     points = np.random.default_rng(0).uniform((-3, -2), (3, 2), (100, 2))
-    cropped = crop_heightfields(model, np.array([[-90.0, -90], [90, 90]]))
+    cropped = cut_heightfields(model, np.array([[-90.0, -90], [90, 90]]))
     np.testing.assert_allclose(
         ground_heights(cropped, points), ground_heights(model, points), atol=1e-6
     )
@@ -71,8 +71,8 @@ def test_crop_heightfields_of_everything_changes_nothing():
 
 
 @pytest.mark.parametrize("at", [(50.0, 0.0), (-50.0, -50.0), (0.0, 1.99)])
-def test_crop_heightfields_keeps_one_cell(at):
-    cropped = crop_heightfields(make_hfield(), np.array([at]))
+def test_cut_heightfields_keeps_one_cell(at):
+    cropped = cut_heightfields(make_hfield(), np.array([at]))
     assert cropped.hfield_nrow[0] >= 2
     assert cropped.hfield_ncol[0] >= 2
     assert (cropped.hfield_size[0] > 0).all()
@@ -82,8 +82,8 @@ def test_crop_heightfields_keeps_one_cell(at):
     ("attributes", "body"),
     [('euler="0 0 40"', "{}"), ("", '<body pos="0 0 1"><joint/><geom size="1"/>{}</body>')],
 )
-def test_crop_heightfields_skips_rotated_or_moving(attributes, body):
-    cropped = crop_heightfields(make_hfield(attributes, body), np.zeros((1, 2)))
+def test_cut_heightfields_skips_rotated_or_moving(attributes, body):
+    cropped = cut_heightfields(make_hfield(attributes, body), np.zeros((1, 2)))
     assert (cropped.hfield_nrow[0], cropped.hfield_ncol[0]) == (ROWS, COLS)
 
 
@@ -101,20 +101,20 @@ def box_tops(model):
     return model.geom_pos[:, 2] + model.geom_size[:, 2]
 
 
-def test_separate_box_tops_lowers_one_of_two():
+def test_offset_box_tops_lowers_one_of_two():
     model = make_boxes(((0, 0, 0), (2, 1, 0.5)), ((1, 0, 0), (2, 3, 0.5)))
-    separate_box_tops(model)
+    offset_box_tops(model)
     np.testing.assert_allclose(box_tops(model), [0.5, 0.499])
 
 
-def test_separate_box_tops_uses_two_layers_for_ring():
+def test_offset_box_tops_uses_two_layers_for_ring():
     model = make_boxes(
         ((0, 0, 0), (1, 4, 0.5)),
         ((3, 0, 0), (4, 4, 0.5)),
         ((0, 0, 0), (4, 1, 0.5)),
         ((0, 3, 0), (4, 4, 0.5)),
     )
-    separate_box_tops(model)
+    offset_box_tops(model)
     np.testing.assert_allclose(box_tops(model), [0.5, 0.5, 0.499, 0.499])
 
 
@@ -126,10 +126,10 @@ def test_separate_box_tops_uses_two_layers_for_ring():
         ((5, 0, 0), (6, 1, 0.5)),  # far away
     ],
 )
-def test_separate_box_tops_keeps_separate_boxes(low, high):
+def test_offset_box_tops_keeps_separate_boxes(low, high):
     model = make_boxes(((0, 0, 0), (1, 1, 0.5)), (low, high))
     before = model.geom_pos.copy()
-    separate_box_tops(model)
+    offset_box_tops(model)
     np.testing.assert_array_equal(model.geom_pos, before)
 
 
@@ -142,27 +142,27 @@ def test_separate_box_tops_keeps_separate_boxes(low, high):
         '<body><freejoint/><geom type="box" size="1 1 0.5"/></body>',
     ],
 )
-def test_separate_box_tops_skips_other_geoms(more):
+def test_offset_box_tops_skips_other_geoms(more):
     model = make_boxes(((-1, -1, -0.5), (1, 1, 0.5)), more=more)
     before = model.geom_pos.copy()
-    separate_box_tops(model)
+    offset_box_tops(model)
     np.testing.assert_array_equal(model.geom_pos, before)
 
 
-def test_separate_box_tops_moves_box_at_origin():
+def test_offset_box_tops_moves_box_at_origin():
     model = make_boxes(((-1, -1, 0), (1, 1, 0.5)), ((-1, -1, -0.5), (1, 1, 0.5)))
-    separate_box_tops(model)
+    offset_box_tops(model)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     np.testing.assert_allclose(data.geom_xpos[:, 2], [0.25, -0.001])
 
 
-def test_separate_box_tops_of_map(tmp_path):
+def test_offset_box_tops_of_map(tmp_path):
     path = generate(MapConfig(rows=2, cols=10)).save(tmp_path / "map.xml", collision="boxes")
     model = mujoco.MjModel.from_xml_path(str(path))
     boxes = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_BOX)
     before = box_tops(model)[boxes]
-    separate_box_tops(model)
+    offset_box_tops(model)
     low = (model.geom_pos - model.geom_size)[boxes]
     high = (model.geom_pos + model.geom_size)[boxes]
     overlap = (low[:, None, :2] < high[None, :, :2] - 1e-6).all(axis=2)

@@ -1,7 +1,7 @@
-"""Robots, grounds and environments that are small and quick.
+"""Small robots, terrains, tasks and environments.
 
-`calm` tasks leave out all that is drawn at random, so that values can be worked by hand. Fixtures
-that are changed by a test are made anew; what is only read lives as long as the session.
+`calm` tasks have no randomization, so that values can be computed by hand. Fixtures that tests
+modify are made for each test; the others are shared in the session.
 """
 
 import sys
@@ -35,7 +35,7 @@ from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import MapTerrain, Plane, Terrain
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
-# The contract is a class that several test files share; there are no packages here to find it in.
+# Test files are not in packages, so shared modules are found by path.
 sys.path.append(str(Path(__file__).parent))
 pytest.register_assert_rewrite("vec_env_contract")
 
@@ -83,7 +83,7 @@ CART = """
   </keyframe>
 </mujoco>
 """
-"""A robot with defaults, motors and sensors of its own, that training must not take over."""
+"""A robot whose own defaults, motors and sensors training must ignore."""
 
 
 @pytest.fixture(scope="session")
@@ -98,7 +98,7 @@ def biped() -> Robot:
 
 @pytest.fixture(scope="session")
 def cart_spec() -> RobotSpec:
-    """Return the spec of a cart whose joints are in another order than in its MJCF."""
+    """Return the spec of a cart; the MJCF has another order of joints."""
     return RobotSpec(
         name="cart",
         urdf="cart.urdf",
@@ -134,7 +134,7 @@ def cart(cart_spec: RobotSpec, tmp_path_factory: pytest.TempPathFactory) -> Robo
 
 @pytest.fixture(scope="session")
 def mixed_map() -> TerrainMap:
-    """Return a map of level and sloping ground on which x and y, and all patches, differ."""
+    """Return a map of stairs and slopes that is not symmetric in x and y."""
     return generate(
         MapConfig(
             rows=3,
@@ -157,7 +157,7 @@ def map_ground(mixed_map: TerrainMap) -> Terrain:
 
 @pytest.fixture(scope="session")
 def calm() -> Callable[..., Task]:
-    """Return tasks of four robots that start alike, stand still and are left alone."""
+    """Return a function that makes tasks without randomization, noise and pushes."""
 
     def make(num_envs: int = 4, **sections: Any) -> Task:
         still = {
@@ -183,7 +183,7 @@ def calm() -> Callable[..., Task]:
 
 @pytest.fixture(scope="session")
 def lively() -> Callable[..., Task]:
-    """Return tasks with everything that is drawn at random, of few robots."""
+    """Return a function that makes tasks of few robots with all randomization."""
 
     def make(num_envs: int = 4, num_threads: int = 1, **sections: Any) -> Task:
         return Task(**({"env": Env(num_envs=num_envs, num_threads=num_threads)} | sections))
@@ -193,7 +193,7 @@ def lively() -> Callable[..., Task]:
 
 @pytest.fixture
 def run_of(lively: Callable[..., Task], tmp_path: Path) -> Callable[..., Run]:
-    """Return runs without a checkpoint."""
+    """Return a function that makes runs without a checkpoint."""
     numbers = count()
 
     def make(ground: str | Path = "plane", **sections: Any) -> Run:
@@ -210,7 +210,7 @@ def map_file(mixed_map: TerrainMap, tmp_path: Path) -> Path:
 
 @pytest.fixture(scope="session")
 def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of a run with two checkpoints, which is only to be read."""
+    """Return the folder of a run with two checkpoints; tests must not modify it."""
     task = Task(
         env=Env(num_envs=4, num_threads=1),
         policy=Policy(actor_hidden_dims=(16, 16), critic_hidden_dims=(16, 16)),
@@ -225,7 +225,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def standing(quadruped: Robot, calm: Callable[..., Task]) -> LeggedEnv:
-    """Return four quadrupeds that have come to rest on a plane."""
+    """Return an environment with four quadrupeds at rest on a plane."""
     env = LeggedEnv(calm(), quadruped, Plane())
     for _ in range(50):
         env.step(torch.zeros(4, 12))

@@ -1,4 +1,4 @@
-"""States made by hand, for tests of what reads them."""
+"""Handmade states for tests."""
 
 from collections.abc import Mapping
 from dataclasses import fields
@@ -14,7 +14,7 @@ Shape = tuple[int, ...]
 
 
 def shapes(*, joints: int, feet: int, penalized: int, points: int) -> dict[str, Shape]:
-    """Return the shape that each array of a state has for one robot."""
+    """Return the shapes of the arrays of a state, for one robot."""
     others = {
         "base_pos": (3,),
         "base_quat": (4,),
@@ -40,7 +40,7 @@ def shapes(*, joints: int, feet: int, penalized: int, points: int) -> dict[str, 
 
 
 def made_state(of_one: Mapping[str, Shape], n: int, **arrays: Any) -> State:
-    """Return a state of n robots that is 0 everywhere but in what is given."""
+    """Return a state of n robots that is 0 except for the given arrays."""
     made = {}
     for name, shape in of_one.items():
         made[name] = np.zeros((n, *shape), bool if name in FLAGS else np.float32)

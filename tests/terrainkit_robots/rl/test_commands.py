@@ -1,4 +1,4 @@
-"""The commands: what is drawn, how headings become turning speeds, when there are new ones."""
+"""Velocity commands: sampling, heading control, resampling and the command curriculum."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -67,7 +67,7 @@ class TestSampleCommands:
         speed, turn = np.hypot(commands[:, 0], commands[:, 1]), np.abs(commands[:, 2])
         assert (speed[speed > 0] >= 0.4).all()
         assert (turn[turn > 0] >= 0.4).all()
-        # A disc of radius 0.4 in a square of 2, and 0.4 of 1: of each for itself.
+        # The area of a disc of radius 0.4 in a square of side 2, and 0.4 of the yaw range.
         assert (speed == 0).mean() == pytest.approx(np.pi * 0.16 / 4, abs=0.01)
         assert (turn == 0).mean() == pytest.approx(0.4, abs=0.015)
         assert ((speed == 0) & (turn > 0)).any()
@@ -78,7 +78,7 @@ class TestSampleCommands:
         commands, heading = draw(replace(_ALL, standing=share))
         stands = (commands == 0).all(axis=1)
         assert stands.mean() == pytest.approx(share, abs=0.015)
-        # To stand is not to turn to a heading either.
+        # A command to stand has no heading.
         np.testing.assert_array_equal(np.isnan(heading), stands)
 
     def test_same_seed_gives_same_values(self) -> None:
@@ -102,7 +102,7 @@ class TestHeading:
         assert self.turn(1.0, 0.2, heading_stiffness=1.0) == pytest.approx(0.8)
 
     def test_yaw_rate_takes_the_short_way(self) -> None:
-        # From 3 rad to -3 rad it is 0.2832 to the left.
+        # The short way from 3 rad to -3 rad is 0.2832 rad to the left.
         assert self.turn(-3, 3) == pytest.approx(0.5 * 0.2832, abs=1e-4)
         assert self.turn(3, -3) == pytest.approx(-0.5 * 0.2832, abs=1e-4)
 
@@ -127,27 +127,27 @@ class TestHeading:
 
 class TestUsesHeading:
     @pytest.mark.parametrize(
-        ("given", "level", "asked"),
+        ("given", "level", "expected"),
         [(None, True, False), (None, False, True), (True, True, True), (False, False, False)],
     )
     def test_default_depends_on_flatness(
-        self, given: bool | None, *, level: bool, asked: bool
+        self, given: bool | None, *, level: bool, expected: bool
     ) -> None:
         ground = Plane()
         ground.is_flat = level
         settings = Commands(heading_command=given, standing=0.0)
-        assert uses_heading(Task(commands=settings), ground) == asked
+        assert uses_heading(Task(commands=settings), ground) == expected
         env = make_env(ground=ground, commands=settings)
-        assert env.velocity_command.heading_command == asked
+        assert env.velocity_command.heading_command == expected
         before = env.commands[:, 2].copy()
         env.velocity_command.update_heading(quat_to_yaw(env.state.base_quat) + np.float32(0.5))
-        assert (env.commands[:, 2] != before).any() == asked
+        assert (env.commands[:, 2] != before).any() == expected
 
 
 def expanded(
     lin_vel_x: tuple[float, float], tracking: float, settings: Commands
 ) -> tuple[float, float]:
-    """Return the range of the forward speed after 10 s of tracking, of 10 s that are averaged."""
+    """Return the range of the forward speed after 10 s of tracking, averaged over 10 s."""
     command = VelocityCommand(settings, 4, 0.02, heading_command=False)
     command.lin_vel_x = lin_vel_x
     command.expand_range(1.5 * tracking * 10, 10, scale=1.5, min_seconds=10)
@@ -187,7 +187,7 @@ class TestExpandRange:
 
 
 def make_env(num_envs: int = 4, **changes: Any) -> LeggedEnv:
-    """Return an environment in which nothing moves robots but gravity."""
+    """Return an environment without pushes and random velocities."""
     task = Task(
         env=changes.pop("env", Env(num_envs=num_envs, num_threads=1)),
         init_state=InitState(lin_vel=0, ang_vel=0, reset_range=(1, 1)),
@@ -200,7 +200,7 @@ def make_env(num_envs: int = 4, **changes: Any) -> LeggedEnv:
 
 
 def run(env: LeggedEnv, steps: int) -> list[Any]:
-    """Return the commands after each step."""
+    """Step the environment, and return the commands after each step."""
     seen = []
     for _ in range(steps):
         env.step(torch.zeros(env.num_envs, env.num_actions))
@@ -242,15 +242,15 @@ class TestInEnvironment:
         np.testing.assert_allclose(env.get_observations()["policy"][:, :3], scaled)
 
     def test_reward_uses_the_commands_of_the_step(self) -> None:
-        """Not what has just been drawn for the next step."""
+        """The reward must not use the commands that were just sampled for the next step."""
         only = Rewards(**{**dict.fromkeys(REWARDS, 0.0), "tracking_lin_vel": 1.0})
         env = make_env(commands=Commands(standing=0, resampling_time=0.02), rewards=only)
         for _ in range(3):
-            asked = env.commands.copy()
+            expected = env.commands.copy()
             _, rewards, *_ = env.step(torch.zeros(4, 12))
-            off = np.square(asked[:, :2] - env.state.base_lin_vel[:, :2]).sum(axis=1)
+            off = np.square(expected[:, :2] - env.state.base_lin_vel[:, :2]).sum(axis=1)
             np.testing.assert_allclose(rewards, 0.02 * np.exp(-off / 0.25), rtol=1e-4)
-            assert (env.commands != asked).any()
+            assert (env.commands != expected).any()
 
     def test_yaw_rate_follows_the_heading(self) -> None:
         env = make_env(commands=Commands(heading_command=True, standing=0))
@@ -295,7 +295,7 @@ class TestInEnvironment:
         assert np.abs(run(env, 3)[-1]).max() <= 1
 
     def test_range_expands_after_min_seconds(self) -> None:
-        """One robot that stood still as it was told to does not make all of them run."""
+        """A single short episode must not expand the range for all robots."""
         env = make_env(
             num_envs=4,
             env=Env(num_envs=4, num_threads=1, episode_length_s=0.2),

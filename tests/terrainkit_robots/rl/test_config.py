@@ -6,9 +6,9 @@ from typing import Annotated, get_type_hints
 import pytest
 from msgspec import Meta
 
-from terrainkit.annotations import SORTED, PositiveFloat
 from terrainkit.errors import ConfigError
 from terrainkit.schema import Config, field_docs
+from terrainkit.type_hint import SORTED, PositiveFloat
 from terrainkit_robots.rl.config import (
     Algorithm,
     Asset,

@@ -6,9 +6,9 @@ from typing import Literal, get_args, get_origin, get_type_hints
 
 import pytest
 
-from terrainkit.annotations import parse_annotation
 from terrainkit.errors import ConfigError
 from terrainkit.schema import Config, flatten
+from terrainkit.type_hint import parse_hint
 from terrainkit_robots.rl.config import Commands, Rewards, Task
 
 
@@ -66,7 +66,7 @@ def with_value(section, name, value):
 
 def others(kind, value):
     """Return values of a type other than `value`, within any limits of ours."""
-    if parse_annotation(kind).is_optional:
+    if parse_hint(kind).is_optional:
         (inner,) = (part for part in get_args(kind) if part is not types.NoneType)
         return [*([] if value is None else [None]), *others(inner, value)]
     if get_origin(kind) is Literal:

@@ -1,4 +1,4 @@
-"""The curriculum: simulated robots end on the ground that suits them."""
+"""The terrain curriculum, with simulated skills and in the environment."""
 
 from pathlib import Path
 from typing import Any
@@ -20,11 +20,11 @@ from terrainkit_robots.rl.terrain import Plane
 torch.set_num_threads(1)
 
 _STEP = 1.0
-"""Time step of the simulated walks [s]."""
+"""Time step of the simulated episodes [s]."""
 
 
 class Patches(Plane):
-    """A plane that counts as a map of patches, 8 m long."""
+    """A plane that is divided into patches of 8 m."""
 
     is_flat = False
 
@@ -35,7 +35,7 @@ class Patches(Plane):
         self.terrain_names = np.tile(np.array(names), (rows, 1))
 
 
-def live(
+def simulate(
     curriculum: TerrainCurriculum,
     skill: NDArray[np.float64],
     episodes: int,
@@ -43,9 +43,9 @@ def live(
     *,
     noise: float,
 ) -> None:
-    """Let robots live episodes of 20 s: each follows its commands up to the level of its skill.
+    """Simulate episodes of 20 s: robots follow their commands up to the level of their skill.
 
-    On harder ground a robot falls in place. It follows at nine tenths of the speed asked for.
+    Above that level a robot falls at once. Robots walk at nine tenths of the commanded speed.
     """
     n, rng = len(skill), np.random.default_rng(7)
     steering = VelocityCommand(commands, n, 1.0, heading_command=True)
@@ -56,25 +56,25 @@ def live(
         pos, yaw = np.zeros((n, 2)), rng.uniform(-np.pi, np.pi, n).astype(np.float32)
         for step in range(20):
             if step % 10 == 0:
-                wanted, heading = sample_commands(rng, n, commands, commands.lin_vel_x)
+                command, heading = sample_commands(rng, n, commands, commands.lin_vel_x)
             if commands.heading_command:
-                steering.heading, steering.commands = heading, wanted
+                steering.heading, steering.commands = heading, command
                 steering.update_heading(yaw)
-            curriculum.accumulate_command(wanted, yaw, _STEP)
+            curriculum.accumulate_command(command, yaw, _STEP)
             c, s = np.cos(yaw), np.sin(yaw)
-            pos[:, 0] += 0.9 * _STEP * (c * wanted[:, 0] - s * wanted[:, 1])
-            pos[:, 1] += 0.9 * _STEP * (s * wanted[:, 0] + c * wanted[:, 1])
-            yaw += np.float32(_STEP) * wanted[:, 2]
+            pos[:, 0] += 0.9 * _STEP * (c * command[:, 0] - s * command[:, 1])
+            pos[:, 1] += 0.9 * _STEP * (s * command[:, 0] + c * command[:, 1])
+            yaw += np.float32(_STEP) * command[:, 2]
         distance = np.where(fails, 0.1, np.linalg.norm(pos, axis=1))
         curriculum.on_episode_end(everyone, distance, fails, update_levels=True)
 
 
 def walk(curriculum: TerrainCurriculum, forward: float, seconds: float) -> None:
-    """Ask every robot to go east."""
+    """Command every robot to walk along x."""
     n = len(curriculum.levels)
-    wanted = np.tile(np.array([forward, 0, 0], np.float32), (n, 1))
+    command = np.tile(np.array([forward, 0, 0], np.float32), (n, 1))
     for _ in range(round(seconds / _STEP)):
-        curriculum.accumulate_command(wanted, np.zeros(n, np.float32), _STEP)
+        curriculum.accumulate_command(command, np.zeros(n, np.float32), _STEP)
 
 
 def end_all(curriculum: TerrainCurriculum, distance: float, *, fallen: bool = False) -> None:
@@ -86,7 +86,7 @@ def end_all(curriculum: TerrainCurriculum, distance: float, *, fallen: bool = Fa
 
 @pytest.fixture
 def curriculum() -> TerrainCurriculum:
-    """Four robots at level 4 of 10, on a patch 8 m long."""
+    """Return the curriculum of four robots at level 4 of 10, with patches of 8 m."""
     made = TerrainCurriculum(Patches(), 4, 5, 1)
     made.levels[:] = 4
     return made
@@ -97,7 +97,7 @@ class TestConvergence:
     @pytest.mark.parametrize("skill", [2, 5, 7])
     def test_levels_converge_to_skill(self, skill: int, *, heading: bool) -> None:
         curriculum = TerrainCurriculum(Patches(), 100, 5, 1)
-        live(
+        simulate(
             curriculum, np.full(100, skill + 0.5), 60, Commands(heading_command=heading), noise=0.5
         )
         assert curriculum.levels.mean() == pytest.approx(skill, abs=0.75)
@@ -106,65 +106,65 @@ class TestConvergence:
     def test_robots_converge_independently(self) -> None:
         curriculum = TerrainCurriculum(Patches(), 200, 5, 1)
         skill = np.repeat([1.5, 6.5], 100)
-        live(curriculum, skill, 80, Commands(), noise=0.5)
+        simulate(curriculum, skill, 80, Commands(), noise=0.5)
         assert curriculum.levels[:100].mean() == pytest.approx(1, abs=0.75)
         assert curriculum.levels[100:].mean() == pytest.approx(6, abs=0.75)
 
     def test_perfect_robots_stay_in_top_rows(self) -> None:
         curriculum = TerrainCurriculum(Patches(), 100, 5, 1)
-        live(curriculum, np.full(100, np.inf), 60, Commands(), noise=0.5)
+        simulate(curriculum, np.full(100, np.inf), 60, Commands(), noise=0.5)
         assert set(curriculum.levels) == {7, 8, 9}
         before = curriculum.levels.copy()
-        live(curriculum, np.full(100, np.inf), 5, Commands(), noise=0.5)
+        simulate(curriculum, np.full(100, np.inf), 5, Commands(), noise=0.5)
         assert curriculum.levels.min() >= 7
         assert (curriculum.levels != before).any()
 
     def test_failing_robots_reach_first_row(self) -> None:
         curriculum = TerrainCurriculum(Patches(), 100, 5, 1)
-        live(curriculum, np.full(100, -np.inf), 10, Commands(), noise=0.5)
+        simulate(curriculum, np.full(100, -np.inf), 10, Commands(), noise=0.5)
         assert set(curriculum.levels) == {0}
 
     def test_same_seed_gives_same_levels(self) -> None:
         levels = []
         for _ in range(2):
             curriculum = TerrainCurriculum(Patches(), 50, 5, 3)
-            live(curriculum, np.full(50, np.inf), 40, Commands(), noise=0.5)
+            simulate(curriculum, np.full(50, np.inf), 40, Commands(), noise=0.5)
             levels.append(curriculum.levels)
         np.testing.assert_array_equal(*levels)
 
     def test_columns_never_change(self) -> None:
         curriculum = TerrainCurriculum(Patches(), 10, 5, 1)
         assert curriculum.columns.tolist() == [0] * 5 + [1] * 5
-        live(curriculum, np.full(10, 3.0), 10, Commands(), noise=0.5)
+        simulate(curriculum, np.full(10, 3.0), 10, Commands(), noise=0.5)
         assert curriculum.columns.tolist() == [0] * 5 + [1] * 5
         np.testing.assert_array_equal(curriculum.env_origins[:, 0], 8 * curriculum.levels + 4)
 
 
 class TestOnEpisodeEnd:
-    """Half of 8 m is crossed; half of what was asked is enough to stay."""
+    """Robots move up after 4 m, and stay with half of the commanded distance."""
 
     @pytest.mark.parametrize(
-        ("asked", "distance", "fallen", "level"),
+        ("commanded", "distance", "fallen", "level"),
         [
             (10.0, 4.5, False, 5),  # crossed
-            (10.0, 3.9, False, 3),  # less than half of what was asked
+            (10.0, 3.9, False, 3),  # less than half of the command
             (7.0, 3.6, False, 4),  # more than half of it
             (1.0, 0.1, False, 3),
             (1.0, 0.6, False, 4),
-            (1.0, 0.9, True, 3),  # as asked, but it fell
+            (1.0, 0.9, True, 3),  # far enough, but fallen
             (10.0, 4.5, True, 5),  # fell after it had crossed
         ],
     )
     def test_level_change(
         self,
         curriculum: TerrainCurriculum,
-        asked: float,
+        commanded: float,
         distance: float,
         *,
         fallen: bool,
         level: int,
     ) -> None:
-        walk(curriculum, asked / 10, 10)
+        walk(curriculum, commanded / 10, 10)
         end_all(curriculum, distance, fallen=fallen)
         assert curriculum.levels.tolist() == [level] * 4
 
@@ -179,13 +179,13 @@ class TestOnEpisodeEnd:
         assert curriculum.levels.tolist() == [3] * 4
 
     def test_only_elapsed_time_counts(self, curriculum: TerrainCurriculum) -> None:
-        """Asked for 1 m/s during 2 s, not during an episode of 20 s."""
+        """A command of 1 m/s for 2 s counts as 2 m, not as the 20 m of a full episode."""
         walk(curriculum, 1.0, 2)
         end_all(curriculum, 1.8)
         assert curriculum.levels.tolist() == [4] * 4
 
     def test_changing_commands_are_integrated(self, curriculum: TerrainCurriculum) -> None:
-        """There and back again: the robot is where it was asked to be."""
+        """Forward and back: the commanded displacement is 0."""
         walk(curriculum, 1.0, 10)
         walk(curriculum, -1.0, 10)
         end_all(curriculum, 0.2)
@@ -235,7 +235,7 @@ class TestSuccess:
         curriculum.on_episode_end(
             np.arange(4), np.full(4, 5.0) * ~fallen, fallen, update_levels=False
         )
-        # Of the two at level 0 the first fell, and the second weighs a twentieth.
+        # Of the two robots at level 0, the first fell; the second has the weight 0.05.
         assert curriculum.success[0, 0] == pytest.approx(0.05)
         assert curriculum.success[4, 1] == curriculum.success[9, 1] == 1
         assert np.isnan(curriculum.success).sum() == 20 - 3
@@ -293,12 +293,12 @@ class TestCheckpoint:
         whole, first = (TerrainCurriculum(Patches(), 20, 5, 1) for _ in range(2))
         skill = np.full(20, np.inf)
         for each in (whole, first):
-            live(each, skill, 30, Commands(), noise=0.5)
+            simulate(each, skill, 30, Commands(), noise=0.5)
         other = TerrainCurriculum(Patches(), 20, 5, 99)
         other._seed = 1
         other.load_state_dict(first.state_dict())
         for each in (whole, other):
-            live(each, skill, 10, Commands(), noise=0.5)
+            simulate(each, skill, 10, Commands(), noise=0.5)
         np.testing.assert_array_equal(other.levels, whole.levels)
         np.testing.assert_array_equal(other.columns, whole.columns)
         np.testing.assert_array_equal(other.commanded, whole.commanded)
@@ -306,7 +306,7 @@ class TestCheckpoint:
 
     def test_state_dict_is_a_copy(self, curriculum: TerrainCurriculum) -> None:
         state = curriculum.state_dict()
-        live(curriculum, np.full(4, np.inf), 5, Commands(), noise=0.5)
+        simulate(curriculum, np.full(4, np.inf), 5, Commands(), noise=0.5)
         assert state["levels"].tolist() == [4] * 4
         assert np.isnan(np.asarray(state["success"])).all()
 
@@ -338,7 +338,7 @@ class TestCheckpoint:
 
 
 class TestInEnvironment:
-    """The curriculum of a real environment, whose robots do nothing but stand."""
+    """The curriculum in an environment whose robots only stand."""
 
     def make(self, **terrain: Any) -> LeggedEnv:
         task = Task(
@@ -388,12 +388,12 @@ class TestInEnvironment:
         assert env.curriculum.levels.tolist() == [4] * 6
 
     def test_cut_episodes_keep_levels(self) -> None:
-        """As rsl-rl's runner does it with `init_at_random_ep_len`."""
+        """rsl-rl cuts the first episodes with `init_at_random_ep_len`."""
         env = self.make()
         env.episode_length_buf = torch.tensor([0, 1, 2, 3, 5, 9])
         self.walk(env, 10)
         assert env.curriculum.levels.tolist() == [3, 4, 4, 4, 4, 4]
-        # From then on their episodes are whole.
+        # From here on the episodes are complete.
         self.walk(env, 10)
         assert env.curriculum.levels.tolist() == [2, 3, 3, 3, 3, 3]
 
@@ -404,7 +404,7 @@ class TestInEnvironment:
         assert env.curriculum.levels.tolist() == [3, 3, 5, 3, 3, 3]
 
     def test_leaving_the_map_moves_up(self) -> None:
-        """A patch may be narrower than it is long: its side is nearer than half its length."""
+        """The side of a narrow patch is closer than half of its length."""
         env = self.make()
         env.terrain.lower = (-np.inf, 2.0)
         env.sim.qpos[1, 1] -= 2.9

@@ -53,7 +53,7 @@ class TestEnvWithTorqueControl(VecEnvContract):
         return LeggedEnv(task, quadruped, Plane())
 
 
-def still(env):
+def stand(env):
     return env.step(torch.zeros(env.num_envs, env.num_actions))
 
 
@@ -63,7 +63,7 @@ def acts(env, count, seed=0):
 
 
 def record(env, actions):
-    """Return the bytes of all that steps return."""
+    """Return the bytes of everything that the steps return."""
     found = []
     for each in actions:
         observed, rewards, dones, extras = env.step(each)
@@ -76,7 +76,7 @@ class TestObservations:
     def test_widths(self, quadruped, biped, calm, map_ground):
         env = LeggedEnv(calm(), quadruped, Plane())
         assert env.get_observations()["policy"].shape == (4, 45)
-        # And 3 velocity, friction, mass, 3 center of mass, 12 offsets, 3 push, 12 forces.
+        # Plus velocity 3, friction, mass, center of mass 3, offsets 12, push 3, forces 12.
         assert env.get_observations()["privileged"].shape == (4, 45 + 3 + 1 + 1 + 3 + 12 + 3 + 12)
         env = LeggedEnv(calm(), quadruped, map_ground)
         assert env.get_observations()["policy"].shape == (4, 45 + 187)
@@ -93,12 +93,12 @@ class TestObservations:
 
     @pytest.mark.parametrize("on_map", [False, True])
     def test_foot_forces_are_in_units_of_weight(self, quadruped, calm, map_ground, on_map):
-        # The ground has a mass too: thousands of tons.
+        # The model's total mass includes that of the ground, thousands of tons.
         env = LeggedEnv(calm(), quadruped, map_ground if on_map else Plane())
         env.curriculum.levels[:] = 0
         env.reset()
         for _ in range(50):
-            observed, *_ = still(env)
+            observed, *_ = stand(env)
         up = observed["privileged"][:, -12:].reshape(4, 4, 3)[..., 2]
         np.testing.assert_allclose(up.sum(axis=1), 1, atol=0.03)
 
@@ -108,14 +108,14 @@ class TestObservations:
         for _ in range(10):
             observed = env.get_observations()["policy"][:, :3] / torch.tensor([2, 2, 0.25])
             np.testing.assert_allclose(observed, env.commands, atol=1e-6)
-            still(env)
+            stand(env)
 
     def test_heading_command_is_observed_at_reset(self, quadruped, lively):
         commands = Commands(heading_command=True, standing=0.0, resampling_time=100.0)
         env = LeggedEnv(lively(16, commands=commands), quadruped, Plane())
         first = env.commands[:, 2].copy()
-        still(env)
-        # Robots hardly turn in 20 ms, so neither does what they are asked for.
+        stand(env)
+        # Robots hardly turn in 20 ms, so the commands hardly change.
         np.testing.assert_allclose(env.commands[:, 2], first, atol=0.05)
 
 
@@ -124,9 +124,9 @@ class TestTermination:
         env = LeggedEnv(calm(2), quadruped, Plane())
         assert env.max_episode_length == 1000
         for k in range(999):
-            _, _, dones, extras = still(env)
+            _, _, dones, extras = stand(env)
             assert not dones.any(), k
-        _, _, dones, extras = still(env)
+        _, _, dones, extras = stand(env)
         assert dones.all()
         assert extras["time_outs"].all()
         assert extras["log"]["Episode/falls"] == 0
@@ -137,7 +137,7 @@ class TestTermination:
         twin = LeggedEnv(calm(4), quadruped, MapTerrain(mixed_map))
         for each in (env, twin):
             for _ in range(5):
-                still(each)
+                stand(each)
         qpos, qvel = env.sim.qpos[2], env.sim.qvel[2]
         if how == "back":
             qpos[3:7] = (0, 1, 0, 0)
@@ -151,8 +151,8 @@ class TestTermination:
             qvel[8] = 1e12
         else:
             qpos[9] = np.nan
-        observed, rewards, dones, extras = still(env)
-        expected, expected_rewards, *_ = still(twin)
+        observed, rewards, dones, extras = stand(env)
+        expected, expected_rewards, *_ = stand(twin)
         assert dones.tolist() == [False, False, True, False]
         assert not extras["time_outs"].any()
         assert extras["log"]["Episode/falls"] == 1
@@ -170,7 +170,7 @@ class TestTermination:
         for k, tilt in enumerate((0.0, 0.45, 0.55)):
             env.sim.qpos[k, 2] = 2.0
             env.sim.qpos[k, 3:7] = (np.cos(tilt / 2), 0, np.sin(tilt / 2), 0)
-        _, _, dones, _ = still(env)
+        _, _, dones, _ = stand(env)
         assert dones.tolist() == [False, False, True]
 
     def test_base_contact_terminates(self, quadruped, calm):
@@ -178,7 +178,7 @@ class TestTermination:
         env.sim.qpos[1, 2:7] = (0.06, 0, 1, 0, 0)
         fell = []
         for _ in range(10):
-            _, _, dones, extras = still(env)
+            _, _, dones, extras = stand(env)
             assert not extras["time_outs"].any()
             fell.append(dones.tolist())
             if dones.any():
@@ -189,15 +189,15 @@ class TestTermination:
         env = LeggedEnv(calm(3), quadruped, Plane())
         for value in (np.nan, 1e12, np.nan, 1e9, np.inf):
             env.sim.qvel[1, 7] = value
-            _, rewards, dones, _ = still(env)
+            _, rewards, dones, _ = stand(env)
             assert dones.tolist() == [False, True, False], value
             assert torch.isfinite(rewards).all()
 
     def test_unstable_state_gets_only_termination_reward(self, quadruped, calm):
-        # What is seen of it is the pose of MuJoCo's reset, in which nothing is asked too much.
+        # Its state is that of MuJoCo's reset, which must not be rewarded.
         env = LeggedEnv(calm(3, rewards=Rewards(termination=-3.0)), quadruped, Plane())
         env.sim.qvel[1, 7] = np.nan
-        _, rewards, dones, extras = still(env)
+        _, rewards, dones, extras = stand(env)
         assert dones.tolist() == [False, True, False]
         assert rewards[1] == pytest.approx(-3 * 0.02)
         paid = {k: v for k, v in extras["log"].items() if k.startswith("Episode/rew_")}
@@ -206,12 +206,12 @@ class TestTermination:
         assert (rewards[[0, 2]] > 0).all()
 
     def test_unstable_state_is_no_curriculum_success(self, quadruped, calm, map_ground):
-        # MuJoCo puts it at the world's origin, far from where the robot was.
+        # MuJoCo moves the robot to the world's origin, far from its start.
         env = LeggedEnv(calm(4), quadruped, map_ground)
         env.curriculum.levels[:] = 1
         env.reset()
         env.sim.qvel[2, 7] = np.nan
-        _, _, dones, _ = still(env)
+        _, _, dones, _ = stand(env)
         assert dones.tolist() == [False, False, True, False]
         assert env.curriculum.levels[2] <= 1
         assert np.nansum(env.curriculum.success) == 0
@@ -220,7 +220,7 @@ class TestTermination:
         task = calm(2, rewards=Rewards(termination=-100.0, only_positive_rewards=True))
         env = LeggedEnv(task, quadruped, Plane())
         env.sim.qpos[1, 2:7] = (1.0, 0, 1, 0, 0)
-        _, rewards, dones, _ = still(env)
+        _, rewards, dones, _ = stand(env)
         assert dones.tolist() == [False, True]
         assert rewards[0] >= 0
         assert rewards[1] == pytest.approx(-2.0, abs=0.1)
@@ -229,7 +229,7 @@ class TestTermination:
         env = LeggedEnv(calm(2), quadruped, Plane())
         env.episode_length_buf = torch.tensor([999, 999])
         env.sim.qpos[1, 2:7] = (1.0, 0, 1, 0, 0)
-        _, _, dones, extras = still(env)
+        _, _, dones, extras = stand(env)
         assert dones.all()
         assert extras["time_outs"].tolist() == [True, False]
 
@@ -237,9 +237,9 @@ class TestTermination:
 class TestLog:
     def test_logged_rewards_are_per_second(self, quadruped, calm):
         env = LeggedEnv(calm(2), quadruped, Plane())
-        total = sum(still(env)[1] for _ in range(9))
+        total = sum(stand(env)[1] for _ in range(9))
         env.episode_length_buf = torch.tensor([0, 999])
-        _, rewards, _, extras = still(env)
+        _, rewards, _, extras = stand(env)
         total = total + rewards
         logged = {k: v for k, v in extras["log"].items() if k.startswith("Episode/rew_")}
         assert sum(logged.values()) == pytest.approx(float(total[1]) / (10 * 0.02), rel=1e-4)
@@ -247,24 +247,24 @@ class TestLog:
     def test_every_reward_is_logged(self, quadruped, calm):
         env = LeggedEnv(calm(2), quadruped, Plane())
         env.episode_length_buf = torch.tensor([0, 999])
-        log = still(env)[3]["log"]
+        log = stand(env)[3]["log"]
         assert {f"Episode/rew_{name}" for name in env.rewards} <= set(log)
 
     def test_log_has_levels_on_a_map(self, quadruped, calm, map_ground):
         env = LeggedEnv(calm(4), quadruped, map_ground)
         env.episode_length_buf = torch.tensor([0, 999, 0, 0])
-        log = still(env)[3]["log"]
+        log = stand(env)[3]["log"]
         assert {"Curriculum/level_stairs", "Curriculum/level_rough_slope"} <= set(log)
 
     def test_log_omits_terrains_without_robots(self, quadruped, calm, map_ground):
-        # One robot on a map with two columns: nobody is on the second.
+        # With one robot, the second column of the map is empty.
         env = LeggedEnv(calm(1), quadruped, map_ground)
         env.episode_length_buf = torch.tensor([999])
-        log = still(env)[3]["log"]
+        log = stand(env)[3]["log"]
         assert np.isfinite(list(log.values())).all()
 
     def test_no_log_without_resets(self, quadruped, calm):
-        assert "log" not in still(LeggedEnv(calm(2), quadruped, Plane()))[3]
+        assert "log" not in stand(LeggedEnv(calm(2), quadruped, Plane()))[3]
 
 
 class TestSeeds:
@@ -288,7 +288,7 @@ class TestSeeds:
         torch.manual_seed(0)
         before = np.random.get_state()[1].copy(), torch.get_rng_state().clone()  # noqa: NPY002
         env = LeggedEnv(lively(3), quadruped, Plane())
-        still(env)
+        stand(env)
         assert np.array_equal(np.random.get_state()[1], before[0])  # noqa: NPY002
         assert torch.equal(torch.get_rng_state(), before[1])
 
@@ -298,7 +298,7 @@ class TestStateDict:
     def test_resume_is_bit_identical(self, quadruped, lively, map_ground, on_map):
         ground = map_ground if on_map else Plane()
         domain_rand = DomainRand(push_interval_s=0.3)
-        # Short commands and episodes, so that all that is drawn is drawn again.
+        # Short commands and episodes, so that everything random is sampled again.
         task = lively(
             env=Env(num_envs=6, num_threads=1, episode_length_s=0.7),
             commands=Commands(
@@ -339,7 +339,7 @@ class TestStateDict:
     def test_load_keeps_replaced_episode_lengths(self, quadruped, lively):
         env = LeggedEnv(lively(3), quadruped, Plane())
         env.episode_length_buf = torch.tensor([5, 6, 7])
-        still(env)
+        stand(env)
         saved = env.state_dict()
         other = LeggedEnv(lively(3), quadruped, Plane())
         other.load_state_dict(saved)
@@ -354,7 +354,7 @@ class TestStateDict:
         assert (other.curriculum.levels == 2).all()
         assert other.velocity_command.lin_vel_x == (-1.3, 1.3)
         assert (other.episode_length_buf == 0).all()
-        still(other)
+        stand(other)
 
     @pytest.mark.parametrize(
         ("part", "name"), [("arrays", "steps_until_push"), ("state", "push_vel")]
@@ -390,7 +390,7 @@ class TestSetCommands:
         for _ in range(10):
             observed = env.get_observations()["policy"][:, :3] / torch.tensor([2, 2, 0.25])
             np.testing.assert_allclose(observed, self.HELD, atol=1e-6)
-            still(env)
+            stand(env)
             np.testing.assert_allclose(env.state.commands, self.HELD)
 
     def test_fixed_commands_survive_a_reset(self, quadruped, lively):
@@ -410,7 +410,7 @@ class TestSetCommands:
         np.testing.assert_allclose(observed, env.commands, atol=1e-6)
         drawn = env.commands.copy()
         env.set_commands(None)  # there is nothing to let go
-        still(env)
+        stand(env)
         np.testing.assert_array_equal(env.commands, drawn)
 
 
@@ -420,7 +420,7 @@ class TestReset:
         env.curriculum.levels[:] = [0, 1, 2, 0, 1, 2]
         env.curriculum.columns[:] = [0, 0, 0, 1, 1, 1]
         for _ in range(3):
-            still(env)
+            stand(env)
         env.reset()
         assert (env.episode_length_buf == 0).all()
         expected = map_ground.env_origins[env.curriculum.levels, env.curriculum.columns]
@@ -443,7 +443,7 @@ DQ = np.array([2.0, -1.0, 0.5])
 
 @pytest.fixture
 def torques(cart, calm):
-    """Return the torques of an action in one physics step, from `Q` and `DQ` high in the air."""
+    """Return the torques of an action in one physics step, from `Q` and `DQ` in the air."""
 
     def act(action, offset=(0.0, 0.0, 0.0), **settings):
         env = LeggedEnv(calm(1, control=Control(**settings)), cart, Plane())
@@ -463,7 +463,7 @@ def torques(cart, calm):
 
 class TestPositionControl:
     def test_torques_of_the_specs_gains(self, torques):
-        # Hinges: kp (default + scale a - q) - kd dq; the wheel, without stiffness: kd (12 a - dq).
+        # Hinges: kp (default + scale a - q) - kd dq. Wheel, without stiffness: kd (12 a - dq).
         expected = [
             0.4 * (12 * 0.2 - 2.0),
             20 * (-0.2 + 0.25 * 0.4 - -0.3) - 1.5 * -1.0,
@@ -477,7 +477,7 @@ class TestPositionControl:
         np.testing.assert_allclose(torques((-9, -9, -9)), [-3, -5, -6])
 
     def test_joint_offset_shifts_the_target(self, torques):
-        # A motor that measures 0.05 too much goes to 0.05 too little.
+        # A motor that measures 0.05 rad too much moves 0.05 rad too little.
         plain = torques((0.2, 0.0, 0.1))
         shifted = torques((0.2, 0.0, 0.1), offset=(0.05, 0.05, 0.05))
         np.testing.assert_allclose(shifted - plain, [0, -20 * 0.05, -20 * 0.05], atol=1e-5)
@@ -492,7 +492,7 @@ class TestPositionControl:
         np.testing.assert_allclose(found, expected, rtol=1e-5)
 
     def test_zero_stiffness_controls_velocity(self, torques):
-        # Without stiffness every joint is as a wheel: its target is a speed, around 0.
+        # Without stiffness, every joint is controlled like a wheel: by its velocity.
         found = torques((0.5, 0.2, 0.1), stiffness=0.0)
         expected = [0.4 * (6 - 2.0), 1.5 * (0.25 * 0.2 - -1.0), 1.5 * (0.5 * 0.1 - 0.5)]
         np.testing.assert_allclose(found, expected, rtol=1e-5)
@@ -500,7 +500,7 @@ class TestPositionControl:
 
 class TestVelocityControl:
     def test_torques_follow_velocity_targets(self, torques):
-        # An action of 1 is the joint's largest speed.
+        # An action of 1 is the joint's velocity limit.
         found = torques((0.1, 0.1, -0.1), control_type="V")
         expected = [0.4 * (3.0 - 2.0), 1.5 * (1.0 - -1.0), 1.5 * (-1.0 - 0.5)]
         np.testing.assert_allclose(found, expected, rtol=1e-5)

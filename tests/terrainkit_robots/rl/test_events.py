@@ -1,4 +1,4 @@
-"""The randomization: what differs, between which bounds, and what stays as the model has it."""
+"""Events: domain randomization, pushes and reset states."""
 
 from dataclasses import fields, replace
 from pathlib import Path
@@ -174,7 +174,7 @@ class TestApplyParams:
         assert (bias[:, :, :2] == 0).all()
 
     def test_torque_control_has_no_gains(self) -> None:
-        """Only the strength of the motors counts."""
+        """Torque control has no gains, so only the motor strength is applied."""
         sim = physics_of("T")
         apply_params(sim, draw(sim, replace(DomainRand(), motor_strength=None)))
         model = sim.scene.model
@@ -189,7 +189,7 @@ class TestApplyParams:
         assert (sim.batch.expand("actuator_biasprm") == 0).all()
 
     def test_apply_is_idempotent(self) -> None:
-        """A checkpoint's differences are applied over those of the start."""
+        """Loading a checkpoint applies its parameters over the initial ones."""
         sim = physics_of()
         first, second = draw(sim, DomainRand(), seed=1), draw(sim, DomainRand(), seed=2)
         apply_params(sim, second)
@@ -276,7 +276,7 @@ class TestInEnvironment:
         assert changed.tolist() == [False, True, False, False, False, False]
 
     def test_joint_offset_shifts_the_position(self) -> None:
-        """With zero action the measured pose, not the true one, goes to the default."""
+        """With action 0, the measured joint positions converge to the default pose."""
         env = make_env(replace(_NONE, joint_offset=0.05))
         env.scene.model.opt.gravity[:] = 0
         for _ in range(40):
@@ -292,11 +292,11 @@ class TestInEnvironment:
         pushes = []
         for _ in range(9):
             env.step(torch.zeros(6, 12))
-            np.testing.assert_array_equal(env.state.push_vel, env.push_vel)
+            np.testing.assert_array_equal(env.state.push_vel, env.pushes.velocity)
             pushes.append(env.state.push_vel)
         velocity = np.array(pushes)
         pushed = (velocity != 0).any(axis=2)
-        # Every third step, and not at the same time.
+        # Each robot every third step, with different phases.
         assert (pushed[:3].sum(axis=0) == 1).all()
         np.testing.assert_array_equal(pushed[3:], pushed[:-3])
         assert len(set(pushed.argmax(axis=0))) > 1
@@ -324,12 +324,12 @@ class TestInEnvironment:
         env = make_env(replace(_NONE, push_interval_s=0.0))
         for _ in range(5):
             env.step(torch.zeros(6, 12))
-        assert (env.push_vel == 0).all()
+        assert (env.pushes.velocity == 0).all()
 
 
 @pytest.fixture(scope="module")
 def default_ground():
-    """Return a map of every default terrain at its easiest, a middling and its hardest."""
+    """Return a map with every default terrain at three difficulties."""
     return MapTerrain(generate(MapConfig(rows=3, seed=5)))
 
 
@@ -344,7 +344,7 @@ def drawn(robot, scene, ground, settings, origins, seed=0):
 
 
 def deepest(env, qpos, down=0.0):
-    """Return how deep a robot is in the ground, below 0 [m], once it is lowered by `down`."""
+    """Return the clearance of a robot that is lowered by `down`, negative in the ground [m]."""
     data = mujoco.MjData(env.scene.model)
     data.qpos[:] = qpos
     data.qpos[2] -= down
@@ -353,7 +353,7 @@ def deepest(env, qpos, down=0.0):
 
 
 def everywhere(env):
-    """Start on every patch of the map, each its own robot."""
+    """Reset with one robot on every patch of the map."""
     rows, cols = env.terrain.env_origins.shape[:2]
     env.curriculum.levels[:] = np.repeat(np.arange(rows), cols)
     env.curriculum.columns[:] = np.tile(np.arange(cols), rows)

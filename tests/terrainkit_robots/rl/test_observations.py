@@ -1,4 +1,4 @@
-"""The observations: each against numbers worked out by hand; their order, widths and noise."""
+"""Observations: values computed by hand, order, widths and noise."""
 
 from dataclasses import fields, replace
 from pathlib import Path
@@ -35,7 +35,7 @@ _TASK_TABLE = [
     ("actions", 12),
     ("height_scan", 187),
 ]
-"""The policy's group in its order: 45 numbers for 12 joints, and the scan."""
+"""Terms of the policy group in order: 45 numbers for 12 joints, and the height scan."""
 
 _SECRETS = [
     ("base_lin_vel", 3),
@@ -49,7 +49,7 @@ _SECRETS = [
 
 
 def state(n: int = 1, **arrays: Any) -> State:
-    """Return a state of n quadrupeds that is 0 everywhere but in what is given."""
+    """Return a state of n quadrupeds that is 0 except for the given arrays."""
     return made_state(_SHAPES, n, **arrays)
 
 
@@ -67,7 +67,7 @@ def privileged_of(robot: Robot, task: Task | None = None) -> tuple[ObservationTe
 
 
 def observed(group: tuple[ObservationTerm, ...], name: str, given: State) -> list[float]:
-    """Return what one observation adds to its group, without noise."""
+    """Return the values of one term, without noise."""
     [only] = [each for each in group if each.name == name]
     values: list[float] = compute_observations([only], given, 100.0)[0].tolist()
     return values
@@ -82,7 +82,7 @@ def slices(group: tuple[ObservationTerm, ...], given: State) -> dict[str, slice]
 
 
 class TestByHand:
-    """Each observation has its own test here; `test_every_term_is_tested` sees to that."""
+    """One test per term, which `test_every_term_is_tested` checks."""
 
     def test_commands(self, robot: Robot) -> None:
         given = state(commands=[[0.5, -1, 0.8]])
@@ -99,10 +99,10 @@ class TestByHand:
         assert observed(group_of(robot), "base_ang_vel", given) == [1, -0.5, 0.25]
 
     def test_dof_pos(self, robot: Robot) -> None:
-        # What is measured, with the error of the joint's zero, less the default.
+        # Measured position, including the joint offset, minus the default pose.
         given = state(dof_pos=robot.default_pose + np.float32(0.5), joint_offset=0.125)
         assert observed(group_of(robot), "dof_pos", given) == pytest.approx([0.625] * 12)
-        # Wheels turn on and on; 100 is the largest observation.
+        # Wheels are observed as 0; 100 is the clipping limit.
         wheeled = replace(robot, wheels=np.arange(12) % 3 == 2)
         given = state(dof_pos=robot.default_pose + np.float32(400))
         seen = observed(group_of(wheeled), "dof_pos", given)
@@ -117,7 +117,7 @@ class TestByHand:
         assert observed(group_of(robot), "actions", given) == [3, -2, *[0] * 10]
 
     def test_height_scan(self, robot: Robot) -> None:
-        # 0.5 m below the base is 0; 1 m more or less is the most.
+        # A height of 0.5 m is observed as 0; differences are clipped at 1 m.
         heights = [0.5, 0.7, 0.3, 9, -9, *[0.5] * 182]
         given = state(height_scan=[heights])
         expected = [0, 1, -1, 5, -5, *[0] * 182]
@@ -143,7 +143,7 @@ class TestByHand:
         assert observed(privileged_of(robot), "joint_offset", given) == [0.25] * 12
 
     def test_push_vel(self, robot: Robot) -> None:
-        # A base that looks to the left (+y): a push to +x comes from its left, to its right.
+        # The base faces +y, so a push along +x is a push to its right.
         given = state(base_quat=[np.sqrt(0.5), 0, 0, np.sqrt(0.5)], push_vel=[1, 0, 0])
         expected = [0, -1, 0]
         assert observed(privileged_of(robot), "push_vel", given) == pytest.approx(
@@ -151,7 +151,7 @@ class TestByHand:
         )
 
     def test_foot_force(self, robot: Robot) -> None:
-        # In parts of the weight, 100 N, in the base's frame: it looks to the left.
+        # In units of the weight, 100 N, in the frame of a base that faces +y.
         force = [[0, 0, 50], [10, 0, 0], [0, 20, 0], [0, 0, 0]]
         given = state(base_quat=[np.sqrt(0.5), 0, 0, np.sqrt(0.5)], foot_force=[force])
         expected = [0, 0, 0.5, 0, -0.1, 0, 0.2, 0, 0, 0, 0, 0]
@@ -216,7 +216,7 @@ _NOISE = {
     "dof_vel": 1.5 * 0.05,
     "height_scan": 0.1 * 5,
 }
-"""Half widths of the noise of the default task, after the scale."""
+"""Half ranges of the noise of the default task, after scaling."""
 
 
 class TestNoise:
@@ -234,7 +234,7 @@ class TestNoise:
             if most == 0:
                 assert (drawn == 0).all(), name
                 continue
-            # Uniform over [-most, most]: its ends, its quarters, and each number for itself.
+            # Uniform over [-most, most]: check the limits, the quartiles and the independence.
             assert most * 0.99 < drawn.max() <= most * 1.001, name
             assert -most * 1.001 <= drawn.min() < -most * 0.99, name
             quarters = np.quantile(drawn / most, [0.25, 0.5, 0.75])
@@ -261,7 +261,7 @@ class TestNoise:
         rng = np.random.default_rng(0)
         seen = compute_observations(group, state(5), 100.0, rng)
         np.testing.assert_array_equal(seen, compute_observations(group, state(5), 100.0))
-        # And nothing was drawn in vain.
+        # The random generator is not used.
         assert rng.bit_generator.state == np.random.default_rng(0).bit_generator.state
 
     def test_privileged_group_has_no_noise(self, robot: Robot) -> None:
@@ -289,7 +289,7 @@ class TestInEnvironment:
     def test_height_scan_on_request(self) -> None:
         env = self.make(terrain=Terrain(measure_heights=True))
         assert env.get_observations()["policy"].shape == (3, 232)
-        # On a plane all of it is the height of the base.
+        # On a plane, every point is at the height of the base.
         scan = env.get_observations()["privileged"][:, 45:232].numpy()
         height = env.state.base_pos[:, 2:]
         np.testing.assert_allclose(scan, np.tile(5 * (height - 0.5), 187), atol=1e-5)
@@ -313,7 +313,7 @@ class TestInEnvironment:
         assert not torch.equal(*noises)
 
     def test_observations_of_known_state(self) -> None:
-        """Standing upright at the default pose and told 1, 0, 0.5 it sees just this."""
+        """An upright robot in the default pose with the commands 1, 0, 0.5."""
         env = self.make(noise=Noise(noise_level=0.0))
         env.set_commands(np.tile(np.array([1, 0, 0.5], np.float32), (3, 1)))
         env.joint_offset[:] = 0

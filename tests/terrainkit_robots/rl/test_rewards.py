@@ -1,4 +1,4 @@
-"""The rewards: each against numbers worked out by hand, and what is true of all of them."""
+"""Reward terms: values computed by hand, and properties of all terms."""
 
 import re
 from collections.abc import Iterator
@@ -23,11 +23,11 @@ from terrainkit_robots.rl.terrain import Plane
 torch.set_num_threads(1)
 
 _SHAPES = shapes(joints=2, feet=2, penalized=3, points=0)
-"""Shapes by robot: two joints, where nothing else is said, and two feet."""
+"""Shapes of the state of a robot with two joints and two feet."""
 
 
 def state(n: int = 1, **arrays: Any) -> State:
-    """Return a state of n robots that is 0 everywhere but in what is given."""
+    """Return a state of n robots that is 0 except for the given arrays."""
     return made_state(_SHAPES, n, **arrays)
 
 
@@ -48,7 +48,7 @@ def random_state(n: int, seed: int) -> State:
 
 @pytest.fixture(scope="module")
 def robot() -> Robot:
-    """Two joints: soft limits +-1 and none; 10 and 20 N m; 5 and 10 rad/s; bent 0.5 and -0.5."""
+    """Return a robot with two joints, the second without position limits."""
     real = Robot.load(Path(str(bundled.find("quadruped"))).parent)
     return replace(
         real,
@@ -67,7 +67,7 @@ def paid(name: str, robot: Robot, given: State, **settings: Any) -> list[float]:
 
 
 class TestByHand:
-    """Each reward has its own test here; `test_every_reward_is_tested` sees to that."""
+    """One test per reward, which `test_every_reward_is_tested` checks."""
 
     def test_tracking_lin_vel(self, robot: Robot) -> None:
         given = state(
@@ -75,7 +75,7 @@ class TestByHand:
             commands=[[1, 0, 9], [1, 0, 0], [0, 0.5, 0]],
             base_lin_vel=[[1, 0, 7], [0.5, 0, 0], [0.3, 0.1, 0]],
         )
-        # exp(0); exp(-0.25 / 0.25); exp(-(0.09 + 0.16) / 0.25). Up and turning do not count.
+        # exp(0); exp(-0.25 / 0.25); exp(-(0.09 + 0.16) / 0.25).
         expected = [1, 0.36788, 0.36788]
         assert paid("tracking_lin_vel", robot, given) == pytest.approx(expected, abs=1e-5)
         wide = paid("tracking_lin_vel", robot, given, tracking_sigma=0.5)
@@ -105,14 +105,14 @@ class TestByHand:
         assert paid("base_height", robot, given) == pytest.approx([0, 0.04])
         own = paid("base_height", robot, given, base_height_target=0.4)
         assert own == pytest.approx([0.01, 0.01])
-        # Over a hole of 10 m it is as bad as on the ground, no worse: 0.3^2.
+        # Over a hole of 10 m, the error is limited to the target: 0.3^2.
         assert paid("base_height", robot, state(1, base_height=[10.0])) == pytest.approx([0.09])
 
     def test_torques(self, robot: Robot) -> None:
         assert paid("torques", robot, state(torques=[[3, -4]])) == [25]
 
     def test_dof_power(self, robot: Robot) -> None:
-        # |2 * 3| + |-1 * 4|: braking costs too.
+        # |2 * 3| + |-1 * 4|: negative power counts as well.
         given = state(torques=[[2, -1]], dof_vel=[[3, 4]])
         assert paid("dof_power", robot, given) == [10]
 
@@ -133,7 +133,7 @@ class TestByHand:
             last_actions=[[2, 0], [0, 2]],
             last_last_actions=[[1, 0], [1, 0]],
         )
-        # Even motion is free: 3 - 4 + 1. 1 - 0 + 1 = 2 and 0 - 4 + 0 = -4.
+        # Constant changes are free: 3 - 4 + 1. 1 - 0 + 1 = 2 and 0 - 4 + 0 = -4.
         assert paid("action_smoothness", robot, given) == [0, 20]
 
     def test_collision(self, robot: Robot) -> None:
@@ -149,7 +149,7 @@ class TestByHand:
         assert paid("dof_pos_limits", robot, given) == [0, 0.25, 0.5]
 
     def test_dof_vel_limits(self, robot: Robot) -> None:
-        # 0.9 of 5 and of 10 rad/s is free; each joint costs at most 1.
+        # 0.9 of 5 and of 10 rad/s is free; the excess of each joint is at most 1.
         given = state(3, dof_vel=[[4.5, -9], [-5, 9.25], [50, 0]])
         assert paid("dof_vel_limits", robot, given) == pytest.approx([0, 0.75, 1])
         tight = paid("dof_vel_limits", robot, given, soft_dof_vel_limit=0.85)
@@ -169,7 +169,7 @@ class TestByHand:
             first_contact=[[True, False], [True, True], [True, True], [False, False]],
             air_time=[[0.75, 3], [0.5, 0.125], [0.75, 0.75], [2, 2]],
         )
-        # 0.75 - 0.25; 0.25 - 0.125; asked to stand; no foot came down.
+        # 0.75 - 0.25; 0.25 - 0.125; commanded to stand; no first contact.
         quarter = paid("feet_air_time", robot, given, air_time_target=0.25)
         assert quarter == pytest.approx([0.5, 0.125, 0, 0])
         longer = paid("feet_air_time", robot, given, air_time_target=0.5)
@@ -187,7 +187,7 @@ class TestByHand:
         assert (np.array(paid("stand_still", robot, given)) > 0).tolist() == [True] + 3 * [False]
 
     def test_foot_clearance(self, robot: Robot) -> None:
-        # (0.13 - 0.08)^2 * |(3, 4)| and 0.08^2 * 0.5; a foot that stands is free, and so is up.
+        # (0.13 - 0.08)^2 * |(3, 4)| and 0.08^2 * 0.5; standing feet and vertical velocity are free.
         given = state(
             2,
             foot_height=[[0.13, 0.0], [0.0, 0.08]],
@@ -196,10 +196,10 @@ class TestByHand:
         assert paid("foot_clearance", robot, given) == pytest.approx([0.0125 + 0.0032, 0], abs=1e-6)
         higher = paid("foot_clearance", robot, given, foot_clearance_target=0.18)
         assert higher == pytest.approx([0.0125 + 0.0162, 0.02], abs=1e-6)
-        # Over a stone's hole of 10 m a step is as bad as one that drags, no worse: 0.08^2 * 1.
+        # Over a hole of 10 m, the error is limited to the target: 0.08^2 * 1.
         hole = state(1, foot_height=[[10.0, 0.08]], foot_vel=[[[1, 0, 0], [0, 0, 0]]])
         assert paid("foot_clearance", robot, hole) == pytest.approx([0.0064])
-        # Feet that are to stay down cost for every height.
+        # With a target of 0, every height is an error.
         low = state(1, foot_height=[[0.1, 0.0]], foot_vel=[[[1, 0, 0], [1, 0, 0]]])
         assert paid("foot_clearance", robot, low, foot_clearance_target=0) == pytest.approx([0.01])
 
@@ -273,10 +273,10 @@ class TestEveryReward:
             assert scales[name] > 0
 
     def test_docstring_has_the_unit(self, name: str) -> None:
-        """What is no pure number has its unit in brackets at the end of the docstring."""
-        told = str(REWARDS[name].__doc__)
-        assert told.startswith(("Reward ", "Penalize ", "Count "))
-        assert told.endswith(".")
+        """The unit is in brackets at the end of the docstring, unless there is none."""
+        docstring = str(REWARDS[name].__doc__)
+        assert docstring.startswith(("Reward ", "Penalize ", "Count "))
+        assert docstring.endswith(".")
         pure = {
             "tracking_lin_vel",
             "tracking_ang_vel",
@@ -287,7 +287,7 @@ class TestEveryReward:
             "termination",
             "stumble",
         }
-        assert bool(re.search(r" \[[^\]]+\]\.$", told)) == (name not in pure)
+        assert bool(re.search(r" \[[^\]]+\]\.$", docstring)) == (name not in pure)
 
 
 @pytest.mark.parametrize("name", _PENALTIES)
@@ -380,7 +380,7 @@ def test_episode_sums_are_logged_per_second() -> None:
         _, rewards, dones, extras = env.step(_REST)
         assert ("log" in extras) == (step == 9) == bool(dones.all())
         assert rewards.tolist() == pytest.approx([0.04] * 4)
-    # 1 at each step, times 2: 2 a second, whatever the length of the episode.
+    # 2 per second, whatever the length of the episode.
     assert extras["log"]["Episode/rew_tracking_ang_vel"] == pytest.approx(2)
     assert set(env.episode_sums) == {"tracking_ang_vel"}
     assert env.episode_sums["tracking_ang_vel"].tolist() == [0] * 4
@@ -399,17 +399,17 @@ def test_episode_sums_of_short_episode() -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class MyRewards(Rewards):
-    """Rewards of a user."""
+    """Rewards with a user's own term."""
 
     headway: float = 0.0
-    """Going east."""
+    """Moving along x."""
 
 
 @pytest.fixture
 def own() -> Iterator[None]:
     @reward
     def headway(state: State, robot: Robot, settings: Rewards) -> Any:  # noqa: ARG001
-        """Return the place along x [m]."""
+        """Reward the position along x [m]."""
         return state.base_pos[:, 0]
 
     yield

@@ -96,7 +96,7 @@ def test_changed_robot_files_names_the_files(tmp_path, task):
     about = (run.folder / RUN_FILE).read_text().partition("[robot_sha256]")[0]
     (run.folder / RUN_FILE).write_text(about)
     (mine / "robot.toml").write_bytes(before + b"\n")
-    assert changed_robot_files(run) == ()  # an earlier version did not note it
+    assert changed_robot_files(run) == ()  # a run of an earlier version has no digests
 
 
 def test_missing_map_is_generated_again(tmp_path, task, mixed_map):

@@ -23,7 +23,7 @@ Make = Callable[..., LeggedRunner]
 
 @pytest.fixture(scope="module")
 def task() -> Task:
-    """Return a task of short episodes, so that many end, and of small networks."""
+    """Return a task with short episodes and small networks."""
     return Task(
         env=Env(num_envs=6, num_threads=1, episode_length_s=0.3),
         policy=Policy(actor_hidden_dims=(16,), critic_hidden_dims=(16,)),
@@ -34,7 +34,7 @@ def task() -> Task:
 
 @pytest.fixture
 def make(quadruped: Robot, task: Task, tmp_path: Path) -> Make:
-    """Make runners of the same seed."""
+    """Return a function that makes runners with the same seed."""
 
     def made(
         task: Task = task,
@@ -50,7 +50,7 @@ def make(quadruped: Robot, task: Task, tmp_path: Path) -> Make:
 
 
 def differences(a: Any, b: Any, path: str = "") -> list[str]:
-    """Return where two states differ; all but how long it took has to be the same."""
+    """Return the paths at which two states differ, except for the elapsed time."""
     if isinstance(a, dict):
         assert a.keys() == b.keys()
         return [d for key in a for d in differences(a[key], b[key], f"{path}.{key}")]
@@ -289,7 +289,7 @@ def test_two_processes_learn_the_same_weights(tmp_path):
     launch = ["torch.distributed.run", "--nproc-per-node", "2", "--standalone"]
     run = subprocess.run(
         [sys.executable, "-m", *launch, str(tmp_path / "two.py"), str(tmp_path)],
-        # An empty PATH has no git, which rsl-rl asks for.
+        # With an empty PATH, git is missing, which rsl-rl imports.
         env={**os.environ, "PATH": "", "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         capture_output=True,
         text=True,

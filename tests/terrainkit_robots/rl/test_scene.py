@@ -19,12 +19,12 @@ def scene(cart, calm):
 
 
 def weight_of(scene):
-    """Return the weight of the robot; the ground has a mass too, of thousands of tons."""
+    """Return the weight of the robot, without that of the ground."""
     return scene.model.body_subtreemass[scene.base] * 9.81
 
 
 def contacts(model, qpos):
-    """Return the pairs of geoms that touch, by name."""
+    """Return the names of the pairs of geoms in contact."""
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
     mujoco.mj_forward(model, data)
@@ -37,7 +37,7 @@ class TestActuators:
         assert model.nu == 3
         driven = [model.joint(model.actuator(k).trnid[0]).name for k in range(3)]
         assert driven == list(cart.spec.joint_order)
-        # The MJCF has them in another order, or this would prove nothing.
+        # The order in the MJCF is different.
         assert list(scene.joint_qpos) != sorted(scene.joint_qpos)
 
     def test_gains_and_limits_are_the_specs(self, scene):
@@ -50,12 +50,12 @@ class TestActuators:
         assert model.actuator_forcelimited.all()
 
     def test_defaults_of_the_file_are_ignored(self, scene):
-        # Its default for motors has a gear of 7 and a narrow range of controls.
+        # The file's default for motors has a gear of 7 and a limited control range.
         np.testing.assert_allclose(scene.model.actuator_gear[:, 0], 1)
         assert not scene.model.actuator_ctrllimited.any()
 
     def test_torque_limits_of_the_file_are_ignored(self, scene):
-        # A joint of the file passes on 1 N m: the spec's effort is 6, and torques would say so.
+        # A joint of the file is limited to 1 N m; its effort in the spec is 6 N m.
         assert not scene.model.jnt_actfrclimited.any()
 
     def test_armature_is_the_specs_without_friction(self, scene):
@@ -188,7 +188,7 @@ class TestForces:
 
     @pytest.mark.parametrize("collision", ["hfield", "boxes"])
     def test_feet_carry_the_robot_on_a_map(self, quadruped, calm, mixed_map, collision):
-        # Which of two geoms is the first differs with their kind; the force must not.
+        # The order of the two geoms depends on their types; the force must not.
         env = LeggedEnv(calm(6), quadruped, MapTerrain(mixed_map, collision))
         env.curriculum.levels[:] = 0
         env.reset()
@@ -242,7 +242,7 @@ class TestBuildSceneErrors:
             build_scene(Robot.from_spec(spec, cart.mjcf.parent), Plane(), calm())
 
     def test_build_scene_rejects_other_moving_bodies(self, cart, calm, tmp_path):
-        # Positions begin with those of the base.
+        # qpos must start with the base.
         text = cart.mjcf.read_text().replace(
             '<body name="trunk"',
             '<body name="ball" pos="2 0 1"><freejoint/><geom size="0.1"/></body><body name="trunk"',
@@ -310,9 +310,9 @@ class TestRobotErrors:
         assert "\n" not in str(caught.value)
 
     def test_load_rejects_folder_without_spec(self, tmp_path):
-        with pytest.raises(ConfigError, match=r"got no robot\.toml; expected an onboarded"):
+        with pytest.raises(ConfigError, match=r"cannot read .*robot\.toml"):
             Robot.load(tmp_path)
 
     def test_load_rejects_missing_folder(self, tmp_path):
-        with pytest.raises(ConfigError, match=r"got no robot\.toml"):
+        with pytest.raises(ConfigError, match=r"cannot read .*robot\.toml"):
             Robot.load(tmp_path / "nowhere")

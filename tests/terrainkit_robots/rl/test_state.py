@@ -14,7 +14,7 @@ from terrainkit_robots.rl.terrain import Plane
 
 @pytest.fixture
 def moving(cart, calm):
-    """Return carts that tumble through the air."""
+    """Return carts that tumble in the air."""
     env = LeggedEnv(calm(5), cart, Plane())
     rng = np.random.default_rng(2)
     env.sim.qpos[:, 2] = 2.0
@@ -25,7 +25,7 @@ def moving(cart, calm):
 
 @pytest.fixture
 def sensed(cart, moving):
-    """Return what MuJoCo's own sensors tell of those carts: one dictionary each."""
+    """Return the values of MuJoCo's own sensors for those carts, one dictionary each."""
     with quiet_mujoco():
         spec = mujoco.MjSpec.from_file(str(cart.mjcf))
         kind, site, body = mujoco.mjtSensor, mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_BODY
@@ -73,7 +73,7 @@ class TestStateAgainstMujoco:
         np.testing.assert_allclose(moving.state.dof_vel, expected, atol=1e-5)
 
     def test_foot_height_is_at_the_sole(self, moving, sensed):
-        # A foot's own radius is taken off; the sole of the leg is between its two shapes.
+        # The radius of the foot is subtracted.
         expected = [each["wheel"][2] - 0.03 for each in sensed]
         np.testing.assert_allclose(moving.state.foot_height[:, 0], expected, atol=1e-5)
 
@@ -88,7 +88,7 @@ class TestByHand:
         for name in ("base_lin_vel", "dof_vel", "dof_acc", "actions", "foot_force", "push_vel"):
             assert (getattr(state, name) == 0).all(), name
         assert not state.fallen.any()
-        # The wheel hangs 0.2 m along a leg that is turned by -0.2 rad, less its radius.
+        # The wheel hangs on a leg of 0.2 m that is rotated by -0.2 rad.
         wheel = 0.24 - 0.2 * np.cos(0.2) - 0.03
         np.testing.assert_allclose(state.foot_height[:, 0], wheel, atol=1e-5)
 
@@ -125,11 +125,13 @@ class TestByHand:
             flown += 1
             assert flown < 50
         came = env.state.first_contact[0]
-        # The step in which a foot comes down counts: so long had it been up, to within a step.
+        # The step of the first contact is included.
         np.testing.assert_allclose(env.state.air_time[0, came], flown * env.cfg.dt, rtol=1e-4)
         env.step(torch.zeros(1, 12))
         assert not (env.state.first_contact[0] & came).any()
-        np.testing.assert_allclose(env.air_time[0, came & (env.state.foot_force[0, :, 2] > 1)], 0)
+        np.testing.assert_allclose(
+            env.sensors.air_time[0, came & (env.state.foot_force[0, :, 2] > 1)], 0
+        )
 
     def test_standing_feet_have_no_first_contact(self, standing):
         for _ in range(5):
@@ -155,7 +157,7 @@ class TestByHand:
             assert (env.state.push_vel[:, 2] == 0).all()
             assert 0.7 < np.abs(env.state.push_vel).max() <= 0.8
             seen.append((env.state.push_vel != 0).any(axis=1))
-        # Every 0.04 s each, and told only of the step that it was in.
+        # Each robot every 0.04 s; the state has only the push of the step.
         np.testing.assert_array_equal(seen[0], ~seen[1])
         np.testing.assert_array_equal(seen[2:], seen[:2])
 
@@ -187,11 +189,11 @@ class TestStateCopies:
             np.testing.assert_array_equal(getattr(kept, name), value, err_msg=name)
 
     def test_state_shares_no_memory(self, quadruped, lively):
-        # A reward that writes into the state must not change the robots.
+        # A reward that modifies the state must not change the simulation.
         env = LeggedEnv(lively(3), quadruped, Plane())
         env.step(torch.zeros(3, 12))
         own = [env.sim.batch.state, *vars(env.params).values(), env.commands]
-        own += [env.joint_offset, env.push_vel, env.air_time, env.actions]
+        own += [env.joint_offset, env.pushes.velocity, env.sensors.air_time, env.actions]
         for field in fields(State):
             value = getattr(env.state, field.name)
             assert not any(np.shares_memory(value, other) for other in own), field.name

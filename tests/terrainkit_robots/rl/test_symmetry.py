@@ -1,4 +1,4 @@
-"""The mirror: what is true of a robot is true of its image."""
+"""Left-right symmetry: mirrored robots behave like mirror images."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -22,11 +22,11 @@ from terrainkit_robots.spec.robot_spec import MirrorJoint
 torch.set_num_threads(1)
 
 _PAIRS = 4
-"""Robots k and k + 4 of each environment here are images of one another."""
+"""Robots k and k + 4 of each environment are mirror images."""
 
 
 class Valley(Plane):
-    """A plane that looks like a valley along x, the same to both sides of y = 0."""
+    """A plane whose height scan sees a valley along x, symmetric about y = 0."""
 
     is_flat = False
 
@@ -49,7 +49,7 @@ def robot_named(name: str) -> Robot:
 
 
 def mirror_physics(env: LeggedEnv, mirror: MirrorMaps, *, turn: bool = True) -> None:
-    """Put a random state into half of the environments, and its image into the others."""
+    """Set random states in half of the environments, and mirror images in the others."""
     rng, p, scene = np.random.default_rng(3), env.sim, env.scene
     a, b = slice(0, _PAIRS), slice(_PAIRS, 2 * _PAIRS)
     height = float(env.robot.spec.spawn_height or 0.0)
@@ -61,7 +61,7 @@ def mirror_physics(env: LeggedEnv, mirror: MirrorMaps, *, turn: bool = True) -> 
     bent = env.robot.default_pose + rng.uniform(-0.1, 0.1, (_PAIRS, env.num_actions))
     p.qpos[a, scene.joint_qpos] = bent
     p.qvel[a] = rng.uniform(-0.5, 0.5, (_PAIRS, scene.model.nv))
-    # The image, from physics alone: y is turned around, so are turns about x and z.
+    # The mirror image: y is negated, and so are rotations about x and z.
     p.qpos[b] = p.qpos[a]
     p.qpos[b, 1] *= -1
     p.qpos[b, 4] *= -1
@@ -75,7 +75,7 @@ def mirror_physics(env: LeggedEnv, mirror: MirrorMaps, *, turn: bool = True) -> 
 
 
 def mirror_memory(env: LeggedEnv, mirror: MirrorMaps) -> None:
-    """Make commands, actions and differences of one half the images of the other's."""
+    """Mirror the commands, actions and parameters of one half to the other."""
     from terrainkit_robots.rl.events import apply_params
 
     rng = np.random.default_rng(4)
@@ -85,10 +85,10 @@ def mirror_memory(env: LeggedEnv, mirror: MirrorMaps) -> None:
     env.velocity_command.fixed[b] = env.velocity_command.fixed[a] * np.array([1, -1, -1])
     env.actions[:, a] = rng.uniform(-0.2, 0.2, env.actions[:, a].shape)
     env.actions[:, b] = [mirror.actions(each) for each in env.actions[:, a]]
-    env.push_vel[a] = rng.uniform(-1, 1, (_PAIRS, 3)) * [1, 1, 0]
-    env.push_vel[b] = env.push_vel[a] * np.array([1, -1, 1])
+    env.pushes.velocity[a] = rng.uniform(-1, 1, (_PAIRS, 3)) * [1, 1, 0]
+    env.pushes.velocity[b] = env.pushes.velocity[a] * np.array([1, -1, 1])
     env.joint_offset[b] = mirror.actions(env.joint_offset[a])
-    env.air_time[:] = 0
+    env.sensors.air_time[:] = 0
     d = env.params
     for same in (d.friction, d.geom_friction, d.added_mass, d.strength):
         same[b] = same[a]
@@ -129,11 +129,11 @@ class TestRobot:
         mirror = mirror_maps(env)
         mirror_physics(env, mirror)
         mirror_memory(env, mirror)
-        _look_again(env)
-        # The feet have no contacts yet; any forces will do, of feet that are images by their place.
+        _recompute(env)
+        # There are no contacts yet: set random forces on mirrored feet.
         feet = env.sim.sensor("foot_position")
         force = np.random.default_rng(5).uniform(-50, 50, feet.shape).astype(np.float32)
-        twins = _nearest_images(feet)
+        twins = _mirrored_feet(feet)
         force[_PAIRS:] = force[:_PAIRS, twins] * np.array([1, -1, 1], np.float32)
         env.state.foot_force[:] = force
         env._compute_observations()
@@ -164,12 +164,12 @@ class TestRobot:
         np.testing.assert_allclose(rewards[:_PAIRS], rewards[_PAIRS:], atol=1e-4)
 
     def test_wrong_sign_is_detected(self, name: str) -> None:
-        """Proves that the tests above can fail."""
+        """Checks that the tests above can fail."""
         env = make_env(name)
         mirror = mirror_maps(env)
         mirror_physics(env, mirror)
         mirror_memory(env, mirror)
-        _look_again(env)
+        _recompute(env)
         mirror.groups["policy"].sign[-1] *= -1
         with pytest.raises(AssertionError, match="actions"):
             assert_images(env, mirror, 3e-5)
@@ -209,7 +209,7 @@ class TestAugment:
         assert acted is not None
         acted.sum().backward()
         assert actions.grad is not None
-        # Of a quadruped's joints only the hips turn the other way: 1 + 1 or 1 - 1.
+        # Only the hip joints of a quadruped change their sign: 1 - 1, otherwise 1 + 1.
         assert sorted(actions.grad[0].tolist()) == [0] * 4 + [2] * 8
 
     def test_rsl_rl_accepts_augment(self) -> None:
@@ -236,7 +236,7 @@ class TestAugment:
 
 
 class TestNames:
-    """The mirror of the quadruped, by the names of its joints and feet."""
+    """The mirror maps of the quadruped, by the names of its joints and feet."""
 
     def test_joints(self) -> None:
         env = make_env("quadruped")
@@ -318,8 +318,8 @@ class TestErrors:
             mirror_maps(env)
 
 
-def _look_again(env: LeggedEnv) -> None:
-    """Observe what was written into the physics."""
+def _recompute(env: LeggedEnv) -> None:
+    """Compute state and observations from the simulations."""
     import mujoco
 
     everyone = np.arange(env.num_envs)
@@ -330,8 +330,8 @@ def _look_again(env: LeggedEnv) -> None:
     env._compute_observations()
 
 
-def _nearest_images(feet: Any) -> list[int]:
-    """Return which foot of one robot stands where the image of each foot of the other does."""
+def _mirrored_feet(feet: Any) -> list[int]:
+    """Return the index of the mirrored foot of each foot, by position."""
     image = feet[:_PAIRS] * np.array([1, -1, 1])
     far = np.linalg.norm(feet[_PAIRS:, :, None] - image[:, None], axis=-1).max(axis=0)
     assert far.min(axis=1).max() < 1e-4

@@ -1,4 +1,4 @@
-"""The terminations: what is a fall and what is not."""
+"""Terminations, as functions and in the environment."""
 
 from pathlib import Path
 from typing import Any
@@ -48,7 +48,7 @@ class TestIllegalContact:
 class TestBadOrientation:
     @pytest.mark.parametrize("around", [1, 2])
     def test_tilt_limit(self, around: int) -> None:
-        """Rolled or pitched by an angle, it is that angle that counts."""
+        """The angle counts for roll and for pitch."""
         angles = np.array([0, 0.5, 1.29, 1.31, 2, np.pi, -1.29, -1.31], np.float32)
         quat = np.zeros((len(angles), 4), np.float32)
         quat[:, 0], quat[:, around] = np.cos(angles / 2), np.sin(angles / 2)
@@ -86,7 +86,7 @@ def make_env(ground: Plane | None = None, **changes: Any) -> LeggedEnv:
 
 
 def step(env: LeggedEnv) -> tuple[list[bool], list[bool]]:
-    """Return who is done, and whose time is out."""
+    """Return dones and time-outs of a step."""
     _, _, dones, extras = env.step(torch.zeros(4, 12))
     return dones.tolist(), extras["time_outs"].tolist()
 
@@ -121,7 +121,7 @@ class TestInEnvironment:
         env = make_env(Field())
         env.sim.qpos[3, 1] = -1.2
         assert step(env) == ([False, False, False, True], [False] * 4)
-        assert env.state.base_pos[3, 1] > -1  # begun anew
+        assert env.state.base_pos[3, 1] > -1  # after the reset
 
     def test_unstable_physics_terminates(self) -> None:
         env = make_env()

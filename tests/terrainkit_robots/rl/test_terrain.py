@@ -14,7 +14,7 @@ EXACT = 1e-3
 
 
 def rays(model, xy, group=None):
-    """Return the height of a model under points, by MuJoCo's own rays."""
+    """Return the height of a model at points, by ray casting."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     hit, heights = np.zeros(1, np.int32), np.full(len(xy), np.nan)
@@ -38,7 +38,7 @@ def anywhere(ground, count, seed=0):
 
 @pytest.fixture(scope="module")
 def scanned(tmp_path_factory):
-    """Return a level floor with a step and a slope, that is nowhere symmetric."""
+    """Return an asymmetric terrain: a level floor with a step and a slope."""
     path = tmp_path_factory.mktemp("scanned") / "ground.xml"
     path.write_text("""
         <mujoco>
@@ -54,7 +54,7 @@ def scanned(tmp_path_factory):
 
 class TestHeightfieldSurface:
     def test_height_on_both_triangles(self):
-        # The diagonal goes from (0, 0) to (1, 1): the far corner at (0, 1) is on the upper side.
+        # The diagonal runs from (0, 0) to (1, 1).
         grid = HeightfieldSurface(
             heights=np.array([[0.0, 1.0], [2.0, 4.0]], np.float32),
             first_sample=(10.0, 20.0),
@@ -75,7 +75,7 @@ class TestHeightfieldSurface:
         np.testing.assert_allclose(grid.height(x, y), [0, 4, 1, 2.5])
 
     def test_height_is_single_precision(self):
-        # Twice the width would cost twice the time.
+        # Double precision would take twice the time.
         grid = HeightfieldSurface(
             heights=np.zeros((4, 5), np.float32), first_sample=(0.0, 0.0), cell=1.0
         )
@@ -99,12 +99,12 @@ class TestPlane:
 class TestMapTerrain:
     @pytest.mark.parametrize("collision", ["hfield", "boxes", "auto"])
     def test_height_matches_rays(self, terrain_map, collision):
-        # Two of its patches are stairs and obstacles, one is rough: boxes beside a heightfield.
+        # Stairs and obstacles become boxes, the rough patch a heightfield.
         ground = MapTerrain(terrain_map, collision)
         xy = anywhere(ground, 4000)
         found = ground.height(xy[:, 0], xy[:, 1])
         off = np.abs(found - rays(compiled(ground), xy))
-        # A point on a wall is on either side of it, by rounding.
+        # A point on a wall may be on either side of it.
         assert np.mean(off > EXACT) < 0.0005, xy[off > EXACT][:5]
 
     @pytest.mark.parametrize("collision", ["hfield", "boxes", "auto"])
@@ -116,7 +116,7 @@ class TestMapTerrain:
         assert np.mean(off > EXACT) < 0.001, xy[off > EXACT][:5]
 
     def test_boxes_are_level_up_to_walls(self, level_map):
-        # All ground is level, so each point is as high as the sample that it is nearest to.
+        # Each point has the height of its nearest sample.
         ground = MapTerrain(level_map, "boxes")
         xy = anywhere(ground, 2000, seed=2)
         cell, (x, y) = level_map.grid.cell, level_map.first_sample
@@ -149,7 +149,7 @@ class TestMapTerrain:
         terrain_map = generate(config)
         ground = MapTerrain(terrain_map)
         assert ground.terrain_names.shape == (4, 3)
-        assert len({tuple(row) for row in ground.terrain_names}) > 1  # or nothing is told apart
+        assert len({tuple(row) for row in ground.terrain_names}) > 1
         for row in range(4):
             for col in range(3):
                 x, y, _ = ground.env_origins[row, col]
@@ -245,7 +245,7 @@ class TestModelTerrain:
         assert not (tmp_path / "MUJOCO_LOG.TXT").exists()
 
     def test_statistic_of_file_is_ignored(self, tmp_path):
-        # The statistics of a scene are for its cameras: they do not say how high it is.
+        # The statistic of a scene is for cameras and may be smaller than the model.
         path = tmp_path / "tower.xml"
         path.write_text(
             '<mujoco><statistic extent="0.8" center="0 0 0.1"/><worldbody>'
@@ -266,7 +266,7 @@ class TestModelTerrain:
         np.testing.assert_allclose(ground.env_origins[0, 0], [0, 0, 0], atol=1e-6)
 
     def test_transparent_geoms_are_measured(self, tmp_path):
-        # Rays of MuJoCo pass through what is fully transparent.
+        # MuJoCo's rays ignore fully transparent geoms.
         path = tmp_path / "glass.xml"
         path.write_text(
             '<mujoco><worldbody><geom type="plane" size="5 5 0.1" pos="0 0 -1"/>'
@@ -323,12 +323,12 @@ class TestLoadTerrain:
 class TestHeightScan:
     @staticmethod
     def cast(env, yaw):
-        """Return the scan of a robot, by rays at the points where it should look."""
+        """Return the expected height scan of a robot, by ray casting."""
         points = env.cfg.terrain
         x, y = np.meshgrid(points.measured_points_x, points.measured_points_y, indexing="ij")
         x, y = x.ravel(), y.ravel()
         base = env.sim.qpos[0]
-        # To the left of where it heads is a quarter of a turn further.
+        # The y axis of the scan is 90 degrees to the left of the heading.
         at = base[:2] + np.column_stack(
             [x * np.cos(yaw) - y * np.sin(yaw), x * np.sin(yaw) + y * np.cos(yaw)]
         )

@@ -3,7 +3,7 @@ import resource
 import shutil
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -27,9 +27,9 @@ from terrainkit_robots.rl.runner import TrainingProgress
 from terrainkit_robots.rl.train import train
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def task() -> Task:
-    """Return a task of short episodes, so that many end, and of small networks."""
+    """Return a task with short episodes and small networks."""
     return Task(
         env=Env(num_envs=4, num_threads=1, episode_length_s=0.3),
         policy=Policy(actor_hidden_dims=(16,), critic_hidden_dims=(16,)),
@@ -38,7 +38,31 @@ def task() -> Task:
     )
 
 
-def lasting(task: Task, iterations: int) -> Task:
+@pytest.fixture(scope="module")
+def trained_once(task: Task, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a run of four iterations with a checkpoint of each; tests use copies of it."""
+    each = replace(task, runner=replace(task.runner, save_interval=1))
+    folder = tmp_path_factory.mktemp("trained") / "run"
+    train("quadruped", "plane", each, folder=folder)
+    return folder
+
+
+@pytest.fixture
+def run_after(trained_once: Path, tmp_path: Path) -> Callable[..., Path]:
+    """Return a function that copies the run with the checkpoints of some iterations."""
+
+    def copy(*iterations: int, name: str = "run") -> Path:
+        folder = tmp_path / name
+        shutil.copytree(trained_once, folder)
+        for iteration, path in checkpoints(folder).items():
+            if iteration not in iterations:
+                path.unlink()
+        return folder
+
+    return copy
+
+
+def with_iterations(task: Task, iterations: int) -> Task:
     return replace(task, runner=replace(task.runner, max_iterations=iterations))
 
 
@@ -52,7 +76,7 @@ def same_weights(a: Path, b: Path) -> bool:
 
 @contextmanager
 def full_disk(size: int) -> Iterator[None]:
-    """Let no file grow beyond a size [bytes]."""
+    """Limit the size of files [bytes]."""
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
     try:
@@ -71,14 +95,14 @@ def test_train_writes_a_run(task, tmp_path):
 
 def test_train_names_the_default_folder(task, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    folder = train("quadruped", "plane", lasting(task, 1)).folder
+    folder = train("quadruped", "plane", with_iterations(task, 1)).folder
     assert folder.parent == Path("logs/quadruped")
     assert (folder / "model_1.pt").exists()
 
 
-def test_resume_continues_exactly_in_its_folder(task, tmp_path):
-    train("quadruped", "plane", task, folder=tmp_path / "whole")
-    train("quadruped", "plane", lasting(task, 2), folder=tmp_path / "run")
+def test_resume_continues_exactly_in_its_folder(task, tmp_path, run_after):
+    run_after(4, name="whole")
+    run_after(2)
     done = train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
     assert done.folder == tmp_path / "run"
     assert same_weights(tmp_path / "whole" / "model_4.pt", tmp_path / "run" / "model_4.pt")
@@ -87,13 +111,13 @@ def test_resume_continues_exactly_in_its_folder(task, tmp_path):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_interrupted_run_resumes_exactly(task, tmp_path, number):
+def test_interrupted_run_resumes_exactly(task, tmp_path, run_after, number):
     def interrupt(progress: TrainingProgress) -> None:
         if progress.iteration == 2:
             signal.raise_signal(number)
 
     before = [signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)]
-    train("quadruped", "plane", task, folder=tmp_path / "whole")
+    run_after(4, name="whole")
     stopped = train(
         "quadruped", "plane", task, folder=tmp_path / "run", progress_callback=interrupt
     )
@@ -141,7 +165,7 @@ def test_train_runs_in_a_thread(task, tmp_path):
     trained: list[Any] = []
     work = threading.Thread(
         target=lambda: trained.append(
-            train("quadruped", "plane", lasting(task, 1), folder=tmp_path / "run")
+            train("quadruped", "plane", with_iterations(task, 1), folder=tmp_path / "run")
         )
     )
     work.start()
@@ -149,9 +173,9 @@ def test_train_runs_in_a_thread(task, tmp_path):
     assert trained[0].iteration == 1
 
 
-def test_resume_accepts_other_num_envs(task, tmp_path):
-    train("quadruped", "plane", lasting(task, 1), folder=tmp_path / "run")
-    more = lasting(replace(task, env=replace(task.env, num_envs=6)), 2)
+def test_resume_accepts_other_num_envs(task, tmp_path, run_after):
+    run_after(1)
+    more = with_iterations(replace(task, env=replace(task.env, num_envs=6)), 2)
     done = train("quadruped", "plane", more, resume=open_run(tmp_path / "run"))
     assert (done.folder, done.iteration) == (tmp_path / "run", 2)
     assert open_run(tmp_path / "run").task.env.num_envs == 6
@@ -162,20 +186,14 @@ def test_tensorboard_has_each_iteration_once_after_a_crash(task, tmp_path):
 
     task = replace(task, runner=replace(task.runner, save_interval=2))
     train("quadruped", "plane", task, folder=tmp_path / "run")
-    (tmp_path / "run" / "model_4.pt").unlink()  # as if it had been killed before
+    (tmp_path / "run" / "model_4.pt").unlink()  # as after a crash
     train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
     curves = EventAccumulator(str(tmp_path / "run")).Reload()
     assert [event.step for event in curves.Scalars("Loss/value")] == [1, 2, 3, 4]
 
 
-def test_resume_from_earlier_checkpoint_overwrites_nothing(task, tmp_path):
-    run, branch = tmp_path / "run", tmp_path / "branch"
-    train(
-        "quadruped",
-        "plane",
-        replace(task, runner=replace(task.runner, save_interval=2)),
-        folder=run,
-    )
+def test_resume_from_earlier_checkpoint_overwrites_nothing(task, tmp_path, run_after):
+    run, branch = run_after(2, 4), tmp_path / "branch"
     before = (run / "model_4.pt").read_bytes()
     done = train("quadruped", "plane", task, resume=open_run(run, 2), folder=branch)
     assert done.folder == branch
@@ -187,21 +205,22 @@ def test_resume_from_earlier_checkpoint_overwrites_nothing(task, tmp_path):
 def test_resume_rejects_a_modified_robot(task, tmp_path, name):
     mine, run = tmp_path / "mine", tmp_path / "run"
     shutil.copytree(tasks.get_task("quadruped").folder, mine)
-    train(mine, "plane", lasting(task, 1), folder=run)
+    train(mine, "plane", with_iterations(task, 1), folder=run)
     (mine / name).write_text((mine / name).read_text() + "\n")
     with pytest.raises(ConfigError, match=rf"{name} of .*mine changed since .*run was trained"):
         train(mine, "plane", task, resume=open_run(run))
     assert list(checkpoints(run)) == [1]
     other = tmp_path / "other"
     shutil.copytree(mine, other)
-    done = train(other, "plane", lasting(task, 1), resume=open_run(run), folder=tmp_path / "new")
+    done = train(
+        other, "plane", with_iterations(task, 1), resume=open_run(run), folder=tmp_path / "new"
+    )
     assert list(checkpoints(done.folder)) == [1]
 
 
-def test_resume_with_other_task_starts_new_run(task, tmp_path, mixed_map):
-    run = tmp_path / "run"
-    train("quadruped", "plane", task, folder=run)
-    other = lasting(replace(task, rewards=replace(task.rewards, base_height=-1.0)), 1)
+def test_resume_with_other_task_starts_new_run(task, run_after, tmp_path, mixed_map):
+    run = run_after(4)
+    other = with_iterations(replace(task, rewards=replace(task.rewards, base_height=-1.0)), 1)
     seen: list[int] = []
     done = train(
         "quadruped",
@@ -217,16 +236,16 @@ def test_resume_with_other_task_starts_new_run(task, tmp_path, mixed_map):
     done = train(
         "quadruped",
         path,
-        lasting(replace(task, terrain=blind), 1),
+        with_iterations(replace(task, terrain=blind), 1),
         resume=open_run(run),
         folder=tmp_path / "map",
     )
     assert open_run(done.folder).terrain == str(path)
 
 
-def test_new_run_keeps_optimizer_unless_rates_differ(task, tmp_path):
-    """With Adam begun anew, at the first step's rate, one update undoes what was learned."""
-    train("quadruped", "plane", task, folder=tmp_path / "run")
+def test_new_run_keeps_optimizer_unless_rates_differ(task, tmp_path, run_after):
+    """With a new optimizer and the initial rate, one update could undo the training."""
+    run_after(4)
     run = open_run(tmp_path / "run")
     before = read_checkpoint(run.checkpoint)
     before["optimizer_state_dict"]["param_groups"][0]["lr"] = 3e-5
@@ -237,10 +256,10 @@ def test_new_run_keeps_optimizer_unless_rates_differ(task, tmp_path):
         ("rate", replace(task.algorithm, learning_rate=2e-4), 2e-4, 0),
         ("schedule", replace(task.algorithm, schedule="fixed"), 1e-3, 0),
     ):
-        other = lasting(replace(task, algorithm=algorithm), 1)
+        other = with_iterations(replace(task, algorithm=algorithm), 1)
         train("quadruped", "plane", other, resume=run, folder=tmp_path / name)
         after = read_checkpoint(open_run(tmp_path / name).checkpoint)["optimizer_state_dict"]
-        # 2 epochs of 2 batches, each of which may change the rate by half
+        # 2 epochs of 2 batches, each of which may change the rate by a factor of 1.5
         assert after["param_groups"][0]["lr"] == pytest.approx(rate, rel=1.5**4 - 1)
         assert int(after["state"][0]["step"]) == done + 4
 
@@ -250,7 +269,7 @@ def test_new_run_keeps_levels_on_same_map(task, tmp_path, mixed_map):
     mixed_map.save(path)
     mixed_map.save(copied)
     terrainkit.generate(replace(mixed_map.config, seed=mixed_map.config.seed + 1)).save(other)
-    task = lasting(replace(task, terrain=Terrain(curriculum=False, max_init_level=0)), 1)
+    task = with_iterations(replace(task, terrain=Terrain(curriculum=False, max_init_level=0)), 1)
     train("quadruped", path, task, folder=tmp_path / "run")
     run = open_run(tmp_path / "run")
     before = read_checkpoint(run.checkpoint)
@@ -271,7 +290,7 @@ def test_resume_switches_between_plane_and_map(task, tmp_path, mixed_map, before
     path = mixed_map.save(tmp_path / "map.npz")
     after = {"plane": "auto", "auto": "plane"}[before]
     first, second = (
-        lasting(replace(task, terrain=Terrain(collision=touched, measure_heights=True)), 1)
+        with_iterations(replace(task, terrain=Terrain(collision=touched, measure_heights=True)), 1)
         for touched in (before, after)
     )
     train("quadruped", path, first, folder=tmp_path / "run")
@@ -280,19 +299,17 @@ def test_resume_switches_between_plane_and_map(task, tmp_path, mixed_map, before
     assert done.iteration == 1
 
 
-def test_resume_from_renamed_checkpoint_starts_new_run(task, tmp_path, monkeypatch):
+def test_resume_from_renamed_checkpoint_starts_new_run(task, run_after, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    run = tmp_path / "run"
-    train("quadruped", "plane", lasting(task, 1), folder=run)
+    run = run_after(1)
     (run / "model_1.pt").rename(run / "best.pt")
     done = train("quadruped", "plane", task, resume=open_run(run / "best.pt"))
     assert done.folder.parent == Path("logs/quadruped")
     assert [path.name for path in run.glob("*.pt")] == ["best.pt"]
 
 
-def test_resume_from_policy_starts_new_run(task, tmp_path):
-    run = tmp_path / "run"
-    train("quadruped", "plane", lasting(task, 1), folder=run)
+def test_resume_from_policy_starts_new_run(task, run_after, tmp_path):
+    run = run_after(1)
     path = run / "model_1.pt"
     save_checkpoint(path, policy_state(read_checkpoint(path)))
     done = train("quadruped", "plane", task, resume=open_run(run), folder=tmp_path / "more")
@@ -300,16 +317,16 @@ def test_resume_from_policy_starts_new_run(task, tmp_path):
     assert list(checkpoints(run)) == [1]
 
 
-def test_resume_rejects_a_completed_run(task, tmp_path):
-    train("quadruped", "plane", task, folder=tmp_path / "run")
+def test_resume_rejects_a_completed_run(task, tmp_path, run_after):
+    run_after(4)
     with pytest.raises(
         ConfigError, match=r"runner\.max_iterations: got 4; expected more than the 4"
     ):
         train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
 
 
-def test_resume_rejects_another_robot(task, tmp_path):
-    train("quadruped", "plane", lasting(task, 1), folder=tmp_path / "run")
+def test_resume_rejects_another_robot(task, tmp_path, run_after):
+    run_after(1)
     with pytest.raises(ConfigError, match="belongs to another robot, quadruped"):
         train("biped", "plane", task, resume=open_run(tmp_path / "run"), folder=tmp_path / "b")
     assert not (tmp_path / "b").exists()
@@ -364,9 +381,9 @@ def test_full_disk_for_logs_is_one_error(task, tmp_path, capfd):
 
 def test_divergence_names_the_last_checkpoint(task, tmp_path):
     algorithm = replace(task.algorithm, learning_rate=1e30, schedule="fixed")
-    mad = replace(task, algorithm=algorithm)
+    diverging = replace(task, algorithm=algorithm)
     with pytest.raises(ConfigError, match=r"networks have diverged.*; there is no checkpoint"):
-        train("quadruped", "plane", mad, folder=tmp_path / "run")
+        train("quadruped", "plane", diverging, folder=tmp_path / "run")
 
 
 def test_too_many_environments_write_nothing(task, tmp_path):
@@ -414,5 +431,5 @@ def test_train_rejects_a_mismatched_spec(task, tmp_path):
 
 def test_train_sets_passive_wait_policy(task, tmp_path, monkeypatch):
     monkeypatch.delenv("OMP_WAIT_POLICY", raising=False)
-    train("quadruped", "plane", lasting(task, 1), folder=tmp_path / "run")
+    train("quadruped", "plane", with_iterations(task, 1), folder=tmp_path / "run")
     assert os.environ["OMP_WAIT_POLICY"] == "PASSIVE"

@@ -1,4 +1,4 @@
-"""The contract of rsl-rl's `VecEnv`, as tests that any implementation has to pass.
+"""Tests that every implementation of rsl-rl's `VecEnv` must pass.
 
 Subclass `VecEnvContract` and give it a fixture `env`: a new environment whose episodes are short.
 """
@@ -17,7 +17,7 @@ _STEPS = 12
 
 
 class VecEnvContract:
-    """What the runner relies on; `env` is a fixture of the subclass."""
+    """Properties that the runner relies on; the subclass provides the fixture `env`."""
 
     @staticmethod
     def actions(env: VecEnv, seed: int = 0) -> torch.Tensor:
@@ -68,7 +68,7 @@ class VecEnvContract:
             assert rewards.device == dones.device == torch.device(env.device)
 
     def test_returned_tensors_never_change(self, env: VecEnv) -> None:
-        # A view of a live array would hold the next observation in place of this one.
+        # A view of a live array would change with the next step.
         kept, copies = [], []
         first = env.get_observations()
         kept.append(dict(first.items()))
@@ -111,7 +111,7 @@ class VecEnvContract:
             out = extras["time_outs"].bool()
             assert dones.bool()[out].all()
             assert (lengths[out] + 1 >= longest).all()
-            # Who got that far is done, be it by time or by a fall in the last step.
+            # An episode of that length is done, by a time-out or by a fall.
             assert dones.bool()[lengths + 1 >= longest].all()
             seen += int(out.sum())
         assert seen > 0

@@ -12,7 +12,7 @@ from terrainkit_robots.simulation.sim_model import SimModel, make_sim_model
 from terrainkit_robots.simulation.standing import contact_areas, stand_test
 
 
-def test_one_that_stands(stood):
+def test_assess_accepts_standing_robot(stood):
     assessment = assess(stood)
     assert assessment.stands
     assert (assessment.failures, assessment.degree) == ((), 0)
@@ -21,25 +21,25 @@ def test_one_that_stands(stood):
 @pytest.mark.parametrize(
     ("changes", "fault", "degree"),
     [
-        ({"tilt": math.radians(3.6)}, "it tilts by 3.6 degrees; expected at most 3", 0),
-        ({"tilt": math.radians(12)}, "it tilts by 12.0 degrees; expected at most 3", 1),
-        ({"tilt": math.radians(90)}, "it tilts by 90.0 degrees; expected at most 3", 2),
-        ({"height_loss": 0.15}, "its base sinks by 0.150 m; expected at most 0.100", 1),
-        ({"height_loss": 9.0}, "its base sinks by 9.000 m; expected at most 0.100", 2),
-        ({"drift": 0.2}, "it drifts by 0.200 m; expected at most 0.100", 1),
-        ({"other_contacts": ("calf",)}, "calf touches the ground; expected only feet", 1),
+        ({"tilt": math.radians(3.6)}, "it tilts by 3.6 deg (expected at most 3 deg)", 0),
+        ({"tilt": math.radians(12)}, "it tilts by 12.0 deg (expected at most 3 deg)", 1),
+        ({"tilt": math.radians(90)}, "it tilts by 90.0 deg (expected at most 3 deg)", 2),
+        ({"height_loss": 0.15}, "its base sinks by 0.150 m (expected at most 0.100 m)", 1),
+        ({"height_loss": 9.0}, "its base sinks by 9.000 m (expected at most 0.100 m)", 2),
+        ({"drift": 0.2}, "it drifts by 0.200 m (expected at most 0.100 m)", 1),
+        ({"other_contacts": ("calf",)}, "calf touches the ground (expected only feet)", 1),
         (
             {"other_contacts": tuple("abcdef")},
-            "a, b, c, d and 2 more touch the ground; expected only",
+            "a, b, c, d and 2 more touch the ground (expected only",
             1,
         ),
-        ({"lifted_feet": ("toe",)}, "toe does not touch the ground; expected all feet", 1),
-        ({"lifted_feet": ("a", "b")}, "a, b do not touch the ground; expected all feet", 1),
-        ({"saturation": 0.98}, "knee gives 98% of its effort; expected at most 95%", 1),
+        ({"lifted_feet": ("toe",)}, "toe does not touch the ground (expected all feet)", 1),
+        ({"lifted_feet": ("a", "b")}, "a, b do not touch the ground (expected all feet)", 1),
+        ({"saturation": 0.98}, "knee needs 98% of its effort limit (expected at most 95%)", 1),
         ({"diverged": True, "seconds": 0.5}, "its simulation diverged after 0.50 s", 2),
     ],
 )
-def test_each_fault_has_its_number_and_its_limit(stood, changes, fault, degree):
+def test_assess_reports_value_and_limit(stood, changes, fault, degree):
     assessment = assess(replace(stood, **changes))
     assert not assessment.stands
     assert len(assessment.failures) == 1
@@ -47,7 +47,7 @@ def test_each_fault_has_its_number_and_its_limit(stood, changes, fault, degree):
     assert assessment.degree == degree
 
 
-def test_what_blew_up_is_asked_nothing_else_and_others_everything(stood):
+def test_assess_reports_every_failure_unless_diverged(stood):
     wrong = {
         "tilt": 1.0,
         "height_loss": 0.3,
@@ -64,35 +64,33 @@ def quadruped():
     return Facts(load_robot(bundled.find("quadruped")))
 
 
-def judged(facts, scene):
+def stand(facts, sim):
     return assess(
-        stand_test(
-            scene, suggest_gains(facts), positions=facts.positions, areas=contact_areas(facts)
-        )
+        stand_test(sim, suggest_gains(facts), positions=facts.positions, areas=contact_areas(facts))
     )
 
 
-def test_one_that_falls_through_the_floor_does_not_stand(quadruped):
-    """It falls upright, and nothing of it touches what its bits do not meet."""
+def test_assess_robot_below_floor(quadruped):
+    """The contact bits of robot and floor do not match, so it falls without contacts."""
     model = make_sim_model(quadruped).model.__copy__()
     model.geom_contype[:] = model.geom_conaffinity[:] = 2
     model.geom_contype[0] = model.geom_conaffinity[0] = 1
     assert model.geom_bodyid[0] == 0
-    assessment = judged(quadruped, SimModel.from_mujoco(model, base="base"))
+    assessment = stand(quadruped, SimModel.from_mujoco(model, base="base"))
     assert assessment.degree == 2
     assert any("its base sinks by" in fault for fault in assessment.failures)
     assert any("RL_foot, RR_foot do not touch the ground" in fault for fault in assessment.failures)
 
 
-def test_feet_in_the_air_are_told(quadruped):
-    """It tips over a leg that nothing stops."""
+def test_assess_reports_lifted_feet(quadruped):
+    """One leg has no contacts, so the robot tips over it."""
     model = make_sim_model(quadruped).model.__copy__()
     for geom in range(model.ngeom):
         if model.body(model.geom_bodyid[geom]).name in ("RR_calf", "RR_foot"):
             model.geom_contype[geom] = model.geom_conaffinity[geom] = 0
-    faults = judged(quadruped, SimModel.from_mujoco(model, base="base")).failures
-    assert "FL_foot, RR_foot do not touch the ground; expected all feet" in faults
+    faults = stand(quadruped, SimModel.from_mujoco(model, base="base")).failures
+    assert "FL_foot, RR_foot do not touch the ground (expected all feet)" in faults
 
 
-def test_one_that_stands_does_so_on_every_foot(quadruped):
-    assert judged(quadruped, make_sim_model(quadruped)).stands
+def test_assess_accepts_bundled_quadruped(quadruped):
+    assert stand(quadruped, make_sim_model(quadruped)).stands

@@ -30,7 +30,7 @@ def read(folder, text):
     return make_sim_model(Facts(load_robot(path)))
 
 
-def test_a_pendulum_is_fastest_at_the_bottom(tmp_path):
+def test_drop_test_of_pendulum(tmp_path):
     drop = drop_test(read(tmp_path, PENDULUM))
     inertia = 0.01 + 2 * 0.5**2
     assert drop.max_speed == pytest.approx(math.sqrt(2 * 2 * 9.81 * 0.5 / inertia), rel=0.02)
@@ -38,7 +38,7 @@ def test_a_pendulum_is_fastest_at_the_bottom(tmp_path):
 
 
 @pytest.mark.parametrize("name", bundled.names())
-def test_healthy_robots_come_down_gently_and_alike_each_time(name):
+def test_drop_test_of_bundled_robots_is_reproducible(name):
     sim = make_sim_model(Facts(load_robot(bundled.find(name))))
     before = sim.standing_qpos.copy(), sim.model.geom_contype.copy()
     drop = drop_test(sim)
@@ -49,7 +49,7 @@ def test_healthy_robots_come_down_gently_and_alike_each_time(name):
     np.testing.assert_array_equal(sim.model.geom_contype, before[1])
 
 
-def test_a_robot_that_blows_up_is_noticed(tmp_path):
+def test_drop_test_detects_divergence(tmp_path):
     sim = read(tmp_path, PENDULUM)
     sim.model.opt.gravity[2] = -1e12
     drop = drop_test(sim)
@@ -57,7 +57,7 @@ def test_a_robot_that_blows_up_is_noticed(tmp_path):
     assert drop.seconds < 1.5
 
 
-def test_a_robot_without_joints_falls_as_one(tmp_path):
+def test_drop_test_without_joints(tmp_path):
     text = """<robot name="stone"><link name="stone">
       <inertial><mass value="1"/>
         <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>

@@ -51,9 +51,9 @@ def crane(tmp_path):
     return {result.joint: result for result in joint_sweep(make_sim_model(Facts(load_robot(path))))}
 
 
-def test_a_wall_stops_a_boom(crane):
+def test_joint_sweep_stops_at_collision(crane):
     swing = crane["swing"]
-    # The tip is 0.6 m out, and the wall's face is at y = 0.49: it meets from asin(0.48 / 0.6) on.
+    # The tip has a radius of 0.6 m, and the wall is at y = 0.49: contact from asin(0.48 / 0.6) on.
     assert swing.reached[1] == pytest.approx(math.asin(0.48 / 0.6), abs=3 / 40)
     assert swing.reached[0] == pytest.approx(-1.5)
     assert swing.blocked[0] is None
@@ -61,7 +61,7 @@ def test_a_wall_stops_a_boom(crane):
     assert swing.share == pytest.approx((swing.reached[1] + 1.5) / 3)
 
 
-def test_gravity_is_held(crane):
+def test_joint_sweep_measures_gravity_load(crane):
     hook = crane["hook_joint"]
     assert hook.load == pytest.approx(0.5 * 9.81 * 0.2)
     assert hook.max_load == pytest.approx(0.5 * 9.81 * 0.2)
@@ -70,7 +70,7 @@ def test_gravity_is_held(crane):
     assert crane["swing"].max_load == pytest.approx(0, abs=1e-9)
 
 
-def test_all_limited_joints_are_swept_in_the_order_of_the_motors():
+def test_joint_sweep_follows_actuator_order():
     facts = Facts(load_robot(bundled.find("biped")))
     sim = make_sim_model(facts)
     results = joint_sweep(sim)
@@ -81,7 +81,7 @@ def test_all_limited_joints_are_swept_in_the_order_of_the_motors():
         assert result.load < result.effort
 
 
-def test_left_and_right_reach_the_same():
+def test_joint_sweep_is_symmetric():
     results = {
         r.joint: r
         for r in joint_sweep(make_sim_model(Facts(load_robot(bundled.find("quadruped")))))
@@ -92,7 +92,7 @@ def test_left_and_right_reach_the_same():
     assert set(left.blocked[0]) == {"FL_foot", "FR_foot"}
 
 
-def test_a_joint_that_follows_is_moved_along(tmp_path):
+def test_joint_sweep_moves_mimic_joints(tmp_path):
     text = CRANE.replace(
         '<parent link="boom"/><child link="hook"/>',
         '<mimic joint="swing" multiplier="0.5"/><parent link="boom"/><child link="hook"/>',

@@ -17,9 +17,9 @@ from terrainkit_robots.simulation.time_step import max_stable_time_step
 
 BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]
 
-# What the robots are trained with, by joint: stiffness and damping of legged_gym (a1 with those of
-# walk-these-ways, anymal_c, cassie), of unitree_rl_gym and Isaac Lab (go2, h1, g1).
-TRAINED = {
+# Published gains by joint, stiffness and damping: a1 of walk-these-ways, anymal_c and cassie of
+# legged_gym, go2, h1 and g1 of unitree_rl_gym and Isaac Lab.
+PUBLISHED = {
     "a1/urdf/a1.urdf": {".*": ((20, 40), (0.5, 1))},
     "go2/urdf/go2.urdf": {".*": ((20, 40), (0.5, 1))},
     "go2_mjcf/go2.xml": {".*": ((20, 40), (0.5, 1))},
@@ -41,7 +41,7 @@ TRAINED = {
     },
 }
 
-REFUSED = ["cassie/urdf/cassie.urdf"]  # by MuJoCo, for their inertias
+INVALID = ["cassie/urdf/cassie.urdf"]  # MuJoCo rejects the inertias
 
 WHEELED = """
 <robot name="car">
@@ -118,7 +118,7 @@ def path_of(name, robot_file):
 
 def facts_of(name, robot_file):
     path = path_of(name, robot_file)
-    return repaired(path) if name in REFUSED else read(path)
+    return repaired(path) if name in INVALID else read(path)
 
 
 @cache
@@ -134,10 +134,10 @@ every_robot = pytest.mark.parametrize(
 )
 
 
-@pytest.mark.parametrize("name", TRAINED)
-def test_they_are_within_a_factor_of_what_people_train_with(name, robot_file):
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_gains_are_close_to_published_gains(name, robot_file):
     found = suggest_gains(facts_of(name, robot_file))
-    for pattern, ((softest, stiffest), (least, most)) in TRAINED[name].items():
+    for pattern, ((softest, stiffest), (least, most)) in PUBLISHED[name].items():
         joints = [joint for joint in found if re.fullmatch(pattern, joint)]
         assert joints
         for joint in joints:
@@ -147,7 +147,7 @@ def test_they_are_within_a_factor_of_what_people_train_with(name, robot_file):
 
 
 @every_robot
-def test_every_motor_has_one_and_twins_have_the_same(name, robot_file):
+def test_gains_of_mirrored_joints_are_equal(name, robot_file):
     facts = facts_of(name, robot_file)
     found = suggest_gains(facts)
     assert tuple(found) == make_sim_model(facts).actuated
@@ -157,7 +157,7 @@ def test_every_motor_has_one_and_twins_have_the_same(name, robot_file):
 
 
 @every_robot
-def test_they_are_round_and_say_why(name, robot_file):
+def test_gains_are_rounded_and_explained(name, robot_file):
     for gain in suggest_gains(facts_of(name, robot_file)).values():
         for value in (gain.stiffness, gain.damping):
             digits = f"{value:.6e}".split("e")[0].rstrip("0").rstrip(".")
@@ -167,7 +167,7 @@ def test_they_are_round_and_say_why(name, robot_file):
 
 
 @every_robot
-def test_explicit_control_is_stable_with_them_at_the_time_step_of_training(name, robot_file):
+def test_gains_are_stable_at_training_time_step(name, robot_file):
     facts = facts_of(name, robot_file)
     assert (
         max_stable_time_step(make_sim_model(facts), suggest_gains(facts)).seconds > 1.1 * TIME_STEP
@@ -175,14 +175,14 @@ def test_explicit_control_is_stable_with_them_at_the_time_step_of_training(name,
 
 
 @every_robot
-def test_armature_is_never_less_than_declared(name, robot_file):
+def test_gains_never_reduce_armature(name, robot_file):
     facts = facts_of(name, robot_file)
     found = suggest_gains(facts)
     for joint in facts.actuated:
         assert found[joint.name].armature >= joint.armature
 
 
-def test_a_light_calf_gets_the_armature_that_its_motor_has():
+def test_gains_add_armature_to_light_calf():
     light = suggest_gains(read(bundled.find("quadruped")))
     assert light["FL_calf_joint"].armature == pytest.approx(0.01)
     assert "armature" in light["FL_calf_joint"].reason
@@ -191,7 +191,7 @@ def test_a_light_calf_gets_the_armature_that_its_motor_has():
     assert "armature" not in declared["FL_calf_joint"].reason
 
 
-def test_an_arm_holds_its_weight_within_a_degree(tmp_path):
+def test_gains_hold_weight_of_arm(tmp_path):
     gain = suggest_gains(written(tmp_path, ARM.format(kind="revolute", effort="1000")))["shoulder"]
     torque = 2 * 9.81 * 0.5
     assert gain.stiffness == pytest.approx(torque / 0.02, rel=0.12)  # 490, rounded to 500
@@ -200,22 +200,22 @@ def test_an_arm_holds_its_weight_within_a_degree(tmp_path):
     assert gain.damping == pytest.approx(min(critical, torque / 0.02 / 20), rel=0.12)
 
 
-def test_a_weak_motor_is_not_asked_for_all_it_has_at_a_small_error(tmp_path):
+def test_gains_respect_effort_limit(tmp_path):
     gain = suggest_gains(written(tmp_path, ARM.format(kind="revolute", effort="10")))["shoulder"]
     assert gain.stiffness == pytest.approx(20)
     assert "effort limit of 10 N m at an error of 0.5 rad" in gain.reason
 
 
 @pytest.mark.parametrize(("effort", "why"), [("1e5", "N within 0.002 m"), ("10", "10 N at an err")])
-def test_a_slide_is_told_newtons_and_metres(tmp_path, effort, why):
+def test_gains_of_prismatic_joint_have_linear_units(tmp_path, effort, why):
     gain = suggest_gains(written(tmp_path, ARM.format(kind="prismatic", effort=effort)))["shoulder"]
     assert gain.stiffness == pytest.approx(min(2 * 9.81 / 0.002, float(effort) / 0.05), rel=0.12)
     assert why in gain.reason
     assert not re.search(r"N m|rad|kg m2", gain.reason)
 
 
-def test_slides_and_hinges_that_are_equally_stiff_are_not_damped_alike(tmp_path):
-    """What slides moves 2 kg, and what turns, equally stiff, 0.05 kg m2."""
+def test_gains_of_slides_and_hinges_are_damped_separately(tmp_path):
+    """Both have the same stiffness, for 2 kg and for 0.05 kg m2."""
     found = suggest_gains(written(tmp_path, GANTRY))
     assert found["rail"].stiffness == found["swing"].stiffness == 200
     alone = written(tmp_path, GANTRY.split("<!-- and -->")[0] + "</robot>")
@@ -227,17 +227,17 @@ def test_slides_and_hinges_that_are_equally_stiff_are_not_damped_alike(tmp_path)
     ("limit", "damping"),
     [('<limit effort="5" velocity="10"/>', 0.5), ("", 0.02 / 0.05)],
 )
-def test_a_wheel_is_told_a_speed(limit, damping, tmp_path):
+def test_gains_of_wheel_control_velocity(limit, damping, tmp_path):
     gain = suggest_gains(written(tmp_path, WHEELED.format(limit=limit)))["axle"]
     assert gain.stiffness == 0
     assert gain.damping == pytest.approx(damping, rel=0.12)
 
 
-def test_a_wheel_with_a_strong_motor_is_damped_as_the_time_step_bears(tmp_path):
+def test_gains_of_wheel_respect_time_step(tmp_path):
     text = WHEELED.format(limit='<limit effort="500" velocity="1"/>')
     gain = suggest_gains(written(tmp_path, text))["axle"]
     assert gain.damping == pytest.approx(0.5 * 0.02 / TIME_STEP, rel=0.12)
 
 
-def test_without_joints_there_are_none(tmp_path):
+def test_gains_without_joints_are_empty(tmp_path):
     assert suggest_gains(written(tmp_path, '<robot name="r"><link name="a"/></robot>')) == {}

@@ -19,7 +19,7 @@ def quadruped():
 
 
 def chain(folder, count, shape=""):
-    """Return the plant of so many links on a row of hinges, each at the same place."""
+    """Return the simulation model of a chain of hinges, all at the same point."""
     links = [f'<link name="l{k}">{INERTIAL}{shape}</link>' for k in range(count + 1)]
     joints = [
         f'<joint name="j{k}" type="revolute"><parent link="l{k}"/><child link="l{k + 1}"/>'
@@ -31,7 +31,7 @@ def chain(folder, count, shape=""):
     return make_sim_model(Facts(load_robot(path)))
 
 
-def test_a_robot_is_put_above_the_floor():
+def test_reset_places_robot_above_floor():
     sim = make_sim_model(quadruped())
     with quiet_mujoco():
         rollout = Rollout(sim)
@@ -41,7 +41,7 @@ def test_a_robot_is_put_above_the_floor():
         np.testing.assert_array_equal(rollout.data.qpos[3:], sim.standing_qpos[3:])
 
 
-def test_motors_get_their_gains():
+def test_rollout_applies_gains():
     facts = quadruped()
     sim, gains = make_sim_model(facts), suggest_gains(facts)
     with quiet_mujoco():
@@ -59,7 +59,7 @@ def test_motors_get_their_gains():
     assert rollout.model.dof_armature[dof] == gains["FL_calf_joint"].armature
 
 
-def test_a_robot_may_be_told_not_to_touch_itself():
+def test_rollout_without_self_collision():
     sim = make_sim_model(quadruped())
     crossed = sim.standing_qpos.copy()
     crossed[[7, 10]] = -1.0, 1.0  # both front legs inward
@@ -72,7 +72,7 @@ def test_a_robot_may_be_told_not_to_touch_itself():
             assert rollout.data.ncon == 4  # the feet on the floor
 
 
-def test_locked_joints_do_not_move():
+def test_rollout_with_locked_joints():
     sim = make_sim_model(quadruped())
     with quiet_mujoco():
         rollout = Rollout(sim)
@@ -83,7 +83,7 @@ def test_locked_joints_do_not_move():
     np.testing.assert_allclose(rollout.data.qpos[7:], sim.standing_qpos[7:], atol=1e-6)
 
 
-def test_what_is_not_a_number_is_noticed():
+def test_rollout_detects_divergence():
     sim = make_sim_model(quadruped())
     with quiet_mujoco():
         rollout = Rollout(sim)
@@ -95,12 +95,12 @@ def test_what_is_not_a_number_is_noticed():
         assert rollout.diverged
 
 
-def test_a_robot_of_too_many_joints_is_not_simulated(tmp_path):
+def test_rollout_rejects_many_joints(tmp_path):
     with pytest.raises(CannotCheckError, match="degrees of freedom: got 101"):
         Rollout(chain(tmp_path, 101))
 
 
-def test_a_heap_of_shapes_is_not_simulated(tmp_path):
+def test_rollout_rejects_many_contacts(tmp_path):
     ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
     sim = chain(tmp_path, 40, ball)
     with quiet_mujoco(), pytest.raises(CannotCheckError, match="contacts: got"):

@@ -43,7 +43,7 @@ def arm(tmp_path):
     return write
 
 
-def test_its_names_are_those_of_the_robot(facts):
+def test_sim_model_has_names_of_robot(facts):
     sim = make_sim_model(facts)
     assert sim.floating
     assert sim.base == BASES[facts.model.name]
@@ -54,13 +54,13 @@ def test_its_names_are_those_of_the_robot(facts):
         assert sim.model.joint(joint.name).range == pytest.approx(joint.range)
 
 
-def test_its_mass_is_that_of_the_robot(facts):
+def test_sim_model_has_mass_of_robot(facts):
     model = make_sim_model(facts).model
     assert model.body_subtreemass[0] == pytest.approx(facts.total_mass)
     assert model.opt.timestep == TIME_STEP
 
 
-def test_it_stands_at_home_with_its_lowest_shape_on_the_floor(facts):
+def test_sim_model_stands_on_the_floor(facts):
     sim = make_sim_model(facts)
     model, data = sim.model, mujoco.MjData(sim.model)
     data.qpos[:] = sim.standing_qpos
@@ -78,7 +78,7 @@ def test_it_stands_at_home_with_its_lowest_shape_on_the_floor(facts):
     assert placed == pytest.approx({name: facts.positions[name] for name in sim.joints})
 
 
-def test_motors_have_no_gain_and_the_effort_that_is_declared(facts):
+def test_sim_model_has_effort_limits(facts):
     sim = make_sim_model(facts)
     assert not sim.model.actuator_gainprm[:, 0].any()
     for joint in facts.actuated:
@@ -86,12 +86,12 @@ def test_motors_have_no_gain_and_the_effort_that_is_declared(facts):
         assert actuator.forcerange[1] == pytest.approx(joint.limit.effort)
 
 
-def test_nothing_is_in_it_that_is_only_seen(facts):
+def test_sim_model_has_only_collision_shapes(facts):
     model = make_sim_model(facts).model
     assert ((model.geom_contype != 0) | (model.geom_conaffinity != 0)).all()
 
 
-def test_it_is_compiled_once(facts):
+def test_sim_model_is_cached(facts):
     assert make_sim_model(facts) is make_sim_model(facts)
     again = SimModel.from_mujoco(make_sim_model(facts).model, base=make_sim_model(facts).base)
     assert (again.joints, again.actuated) == (
@@ -100,7 +100,7 @@ def test_it_is_compiled_once(facts):
     )
 
 
-def test_other_positions_leave_what_is_not_named(facts):
+def test_qpos_at_keeps_other_positions(facts):
     sim = make_sim_model(facts)
     first, *others = sim.joints
     moved = sim.qpos_at({first: 0.123, "no such joint": 9.0})
@@ -110,7 +110,7 @@ def test_other_positions_leave_what_is_not_named(facts):
     assert len(others) == len(moved) - 8
 
 
-def test_what_is_bolted_down_has_no_floor(arm):
+def test_sim_model_with_fixed_base_has_no_floor(arm):
     sim = make_sim_model(arm())
     assert not sim.floating
     assert sim.model.ngeom == 0
@@ -118,8 +118,7 @@ def test_what_is_bolted_down_has_no_floor(arm):
 
 
 @pytest.mark.parametrize("name", ["arm", "it's, id 7, line 3", "n" * 5000])
-def test_what_mujoco_refuses_is_told_in_one_line_and_of_no_file(arm, name):
-    """MuJoCo counts the lines of a text that nobody has."""
+def test_sim_model_error_is_one_line(arm, name):
     with pytest.raises(CannotCheckError) as caught:
         make_sim_model(arm(name=name, ixx="1.0"))
     told = str(caught.value)
@@ -130,7 +129,7 @@ def test_what_mujoco_refuses_is_told_in_one_line_and_of_no_file(arm, name):
     assert len(told) < 300
 
 
-def test_a_robot_of_thousands_of_bodies_is_not_simulated(tmp_path):
+def test_sim_model_rejects_many_bodies(tmp_path):
     parts = [
         f'<link name="l{k}"/><joint name="j{k}" type="revolute"><parent link="l{k - 1}"/>'
         f'<child link="l{k}"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'

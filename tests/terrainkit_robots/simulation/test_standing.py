@@ -43,7 +43,7 @@ def check(standing):
 
 
 @pytest.mark.parametrize("name", [*QUADRUPEDS, "quadruped.urdf", "quadruped.xml"])
-def test_quadrupeds_stand_for_five_seconds(name, robot_file):
+def test_stand_test_of_quadrupeds(name, robot_file):
     facts = facts_of(name, robot_file)
     standing = stand(facts, seconds=5)
     check(standing)
@@ -53,7 +53,7 @@ def test_quadrupeds_stand_for_five_seconds(name, robot_file):
     assert standing.height + standing.height_loss == pytest.approx(facts.stance.height, abs=1e-3)
 
 
-def test_anymal_c_stands_once_it_is_repaired(robot_file):
+def test_stand_test_of_repaired_anymal_c(robot_file):
     path = robot_file("anymal_c/urdf/anymal_c.urdf")
 
     def look(contents):
@@ -63,20 +63,20 @@ def test_anymal_c_stands_once_it_is_repaired(robot_file):
 
 
 @pytest.mark.parametrize("name", [*BIPEDS, "biped.urdf", "biped.xml"])
-def test_bipeds_stand_with_their_joints_locked(name, robot_file):
+def test_stand_test_of_bipeds_with_locked_joints(name, robot_file):
     standing = stand(facts_of(name, robot_file), seconds=5, joints_locked=True)
     check(standing)
     assert standing.joint_error < 1e-4
     assert standing.saturation == 0
 
 
-def test_a_biped_falls_under_position_control():
+def test_stand_test_of_biped_falls():
     standing = stand(read(bundled.find("biped")))
     assert standing.tilt > 0.5
     assert "pelvis" in standing.other_contacts
 
 
-def test_it_is_the_same_each_time():
+def test_stand_test_is_reproducible():
     facts = read(bundled.find("quadruped"))
     model = make_sim_model(facts).model
     before = model.actuator_gainprm.copy(), model.dof_armature.copy()
@@ -87,7 +87,7 @@ def test_it_is_the_same_each_time():
     assert (model.dof_armature == before[1]).all()
 
 
-def test_a_stiffer_robot_sinks_less():
+def test_stand_test_with_stiffer_gains_sinks_less():
     facts = read(bundled.find("quadruped"))
     stiff = {
         name: type(gain)(
@@ -105,7 +105,7 @@ def test_a_stiffer_robot_sinks_less():
     )
 
 
-def test_knees_on_the_ground_are_no_feet():
+def test_stand_test_reports_knee_contacts():
     facts = read(bundled.find("quadruped").with_suffix(".xml"))
     limp = {
         name: type(gain)(stiffness=1.0, damping=1.0, armature=gain.armature, reason="")
@@ -119,12 +119,12 @@ def test_knees_on_the_ground_are_no_feet():
     assert not {"FL_foot", "RR_foot"} & set(standing.other_contacts)
 
 
-def test_without_footholds_feet_are_told_as_well():
+def test_stand_test_without_areas_reports_feet():
     facts = read(bundled.find("quadruped"))
     assert "FL_foot" in stand(facts, areas=()).other_contacts
 
 
-def test_a_foot_may_touch_anywhere_and_a_shank_with_its_tip():
+def test_contact_areas_of_foot_and_shank():
     facts = read(bundled.find("quadruped"))
     holds = {hold.body: hold for hold in contact_areas(facts)}
     assert math.isinf(holds["FL_foot"].radius)
@@ -132,7 +132,7 @@ def test_a_foot_may_touch_anywhere_and_a_shank_with_its_tip():
     assert holds["FL_calf"].center == pytest.approx((0, 0, -0.22), abs=0.03)
 
 
-def test_what_is_bolted_down_does_not_stand(tmp_path):
+def test_stand_test_rejects_fixed_base(tmp_path):
     path = tmp_path / "arm.urdf"
     path.write_text(
         """<robot name="arm"><link name="pole"/><link name="arm"><inertial><mass value="1"/>

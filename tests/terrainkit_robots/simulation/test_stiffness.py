@@ -14,7 +14,7 @@ def sliding(sliding_shanks):
     return Facts(load_robot(sliding_shanks))
 
 
-def test_what_turns_does_not_hold_the_newtons_of_what_slides(sliding):
+def test_stiffness_of_hinges_ignores_loads_of_slides(sliding):
     held = {
         joint.name: abs(sliding.stance.torques[joint.name])
         for leg in sliding.legs
@@ -22,7 +22,7 @@ def test_what_turns_does_not_hold_the_newtons_of_what_slides(sliding):
     }
     turning = max(force for name, force in held.items() if "calf" not in name)
     pushed = max(force for name, force in held.items() if "calf" in name)
-    assert pushed > 5 * turning  # newtons, beside newton metres
+    assert pushed > 5 * turning  # N compared with N m
     weight, length = sliding.total_mass * 9.81, sliding.legs[0].length
     needed = max(turning / 0.09, 1.5 * weight * length / 4)
     found = suggest_gains(sliding)
@@ -33,7 +33,7 @@ def test_what_turns_does_not_hold_the_newtons_of_what_slides(sliding):
             assert f" {pushed:.2g} " not in gain.reason
 
 
-def test_what_slides_holds_its_newtons_within_millimetres(sliding):
+def test_stiffness_of_slides_limits_sag(sliding):
     pushed = max(abs(sliding.stance.torques[f"{leg}_calf_joint"]) for leg in LEGS)
     gain = suggest_gains(sliding)["FL_calf_joint"]
     assert gain.stiffness == pytest.approx(pushed / 0.009, rel=0.12)

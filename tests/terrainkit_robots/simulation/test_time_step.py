@@ -47,19 +47,19 @@ def quadruped():
     return make_sim_model(facts), suggest_gains(facts)
 
 
-def test_inertia_of_a_pendulum_that_is_bolted_down(pendulum):
+def test_joint_inertias_of_pendulum(pendulum):
     found = joint_inertias(pendulum)["j"]
     assert found.free == pytest.approx(INERTIA)
     assert found.locked == pytest.approx(INERTIA)
 
 
-def test_what_gives_way_is_lighter():
+def test_joint_inertias_free_are_smaller():
     sim, _ = quadruped()
     for found in joint_inertias(sim).values():
         assert 0 < found.free < found.locked
 
 
-def test_inertia_agrees_with_a_sudden_torque():
+def test_joint_inertias_match_impulse_response():
     sim, _ = quadruped()
     data = mujoco.MjData(sim.model)
     model = sim.model.__copy__()
@@ -75,33 +75,33 @@ def test_inertia_agrees_with_a_sudden_torque():
         assert 1 / data.qacc[dof] == pytest.approx(joint_inertias(sim)[name].free, rel=1e-6)
 
 
-def test_needed_inertia_undoes_stable_stiffness():
+def test_min_stable_inertia_inverts_max_stable_stiffness():
     assert min_stable_inertia(max_stable_stiffness(0.02)) == pytest.approx(0.02)
 
 
 @pytest.mark.parametrize(("stiffness", "damping"), [(100.0, 3.0), (0.0, 5.0), (1000.0, 0.0)])
-def test_longest_step_of_one_joint(pendulum, stiffness, damping):
+def test_max_stable_time_step_of_one_joint(pendulum, stiffness, damping):
     step = max_stable_time_step(pendulum, {"j": gain(stiffness, damping)})
     # 4 m - 2 h d - h^2 k = 0
     roots = np.roots([stiffness, 2 * damping, -4 * INERTIA])
-    wanted = min(root for root in roots if root > 0)
-    assert step.seconds == pytest.approx(wanted, rel=1e-6)
+    expected = min(root for root in roots if root > 0)
+    assert step.seconds == pytest.approx(expected, rel=1e-6)
     assert step.joint == "j"
 
 
-def test_longest_step_counts_armature(pendulum):
+def test_max_stable_time_step_includes_armature(pendulum):
     bare = max_stable_time_step(pendulum, {"j": gain(0.0, 5.0)}).seconds
     more = max_stable_time_step(pendulum, {"j": gain(0.0, 5.0, armature=INERTIA)}).seconds
     assert more == pytest.approx(2 * bare)
 
 
-def test_longest_step_without_gains(pendulum):
+def test_max_stable_time_step_without_gains(pendulum):
     assert max_stable_time_step(pendulum, {}).seconds == np.inf
     assert max_stable_time_step(pendulum, {"j": gain(0.0, 0.0)}).joint == ""
 
 
 @pytest.mark.parametrize(("factor", "grows"), [(0.98, False), (1.02, True)])
-def test_a_robot_shakes_from_the_longest_step_on(factor, grows):
+def test_max_stable_time_step_separates_stable_from_unstable(factor, grows):
     sim, gains = quadruped()
     step = factor * max_stable_time_step(sim, gains).seconds
     model = sim.model.__copy__()

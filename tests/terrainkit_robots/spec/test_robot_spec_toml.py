@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from terrainkit.annotations import parse_annotation
 from terrainkit.errors import ConfigError
+from terrainkit.type_hint import parse_hint
 from terrainkit_robots.spec.robot_spec import (
     JOINT_TABLES,
     MirrorJoint,
@@ -56,7 +56,7 @@ def strategy(field):
             max_size=4,
         ),
     }
-    kind = parse_annotation(field.type).kind
+    kind = parse_hint(field.type).kind
     by_type = {str: NAMES, tuple: LISTS, float: st.none() | POSITIVE}
     return by_name[field.name] if field.name in by_name else by_type[get_origin(kind) or kind]
 

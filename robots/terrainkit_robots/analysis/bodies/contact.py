@@ -109,16 +109,25 @@ def convex_hull(points: Matrix) -> Matrix:
 
     It is counter-clockwise from the lowest x. Collinear points have their two ends as hull.
     """
-    from scipy.spatial import ConvexHull, QhullError
-
+    # Andrew's monotone chain. Importing scipy.spatial would take longer than the whole lint pass.
     points = np.unique(points.round(9), axis=0)
     if len(points) < 3:
         return points
-    try:
-        order = ConvexHull(points).vertices
-    except QhullError:
-        return points[[0, -1]]
-    return np.asarray(points[np.roll(order, -order.argmin())])
+
+    def chain(path: Matrix) -> list[Matrix]:
+        hull: list[Matrix] = []
+        for point in path:
+            while len(hull) > 1 and _cross(hull[-1] - hull[-2], point - hull[-1]) <= 0:
+                hull.pop()
+            hull.append(point)
+        return hull[:-1]
+
+    return np.array(chain(points) + chain(points[::-1]))
+
+
+def _cross(a: Matrix, b: Matrix) -> float:
+    """Return the z component of the cross product of two vectors in the plane."""
+    return float(a[0] * b[1] - a[1] * b[0])
 
 
 def margin(point: Matrix, polygon: Matrix) -> float:

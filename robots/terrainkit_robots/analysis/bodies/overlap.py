@@ -95,7 +95,9 @@ class OverlapScene:
         import mujoco
 
         model, data = self._model_and_data
-        for poses in self._shape_poses(positions, count):
+        body = body_poses(self._bodies, positions)
+        each = [np.broadcast_to(body[b.index], (count, 4, 4)) for b, _ in self._shapes]
+        for poses in np.stack(each, axis=1):
             world = poses @ self._geom_poses
             data.geom_xpos[:] = world[:, :3, 3]
             data.geom_xmat[:] = world[:, :3, :3].reshape(-1, 9)
@@ -106,12 +108,6 @@ class OverlapScene:
                     first, second = self._shapes[a][1], self._shapes[b][1]
                     found.append(Overlap(first=first, second=second, depth=depth))
             yield sorted(found, key=lambda overlap: -overlap.depth)
-
-    def _shape_poses(self, positions: Mapping[str, Matrix], count: int) -> Matrix:
-        """Return the pose of the body of each shape, shape (count, shapes, 4, 4)."""
-        poses = body_poses(self._bodies, positions)
-        each = [np.broadcast_to(poses[body.index], (count, 4, 4)) for body, _ in self._shapes]
-        return np.stack(each, axis=1)
 
     @cached_property
     def _pairs(self) -> Matrix:

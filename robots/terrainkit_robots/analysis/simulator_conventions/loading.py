@@ -85,7 +85,12 @@ def mujoco_load_error(model: RobotModel) -> LoadError | None:
         with quiet_mujoco():
             mujoco.MjModel.from_xml_path(str(model.file))
     except (ValueError, RuntimeError, mujoco.FatalError, mujoco.UnexpectedError) as error:
-        return _from_mujoco(str(error))
+        text = str(error)
+        lines = [re.sub(r"^(XML )?Error:\s*", "", line.strip()) for line in text.splitlines()]
+        informative = (line for line in lines if line and not line.startswith("Element "))
+        message = " ".join(next(informative, "no reason").split())
+        element = re.search(r"Element name '([^']*)'", text)
+        return LoadError(message=short(message, 200), element=element[1] if element else "")
     return None
 
 
@@ -125,14 +130,6 @@ def yourdfpy_load_error(model: RobotModel, tree: Tree) -> LoadError | None:
     finally:
         log.setLevel(level)
     return None
-
-
-def _from_mujoco(error: str) -> LoadError:
-    """Return the first informative line of an error of MuJoCo."""
-    lines = [re.sub(r"^(XML )?Error:\s*", "", line.strip()) for line in error.splitlines()]
-    line = next((line for line in lines if line and not line.startswith("Element ")), "no reason")
-    named = re.search(r"Element name '([^']*)'", error)
-    return LoadError(message=short(" ".join(line.split()), 200), element=named[1] if named else "")
 
 
 def _read(path: Path) -> bytes:

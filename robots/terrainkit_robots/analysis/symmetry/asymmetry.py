@@ -74,8 +74,9 @@ def find_misalignments(
         if _has_zero_axis(left.joint) or _has_zero_axis(right.joint):
             displaced |= pair.indices
             continue
-        parents = {left.body.parent, right.body.parent}
-        if not parents & displaced and _has_mirror_parents(pair, mirror):
+        a, b = left.body.parent, right.body.parent
+        has_mirror_parents = a is not None and (a == b or mirror.image_index.get(a) == b)
+        if not {a, b} & displaced and has_mirror_parents:
             misalignment = _misalignment(mirror, pair, pair_of.get(left.body.parent or 0))
             if misalignment is None:
                 continue
@@ -103,14 +104,6 @@ def _is_half_rotation(left: MirrorSide, right: MirrorSide) -> bool:
     return any(
         float(np.linalg.norm(left.offset * turn - right.offset)) <= tolerance for turn in turns
     )
-
-
-def _has_mirror_parents(pair: MirrorPair, mirror: Mirror) -> bool:
-    """Return whether the bodies of a pair have the same parent, or mirrored ones."""
-    a, b = pair.left.body.parent, pair.right.body.parent
-    if a is None or b is None:
-        return False
-    return a == b or mirror.image_index.get(a) == b
 
 
 def _misalignment(
@@ -175,16 +168,14 @@ class FlippedJoint:
     """Axis of the same joint of another leg."""
 
 
-def find_flipped_joints(
-    legs: Sequence[Leg], bodies: Sequence[Body], zero_poses: Sequence[Matrix]
-) -> Iterator[FlippedJoint]:
+def find_flipped_joints(legs: Sequence[Leg], bodies: Sequence[Body]) -> Iterator[FlippedJoint]:
     """Yield the joints of legs whose axes are opposite to those of all other legs."""
     lengths = {len(leg.limb.chain) for leg in legs}
     if len(legs) < _MIN_LEGS or len(lengths) != 1:
         return
     for indices in zip(*(leg.limb.chain for leg in legs), strict=True):
         joints = [bodies[i].joint for i in indices]
-        axes = [joint_axis(bodies[i], zero_poses[i])[1] for i in indices]
+        axes = [joint_axis(bodies[i], bodies[i].zero_pose)[1] for i in indices]
         cosines = [float(axis @ axes[0]) for axis in axes]
         if min(map(abs, cosines)) < _MIN_PARALLEL_COSINE:
             continue
@@ -232,11 +223,8 @@ def find_flipped_pairs(
         ]
         opposed = [pair for pair in comparable if has_flipped_axes(pair.left, pair.right)]
         others = len(comparable) - len(opposed)
-        if len(opposed) == 1 and others >= _MIN_OTHER_PAIRS and _has_symmetric_limits(opposed[0]):
+        if len(opposed) != 1 or others < _MIN_OTHER_PAIRS:
+            continue
+        a, b = opposed[0].left.joint.range, opposed[0].right.joint.range
+        if a is None or b is None or (limits_match(a, b, 1) and limits_match(a, b, -1)):
             yield opposed[0], others
-
-
-def _has_symmetric_limits(pair: MirrorPair) -> bool:
-    """Return whether the limits of a pair are mirrored for either direction of the axes."""
-    a, b = pair.left.joint.range, pair.right.joint.range
-    return a is None or b is None or (limits_match(a, b, 1) and limits_match(a, b, -1))

@@ -1,1 +1,1 @@
-"""The rules: one family, one file. A function under `@rule` is all that a new one needs."""
+"""Lint rules: one module per family. A function with the decorator `rule` is a rule."""

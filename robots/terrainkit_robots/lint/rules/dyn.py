@@ -148,7 +148,7 @@ def does_not_stand(robot: Facts) -> Iterator[Violation]:
         source=robot.model.source,
         severity=_LEVELS[level],
         certainty="likely",
-        message=f"standing pose {control}: {', '.join(assessment.failures)}"
+        message=f"standing pose {control}: {'; '.join(assessment.failures)}"
         + ("; without self-collision the robot stands" if stands_without else ""),
         hint=_OVERLAP_HINT if stands_without else "",
         measured={
@@ -207,18 +207,7 @@ def unreachable_limits(robot: Facts) -> Iterator[Violation]:
         raise CannotCheckError("no joint with an actuator has limits")
     sources = {joint.name: joint.source for joint in robot.joints}
     for result in results:
-        message = ""
-        if _has_limb_collision(robot, result):
-            message = (
-                f"usable range of {_describe(result)}; expected at least {_MIN_RANGE_SHARE:.0%} of "
-                "its range"
-            )
-        elif robot.legs and result.load > result.effort:
-            message = (
-                f"torque of joint {result.joint} that holds its limb at the default pose: got "
-                f"{result.load:.3g} {result.units.effort}; expected at most its effort limit of "
-                f"{result.effort:.3g} {result.units.effort}"
-            )
+        message = _joint_message(robot, result)
         if message:
             yield Violation(
                 subject=result.joint,
@@ -230,19 +219,20 @@ def unreachable_limits(robot: Facts) -> Iterator[Violation]:
             )
     blocked = [result for result in results if result.share < _FULL_RANGE_SHARE]
     weak = [result for result in results if result.max_load > result.effort]
-    total, parts = count(len(results), "joint"), []
+    parts = []
     if blocked:
         worst = min(blocked, key=lambda result: result.share)
         parts.append(
-            "blocked by a collision before their limits, moved one at a time from the default "
-            f"pose: {len(blocked)} of {total}; worst {_describe(worst)}"
+            f"{len(blocked)} of {count(len(results), 'joint')} blocked by a collision before a "
+            "limit, moved one at a time from the default pose; worst "
+            f"{worst.joint}, which reaches {_describe(worst)}"
         )
     if weak:
         worst = max(weak, key=lambda result: result.max_load / result.effort)
         parts.append(
-            f"too weak to lift the limb over the whole range: {len(weak)} of {total}; worst "
-            f"{worst.joint}: got {worst.max_load:.3g} {worst.units.effort}; expected at most its "
-            f"effort limit of {worst.effort:.3g} {worst.units.effort}"
+            f"{len(weak)} of {count(len(results), 'joint')} too weak to lift the limb over the "
+            f"whole range; worst {worst.joint}, which needs {worst.max_load:.3g} "
+            f"{worst.units.effort} with an effort limit of {worst.effort:.3g} {worst.units.effort}"
         )
     if parts:
         yield Violation(
@@ -254,12 +244,27 @@ def unreachable_limits(robot: Facts) -> Iterator[Violation]:
         )
 
 
+def _joint_message(robot: Facts, result: SweepResult) -> str:
+    """Return why a joint cannot move or hold its limb; empty if it can."""
+    if _has_limb_collision(robot, result):
+        return (
+            f"usable range of joint {result.joint}: got {_describe(result)}; expected at least "
+            f"{_MIN_RANGE_SHARE:.0%} of its range"
+        )
+    if robot.legs and result.load > result.effort:
+        return (
+            f"torque of joint {result.joint} that holds its limb at the default pose: got "
+            f"{result.load:.3g} {result.units.effort}; expected at most its effort limit of "
+            f"{result.effort:.3g} {result.units.effort}"
+        )
+    return ""
+
+
 def _describe(result: SweepResult) -> str:
     first, second = next(pair for pair in result.blocked if pair is not None)
     return (
-        f"{result.joint}: got {result.reached[0]:.2f} to {result.reached[1]:.2f} of "
-        f"{result.limits[0]:.2f} to {result.limits[1]:.2f} {result.units.position}, where {first} "
-        f"collides with {second}"
+        f"{result.reached[0]:.2f} to {result.reached[1]:.2f} of {result.limits[0]:.2f} to "
+        f"{result.limits[1]:.2f} {result.units.position}, where {first} collides with {second}"
     )
 
 

@@ -174,8 +174,8 @@ def _has_valid_mass(body: Body) -> bool:
 def negative_mass(robot: Facts) -> Iterator[Violation]:
     """A mass is negative.
 
-    A negative mass reduces the mass of the body that the link is fixed to. MuJoCo ignores it
-    without a message if the link is merged into another one, and rejects the file otherwise.
+    A negative mass reduces the mass of the body that the link is fixed to. MuJoCo silently ignores
+    it if the link is merged into another one, and rejects the file otherwise.
 
     Fix:
         Enter the mass of the part.

@@ -71,7 +71,7 @@ _TYPE_SYNONYMS = {
 def unknown_joint_type(robot: Facts) -> Iterator[Violation]:
     """The type of a joint does not exist.
 
-    MuJoCo and urdfdom reject the file. Other simulators treat the joint as fixed without a message.
+    MuJoCo and urdfdom reject the file. Other simulators silently treat the joint as fixed.
 
     Fix:
         Use one of the joint types of the format. Types are lowercase.
@@ -229,7 +229,7 @@ def missing_limit(robot: Facts) -> Iterator[Violation]:
     Its limits are missing, incomplete, or equal. In URDF a missing number counts as 0. With equal
     limits or without limits, MuJoCo and legged_gym let the joint turn without end, urdfdom rejects
     the file, and other simulators lock the joint. A limit with one end only is an error as well:
-    MuJoCo then applies no limit at all, without a message.
+    MuJoCo then silently applies no limit at all.
 
     Fix:
         Give <limit> the lower and upper end of the real joint, in radians or meters. A joint that
@@ -280,8 +280,8 @@ def _limits(limit: Limit) -> tuple[float, float]:
 def inverted_limits(robot: Facts) -> Iterator[Violation]:
     """The lower limit of a joint is above the upper limit.
 
-    MuJoCo ignores such limits in a URDF without a message, and rejects them in MJCF. In other
-    simulators the joint oscillates between two limits that exclude each other.
+    MuJoCo silently ignores such limits in a URDF, and rejects them in MJCF. In other simulators the
+    joint oscillates between two limits that exclude each other.
 
     Fix:
         Swap the two numbers, or restore a lost sign. A missing number counts as 0.

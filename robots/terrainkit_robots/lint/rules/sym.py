@@ -436,7 +436,7 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
         if error.is_axis:
             yield _report_pair(robot, error)
     reported = {violation.subject for violation in zero_axis(robot)}
-    for found in find_flipped_joints(robot.legs, robot.bodies, robot.zero_poses):
+    for found in find_flipped_joints(robot.legs, robot.bodies):
         joint = found.joint
         if joint.name in reported:
             continue
@@ -451,6 +451,11 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
             "axes on each side",
             measured={"others": found.others},
         )
+    yield from _opposite_axes(robot, reported)
+
+
+def _opposite_axes(robot: Facts, reported: set[str]) -> Iterator[Violation]:
+    """Yield joints whose axis is opposite to that of the mirror image, but should not be."""
     for pair in robot.mirror_pairs:
         left, right = pair.left, pair.right
         a, b = left.joint.range, right.joint.range

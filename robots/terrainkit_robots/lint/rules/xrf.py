@@ -231,7 +231,7 @@ def _axis_in_link(link: str, robot: Facts, joint: Joint) -> Matrix:
     """Return the axis of a joint in the frame of a link, all joints at 0."""
     from terrainkit_robots.lint.compare.robot_pairs import trunk_pose_in_link
 
-    pose = trunk_pose_in_link(robot, link) @ robot.zero_poses[robot.body_of[joint.child].index]
+    pose = trunk_pose_in_link(robot, link) @ robot.body_of[joint.child].zero_pose
     return pose[:3, :3] @ joint.direction
 
 
@@ -345,7 +345,7 @@ def compare_joint_order(robot: Facts) -> Iterator[Violation]:
     """The order of the joints differs between the files.
 
     Simulators number joints in the order of the file. The actions and observations of a policy
-    trained on one file then belong to other joints of the other file, without a message.
+    trained on one file then silently belong to other joints of the other file.
 
     Fix:
         Permute actions and observations with the lists in the message, or reorder one of the files.

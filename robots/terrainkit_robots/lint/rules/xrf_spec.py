@@ -201,7 +201,7 @@ def spec_bodies(robot: Facts) -> Iterator[Violation]:
         Use the link names of the description.
 
     Source:
-        RobotSpec; legged_gym finds no body without a message, Isaac Lab does not start.
+        RobotSpec; legged_gym silently finds no body, Isaac Lab does not start.
     """
     spec = _spec(robot)
     known = [link.name for link in robot.links]

@@ -32,7 +32,7 @@ _MAX_RANGE_FACTOR = 0.25
 """Largest ratio of the action scale to the joint range."""
 
 
-def derive_effort(
+def effort_column(
     robot: Facts, gains: "Mapping[str, Gain]", mirror: Mapping[str, MirrorJoint]
 ) -> Column:
     """Return the effort limit of each joint [N m] or [N].
@@ -58,7 +58,7 @@ def derive_effort(
     return column
 
 
-def derive_velocity(robot: Facts, mirror: Mapping[str, MirrorJoint]) -> Column:
+def velocity_column(robot: Facts, mirror: Mapping[str, MirrorJoint]) -> Column:
     """Return the velocity limit of each joint [rad/s] or [m/s].
 
     Args:
@@ -77,7 +77,7 @@ def derive_velocity(robot: Facts, mirror: Mapping[str, MirrorJoint]) -> Column:
     return column
 
 
-def derive_armature(robot: Facts, gains: "Mapping[str, Gain]") -> Column:
+def armature_column(robot: Facts, gains: "Mapping[str, Gain]") -> Column:
     """Return the armature of each joint [kg m2] or [kg]."""
     column = Column()
     for joint in robot.actuated:
@@ -91,7 +91,7 @@ def derive_armature(robot: Facts, gains: "Mapping[str, Gain]") -> Column:
     return column
 
 
-def derive_action_scale(
+def action_scale_column(
     robot: Facts, gains: "Mapping[str, Gain]", effort: Column, velocity: Column
 ) -> Column:
     """Return the change of each joint target for an action of 1 [rad] or [m].

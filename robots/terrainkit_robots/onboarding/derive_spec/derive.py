@@ -11,14 +11,14 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.onboarding.derive_spec import named_bodies
 from terrainkit_robots.onboarding.derive_spec.actuator_limits import (
-    derive_action_scale,
-    derive_armature,
-    derive_effort,
-    derive_velocity,
+    action_scale_column,
+    armature_column,
+    effort_column,
+    velocity_column,
 )
 from terrainkit_robots.onboarding.derive_spec.foot_radius import foot_radius
 from terrainkit_robots.spec.column import Column, collect_provenance, rounded
-from terrainkit_robots.spec.robot_spec import Provenance, RobotSpec
+from terrainkit_robots.spec.robot_spec import Origin, Provenance, RobotSpec
 from terrainkit_robots.text import names
 
 if TYPE_CHECKING:
@@ -59,16 +59,16 @@ def derive_spec(
         raise ConfigError(f"gains of {names(missing)} are missing; expected all actuated joints")
     mirror = facts.mirror_map
     columns = _columns(facts, gains)
-    columns["effort"] = derive_effort(facts, gains, mirror)
-    columns["velocity"] = derive_velocity(facts, mirror)
-    columns["armature"] = derive_armature(facts, gains)
-    columns["action_scale"] = derive_action_scale(
+    columns["effort"] = effort_column(facts, gains, mirror)
+    columns["velocity"] = velocity_column(facts, mirror)
+    columns["armature"] = armature_column(facts, gains)
+    columns["action_scale"] = action_scale_column(
         facts, gains, columns["effort"], columns["velocity"]
     )
     pose = columns["default_pose"].values
     reset, reset_reason = _reset_range(facts, pose)
     lengths = _lengths(facts)
-    tables: dict[str, Any] = {name: column.values for name, column in columns.items()}
+    values: dict[str, Any] = {name: column.values for name, column in columns.items()}
     heights: dict[str, Any] = {name: value for name, (value, _) in lengths.items()}
     return RobotSpec(
         name=facts.model.title,
@@ -82,31 +82,25 @@ def derive_spec(
         thighs=named_bodies.thighs(facts),
         termination_contacts=named_bodies.termination_contacts(facts),
         penalized_contacts=named_bodies.penalized_contacts(facts),
-        **tables,
+        **values,
         soft_limits=_soft_limits(facts, pose),
         reset_range=reset,
         **heights,
         mirror=mirror,
         provenance={
             **collect_provenance(columns),
-            "soft_limits": _suggested(f"{_SOFT_LIMIT_FACTOR:g} of each joint range, centered"),
-            "reset_range": _suggested(reset_reason),
+            "soft_limits": Provenance(
+                origin="suggested", reason=f"{_SOFT_LIMIT_FACTOR:g} of each joint range, centered"
+            ),
+            "reset_range": _provenance("suggested", reset_reason),
             **{name: origin for name, (_, origin) in lengths.items()},
-            "mirror": _measured("joint positions and axes at zero pose"),
+            "mirror": _provenance("measured", "joint positions and axes at zero pose"),
         },
     )
 
 
-def _suggested(reason: str) -> Provenance:
-    return Provenance(origin="suggested", reason=reason)
-
-
-def _measured(reason: str) -> Provenance:
-    return Provenance(origin="measured", reason=reason)
-
-
-def _solved(reason: str) -> Provenance:
-    return Provenance(origin="solved", reason=reason)
+def _provenance(origin: Origin, reason: str) -> Provenance:
+    return Provenance(origin=origin, reason=reason)
 
 
 def _columns(facts: Facts, gains: "Mapping[str, Gain]") -> dict[str, Column]:
@@ -115,8 +109,16 @@ def _columns(facts: Facts, gains: "Mapping[str, Gain]") -> dict[str, Column]:
     for joint in facts.actuated:
         gain = gains[joint.name]
         pose.add(joint.name, rounded(facts.positions[joint.name]), origin)
-        stiffness.add(joint.name, rounded(gain.stiffness, 3), _suggested(gain.reason))
-        damping.add(joint.name, rounded(gain.damping, 3), _suggested("see stiffness"))
+        stiffness.add(
+            joint.name,
+            rounded(gain.stiffness, 3),
+            _provenance("suggested", gain.reason),
+        )
+        damping.add(
+            joint.name,
+            rounded(gain.damping, 3),
+            _provenance("suggested", "see stiffness"),
+        )
     return {"default_pose": pose, "stiffness": stiffness, "damping": damping}
 
 
@@ -124,10 +126,12 @@ def _pose_provenance(facts: Facts) -> Provenance:
     home = facts.model.home
     joints = [joint for leg in facts.legs for joint in leg.joints] or facts.actuated
     if home and all(joint.name in home for joint in joints):
-        return Provenance(origin="declared", reason=f"first keyframe of {facts.model.file.name}")
+        return _provenance("declared", f"first keyframe of {facts.model.file.name}")
     if facts.legs:
-        return _solved("legs bent, feet below the center of mass, other joints near 0")
-    return _suggested("closest to 0 within the limits")
+        return Provenance(
+            origin="solved", reason="legs bent, feet below the center of mass, other joints near 0"
+        )
+    return _provenance("suggested", "closest to 0 within the limits")
 
 
 def _soft_limits(facts: Facts, pose: Mapping[str, float]) -> dict[str, tuple[float, float]]:
@@ -146,7 +150,7 @@ def _soft_limits(facts: Facts, pose: Mapping[str, float]) -> dict[str, tuple[flo
 
 def _reset_range(facts: Facts, pose: Mapping[str, float]) -> tuple[tuple[float, float], str]:
     """Return factors on the default pose that keep all joints within their limits, and why."""
-    factors = [_reset_factors(joint, pose[joint.name]) for joint in facts.actuated]
+    factors = [_reset_scale(joint, pose[joint.name]) for joint in facts.actuated]
     lowest = max((low for low, _ in factors), default=_DEFAULT_RESET_RANGE[0])
     highest = min((high for _, high in factors), default=_DEFAULT_RESET_RANGE[1])
     inner = min(1.0, math.ceil(100 * lowest) / 100), max(1.0, math.floor(100 * highest) / 100)
@@ -161,7 +165,7 @@ def _reset_range(facts: Facts, pose: Mapping[str, float]) -> tuple[tuple[float, 
     return inner, f"{default} as in legged_gym, reduced by the limits of {names(bound, most=2)}"
 
 
-def _reset_factors(joint: Joint, position: float) -> tuple[float, float]:
+def _reset_scale(joint: Joint, position: float) -> tuple[float, float]:
     """Return the factors on a position that move the joint to its limits, clipped."""
     if joint.range is None or position == 0:
         return _DEFAULT_RESET_RANGE
@@ -181,11 +185,26 @@ def _lengths(facts: Facts) -> dict[str, tuple[float, Provenance]]:
         width = float(np.ptp(stance.contacts @ facts.mirror.normal))
         length = float(np.mean([leg.length for leg in facts.legs]))
     found = {
-        "base_height_target": (stance.height, _solved("standing at the default pose")),
-        "spawn_height": (stance.spawn_height, _solved("1 cm above the standing height")),
-        "leg_length": (length, _measured(f"hip to knee to contact, {count}")),
-        "stance_width": (width, _solved("distance between the contacts at the default pose")),
-        "foot_radius": (foot_radius(facts), _measured(f"collision shapes of the feet, {count}")),
+        "base_height_target": (
+            stance.height,
+            _provenance("solved", "standing at the default pose"),
+        ),
+        "spawn_height": (
+            stance.spawn_height,
+            _provenance("solved", "1 cm above the standing height"),
+        ),
+        "leg_length": (
+            length,
+            _provenance("measured", f"hip to knee to contact, {count}"),
+        ),
+        "stance_width": (
+            width,
+            _provenance("solved", "distance between the contacts at the default pose"),
+        ),
+        "foot_radius": (
+            foot_radius(facts),
+            _provenance("measured", f"collision shapes of the feet, {count}"),
+        ),
     }
     if facts.bodies[0].virtual:  # the base is the world, which has no height
         del found["base_height_target"], found["spawn_height"]

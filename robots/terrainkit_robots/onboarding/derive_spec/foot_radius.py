@@ -39,10 +39,10 @@ def _leg_radius(robot: Facts, leg: Leg, poses: Sequence[Matrix]) -> float:
         return 0.0
     width = float(np.ptp(contact_points(body, pose, robot.meshes) @ leg.pitch))
     touching = min(shapes, key=lambda shape: min_height(shape, pose, robot.meshes))
-    return max(width / 2, _rolling_radius(robot, touching, pose, leg.pitch))
+    return max(width / 2, _shape_radius(robot, touching, pose, leg.pitch))
 
 
-def _rolling_radius(robot: Facts, shape: BodyShape, pose: Matrix, axis: Matrix) -> float:
+def _shape_radius(robot: Facts, shape: BodyShape, pose: Matrix, axis: Matrix) -> float:
     """Return the radius on which a shape rolls about an axis; 0 for a flat sole."""
     geometry, rotation = shape.geometry, (pose @ shape.pose)[:3, :3]
     match geometry.shape:

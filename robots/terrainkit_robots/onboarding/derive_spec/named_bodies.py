@@ -10,7 +10,7 @@ from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.legs import Leg
 
-_UPPER_BODY_WORDS = frozenset({"head", "torso", "chest", "trunk", "neck"})
+_UPPER_BODY_NAMES = frozenset({"head", "torso", "chest", "trunk", "neck"})
 """Words in names of bodies of a biped that must not touch the ground."""
 
 
@@ -87,7 +87,7 @@ def _is_upper_body(robot: Facts, body: Body) -> bool:
     pairs = robot.mirror.pairs
     names = [link.name for link in body.links if link.collisions]
     return any(pair.left in subtree and pair.right in subtree for pair in pairs) or any(
-        _UPPER_BODY_WORDS & _words(name) for name in names
+        _UPPER_BODY_NAMES & _split_name(name) for name in names
     )
 
 
@@ -99,5 +99,5 @@ def _subtree(robot: Facts, index: int) -> set[int]:
     return found
 
 
-def _words(name: str) -> set[str]:
+def _split_name(name: str) -> set[str]:
     return {word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+", name)}

@@ -31,7 +31,7 @@ class ConfigRobot:
     limits: Mapping[str, tuple[float, float]] | None = None
     """Lower and upper limit of each joint in the URDF; None if unknown."""
 
-    unactuated: Sequence[str] = ()
+    passive_joints: Sequence[str] = ()
     """Movable joints of the URDF without an actuator, such as mimic joints."""
 
     @property

@@ -45,7 +45,7 @@ def config_text(
     *,
     bodies: Sequence[str] = (),
     limits: Mapping[str, tuple[float, float]] | None = None,
-    unactuated: Sequence[str] = (),
+    passive_joints: Sequence[str] = (),
 ) -> str:
     """Return the configuration of a robot, a Python file for the folder of its robot.toml.
 
@@ -56,13 +56,13 @@ def config_text(
             legged_gym finds bodies by substrings, which must not match other bodies.
         limits: Lower and upper limit of each joint in the URDF. Without limits, the default
             factor of the soft limits is used.
-        unactuated: Movable joints of the URDF without an actuator.
+        passive_joints: Movable joints of the URDF without an actuator.
 
     Raises:
         ConfigError: if the framework is unknown, or does not support the robot.
     """
     config_file_name(framework)
-    robot = ConfigRobot(spec=spec, bodies=bodies, limits=limits, unactuated=unactuated)
+    robot = ConfigRobot(spec=spec, bodies=bodies, limits=limits, passive_joints=passive_joints)
     module = _get_module(framework)
     if module.LEGGED_ONLY:
         others = [name for name in framework_names() if not _get_module(name).LEGGED_ONLY]
@@ -88,7 +88,7 @@ def robot_config_text(framework: str, facts: "Facts", spec: RobotSpec) -> str:
         spec,
         bodies=(*(body_name(body) for body in facts.bodies), *spec.feet),
         limits={joint.name: joint.range for joint in joints if joint.range is not None},
-        unactuated=[j.name for j in joints if j.moves and j.name not in spec.joint_order],
+        passive_joints=[j.name for j in joints if j.moves and j.name not in spec.joint_order],
     )
 
 

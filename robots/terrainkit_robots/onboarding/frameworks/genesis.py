@@ -11,9 +11,9 @@ from terrainkit_robots.onboarding.frameworks.source import (
     docstring,
     float_literal,
     format_collection,
+    format_strings,
     join_lines,
     string_literal,
-    string_literals,
     sum_assignment,
 )
 
@@ -97,7 +97,7 @@ def config_text(robot: ConfigRobot) -> str:
             ["# Whether the base is fixed to the world.", f"FIXED = {not spec.floating}", ""],
             _bodies(robot),
             ["", "# The order of actions and observations."],
-            format_collection("JOINTS = ", string_literals(spec.joint_order)),
+            format_collection("JOINTS = ", format_strings(spec.joint_order)),
             *(["", *_table(robot, name, field)] for name, field in _TABLES.items()),
             *_scales(robot),
             ["", *_functions(robot).rstrip().split("\n")],
@@ -132,13 +132,13 @@ def _bodies(robot: ConfigRobot) -> list[str]:
     contacts = (*spec.penalized_contacts, *spec.termination_contacts)
     kept = dict.fromkeys([*spec.feet, *contacts])
     return [
-        *format_collection("FEET = ", string_literals(spec.feet)),
+        *format_collection("FEET = ", format_strings(spec.feet)),
         "# Bodies whose contacts are penalized.",
-        *format_collection("PENALIZED = ", string_literals(spec.penalized_contacts)),
+        *format_collection("PENALIZED = ", format_strings(spec.penalized_contacts)),
         "# Bodies whose ground contact terminates an episode.",
-        *format_collection("TERMINATION = ", string_literals(spec.termination_contacts)),
+        *format_collection("TERMINATION = ", format_strings(spec.termination_contacts)),
         "# Bodies that are not merged into their parents.",
-        *format_collection("LINKS_TO_KEEP = ", string_literals(kept)),
+        *format_collection("LINKS_TO_KEEP = ", format_strings(kept)),
     ]
 
 

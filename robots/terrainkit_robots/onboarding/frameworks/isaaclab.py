@@ -14,12 +14,12 @@ from terrainkit_robots.onboarding.frameworks.source import (
     dict_entries,
     docstring,
     float_literal,
-    float_literals,
     format_collection,
+    format_floats,
+    format_strings,
     indent,
     join_lines,
     string_literal,
-    string_literals,
     sum_assignment,
 )
 
@@ -151,7 +151,7 @@ def _actuator(robot: ConfigRobot, name: str, joints: Sequence[str]) -> list[str]
     if not joints:
         return []
     patterns = usd_patterns(robot.spec.joint_order)
-    names = string_literals(patterns[joint] for joint in joints)
+    names = format_strings(patterns[joint] for joint in joints)
     lines = format_collection("joint_names_expr=", names, depth=3, suffix=",")
     for field, source in _LIMITS.items():
         required = field in ("stiffness", "damping")
@@ -174,10 +174,10 @@ def _scales(robot: ConfigRobot) -> list[str]:
     if robot.velocity_joints:
         lines += ["", *robot.velocity_scale_comment()]
         lines += _value("SPEED_SCALE = ", robot.action_scales(robot.velocity_joints), patterns)
-        wheels = string_literals(patterns[joint] for joint in robot.velocity_joints)
+        wheels = format_strings(patterns[joint] for joint in robot.velocity_joints)
         lines += format_collection("WHEELS = ", wheels)
-    if robot.position_joints and (robot.velocity_joints or robot.unactuated):
-        joints = string_literals(patterns[joint] for joint in robot.position_joints)
+    if robot.position_joints and (robot.velocity_joints or robot.passive_joints):
+        joints = format_strings(patterns[joint] for joint in robot.position_joints)
         lines += format_collection("JOINTS = ", joints)
     return lines
 
@@ -192,7 +192,7 @@ def _value(
     suffix: str = "",
 ) -> list[str]:
     """Return a statement with one number if all joints have the same value, else with a dict."""
-    different = set(float_literals(values.values()))
+    different = set(format_floats(values.values()))
     if complete and len(different) == 1:
         return [f"{prefix}{different.pop()}{suffix}"]
     entries = dict_entries({patterns[joint]: value for joint, value in values.items()})
@@ -201,7 +201,7 @@ def _value(
 
 def _task(robot: ConfigRobot, name: str) -> list[str]:
     """Return the names of bodies, and a function that configures the velocity task."""
-    low, high = float_literals(robot.spec.reset_range)
+    low, high = format_floats(robot.spec.reset_range)
     return [
         "",
         "# Bodies after fixed joints are merged.",
@@ -239,7 +239,7 @@ def _task(robot: ConfigRobot, name: str) -> list[str]:
 def _actions(robot: ConfigRobot) -> list[str]:
     """Return the source of the actions with position targets and velocity targets."""
     lines = ["cfg.actions.joint_pos.scale = ACTION_SCALE"] if robot.position_joints else []
-    if robot.velocity_joints or robot.unactuated:
+    if robot.velocity_joints or robot.passive_joints:
         lines += [
             "cfg.actions.joint_pos.joint_names = JOINTS"
             if robot.position_joints
@@ -272,5 +272,5 @@ def _bodies(robot: ConfigRobot) -> list[str]:
         ("TERMINATION", "termination_contacts"),
     ):
         names = robot.check_bodies(getattr(spec, field), field)
-        lines += format_collection(f"{name} = ", string_literals(patterns[body] for body in names))
+        lines += format_collection(f"{name} = ", format_strings(patterns[body] for body in names))
     return lines

@@ -11,9 +11,9 @@ from terrainkit_robots.onboarding.frameworks.source import (
     dict_entries,
     float_literal,
     format_collection,
+    format_strings,
     indent,
     string_literal,
-    string_literals,
     sum_assignment,
 )
 from terrainkit_robots.onboarding.frameworks.substrings import common_key, gain_keys, keys_for
@@ -47,9 +47,9 @@ def check_legs(robot: ConfigRobot, framework: str, others: Sequence[str]) -> Non
             f"{robot.title} has no legs, but {framework} requires a legged robot; "
             f"other frameworks: {listing(others)}"
         )
-    if robot.unactuated:
+    if robot.passive_joints:
         raise ConfigError(
-            f"{names(robot.unactuated)} of {robot.title} have no actuator, but {framework} "
+            f"{names(robot.passive_joints)} of {robot.title} have no actuator, but {framework} "
             f"actuates all joints; other frameworks: {listing(others)}"
         )
     if not spec.floating:
@@ -184,4 +184,4 @@ def _body_keys(robot: ConfigRobot, field: str, attribute: str) -> list[str]:
     lines = []
     for key, name in result.clashes:
         lines += comment(f"{key} also matches {name}.", depth=2)
-    return [*lines, *format_collection(f"{attribute} = ", string_literals(result.keys), depth=2)]
+    return [*lines, *format_collection(f"{attribute} = ", format_strings(result.keys), depth=2)]

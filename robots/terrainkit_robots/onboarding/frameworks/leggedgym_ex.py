@@ -10,10 +10,10 @@ from terrainkit_robots.onboarding.frameworks.source import (
     docstring,
     float_literal,
     format_collection,
+    format_strings,
     indent,
     join_lines,
     string_literal,
-    string_literals,
 )
 
 LEGGED_ONLY = True
@@ -130,13 +130,13 @@ def _asset(robot: ConfigRobot) -> list[str]:
         *legged_robot.contacts(robot),
         *assignment("base_link_name", string_literal(base), depth=2),
         "# The order of actions and observations.",
-        *format_collection("dof_names = ", string_literals(spec.joint_order), depth=2),
+        *format_collection("dof_names = ", format_strings(spec.joint_order), depth=2),
         *robot.provenance_comment("armature", depth=2, prefix="In the order of dof_names"),
         *format_collection("dof_armature = ", armatures, depth=2),
         *robot.provenance_comment("velocity", depth=2, prefix="In the order of dof_names"),
         *format_collection("dof_vel_limits = ", limits, depth=2),
         *comment("Bodies on fixed joints that Genesis does not merge.", depth=2),
-        *format_collection("links_to_keep = ", string_literals(spec.feet), depth=2),
+        *format_collection("links_to_keep = ", format_strings(spec.feet), depth=2),
         *legged_robot.shapes(),
     ]
 

@@ -13,10 +13,10 @@ from terrainkit_robots.onboarding.frameworks.source import (
     docstring,
     float_literal,
     format_collection,
+    format_strings,
     indent,
     join_lines,
     string_literal,
-    string_literals,
     sum_assignment,
 )
 
@@ -116,7 +116,7 @@ def _articulation(robot: ConfigRobot, name: str, patterns: Mapping[str, str]) ->
         groups.setdefault((_VELOCITY if is_wheel else _POSITION, *arguments), []).append(joint)
     actuators = []
     for (kind, *arguments), joints in groups.items():
-        names = string_literals(patterns[joint] for joint in joints)
+        names = format_strings(patterns[joint] for joint in joints)
         expression = format_collection("target_names_expr=", names, "()", depth=3, suffix=",")
         actuators += [f"{kind}(", *indent([*expression, *arguments]), "),"]
     origins = [

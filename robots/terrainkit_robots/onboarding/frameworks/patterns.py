@@ -31,14 +31,12 @@ def mjlab_patterns(names: Sequence[str]) -> dict[str, str]:
     Raises:
         ConfigError: if two names are the same in mjlab.
     """
-    short_names = {name: name.rsplit("/", maxsplit=1)[-1] for name in names}
+    base_names = {name: name.rsplit("/", maxsplit=1)[-1] for name in names}
     patterns = {}
-    for name, short in short_names.items():
-        is_prefix = any(
-            other != short and other.startswith(short) for other in short_names.values()
-        )
+    for name, short in base_names.items():
+        is_prefix = any(other != short and other.startswith(short) for other in base_names.values())
         patterns[name] = re.escape(short) + ("$" if is_prefix else "")
-    return _check_unique(patterns, "mjlab", short_names)
+    return _check_unique(patterns, "mjlab", base_names)
 
 
 def _usd_pattern(name: str) -> str:
@@ -47,7 +45,7 @@ def _usd_pattern(name: str) -> str:
     pattern = re.sub(
         r"[^\x00-\x7f]+",
         rf"(?:\g<0>{_NON_ASCII_END}",
-        re.sub(r"[\x00-\x7f]", _replace_character, name),
+        re.sub(r"[\x00-\x7f]", _replace_char, name),
     )
     if re.match(r"[A-Za-z]", pattern):
         return pattern
@@ -55,18 +53,18 @@ def _usd_pattern(name: str) -> str:
     return "a?" + first + pattern[1:]
 
 
-def _replace_character(match: re.Match[str]) -> str:
+def _replace_char(match: re.Match[str]) -> str:
     letter = match[0]
     return letter if letter.isalnum() or letter == "_" else "."
 
 
 def _check_unique(
-    patterns: Mapping[str, str], format_name: str, short_names: Mapping[str, str] | None = None
+    patterns: Mapping[str, str], format_name: str, base_names: Mapping[str, str] | None = None
 ) -> dict[str, str]:
     """Return the patterns; raise a ConfigError if one of them matches another name."""
     for name, pattern in patterns.items():
         for other in patterns:
-            if other != name and _matches(name, pattern, (short_names or {}).get(other, other)):
+            if other != name and _matches(name, pattern, (base_names or {}).get(other, other)):
                 raise ConfigError(
                     f"{name!r} and {other!r} have the same name in {format_name}; rename one"
                 )

@@ -50,12 +50,12 @@ def float_literal(value: float) -> str:
     return short if any(letter in short for letter in ".e") else f"{short}.0"
 
 
-def float_literals(values: Iterable[float]) -> list[str]:
+def format_floats(values: Iterable[float]) -> list[str]:
     """Return a float literal for each value."""
     return [float_literal(value) for value in values]
 
 
-def string_literals(texts: Iterable[str]) -> list[str]:
+def format_strings(texts: Iterable[str]) -> list[str]:
     """Return a string literal for each text."""
     return [string_literal(text) for text in texts]
 

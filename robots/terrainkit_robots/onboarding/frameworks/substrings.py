@@ -33,7 +33,7 @@ def common_key(targets: Sequence[str], names: Iterable[str]) -> str | None:
     """
     others = [name for name in names if name not in targets]
     shortest = min(targets, key=len)
-    for candidate in [*_whole_words(shortest), *_substrings(shortest)]:
+    for candidate in [*_word_keys(shortest), *_substrings(shortest)]:
         if all(candidate in name for name in targets) and not any(
             candidate in other for other in others
         ):
@@ -92,7 +92,7 @@ def gain_keys(joints: Sequence[str], gains: Mapping[str, object]) -> Keys:
 def _best_key(targets: Sequence[str], others: Sequence[str]) -> str:
     """Return the key that matches most targets and no other name, or else a target."""
     candidates = dict.fromkeys(
-        candidate for name in targets for candidate in [*_whole_words(name), name]
+        candidate for name in targets for candidate in [*_word_keys(name), name]
     )
     best, max_count = targets[0], 0
     for candidate in candidates:
@@ -102,7 +102,7 @@ def _best_key(targets: Sequence[str], others: Sequence[str]) -> str:
     return best
 
 
-def _whole_words(name: str) -> list[str]:
+def _word_keys(name: str) -> list[str]:
     """Return sequences of words in a name, shortest first; words are separated by _ and others."""
     spans = [match.span() for match in re.finditer(r"[^\W_]+", name)][:12]
     sequences = {

@@ -42,14 +42,14 @@ def names(merged):
     return [[each.name for each in body.links] for body in merged]
 
 
-# Which links move as one
+# Merging
 
 
-def test_a_robot_without_links_has_no_bodies():
+def test_merge_bodies_without_links():
     assert bodies("") == ()
 
 
-def test_fixed_joints_hold_links_together():
+def test_merge_bodies_merges_fixed_joints():
     merged = bodies(
         "".join(map(link, "abcde"))
         + joint("a", "b")
@@ -64,8 +64,8 @@ def test_fixed_joints_hold_links_together():
     assert trunk.top.name == "a"
 
 
-def test_frames_of_links_and_of_the_joint_add_up_along_fixed_joints():
-    # b is 1 m ahead of a and turned to the left, so that c's 2 m ahead of b are to the left of a.
+def test_merge_bodies_composes_frames_along_fixed_joints():
+    # b is 1 m ahead of a and turned to the left, so c, 2 m ahead of b, is to the left of a.
     quarter = f"0 0 {np.pi / 2}"
     merged = bodies(
         "".join(map(link, "abcd"))
@@ -81,24 +81,24 @@ def test_frames_of_links_and_of_the_joint_add_up_along_fixed_joints():
 
 
 @pytest.mark.parametrize("kind", ["revolute", "continuous", "prismatic"])
-def test_joints_of_one_degree_of_freedom_part_bodies(kind):
+def test_merge_bodies_separates_at_moving_joints(kind):
     merged = bodies(link("a") + link("b") + joint("a", "b", kind))
     assert names(merged) == [["a"], ["b"]]
     assert merged[1].joint.moves
 
 
 @pytest.mark.parametrize("kind", ["floating", "planar"])
-def test_what_nothing_drives_parts_bodies_too(kind):
+def test_merge_bodies_separates_at_unactuated_joints(kind):
     merged = bodies(link("a", 1) + link("b", 1) + joint("a", "b", kind))
     assert names(merged) == [["a"], ["b"]]
     assert not merged[1].joint.moves
 
 
-def test_a_joint_of_a_kind_that_is_not_known_holds():
+def test_merge_bodies_treats_unknown_joints_as_fixed():
     assert names(bodies(link("a") + link("b") + joint("a", "b", "hinge"))) == [["a", "b"]]
 
 
-def test_a_world_above_a_floating_joint_is_not_the_trunk():
+def test_merge_bodies_skips_world_above_floating_joint():
     merged = bodies(
         link("world")
         + link("a", 1)
@@ -110,7 +110,7 @@ def test_a_world_above_a_floating_joint_is_not_the_trunk():
     assert merged[0].joint is None
 
 
-def test_what_stands_beside_the_trunk_in_a_world_is_not_of_the_robot():
+def test_merge_bodies_excludes_siblings_of_the_trunk():
     merged = bodies(
         link("world")
         + link("a", 1)
@@ -121,13 +121,13 @@ def test_what_stands_beside_the_trunk_in_a_world_is_not_of_the_robot():
     assert names(merged)[0] == ["world", "a"]
 
 
-def test_the_heaviest_link_gives_the_name():
+def test_body_name_is_that_of_heaviest_link():
     merged = bodies(link("a") + link("b", 0.1) + link("c", 2) + joint("a", "b") + joint("b", "c"))
     assert (merged[0].name, merged[0].top.name) == ("c", "a")
     assert bodies(link("a") + link("b") + joint("a", "b"))[0].name == "a"
 
 
-def test_shapes_are_in_the_frame_of_the_body():
+def test_body_shapes_are_in_body_frame():
     shape = (
         '<collision><origin xyz="0 0 1"/><geometry><sphere radius="1"/></geometry></collision>'
         '<visual><geometry><sphere radius="2"/></geometry></visual>'
@@ -141,11 +141,11 @@ def test_shapes_are_in_the_frame_of_the_body():
     np.testing.assert_allclose(visual.pose[:3, 3], [1, 0, 0], atol=1e-12)
 
 
-# Mass, by hand
+# Mass and inertia by hand
 
 
-def test_two_points_on_a_rod_by_hand():
-    # 1 kg at x = 0 and 3 kg at x = 2: the centre is at 1.5, and 1 * 1.5^2 + 3 * 0.5^2 = 3.
+def test_body_inertia_of_two_point_masses():
+    # 1 kg at x = 0 and 3 kg at x = 2: the center is at 1.5, and 1 * 1.5^2 + 3 * 0.5^2 = 3.
     none = "0 0 0 0 0 0"
     (body,) = bodies(
         link("a", 1, inertia=none) + link("b", 3, inertia=none) + joint("a", "b", xyz="2 0 0")
@@ -156,19 +156,19 @@ def test_two_points_on_a_rod_by_hand():
     np.testing.assert_allclose(body.principal, [0, 3, 3])
 
 
-def test_an_inertia_turns_with_its_frame():
+def test_body_inertia_rotates_with_inertial_frame():
     (body,) = bodies(link("a", 1, inertia="1 2 3 0 0 0", rpy=f"0 0 {np.pi / 2}"))
     np.testing.assert_allclose(body.inertia, np.diag([2, 1, 3]), atol=1e-12)
 
 
-def test_an_inertia_turns_with_its_link():
+def test_body_inertia_rotates_with_link():
     (body,) = bodies(
         link("a") + link("b", 1, inertia="1 2 3 0 0 0") + joint("a", "b", rpy=f"{np.pi / 2} 0 0")
     )
     np.testing.assert_allclose(body.inertia, np.diag([1, 3, 2]), atol=1e-12)
 
 
-def test_a_placeholder_changes_nothing():
+def test_body_mass_ignores_placeholder_links():
     (alone,) = bodies(link("a", 2, xyz="1 2 3", inertia="1 2 3 .1 .2 .3"))
     (held, moved) = bodies(
         link("a", 2, xyz="1 2 3", inertia="1 2 3 .1 .2 .3")
@@ -186,17 +186,17 @@ def test_a_placeholder_changes_nothing():
 
 
 @pytest.mark.parametrize("mass", ["-1", "0", "1e20", "1e29", "nan", "inf", "x"])
-def test_masses_that_make_no_sense_raise_nothing(mass):
+def test_body_mass_of_invalid_values_is_finite(mass):
     (body,) = bodies(link("a", mass, inertia="1e29 0 -1 1e29 0 0") + link("b", 1) + joint("a", "b"))
     assert np.isfinite([body.mass, *body.center, *body.inertia.ravel(), *body.principal]).all()
 
 
-def test_a_mass_of_minus_one_weighs_minus_one():
+def test_body_mass_includes_negative_masses():
     (body,) = bodies(link("a", -1) + link("b", 3) + joint("a", "b"))
     assert body.mass == 2
 
 
-# Mass, against six by six spatial inertias
+# Compared with spatial inertias
 
 NUMBERS = st.floats(-2, 2)
 PLACES = st.tuples(*[NUMBERS] * 3)
@@ -213,7 +213,7 @@ def cross(v):
 
 @settings(max_examples=50, deadline=None)
 @given(st.lists(PARTS, min_size=2, max_size=4))
-def test_merged_bodies_are_sums_of_spatial_inertias(parts):
+def test_body_inertia_is_sum_of_spatial_inertias(parts):
     inner, total = link("root"), np.zeros((6, 6))
     for k, (mass, xyz, rpy, moments, place, turn) in enumerate(parts):
         principal = 0.1 + np.abs(moments)
@@ -230,11 +230,11 @@ def test_merged_bodies_are_sums_of_spatial_inertias(parts):
     np.testing.assert_allclose(body.inertia - body.mass * c @ c, total[:3, :3], atol=1e-9)
 
 
-# Mass, against MuJoCo
+# Compared with MuJoCo
 
 
 def compiled(path):
-    """Return a URDF as MuJoCo compiles it: afloat, without shapes, and with fixed links merged."""
+    """Compile a URDF with a floating base, without shapes, and with fixed links merged."""
     root = etree.parse(str(path)).getroot()
     for shape in list(root.iter("visual", "collision")):
         shape.getparent().remove(shape)
@@ -269,7 +269,7 @@ def compiled(path):
         *bundled.names(),
     ],
 )
-def test_merged_bodies_are_as_mujoco_merges_them(name, robot_file):
+def test_merge_bodies_matches_mujoco(name, robot_file):
     path = bundled.find(name) if name in bundled.names() else robot_file(name)
     model = compiled(path)
     merged = Facts(load_robot(path)).bodies
@@ -282,7 +282,7 @@ def test_merged_bodies_are_as_mujoco_merges_them(name, robot_file):
         inertia = turn @ np.diag(theirs.inertia) @ turn.T
         assert body.mass == pytest.approx(float(theirs.mass[0]), rel=1e-9)
         np.testing.assert_allclose(body.center, theirs.ipos, rtol=1e-9, atol=1e-12)
-        # MuJoCo 3 stops turning to the principal axes a little early.
+        # MuJoCo 3 computes the principal axes less accurately.
         near = 1e-9 if int(mujoco.__version__.split(".")[0]) >= 4 else 1e-5
         np.testing.assert_allclose(
             body.inertia, inertia, rtol=near, atol=near * theirs.inertia.max()

@@ -21,7 +21,7 @@ BAR = (
 
 
 class Counting(Meshes):
-    """Mesh files, and how often they are asked for."""
+    """Mesh files that count how often vertices are requested."""
 
     asked = 0
 
@@ -49,51 +49,51 @@ def longer_than(length):
     return lambda box: half_diagonal(box) < length
 
 
-def test_a_body_reaches_from_its_shapes_to_the_joints_on_it(robot):
+def test_box_if_includes_joints_on_the_body(robot):
     facts = robot(BALL.format("collision"))
     box = facts.body_bounds.box_if(facts.bodies[0], always)
     assert box == pytest.approx(np.array([[-0.1, -0.1, -0.1], [0.1, 0.1, 0.5]]))
 
 
-def test_a_mesh_that_is_not_needed_is_not_opened(robot):
+def test_box_if_skips_unneeded_meshes(robot):
     facts = robot(BALL.format("collision"), BAR.format("visual"))
     assert facts.body_bounds.box_if(facts.bodies[1], longer_than(0.1)) is None
     assert facts.meshes.asked == 0
 
 
-def test_a_mesh_that_settles_a_doubt_is_opened(robot):
+def test_box_if_opens_needed_meshes(robot):
     facts = robot(BALL.format("collision"), BAR.format("visual"))
     assert facts.body_bounds.box_if(facts.bodies[1], longer_than(0.9)) is None
     assert facts.meshes.asked > 0
 
 
-def test_what_is_wrong_of_all_of_it_is_wrong(robot):
+def test_box_if_returns_box_when_condition_holds(robot):
     facts = robot(BALL.format("collision"), BAR.format("visual"))
     box = facts.body_bounds.box_if(facts.bodies[1], longer_than(1.5))
     assert box == pytest.approx(np.array([[-0.1, -0.1, -0.1], [0.1, 0.1, 2.0]]))
 
 
 @pytest.mark.parametrize("shapes", [(), (BAR.format("collision"),)])
-def test_a_body_of_unknown_size_may_be_larger_than_the_robot(robot, shapes):
+def test_box_if_allows_for_unreadable_shapes(robot, shapes):
     facts = robot(*shapes, bar=False)
     assert facts.body_bounds.robot_size == pytest.approx(0.5)
     assert facts.body_bounds.box_if(facts.bodies[1], longer_than(1.2)) is None
     assert facts.body_bounds.box_if(facts.bodies[1], longer_than(5.0)) is not None
 
 
-def test_what_only_stands_for_a_shape_is_none(robot):
+def test_box_if_ignores_marker_shapes(robot):
     facts = robot("<collision><geometry><box size='0.002 0.002 0.002'/></geometry></collision>")
     assert facts.body_bounds.box_if(facts.bodies[1], longer_than(1.2)) is None
 
 
-def test_the_collision_shapes_stand_for_a_body(robot):
+def test_shape_box_prefers_collision_shapes(robot):
     facts = robot(BALL.format("collision"), BAR.format("visual"))
     box = facts.body_bounds.shape_box(facts.bodies[1], always)
     assert box == pytest.approx(np.array([[-0.1] * 3, [0.1] * 3]))
     assert facts.meshes.asked == 0
 
 
-def test_a_mesh_that_is_only_seen_is_opened_where_there_is_doubt(robot):
+def test_shape_box_opens_visual_mesh_only_if_needed(robot):
     facts = robot(BAR.format("visual"))
     asked = []
     assert (
@@ -105,6 +105,6 @@ def test_a_mesh_that_is_only_seen_is_opened_where_there_is_doubt(robot):
     assert facts.body_bounds.shape_box(facts.bodies[1], always)[1, 2] == pytest.approx(2.0)
 
 
-def test_the_extents_are_worked_out_once(robot):
+def test_body_bounds_are_cached(robot):
     facts = robot(BALL.format("collision"))
     assert facts.body_bounds is facts.body_bounds

@@ -11,7 +11,7 @@ NAMES = st.permutations([f"j{k}" for k in range(12)])
 
 
 @given(NAMES, NAMES)
-def test_theirs_is_ours_indexed_with_the_permutation(ours, theirs):
+def test_permutation_maps_ours_to_theirs(ours, theirs):
     places = permutation(ours, theirs)
     assert list(np.array(ours)[places]) == list(theirs)
     assert list(np.array(theirs)[np.argsort(places)]) == list(ours)
@@ -19,7 +19,7 @@ def test_theirs_is_ours_indexed_with_the_permutation(ours, theirs):
     assert is_reordered(places) == (ours != theirs)
 
 
-def test_other_names_have_no_permutation():
+def test_permutation_of_different_names_is_none():
     assert permutation(["a", "b"], ["a", "c"]) is None
     assert permutation(["a"], ["a", "b"]) is None
     assert permutation(["a", "a"], ["a", "b"]) is None
@@ -28,17 +28,17 @@ def test_other_names_have_no_permutation():
     assert permutation([], []) == []
 
 
-def test_the_order_of_the_tree_is_depth_first():
+def test_joints_are_depth_first():
     path = bundled.find("quadruped")
     robot = Facts(load_robot(path))
     legs = ("FL", "FR", "RL", "RR")
-    wanted = tuple(f"{leg}_{part}_joint" for leg in legs for part in ("hip", "thigh", "calf"))
-    assert tuple(joint.name for joint in robot.joints) == wanted
+    expected = tuple(f"{leg}_{part}_joint" for leg in legs for part in ("hip", "thigh", "calf"))
+    assert tuple(joint.name for joint in robot.joints) == expected
     assert robot.actuator_order == ()
-    assert Facts(load_robot(path.with_suffix(".xml"))).actuator_order == wanted
+    assert Facts(load_robot(path.with_suffix(".xml"))).actuator_order == expected
 
 
-def test_only_the_first_motor_of_a_joint_counts_and_only_those_of_joints(tmp_path):
+def test_actuator_order_counts_first_actuator_of_each_joint(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(
         '<mujoco><worldbody><body name="a"><geom size="0.1"/><site name="s"/>'

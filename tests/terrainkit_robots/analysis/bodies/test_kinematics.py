@@ -39,7 +39,7 @@ def path_of(name, robot_file):
 
 
 def random_positions(joints, rng):
-    """Return positions within the limits where there are some, and within half a turn."""
+    """Return random positions within the limits, or within half a turn without limits."""
     positions = {}
     for joint in joints:
         limit = joint.limit
@@ -71,16 +71,16 @@ ARM = """
 """
 
 
-def test_a_turn_and_a_slide_by_hand():
+def test_body_poses_of_hinge_and_slide():
     trunk, turned, slid = body_poses(facts(ARM).bodies, {"turn": np.pi / 2, "slide": 0.5})
     np.testing.assert_array_equal(trunk, np.eye(4))
     np.testing.assert_allclose(turned[:3, 3], [0, 0, 1])
     np.testing.assert_allclose(turned[:3, 0], [0, 1, 0], atol=1e-15)
-    # The axis is not of unit length, the joint still moves half a metre.
+    # The axis is not of unit length, but the joint still moves half a meter.
     np.testing.assert_allclose(slid[:3, 3], [0, 2.5, 1], atol=1e-15)
 
 
-def test_joints_that_are_not_named_are_at_zero():
+def test_body_poses_default_to_zero_positions():
     bodies = facts(ARM).bodies
     for ours, zero in zip(
         body_poses(bodies, {}), body_poses(bodies, {"turn": 0.0, "slide": 0.0}), strict=True
@@ -89,7 +89,7 @@ def test_joints_that_are_not_named_are_at_zero():
     np.testing.assert_allclose(body_poses(bodies, {})[2], at(2, 0, 1))
 
 
-def test_a_joint_that_mimics_follows():
+def test_body_poses_include_mimic_joints():
     follows = '<mimic joint="turn" multiplier="2" offset="0.1"/><axis xyz="2 0 0"/>'
     bodies = facts(ARM.replace('<axis xyz="2 0 0"/>', follows)).bodies
     turned = body_poses(bodies, {"turn": 0.5, "slide": 77.0})[2]
@@ -100,7 +100,7 @@ def test_a_joint_that_mimics_follows():
     np.testing.assert_allclose(body_poses(bodies, {})[2], at(2.1, 0, 1))
 
 
-def test_many_positions_at_once():
+def test_body_poses_broadcast_positions():
     bodies = facts(ARM).bodies
     turns, slides = np.linspace(-3, 3, 5), np.linspace(0, 1, 5)
     many = body_poses(bodies, {"turn": turns, "slide": slides})[2]
@@ -110,18 +110,18 @@ def test_many_positions_at_once():
         np.testing.assert_allclose(pose, one, atol=1e-15)
 
 
-def test_names_that_are_not_there_are_ignored():
+def test_body_poses_ignore_unknown_names():
     np.testing.assert_allclose(body_poses(facts(ARM).bodies, {"x": 1.0})[2], at(2, 0, 1))
 
 
-def test_an_axis_that_is_missing_is_x():
+def test_body_poses_default_axis_is_x():
     bodies = facts(ARM.replace('<axis xyz="0 0 1"/>', "")).bodies
     np.testing.assert_allclose(
         body_poses(bodies, {"turn": np.pi / 2})[1][:3, 1], [0, 0, 1], atol=1e-15
     )
 
 
-def test_where_an_axis_is():
+def test_joint_axis_of_moved_body():
     bodies = facts(ARM).bodies
     poses = body_poses(bodies, {"turn": np.pi / 2, "slide": 0.5})
     point, axis = joint_axis(bodies[2], poses[2])
@@ -129,12 +129,12 @@ def test_where_an_axis_is():
     np.testing.assert_allclose(axis, [0, 1, 0], atol=1e-15)
 
 
-def test_ancestors_lead_from_the_trunk_to_the_body():
+def test_ancestors_lead_from_trunk_to_body():
     bodies = facts(ARM).bodies
     assert [ancestors(bodies, k) for k in range(3)] == [[], [1], [1, 2]]
 
 
-def test_a_chain_of_thousands_of_joints_is_walked():
+def test_body_poses_of_long_chain():
     count = 3_000
     links = "".join(f'<link name="l{k}"/>' for k in range(count))
     joints = "".join(
@@ -147,11 +147,11 @@ def test_a_chain_of_thousands_of_joints_is_walked():
     assert len(ancestors(bodies, count - 1)) == count - 1
 
 
-# Against yourdfpy
+# Compared with yourdfpy
 
 
 @pytest.mark.parametrize("name", URDFS)
-def test_urdfs_move_as_in_yourdfpy(name, robot_file):
+def test_body_poses_match_yourdfpy(name, robot_file):
     yourdfpy = pytest.importorskip("yourdfpy")
     path = path_of(name, robot_file)
     robot = Facts(load_robot(path))
@@ -165,11 +165,11 @@ def test_urdfs_move_as_in_yourdfpy(name, robot_file):
         poses = body_poses(robot.bodies, positions)
         for body, pose in zip(robot.bodies, poses, strict=True):
             for link, local in zip(body.links, body.poses, strict=True):
-                wanted = other.get_transform(link.name, robot.bodies[0].top.name)
-                np.testing.assert_allclose(pose @ local, wanted, atol=1e-9, err_msg=link.name)
+                expected = other.get_transform(link.name, robot.bodies[0].top.name)
+                np.testing.assert_allclose(pose @ local, expected, atol=1e-9, err_msg=link.name)
 
 
-# Against MuJoCo
+# Compared with MuJoCo
 
 
 def same_as_mujoco(robot, model, rng):
@@ -190,14 +190,14 @@ def same_as_mujoco(robot, model, rng):
     for body, pose in zip(robot.bodies, body_poses(robot.bodies, positions), strict=True):
         for link, local in zip(body.links, body.poses, strict=True):
             if not link.virtual:
-                wanted = trunk @ place(link.name)
-                np.testing.assert_allclose(pose @ local, wanted, atol=1e-9, err_msg=link.name)
+                expected = trunk @ place(link.name)
+                np.testing.assert_allclose(pose @ local, expected, atol=1e-9, err_msg=link.name)
                 compared += 1
     return compared
 
 
 def without_meshes(path):
-    """Return the model of a file; one of the robots lacks a mesh, and none is needed here."""
+    """Compile a file without its meshes, which are not needed and may be missing."""
     spec = mujoco.MjSpec.from_file(str(path))
     for geom in [g for g in spec.geoms if g.type == mujoco.mjtGeom.mjGEOM_MESH]:
         spec.delete(geom)
@@ -207,7 +207,7 @@ def without_meshes(path):
 
 
 @pytest.mark.parametrize("name", MJCFS)
-def test_mjcfs_move_as_in_mujoco(name, robot_file):
+def test_body_poses_match_mujoco(name, robot_file):
     path = path_of(name, robot_file)
     robot, model = Facts(load_robot(path)), without_meshes(path)
     rng = np.random.default_rng(0)
@@ -276,7 +276,7 @@ HAND_MADE = {
 
 @pytest.mark.parametrize("inner", HAND_MADE.values(), ids=HAND_MADE)
 @pytest.mark.parametrize("angle", ["degree", "radian"])
-def test_anchors_and_references_are_as_in_mujoco(inner, angle):
+def test_body_poses_with_anchor_match_mujoco(inner, angle):
     text = f'<mujoco model="m"><compiler angle="{angle}"/><worldbody>{inner}</worldbody></mujoco>'
     robot, model = facts(text, "robot.xml"), mujoco.MjModel.from_xml_string(text)
     assert len(robot.joints) == model.njnt - text.count("freejoint")
@@ -285,7 +285,7 @@ def test_anchors_and_references_are_as_in_mujoco(inner, angle):
         assert same_as_mujoco(robot, model, rng) == model.nbody - 1
 
 
-def test_at_its_reference_a_joint_has_not_moved():
+def test_body_poses_at_reference_equal_origin():
     text = (
         '<mujoco><compiler angle="radian"/><worldbody><body name="a"><body name="b" pos="1 0 0">'
         '<joint name="j" axis="0 0 1" pos="-1 0 0" ref="0.5"/><geom size="1"/></body></body>'
@@ -293,6 +293,6 @@ def test_at_its_reference_a_joint_has_not_moved():
     )
     bodies = facts(text, "robot.xml").bodies
     np.testing.assert_allclose(body_poses(bodies, {"j": 0.5})[1], at(1, 0, 0), atol=1e-15)
-    # A quarter turn further it has swung about the origin of a, which is its anchor.
+    # After a quarter turn it has rotated about its anchor, the origin of a.
     swung = body_poses(bodies, {"j": 0.5 + np.pi / 2})[1]
     np.testing.assert_allclose(swung[:3, 3], [0, 1, 0], atol=1e-15)

@@ -10,7 +10,7 @@ from terrainkit_robots.description.load import load_robot
 
 
 def chain(tmp_path, *mimics):
-    """Return a robot of slides on one line, jA and so on, that follow what is told."""
+    """Return a chain of prismatic joints jA, jB, ... with the given <mimic> elements."""
     names = [f"j{letter}" for letter in "ABCDEFGH"[: len(mimics)]]
     links = "".join(f'<link name="l{k}"/>' for k in range(len(mimics) + 1))
     joints = "".join(
@@ -27,10 +27,10 @@ def follows(joint, multiplier=1.0, offset=0.0):
     return f'<mimic joint="{joint}" multiplier="{multiplier}" offset="{offset}"/>'
 
 
-def test_a_follower_of_a_follower(tmp_path):
+def test_mimic_positions_of_chained_joints(tmp_path):
     robot = chain(tmp_path, "", follows("jA", offset=0.5), follows("jB", -2))
     assert mimic_positions(robot.joints, {"jA": 1.0}) == {"jB": 1.5, "jC": -3.0}
-    # However the file has them.
+    # In any order of the file.
     backwards = chain(tmp_path, follows("jB", -2), follows("jC", offset=0.5), "")
     assert [joint.name for joint in mimic_joints(backwards.joints)] == ["jB", "jA"]
     assert mimic_positions(backwards.joints, {"jC": 1.0}) == {"jB": 1.5, "jA": -3.0}
@@ -38,7 +38,7 @@ def test_a_follower_of_a_follower(tmp_path):
     assert body_poses(backwards.bodies, {"jC": 1.0})[3][0, 3] == pytest.approx(1.0 + 1.5 - 3.0)
 
 
-def test_many_positions_at_once(tmp_path):
+def test_mimic_positions_broadcast(tmp_path):
     robot = chain(tmp_path, follows("jB", -2), follows("jC", offset=0.5), "")
     drawn = np.linspace(-1, 1, 5)
     found = mimic_positions(robot.joints, {"jC": drawn, "jA": drawn})
@@ -50,23 +50,23 @@ def test_many_positions_at_once(tmp_path):
     [
         ("", "", follows("nobody", 2, 1)),
         ("", "", follows("jC", 2, 1)),  # itself
-        (follows("jB"), follows("jC"), follows("jA", 2, 1)),  # a circle
+        (follows("jB"), follows("jC"), follows("jA", 2, 1)),  # a cycle
         ("", "", follows("", 2, 1)),
     ],
 )
-def test_who_follows_nobody_stays_where_it_is(tmp_path, mimics):
+def test_mimic_joints_exclude_unknown_targets_and_cycles(tmp_path, mimics):
     robot = chain(tmp_path, *mimics)
     assert mimic_joints(robot.joints) == ()
     assert mimic_positions(robot.joints, {"jC": 7.0}) == {}
     assert body_poses(robot.bodies, {"jC": 7.0})[3][0, 3] == pytest.approx(7.0)
 
 
-def test_who_follows_one_of_a_circle_follows_it(tmp_path):
+def test_mimic_positions_follow_joint_in_cycle(tmp_path):
     robot = chain(tmp_path, follows("jB"), follows("jA"), follows("jB", 2))
     assert mimic_positions(robot.joints, {"jA": 5.0, "jB": 3.0}) == {"jC": 6.0}
 
 
-def test_a_joint_that_does_not_move_is_not_followed(tmp_path):
+def test_mimic_positions_ignore_fixed_targets(tmp_path):
     robot = chain(tmp_path, "", follows("jA", 2, 1))
     path = tmp_path / "robot.urdf"
     path.write_text(path.read_text().replace('"prismatic"', '"fixed"', 1))
@@ -74,7 +74,7 @@ def test_a_joint_that_does_not_move_is_not_followed(tmp_path):
     assert len(robot.joints) == 2
 
 
-def test_positions_stay_numbers_however_large_the_factors(tmp_path):
+def test_mimic_positions_stay_finite(tmp_path):
     robot = chain(tmp_path, "", *(follows(f"j{letter}", -9e29, 9e29) for letter in "ABCDEFG"))
     for position in (1.0, np.array([1.0, -1e30])):
         for found in mimic_positions(robot.joints, {"jA": position}).values():
@@ -82,7 +82,7 @@ def test_positions_stay_numbers_however_large_the_factors(tmp_path):
 
 
 @given(st.lists(st.integers(-1, 7), min_size=8, max_size=8), st.permutations(range(8)))
-def test_who_leads_comes_first_whatever_the_order(tmp_path_factory, leaders, order):
+def test_mimic_joints_come_after_their_targets(tmp_path_factory, leaders, order):
     folder = tmp_path_factory.getbasetemp()
     names = [f"j{letter}" for letter in "ABCDEFGH"]
     mimics = ["" if k < 0 else follows(names[k], 2, 0.1) for k in leaders]
@@ -92,7 +92,7 @@ def test_who_leads_comes_first_whatever_the_order(tmp_path_factory, leaders, ord
     assert len(placed) == len(found)
     for joint in found:
         assert placed.get(joint.mimic.joint, -1) < placed[joint.name]
-    # Those that are left out lead back to themselves, or to nobody.
+    # Excluded joints lead back to themselves, or to an unknown joint.
     for k, leader in enumerate(leaders):
         if leader >= 0 and names[k] not in placed:
             path = [leader]

@@ -35,7 +35,7 @@ def joint(parent, child, xyz="0 0 0", kind="continuous", axis="0 0 1", rpy="0 0 
 
 
 def apart(first, second, xyz, rpy="0 0 0"):
-    """Return a robot of two shapes with an empty body between, so that they may collide."""
+    """Return a robot of two shapes with an empty body between them, so that they can collide."""
     return (
         f'<robot name="r">{link("a", first)}{link("b")}{link("c", second)}'
         f"{joint('a', 'b')}{joint('b', 'c', xyz, rpy=rpy)}</robot>"
@@ -48,16 +48,16 @@ def depth(first, second, xyz, rpy="0 0 0"):
     return found[0].depth if found else 0.0
 
 
-# How deep, by hand
+# Depth
 
 
 @pytest.mark.parametrize(
-    ("first", "second", "xyz", "wanted"),
+    ("first", "second", "xyz", "expected"),
     [
         # Spheres of 0.1 and 0.2 m, 0.25 m apart.
         ('<sphere radius="0.1"/>', '<sphere radius="0.2"/>', "0 0.25 0", 0.05),
         ('<sphere radius="0.1"/>', '<sphere radius="0.2"/>', "0 0.31 0", 0.0),
-        # Boxes with half sides of 0.1 m, 0.15 m apart along x; the other sides are in line.
+        # Boxes with half sides of 0.1 m, 0.15 m apart along x; the other sides are aligned.
         (BOX, BOX, "0.15 0 0", 0.05),
         (BOX, BOX, "0.15 0.18 0", 0.02),
         (BOX, BOX, "0.201 0 0", 0.0),
@@ -67,23 +67,23 @@ def depth(first, second, xyz, rpy="0 0 0"):
         (BOX, '<cylinder radius="0.05" length="0.6"/>', "0 0 0.38", 0.02),
     ],
 )
-def test_depth_by_hand(first, second, xyz, wanted):
-    assert depth(first, second, xyz) == pytest.approx(wanted, abs=1e-5)
+def test_detect_depth_of_primitives(first, second, xyz, expected):
+    assert depth(first, second, xyz) == pytest.approx(expected, abs=1e-5)
 
 
-def test_the_depth_of_a_turned_box():
-    # At 45 degrees the edge reaches 0.1 * sqrt(2) towards the other, 0.22 m away.
+def test_detect_depth_of_rotated_box():
+    # At 45 degrees the edge reaches 0.1 * sqrt(2) toward the other, 0.22 m away.
     found = depth(BOX, BOX, "0.22 0 0", rpy=f"0 0 {math.pi / 4}")
     assert found == pytest.approx(0.1 + 0.1 * math.sqrt(2) - 0.22, abs=1e-5)
 
 
-def test_shapes_are_where_their_origins_say():
+def test_detect_applies_shape_origins():
     first, second = (BOX, 'xyz="1 0 0"'), (BOX, 'xyz="0 -1 0"')
     moved = scene(apart(first, second, "1.15 1 0")).detect({})
     assert [o.depth for o in moved] == [pytest.approx(0.05, abs=1e-5)]
 
 
-def test_the_deepest_comes_first_with_names():
+def test_detect_sorts_by_depth():
     shapes = [(BOX, f'xyz="0 0 {z}"') for z in (0, 1)]
     balls = [
         ('<sphere radius="0.1"/>', 'xyz="0 0 0.17"'),
@@ -98,15 +98,15 @@ def test_the_deepest_comes_first_with_names():
     assert not found[0].has_mesh
 
 
-# Which shapes
+# Pairs
 
 
-def test_neighbours_may_overlap():
+def test_detect_ignores_neighbors():
     text = f'<robot name="r">{link("a", BOX)}{link("b", BOX)}{joint("a", "b")}</robot>'
     assert scene(text).detect({}) == []
 
 
-def test_links_that_are_fixed_to_neighbours_may_overlap():
+def test_detect_ignores_links_fixed_to_neighbors():
     text = (
         f'<robot name="r">{link("a")}{link("b", BOX)}{link("c")}{link("d", BOX)}'
         f"{joint('a', 'b', kind='fixed')}{joint('a', 'c')}{joint('c', 'd', kind='fixed')}</robot>"
@@ -114,7 +114,7 @@ def test_links_that_are_fixed_to_neighbours_may_overlap():
     assert scene(text).detect({}) == []
 
 
-def test_siblings_may_not():
+def test_detect_reports_siblings():
     text = (
         f'<robot name="r">{link("a")}{link("b", BOX)}{link("c", BOX)}'
         f"{joint('a', 'b', '0.1 0 0')}{joint('a', 'c')}</robot>"
@@ -133,11 +133,11 @@ def test_siblings_may_not():
         "<sdf/>",
     ],
 )
-def test_what_has_no_inside_overlaps_nothing(shape):
+def test_detect_ignores_shapes_without_volume(shape):
     assert depth(BOX, shape, "0 0 0") == 0
 
 
-def test_masses_do_not_matter():
+def test_detect_ignores_masses():
     text = apart(BOX, BOX, "0.15 0 0").replace(
         '<link name="a">',
         '<link name="a"><inertial><mass value="-1"/><inertia ixx="0" iyy="-1" izz="0"/></inertial>',
@@ -166,7 +166,7 @@ def mjcf(attributes="", contact="", joints='<joint name="j"/>'):
         (mjcf(joints='<joint name="j"/><joint name="k" axis="1 0 0"/>'), 1),
     ],
 )
-def test_shapes_of_mjcf_collide_as_they_do_in_mujoco(text, count):
+def test_detect_matches_contacts_of_mujoco(text, count):
     found = scene(text, Path("/robots/robot.xml")).detect({})
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
@@ -176,8 +176,8 @@ def test_shapes_of_mjcf_collide_as_they_do_in_mujoco(text, count):
         assert found[0].depth == pytest.approx(-data.contact.dist[0], abs=1e-6)
 
 
-def test_a_body_between_that_is_only_a_joint_is_no_distance():
-    # b has two joints; a and b are neighbours all the same.
+def test_detect_ignores_neighbors_across_virtual_bodies():
+    # b has two joints; a and b are still neighbors.
     text = (
         '<mujoco><worldbody><body name="a"><geom size="0.1"/><body name="b" pos="0.1 0 0">'
         '<joint name="i"/><joint name="j" axis="1 0 0"/><geom size="0.1"/></body></body>'
@@ -198,7 +198,7 @@ def stl(path, points, faces):
 
 @pytest.fixture
 def cube(tmp_path):
-    """Return the file of a cube from 0 to 1 on each axis: its middle is not its origin."""
+    """Return the file of a cube from 0 to 1 on each axis, whose center is not its origin."""
     points = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     faces = [face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))]
@@ -206,13 +206,13 @@ def cube(tmp_path):
     return tmp_path / "cube.stl"
 
 
-def test_a_mesh_is_where_its_corners_are(cube):
+def test_detect_places_mesh_by_its_vertices(cube):
     mesh = f'<mesh filename="{cube}" scale="0.2 0.2 0.2"/>'
     assert depth(BOX, mesh, "0.05 -0.1 -0.1") == pytest.approx(0.05, abs=1e-5)
     assert depth(BOX, mesh, "0.11 -0.1 -0.1") == 0
 
 
-def test_a_mesh_turns_with_its_body(cube):
+def test_detect_rotates_mesh_with_body(cube):
     # A quarter turn about z: the mesh lies from -0.2 to 0 along x.
     mesh = f'<mesh filename="{cube}" scale="0.2 0.2 0.2"/>'
     turned = scene(apart(BOX, mesh, "0.28 -0.1 -0.1"))
@@ -222,16 +222,16 @@ def test_a_mesh_turns_with_its_body(cube):
     assert found.has_mesh
 
 
-def test_a_flat_mesh_overlaps_nothing(tmp_path):
+def test_detect_ignores_flat_meshes(tmp_path):
     stl(tmp_path / "flat.stl", [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)], [(0, 1, 2), (1, 3, 2)])
     assert depth(BOX, f'<mesh filename="{tmp_path}/flat.stl"/>', "0 0 0") == 0
 
 
-# Where the joints are
+# Joint positions
 
 
-def test_a_joint_moves_shapes_apart_and_together():
-    # An arm of 0.3 m: c is beside a, and swings into d.
+def test_detect_depends_on_joint_positions():
+    # An arm of 0.3 m: c starts beside a, and rotates into d.
     robot = scene(
         f'<robot name="r">{link("a", BOX)}{link("b")}{link("c", BOX)}{link("d", BOX)}'
         f"{joint('a', 'b')}{joint('b', 'c', '0.3 0 0')}{joint('a', 'd', '0 0.35 0')}</robot>"
@@ -241,7 +241,7 @@ def test_a_joint_moves_shapes_apart_and_together():
     assert found.depth == pytest.approx(0.15, abs=1e-5)
 
 
-def test_a_sweep_is_one_look_after_the_other():
+def test_sweep_matches_detect():
     robot = scene(apart(BOX, BOX, "0.22 0 0"))
     angles = np.linspace(-3, 3, 7)
     swept = list(robot.sweep({"c_joint": angles}, len(angles)))
@@ -253,12 +253,12 @@ def test_a_sweep_is_one_look_after_the_other():
     assert not all(swept)
 
 
-def test_without_shapes_there_is_nothing_to_look_at():
+def test_detect_without_shapes():
     assert scene('<robot name="r"><link name="a"/></robot>').detect({}) == []
     assert list(scene('<robot name="r"/>').sweep({}, 3)) == [[], [], []]
 
 
-def test_a_heap_of_shapes_is_not_compared():
+def test_overlap_scene_rejects_too_many_shapes():
     links = link("a") + "".join(link(f"l{k}", BOX) for k in range(1500))
     joints = "".join(joint("a", f"l{k}") for k in range(1500))
     with pytest.raises(CannotCheckError, match="collision shapes: got 1500"):
@@ -266,7 +266,7 @@ def test_a_heap_of_shapes_is_not_compared():
 
 
 @pytest.mark.parametrize("name", ["a1/urdf/a1.urdf", "go2/urdf/go2.urdf"])
-def test_a_standing_robot_does_not_overlap_itself(name, robot_file):
+def test_detect_finds_none_on_standing_robots(name, robot_file):
     facts = Facts(load_robot(robot_file(name)))
     assert facts.stance is not None
     assert [o.depth for o in facts.overlap_scene.detect(facts.positions) if o.depth > 0.001] == []

@@ -41,7 +41,7 @@ def mesh(path, scale=(1.0, 1.0, 1.0)):
 
 @pytest.fixture
 def wedge(tmp_path):
-    """Return the file of half of the unit cube: a prism whose corners are known."""
+    """Return the file of half of the unit cube, a prism."""
     a, b, c = (0, 0, 0), (1, 0, 0), (0, 1, 0)
     d, e, f = (0, 0, 1), (1, 0, 1), (0, 1, 1)
     faces = [(a, c, b), (d, e, f), (a, b, e), (a, e, d), (b, c, f), (b, f, e), (c, a, d), (c, d, f)]
@@ -69,13 +69,13 @@ def surface(geometry, rng, count=4000):
     return sphere * size[0] + np.sign(sphere[:, 2:]) * [0, 0, size[1]]
 
 
-# How far
+# Support
 
 
 @pytest.mark.parametrize(
-    ("shape", "along_x", "along_z", "aslant"),
+    ("shape", "along_x", "along_z", "diagonal"),
     [
-        # Aslant is (0.6, 0, 0.8).
+        # The diagonal direction is (0.6, 0, 0.8).
         ("box", 0.1, 0.3, 0.06 + 0.24),
         ("sphere", 0.5, 0.5, 0.5),
         ("cylinder", 0.1, 0.4, 0.06 + 0.32),
@@ -83,22 +83,22 @@ def surface(geometry, rng, count=4000):
         ("ellipsoid", 0.1, 0.3, math.hypot(0.06, 0.24)),
     ],
 )
-def test_reach_by_hand(shape, along_x, along_z, aslant):
+def test_support_by_hand(shape, along_x, along_z, diagonal):
     directions = np.array([[1, 0, 0], [0, 0, 1], [0.6, 0, 0.8]])
     found = [support(geometry(shape), d, Meshes()) for d in directions]
-    assert found == pytest.approx([along_x, along_z, aslant])
+    assert found == pytest.approx([along_x, along_z, diagonal])
 
 
 @every_shape
 @given(direction=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1))
-def test_a_shape_reaches_as_far_as_its_farthest_point(shape, direction):
+def test_support_matches_sampled_surface(shape, direction):
     d = np.array(direction) / np.linalg.norm(direction)
     farthest = float((surface(geometry(shape), np.random.default_rng(0)) @ d).max())
     found = support(geometry(shape), d, Meshes())
     assert farthest - 1e-12 <= found <= farthest + 0.02
 
 
-def test_a_mesh_reaches_to_its_corners(wedge):
+def test_support_of_mesh_uses_vertices(wedge):
     shape, meshes = geometry("mesh", mesh=mesh(wedge, (2.0, 1.0, -1.0))), Meshes()
     found = [support(shape, d, meshes) for d in (*np.eye(3), *-np.eye(3))]
     assert found == pytest.approx([2, 1, 0, 0, 0, 1])
@@ -106,13 +106,13 @@ def test_a_mesh_reaches_to_its_corners(wedge):
 
 
 @pytest.mark.parametrize("shape", ["plane", "unknown", "mesh"])
-def test_what_has_no_extent_is_told(shape):
+def test_support_of_unbounded_shape_raises(shape):
     assert not has_bounds(geometry(shape), Meshes())
     with pytest.raises(ValueError, match="expected a bounded shape"):
         support(geometry(shape), np.array([0, 0, 1.0]), Meshes())
 
 
-def test_a_mesh_that_is_not_there_has_no_extent(tmp_path):
+def test_has_bounds_of_missing_mesh(tmp_path):
     lost = geometry("mesh", mesh=mesh(tmp_path / "lost.stl"))
     assert not has_bounds(lost, Meshes())
     with pytest.raises(MeshError):
@@ -120,50 +120,50 @@ def test_a_mesh_that_is_not_there_has_no_extent(tmp_path):
 
 
 @every_shape
-def test_a_primitive_with_all_its_sizes_has_an_extent(shape):
+def test_has_bounds_of_primitive(shape):
     assert has_bounds(geometry(shape), Meshes())
 
 
 @every_shape
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf, 1e30])
-def test_sizes_that_make_no_sense_are_no_extent(shape, wrong):
+def test_has_bounds_rejects_invalid_sizes(shape, wrong):
     assert not has_bounds(geometry(shape, (*SIZES[shape][:-1], wrong)), Meshes())
 
 
 @every_shape
-def test_missing_sizes_are_no_extent(shape):
+def test_has_bounds_rejects_missing_sizes(shape):
     assert not has_bounds(geometry(shape, SIZES[shape][:-1]), Meshes())
 
 
-# Boxes around
+# Bounds
 
 
-def test_the_box_around_shapes_by_hand():
+def test_bounds_of_several_shapes():
     # The box reaches from (0.9, -0.2, -0.3), the ball to (0.5, 0.5, 2.5).
     shapes = [placed(geometry("box"), (1, 0, 0)), placed(geometry("sphere"), (0, 0, 2))]
     found = bounds(shapes, Meshes())
     np.testing.assert_allclose(found, [[-0.5, -0.5, -0.3], [1.1, 0.5, 2.5]])
 
 
-def test_the_box_around_a_turned_box():
+def test_bounds_of_rotated_box():
     # Half a side of 0.1 and 0.2 at 45 degrees: (0.1 + 0.2) / sqrt(2).
     found = bounds([placed(geometry("box"), rpy=(0, 0, np.pi / 4))], Meshes())
     wide = 0.3 / math.sqrt(2)
     np.testing.assert_allclose(found, [[-wide, -wide, -0.3], [wide, wide, 0.3]])
 
 
-def test_the_box_around_a_lying_cylinder():
+def test_bounds_of_lying_cylinder():
     found = bounds([placed(geometry("cylinder"), rpy=(0, np.pi / 2, 0))], Meshes())
     np.testing.assert_allclose(found[1], [0.4, 0.1, 0.1])
 
 
-def test_the_box_around_a_mesh_that_is_turned(wedge):
+def test_bounds_of_rotated_mesh(wedge):
     # A quarter turn about z takes x to y and y to -x.
     found = bounds([placed(geometry("mesh", mesh=mesh(wedge)), rpy=(0, 0, np.pi / 2))], Meshes())
     np.testing.assert_allclose(found, [[-1, 0, 0], [0, 1, 1]], atol=1e-12)
 
 
-def test_shapes_without_extent_do_not_count():
+def test_bounds_ignore_unbounded_shapes():
     shapes = [placed(geometry("plane")), placed(geometry("sphere"), (1, 0, 0))]
     np.testing.assert_allclose(bounds(shapes, Meshes())[0], [0.5, -0.5, -0.5])
     assert bounds(shapes[:1], Meshes()) is None
@@ -172,7 +172,7 @@ def test_shapes_without_extent_do_not_count():
 
 @every_shape
 @given(turn=st.tuples(*[st.floats(-4, 4)] * 3), place=st.tuples(*[st.floats(-1, 1)] * 3))
-def test_all_points_are_in_the_box_and_touch_it(shape, turn, place):
+def test_bounds_are_tight(shape, turn, place):
     one = placed(geometry(shape), place, turn)
     points = surface(one.geometry, np.random.default_rng(0)) @ one.pose[:3, :3].T + place
     lower, upper = bounds([one], Meshes())
@@ -185,7 +185,7 @@ def test_all_points_are_in_the_box_and_touch_it(shape, turn, place):
 # The lowest point
 
 
-def test_the_lowest_point_by_hand():
+def test_min_height_by_hand():
     pose = np.eye(4)
     pose[:3, 3] = [5, 5, 1]
     assert min_height(placed(geometry("sphere"), (0, 0, 0.2)), pose, Meshes()) == pytest.approx(0.7)
@@ -193,12 +193,12 @@ def test_the_lowest_point_by_hand():
     assert min_height(tilted, pose, Meshes()) == pytest.approx(1 - 0.06 - 0.32)
 
 
-def test_the_lowest_point_of_a_body_that_hangs_upside_down():
+def test_min_height_of_inverted_body():
     pose = np.diag([1.0, -1.0, -1.0, 1.0])
     assert min_height(placed(geometry("box"), (0, 0, 1)), pose, Meshes()) == pytest.approx(-1.3)
 
 
-def test_without_extent_the_origin_is_lowest():
+def test_min_height_without_bounds_is_origin():
     assert min_height(placed(geometry("unknown"), (0, 0, 0.2)), np.eye(4), Meshes()) == 0.2
 
 
@@ -206,7 +206,7 @@ def test_without_extent_the_origin_is_lowest():
 
 
 @pytest.mark.parametrize(
-    ("shape", "wanted"),
+    ("shape", "expected"),
     [
         ("box", 0.2 * 0.4 * 0.6),
         ("sphere", math.pi / 6),
@@ -215,17 +215,17 @@ def test_without_extent_the_origin_is_lowest():
         ("ellipsoid", 4 / 3 * math.pi * 0.006),
     ],
 )
-def test_the_volume_by_hand(shape, wanted):
-    assert volume(geometry(shape), Meshes()) == pytest.approx(wanted)
+def test_volume_of_primitives(shape, expected):
+    assert volume(geometry(shape), Meshes()) == pytest.approx(expected)
 
 
-def test_the_volume_of_a_mesh_by_hand(wedge):
+def test_volume_of_mesh(wedge):
     assert volume(geometry("mesh", mesh=mesh(wedge)), Meshes()) == pytest.approx(0.5)
     scaled = mesh(wedge, (2.0, -3.0, 0.5))
     assert volume(geometry("mesh", mesh=scaled), Meshes()) == pytest.approx(1.5)
 
 
 @pytest.mark.parametrize("shape", ["plane", "unknown", "mesh"])
-def test_what_has_no_volume_is_told(shape):
+def test_volume_of_unbounded_shape_raises(shape):
     with pytest.raises(ValueError, match="expected a shape with a volume"):
         volume(geometry(shape), Meshes())

@@ -36,23 +36,23 @@ def rejected(tree):
     return [(joint.name, reason) for joint, reason in tree.rejected]
 
 
-def test_no_links():
+def test_tree_without_links():
     empty = tree("", [])
     assert empty.roots == empty.order == empty.rejected == empty.cycles == ()
 
 
-def test_links_come_after_their_parents_depth_first():
+def test_tree_order_is_depth_first():
     sound = tree("e d c b a", [("a", "b"), ("b", "c"), ("a", "d"), ("d", "e")])
     assert sound.order == ("a", "b", "c", "d", "e")
     assert sound.roots == ("a",)
     assert sound.rejected == ()
 
 
-def test_children_are_in_the_order_of_the_joints():
+def test_tree_keeps_order_of_joints():
     assert tree("a b c d", [("a", "d"), ("a", "b"), ("a", "c")]).order == ("a", "d", "b", "c")
 
 
-def test_joints_above_and_below():
+def test_tree_parent_and_child_joints():
     sound = tree("a b c", [("a", "b"), ("a", "c")])
     assert sound.parent_joint["b"].name == "a-b"
     assert "a" not in sound.parent_joint
@@ -60,57 +60,57 @@ def test_joints_above_and_below():
     assert sound.child_joints["c"] == ()
 
 
-def test_the_largest_of_several_trees_is_the_robot():
+def test_tree_root_has_most_descendants():
     several = tree("x a b p q r", [("a", "b"), ("p", "q"), ("q", "r")])
     assert several.roots == ("p", "a", "x")
     assert several.order == ("p", "q", "r")
 
 
-def test_of_trees_of_one_size_the_first_in_the_file_is_the_robot():
+def test_tree_root_tie_takes_first_link():
     assert tree("b a", []).roots == ("b", "a")
 
 
-def test_the_first_link_of_a_name_counts():
+def test_tree_keeps_first_link_of_each_name():
     model = robot(["a", "b", "b"], [("a", "b")])
     double = build_tree(model)
     assert double.order == ("a", "b")
     assert double.links["b"] is model.links[1]
 
 
-def test_a_joint_that_is_written_twice_is_left_out_once():
+def test_tree_rejects_duplicate_joint():
     double = tree("a b", [joint("a", "b", "j"), joint("a", "b", "j")])
     assert rejected(double) == [("j", "duplicate")]
     assert double.order == ("a", "b")
 
 
-def test_two_joints_of_a_name_both_hold_their_links():
+def test_tree_keeps_joints_with_equal_names():
     double = tree("a b c", [joint("a", "b", "j"), joint("a", "c", "j")])
     assert rejected(double) == []
     assert double.order == ("a", "b", "c")
 
 
-def test_a_joint_to_a_link_that_is_not_there_is_left_out():
+def test_tree_rejects_unknown_links():
     lost = tree("a b", [("a", "x"), ("y", "b"), ("a", "")])
     assert rejected(lost) == [(name, "unknown-link") for name in ("a-x", "y-b", "a-")]
     assert lost.order == ("a",)
 
 
-def test_a_second_parent_is_left_out():
+def test_tree_rejects_second_parent():
     two = tree("a b c", [("a", "b"), ("a", "c"), ("b", "c")])
     assert rejected(two) == [("b-c", "second-parent")]
     assert two.order == ("a", "b", "c")
     assert two.cycles == ()
 
 
-def test_a_link_below_itself():
+def test_tree_rejects_link_below_itself():
     own = tree("a b", [("a", "b"), ("a", "a")])
     assert own.cycles == (("a",),)
     assert rejected(own) == [("a-a", "cycle")]
     assert own.order == ("a", "b")
 
 
-def test_a_circle_with_a_tail_is_opened():
-    # No link is without a parent, but the robot is still read: the circle is cut above a.
+def test_tree_opens_cycle_with_tail():
+    # Every link has a parent, so the cycle is cut above a.
     circle = tree("a b c d", [("a", "b"), ("b", "c"), ("c", "a"), ("c", "d")])
     assert len(circle.cycles) == 1
     assert set(circle.cycles[0]) == {"a", "b", "c"}
@@ -118,15 +118,15 @@ def test_a_circle_with_a_tail_is_opened():
     assert set(circle.order) == {"a", "b", "c", "d"}
 
 
-def test_a_circle_beside_the_robot():
+def test_tree_opens_cycle_beside_robot():
     beside = tree("a b p q", [("a", "b"), ("p", "q"), ("q", "p")])
     assert set(beside.cycles[0]) == {"p", "q"}
     assert beside.order == ("a", "b")
     assert len(beside.roots) == 2
 
 
-def test_the_robot_begins_where_there_never_was_a_parent():
-    # The circle has more links, and so has what hangs on a link that is not there.
+def test_tree_root_never_had_a_parent():
+    # The cycle has more links, and so has the tree below a missing link.
     beside = tree("a b p q r", [("a", "b"), ("p", "q"), ("q", "r"), ("r", "p")])
     assert beside.roots[0] == "a"
     lost = tree("p q r a b", [("x", "p"), ("p", "q"), ("q", "r"), ("a", "b")])
@@ -134,33 +134,33 @@ def test_the_robot_begins_where_there_never_was_a_parent():
     assert lost.order == ("a", "b")
 
 
-def test_two_circles():
+def test_tree_opens_two_cycles():
     two = tree("a b c d", [("a", "b"), ("b", "a"), ("c", "d"), ("d", "c")])
     assert [set(cycle) for cycle in two.cycles] == [{"a", "b"}, {"c", "d"}]
     assert len(two.rejected) == 2
     assert len(two.roots) == 2
 
 
-def test_what_holds_a_body_of_mjcf_in_the_world_is_not_between_links():
+def test_tree_ignores_joints_to_mjcf_world():
     held = tree("a b", [("world", "a"), ("a", "b")], kind="mjcf")
     assert held.order == ("a", "b")
     assert held.rejected == ()
     assert "a" not in held.parent_joint
 
 
-def test_in_urdf_the_world_is_a_link_like_others():
+def test_tree_keeps_world_link_of_urdf():
     assert rejected(tree("a", [("world", "a")])) == [("world-a", "unknown-link")]
     assert tree("world a", [("world", "a")]).order == ("world", "a")
 
 
-def test_ten_thousand_links_in_a_chain_are_no_trouble():
+def test_tree_of_long_chain():
     count = 10_000
     names = [f"l{i}" for i in range(count)]
     model = robot(names, list(itertools.pairwise(names)))
     assert build_tree(model).order == tuple(names)
 
 
-def test_a_circle_of_ten_thousand_links_is_no_trouble():
+def test_tree_of_long_cycle():
     count = 10_000
     names = [f"l{i}" for i in range(count)]
     model = robot(names, list(zip(names, [*names[1:], names[0]], strict=True)))
@@ -169,13 +169,13 @@ def test_a_circle_of_ten_thousand_links_is_no_trouble():
     assert len(circle.order) == count
 
 
-def test_a_star_of_ten_thousand_links_is_no_trouble():
+def test_tree_of_large_star():
     names = [f"l{i}" for i in range(10_000)]
     star = build_tree(robot(names, [(names[0], name) for name in names[1:]]))
     assert star.order == tuple(names)
 
 
-def test_ten_thousand_links_without_joints_are_no_trouble():
+def test_tree_of_many_separate_links():
     names = [f"l{i}" for i in range(10_000)]
     assert build_tree(robot(names, [])).roots == tuple(names)
 
@@ -187,10 +187,10 @@ NAMES = st.sampled_from("abcdefgh")
     st.lists(NAMES, max_size=10),
     st.lists(st.tuples(NAMES, NAMES, st.sampled_from(["", "j", "k"])), max_size=12),
 )
-def test_any_joints_make_a_forest(links, joints):
+def test_tree_of_random_joints_is_forest(links, joints):
     model = robot(links, [joint(p, c, n or f"{p}-{c}") for p, c, n in joints])
     forest = build_tree(model)
-    # Every joint is in the tree or left out, and every link is below exactly one root.
+    # Every joint is accepted or rejected, and every link is below exactly one root.
     assert len(forest.parent_joint) + len(forest.rejected) == len(joints)
     seen, stack = [], list(forest.roots)
     while stack:
@@ -211,14 +211,14 @@ def test_any_joints_make_a_forest(links, joints):
 
 
 @given(st.permutations(range(7)))
-def test_the_order_of_joints_does_not_change_the_tree(order):
+def test_tree_is_independent_of_joint_order(order):
     pairs = [("a", "b"), ("b", "c"), ("b", "d"), ("a", "e"), ("e", "f"), ("e", "g"), ("g", "h")]
     shuffled = tree("a b c d e f g h", [pairs[k] for k in order])
     assert set(shuffled.order) == set("abcdefgh")
     assert {(j.parent, j.child) for j in shuffled.parent_joint.values()} == set(pairs)
 
 
-def test_a_real_robot_in_full(robot_file):
+def test_tree_of_published_robot_is_complete(robot_file):
     model = load_robot(robot_file("g1/g1_29dof.urdf"))
     sound = build_tree(model)
     assert sound.roots == ("pelvis",)

@@ -30,12 +30,12 @@ def mujoco_takes(inertia):
     )
 
 
-def test_a_plate_has_a_ratio_of_1_and_a_ball_of_2():
+def test_triangle_ratio_of_plate_and_ball():
     assert triangle_ratio(np.array([0.5, 0.5, 1.0])) == 1.0
     assert triangle_ratio(np.array([1.0, 1.0, 1.0])) == 2.0
 
 
-def test_a_box_has_the_inertia_that_mujoco_gives_it():
+def test_box_inertia_matches_mujoco():
     sides = np.array([0.2, 0.3, 0.5])
     model = mujoco.MjModel.from_xml_string(
         "<mujoco><worldbody><body><freejoint/>"
@@ -45,28 +45,28 @@ def test_a_box_has_the_inertia_that_mujoco_gives_it():
     assert ours == pytest.approx(np.sort(model.body_inertia[1]))
 
 
-def test_half_the_largest_moment_is_what_the_others_are_raised_to():
+def test_nearest_physical_raises_small_moments():
     nearest = nearest_physical(np.diag([0.25, 0.25, 1.0]))
     assert np.diag(nearest) == pytest.approx([0.5, 0.5, 1.0], abs=1e-3)
     assert np.count_nonzero(nearest - np.diag(np.diag(nearest))) == 0
 
 
-def test_what_is_sound_stays_as_it_is():
+def test_nearest_physical_keeps_physical_inertia():
     sound = symmetric(np.array([[3.0, 0.2, 0.1], [0.2, 2.5, -0.3], [0.1, -0.3, 2.0]]))
     assert nearest_physical(sound) == pytest.approx(sound, abs=1e-12)
 
 
-def test_every_sign_wrong_is_every_sign_turned_around():
+def test_nearest_physical_negates_negative_inertia():
     assert nearest_physical(-np.diag([1.0, 1.2, 1.4])) == pytest.approx(np.diag([1.0, 1.2, 1.4]))
 
 
-def test_of_nothing_nothing_can_be_kept():
+def test_nearest_physical_of_zero_is_none():
     assert nearest_physical(np.zeros((3, 3))) is None
 
 
 @given(arrays(np.float64, (3, 3), elements=numbers))
 @settings(max_examples=60, deadline=None)
-def test_mujoco_takes_whatever_was_repaired(matrix):
+def test_nearest_physical_is_accepted_by_mujoco(matrix):
     nearest = nearest_physical(symmetric(matrix))
     if nearest is None:
         assert principal_moments(symmetric(matrix)) == pytest.approx(np.zeros(3), abs=1e-12)
@@ -75,7 +75,7 @@ def test_mujoco_takes_whatever_was_repaired(matrix):
     mujoco_takes(nearest)
 
 
-def test_the_radius_of_gyration_of_a_rod_is_its_length_over_the_root_of_12():
+def test_gyration_radius_of_rod():
     moments = np.array([1e-9, 1 / 12, 1 / 12])
     assert gyration_radius(moments, 1.0) == pytest.approx(12**-0.5)
     assert gyration_radius(moments, 0.0) == 0.0

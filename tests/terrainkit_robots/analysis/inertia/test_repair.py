@@ -29,7 +29,7 @@ ARM = """<mujoco model="arm">
 
 @pytest.fixture
 def repaired(tmp_path):
-    """Return what becomes of a link, and the attributes that its fix writes or removes."""
+    """Return the fixed inertia of a link, and the attributes that the fix sets or removes."""
 
     def make(text, link):
         path = tmp_path / "robot.xml"
@@ -58,7 +58,7 @@ def repaired(tmp_path):
         ('zaxis="1 0 1"', ["zaxis"]),
     ],
 )
-def test_the_inertia_of_the_mirror_image_is_written_in_full(repaired, axes, removed):
+def test_fix_takes_inertia_of_mirror_image(repaired, axes, removed):
     text = QUADRUPED.read_text()
     sound = mujoco.MjModel.from_xml_string(text).body("FL_thigh")
     assert THIGH in text
@@ -72,7 +72,7 @@ def test_the_inertia_of_the_mirror_image_is_written_in_full(repaired, axes, remo
 
 
 @pytest.mark.parametrize("axes", ["", 'quat="0.5 0.5 0.5 0.5"'])
-def test_a_diagonal_one_stays_in_its_axes(repaired, axes):
+def test_fix_keeps_diagonal_inertia_diagonal(repaired, axes):
     text = ARM.format(inertia=f'{axes} diaginertia="0.014 0.003 0.004"')
     inertia, names = repaired(text, "tip")
     assert names == ["diaginertia"]
@@ -80,7 +80,7 @@ def test_a_diagonal_one_stays_in_its_axes(repaired, axes):
     assert moments[0] + moments[1] >= moments[2] * (1 - 1e-9)
 
 
-def test_a_box_in_other_axes_is_written_in_full(repaired):
+def test_fix_writes_rotated_box_in_full(repaired):
     text = ARM.format(inertia='quat="1 0 0 1" diaginertia="0 0 0"')
     inertia, names = repaired(text, "tip")
     assert names == ["diaginertia"]
@@ -91,7 +91,7 @@ def test_a_box_in_other_axes_is_written_in_full(repaired):
     np.testing.assert_allclose(again, inertia, rtol=1e-4, atol=1e-9)
 
 
-def test_a_full_one_stays_full(repaired):
+def test_fix_keeps_full_inertia_full(repaired):
     text = ARM.format(inertia='fullinertia="0.009 0.009 0.002 0.01 0 0"')
     _, names = repaired(text, "tip")
     assert names == ["fullinertia"]
@@ -100,7 +100,7 @@ def test_a_full_one_stays_full(repaired):
     assert names == ["fullinertia"]
 
 
-def test_what_mujoco_makes_of_shapes_has_no_repair(tmp_path):
+def test_fix_of_derived_inertia_is_none(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(ARM.format(inertia='diaginertia="1 1 1"'))
     facts = Facts(load_robot(path), Meshes())

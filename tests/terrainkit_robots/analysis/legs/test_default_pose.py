@@ -19,7 +19,7 @@ def changed(spec, **values):
     return RobotSpec(**(fields | values))
 
 
-def test_the_pose_of_the_spec_is_the_stance(bundled, gains):
+def test_positions_of_spec_define_stance(bundled, gains):
     plain = bundled("quadruped.urdf")
     spec = derive_spec(plain, gains=gains(plain), floating=True)
     low = {".*_hip_joint": 0.1, ".*_thigh_joint": 1.2, ".*_calf_joint": -2.4}
@@ -28,28 +28,28 @@ def test_the_pose_of_the_spec_is_the_stance(bundled, gains):
     assert facts.stance.height < plain.stance.height - 0.1
 
 
-def test_what_the_spec_leaves_open_is_searched_for(bundled, gains):
+def test_positions_missing_in_spec_are_solved(bundled, gains):
     plain = bundled("quadruped.urdf")
     spec = derive_spec(plain, gains=gains(plain), floating=True)
     facts = bundled("quadruped.urdf", spec=changed(spec, default_pose={"FL_hip_joint": 0.2}))
-    wanted = dict(plain.positions) | {"FL_hip_joint": 0.2}
-    assert facts.positions == wanted
+    expected = dict(plain.positions) | {"FL_hip_joint": 0.2}
+    assert facts.positions == expected
     nothing = bundled("quadruped.urdf", spec=changed(spec, default_pose={"(": 1.0, "x": 2.0}))
     assert nothing.positions == plain.positions
 
 
-def test_a_joint_that_mimics_another_follows_the_spec(robot, spec):
+def test_positions_of_mimic_joints_follow_spec(robot, spec):
     facts = robot(SLIDE, spec=spec(joint_order=("a",), default_pose={"a": 1.0}))
     assert facts.positions == {"a": 1.0, "b": -2.0}
 
 
-def test_the_pose_of_the_spec_may_be_outside_the_limits(robot, spec):
+def test_positions_of_spec_may_exceed_limits(robot, spec):
     facts = robot(SLIDE, spec=spec(joint_order=("a",), default_pose={"a": 3.0}))
     assert facts.positions["a"] == 3.0
 
 
 @pytest.mark.parametrize("name", ["quadruped.urdf", "biped.xml"])
-def test_the_pose_that_was_derived_is_the_one_that_was_solved(bundled, gains, name):
+def test_positions_of_derived_spec_equal_solved_pose(bundled, gains, name):
     plain = bundled(name)
     facts = bundled(name, spec=derive_spec(plain, gains=gains(plain), floating=True))
     np.testing.assert_allclose(
@@ -71,7 +71,7 @@ CHAIN = """
 </robot>"""
 
 
-def test_followers_of_followers_are_where_they_are_put(robot, spec):
+def test_positions_of_chained_mimic_joints(robot, spec):
     assert robot(CHAIN).positions == {"jA": 1.0, "jB": 1.5, "jC": -3.0}
     told = robot(CHAIN, spec=spec(joint_order=("jA",), default_pose={"jA": 2.0}))
     assert told.positions == {"jA": 2.0, "jB": 2.5, "jC": -5.0}

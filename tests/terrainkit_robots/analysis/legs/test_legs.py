@@ -16,8 +16,8 @@ BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf",
 DOG = ("roll", "hip", "knee")
 HUMAN = ("hip", "roll", "yaw", "knee", "ankle", "roll")
 
-# Feet, joints of each leg, and leg length [m]: what the description says from hip to knee, from
-# there to the ankle if there is one, and on to where the foot touches.
+# Feet, joints of each leg, and leg length [m]: the declared distances from hip over knee
+# and ankle to the contact.
 KNOWN = {
     "a1/urdf/a1.urdf": (["FR_foot", "FL_foot", "RR_foot", "RL_foot"], DOG, 0.2 + 0.2 + 0.02),
     "go2/urdf/go2.urdf": (["FL_foot", "FR_foot", "RL_foot", "RR_foot"], DOG, 2 * 0.213 + 0.022),
@@ -60,7 +60,7 @@ def facts(text, file=FILE):
 
 
 @pytest.mark.parametrize("name", KNOWN)
-def test_legs_of_known_robots(name, robot_file):
+def test_legs_of_published_robots(name, robot_file):
     feet, roles, length = KNOWN[name]
     legs = Facts(load_robot(path_of(name, robot_file))).legs
     assert [leg.foot for leg in legs] == feet
@@ -72,7 +72,7 @@ def test_legs_of_known_robots(name, robot_file):
         assert len(leg.joints) == len(roles)
 
 
-def test_joints_by_their_role(robot_file):
+def test_leg_joint_by_role(robot_file):
     leg = Facts(load_robot(path_of("h1/urdf/h1.urdf", robot_file))).legs[0]
     assert leg.joint("yaw").name == "left_hip_yaw_joint"
     assert leg.joint("hip").name == "left_hip_pitch_joint"
@@ -81,7 +81,7 @@ def test_joints_by_their_role(robot_file):
     assert leg.joint("slide") is None
 
 
-# The same robots, told otherwise
+# Invariance
 
 
 def scaled(root, factor):
@@ -97,7 +97,7 @@ def scaled(root, factor):
 
 
 def renamed(root):
-    """Call everything by a number."""
+    """Replace all names by numbers."""
     links = {e.get("name"): f"link_{k}" for k, e in enumerate(root.findall("link"))}
     for element in root.findall("link"):
         element.set("name", links[element.get("name")])
@@ -121,7 +121,7 @@ def turned(root, yaw):
 
 @pytest.fixture(scope="module")
 def original(robot_file):
-    """Return the elements of a URDF; they are read once."""
+    """Return facts of a URDF before and after a change. Files are parsed once."""
     read = {}
 
     def parsed(name):
@@ -143,7 +143,7 @@ def original(robot_file):
 
 
 @pytest.mark.parametrize("name", URDFS)
-def test_names_are_not_needed(name, original):
+def test_legs_do_not_depend_on_names(name, original):
     before, after = original(name, renamed)
     assert [leg.limb.chain for leg in after.legs] == [leg.limb.chain for leg in before.legs]
     assert [leg.roles for leg in after.legs] == [leg.roles for leg in before.legs]
@@ -155,7 +155,7 @@ def test_names_are_not_needed(name, original):
 
 @pytest.mark.parametrize("name", URDFS)
 @pytest.mark.parametrize("yaw", [math.pi / 2, math.pi])
-def test_where_the_robot_looks_does_not_matter(name, yaw, original):
+def test_legs_do_not_depend_on_heading(name, yaw, original):
     before, after = original(name, turned, yaw)
     assert [leg.foot for leg in after.legs] == [leg.foot for leg in before.legs]
     assert [leg.roles for leg in after.legs] == [leg.roles for leg in before.legs]
@@ -170,17 +170,17 @@ def test_where_the_robot_looks_does_not_matter(name, yaw, original):
 
 @pytest.mark.parametrize("name", ["a1/urdf/a1.urdf", "cassie/urdf/cassie.urdf", "quadruped.urdf"])
 @pytest.mark.parametrize("factor", [0.2, 5.0])
-def test_size_does_not_matter(name, factor, original):
+def test_legs_do_not_depend_on_size(name, factor, original):
     before, after = original(name, scaled, factor)
     assert [leg.foot for leg in after.legs] == [leg.foot for leg in before.legs]
     assert [leg.roles for leg in after.legs] == [leg.roles for leg in before.legs]
-    # Of a rounded foot more or less of it counts as sole.
+    # The size of the sole of a rounded foot depends on the scale.
     for ours, theirs in zip(after.legs, before.legs, strict=True):
         assert ours.length == pytest.approx(factor * theirs.length, rel=0.03)
     assert after.stance.height == pytest.approx(factor * before.stance.height, rel=0.03)
 
 
-# Robots without legs, by hand
+# Robots without legs
 
 
 def link(name, shape="", origin=""):
@@ -213,11 +213,11 @@ def arm(prefix, parent, root, joints=6):
 BOX = '<box size="0.5 0.3 0.1"/>'
 
 
-def test_an_arm_has_no_legs():
+def test_legs_of_arm_are_empty():
     assert robot(link("base", BOX), arm("link_", "base", "0 0 0.1")).legs == ()
 
 
-def test_an_arm_on_a_gripper_has_no_legs():
+def test_legs_of_arm_with_gripper_are_empty():
     jaws = "".join(
         link(f"jaw{k}", '<box size="0.01 0.01 0.1"/>')
         + joint("link_5", f"jaw{k}", f"0 {y} 0.05", "0 1 0", "prismatic")
@@ -226,13 +226,13 @@ def test_an_arm_on_a_gripper_has_no_legs():
     assert robot(link("base", BOX), arm("link_", "base", "0 0 0.1"), jaws).legs == ()
 
 
-def test_two_arms_on_a_pedestal_have_no_legs():
+def test_legs_of_two_arms_are_empty():
     base = link("base", '<cylinder radius="0.2" length="1"/>', 'xyz="0 0 -0.5"')
     arms = arm("a", "base", "0 0.2 0") + arm("b", "base", "0 -0.2 0")
     assert robot(base, arms).legs == ()
 
 
-def test_a_drone_has_no_legs():
+def test_legs_of_drone_are_empty():
     rotors = "".join(
         link(f"rotor{k}", '<cylinder radius="0.1" length="0.01"/>')
         + joint("base", f"rotor{k}", f"{x} {y} 0", "0 0 1", "continuous")
@@ -242,7 +242,7 @@ def test_a_drone_has_no_legs():
 
 
 @pytest.mark.parametrize("name", ["wheel", "part"])
-def test_a_car_that_steers_has_no_legs(name):
+def test_legs_of_steered_car_are_empty(name):
     wheels = "".join(
         link(f"column{k}")
         + joint("base", f"column{k}", f"{x} {y} -0.1", "0 0 1")
@@ -253,7 +253,7 @@ def test_a_car_that_steers_has_no_legs(name):
     assert robot(link("base", BOX), wheels).legs == ()
 
 
-def test_a_hand_has_no_legs():
+def test_legs_of_hand_are_empty():
     fingers = "".join(
         link(f"finger{k}_a")
         + joint("palm", f"finger{k}_a", f"{x} 0.02 -0.05")
@@ -264,7 +264,7 @@ def test_a_hand_has_no_legs():
     assert robot(link("palm", '<box size="0.1 0.1 0.03"/>'), fingers).legs == ()
 
 
-# What belongs to a leg
+# Parts of legs
 
 
 def leg(name, root, parent="trunk", foot='<sphere radius="0.02"/>'):
@@ -285,7 +285,7 @@ def table(**other):
     return robot(link("trunk", BOX), *legs.values())
 
 
-def test_a_leg_by_hand():
+def test_leg_of_two_joints():
     found = table().legs
     assert [each.foot for each in found] == ["p_b", "q_b", "r_b", "s_b"]
     assert {each.roles for each in found} == {("hip", "knee")}
@@ -293,7 +293,7 @@ def test_a_leg_by_hand():
     assert found[0].pitch.tolist() == [0, 1, 0]
 
 
-def test_a_leg_that_lost_a_joint_is_still_one():
+def test_legs_with_a_fixed_joint():
     stiff = leg("s", CORNERS["s"]).replace(
         '<joint name="s_b_joint" type="revolute">', '<joint name="s_b_joint" type="fixed">'
     )
@@ -311,7 +311,7 @@ def test_a_leg_that_lost_a_joint_is_still_one():
     assert sorted(len(each.joints) for each in table(**longer).legs) == [2, 3, 3, 3]
 
 
-def test_a_leg_with_toes_is_one_leg():
+def test_leg_with_toes_is_one_leg():
     toes = leg("p", CORNERS["p"]) + "".join(
         link(f"p_{side}", '<sphere radius="0.01"/>') + joint("p_b", f"p_{side}", f"{x} 0 -0.21")
         for side, x in (("front", 0.03), ("back", -0.03))
@@ -321,8 +321,8 @@ def test_a_leg_with_toes_is_one_leg():
     assert {"p_front", "p_back"} & {each.foot for each in found}
 
 
-def test_a_foot_is_the_link_that_touches():
-    # A foot of its own, and a frame for a sensor in its sole.
+def test_foot_is_the_link_that_touches():
+    # A separate foot link, and the frame of a sensor in its sole.
     parts = {}
     for name, root in CORNERS.items():
         ankle = f"{name}_b"
@@ -340,7 +340,7 @@ def test_a_foot_is_the_link_that_touches():
     assert [each.foot for each in found] == ["p_ball", "q_ball", "r_ball", "s_ball"]
 
 
-def test_a_foot_that_lost_its_shape_is_still_the_foot():
+def test_foot_without_collision_shape_is_kept():
     drawn = '<visual><geometry><sphere radius="0.02"/></geometry></visual>'
     parts = {
         name: link(f"{name}_a")
@@ -354,7 +354,7 @@ def test_a_foot_that_lost_its_shape_is_still_the_foot():
     assert [each.foot for each in table(**parts).legs] == ["p_foot", "q_foot", "r_foot", "s_foot"]
 
 
-def test_without_any_shape_a_frame_is_the_foot():
+def test_foot_without_shapes_is_a_frame():
     parts = {
         name: f'<link name="{name}_a"/><link name="{name}_b"/><link name="{name}_end"/>'
         + joint("trunk", f"{name}_a", root)
@@ -365,7 +365,7 @@ def test_without_any_shape_a_frame_is_the_foot():
     assert [each.foot for each in table(**parts).legs] == ["p_end", "q_end", "r_end", "s_end"]
 
 
-def test_a_waist_is_of_no_leg():
+def test_waist_is_no_leg_joint():
     found = robot(
         link("trunk", BOX),
         link("pelvis"),
@@ -377,7 +377,7 @@ def test_a_waist_is_of_no_leg():
     assert [each.length for each in found] == pytest.approx([0.47] * 2)
 
 
-def test_a_leg_that_slides():
+def test_leg_with_prismatic_joint():
     found = robot(
         link("trunk", BOX),
         *(
@@ -402,8 +402,8 @@ def test_a_leg_that_slides():
         (("0 -1 0", "0 1 0"), ("hip", "knee")),
     ],
 )
-def test_roles_come_from_axes(axes, roles):
-    # The last three joints are 0.2 m apart, those before in one place.
+def test_roles_follow_axes(axes, roles):
+    # The last three joints are 0.2 m apart, the others are at one point.
     def chain(name, y):
         parts, at = [], "trunk"
         for k, axis in enumerate(axes):
@@ -417,8 +417,8 @@ def test_roles_come_from_axes(axes, roles):
     assert [each.roles for each in found] == [roles] * 2
 
 
-def test_a_spider_stands_on_all_eight():
-    # Legs all around, each bends about its own level axis.
+def test_legs_of_eight_legged_spider():
+    # Radial legs, each of which bends about its own horizontal axis.
     parts = []
     for k in range(8):
         angle = 2 * math.pi * (k + 0.5) / 8

@@ -11,7 +11,7 @@ FILE = Path("/robots/robot.urdf")
 
 
 def link(name, ball=None, mass=1.0, center="0 0 0"):
-    """Return a link; `ball` is where a sphere of 0.02 m is."""
+    """Return a link, with a sphere of 0.02 m at `ball`."""
     shape = ""
     if ball is not None:
         shape = (
@@ -33,7 +33,7 @@ def joint(parent, child, xyz, kind="revolute", axis="0 1 0", more=""):
 
 
 def limb(name, root, lengths=(0.3, 0.3), parent="trunk", kind="revolute"):
-    """Return a limb of one hinge more than it has lengths, hanging down from `root`."""
+    """Return a vertical limb at `root` with one joint for each length."""
     parts, at = "", parent
     for number, length in enumerate(lengths):
         child = f"{name}{number}"
@@ -55,10 +55,10 @@ def scores(robot):
     return {robot.bodies[limb.chain[-1]].name: limb.score for limb in robot.limbs}
 
 
-# What a limb is
+# Detection
 
 
-def test_a_limb_by_hand():
+def test_limb_of_two_joints():
     (found,) = facts(limb("a", "1 2 0", (0.3, 0.2))).limbs
     assert found.chain == (1, 2)
     assert [each.name for each in found.joints] == ["a0_joint", "a1_joint"]
@@ -67,7 +67,7 @@ def test_a_limb_by_hand():
     assert not found.has_leg_names
 
 
-def test_fixed_links_belong_to_what_they_are_fixed_to():
+def test_limb_includes_fixed_links():
     (found,) = facts(
         limb("a", "0 0 0"), link("tip", "0 0 0"), joint("a1", "tip", "0 0 -0.4", "fixed")
     ).limbs
@@ -75,7 +75,7 @@ def test_fixed_links_belong_to_what_they_are_fixed_to():
     np.testing.assert_allclose(found.tip, [0, 0, -0.72])
 
 
-def test_without_shapes_a_limb_ends_at_its_lowest_frame():
+def test_limb_without_shapes_ends_at_lowest_frame():
     (found,) = facts(
         link("a"),
         link("b"),
@@ -87,16 +87,16 @@ def test_without_shapes_a_limb_ends_at_its_lowest_frame():
     np.testing.assert_allclose(found.tip, [0.1, 0, -0.6])
 
 
-def test_one_joint_is_no_limb():
+def test_limb_needs_two_joints():
     assert facts(limb("a", "0 0 0", (0.3,))).limbs == ()
 
 
-def test_a_trunk_alone_has_no_limbs():
+def test_limbs_of_trunk_are_empty():
     assert facts().limbs == ()
     assert Facts(load_robot(FILE, contents={FILE: b'<robot name="r"/>'})).limbs == ()
 
 
-def test_joints_that_follow_others_do_not_count():
+def test_limb_ignores_mimic_joints():
     follows = '<mimic joint="a_joint"/>'
     parts = [link("a"), link("b", "0 0 -0.3"), joint("trunk", "a", "0 0 0")]
     assert len(facts(*parts, joint("a", "b", "0 0 -0.3")).limbs) == 1
@@ -112,7 +112,7 @@ def test_joints_that_follow_others_do_not_count():
         ('<motor joint="i"/><motor tendon="t"/>', 1),
     ],
 )
-def test_joints_count_that_a_motor_or_a_tendon_drives(actuators, count):
+def test_limb_counts_joints_with_motor_or_tendon(actuators, count):
     text = (
         '<mujoco><worldbody><body name="a"><freejoint/><geom size="0.1"/><body name="b">'
         '<joint name="i" axis="0 1 0"/><geom size="0.1"/><body name="c" pos="0 0 -1">'
@@ -125,19 +125,19 @@ def test_joints_count_that_a_motor_or_a_tendon_drives(actuators, count):
     assert len(Facts(load_robot(file, contents={file: text.encode()})).limbs) == count
 
 
-def test_a_wheel_does_not_bend_a_limb():
-    # A turret and a steering column, each with a wheel below that spins about its middle.
+def test_limb_does_not_bend_at_wheel():
+    # A turret and a steering column, each with a wheel below it.
     parts = [link("a"), joint("trunk", "a", "0 0 0", axis="0 0 1"), link("b", "0 0 0")]
     assert facts(*parts, joint("a", "b", "0 0 -0.3", "continuous")).limbs == ()
     assert len(facts(*parts, joint("a", "b", "0 0 -0.3")).limbs) == 1
 
 
-def test_a_shank_that_turns_without_end_is_no_wheel():
+def test_continuous_shank_is_no_wheel():
     parts = limb("a", "0 0 0", kind="continuous")
     assert len(facts(parts).limbs) == 1
 
 
-def test_a_wheel_at_the_end_of_a_leg():
+def test_limb_may_end_in_wheel():
     robot = facts(
         limb("leg", "0 0 0"),
         link("wheel", "0 0 0"),
@@ -146,28 +146,28 @@ def test_a_wheel_at_the_end_of_a_leg():
     assert len(robot.limbs[0].joints) == 3
 
 
-# How much it looks like a leg
+# Score
 
 FOUR = [("x", "0.3 0.2 0"), ("y", "0.3 -0.2 0"), ("z", "-0.3 0.2 0"), ("w", "-0.3 -0.2 0")]
 
 
-def test_what_stands_and_is_mirrored_is_a_leg_whatever_its_name():
+def test_score_of_mirrored_limbs_on_ground():
     robot = facts(*(limb(name, root) for name, root in FOUR))
     assert set(scores(robot).values()) == {1.5}
 
 
-def test_a_name_is_worth_half_a_point():
+def test_score_of_leg_names_adds_half():
     robot = facts(*(limb(f"{name}_thigh", root) for name, root in FOUR))
     assert set(scores(robot).values()) == {2.0}
     assert all(each.has_leg_names for each in robot.limbs)
 
 
-def test_one_limb_alone_is_not_mirrored():
+def test_score_of_single_limb():
     assert scores(facts(limb("a", "0 0 0"))) == {"a1": 1.0}
     assert scores(facts(limb("leg", "0 0 0"))) == {"leg1": 1.5}
 
 
-def test_arms_are_not_legs():
+def test_score_of_arms_is_low():
     # Shorter than the legs and mirrored as well.
     legs = [limb(name, root) for name, root in FOUR[:2]]
     arms = [
@@ -177,21 +177,21 @@ def test_arms_are_not_legs():
     assert found == {"x1": 1.5, "y1": 1.5, "p1": 0.5, "q1": 0.5}
 
 
-def test_arms_that_reach_the_ground_are_told_by_name():
+def test_score_of_arms_on_ground_depends_on_names():
     legs = [limb(f"{name}_leg", root) for name, root in FOUR[:2]]
     arms = [limb(f"{name}_arm", root) for name, root in FOUR[2:]]
     found = scores(facts(*legs, *arms))
     assert found == {"x_leg1": 2.0, "y_leg1": 2.0, "z_arm1": 0.5, "w_arm1": 0.5}
 
 
-def test_arms_above_wheels_are_not_legs():
-    # The lowest of all limbs, but half a metre above what the robot stands on.
+def test_score_of_arms_above_wheels_is_low():
+    # The lowest limbs, but half a meter above the pedestal of the robot.
     arms = [limb(name, root) for name, root in FOUR[:2]]
     base = link("trunk", "0 0 -1.4")
     assert set(scores(facts(*arms, trunk=base)).values()) == {0.5}
 
 
-def test_legs_that_are_folded_at_zero_are_legs():
+def test_score_of_folded_legs_is_high():
     # The belly is lower than the feet, but by less than half of the height.
     legs = [limb(f"{name}_leg", root, (0.2, 0.1)) for name, root in FOUR]
     belly = link("trunk", "0 0 -0.4")
@@ -199,7 +199,7 @@ def test_legs_that_are_folded_at_zero_are_legs():
 
 
 @pytest.mark.parametrize(("height", "score"), [(0.0, 1.5), (0.05, 1.5), (0.15, 1.0), (0.3, 0.5)])
-def test_how_close_to_the_ground_a_foot_ends(height, score):
+def test_score_depends_on_height_of_foot(height, score):
     # The robot is 1 m high.
     legs = [limb(name, root, (0.3, 0.28)) for name, root in FOUR[:2]]
     short = [limb(name, f"{root[:-1]} {height}", (0.3, 0.28)) for name, root in FOUR[2:]]
@@ -207,17 +207,17 @@ def test_how_close_to_the_ground_a_foot_ends(height, score):
     assert scores(robot)["z1"] == score
 
 
-def test_one_joint_more_or_less_is_still_a_twin():
+def test_score_allows_one_missing_joint():
     robot = facts(limb("a", "0 0.2 0", (0.3, 0.3)), limb("b", "0 -0.2 0", (0.2, 0.2, 0.2)))
     assert scores(robot) == {"a1": 1.5, "b2": 1.5}
 
 
-def test_front_and_rear_are_twins_too():
+def test_score_counts_front_and_rear_as_mirrored():
     robot = facts(limb("a", "0.3 0 0"), limb("b", "-0.3 0 0"))
     assert scores(robot) == {"a1": 1.5, "b1": 1.5}
 
 
-def test_the_jaws_of_a_gripper_are_not_twins():
+def test_score_of_gripper_jaws_is_not_mirrored():
     arm = limb("a", "0 0 0", (0.4, 0.4))
     jaws = [
         link(name, "0 0 -0.1") + joint("a1", name, f"0 {y} -0.4")
@@ -226,7 +226,7 @@ def test_the_jaws_of_a_gripper_are_not_twins():
     assert set(scores(facts(arm, *jaws)).values()) == {1.0}
 
 
-def test_a_robot_on_a_world_is_less_likely_to_walk():
+def test_score_of_fixed_base_is_lower():
     world = '<link name="world"/>' + link("trunk", mass=10)
     robot = facts(
         joint("world", "trunk", "0 0 1", "fixed"),
@@ -236,7 +236,7 @@ def test_a_robot_on_a_world_is_less_likely_to_walk():
     assert set(scores(robot).values()) == {1.0}
 
 
-# Words
+# Names
 
 
 @pytest.mark.parametrize(
@@ -246,7 +246,7 @@ def test_a_robot_on_a_world_is_less_likely_to_walk():
         "shank", "LLeg", "tibia", "coxa_rf", "left_sole", "hind_leg_shoulder_leg",
     ],
 )  # fmt: skip
-def test_names_of_legs(name):
+def test_has_leg_names(name):
     assert facts(limb(name, "0 0 0")).limbs[0].has_leg_names
 
 
@@ -257,17 +257,17 @@ def test_names_of_legs(name):
         "finger_mcp", "wheel_mount", "front_shoulder", "allegro",
     ],
 )  # fmt: skip
-def test_names_of_others(name):
+def test_has_leg_names_is_false_for_others(name):
     assert not facts(limb(name, "0 0 0")).limbs[0].has_leg_names
 
 
 @pytest.mark.parametrize("name", ["armature", "handle", "proprioception"])
-def test_words_in_other_words_count_for_nothing(name):
+def test_score_ignores_words_within_words(name):
     assert scores(facts(limb(name, "0 0 0"))) == {f"{name}1": 1.0}
 
 
-def test_the_names_of_most_parts_decide():
-    # An arm on a part that is called hip is an arm, a leg that begins at a shoulder a leg.
+def test_has_leg_names_takes_majority():
+    # An arm on a link named hip is an arm, and a leg on a shoulder is a leg.
     def chain(first, second):
         return facts(
             link(first), joint("trunk", first, "0 0 0"), limb(second, "0 0 -0.1", parent=first)
@@ -280,7 +280,7 @@ def test_the_names_of_most_parts_decide():
 # Limbs that share joints
 
 
-def test_toes_are_one_leg():
+def test_is_branch_of_toes():
     robot = facts(
         limb("a", "0 0 0", (0.4, 0.4)),
         *(
@@ -293,7 +293,7 @@ def test_toes_are_one_leg():
     assert is_branch(other, one, 1.0)
 
 
-def test_legs_below_a_waist_are_two():
+def test_is_branch_is_false_below_waist():
     waist = link("w") + joint("trunk", "w", "0 0 -0.1", axis="0 0 1")
     robot = facts(waist, limb("a", "0 0.1 0", parent="w"), limb("b", "0 -0.1 0", parent="w"))
     one, other = robot.limbs
@@ -301,7 +301,7 @@ def test_legs_below_a_waist_are_two():
     assert scores(robot) == {"a1": 1.5, "b1": 1.5}
 
 
-def test_legs_behind_a_long_spine_are_two():
+def test_is_branch_is_false_behind_spine():
     spine, at = "", "trunk"
     for k in range(8):
         spine += link(f"s{k}") + joint(at, f"s{k}", "-0.05 0 0", axis="0 0 1")
@@ -313,8 +313,8 @@ def test_legs_behind_a_long_spine_are_two():
     assert not is_branch(one, other, 1.0)
 
 
-def test_a_rod_of_a_closed_loop_is_no_leg_of_its_own():
-    # It hangs beside the knee, below two of the four joints of the leg.
+def test_is_branch_of_closed_loop_rod():
+    # It is beside the knee, below two of the four joints of the leg.
     robot = facts(
         limb("a", "0 0 0", (0.05, 0.05, 0.4, 0.4)),
         link("rod"),
@@ -326,7 +326,7 @@ def test_a_rod_of_a_closed_loop_is_no_leg_of_its_own():
     assert is_branch(one, other, 1.0)
 
 
-def test_limbs_that_share_nothing_are_two():
+def test_is_branch_needs_shared_joints():
     one, other = facts(limb("a", "0 0 0"), limb("b", "0 0.01 0")).limbs
     assert not is_branch(one, other, 1.0)
 
@@ -334,18 +334,18 @@ def test_limbs_that_share_nothing_are_two():
 # Size
 
 
-def test_a_snake_has_no_legs():
+def test_limbs_of_snake_are_empty():
     assert facts(limb("a", "0 0 0", (0.01,) * 40)).limbs == ()
 
 
-def test_thousands_of_limbs_are_no_trouble():
+def test_limbs_of_many_chains_are_limited():
     parts = [limb(f"l{k}", f"{k * 0.01} 0 0") for k in range(600)]
     robot = facts(*parts)
     assert len(robot.bodies) == 1201
     assert len(robot.limbs) == 64
 
 
-def test_a_chain_of_thousands_is_no_trouble():
+def test_limbs_of_long_chain_are_empty():
     robot = facts(limb("a", "0 0 0", (0.001,) * 3000))
     assert len(robot.bodies) == 3001
     assert robot.limbs == ()

@@ -41,8 +41,8 @@ def read(path):
     return Facts(load_robot(path))
 
 
-def afloat(path):
-    """Return the text of a URDF with nothing drawn, and a trunk that floats."""
+def floating_base(path):
+    """Return the text of a URDF with a floating base and without visuals."""
     root = etree.parse(str(path)).getroot()
     for element in [*root.iter("visual"), *root.findall("mujoco")]:
         element.getparent().remove(element)
@@ -66,9 +66,13 @@ def afloat(path):
 
 @cache
 def compiled(path):
-    """Return the model of a robot above a plane, without what is only drawn."""
+    """Compile a robot above a plane, without its visuals."""
     text = path.suffix == ".urdf"
-    spec = mujoco.MjSpec.from_string(afloat(path)) if text else mujoco.MjSpec.from_file(str(path))
+    spec = (
+        mujoco.MjSpec.from_string(floating_base(path))
+        if text
+        else mujoco.MjSpec.from_file(str(path))
+    )
     drawn = [g for g in spec.geoms if not (g.contype or g.conaffinity)]
     for geom in drawn if not text else []:
         spec.delete(geom)
@@ -98,11 +102,11 @@ def on_the_ground(model, data):
     return [distance for distance in near if distance < 0]
 
 
-# Against MuJoCo
+# Compared with MuJoCo
 
 
 @every_robot
-def test_the_lowest_shape_touches_at_the_height_of_the_stance(name, robot_file):
+def test_stance_height_touches_ground_in_mujoco(name, robot_file):
     path = path_of(name, robot_file)
     stance, model = read(path).stance, compiled(path)
     assert on_the_ground(model, placed(model, stance, stance.height + 1e-4)) == []
@@ -112,7 +116,7 @@ def test_the_lowest_shape_touches_at_the_height_of_the_stance(name, robot_file):
 
 
 def same_torques(facts, model):
-    """Compare with what MuJoCo needs to hold the robot still, given the pushes on its feet."""
+    """Compare with the forces that hold the robot still in MuJoCo, given the ground forces."""
     stance = facts.stance
     data = placed(model, stance, 0.0)
     weight = facts.total_mass * GRAVITY
@@ -123,7 +127,7 @@ def same_torques(facts, model):
         jacobian = np.zeros((3, model.nv))
         mujoco.mj_jac(model, data, jacobian, None, place, foot)
         needed -= jacobian.T @ [0, 0, push]
-    # Nothing is left that would move the trunk: the forces are in balance.
+    # No residual force acts on the trunk.
     np.testing.assert_allclose(needed[:6], 0, atol=1e-6)
     assert set(stance.torques) == {joint.name for leg in facts.legs for joint in leg.joints}
     for joint, torque in stance.torques.items():
@@ -131,13 +135,13 @@ def same_torques(facts, model):
 
 
 @every_robot
-def test_torques_are_what_holds_the_joints_in_mujoco(name, robot_file):
+def test_stance_torques_match_mujoco(name, robot_file):
     path = path_of(name, robot_file)
     same_torques(read(path), compiled(path))
 
 
-def test_a_waist_carries_what_all_legs_below_it_do(tmp_path):
-    # The legs of the bundled biped under a waist that leans, with a torso on the other side.
+def test_stance_torque_of_waist_matches_mujoco(tmp_path):
+    # The legs of the bundled biped below an inclined waist with a torso above it.
     text = bundled.find("biped").read_text()
     model = load_robot(bundled.find("biped"))
     trunk = Facts(model).bodies[0].top.name
@@ -160,7 +164,7 @@ def test_a_waist_carries_what_all_legs_below_it_do(tmp_path):
 
 
 @every_robot
-def test_the_centre_of_mass_is_where_mujoco_has_it(name, robot_file):
+def test_stance_center_matches_mujoco(name, robot_file):
     path = path_of(name, robot_file)
     facts = read(path)
     data = placed(compiled(path), facts.stance, 0.0)
@@ -169,12 +173,12 @@ def test_the_centre_of_mass_is_where_mujoco_has_it(name, robot_file):
 
 
 @every_robot
-def test_healthy_robots_stand(name, robot_file):
+def test_stance_of_published_robots_is_valid(name, robot_file):
     facts = read(path_of(name, robot_file))
     stance = facts.stance
     assert stance.margin > 0.02
     assert len(stance.contacts) == len(facts.legs)
-    # All feet are on the ground, within what a sole is thick.
+    # All feet are on the ground, within the thickness of a sole.
     np.testing.assert_allclose(stance.contacts[:, 2], -stance.height, atol=0.01)
     for joint in facts.joints:
         limit, position = joint.limit, stance.positions[joint.name]
@@ -231,7 +235,7 @@ def at(hip, knee):
     }
 
 
-def test_a_table_on_straight_legs():
+def test_stance_on_straight_legs():
     stance = stand(table(), at(0, 0))
     assert stance.height == pytest.approx(0.62)
     assert stance.spawn_height == pytest.approx(0.63)
@@ -241,7 +245,7 @@ def test_a_table_on_straight_legs():
     assert stance.margin == pytest.approx(0.2)
 
 
-def test_a_table_on_bent_legs():
+def test_stance_on_bent_legs():
     # Thigh 0.5 rad back, shank 0.5 rad ahead: the foot is below the hip, the knee 0.3 sin(0.5) m
     # behind it. Each leg carries a quarter of 12 kg: the knee needs that times the lever.
     stance = stand(table(), at(0.5, -1.0))
@@ -252,9 +256,9 @@ def test_a_table_on_bent_legs():
     assert stance.torques["hr_knee"] == pytest.approx(3 * GRAVITY * lever)
 
 
-def test_a_table_that_leans_on_its_hips():
+def test_stance_on_inclined_legs():
     # Straight legs 0.2 rad back: every foot is 0.6 sin(0.2) m behind its hip. The weight is then
-    # ahead of the middle, and the fore legs carry more: lever is 0.3 m either way.
+    # ahead of the middle, and the front legs carry more: lever is 0.3 m either way.
     stance = stand(table(), at(0.2, 0))
     back = 0.6 * math.sin(0.2)
     fore = 12 * GRAVITY * (0.3 + back) / 0.6 / 2
@@ -263,26 +267,26 @@ def test_a_table_that_leans_on_its_hips():
     assert stance.margin == pytest.approx(min(0.2, 0.3 - back))
 
 
-def test_the_weight_of_a_leg_hangs_on_its_hip():
+def test_stance_torque_includes_leg_mass():
     # Each leg has two parts of 1 kg, and stands straight 0.2 rad back.
     stance = stand(table(leg_mass=1.0), at(0.2, 0))
     back = 0.6 * math.sin(0.2)
-    center = -8 * back / 2 / 20  # eight parts whose mean is half way down
+    center = -8 * back / 2 / 20  # eight parts whose mean is halfway down
     fore = 20 * GRAVITY * (0.3 + back + center) / 0.6 / 2
     hanging = 1 * GRAVITY * (0.15 + 0.45) * math.sin(0.2)
     assert stance.center[0] == pytest.approx(center)
     assert stance.torques["fl_hip"] == pytest.approx(-fore * back + hanging)
 
 
-def test_a_foot_that_is_in_the_air_lifts_nothing_else():
-    # With one leg folded the other three carry; the lowest shape is still theirs.
+def test_stance_with_one_foot_in_the_air():
+    # With one leg folded the other three carry; they still have the lowest shapes.
     positions = at(0, 0) | {"fl_hip": 1.0, "fl_knee": -2.0}
     stance = stand(table(), positions)
     assert stance.height == pytest.approx(0.62)
 
 
-def test_what_hangs_lower_than_the_feet_counts_for_the_height():
-    # Legs folded so far that the trunk's belly is lower than the feet.
+def test_stance_height_includes_trunk():
+    # The legs are folded so far that the trunk is lower than the feet.
     facts = table(foot=0.001)
     stance = stand(facts, at(1.5, -2.5))
     lowest = 0.3 * math.cos(1.5) + 0.3 * math.cos(1.0) + 0.001
@@ -291,7 +295,7 @@ def test_what_hangs_lower_than_the_feet_counts_for_the_height():
     assert stand(facts, at(1.5, 0)).height == pytest.approx(0.05)
 
 
-def test_a_robot_without_mass_stands_without_effort():
+def test_stance_without_mass_has_no_torques():
     stance = stand(table(trunk_mass=0.0), at(0.5, -1.0))
     assert set(stance.torques.values()) == {0.0} or max(map(abs, stance.torques.values())) < 1e-9
     assert np.isfinite(stance.margin)
@@ -303,10 +307,10 @@ SQUARE = np.array([[0.3, 0.2], [0.3, -0.2], [-0.3, 0.2], [-0.3, -0.2]])
 
 
 @pytest.mark.parametrize(
-    ("places", "center", "wanted"),
+    ("places", "center", "expected"),
     [
         (SQUARE, (0, 0), [25, 25, 25, 25]),
-        # Half way to the fore feet they carry three quarters.
+        # Halfway to the front feet, these carry three quarters.
         (SQUARE, (0.15, 0), [37.5, 37.5, 12.5, 12.5]),
         (SQUARE, (0.3, 0), [50, 50, 0, 0]),
         (SQUARE[:2], (0.3, 0.1), [75, 25]),
@@ -315,11 +319,11 @@ SQUARE = np.array([[0.3, 0.2], [0.3, -0.2], [-0.3, 0.2], [-0.3, -0.2]])
         (np.array([[0, 0.1], [0, -0.1], [0.6, 0]]), (0.2, 0), [100 / 3] * 3),
     ],
 )
-def test_how_feet_share_a_weight(places, center, wanted):
-    assert ground_forces(places, np.array(center), 100.0) == pytest.approx(wanted)
+def test_ground_forces_by_hand(places, center, expected):
+    assert ground_forces(places, np.array(center), 100.0) == pytest.approx(expected)
 
 
-def test_feet_that_cannot_balance_it_still_carry_the_weight():
+def test_ground_forces_without_balance_sum_to_weight():
     forces = ground_forces(SQUARE, np.array([1.0, 0.0]), 100.0)
     assert forces.sum() == pytest.approx(100)
     assert (forces >= 0).all()
@@ -329,21 +333,21 @@ POINT = st.tuples(st.floats(-1, 1), st.floats(-1, 1))
 
 
 @given(st.lists(POINT, min_size=1, max_size=8), POINT, st.floats(0, 1000))
-def test_forces_push_and_carry_the_whole_weight(places, center, weight):
+def test_ground_forces_are_upward_and_sum_to_weight(places, center, weight):
     forces = ground_forces(np.array(places), np.array(center), weight)
     assert (forces >= 0).all()
     assert forces.sum() == pytest.approx(weight, abs=1e-9)
 
 
 @given(st.lists(st.tuples(POINT, st.floats(0.1, 1)), min_size=3, max_size=8))
-def test_forces_are_in_balance_around_the_weight(feet):
+def test_ground_forces_are_balanced(feet):
     places = np.array([place for place, _ in feet])
     shares = np.array([share for _, share in feet])
     center = shares @ places / shares.sum()
     forces = ground_forces(places, center, 100.0)
     even = np.full(len(places), 100 / len(places))
     if np.isclose(forces, 0).any():
-        return  # a foot that would have to pull was let go of
+        return  # a foot lifted off
     np.testing.assert_allclose(forces @ places / 100, center, atol=1e-6)
     assert (
         np.linalg.norm(forces - even) <= np.linalg.norm(shares / shares.sum() * 100 - even) + 1e-6
@@ -351,7 +355,7 @@ def test_forces_are_in_balance_around_the_weight(feet):
 
 
 @every_robot
-def test_feet_are_pushed_within_their_soles(name, robot_file):
+def test_force_points_are_within_soles(name, robot_file):
     facts = read(path_of(name, robot_file))
     stance = facts.stance
     poses = body_poses(facts.bodies, stance.positions)
@@ -362,7 +366,7 @@ def test_feet_are_pushed_within_their_soles(name, robot_file):
         assert (place[:2] <= points.max(axis=0) + 1e-9).all()
 
 
-def test_contacts_are_where_the_legs_end():
+def test_contacts_are_at_leg_ends():
     facts = table()
     positions = at(0.5, -1.0)
     stance, poses = stand(facts, positions), body_poses(facts.bodies, positions)

@@ -53,7 +53,7 @@ def joint(lower, upper, kind="revolute"):
 
 
 @pytest.mark.parametrize(
-    ("lower", "upper", "wanted"),
+    ("lower", "upper", "expected"),
     [
         (-1.0, 2.0, (-1, 2)),
         (2.0, -1.0, (-math.inf, math.inf)),
@@ -62,27 +62,27 @@ def joint(lower, upper, kind="revolute"):
         (1.0, None, (-math.inf, math.inf)),
     ],
 )
-def test_limits_that_make_no_sense_do_not_limit(lower, upper, wanted):
-    assert joint_range(joint(lower, upper)) == wanted
+def test_joint_range_of_invalid_limits_is_infinite(lower, upper, expected):
+    assert joint_range(joint(lower, upper)) == expected
 
 
-def test_a_continuous_joint_has_no_limits():
+def test_joint_range_of_continuous_joint_is_infinite():
     assert joint_range(joint(-1.0, 1.0, "continuous")) == (-math.inf, math.inf)
 
 
 @pytest.mark.parametrize(
-    ("lower", "upper", "position", "wanted"),
+    ("lower", "upper", "position", "expected"),
     [(-1.0, 2.0, 0.0, 0.0), (0.5, 2.0, 0.0, 0.5), (-2.0, -0.5, 0.0, -0.5), (2.0, 1.0, 0.3, 0.3)],
 )
-def test_the_closest_position_that_is_allowed(lower, upper, position, wanted):
-    assert clip_to_limits(joint(lower, upper), position) == wanted
+def test_clip_to_limits_returns_closest_position(lower, upper, position, expected):
+    assert clip_to_limits(joint(lower, upper), position) == expected
 
 
-# Real robots
+# Published robots
 
 
 @every_urdf
-def test_every_joint_has_a_position_within_its_limits(name, robot_file):
+def test_standing_pose_is_within_limits(name, robot_file):
     robot = load(name, robot_file)
     positions = solve_standing_pose(robot.leg_model)
     assert set(positions) == {each.name for each in robot.joints}
@@ -92,7 +92,7 @@ def test_every_joint_has_a_position_within_its_limits(name, robot_file):
 
 
 @every_urdf
-def test_the_mass_is_above_the_middle_of_the_feet(name, robot_file):
+def test_standing_pose_centers_mass_above_feet(name, robot_file):
     robot = load(name, robot_file)
     stance = robot.stance
     middle = stance.contacts.mean(axis=0)
@@ -101,19 +101,19 @@ def test_the_mass_is_above_the_middle_of_the_feet(name, robot_file):
 
 
 @every_urdf
-def test_legs_are_bent_as_much_as_they_should(name, robot_file):
+def test_standing_pose_bends_legs_as_specified(name, robot_file):
     robot = load(name, robot_file)
-    wanted = 0.965 if len(robot.legs) == 2 else 0.75
+    expected = 0.965 if len(robot.legs) == 2 else 0.75
     poses = body_poses(robot.bodies, robot.stance.positions)
     for leg, contact in zip(robot.legs, robot.stance.contacts, strict=True):
         hinged = [i for i in leg.limb.chain if robot.bodies[i].joint.moves]
         hip = hinged[leg.roles.index("hip")]
         point, _ = joint_axis(robot.bodies[hip], poses[hip])
-        assert (point - contact)[2] / leg.length == pytest.approx(wanted, abs=0.05)
+        assert (point - contact)[2] / leg.length == pytest.approx(expected, abs=0.05)
 
 
 @every_urdf
-def test_left_and_right_stand_alike(name, robot_file):
+def test_standing_pose_is_symmetric(name, robot_file):
     robot = load(name, robot_file)
     poses = body_poses(robot.bodies, robot.stance.positions)
     for pair in robot.mirror.pairs:
@@ -122,7 +122,7 @@ def test_left_and_right_stand_alike(name, robot_file):
 
 
 @every_urdf
-def test_knees_are_above_the_ground(name, robot_file):
+def test_standing_pose_keeps_knees_above_ground(name, robot_file):
     robot = load(name, robot_file)
     poses = body_poses(robot.bodies, robot.stance.positions)
     for leg in robot.legs:
@@ -133,7 +133,7 @@ def test_knees_are_above_the_ground(name, robot_file):
 
 
 @pytest.mark.parametrize("name", ["h1/urdf/h1.urdf", "g1/g1_29dof.urdf", "biped.urdf"])
-def test_soles_are_flat_on_the_ground(name, robot_file):
+def test_standing_pose_keeps_soles_flat(name, robot_file):
     robot = load(name, robot_file)
     poses = body_poses(robot.bodies, robot.stance.positions)
     for leg in robot.legs:
@@ -142,15 +142,15 @@ def test_soles_are_flat_on_the_ground(name, robot_file):
         assert np.ptp(points[:, 0]) > 0.1  # heel and toes
 
 
-def test_humanoids_bend_their_knees_ahead(robot_file):
+def test_standing_pose_bends_humanoid_knees_forward(robot_file):
     robot = load("g1/g1_29dof.urdf", robot_file)
     assert robot.stance.positions["left_knee_joint"] > 0.1
     assert robot.stance.positions["left_hip_pitch_joint"] < 0
     assert robot.stance.positions["left_shoulder_pitch_joint"] == 0
 
 
-def test_without_limits_knees_point_inward(robot_file):
-    # ANYmal's joints have none; as its makers pose it, fore knees are behind and hind ones ahead.
+def test_standing_pose_without_limits_bends_knees_inward(robot_file):
+    # The joints of ANYmal have no limits. Its default pose has knees inward at front and rear.
     robot = load("anymal_c/urdf/anymal_c.urdf", robot_file)
     poses = body_poses(robot.bodies, robot.stance.positions)
     for leg in robot.legs:
@@ -194,27 +194,27 @@ def feet(robot):
     return robot.stance.contacts - [[float(x) for x in root.split()] for root in ROOTS.values()]
 
 
-def test_a_leg_is_as_long_as_it_should_be_and_below_its_hip():
-    # The hips and the mass are in the middle; 0.3 m and 0.3 m, and a ball of 0.02 m.
+def test_standing_pose_puts_feet_below_hips():
+    # The hips and the mass are at the center. Links of 0.3 m, and a foot radius of 0.02 m.
     robot = table(thigh=0.3, shank=0.3)
     assert feet(robot) == pytest.approx(np.tile([0, 0, -0.75 * 0.62], (4, 1)), abs=0.01)
 
 
 @pytest.mark.parametrize("x", [-0.05, 0.03, 0.1])
-def test_feet_follow_the_mass(x):
+def test_standing_pose_shifts_feet_with_mass(x):
     robot = table(center=f"{x} 0 0", thigh=0.3, shank=0.3)
     assert robot.stance.center[0] == pytest.approx(x, abs=0.02)
     assert robot.stance.contacts[:, 0].mean() == pytest.approx(robot.stance.center[0], abs=0.01)
 
 
 @pytest.mark.parametrize("limits", [(-3, 3, -3, -0.1), (-3, 3, 0.1, 3)])
-def test_a_knee_bends_the_way_its_limits_allow(limits):
+def test_standing_pose_bends_knee_within_limits(limits):
     positions = table(thigh=0.3, shank=0.3, limits=limits).stance.positions
     assert np.sign(positions["fl_knee"]) == np.sign(limits[2] + limits[3])
     assert np.sign(positions["fl_hip"]) == -np.sign(positions["fl_knee"])
 
 
-def test_an_axis_that_points_the_other_way_makes_opposite_positions():
+def test_standing_pose_negates_for_opposite_axis():
     limits = (-3, 3, -3, -0.1)
     ours = table(thigh=0.3, shank=0.3, limits=limits).stance.positions
     other = table(thigh=0.3, shank=0.3, limits=(-3, 3, 0.1, 3), axis="0 -1 0").stance.positions
@@ -222,13 +222,13 @@ def test_an_axis_that_points_the_other_way_makes_opposite_positions():
         assert other[name] == pytest.approx(-position, abs=0.01)
 
 
-def test_limits_are_kept_clear_of():
-    # 0.75 of the length takes a knee of 1.45 rad; the limit is right there.
+def test_standing_pose_avoids_limits():
+    # 0.75 of the length requires a knee angle of 1.45 rad, which is close to the limit.
     robot = table(thigh=0.3, shank=0.3, limits=(-3, 3, -1.5, 0))
     assert -1.44 < robot.stance.positions["fl_knee"] < -1.0
 
 
-def test_a_leg_that_cannot_reach_does_what_it_can():
+def test_standing_pose_of_unreachable_target():
     robot = table(thigh=0.3, shank=0.3, limits=(-0.1, 0.1, -0.2, 0.2))
     for name, position in robot.stance.positions.items():
         assert abs(position) <= (0.1 if name.endswith("hip") else 0.2)
@@ -236,7 +236,7 @@ def test_a_leg_that_cannot_reach_does_what_it_can():
 
 
 @pytest.mark.parametrize("limits", [(1, -1, 2, -2), (0, 0, 0, 0), (-1e29, 1e29, -1e29, 1e29)])
-def test_limits_without_sense_still_give_a_pose(limits):
+def test_standing_pose_with_invalid_limits(limits):
     robot = table(thigh=0.3, shank=0.3, limits=limits)
     assert np.isfinite(list(robot.stance.positions.values())).all()
     assert max(map(abs, robot.stance.positions.values())) < 2.5
@@ -250,18 +250,18 @@ def test_limits_without_sense_still_give_a_pose(limits):
     lower=st.floats(-2.5, -0.5),
     upper=st.floats(-0.3, 0.5),
 )
-def test_any_leg_stands_where_it_should(thigh, ratio, lower, upper):
+def test_standing_pose_of_random_legs(thigh, ratio, lower, upper):
     shank = thigh * ratio
     robot = table(thigh=thigh, shank=shank, limits=(-3, 3, lower, upper))
     places = feet(robot)
     assert np.abs(places[:, :2]).max() < 0.06 * robot.legs[0].length
     assert (places[:, 2] < 0).all()
-    # Stretched further only where the knee cannot be bent enough.
+    # A leg is longer only if the knee cannot bend enough.
     stretch = -places[:, 2].mean() / robot.legs[0].length
     assert 0.7 < stretch < 1.0
 
 
-def test_a_keyframe_is_taken_as_it_is():
+def test_standing_pose_keeps_keyframe():
     path = bundled.find("quadruped").with_suffix(".xml")
     robot = Facts(load_robot(path))
     assert robot.model.home
@@ -270,7 +270,7 @@ def test_a_keyframe_is_taken_as_it_is():
     }
 
 
-def test_a_robot_without_legs_is_left_as_it_is():
+def test_standing_pose_without_legs():
     text = (
         '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="revolute">'
         '<parent link="a"/><child link="b"/><limit lower="0.5" upper="1"/></joint></robot>'
@@ -280,7 +280,7 @@ def test_a_robot_without_legs_is_left_as_it_is():
     assert solve_standing_pose(robot.leg_model) == {"j": 0.5}
 
 
-def test_the_centre_of_mass_by_hand():
+def test_center_of_mass_by_hand():
     robot = table(thigh=0.3, shank=0.3)
     # 20 kg at the trunk's origin; four thighs of 0.1 kg there too, four shanks 0.3 m below.
     poses = body_poses(robot.bodies, {})
@@ -289,7 +289,7 @@ def test_the_centre_of_mass_by_hand():
     )
 
 
-def test_without_mass_the_centre_is_the_origin():
+def test_center_of_mass_without_mass_is_origin():
     text = '<robot name="r"><link name="a"/></robot>'
     robot = Facts(load_robot(FILE, contents={FILE: text.encode()}))
     assert center_of_mass(robot.bodies, body_poses(robot.bodies, {})).tolist() == [0, 0, 0]

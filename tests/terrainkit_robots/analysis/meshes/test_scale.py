@@ -20,7 +20,7 @@ from terrainkit_robots.mesh.surface import Surface, binary_stl
 
 
 class Builder:
-    """A chain of links, `reach` apart, with boxes for meshes."""
+    """Builds chains of links at distance `reach`, with boxes as meshes."""
 
     def __init__(self, folder):
         self.folder = folder
@@ -63,7 +63,7 @@ class Builder:
                 joints=tuple(joints),
             )
         )
-        scales = MeshScales(facts.tree, facts.bodies, facts.zero_poses, facts.meshes)
+        scales = MeshScales(facts.tree, facts.bodies, facts.meshes)
         found = [scales.mismatch(use) for use in mesh_uses(facts.model)]
         return [mismatch.ratio for mismatch in found if mismatch is not None]
 
@@ -74,14 +74,14 @@ def robot(tmp_path):
 
 
 @pytest.mark.parametrize("size", [0.01, 0.05, 0.3, 1.0, 2.5])
-def test_parts_of_a_robot_may_be_of_any_size(robot, size):
+def test_mismatch_accepts_common_sizes(robot, size):
     part = robot.mesh(size)
     links = [robot.link(name, part, collisions=(part,)) for name in "abc"]
     assert not robot.mismatches(*links)
 
 
 @pytest.mark.parametrize("size", [0.02, 0.05, 0.3])
-def test_millimetres_for_metres(robot, size):
+def test_mismatch_of_millimeters_as_meters(robot, size):
     part = robot.mesh(size * 1000)
     ratios = robot.mismatches(*(robot.link(name, part) for name in "abc"))
     assert len(ratios) == 3
@@ -92,7 +92,7 @@ def test_millimetres_for_metres(robot, size):
 
 
 @pytest.mark.parametrize("size", [0.01, 0.05, 0.3])
-def test_metres_for_millimetres(robot, size):
+def test_mismatch_of_meters_as_millimeters(robot, size):
     part = robot.mesh(size, 0.001)
     box = Geometry(source=robot.at, shape="box", size=(size / 2,) * 3)
     ratios = robot.mismatches(*(robot.link(name, part, collisions=(box,)) for name in "abc"))
@@ -100,7 +100,7 @@ def test_metres_for_millimetres(robot, size):
     assert max(ratios) < 0.02
 
 
-def test_one_part_of_many_that_is_wrong(robot):
+def test_mismatch_of_one_mesh(robot):
     right, wrong = robot.mesh(0.3), robot.mesh(0.31, 1000.0)
     links = [robot.link(name, right) for name in "abcd"]
     assert robot.mismatches(*links[:2], robot.link("x", wrong), *links[2:]) == pytest.approx(
@@ -108,25 +108,25 @@ def test_one_part_of_many_that_is_wrong(robot):
     )
 
 
-def test_a_small_part_beside_a_large_one_is_a_detail(robot):
+def test_mismatch_accepts_small_details(robot):
     screw, shell = robot.mesh(0.002), robot.mesh(0.3)
     assert not robot.mismatches(*(robot.link(name, shell, screw) for name in "abc"))
 
 
-def test_axes_that_meet_in_one_point_say_nothing(robot):
+def test_mismatch_accepts_intersecting_axes(robot):
     part = robot.mesh(0.2)
     wrist = [robot.link(name, part) for name in "abc"]
     assert not robot.mismatches(*wrist, reach=0.0)
     assert not robot.mismatches(*wrist, reach=0.004)
 
 
-def test_a_camera_that_turns_on_a_car(robot):
+def test_mismatch_accepts_camera_on_vehicle(robot):
     assert not robot.mismatches(
         robot.link("car", robot.mesh(2.0)), robot.link("camera"), reach=0.05
     )
 
 
-def test_a_room_around_a_robot(robot):
+def test_mismatch_accepts_massless_environment(robot):
     room = robot.mesh(50.0)
     part = robot.mesh(0.3)
     links = [robot.link("a", part), robot.link("b", part)]
@@ -136,12 +136,12 @@ def test_a_room_around_a_robot(robot):
     )
 
 
-def test_a_crane_is_no_robot_in_millimetres(robot):
+def test_mismatch_accepts_crane(robot):
     links = [robot.link(name, robot.mesh(size)) for name, size in (("a", 8.0), ("b", 25.0))]
     assert not robot.mismatches(*links, reach=8.0)
 
 
-def test_a_file_that_cannot_be_read(robot):
+def test_mismatch_ignores_unreadable_mesh(robot):
     lost = Geometry(
         source=robot.at,
         shape="mesh",
@@ -150,6 +150,6 @@ def test_a_file_that_cannot_be_read(robot):
     assert not robot.mismatches(robot.link("a", lost), robot.link("b", lost))
 
 
-def test_joints_at_infinity(robot):
+def test_mismatch_ignores_invalid_offsets(robot):
     part = robot.mesh(0.3)
     assert not robot.mismatches(robot.link("a", part), robot.link("b", part), reach=1e9)

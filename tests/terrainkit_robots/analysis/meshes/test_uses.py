@@ -31,7 +31,7 @@ TWO_LINKS = """<robot name="r">
 
 @pytest.fixture
 def robot(tmp_path):
-    """Return a function that reads a robot, beside which there is m/foot.stl."""
+    """Return a function that loads a robot from a folder with m/foot.stl."""
 
     def make(text=TWO_LINKS, name="robot.urdf"):
         (tmp_path / "m").mkdir()
@@ -42,7 +42,7 @@ def robot(tmp_path):
     return make
 
 
-def test_every_use(robot):
+def test_mesh_uses_of_every_link(robot):
     uses = [
         (use.link.name, use.mesh.filename, use.is_collision) for use in mesh_uses(robot().model)
     ]
@@ -54,7 +54,7 @@ def test_every_use(robot):
     ]
 
 
-def test_one_for_each_name(robot):
+def test_meshes_by_name_groups_equal_names(robot):
     used = meshes_by_name(robot().model, Meshes())
     assert [(u.name, len(u.uses), u.source.line) for u in used] == [
         ("./m/foot.stl", 1, 4),
@@ -65,7 +65,7 @@ def test_one_for_each_name(robot):
     assert [is_missing(u) for u in used] == [False, False, True]
 
 
-def test_one_for_each_file_that_is_there(robot):
+def test_meshes_by_file_skips_missing_files(robot):
     (used,) = meshes_by_file(robot().model, Meshes())
     assert used.name == "m/foot.stl"
     assert used.source.line == 3
@@ -74,7 +74,7 @@ def test_one_for_each_file_that_is_there(robot):
     assert [use.link.name for use in used.collisions] == ["a", "b"]
 
 
-def test_edits_of_every_use(robot):
+def test_replace_edits_change_every_use(robot):
     facts = robot()
     (used,) = meshes_by_file(facts.model, facts.meshes)
     write, *edits = replace_edits(
@@ -89,7 +89,7 @@ def test_edits_of_every_use(robot):
     }
 
 
-def test_a_name_that_is_taken_is_left(robot, tmp_path):
+def test_replace_edits_keep_existing_files(robot, tmp_path):
     facts = robot()
     (tmp_path / "m/foot_hull.stl").write_bytes(b"somebody's")
     (used,) = meshes_by_file(facts.model, facts.meshes)
@@ -97,13 +97,13 @@ def test_a_name_that_is_taken_is_left(robot, tmp_path):
     assert write.path.name == "foot_hull_2.stl"
 
 
-def test_names_relative_to_the_robot(robot, tmp_path):
+def test_relative_name_of_mesh(robot, tmp_path):
     facts = robot()
     assert relative_name(facts.model, tmp_path / "m/foot.stl") == "m/foot.stl"
     assert relative_name(facts.model, tmp_path.parent / "x/foot.stl") == "../x/foot.stl"
 
 
-def test_names_relative_to_a_link_to_the_robot(robot, tmp_path):
+def test_relative_name_through_symbolic_link(robot, tmp_path):
     robot()
     elsewhere = tmp_path / "far/away"
     elsewhere.mkdir(parents=True)
@@ -114,7 +114,7 @@ def test_names_relative_to_a_link_to_the_robot(robot, tmp_path):
     assert (tmp_path / "linked" / name).samefile(tmp_path / "m/foot.stl")
 
 
-def test_names_in_mjcf_start_at_meshdir(robot):
+def test_replace_edits_of_mjcf_are_relative_to_meshdir(robot):
     text = """<mujoco><compiler meshdir="m"/>
       <asset><mesh name="f" file="foot.stl"/></asset>
       <worldbody><body name="a"><freejoint/><geom type="mesh" mesh="f" mass="1"/></body></worldbody>
@@ -127,14 +127,14 @@ def test_names_in_mjcf_start_at_meshdir(robot):
     assert (edit.name, edit.value) == ("file", "foot_hull.stl")
 
 
-def test_what_xacro_made_is_not_edited(robot):
+def test_replace_edits_of_xacro_are_none(robot):
     facts = Facts(replace(robot().model, kind="xacro"))
     (used,) = meshes_by_file(facts.model, facts.meshes)
     assert rename_edits(facts.model, used.uses, "x") is None
     assert replace_edits(facts.model, facts.meshes, used.uses, ".stl", bytes) is None
 
 
-def test_what_is_not_well_formed_is_not_edited(robot):
+def test_replace_edits_of_malformed_file_are_none(robot):
     facts = robot(TWO_LINKS.replace("</robot>", ""))
     (used,) = meshes_by_file(facts.model, facts.meshes)
     assert replace_edits(facts.model, facts.meshes, used.uses, ".stl", bytes) is None

@@ -1,4 +1,4 @@
-"""Small trees, by hand."""
+"""Small trees of links."""
 
 import pytest
 
@@ -14,7 +14,7 @@ SPHERE = '<collision><geometry><sphere radius="0.01"/></geometry></collision>'
 
 @pytest.fixture
 def urdf(tmp_path):
-    """Return facts of a URDF of joints `name: parent > child`, a `!` for fixed, `*` for kept."""
+    """Return facts of a URDF of joints `name: parent > child`; `!` is fixed, `*` is kept."""
 
     def make(*joints, extra=""):
         links: dict[str, None] = {}
@@ -40,7 +40,7 @@ def urdf(tmp_path):
 
 @pytest.fixture
 def mjcf(tmp_path):
-    """Return facts of a MJCF whose world has the given bodies."""
+    """Return facts of an MJCF whose world body has the given bodies."""
 
     def make(bodies):
         path = tmp_path / "robot.xml"

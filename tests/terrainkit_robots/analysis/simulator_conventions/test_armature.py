@@ -8,8 +8,8 @@ from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 
 
-def test_a_point_mass_on_a_rod(mjcf):
-    # 2 kg at 0.5 m from the axis of j1: 0.5 kg m2 and its own 0.001; about its own axis only that.
+def test_inertias_of_point_mass_on_rod(mjcf):
+    # 2 kg at 0.5 m from the axis of j1: 0.5 kg m2 plus its own 0.001; about j2 only 0.001.
     inertial = '<inertial pos="0 0 0" mass="2" diaginertia="0.001 0.001 0.001"/>'
     facts = mjcf(
         '<body name="b"><freejoint/><geom size="0.1"/>'
@@ -20,25 +20,25 @@ def test_a_point_mass_on_a_rod(mjcf):
     )
     moved = {
         each.joint.name: each.inertia
-        for each in inertias_without_armature(facts.bodies, facts.actuated, facts.zero_poses)
+        for each in inertias_without_armature(facts.bodies, facts.actuated)
     }
     assert moved == pytest.approx({"j1": 0.501, "j2": 0.001}, rel=1e-6)
 
 
-def test_joints_with_armature_are_left_out(mjcf):
+def test_inertias_exclude_joints_with_armature(mjcf):
     geom = '<geom size="0.1" mass="1"/>'
     facts = mjcf(
         f'<body name="b"><freejoint/>{geom}<body name="a">{geom}<joint name="j" armature="0.01"/>'
         f'</body><body name="s">{geom}<joint name="slide" type="slide"/></body></body>'
     )
-    (moved,) = inertias_without_armature(facts.bodies, facts.actuated, facts.zero_poses)
+    (moved,) = inertias_without_armature(facts.bodies, facts.actuated)
     assert (moved.joint.name, moved.inertia) == ("slide", pytest.approx(1.0))
 
 
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
-def test_against_the_mass_matrix_of_mujoco(name):
+def test_inertias_match_mass_matrix_of_mujoco(name):
     path = bundled.find(name)
-    # With the base held, the diagonal of the mass matrix is the inertia about each axis.
+    # With a fixed base, the diagonal of the mass matrix is the inertia about each axis.
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -46,7 +46,7 @@ def test_against_the_mass_matrix_of_mujoco(name):
     mujoco.mj_fullM(model, data, matrix)
     diagonal = {model.joint(i).name: matrix[model.jnt_dofadr[i]] for i in range(model.njnt)}
     facts = Facts(load_robot(path))
-    moved = inertias_without_armature(facts.bodies, facts.actuated, facts.zero_poses)
+    moved = inertias_without_armature(facts.bodies, facts.actuated)
     assert moved
     for each in moved:
         at = model.joint(each.joint.name).dofadr[0]

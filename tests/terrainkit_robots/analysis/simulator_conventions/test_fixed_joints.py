@@ -25,8 +25,8 @@ def merged_feet(facts):
     return find_merged_feet(facts.tree, facts.bodies, facts.legs, facts.fixed_joints)
 
 
-def test_what_is_merged_and_into_what(urdf):
-    # tip is kept where the attribute counts; what hangs below it by a fixed joint goes into it.
+def test_merge_joints_depends_on_simulator(urdf):
+    # tip is kept where the attribute is read; links fixed to it are then merged into it.
     facts = urdf("ja: b > a", "jm!: a > mid", "jt!*: mid > tip", "jc!: tip > cap")
     assert [joint.name for joint in facts.fixed_joints] == ["jm", "jt", "jc"]
     for simulator in ("MuJoCo", "Genesis"):
@@ -36,13 +36,13 @@ def test_what_is_merged_and_into_what(urdf):
         assert body_of(facts, simulator) == kept
 
 
-def test_a_merged_link_leaves_its_children_in_its_place(urdf):
+def test_merge_joints_replaces_link_by_children(urdf):
     facts = urdf("ja: b > a", "jm!: b > m", "jz: b > z", "jx: m > x", "jy: m > y")
     tree = merged_tree(facts, "MuJoCo")
     assert [joint.name for joint in tree.child_joints["b"]] == ["ja", "jx", "jy", "jz"]
 
 
-def test_the_bodies_of_mjcf_are_not_merged(mjcf):
+def test_merge_joints_keeps_mjcf_bodies(mjcf):
     geom = '<geom size="0.1" mass="1"/>'
     facts = mjcf(f'<body name="b"><freejoint/>{geom}<body name="f">{geom}</body></body>')
     assert facts.fixed_joints == ()
@@ -50,7 +50,7 @@ def test_the_bodies_of_mjcf_are_not_merged(mjcf):
 
 
 @pytest.mark.parametrize("name", ["quadruped.urdf", "quadruped.xml"])
-def test_feet_are_merged_into_shanks_where_nothing_keeps_them(name):
+def test_merged_feet_of_bundled_quadruped(name):
     merges = merged_feet(Facts(load_robot(bundled.find("quadruped").with_name(name))))
     if name.endswith("xml"):
         assert merges == ()
@@ -60,22 +60,22 @@ def test_feet_are_merged_into_shanks_where_nothing_keeps_them(name):
     assert dict(merges[0].merged_body) == {"MuJoCo": "FL_calf", "Genesis": "FL_calf"}
 
 
-def test_feet_without_the_attribute_are_merged_everywhere(tmp_path):
+def test_merged_feet_without_attribute(tmp_path):
     text = bundled.find("quadruped").read_text().replace('dont_collapse="true"', "")
     (tmp_path / "robot.urdf").write_text(text)
     merges = merged_feet(Facts(load_robot(tmp_path / "robot.urdf")))
     assert {simulator for each in merges for simulator in each.merged_body} == set(SIMULATORS)
 
 
-def test_feet_that_are_the_last_body_are_never_merged():
+def test_merged_feet_of_separate_bodies_is_empty():
     assert merged_feet(Facts(load_robot(bundled.find("biped")))) == ()
 
 
-def test_each_simulator_has_its_own_way_to_keep_a_link():
+def test_keep_link_options_cover_every_simulator():
     assert list(KEEP_LINK_OPTIONS) == list(SIMULATORS)
 
 
-def test_no_links(tmp_path):
+def test_merged_feet_without_links(tmp_path):
     (tmp_path / "robot.urdf").write_text('<robot name="r"/>')
     facts = Facts(load_robot(tmp_path / "robot.urdf"))
     assert merged_feet(facts) == ()

@@ -33,7 +33,7 @@ def bodies(facts):
     return {name: " ".join(order.bodies) for name, order in orders(facts).items()}
 
 
-# Worked by hand. b carries c and a, and F with x3, x1 and G, which carries y1.
+# By hand. b is the parent of c, a and F; F of x3, x1 and G; G of y1.
 
 TREE = (
     "jc: b > c",
@@ -48,14 +48,14 @@ TREE = (
 )
 
 
-def test_siblings_out_of_order_and_fixed_joints_between(urdf):
+def test_simulator_orders_by_hand(urdf):
     facts = urdf(*TREE)
     assert " ".join(facts.file_order) == "jc jz jx3 jx1 jy1 ja jk"
     assert joints(facts) == {
-        "MuJoCo": "jc jk jx3 jy1 jx1 ja jz",  # G's children where G was, before x1
+        "MuJoCo": "jc jk jx3 jy1 jx1 ja jz",  # the child of G replaces G, before x1
         "Isaac Gym": "ja jz jc jk jx1 jx3 jy1",
         "Isaac Lab": "ja jc jx1 jx3 jy1 jz jk",
-        "Genesis": "jc jk jx3 jx1 jy1 ja jz",  # as genesis-world 1.4.5 lists this very tree
+        "Genesis": "jc jk jx3 jx1 jy1 ja jz",  # as genesis-world 1.4.5 lists this tree
     }
     assert bodies(facts) == {
         "MuJoCo": "b c k x3 y1 x1 a z",
@@ -71,13 +71,13 @@ def test_siblings_out_of_order_and_fixed_joints_between(urdf):
     }
 
 
-def test_mujoco_compiles_the_tree_in_the_order_that_is_said(urdf):
+def test_simulator_order_matches_mujoco_compiler(urdf):
     facts = urdf(*TREE)
     compiled = compile_urdf(facts.model.file.read_text())
     assert compiled == (orders(facts)["MuJoCo"].joints, orders(facts)["MuJoCo"].bodies)
 
 
-def test_a_link_that_is_kept_is_a_body_of_two_simulators(urdf):
+def test_simulator_orders_with_kept_link(urdf):
     facts = urdf("jb: b > a", "jF!*: a > F", "jc: F > c")
     assert bodies(facts) == {
         "MuJoCo": "b a c",
@@ -87,23 +87,23 @@ def test_a_link_that_is_kept_is_a_body_of_two_simulators(urdf):
     }
 
 
-def test_one_order_of_siblings_is_certain_everywhere(urdf):
+def test_simulator_orders_are_certain_if_unique(urdf):
     facts = urdf("ja: b > a", "jc: b > c", "jd: a > d", "je: c > e")
     assert all(order.certain for order in facts.simulator_orders)
     assert joints(facts)["Isaac Lab"] == "ja jc jd je"
     assert joints(facts)["Isaac Gym"] == "ja jd jc je"
 
 
-def test_a_fixed_joint_that_may_be_merged_or_not_leaves_the_levels_open(urdf):
-    # Merged, c is beside a; else it is a level below, after d.
+def test_simulator_order_with_fixed_joint_is_uncertain(urdf):
+    # If merged, c is a sibling of a; otherwise it is one level below, after d.
     facts = urdf("ja: b > a", "jb!: b > bb", "jc: bb > c", "jd: a > d")
     assert joints(facts)["Isaac Lab"] == "ja jc jd"
     assert not orders(facts)["Isaac Lab"].certain
     assert orders(facts)["Isaac Gym"].certain
 
 
-def test_names_are_sorted_as_usd_has_them(urdf):
-    # In the file - comes before 1, in USD it is _ and comes after.
+def test_simulator_orders_sort_usd_names(urdf):
+    # In the file, - sorts before 1. In USD it becomes _ and sorts after 1.
     facts = urdf("a1: b > p", "a-z: b > q")
     assert joints(facts)["Isaac Gym"] == "a1 a-z"
     assert not orders(urdf("left_10: b > p", "left_1_: b > q", "left_09: b > r"))[
@@ -111,7 +111,7 @@ def test_names_are_sorted_as_usd_has_them(urdf):
     ].certain
 
 
-def test_the_bodies_of_mjcf_stay_and_their_joints_follow_the_file(mjcf):
+def test_simulator_orders_of_mjcf(mjcf):
     geom = '<geom size="0.1" mass="1"/>'
     facts = mjcf(
         f'<body name="b"><freejoint/>{geom}'
@@ -129,7 +129,7 @@ def test_the_bodies_of_mjcf_stay_and_their_joints_follow_the_file(mjcf):
     assert not orders(facts)["Isaac Gym"].certain
 
 
-def test_bodies_with_several_joints_are_to_be_verified(mjcf):
+def test_simulator_orders_of_multi_joint_bodies(mjcf):
     geom = '<geom size="0.1" mass="1"/>'
     two = '<joint name="j1" axis="1 0 0"/><joint name="j2"/>'
     facts = mjcf(f'<body name="b"><freejoint/>{geom}<body name="a">{two}{geom}</body></body>')
@@ -139,8 +139,8 @@ def test_bodies_with_several_joints_are_to_be_verified(mjcf):
     assert [name for name, order in found.items() if order.certain] == ["MuJoCo", "Genesis"]
 
 
-# Orders that were published, and their files list the legs otherwise: A1's FR first, ANYmal C's
-# LF, RF, LH, RH.
+# Published orders. The files list the legs in another order: A1 with FR first, ANYmal C as LF, RF,
+# LH, RH.
 
 
 @pytest.mark.parametrize(
@@ -154,15 +154,15 @@ def test_bodies_with_several_joints_are_to_be_verified(mjcf):
         ("anymal_c/urdf/anymal_c.urdf", ["LF", "LH", "RF", "RH"], ["_HAA", "_HFE", "_KFE"]),
     ],
 )
-def test_isaac_orders_are_those_that_were_published(robot_file, name, legs, parts):
+def test_isaac_orders_match_published_lists(robot_file, name, legs, parts):
     found = orders(Facts(load_robot(robot_file(name))))
     assert found["Isaac Gym"].joints == tuple(leg + part for leg in legs for part in parts)
     assert found["Isaac Lab"].joints == tuple(leg + part for part in parts for leg in legs)
-    assert not found["Isaac Lab"].certain  # an importer that keeps the file's order gives another
+    assert not found["Isaac Lab"].certain  # an importer that keeps the order of the file differs
     assert "robot.joint_names" in found["Isaac Lab"].reason
 
 
-def test_isaac_lab_goes_through_g1_as_nvidia_publishes_it(robot_file):
+def test_isaac_lab_order_matches_published_g1(robot_file):
     order = orders(Facts(load_robot(robot_file("g1/g1_29dof.urdf"))))["Isaac Lab"]
     assert order.certain
     assert order.joints[:9] == (
@@ -178,11 +178,11 @@ def test_isaac_lab_goes_through_g1_as_nvidia_publishes_it(robot_file):
     )
 
 
-# MuJoCo's own compiler.
+# Compared with MuJoCo
 
 
 def compile_urdf(text):
-    """Return joints and bodies of a URDF, its links all of one shape so that it compiles."""
+    """Return the compiled joints and bodies of a URDF, with the same inertial for all links."""
     root = etree.fromstring(text.encode())
     for link in root.iterchildren("link"):
         for part in list(link):
@@ -215,13 +215,13 @@ def check(path, compiled):
 
 
 @pytest.mark.parametrize("name", SHARED)
-def test_mujoco_orders_a_shared_robot_as_is_said(robot_file, name):
+def test_mujoco_order_of_published_robot(robot_file, name):
     path = robot_file(name)
     check(path, compile_urdf(path.read_text()))
 
 
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
-def test_mujoco_orders_a_bundled_robot_as_is_said(name):
+def test_mujoco_order_of_bundled_robot(name):
     path = bundled.find(name)
     check(path, compile_urdf(path.read_text()))
     model = path.with_suffix(".xml")
@@ -241,7 +241,7 @@ def trees(draw):
 
 @settings(deadline=None, max_examples=50)
 @given(trees())
-def test_mujoco_orders_any_tree_as_is_said(tmp_path_factory, ends):
+def test_mujoco_order_of_random_tree(tmp_path_factory, ends):
     text = "<robot name='r'>" + "".join(f"<link name='l{k}'/>" for k in range(len(ends) + 1))
     for parent, child, fixed in ends:
         text += (
@@ -253,10 +253,7 @@ def test_mujoco_orders_any_tree_as_is_said(tmp_path_factory, ends):
     check(path, compile_urdf(path.read_text()))
 
 
-# Permutations.
-
-
-def test_nothing_to_order(tmp_path):
+def test_simulator_orders_without_links(tmp_path):
     path = Path(tmp_path / "robot.urdf")
     path.write_text('<robot name="r"/>')
     assert all(
@@ -264,6 +261,6 @@ def test_nothing_to_order(tmp_path):
     )
 
 
-def test_a_broken_tree_is_never_certain(urdf):
+def test_simulator_orders_of_broken_tree_are_uncertain(urdf):
     facts = urdf("ja: b > a", "jc: b > c", "jd: a > c")
     assert not any(order.certain for order in facts.simulator_orders)

@@ -31,21 +31,21 @@ def facts_of(folder, text, name="robot.xml"):
 
 
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
-def test_the_bundled_robots_load(name):
+def test_load_errors_of_bundled_robots_are_none(name):
     for suffix in (".urdf", ".xml"):
         facts = Facts(load_robot(bundled.find(name).with_suffix(suffix)))
         assert mujoco_load_error(facts.model) is None
     assert load_in_yourdfpy(Facts(load_robot(bundled.find(name)))) is None
 
 
-def test_the_words_of_mujoco_and_the_element(tmp_path):
+def test_mujoco_load_error_names_element(tmp_path):
     text = bundled.find("quadruped").read_text().replace('ixx="', 'ixx="9', 1)
     refusal = mujoco_load_error(facts_of(tmp_path, text, "robot.urdf").model)
     assert refusal.message == "inertia must satisfy A + B >= C; use 'balanceinertia' to fix"
     assert refusal.element == "base"
 
 
-def test_the_words_of_yourdfpy(tmp_path):
+def test_yourdfpy_load_error_is_one_line(tmp_path):
     text = (
         '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="revolute"/></robot>'
     )
@@ -72,13 +72,13 @@ def test_the_words_of_yourdfpy(tmp_path):
         ),
     ],
 )
-def test_what_could_be_costly_is_not_tried(tmp_path, inside, why):
+def test_mujoco_load_error_rejects_costly_elements(tmp_path, inside, why):
     text = f"<mujoco>{inside}<worldbody>{BODY}</worldbody></mujoco>"
     with pytest.raises(NotAttemptedError, match=why):
         mujoco_load_error(facts_of(tmp_path, text).model)
 
 
-def test_too_many_bodies_are_not_tried(tmp_path):
+def test_mujoco_load_error_rejects_many_bodies(tmp_path):
     links = "".join(f'<link name="l{k}"/>' for k in range(601))
     facts = facts_of(tmp_path, f'<robot name="r">{links}</robot>', "robot.urdf")
     with pytest.raises(NotAttemptedError, match="got 601; expected at most 600"):
@@ -94,28 +94,28 @@ def mesh_of(name, folder=""):
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
 @pytest.mark.parametrize(("name", "folder"), [("m.stl", ""), ("else/m.stl", ""), ("m.stl", "in")])
-def test_a_pipe_is_never_opened(tmp_path, name, folder):
+def test_mujoco_load_error_never_opens_pipe(tmp_path, name, folder):
     (tmp_path / "in").mkdir()
     os.mkfifo(tmp_path / (folder or ".") / "m.stl")
     with pytest.raises(NotAttemptedError, match=r"m\.stl is not passed to MuJoCo"):
         mujoco_load_error(facts_of(tmp_path, mesh_of(name, folder), "robot.urdf").model)
 
 
-def test_a_device_is_never_opened(tmp_path):
+def test_mujoco_load_error_never_opens_device(tmp_path):
     if not Path("/dev/zero").exists():
         pytest.skip("no devices here")
     with pytest.raises(NotAttemptedError, match="zero is not passed"):
         mujoco_load_error(facts_of(tmp_path, mesh_of("/dev/zero"), "robot.urdf").model)
 
 
-def test_meshes_of_many_bytes_are_not_tried(tmp_path):
+def test_mujoco_load_error_rejects_large_meshes(tmp_path):
     with (tmp_path / "m.stl").open("wb") as file:
         file.truncate(33 * 2**20)
     with pytest.raises(NotAttemptedError, match="33,554,432 bytes"):
         mujoco_load_error(facts_of(tmp_path, mesh_of("m.stl"), "robot.urdf").model)
 
 
-def test_a_picture_of_many_pixels_is_not_tried(tmp_path):
+def test_mujoco_load_error_rejects_large_textures(tmp_path):
     head = b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sII", 13, b"IHDR", 99999, 99999)
     (tmp_path / "t.png").write_bytes(head)
     text = f'<mujoco><asset><texture type="2d" name="t" file="t.png"/></asset><worldbody>{BODY}'
@@ -123,20 +123,20 @@ def test_a_picture_of_many_pixels_is_not_tried(tmp_path):
         mujoco_load_error(facts_of(tmp_path, f"{text}</worldbody></mujoco>").model)
 
 
-def test_what_is_included_is_looked_at_as_well(tmp_path):
+def test_mujoco_load_error_checks_included_files(tmp_path):
     (tmp_path / "part.xml").write_text('<mujoco><size nkey="99999999"/></mujoco>')
     text = f'<mujoco><include file="part.xml"/><worldbody>{BODY}</worldbody></mujoco>'
     with pytest.raises(NotAttemptedError, match="nkey"):
         mujoco_load_error(facts_of(tmp_path, text).model)
 
 
-def test_entities_are_not_given_to_yourdfpy(tmp_path):
+def test_yourdfpy_load_error_rejects_entities(tmp_path):
     text = '<!DOCTYPE robot [<!ENTITY a "b">]><robot name="&a;"><link name="a"/></robot>'
     with pytest.raises(NotAttemptedError, match="entities"):
         load_in_yourdfpy(facts_of(tmp_path, text, "robot.urdf"))
 
 
-def test_xacro_has_no_file_to_be_read(tmp_path):
+def test_load_errors_reject_xacro(tmp_path):
     text = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r"><link name="a"/></robot>'
     facts = facts_of(tmp_path, text, "robot.xacro")
     for load in (load_in_mujoco, load_in_yourdfpy):
@@ -144,7 +144,7 @@ def test_xacro_has_no_file_to_be_read(tmp_path):
             load(facts)
 
 
-def test_a_file_that_is_gone_is_not_tried(tmp_path):
+def test_load_errors_reject_missing_file(tmp_path):
     facts = facts_of(tmp_path, '<robot name="r"><link name="a"/></robot>', "robot.urdf")
     facts.model.file.unlink()
     for load in (load_in_mujoco, load_in_yourdfpy):
@@ -152,7 +152,7 @@ def test_a_file_that_is_gone_is_not_tried(tmp_path):
             load(facts)
 
 
-def test_nothing_is_written_beside(tmp_path, monkeypatch):
+def test_mujoco_load_error_writes_no_files(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     facts = facts_of(tmp_path, mesh_of("missing.stl"), "robot.urdf")
     assert "Error opening file" in mujoco_load_error(facts.model).message

@@ -1,7 +1,7 @@
 from terrainkit_robots.analysis.simulator_conventions.order_table import order_table
 
 
-def test_a_row_for_each_joint_with_its_number_everywhere(urdf):
+def test_order_table_has_a_row_for_each_joint(urdf):
     facts = urdf("jc: b > c", "ja: b > a", "jk: c > k")
     assert order_table(facts.file_order, facts.simulator_orders) == (
         ("joint", "file", "MuJoCo", "Isaac Gym", "Isaac Lab", "Genesis"),

@@ -79,7 +79,7 @@ def pairs(robot):
         ("left/hip", "right/hip"),
     ],
 )
-def test_left_and_right_change_places(name, other):
+def test_swap_sides_exchanges_left_and_right(name, other):
     assert swap_sides(name) == other
     assert swap_sides(other) == name
 
@@ -100,19 +100,19 @@ def test_left_and_right_change_places(name, other):
         "4",
     ],
 )
-def test_names_without_a_side_stay(name):
+def test_swap_sides_keeps_names_without_side(name):
     assert swap_sides(name) == name
 
 
 @given(st.text(max_size=20))
-def test_twice_is_back(name):
+def test_swap_sides_is_an_involution(name):
     assert swap_sides(swap_sides(name)) == name
 
 
 # Planes
 
 
-def test_the_image_of_a_vector():
+def test_image_of_vectors():
     mirror = Mirror(normal=np.array([0.0, 1.0, 0.0]), pairs=())
     assert mirror.image(np.array([1.0, 2.0, 3.0])).tolist() == [1, -2, 3]
     both = np.array([[1.0, 2.0, 3.0], [0.0, -1.0, 0.0]])
@@ -121,18 +121,18 @@ def test_the_image_of_a_vector():
 
 
 @every_robot
-def test_robots_are_mirrored_left_to_right(name, robot_file):
+def test_mirror_of_published_robots(name, robot_file):
     robot = load(name, robot_file)
     assert robot.mirror.normal.tolist() == [0, 1, 0]
     assert len(robot.mirror.pairs) == PAIRS[name]
     for pair in robot.mirror.pairs:
-        assert robot.zero_poses[pair.left][1, 3] > robot.zero_poses[pair.right][1, 3]
+        assert robot.bodies[pair.left].zero_pose[1, 3] > robot.bodies[pair.right].zero_pose[1, 3]
         assert swap_sides(robot.bodies[pair.left].name) == robot.bodies[pair.right].name
 
 
 @every_robot
-def test_mirrored_positions_look_mirrored(name, robot_file):
-    # Each pair is put at equal or opposite positions, as its sign says; everything else at zero.
+def test_mirror_signs_give_mirrored_poses(name, robot_file):
+    # Each pair has equal or opposite positions, according to its sign; all others are at zero.
     robot = load(name, robot_file)
     rng = np.random.default_rng(0)
     for _ in range(5):
@@ -148,7 +148,7 @@ def test_mirrored_positions_look_mirrored(name, robot_file):
             np.testing.assert_allclose(image, poses[pair.right][:3, 3], atol=2e-3)
 
 
-def test_the_twin_of_a_body(robot_file):
+def test_image_body_returns_index_and_sign(robot_file):
     robot = load("go2/urdf/go2.urdf", robot_file)
     index = {body.top.name: body.index for body in robot.bodies}
     assert robot.mirror.image_body(index["FL_hip"]) == (index["FR_hip"], -1)
@@ -163,7 +163,7 @@ def test_the_twin_of_a_body(robot_file):
 @pytest.mark.parametrize(
     ("axis", "other", "sign"),
     [
-        # A turn to the left is mirrored by one to the right, but both nod alike.
+        # Roll and yaw are negated by the reflection, pitch is not.
         ("0 1 0", "0 1 0", 1),
         ("0 1 0", "0 -1 0", -1),
         ("1 0 0", "1 0 0", -1),
@@ -174,7 +174,7 @@ def test_the_twin_of_a_body(robot_file):
         ("1 1 0", "-1 1 0", 1),
     ],
 )
-def test_the_sign_of_hinges(axis, other, sign):
+def test_mirror_sign_of_hinges(axis, other, sign):
     robot = facts(("trunk", "left", "0 1 0", axis), ("trunk", "right", "0 -1 0", other))
     assert pairs(robot) == [("left", "right", sign)]
 
@@ -188,7 +188,7 @@ def test_the_sign_of_hinges(axis, other, sign):
         ("0 0 1", "0 0 -1", -1),
     ],
 )
-def test_the_sign_of_slides(axis, other, sign):
+def test_mirror_sign_of_slides(axis, other, sign):
     robot = facts(
         ("trunk", "left", "0 1 0", axis, "prismatic"),
         ("trunk", "right", "0 -1 0", other, "prismatic"),
@@ -196,18 +196,18 @@ def test_the_sign_of_slides(axis, other, sign):
     assert pairs(robot) == [("left", "right", sign)]
 
 
-def test_places_are_enough():
+def test_mirror_pairs_by_position():
     robot = facts(("trunk", "x", "0.1 1 0", "0 1 0"), ("trunk", "q", "0.1 -1 0", "0 1 0"))
     assert pairs(robot) == [("x", "q", 1)]
 
 
-def test_names_are_enough():
+def test_mirror_pairs_by_name():
     robot = facts(("trunk", "l_a", "0.1 1 0", "0 1 0"), ("trunk", "r_a", "0.5 -1 0", "0 1 0"))
     assert pairs(robot) == [("l_a", "r_a", 1)]
 
 
-def test_places_come_before_names():
-    # Left and right are mixed up in the names; the places say what belongs together.
+def test_mirror_prefers_position_over_name():
+    # The names confuse left and right; the positions are decisive.
     robot = facts(
         ("trunk", "l_a", "1 1 0", "0 1 0"),
         ("trunk", "r_a", "-1 -1 0", "0 1 0"),
@@ -217,7 +217,7 @@ def test_places_come_before_names():
     assert pairs(robot) == [("l_a", "x", 1), ("y", "r_a", 1)]
 
 
-def test_of_several_at_one_place_the_name_decides():
+def test_mirror_resolves_ties_by_name():
     robot = facts(
         ("trunk", "left_a", "0 1 0", "0 1 0"),
         ("trunk", "left_b", "0 1 0", "0 1 0"),
@@ -230,29 +230,29 @@ def test_of_several_at_one_place_the_name_decides():
     }
 
 
-def test_what_is_in_the_middle_has_no_twin():
+def test_mirror_excludes_bodies_in_the_plane():
     assert (
         pairs(facts(("trunk", "head", "1 0 0", "0 1 0"), ("trunk", "tail", "-1 0 0", "0 1 0")))
         == []
     )
 
 
-def test_a_body_alone_has_no_twin():
+def test_mirror_excludes_single_body():
     assert pairs(facts(("trunk", "arm", "0 1 0", "0 1 0"))) == []
 
 
-def test_two_on_one_side_are_not_twins():
+def test_mirror_excludes_bodies_on_one_side():
     assert (
         pairs(facts(("trunk", "l_a", "0 1 0", "0 1 0"), ("trunk", "r_a", "0 2 0", "0 1 0"))) == []
     )
 
 
-def test_a_joint_of_another_kind_is_no_twin_by_place():
+def test_mirror_excludes_other_joint_types():
     robot = facts(("trunk", "a", "0 1 0", "0 1 0"), ("trunk", "b", "0 -1 0", "0 1 0", "prismatic"))
     assert pairs(robot) == []
 
 
-def test_bodies_are_in_one_pair_at_most():
+def test_mirror_pairs_each_body_once():
     robot = facts(
         *(("trunk", f"l{k}", "0 1 0", "0 1 0") for k in range(3)),
         *(("trunk", f"r{k}", "0 -1 0", "0 1 0") for k in range(2)),
@@ -261,7 +261,7 @@ def test_bodies_are_in_one_pair_at_most():
     assert len(used) == len(set(used)) == 4
 
 
-def test_a_robot_that_walks_along_y_is_mirrored_across_x():
+def test_mirror_of_robot_along_y_is_x():
     legs = []
     for name, x, y in (("fl", -0.2, 0.3), ("fr", 0.2, 0.3), ("hl", -0.2, -0.3), ("hr", 0.2, -0.3)):
         legs += [
@@ -275,7 +275,7 @@ def test_a_robot_that_walks_along_y_is_mirrored_across_x():
     assert len(robot.mirror.pairs) == 4
 
 
-def test_a_robot_beside_its_own_origin_is_mirrored_in_its_middle():
+def test_mirror_offset_of_lateral_trunk_frame():
     # The frame of the trunk is that of a sensor at its side.
     path = bundled.find("quadruped")
     plain = Facts(load_robot(path))
@@ -293,12 +293,12 @@ def test_a_robot_beside_its_own_origin_is_mirrored_in_its_middle():
     assert robot.stance.positions == pytest.approx(plain.stance.positions, abs=1e-6)
 
 
-def test_robots_without_bodies_or_joints():
+def test_mirror_without_joints():
     assert facts().mirror.pairs == ()
     assert Facts(load_robot(FILE, contents={FILE: b'<robot name="r"/>'})).mirror.pairs == ()
 
 
-def test_thousands_of_bodies_are_no_trouble():
+def test_mirror_of_thousands_of_bodies():
     joints = [
         ("trunk", f"{side}{k}", f"{k * 1e-3} {y} 0", "0 1 0")
         for k in range(1000)

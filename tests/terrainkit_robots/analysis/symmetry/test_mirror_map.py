@@ -33,20 +33,20 @@ def waist(robot, axis, kind="revolute", y=0):
         ("0 1 0", "prismatic", -1),
     ],
 )
-def test_a_joint_in_the_plane_is_its_own_twin(robot, axis, kind, sign):
+def test_mirror_map_of_joint_in_the_plane(robot, axis, kind, sign):
     assert waist(robot, axis, kind) == {"w": MirrorJoint(joint="w", sign=sign)}
 
 
-def test_a_joint_of_one_arm_has_no_twin(robot):
+def test_mirror_map_excludes_single_arm(robot):
     assert waist(robot, "0 1 0", y=0.3) == {}
 
 
-def test_an_axis_that_is_askew_has_no_mirror_image(robot):
+def test_mirror_map_excludes_skewed_axis(robot):
     assert waist(robot, "0 1 1") == {}
 
 
 @pytest.mark.parametrize("name", ["quadruped.urdf", "biped.urdf", "biped.xml"])
-def test_mirrored_positions_look_mirrored(bundled, name):
+def test_mirror_map_gives_mirrored_poses(bundled, name):
     facts = bundled(name)
     twins = facts.mirror_map
     assert list(twins) == [joint.name for joint in facts.actuated]
@@ -60,7 +60,7 @@ def test_mirrored_positions_look_mirrored(bundled, name):
             np.testing.assert_allclose(flip @ here[one][:3, 3], there[other][:3, 3], atol=1e-3)
 
 
-def test_a_twin_that_no_motor_drives_is_none(robot):
+def test_mirror_map_excludes_unactuated_joints(robot):
     links = "".join(
         LINK.format(name=n, kind="revolute", axis="0 1 0", y=y)
         for n, y in (("left", 0.3), ("right", -0.3))

@@ -81,8 +81,8 @@ def test_does_not_stand_severity(monkeypatch, stood, tilt, lifted, severity):
 def test_unreachable_limits_counts_blocked_joints():
     (violation,) = check("DYN003", bundled.find("quadruped"))
     assert violation.message.startswith(
-        "blocked by a collision before their limits, moved one at a time from the default pose: "
-        "6 of 12 joints; worst "
+        "6 of 12 joints blocked by a collision before a limit, moved one at a time from the "
+        "default pose; worst "
     )
     assert " rad, where " in violation.message
 
@@ -90,8 +90,8 @@ def test_unreachable_limits_counts_blocked_joints():
 def test_unreachable_limits_units_of_sliding_joint(robot):
     (violation,) = check("DYN003", robot(LIFT))
     assert violation.message == (
-        "too weak to lift the limb over the whole range: 1 of 1 joint; worst lift: got 9.81 N; "
-        "expected at most its effort limit of 5 N"
+        "1 of 1 joint too weak to lift the limb over the whole range; worst lift, which needs "
+        "9.81 N with an effort limit of 5 N"
     )
 
 

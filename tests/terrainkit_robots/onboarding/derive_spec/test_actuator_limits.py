@@ -3,10 +3,10 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.onboarding.derive_spec.actuator_limits import (
-    derive_action_scale,
-    derive_armature,
-    derive_effort,
-    derive_velocity,
+    action_scale_column,
+    armature_column,
+    effort_column,
+    velocity_column,
 )
 
 HIP = 'effort="23.7" velocity="30.1"'
@@ -24,7 +24,7 @@ def with_first_limit(bundled, tmp_path, *, limit):
 
 def test_derive_effort_from_file(bundled, gains):
     facts = bundled("quadruped.urdf")
-    column = derive_effort(facts, gains(facts), facts.mirror_map)
+    column = effort_column(facts, gains(facts), facts.mirror_map)
     assert column.values["FR_calf_joint"] == 45.43
     assert dict(column.provenance("effort"))["effort"].reason == "in quadruped.urdf"
 
@@ -32,8 +32,8 @@ def test_derive_effort_from_file(bundled, gains):
 def test_derive_effort_from_mirror_joint(bundled, gains, tmp_path):
     facts = with_first_limit(bundled, tmp_path, limit='<limit lower="-1" upper="1"/>')
     twins = facts.mirror_map
-    effort = derive_effort(facts, gains(facts), twins)
-    speed = derive_velocity(facts, twins)
+    effort = effort_column(facts, gains(facts), twins)
+    speed = velocity_column(facts, twins)
     assert effort.values["FL_hip_joint"] == 23.7
     assert speed.values["FL_hip_joint"] == 30.1
     origins = dict(effort.provenance("effort"))
@@ -46,28 +46,28 @@ def test_derive_effort_from_mirror_joint(bundled, gains, tmp_path):
 def test_derive_effort_from_stiffness_or_torque(bundled, gains, tmp_path):
     facts = bundled("quadruped.urdf", (HIP, ""), tmp_path=tmp_path)
     twins = facts.mirror_map
-    column = derive_effort(facts, gains(facts, stiffness=40.0), twins)
+    column = effort_column(facts, gains(facts, stiffness=40.0), twins)
     assert column.values["FL_hip_joint"] == 40.0
     assert "the stiffness at an error of 1 rad" in column.origins["FL_hip_joint"].reason
     held = abs(facts.stance.torques["FL_thigh_joint"])
-    weak = derive_effort(facts, gains(facts, stiffness=0.1), twins)
+    weak = effort_column(facts, gains(facts, stiffness=0.1), twins)
     assert weak.values["FL_thigh_joint"] == pytest.approx(2 * held, rel=0.01)
     assert "2 times the holding torque" in weak.origins["FL_thigh_joint"].reason
-    speeds = derive_velocity(facts, twins)
+    speeds = velocity_column(facts, twins)
     assert speeds.values["FL_hip_joint"] == 20.0
     assert speeds.origins["FL_hip_joint"].origin == "suggested"
 
 
 def test_derive_armature_from_file_or_gains(bundled, gains):
     urdf, mjcf = bundled("quadruped.urdf"), bundled("quadruped.xml")
-    assert set(derive_armature(urdf, gains(urdf)).values.values()) == {0.0}
-    needed = derive_armature(urdf, gains(urdf, armature=0.01))
+    assert set(armature_column(urdf, gains(urdf)).values.values()) == {0.0}
+    needed = armature_column(urdf, gains(urdf, armature=0.01))
     assert set(needed.values.values()) == {0.01}
     assert "required by the gains" in needed.origins["FL_hip_joint"].reason
     declared = {joint.name: joint.armature for joint in mjcf.actuated}
-    kept = derive_armature(mjcf, gains(mjcf))
+    kept = armature_column(mjcf, gains(mjcf))
     assert kept.values == pytest.approx(declared)
-    more = derive_armature(mjcf, gains(mjcf, armature=1.0))
+    more = armature_column(mjcf, gains(mjcf, armature=1.0))
     assert set(more.values.values()) == {1.0}
 
 
@@ -82,8 +82,8 @@ def test_derive_armature_from_file_or_gains(bundled, gains):
 def test_derive_action_scale_from_effort(bundled, gains, stiffness, scale, reason):
     facts = bundled("quadruped.urdf")
     gain, twins = gains(facts, stiffness=stiffness), facts.mirror_map
-    effort, velocity = derive_effort(facts, gain, twins), derive_velocity(facts, twins)
-    column = derive_action_scale(facts, gain, effort, velocity)
+    effort, velocity = effort_column(facts, gain, twins), velocity_column(facts, twins)
+    column = action_scale_column(facts, gain, effort, velocity)
     assert column.values["FL_hip_joint"] == pytest.approx(scale, rel=0.01)
     assert column.origins["FL_hip_joint"].reason == reason
 
@@ -93,7 +93,7 @@ def test_derive_action_scale_of_short_range(bundled, gains, tmp_path):
         bundled, tmp_path, limit='<limit lower="-0.1" upper="0.1" effort="23.7" velocity="30.1"/>'
     )
     gain, twins = gains(facts, stiffness=10.0), facts.mirror_map
-    effort, velocity = derive_effort(facts, gain, twins), derive_velocity(facts, twins)
-    column = derive_action_scale(facts, gain, effort, velocity)
+    effort, velocity = effort_column(facts, gain, twins), velocity_column(facts, twins)
+    column = action_scale_column(facts, gain, effort, velocity)
     assert column.values["FL_hip_joint"] == pytest.approx(0.05)
     assert column.origins["FL_hip_joint"].reason == "0.25 of the joint range"

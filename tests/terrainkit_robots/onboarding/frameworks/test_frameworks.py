@@ -155,7 +155,7 @@ def test_config_text_soft_limit_factor(robots):
 @pytest.mark.parametrize("framework", LEGGED)
 def test_legged_frameworks_reject_unactuated_joints(robots, framework):
     with pytest.raises(ConfigError, match=f"tail_joint of .* have no actuator, but {framework}"):
-        config_text(framework, robots.quadruped(), unactuated=["tail_joint"])
+        config_text(framework, robots.quadruped(), passive_joints=["tail_joint"])
 
 
 def test_robot_config_text_finds_unactuated_joints(robots, bundled_xml):

@@ -203,7 +203,7 @@ def test_isaaclab_config_of_wheels(load, modules, robots):
 
 def test_isaaclab_actions_exclude_unactuated_joints(load, modules, robots):
     spec = robots.quadruped()
-    task = load("isaaclab", spec, modules, unactuated=["tail_joint"]).rough_env_cfg()
+    task = load("isaaclab", spec, modules, passive_joints=["tail_joint"]).rough_env_cfg()
     assert tuple(task.actions.joint_pos.joint_names) == spec.joint_order
 
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from msgspec import Meta
 
-from terrainkit.annotations import (
+from terrainkit.errors import ConfigError
+from terrainkit.type_hint import (
     UNIQUE,
     Interval,
     PositiveFloat,
@@ -16,7 +17,6 @@ from terrainkit.annotations import (
     convert,
     describe,
 )
-from terrainkit.errors import ConfigError
 
 Mode = Literal["a", "b"]
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit_robots.rendering.child_process import Frame, RenderError, iterate_frames
+from terrainkit_robots.rendering.child_process import Frame, RenderError, stream_frames
 from terrainkit_robots.rendering.renderer import (
     VISIBLE_GROUPS,
     add_box,
@@ -57,7 +57,7 @@ def render_robot(file: Path, size: tuple[int, int] = DEFAULT_SIZE) -> dict[str, 
     """
     import cv2
 
-    frames = iterate_frames(partial(robot_frames, file.absolute(), size))
+    frames = stream_frames(partial(robot_frames, file.absolute(), size))
     return {
         name: cv2.imencode(".png", frame[:, :, ::-1])[1].tobytes()
         for name, frame in zip(VIEWS, frames, strict=True)

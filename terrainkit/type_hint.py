@@ -1,4 +1,4 @@
-"""Annotations that state the type and range of a value: conversion, and description in words."""
+"""Type hints that state the type and range of a value: conversion, and description in words."""
 
 import dataclasses
 import math
@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import Meta
 
 from terrainkit.errors import ConfigError
-from terrainkit.text import nearest, shorten
+from terrainkit.text import closest, truncate
 from terrainkit.toml_text import key_text
 
 NONE = "none"
@@ -36,8 +36,8 @@ _NAMES = {int: "an integer", float: "a number", str: "a string", bool: "true or 
 _LIMITS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 
 
-class Parsed(NamedTuple):
-    """The parts of an annotation."""
+class TypeHint(NamedTuple):
+    """The parts of a type hint."""
 
     kind: Any
     """The type, such as `float` or `tuple[float, float]`."""
@@ -55,12 +55,12 @@ class Parsed(NamedTuple):
     """Whether None is accepted."""
 
 
-def parse_annotation(annotation: Any) -> Parsed:
-    """Return the parts of an annotation, which may be in an `Annotated` and a union with None."""
-    parts, is_optional = (annotation,), False
-    if get_origin(annotation) in (typing.Union, types.UnionType):
-        parts = tuple(part for part in get_args(annotation) if part is not types.NoneType)
-        is_optional = types.NoneType in get_args(annotation)
+def parse_hint(hint: Any) -> TypeHint:
+    """Return the parts of a type hint, which may be in an `Annotated` and a union with None."""
+    parts, is_optional = (hint,), False
+    if get_origin(hint) in (typing.Union, types.UnionType):
+        parts = tuple(part for part in get_args(hint) if part is not types.NoneType)
+        is_optional = types.NoneType in get_args(hint)
     (kind,) = parts
     constraints: dict[str, Any] = {}
     if get_origin(kind) is Annotated:
@@ -69,7 +69,7 @@ def parse_annotation(annotation: Any) -> Parsed:
             constraints |= {n: v for n in names if (v := getattr(meta, n)) is not None}
             constraints |= meta.extra or {}
         kind = kind.__origin__
-    return Parsed(kind, get_origin(kind), get_args(kind), constraints, is_optional)
+    return TypeHint(kind, get_origin(kind), get_args(kind), constraints, is_optional)
 
 
 def is_table(kind: Any) -> bool:
@@ -77,7 +77,7 @@ def is_table(kind: Any) -> bool:
     return isinstance(kind, type) and dataclasses.is_dataclass(kind)
 
 
-def convert(name: str, value: object, annotation: Any) -> Any:
+def convert(name: str, value: object, hint: Any) -> Any:
     """Return `value` as the annotated type: 8 as 8.0 for a float, a list as a tuple.
 
     Nothing is guessed: a string is never a number, a boolean never an integer.
@@ -85,13 +85,13 @@ def convert(name: str, value: object, annotation: Any) -> Any:
     Args:
         name: Name of the value in the error message.
         value: A value from a caller or a file; numpy's scalars become Python's.
-        annotation: A type, with its range as in `Annotated[float, msgspec.Meta(ge=0)]`.
+        hint: A type, with its range as in `Annotated[float, msgspec.Meta(ge=0)]`.
 
     Raises:
         ConfigError: if the value has another type, is out of range or not finite.
     """
     value = _to_python(value)
-    kind, origin, args, constraints, is_optional = parse_annotation(annotation)
+    kind, origin, args, constraints, is_optional = parse_hint(hint)
     if value is None and is_optional:
         return None
     if origin is Mapping and isinstance(value, Mapping):
@@ -105,14 +105,14 @@ def convert(name: str, value: object, annotation: Any) -> Any:
         return value
     if not is_table(kind) and not isinstance(value, Mapping) and _is_valid(value, constraints):
         try:
-            return msgspec.convert(value, annotation)
+            return msgspec.convert(value, hint)
         except (msgspec.ValidationError, UnicodeEncodeError):
             pass
-    near = nearest(str(value), map(str, args)) if origin is Literal else ""
-    hint = f"; did you mean {near!r}?" if near else ""
+    near = closest(str(value), map(str, args)) if origin is Literal else ""
+    suggestion = f"; did you mean {near!r}?" if near else ""
     if isinstance(value, Mapping) and "." in name:
-        hint += " (a key with a dot needs quotes)"
-    raise ConfigError(f"{name}: got {show(value)}; expected {describe(annotation)}{hint}")
+        suggestion += " (a key with a dot needs quotes)"
+    raise ConfigError(f"{name}: got {show(value)}; expected {describe(hint)}{suggestion}")
 
 
 def _to_python(value: Any) -> Any:
@@ -139,15 +139,15 @@ def show(value: object) -> str:
     if isinstance(value, int) and abs(value) >= _MAX_INT:  # Python does not print 5000 digits
         return "an integer beyond 64 bits"
     if isinstance(value, tuple):
-        return shorten(f"[{', '.join(map(show, value))}]")
+        return truncate(f"[{', '.join(map(show, value))}]")
     if isinstance(value, Mapping):
         return "a table"
-    return type(value).__name__ if is_table(type(value)) else shorten(repr(value))
+    return type(value).__name__ if is_table(type(value)) else truncate(repr(value))
 
 
-def describe(annotation: Any) -> str:
-    """Return in words what an annotation accepts, such as `an integer from 1 to 10`."""
-    kind, origin, args, constraints, is_optional = parse_annotation(annotation)
+def describe(hint: Any) -> str:
+    """Return in words what a type hint accepts, such as `an integer from 1 to 10`."""
+    kind, origin, args, constraints, is_optional = parse_hint(hint)
     if "description" in constraints:
         text = str(constraints["description"])
     elif origin is Literal:
@@ -163,7 +163,7 @@ def describe(annotation: Any) -> str:
     elif is_table(kind):
         text = f"a table ({kind.__name__})"
     else:
-        text = _NAMES.get(kind, f"a {kind.__name__}")
+        text = _NAMES.get(kind, f"a {kind.__name__.lower()}")
     limits = {name: _number(value) for name, value in constraints.items() if name in _LIMITS}
     if {"ge", "le"} <= set(limits):
         text += f" from {limits['ge']} to {limits['le']}"
