@@ -118,7 +118,7 @@ def pick_thigh(robot: Mutant, primitive: bool | None) -> tuple[str, np.ndarray]:
         and _is_leg(b.name)
         and primitive in (None, _is_primitive(b))
     )
-    pose = robot.facts.zero_poses[thigh.index]
+    pose = thigh.zero_pose
     middle = (pose @ thigh.collisions[0].pose)[:3, 3]
     return thigh.name, 0.8 * pose[:3, 3] + 0.2 * middle
 
@@ -152,9 +152,8 @@ def _add_sphere_to_leg(robot: Mutant, primitive: bool) -> Subjects:
     other = robot.pick(
         b for b in firsts if b is not one and b.collisions and _is_primitive(b) is primitive
     )
-    poses = robot.facts.zero_poses
-    middle = (poses[other.index] @ other.collisions[0].pose)[:, 3]
-    position = np.linalg.inv(poses[one.index]) @ middle
+    middle = (other.zero_pose @ other.collisions[0].pose)[:, 3]
+    position = np.linalg.inv(one.zero_pose) @ middle
     _add_shape(robot, one.top.name, '<sphere radius="0.05"/>', position[:3])
     return [*robot.body_names(one.name), *robot.body_names(other.name)]
 
@@ -177,7 +176,7 @@ def overlap_in_range(robot: Mutant) -> Subjects:
     bodies = robot.facts.bodies
     calf = robot.facts.body_of[child(robot.pick(robot.knee_joints()))]
     thigh = bodies[calf.parent]
-    hip, knee = (robot.facts.zero_poses[body.index][:3, 3] for body in (thigh, calf))
+    hip, knee = (body.zero_pose[:3, 3] for body in (thigh, calf))
     length = float(np.linalg.norm(knee - hip))
     trunk = robot.base_link().get("name")
     home = np.linalg.inv(robot.link_pose(trunk))

@@ -141,7 +141,7 @@ class Mutant:
             body = self.facts.body_of[child(joint)]
             while below := [b for b in self.facts.bodies if b.parent == body.index]:
                 body = below[0]
-            pose = self.facts.zero_poses[body.index]
+            pose = body.zero_pose
             shapes = [(float((pose @ s.pose)[2, 3]), s.link) for s in body.collisions]
             if len(body.links) == 1:
                 feet.append(body.links[-1].name)
@@ -159,7 +159,7 @@ class Mutant:
         """Return the pose of a link in the trunk frame, all joints at 0, shape (4, 4) [m]."""
         body = self.facts.body_of[link]
         names = [part.name for part in body.links]
-        pose: np.ndarray = self.facts.zero_poses[body.index] @ body.poses[names.index(link)]
+        pose: np.ndarray = body.zero_pose @ body.poses[names.index(link)]
         return pose
 
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.bodies.bodies import Body, merge_bodies, physical_parent
 from terrainkit_robots.analysis.bodies.bounds import BodyBounds
-from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.bodies.overlap import OverlapScene
 from terrainkit_robots.analysis.bodies.tree import Tree, build_tree
 from terrainkit_robots.analysis.inertia.repair import InertiaRepair
@@ -124,14 +123,9 @@ class Facts:
         return sum(body.mass for body in self.bodies)
 
     @cached_property
-    def zero_poses(self) -> tuple[Matrix, ...]:
-        """Poses of the bodies in the frame of the trunk, all joints at 0, each (4, 4) [m]."""
-        return tuple(body_poses(self.bodies, {}))
-
-    @cached_property
     def body_bounds(self) -> BodyBounds:
         """Bounding boxes of the bodies."""
-        return BodyBounds(self.bodies, self.zero_poses, self.meshes)
+        return BodyBounds(self.bodies, self.meshes)
 
     @cached_property
     def overlap_scene(self) -> OverlapScene:
@@ -141,9 +135,7 @@ class Facts:
     @cached_property
     def inertia_repair(self) -> InertiaRepair:
         """The fixes of inertias."""
-        return InertiaRepair(
-            bodies=self.bodies, zero_poses=self.zero_poses, mirror=self.mirror, meshes=self.meshes
-        )
+        return InertiaRepair(bodies=self.bodies, mirror=self.mirror, meshes=self.meshes)
 
     def physical_parent(self, body: Body) -> Body | None:
         """Return the nearest ancestor of a body that is not virtual."""
@@ -164,12 +156,12 @@ class Facts:
         """Chains from the trunk to each leaf with at least two actuated joints."""
         has_tendons = any(not actuator.joint for actuator in self.model.actuators)
         actuated = self.joints if has_tendons else self.actuated
-        return detect_limbs(self.tree, self.bodies, actuated, self.zero_poses, self.meshes)
+        return detect_limbs(self.tree, self.bodies, actuated, self.meshes)
 
     @cached_property
     def legs(self) -> tuple[Leg, ...]:
         """The limbs that the robot stands on. Empty for an arm, a drone or a car."""
-        return detect_legs(self.limbs, self.bodies, self.zero_poses)
+        return detect_legs(self.limbs, self.bodies)
 
     @cached_property
     def leg_bodies(self) -> frozenset[int]:
@@ -189,7 +181,6 @@ class Facts:
             joints=self.joints,
             legs=self.legs,
             mirror=self.mirror,
-            zero_poses=self.zero_poses,
             keyframe=self.model.home,
             meshes=self.meshes,
         )
@@ -221,17 +212,17 @@ class Facts:
     @cached_property
     def mirror(self) -> Mirror:
         """The mirror plane, and the pairs of mirrored bodies."""
-        return detect_mirror(self.legs, self.bodies, self.zero_poses)
+        return detect_mirror(self.legs, self.bodies)
 
     @cached_property
     def mirror_map(self) -> "Mapping[str, MirrorJoint]":
         """The mirrored joint of each actuated joint that has one, by name."""
-        return mirror_map(self.bodies, self.actuated, self.mirror, self.zero_poses)
+        return mirror_map(self.bodies, self.actuated, self.mirror)
 
     @cached_property
     def mirror_pairs(self) -> tuple[MirrorPair, ...]:
         """The pairs of mirrored joints, parents first."""
-        return mirror_pairs(self.bodies, self.zero_poses, self.mirror, self.leg_bodies)
+        return mirror_pairs(self.bodies, self.mirror, self.leg_bodies)
 
     def outlier_first(
         self, left: MirrorSide, right: MirrorSide, value: Callable[[Body], Matrix | None]

@@ -108,9 +108,7 @@ def reference_kinematics(source: "Facts", written: "Facts") -> ReferenceKinemati
     }
     inertias = {
         body.joint.name: inertia
-        for body, inertia in zip(
-            source.bodies, composite_inertias(source.bodies, source.zero_poses), strict=True
-        )
+        for body, inertia in zip(source.bodies, composite_inertias(source.bodies), strict=True)
         if body.joint is not None and math.isfinite(inertia) and inertia > 0
     }
     positions = _random_positions(written)

@@ -54,7 +54,6 @@ def test_facts_of_small_robot():
         "c": 1,
         "d": 2,
     }
-    assert len(robot.zero_poses) == 3
     assert robot.limbs == robot.legs == ()
     assert robot.stance is None
     assert robot.positions["bc"] == 0.2
@@ -65,7 +64,7 @@ def test_facts_of_empty_robot():
     assert robot.bodies == robot.links == robot.joints == robot.actuated == ()
     assert robot.body_of == robot.positions == {}
     assert robot.total_mass == 0
-    assert robot.zero_poses == robot.limbs == robot.legs == robot.mirror.pairs == ()
+    assert robot.limbs == robot.legs == robot.mirror.pairs == ()
     assert robot.stance is None
     assert robot.overlap_scene.detect({}) == []
 
@@ -81,7 +80,6 @@ def test_facts_are_cached():
     for name in (
         "tree",
         "bodies",
-        "zero_poses",
         "limbs",
         "legs",
         "mirror",
@@ -153,7 +151,6 @@ def test_facts_open_no_mesh_early(robot_file):
     robot = Facts(load_robot(robot_file("g1/g1_29dof.urdf")), meshes)
     assert len(robot.bodies) == 30
     assert robot.total_mass > 30
-    assert len(robot.zero_poses) == 30
     assert not meshes.opened
 
 

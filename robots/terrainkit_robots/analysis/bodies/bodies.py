@@ -10,10 +10,11 @@ from functools import cached_property
 
 import numpy as np
 
+from terrainkit_robots.analysis.bodies.kinematics import BodyFrame, body_poses
 from terrainkit_robots.analysis.bodies.tree import Tree
 from terrainkit_robots.analysis.inertia.merged_inertia import parallel_axis
 from terrainkit_robots.analysis.inertia.physical import MAX_INERTIA
-from terrainkit_robots.description.model import Geometry, Joint, Link
+from terrainkit_robots.description.model import Geometry, Link
 from terrainkit_robots.transforms import Matrix
 
 
@@ -30,20 +31,14 @@ class BodyShape:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Body:
+class Body(BodyFrame):
     """Links that move as one. The frame of a body is the frame of its top link."""
 
     index: int
-    """Index in the list of bodies. A parent comes before its children."""
+    """Index in the list of bodies."""
 
-    parent: int | None
-    """Index of the parent. None for the trunk."""
-
-    joint: Joint | None
-    """The joint that connects it to its parent. None for the trunk."""
-
-    origin: Matrix
-    """Pose in the frame of the parent at the reference position of the joint, shape (4, 4) [m]."""
+    zero_pose: Matrix
+    """Pose in the frame of the trunk, all joints at 0, shape (4, 4) [m]."""
 
     links: tuple[Link, ...]
     """Its links, the top link first."""
@@ -145,31 +140,34 @@ def merge_bodies(tree: Tree) -> tuple[Body, ...]:
     has_world = is_empty and len(joints) == 1 and joints[0].kind == "floating"
     order = tree.order[1:] if has_world else tree.order
     index_of: dict[str, int] = {order[0]: 0}
-    frames: list[dict[str, Matrix]] = [{order[0]: np.eye(4)}]
-    edges: list[tuple[int | None, Joint | None, Matrix]] = [(None, None, np.eye(4))]
+    link_poses: list[dict[str, Matrix]] = [{order[0]: np.eye(4)}]
+    body_frames = [BodyFrame(parent=None, joint=None, origin=np.eye(4))]
     for name in order[1:]:
         joint = tree.parent_joint[name]
         if joint.parent not in index_of:
             continue  # a sibling of the base below a world link
         parent = index_of[joint.parent]
-        origin = frames[parent][joint.parent] @ joint.origin
+        origin = link_poses[parent][joint.parent] @ joint.origin
         if joint.moves or joint.kind in ("floating", "planar", "ball"):
-            index_of[name] = len(edges)
-            edges.append((parent, joint, origin))
-            frames.append({name: np.eye(4)})
+            index_of[name] = len(body_frames)
+            body_frames.append(BodyFrame(parent=parent, joint=joint, origin=origin))
+            link_poses.append({name: np.eye(4)})
         else:
             index_of[name] = parent
-            frames[parent][name] = origin
+            link_poses[parent][name] = origin
     return tuple(
         Body(
             index=index,
-            parent=parent,
-            joint=joint,
-            origin=origin,
-            links=tuple(tree.links[name] for name in frames[index]),
-            poses=tuple(frames[index].values()),
+            parent=frame.parent,
+            joint=frame.joint,
+            origin=frame.origin,
+            zero_pose=zero_pose,
+            links=tuple(tree.links[name] for name in poses),
+            poses=tuple(poses.values()),
         )
-        for index, (parent, joint, origin) in enumerate(edges)
+        for index, (frame, zero_pose, poses) in enumerate(
+            zip(body_frames, body_poses(body_frames, {}), link_poses, strict=True)
+        )
     )
 
 

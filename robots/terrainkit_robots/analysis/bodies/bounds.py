@@ -29,9 +29,7 @@ class BodyBounds:
     Each box is in the frame of its body and has shape (2, 3): lower and upper corner [m].
     """
 
-    def __init__(
-        self, bodies: Sequence[Body], zero_poses: Sequence[Matrix], meshes: Meshes
-    ) -> None:
+    def __init__(self, bodies: Sequence[Body], meshes: Meshes) -> None:
         self._meshes = meshes
         self._frames: list[list[Matrix]] = [[pose[:3, 3] for pose in body.poses] for body in bodies]
         for body in bodies:
@@ -39,7 +37,7 @@ class BodyBounds:
                 anchor = np.zeros(3) if body.joint is None else body.joint.anchor
                 point = body.origin[:3, :3] @ anchor + body.origin[:3, 3]
                 self._frames[body.parent].append(point)
-        origins = np.array([pose[:3, 3] for pose in zero_poses]).reshape(-1, 3)
+        origins = np.array([body.zero_pose[:3, 3] for body in bodies]).reshape(-1, 3)
         self._primitive_boxes: dict[int, Matrix | None] = {}
         self.robot_size: float = (
             float(np.linalg.norm(np.ptp(origins, axis=0))) if len(origins) else 0.0

@@ -5,16 +5,31 @@ tests compare it with MuJoCo and yourdfpy.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.mimic_joints import mimic_positions
+from terrainkit_robots.description.model import Joint
 from terrainkit_robots.transforms import Matrix, axis_angle_to_matrix
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BodyFrame:
+    """The frame of a body, and the joint that moves it."""
+
+    parent: int | None
+    """Index of the parent, which comes before its children. None for the trunk."""
+
+    joint: Joint | None
+    """The joint that connects it to its parent. None for the trunk."""
+
+    origin: Matrix
+    """Pose in the frame of the parent at the reference position of the joint, shape (4, 4) [m]."""
+
+
 def body_poses(
-    bodies: Sequence[Body], positions: Mapping[str, float] | Mapping[str, Matrix]
+    bodies: Sequence[BodyFrame], positions: Mapping[str, float] | Mapping[str, Matrix]
 ) -> list[Matrix]:
     """Return the pose of each body in the frame of the trunk, shape (..., 4, 4) [m].
 
@@ -41,7 +56,7 @@ def body_poses(
     return poses
 
 
-def joint_motion(body: Body, position: Matrix | np.float64) -> Matrix:
+def joint_motion(body: BodyFrame, position: Matrix | np.float64) -> Matrix:
     """Return the motion of a body by its joint.
 
     Args:
@@ -63,7 +78,7 @@ def joint_motion(body: Body, position: Matrix | np.float64) -> Matrix:
     return motion
 
 
-def joint_axis(body: Body, pose: Matrix) -> tuple[Matrix, Matrix]:
+def joint_axis(body: BodyFrame, pose: Matrix) -> tuple[Matrix, Matrix]:
     """Return the axis of a body's joint in the frame of the trunk.
 
     Args:
@@ -77,7 +92,7 @@ def joint_axis(body: Body, pose: Matrix) -> tuple[Matrix, Matrix]:
     return pose[:3, :3] @ body.joint.anchor + pose[:3, 3], pose[:3, :3] @ body.joint.direction
 
 
-def ancestors(bodies: Sequence[Body], index: int) -> list[int]:
+def ancestors(bodies: Sequence[BodyFrame], index: int) -> list[int]:
     """Return the indices of the bodies from below the trunk down to `index`."""
     chain = []
     current: int | None = index

@@ -7,24 +7,23 @@ import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.inertia.merged_inertia import parallel_axis
-from terrainkit_robots.transforms import Matrix
 
 
-def composite_inertias(bodies: Sequence[Body], zero_poses: Sequence[Matrix]) -> list[float]:
+def composite_inertias(bodies: Sequence[Body]) -> list[float]:
     """Return the diagonal of the mass matrix, all joints at 0.
 
     Args:
         bodies: The bodies, parents first.
-        zero_poses: Their poses in the frame of the trunk, all joints at 0, each (4, 4) [m].
 
     Returns:
         For each body the inertia of it and all bodies below it about the axis of its joint
         [kg m2], or their mass [kg] for a prismatic joint. NaN for a body without a moving joint.
     """
     masses = [body.mass for body in bodies]
-    firsts: list[Matrix] = []
-    seconds: list[Matrix] = []
-    for body, pose in zip(bodies, zero_poses, strict=True):
+    firsts = []
+    seconds = []
+    for body in bodies:
+        pose = body.zero_pose
         rotation, center = pose[:3, :3], pose[:3, :3] @ body.center + pose[:3, 3]
         firsts.append(body.mass * center)
         seconds.append(rotation @ body.inertia @ rotation.T + parallel_axis(body.mass, center))
@@ -32,7 +31,7 @@ def composite_inertias(bodies: Sequence[Body], zero_poses: Sequence[Matrix]) -> 
     for body in reversed(bodies):  # children before their parents
         index, joint = body.index, body.joint
         if joint is not None and joint.moves:
-            pose = zero_poses[index]
+            pose = body.zero_pose
             axis, point = pose[:3, :3] @ joint.direction, pose[:3, :3] @ joint.anchor + pose[:3, 3]
             mass, first, second = masses[index], firsts[index], seconds[index]
             # Shifted from the origin of the trunk to the axis, neither of which is the center of

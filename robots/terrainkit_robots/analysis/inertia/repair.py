@@ -33,9 +33,6 @@ class InertiaRepair:
     """Fixes of invalid inertias, from the mirrored link, the inertia itself or the shapes."""
 
     bodies: Sequence[Body]
-    zero_poses: Sequence[Matrix]
-    """Poses of the bodies in the frame of the trunk, all joints at 0, each (4, 4) [m]."""
-
     mirror: Mirror
     meshes: Meshes
 
@@ -99,7 +96,7 @@ class InertiaRepair:
         """Return the axes of a link's inertial frame in the frame of the trunk, shape (3, 3)."""
         body, index = self._location[link.name]
         assert link.inertial is not None
-        pose = self.zero_poses[body.index] @ body.poses[index] @ link.inertial.origin
+        pose = body.zero_pose @ body.poses[index] @ link.inertial.origin
         return np.asarray(pose[:3, :3])
 
     def _nearest(self, link: Link, inertia: Matrix) -> Matrix | None:

@@ -8,7 +8,6 @@ from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.analysis.symmetry.mirror import Mirror
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.mesh.mesh_cache import Meshes
-from terrainkit_robots.transforms import Matrix
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -24,9 +23,6 @@ class LegModel:
     legs: Sequence[Leg]
 
     mirror: Mirror
-
-    zero_poses: Sequence[Matrix]
-    """Poses of the bodies in the frame of the trunk, all joints at 0, each (4, 4) [m]."""
 
     keyframe: Mapping[str, float]
     """Joint positions [rad] or [m] of the first keyframe, by name. Empty without one."""

@@ -58,15 +58,12 @@ class Leg:
         return next((j for j, r in zip(self.joints, self.roles, strict=True) if r == role), None)
 
 
-def detect_legs(
-    limbs: Sequence[Limb], bodies: Sequence[Body], zero_poses: Sequence[Matrix]
-) -> tuple[Leg, ...]:
+def detect_legs(limbs: Sequence[Limb], bodies: Sequence[Body]) -> tuple[Leg, ...]:
     """Return the legs of a robot in the order of its bodies.
 
     Args:
         limbs: The limbs of the robot.
         bodies: The bodies, parents first.
-        zero_poses: Their poses in the frame of the trunk, all joints at 0, each (4, 4) [m].
     """
     candidates = sorted(
         (limb for limb in limbs if limb.score >= _MIN_LEG_SCORE),
@@ -75,24 +72,20 @@ def detect_legs(
     if not candidates:
         return ()
     kept: list[Limb] = []
-    size = float(np.linalg.norm(np.ptp([pose[:3, 3] for pose in zero_poses], axis=0)))
+    size = float(np.linalg.norm(np.ptp([body.zero_pose[:3, 3] for body in bodies], axis=0)))
     for limb in candidates:
         if not any(is_branch(limb, other, size) for other in kept):
             kept.append(limb)
     kept.sort(key=lambda limb: limb.chain)
     uses = Counter(index for limb in kept for index in limb.chain)
-    return tuple(
-        _make_leg(limb, bodies, zero_poses, [uses[i] > 1 for i in limb.chain]) for limb in kept
-    )
+    return tuple(_make_leg(limb, bodies, [uses[i] > 1 for i in limb.chain]) for limb in kept)
 
 
-def _make_leg(
-    limb: Limb, bodies: Sequence[Body], zero_poses: Sequence[Matrix], shared: Sequence[bool]
-) -> Leg:
+def _make_leg(limb: Limb, bodies: Sequence[Body], shared: Sequence[bool]) -> Leg:
     moving = [i for i in limb.chain if (j := bodies[i].joint) is not None and j.moves]
     waist = sum(s for s, i in zip(shared, limb.chain, strict=True) if i in moving)
     axes = [
-        None if joint.kind == "prismatic" else joint_axis(bodies[i], zero_poses[i])[1]
+        None if joint.kind == "prismatic" else joint_axis(bodies[i], bodies[i].zero_pose)[1]
         for joint, i in zip(limb.joints[waist:], moving[waist:], strict=True)
     ]
     points = limb.points[waist:]
@@ -101,7 +94,7 @@ def _make_leg(
     path = [_project(points[k], pitch) for k in bending] + [_project(limb.tip, pitch)]
     return Leg(
         limb=limb,
-        foot=_foot_link(limb, bodies, zero_poses),
+        foot=_foot_link(limb, bodies),
         roles=(*[_WAIST] * waist, *_roles(axes, bending, path)),
         pitch=pitch,
         length=float(sum(np.linalg.norm(b - a) for a, b in itertools.pairwise(path))),
@@ -160,13 +153,13 @@ def _roles(
     return tuple(role(k) for k in range(len(axes)))
 
 
-def _foot_link(limb: Limb, bodies: Sequence[Body], zero_poses: Sequence[Matrix]) -> str:
+def _foot_link(limb: Limb, bodies: Sequence[Body]) -> str:
     """Return the link at the tip that is named a foot, or else has the lowest shape.
 
     A frame without shapes, such as that of a sensor in the sole, is the last choice.
     """
     body = bodies[limb.chain[-1]]
-    pose = zero_poses[body.index]
+    pose = body.zero_pose
     distance = float(np.linalg.norm(limb.tip - pose[:3, 3]))
     near = [
         link

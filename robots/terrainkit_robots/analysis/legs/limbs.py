@@ -86,7 +86,6 @@ def detect_limbs(
     tree: Tree,
     bodies: Sequence[Body],
     actuated: Sequence[Joint],
-    zero_poses: Sequence[Matrix],
     meshes: Meshes,
 ) -> tuple[Limb, ...]:
     """Return the limbs of a robot in the order of its bodies.
@@ -95,20 +94,19 @@ def detect_limbs(
         tree: The tree of links.
         bodies: The bodies, parents first.
         actuated: Joints that an actuator moves, directly or perhaps through a tendon.
-        zero_poses: Poses of the bodies in the frame of the trunk, all joints at 0, each (4, 4) [m].
         meshes: Mesh files.
     """
-    leaves = _leaves(bodies, actuated, zero_poses, meshes)
+    leaves = _leaves(bodies, actuated, meshes)
     if not leaves:
         return ()
-    lower, upper = _robot_bounds(bodies, zero_poses, meshes)
+    lower, upper = _robot_bounds(bodies, meshes)
     ground = min(float(leaf.tip[2]) for leaf in leaves)
     height = max(float(upper[2]) - min(float(lower[2]), ground), 1e-6)
     size = max(float(np.linalg.norm(upper - lower)), 1e-6)
     in_limbs = {index for leaf in leaves for index in leaf.chain}
     rest = min(  # the lowest point outside of the limbs, such as a pedestal or wheels
         (
-            min_height(shape, zero_poses[body.index], meshes)
+            min_height(shape, body.zero_pose, meshes)
             for body in bodies
             if body.index not in in_limbs
             for shape in body.collisions
@@ -161,7 +159,6 @@ def _length(limb: Chain, start: int) -> float:
 def _leaves(
     bodies: Sequence[Body],
     actuated: Sequence[Joint],
-    zero_poses: Sequence[Matrix],
     meshes: Meshes,
 ) -> list[Chain]:
     parents = {body.parent for body in bodies}
@@ -177,8 +174,8 @@ def _leaves(
         bending = joints[:-1] if joints and _is_continuous_wheel(bodies[moving[-1]]) else joints
         driven = sum(id(joint) in actuated_ids for joint in bending)
         if len(joints) <= _MAX_JOINTS and driven >= 2:
-            tip = contact_points(body, zero_poses[body.index], meshes).mean(axis=0)
-            points = [joint_axis(bodies[i], zero_poses[i])[0] for i in moving]
+            tip = contact_points(body, body.zero_pose, meshes).mean(axis=0)
+            points = [joint_axis(bodies[i], bodies[i].zero_pose)[0] for i in moving]
             leaves.append(
                 Chain(chain=tuple(chain), joints=tuple(joints), points=np.array(points), tip=tip)
             )
@@ -197,12 +194,11 @@ def _is_continuous_wheel(body: Body) -> bool:
     return body.mass <= 0 or offset <= _MAX_WHEEL_OFFSET * float(np.sqrt(moment / body.mass))
 
 
-def _robot_bounds(
-    bodies: Sequence[Body], zero_poses: Sequence[Matrix], meshes: Meshes
-) -> tuple[Matrix, Matrix]:
+def _robot_bounds(bodies: Sequence[Body], meshes: Meshes) -> tuple[Matrix, Matrix]:
     """Return the lower and upper corner of the bounding box of the robot at zero."""
-    corners = [pose[:3, 3] for pose in zero_poses]
-    for body, pose in zip(bodies, zero_poses, strict=True):
+    corners = [body.zero_pose[:3, 3] for body in bodies]
+    for body in bodies:
+        pose = body.zero_pose
         box = bounds(body.collisions, meshes)
         if box is not None:
             grid = np.array([[x, y, z] for x in box[:, 0] for y in box[:, 1] for z in box[:, 2]])

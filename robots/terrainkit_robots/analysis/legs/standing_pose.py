@@ -290,8 +290,8 @@ def _make_objective(
     leaf = chain[-1]
     poses = body_poses(robot.bodies, positions)
     if ankles:
-        angle = flat_foot_angle(leaf, robot.zero_poses[leaf.index], leg.pitch, robot.meshes)
-        foot = robot.zero_poses[leaf.index].copy()
+        angle = flat_foot_angle(leaf, leaf.zero_pose, leg.pitch, robot.meshes)
+        foot = leaf.zero_pose.copy()
         foot[:3, :3] = axis_angle_to_matrix(leg.pitch, np.float64(angle)) @ foot[:3, :3]
     else:
         angle, foot = 0.0, poses[leaf.index]  # the contact of a ball depends on the pose
@@ -337,9 +337,9 @@ def _level_coefficients(
     The rotations of all joints that bend the leg then add up to `angle`.
     """
     signs = {
-        joint.name: float(np.sign(joint_axis(robot.bodies[i], robot.zero_poses[i])[1] @ leg.pitch))
-        for i in leg.limb.chain
-        if (joint := robot.bodies[i].joint) is not None and joint.moves
+        joint.name: float(np.sign(joint_axis(body, body.zero_pose)[1] @ leg.pitch))
+        for body in (robot.bodies[i] for i in leg.limb.chain)
+        if (joint := body.joint) is not None and joint.moves
     }
     roles = [(j.name, role) for j, role in zip(leg.joints, leg.roles, strict=True)]
     bending = {name for name, role in roles if role in _BENDING_ROLES}

@@ -69,20 +69,17 @@ class ScaleMismatch:
 class MeshScales:
     """The lengths of a robot that meshes are compared with."""
 
-    def __init__(
-        self, tree: Tree, bodies: Sequence[Body], zero_poses: Sequence[Matrix], meshes: Meshes
-    ) -> None:
+    def __init__(self, tree: Tree, bodies: Sequence[Body], meshes: Meshes) -> None:
         """Measure a robot.
 
         Args:
             tree: The tree of links.
             bodies: The bodies, the trunk first.
-            zero_poses: Their poses in the frame of the trunk, all joints at 0, each (4, 4) [m].
             meshes: Mesh files.
         """
         self._tree, self._meshes = tree, meshes
         self._trunk_links = {link.name for link in bodies[0].links} if bodies else set()
-        points = np.array([np.zeros(3), *(pose[:3, 3] for pose in zero_poses)])
+        points = np.array([np.zeros(3), *(body.zero_pose[:3, 3] for body in bodies)])
         is_valid = (np.abs(points) < _MAX_LENGTH).all()
         self.robot_size = _length(np.ptp(points, axis=0)) if is_valid else 0.0
         """Diagonal of the bounding box of all joints, all joints at 0 [m]. 0 if it is invalid."""

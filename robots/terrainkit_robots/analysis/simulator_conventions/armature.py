@@ -13,7 +13,6 @@ import numpy as np
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.inertia.composite_inertia import composite_inertias
 from terrainkit_robots.description.model import Joint
-from terrainkit_robots.transforms import Matrix
 
 GENESIS_ARMATURE = 0.1
 """`default_armature` of the morphs URDF, MJCF and Drone in genesis-world 1.4.5 [kg m2] or [kg]."""
@@ -31,11 +30,11 @@ class JointInertia:
 
 
 def inertias_without_armature(
-    bodies: Sequence[Body], actuated: Sequence[Joint], zero_poses: Sequence[Matrix]
+    bodies: Sequence[Body], actuated: Sequence[Joint]
 ) -> tuple[JointInertia, ...]:
     """Return the inertia of each actuated joint without armature, if it is positive and finite."""
     with np.errstate(all="ignore"):
-        inertias = composite_inertias(bodies, zero_poses)
+        inertias = composite_inertias(bodies)
     actuated_set = set(actuated)
     return tuple(
         JointInertia(joint=body.joint, inertia=inertias[body.index])

@@ -168,16 +168,14 @@ class FlippedJoint:
     """Axis of the same joint of another leg."""
 
 
-def find_flipped_joints(
-    legs: Sequence[Leg], bodies: Sequence[Body], zero_poses: Sequence[Matrix]
-) -> Iterator[FlippedJoint]:
+def find_flipped_joints(legs: Sequence[Leg], bodies: Sequence[Body]) -> Iterator[FlippedJoint]:
     """Yield the joints of legs whose axes are opposite to those of all other legs."""
     lengths = {len(leg.limb.chain) for leg in legs}
     if len(legs) < _MIN_LEGS or len(lengths) != 1:
         return
     for indices in zip(*(leg.limb.chain for leg in legs), strict=True):
         joints = [bodies[i].joint for i in indices]
-        axes = [joint_axis(bodies[i], zero_poses[i])[1] for i in indices]
+        axes = [joint_axis(bodies[i], bodies[i].zero_pose)[1] for i in indices]
         cosines = [float(axis @ axes[0]) for axis in axes]
         if min(map(abs, cosines)) < _MIN_PARALLEL_COSINE:
             continue

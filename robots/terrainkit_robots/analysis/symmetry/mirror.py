@@ -109,20 +109,17 @@ class Mirror:
         return 0 if abs(cosine) < _MIN_ALIGNED_COSINE else 1 if cosine > 0 else -1
 
 
-def detect_mirror(
-    legs: Sequence[Leg], bodies: Sequence[Body], zero_poses: Sequence[Matrix]
-) -> Mirror:
+def detect_mirror(legs: Sequence[Leg], bodies: Sequence[Body]) -> Mirror:
     """Return the mirror plane of a robot, with pairs by position, and by name for the rest.
 
     Args:
         legs: The legs of the robot.
         bodies: The bodies, the trunk first.
-        zero_poses: Their poses in the frame of the trunk, all joints at 0, each (4, 4) [m].
     """
     normal = _plane_normal(legs)
     offset = _plane_offset(legs, bodies, normal)
     mirror = Mirror(normal=normal, pairs=(), offset=offset)
-    points = np.array([pose[:3, 3] - offset * normal for pose in zero_poses]).reshape(-1, 3)
+    points = np.array([body.zero_pose[:3, 3] - offset * normal for body in bodies]).reshape(-1, 3)
     size = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
     image_index: dict[int, int] = {}
     for candidates in (
@@ -136,7 +133,7 @@ def detect_mirror(
     for a, b in image_index.items():
         left, right = (a, b) if points[a] @ normal >= points[b] @ normal else (b, a)
         if (left, right) == (a, b):
-            sign = _pair_sign(mirror, bodies, zero_poses, left, right)
+            sign = _pair_sign(mirror, bodies[left], bodies[right])
             pairs.append(BodyPair(left=left, right=right, sign=sign))
     pairs.sort(key=lambda pair: pair.left)
     return Mirror(normal=normal, pairs=tuple(pairs), offset=offset)
@@ -232,13 +229,11 @@ def swap_sides(name: str) -> str:
     return _TOKEN.sub(swap, name)
 
 
-def _pair_sign(
-    mirror: Mirror, bodies: Sequence[Body], zero_poses: Sequence[Matrix], left: int, right: int
-) -> Sign:
+def _pair_sign(mirror: Mirror, left: Body, right: Body) -> Sign:
     """Return the sign of the joints of two bodies, 0 if they are not comparable."""
-    a, b = bodies[left].joint, bodies[right].joint
+    a, b = left.joint, right.joint
     if a is None or b is None or a.kind != b.kind or not a.moves:
         return 0
-    _, axis = joint_axis(bodies[left], zero_poses[left])
-    _, other = joint_axis(bodies[right], zero_poses[right])
+    _, axis = joint_axis(left, left.zero_pose)
+    _, other = joint_axis(right, right.zero_pose)
     return mirror.joint_sign(a, axis, other)

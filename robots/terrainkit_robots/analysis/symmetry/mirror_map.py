@@ -9,14 +9,12 @@ from terrainkit_robots.analysis.bodies.kinematics import joint_axis
 from terrainkit_robots.analysis.symmetry.mirror import MAX_MIRROR_ERROR, Mirror, Sign
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.spec.robot_spec import MirrorJoint
-from terrainkit_robots.transforms import Matrix
 
 
 def mirror_map(
     bodies: Sequence[Body],
     actuated: Sequence[Joint],
     mirror: Mirror,
-    zero_poses: Sequence[Matrix],
 ) -> dict[str, MirrorJoint]:
     """Return the mirrored joint of each actuated joint that has one, by name.
 
@@ -26,10 +24,9 @@ def mirror_map(
         bodies: The bodies, the trunk first.
         actuated: The actuated joints.
         mirror: The mirror plane.
-        zero_poses: Poses of the bodies in the frame of the trunk, all joints at 0, each (4, 4) [m].
     """
     names = {joint.name for joint in actuated}
-    points = np.array([pose[:3, 3] for pose in zero_poses]).reshape(-1, 3)
+    points = np.array([body.zero_pose[:3, 3] for body in bodies]).reshape(-1, 3)
     size = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
     tolerance = max(MAX_MIRROR_ERROR * size, 1e-3)
     found: dict[str, MirrorJoint] = {}
@@ -39,7 +36,7 @@ def mirror_map(
             continue
         image = mirror.image_body(body.index)
         if image is None:
-            sign = _self_sign(mirror, body, zero_poses[body.index], tolerance)
+            sign = _self_sign(mirror, body, tolerance)
             if sign:
                 found[joint.name] = MirrorJoint(joint=joint.name, sign=sign)
             continue
@@ -49,9 +46,10 @@ def mirror_map(
     return {joint.name: found[joint.name] for joint in actuated if joint.name in found}
 
 
-def _self_sign(mirror: Mirror, body: Body, pose: Matrix, tolerance: float) -> Sign:
+def _self_sign(mirror: Mirror, body: Body, tolerance: float) -> Sign:
     """Return how a joint in the mirror plane mirrors itself, 0 for a joint outside of the plane."""
     assert body.joint is not None
+    pose = body.zero_pose
     anchor, axis = joint_axis(body, pose)
     center = pose[:3, :3] @ body.center + pose[:3, 3]
     points = (anchor, pose[:3, 3], center)

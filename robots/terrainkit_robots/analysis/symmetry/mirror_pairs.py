@@ -54,7 +54,6 @@ class MirrorPair:
 
 def mirror_pairs(
     bodies: Sequence[Body],
-    zero_poses: Sequence[Matrix],
     mirror: Mirror,
     leg_bodies: Collection[int],
 ) -> tuple[MirrorPair, ...]:
@@ -65,15 +64,12 @@ def mirror_pairs(
 
     Args:
         bodies: The bodies, the trunk first.
-        zero_poses: Their poses in the frame of the trunk, all joints at 0, each (4, 4) [m].
         mirror: The mirror plane.
         leg_bodies: Indices of the bodies of legs.
     """
     found = []
     for pair in mirror.pairs:
-        left, right = (
-            _mirror_joint(bodies, zero_poses, mirror, index) for index in (pair.left, pair.right)
-        )
+        left, right = (_mirror_joint(bodies, mirror, index) for index in (pair.left, pair.right))
         if left is None or right is None:
             continue
         has_mirrored_names = (
@@ -85,14 +81,12 @@ def mirror_pairs(
     return tuple(found)
 
 
-def _mirror_joint(
-    bodies: Sequence[Body], zero_poses: Sequence[Matrix], mirror: Mirror, index: int
-) -> MirrorSide | None:
-    body, pose = bodies[index], zero_poses[index]
+def _mirror_joint(bodies: Sequence[Body], mirror: Mirror, index: int) -> MirrorSide | None:
+    body, pose = bodies[index], bodies[index].zero_pose
     if body.joint is None or body.parent is None:
         return None
-    parent, parent_pose = bodies[body.parent], zero_poses[body.parent]
-    origin = parent_pose[:3, 3] if parent.joint is None else joint_axis(parent, parent_pose)[0]
+    parent = bodies[body.parent]
+    origin = joint_axis(parent, parent.zero_pose)[0] if parent.joint else parent.zero_pose[:3, 3]
     if parent.index not in mirror.image_index:  # on the mirror plane
         origin = origin - (origin @ mirror.normal - mirror.offset) * mirror.normal
     point, axis = joint_axis(body, pose)

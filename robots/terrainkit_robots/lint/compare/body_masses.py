@@ -34,7 +34,7 @@ def body_difference(
     frames may be rotated relative to each other. The smaller difference is returned.
     """
     base_frames = [
-        trunk_pose_in_link(facts, base) @ facts.zero_poses[each.index]
+        trunk_pose_in_link(facts, base) @ each.zero_pose
         for facts, base, each in zip((robot, other), pairs.base, (body, other_body), strict=True)
     ]
     own_frames = [np.eye(4), np.eye(4)]

@@ -53,7 +53,7 @@ def trunk_pose_in_link(robot: Facts, link: str) -> Matrix:
     """Return the pose of the trunk in the frame of a link, all joints at 0, shape (4, 4) [m]."""
     body = robot.body_of[link]
     pose = next(p for part, p in zip(body.links, body.poses, strict=True) if part.name == link)
-    return invert_poses(robot.zero_poses[body.index] @ pose)
+    return invert_poses(body.zero_pose @ pose)
 
 
 def _by_name(robot: Facts) -> dict[str, Joint]:

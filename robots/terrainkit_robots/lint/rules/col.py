@@ -93,7 +93,7 @@ def _is_visual_only(leg: Leg, body: Body, robot: Facts) -> bool:
     link = robot.tree.links[leg.foot]
     if link is body.top or not link.visuals or link.collisions:
         return False
-    pose = robot.zero_poses[body.index]
+    pose = body.zero_pose
     position = (pose @ body.poses[body.links.index(link)])[:3, 3]
     floor = min(min_height(placed, pose, robot.meshes) for placed in body.collisions)
     return floor > float(position[2])
@@ -279,7 +279,7 @@ def foot_contacts_disabled(robot: Facts) -> Iterator[Violation]:
     """
     for leg in robot.legs:
         body = robot.bodies[leg.limb.chain[-1]]
-        pose, meshes = robot.zero_poses[body.index], robot.meshes
+        pose, meshes = body.zero_pose, robot.meshes
         disabled = [
             (min_height(placed, pose, meshes), placed)
             for placed in _disabled_shapes(body)

@@ -543,7 +543,7 @@ def wrong_scale(robot: Facts) -> Iterator[Violation]:
     Source:
         STL has no unit; URDF and MJCF use meters.
     """
-    scales = MeshScales(robot.tree, robot.bodies, robot.zero_poses, robot.meshes)
+    scales = MeshScales(robot.tree, robot.bodies, robot.meshes)
     files = meshes_by_file(robot.model, robot.meshes)
     if files and scales.robot_size <= 0:
         raise CannotCheckError("all joints have the same position, so the size is unknown")

@@ -145,7 +145,7 @@ def genesis_armature(robot: Facts) -> Iterator[Violation]:
         `default_armature` in genesis-world 1.4.5 is 0.1 unless MuJoCo compatibility is enabled. It
         is compared with the inertia about the joint axis of all links below, at joint positions 0.
     """
-    moved = inertias_without_armature(robot.bodies, robot.actuated, robot.zero_poses)
+    moved = inertias_without_armature(robot.bodies, robot.actuated)
     slowed = [each for each in moved if each.inertia < GENESIS_ARMATURE]
     if not slowed:
         return

@@ -436,7 +436,7 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
         if error.is_axis:
             yield _report_pair(robot, error)
     reported = {violation.subject for violation in zero_axis(robot)}
-    for found in find_flipped_joints(robot.legs, robot.bodies, robot.zero_poses):
+    for found in find_flipped_joints(robot.legs, robot.bodies):
         joint = found.joint
         if joint.name in reported:
             continue

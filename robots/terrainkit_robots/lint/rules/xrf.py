@@ -231,7 +231,7 @@ def _axis_in_link(link: str, robot: Facts, joint: Joint) -> Matrix:
     """Return the axis of a joint in the frame of a link, all joints at 0."""
     from terrainkit_robots.lint.compare.robot_pairs import trunk_pose_in_link
 
-    pose = trunk_pose_in_link(robot, link) @ robot.zero_poses[robot.body_of[joint.child].index]
+    pose = trunk_pose_in_link(robot, link) @ robot.body_of[joint.child].zero_pose
     return pose[:3, :3] @ joint.direction
 
 

@@ -41,6 +41,7 @@ def foot(*shapes, frames=()):
         parent=None,
         joint=None,
         origin=np.eye(4),
+        zero_pose=np.eye(4),
         links=tuple(links),
         poses=(np.eye(4), *frames),
     )

@@ -63,7 +63,7 @@ class Builder:
                 joints=tuple(joints),
             )
         )
-        scales = MeshScales(facts.tree, facts.bodies, facts.zero_poses, facts.meshes)
+        scales = MeshScales(facts.tree, facts.bodies, facts.meshes)
         found = [scales.mismatch(use) for use in mesh_uses(facts.model)]
         return [mismatch.ratio for mismatch in found if mismatch is not None]
 

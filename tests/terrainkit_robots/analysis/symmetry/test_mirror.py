@@ -126,7 +126,7 @@ def test_mirror_of_published_robots(name, robot_file):
     assert robot.mirror.normal.tolist() == [0, 1, 0]
     assert len(robot.mirror.pairs) == PAIRS[name]
     for pair in robot.mirror.pairs:
-        assert robot.zero_poses[pair.left][1, 3] > robot.zero_poses[pair.right][1, 3]
+        assert robot.bodies[pair.left].zero_pose[1, 3] > robot.bodies[pair.right].zero_pose[1, 3]
         assert swap_sides(robot.bodies[pair.left].name) == robot.bodies[pair.right].name
 
 
