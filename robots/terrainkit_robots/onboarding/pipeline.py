@@ -26,7 +26,7 @@ from terrainkit_robots.onboarding.robot_files import (
 )
 
 if TYPE_CHECKING:
-    from terrainkit_robots.export.collision_simplification.simplify import How, Progress
+    from terrainkit_robots.export.collision_simplification.simplify import CollisionMethod, Progress
     from terrainkit_robots.onboarding.verify import Verification
 
 _BLOCKING_RULES = ("XML", "MSH", "TRE", "INR", "JNT001", "JNT004", "JNT007", "JNT013")
@@ -50,7 +50,7 @@ class OnboardOptions:
     """ROS packages, xacro arguments and ignored rules; the settings files above the robot file are
     added. A selection of rules has no effect."""
 
-    collision: "How" = "keep"
+    collision: "CollisionMethod" = "keep"
     """How collision meshes are simplified."""
 
     frameworks: tuple[str, ...] = ()
