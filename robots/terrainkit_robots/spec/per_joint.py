@@ -12,7 +12,7 @@ from typing import Generic, TypeVar
 from terrainkit.errors import ConfigError
 from terrainkit.toml_text import key_text
 from terrainkit_robots.spec.pattern import compiled, longest_of, ways
-from terrainkit_robots.text import closest, names, short
+from terrainkit_robots.text import closest, names, truncate
 
 T = TypeVar("T")
 
@@ -68,10 +68,11 @@ class Matching(Generic[T]):
         for joint, keys in self.doubled.items():
             listed = names(map(key_text, keys), separator=" and ")
             yield _clash(
-                joint, f"joint {short(joint)} is matched by {listed} of {what}; wanted one of them"
+                joint,
+                f"joint {truncate(joint)} is matched by {listed} of {what}; wanted one of them",
             )
         if self.unmatched and not partial:
-            subject = f"joint {short(self.unmatched[0])} is"
+            subject = f"joint {truncate(self.unmatched[0])} is"
             if len(self.unmatched) > 1:
                 subject = f"joints {names(self.unmatched)} are"
             message = f"{subject} matched by no key of {what}; wanted one for each joint"
@@ -83,7 +84,7 @@ def _clash(subject: str, message: str) -> Clash:
 
 
 def _key(what: str, key: str) -> str:
-    return f"{what}.{short(key_text(key))}"
+    return f"{what}.{truncate(key_text(key))}"
 
 
 def by_joint(table: Mapping[str, T], joints: Sequence[str], what: str = "table") -> dict[str, T]:
