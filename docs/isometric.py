@@ -1,4 +1,4 @@
-"""Pictures of patches in parallel projection, for the gallery."""
+"""Isometric pictures of patches for the documentation, in the colors of the preview."""
 
 import cv2
 import numpy as np
@@ -9,8 +9,8 @@ from terrainkit.mesh import full_mesh
 from terrainkit.preview import height_colors
 
 PAPER = (250, 249, 246)
-DEEPEST = -1.5
-"""Holes are drawn so deep, however deep they are [m]."""
+MIN_HEIGHT = -1.5
+"""Deeper holes are cut off at this height [m]."""
 
 _LIGHT = np.array([-0.35, -0.55, 0.75])
 _SUBPIXEL = 4
@@ -19,15 +19,15 @@ _SUBPIXEL = 4
 def isometric(heights: NDArray[np.float32], cell: float, scale: float) -> NDArray[np.uint8]:
     """Return a picture of a patch seen from low x and low y, shape (height, width, 3).
 
-    Faces are painted from the farthest to the nearest, on twice the pixels, and shrunk.
+    Faces are painted from back to front at twice the resolution.
 
     Args:
         heights: Heights of the patch [m].
-        cell: Distance between two samples [m].
-        scale: Pixels for a metre along the screen.
+        cell: Grid spacing [m].
+        scale: Pixels per meter.
     """
     grid = Grid(shape=heights.shape, cell=cell)
-    mesh = full_mesh(np.maximum(heights, DEEPEST), grid, threshold=0.75 * cell)
+    mesh = full_mesh(np.maximum(heights, MIN_HEIGHT), grid, threshold=0.75 * cell)
     corners = mesh.vertices[mesh.triangles].astype(np.float64)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -49,7 +49,7 @@ def isometric(heights: NDArray[np.float32], cell: float, scale: float) -> NDArra
 
 
 def side_by_side(pictures: list[NDArray[np.uint8]]) -> NDArray[np.uint8]:
-    """Return pictures in a row, standing on one line."""
+    """Return pictures in a row, aligned at the bottom."""
     height = max(len(picture) for picture in pictures)
     padded = [
         np.pad(p, ((height - len(p), 0), (0, 0), (0, 0)), constant_values=PAPER[0])

@@ -1,4 +1,4 @@
-"""MuJoCo without its log: each of its warnings is written to a file where the program runs."""
+"""Suppress the warnings that MuJoCo writes to MUJOCO_LOG.TXT in the working directory."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -6,12 +6,12 @@ from contextlib import contextmanager
 
 @contextmanager
 def quiet_mujoco() -> Iterator[None]:
-    """Keep MuJoCo from writing MUJOCO_LOG.TXT into the current folder."""
+    """Ignore MuJoCo's warnings within a block."""
     import mujoco
 
-    before = mujoco.get_mju_user_warning()
+    previous = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _: None)
     try:
         yield
     finally:
-        mujoco.set_mju_user_warning(before)
+        mujoco.set_mju_user_warning(previous)

@@ -1,4 +1,4 @@
-"""Fixtures shared by the tests of terrainkit_robots."""
+"""Fixtures for the tests of terrainkit_robots."""
 
 import os
 import re
@@ -24,7 +24,7 @@ ROBOTS = Path(os.environ.get("TERRAINKIT_ROBOTS", _PROJECT.parent / "shared" / "
 
 @pytest.fixture(scope="session")
 def robot_file() -> Callable[[str], Path]:
-    """Return the path of a robot file such as `go2/urdf/go2.urdf`; skips if it is not there."""
+    """Return the path of a robot file such as `go2/urdf/go2.urdf`; skip if it is not available."""
 
     def find(name: str) -> Path:
         if not (ROBOTS / name).exists():
@@ -50,7 +50,7 @@ def onboarded(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path], Onbo
 
 @pytest.fixture(scope="session")
 def sliding_shanks(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the URDF of a quadruped whose shanks slide along themselves instead of turning."""
+    """Return the URDF of a quadruped with prismatic knee joints."""
     text, count = re.subn(
         r'(<joint name="\w\w_calf_joint" type=)"revolute"(.*?)'
         r'<axis xyz="0 1 0"/>(\s*)<limit [^>]*/>',
@@ -67,7 +67,7 @@ def sliding_shanks(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def stood() -> StandResult:
-    """Return how a robot with four legs stood that is as it should be."""
+    """Return the result of a passed standing test of a quadruped."""
     return StandResult(
         tilt=0.01,
         max_tilt=0.7,
@@ -90,7 +90,7 @@ BUNDLED = Path(terrainkit_robots.__file__).parent / "description/bundled"
 
 @dataclass(frozen=True)
 class Gain:
-    """What derive_spec needs of a gain."""
+    """The attributes of a gain that derive_spec uses."""
 
     stiffness: float = 40.0
     damping: float = 1.0
@@ -100,7 +100,7 @@ class Gain:
 
 @pytest.fixture
 def bundled():
-    """Return a bundled robot, such as `quadruped.urdf`, with texts replaced."""
+    """Return a function that loads a bundled robot with texts replaced."""
 
     def read(name, *replace, tmp_path=None, spec=None):
         path = BUNDLED / Path(name).stem / name
@@ -118,7 +118,7 @@ def bundled():
 
 @pytest.fixture
 def robot(tmp_path):
-    """Return the robot of a text."""
+    """Return a function that loads a robot from a text."""
 
     def read(text, spec=None):
         path = tmp_path / ("robot.xml" if "<mujoco" in text else "robot.urdf")
@@ -130,7 +130,7 @@ def robot(tmp_path):
 
 @pytest.fixture
 def gains():
-    """Return gains for each actuated joint of a robot."""
+    """Return a function that makes gains for each actuated joint of a robot."""
 
     def make(facts, **changed):
         return {joint.name: Gain(**changed) for joint in facts.actuated}
@@ -139,7 +139,7 @@ def gains():
 
 
 def values(**changed):
-    """Return what a small spec is made from."""
+    """Return the fields of a small spec."""
     table = {"a": 1.0, "b": 2.0}
     names = ("default_pose", "stiffness", "damping", "effort", "velocity", "armature")
     return {
@@ -157,5 +157,5 @@ def values(**changed):
 
 @pytest.fixture
 def spec():
-    """Return a small spec, with values changed."""
+    """Return a function that makes a small spec with changed values."""
     return lambda **changed: RobotSpec(**values(**changed))

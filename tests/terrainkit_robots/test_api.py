@@ -4,7 +4,7 @@ import sys
 import pytest
 
 import terrainkit_robots
-from terrainkit_robots.description import bundled
+from tests.robots import QUADRUPED
 
 
 @pytest.mark.parametrize("name", terrainkit_robots.__all__)
@@ -26,6 +26,6 @@ def test_import_is_lazy():
 
 
 def test_check_robot_accepts_string():
-    report = terrainkit_robots.check_robot(str(bundled.find("quadruped")))
+    report = terrainkit_robots.check_robot(str(QUADRUPED))
     assert report.verdict == "pass"
     assert report.facts.model.name == "quadruped"

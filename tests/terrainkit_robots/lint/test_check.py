@@ -1,11 +1,10 @@
 import pytest
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots.description import bundled
 from terrainkit_robots.lint.check import check_robot
 from terrainkit_robots.lint.settings import Settings
+from tests.robots import QUADRUPED
 
-QUADRUPED = bundled.find("quadruped")
 ROBOT = (
     '<robot name="box"><link name="trunk"><inertial><mass value="{}"/></inertial></link></robot>'
 )

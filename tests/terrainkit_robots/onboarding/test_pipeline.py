@@ -20,6 +20,7 @@ from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
 from terrainkit_robots.onboarding.summary import summarize
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.spec.robot_spec import RobotSpec
+from tests.robots import ARM, QUADRUPED
 
 REAL = [
     "a1/urdf/a1.urdf",
@@ -32,20 +33,6 @@ REAL = [
     "anymal_c/urdf/anymal_c.urdf",
 ]
 COMPARISON_RULES = [rule for rule in rules() if {"against", "spec"} & set(rule.needs)]
-QUADRUPED = bundled.find("quadruped")
-
-ARM = """<robot name="arm">
-  <link name="stand"><inertial><mass value="5"/>
-    <inertia ixx="0.05" iyy="0.05" izz="0.05" ixy="0" ixz="0" iyz="0"/></inertial>
-    <collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>
-  <link name="upper"><inertial><origin xyz="0 0 0.15"/><mass value="1"/>
-    <inertia ixx="0.01" iyy="0.01" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial>
-    <collision><origin xyz="0 0 0.16"/><geometry><box size="0.05 0.05 0.3"/></geometry></collision>
-  </link>
-  <joint name="shoulder" type="revolute"><parent link="stand"/><child link="upper"/>
-    <origin xyz="0 0 0.11"/><axis xyz="0 1 0"/>
-    <limit lower="-1.5" upper="1.5" effort="30" velocity="3"/></joint>
-</robot>"""
 
 
 def options(**changes):

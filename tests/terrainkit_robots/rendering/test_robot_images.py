@@ -6,7 +6,6 @@ import mujoco
 import numpy as np
 import pytest
 
-from terrainkit_robots.description import bundled
 from terrainkit_robots.rendering import robot_images
 from terrainkit_robots.rendering.child_process import RenderError
 from terrainkit_robots.rendering.robot_images import (
@@ -19,16 +18,17 @@ from terrainkit_robots.rendering.robot_images import (
     robot_frames,
     show_robot_geoms,
 )
+from tests.robots import QUADRUPED
 
 SIZE = (144, 120)
-QUADRUPED = bundled.find("quadruped").with_suffix(".xml")
+QUADRUPED_MJCF = QUADRUPED.with_suffix(".xml")
 CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
 
 
 @pytest.fixture(scope="module")
 def red(tmp_path_factory):
     """Return pictures of the bundled quadruped in red; skips where MuJoCo cannot render."""
-    text = QUADRUPED.read_text()
+    text = QUADRUPED_MJCF.read_text()
     file = tmp_path_factory.mktemp("robot") / "robot.xml"
     file.write_text(re.sub(r'(<material [^>]*rgba=)"[^"]*"', r'\1"1 0 0 1"', text))
     try:

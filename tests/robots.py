@@ -1,0 +1,20 @@
+"""Robot descriptions that several tests use."""
+
+from terrainkit_robots.description import bundled
+
+QUADRUPED = bundled.find("quadruped")
+"""The URDF of the bundled quadruped; its MJCF is in the same folder."""
+
+ARM = """<robot name="arm">
+  <link name="stand"><inertial><mass value="5"/>
+    <inertia ixx="0.05" iyy="0.05" izz="0.05" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision></link>
+  <link name="upper"><inertial><origin xyz="0 0 0.15"/><mass value="1"/>
+    <inertia ixx="0.01" iyy="0.01" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><origin xyz="0 0 0.16"/><geometry><box size="0.05 0.05 0.3"/></geometry></collision>
+  </link>
+  <joint name="shoulder" type="revolute"><parent link="stand"/><child link="upper"/>
+    <origin xyz="0 0 0.11"/><axis xyz="0 1 0"/>
+    <limit lower="-1.5" upper="1.5" effort="30" velocity="3"/></joint>
+</robot>"""
+"""The URDF of an arm with a fixed base and one joint, without errors."""
