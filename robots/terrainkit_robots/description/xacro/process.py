@@ -282,7 +282,8 @@ def _error_message(error: BaseException, request: Mapping[str, Any]) -> str:
             case "ExpatError":
                 return f"xacro: malformed XML: {cause}"
         if isinstance(cause, SyntaxError):
-            return f"xacro: invalid expression {truncate((cause.text or '').strip(), 60)!r}: {cause.msg}"
+            expression = truncate((cause.text or "").strip(), 60)
+            return f"xacro: invalid expression {expression!r}: {cause.msg}"
         if isinstance(cause, OSError):
             return f"xacro: cannot read {cause.filename}: {cause.strerror}"
     macro = next(iter(getattr(error, "macros", ())), None)

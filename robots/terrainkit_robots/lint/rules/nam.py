@@ -279,7 +279,8 @@ def invalid_name(robot: Facts) -> Iterator[Violation]:
             subject=first.name,
             source=first.source,
             message=f"{count} with other characters than letters, digits and underscores: "
-            f"{names(renamed)}; USD renames {truncate(first.name)} to {truncate(_valid(first.name))}",
+            f"{names(renamed)}; USD renames {truncate(first.name)} to "
+            f"{truncate(_valid(first.name))}",
             measured={"names": len(renamed)},
         )
 

@@ -93,8 +93,8 @@ def unknown_link(robot: Facts) -> Iterator[Violation]:
         yield Violation(
             subject=uses[0][1].name,
             source=uses[0][1].source,
-            message=f"link {truncate(name)}: does not exist, but is the {joints}; expected a link in "
-            "the file",
+            message=f"link {truncate(name)}: does not exist, but is the {joints}; expected a "
+            "link in the file",
             hint=_suggestion(robot, name) if index < _MAX_SUGGESTIONS else "",
         )
 
@@ -313,9 +313,9 @@ def inner_floating_joint(robot: Facts) -> Iterator[Violation]:
             yield Violation(
                 subject=joint.name,
                 source=joint.source,
-                message=f"type of joint {truncate(joint.name)} between links {truncate(joint.parent)} "
-                f"and {truncate(joint.child)}: got {joint.kind}; expected fixed, revolute, continuous "
-                "or prismatic",
+                message=f"type of joint {truncate(joint.name)} between links "
+                f"{truncate(joint.parent)} and {truncate(joint.child)}: got {joint.kind}; expected "
+                "fixed, revolute, continuous or prismatic",
             )
 
 
@@ -360,8 +360,8 @@ def dummy_root(robot: Facts) -> Iterator[Violation]:
     yield Violation(
         subject=root.name,
         source=root.source,
-        message=f"root link {truncate(root.name)}: has no mass and no collision shape; the trunk is "
-        f"{truncate(trunk)}, attached by the fixed joint {truncate(joint.name)}"
+        message=f"root link {truncate(root.name)}: has no mass and no collision shape; the trunk "
+        f"is {truncate(trunk)}, attached by the fixed joint {truncate(joint.name)}"
         + (", which welds it to the world; expected a floating joint" if is_welded else ""),
         severity="warning" if is_welded else None,
     )

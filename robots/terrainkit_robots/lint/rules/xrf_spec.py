@@ -122,8 +122,9 @@ def spec_joint_order(robot: Facts) -> Iterator[Violation]:
     yield Violation(
         subject=robot.model.title,
         source=robot.model.source,
-        message=f"joint_order[{first}]: got {truncate(ours[first])}; expected {truncate(order[first])}, "
-        f"as in the {elements} of {robot.model.file.name}, or of_file = of_spec[{indices}]",
+        message=f"joint_order[{first}]: got {truncate(ours[first])}; expected "
+        f"{truncate(order[first])}, as in the {elements} of {robot.model.file.name}, or "
+        f"of_file = of_spec[{indices}]",
         measured={"moved": sum(index != k for k, index in enumerate(indices))},
     )
 
@@ -174,7 +175,8 @@ def spec_feet(robot: Facts) -> Iterator[Violation]:
         if index not in leg_ends:
             message = f"feet: got {truncate(name)}, which is not the end of a leg; {expected}"
         elif index in used:
-            message = f"feet: got {truncate(used[index])} and {truncate(name)} of the same leg; {expected}"
+            pair = f"{truncate(used[index])} and {truncate(name)}"
+            message = f"feet: got {pair} of the same leg; {expected}"
         else:
             used[index] = name
             continue
@@ -227,8 +229,8 @@ def spec_bodies(robot: Facts) -> Iterator[Violation]:
             carried = [other for other in spec.feet if _is_ancestor(robot, name, other)]
             if carried and foot not in carried:
                 message = (
-                    f"{field}: got {truncate(name)}, the parent of {names(carried)}, at the index of "
-                    f"{truncate(foot)}; expected the order of feet"
+                    f"{field}: got {truncate(name)}, the parent of {names(carried)}, at the index "
+                    f"of {truncate(foot)}; expected the order of feet"
                 )
                 yield _report(robot, name, message)
 
@@ -300,8 +302,8 @@ def _check_limits(
         limit, unit = limit_of(joints[name]), unit_of(joints[name])
         if limit is not None and limit > 0 and value > _MAX_LIMIT_RATIO * limit:
             message = (
-                f"{table} of {truncate(name)}: got {value:.4g} {unit}, {value / limit:.3g} times the "
-                f"limit of {robot.model.file.name}; expected at most {limit:.4g} {unit}"
+                f"{table} of {truncate(name)}: got {value:.4g} {unit}, {value / limit:.3g} times "
+                f"the limit of {robot.model.file.name}; expected at most {limit:.4g} {unit}"
             )
             yield _report(robot, name, message, {table: value, "declared": limit})
 
@@ -340,7 +342,7 @@ def spec_mirror(robot: Facts) -> Iterator[Violation]:
             yield _report(robot, name, message)
         elif own is not None and own.joint == image.joint and own.sign != image.sign:
             message = (
-                f"mirror of {truncate(name)}: got {got}; expected sign {own.sign:+d}, as their axes "
-                "require"
+                f"mirror of {truncate(name)}: got {got}; expected sign {own.sign:+d}, as their "
+                "axes require"
             )
             yield _report(robot, name, message)
