@@ -147,14 +147,16 @@ class Evaluate(PolicyCommand):
 
 def summary_line(result: "EvaluationResult") -> str:
     """Return the metrics of all robots as one line."""
-    whole = result.metrics
-    success = "" if whole.success is None else f", {_percent(whole.success)} success"
-    error = "; ".join(format_errors(whole))
-    if whole.lin_vel_error is None:
+    from terrainkit_robots.text import count, display_path
+
+    metrics, terrain = result.metrics, display_path(result.config.terrain or "plane")
+    success = "" if metrics.success is None else f", {_percent(metrics.success)} success"
+    error = "; ".join(format_errors(metrics))
+    if metrics.lin_vel_error is None:
         error = "not measured: no robot walked longer than 2 s after a command"
     return (
-        f"{result.robot}, {result.checkpoint}, on {result.config.terrain}: {whole.robots} robots, "
-        f"{whole.falls} fell{success}; error {error}"
+        f"{result.robot}, {result.checkpoint}, on {terrain}: {count(metrics.robots, 'robot')}, "
+        f"{metrics.falls} fell{success}; error {error}"
     )
 
 

@@ -68,7 +68,7 @@ def test_evaluate_writes_json_to_a_file(here, tmp_path, monkeypatch):
     words = ("walk", *QUICK, "-o", "result.json")
     code, out, err = here(*words)
     assert (code, err) == (0, "")
-    assert out.startswith("quadruped, model_7.pt, on plane: 1 robots")
+    assert out.startswith("quadruped, model_7.pt, on plane: 1 robot")
     assert out.endswith("wrote result.json\n")
     before = (tmp_path / "result.json").read_text()
     assert json.loads(before)["seconds"] == 0.04

@@ -19,7 +19,7 @@ from terrainkit_robots.mesh.mesh_cache import Meshes
 
 if TYPE_CHECKING:
     from terrainkit_robots.description.model import RobotModel
-    from terrainkit_robots.export.collision_simplification.simplify import How, Progress
+    from terrainkit_robots.export.collision_simplification.simplify import CollisionMethod, Progress
     from terrainkit_robots.spec.robot_spec import RobotSpec
 
 URDF, MJCF, SCENE, SPEC = "robot.urdf", "robot.xml", "scene.xml", "robot.toml"
@@ -63,7 +63,7 @@ class SpecOverride:
 def make_robot_files(
     source: Facts,
     *,
-    collision: "How" = "keep",
+    collision: "CollisionMethod" = "keep",
     floating: bool | None = None,
     override: SpecOverride | None = None,
     cache_dir: Path | None = None,

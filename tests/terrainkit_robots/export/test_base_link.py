@@ -43,8 +43,8 @@ def test_a_cart_slides_on_the_world(tmp_path):
     assert [joint.name for joint in done.robot.facts.joints] == ["slider", "hinge"]
     assert (spec.joint_order, spec.floating, spec.base) == (("slider",), False, "cart")
     assert done.robot.notes == (
-        "left out table, ball: not part of the robot's tree",
-        "its base is world_link, which stands for the world; slider is on it",
+        "removed table, ball: not part of the kinematic tree",
+        "added the base link world_link for the world, with joints slider",
     )
 
 
@@ -60,7 +60,7 @@ def test_a_walker_of_the_plane_keeps_its_joints_unless_it_is_set_free(tmp_path, 
     moving = [joint.name for joint in done.robot.facts.joints]
     assert moving == (["elbow"] if floating else ["z", "x", "turn", "elbow"])
     assert (spec.floating, spec.base) == (bool(floating), "torso")
-    told = "left out z, x, turn: " if floating else "its base is world_link, which stands "
+    told = "removed z, x, turn: " if floating else "added the base link world_link "
     assert any(note.startswith(told) for note in done.robot.notes)
 
 
