@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots import gl_backend
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.text import one_line, short
+from terrainkit_robots.text import one_line, truncate
 
 Frame = NDArray[np.uint8]
 """An RGB image, shape (height, width, 3)."""
@@ -44,7 +44,7 @@ def stream_frames(render: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
         reason = yield from _run_child(render, backend)
         if not reason:
             return
-        reasons.append(f"{backend or 'default backend'}: {short(one_line(reason), 160)}")
+        reasons.append(f"{backend or 'default backend'}: {truncate(one_line(reason), 160)}")
     advice = gl_backend.installation_advice()
     raise RenderError(f"MuJoCo cannot render here ({'; '.join(reasons)}); {advice}")
 
