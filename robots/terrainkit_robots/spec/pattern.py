@@ -1,7 +1,7 @@
-"""Patterns of joint names: regular expressions that cannot take long.
+"""Regular expressions of joint names with bounded matching time.
 
-Python's engine tries one way after another to match, and some expressions have more ways than there
-are seconds: `(a+)+b`, or `.*.*.*.*.*b`. The ways are counted first, from above.
+Python's engine backtracks, and expressions such as `(a+)+b` or `.*.*.*.*.*b` take exponential or
+high polynomial time. An upper bound of the number of match paths is computed first.
 """
 
 import re
@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 from terrainkit.errors import ConfigError
 
-_LONGEST = 200
-"""A pattern of more characters was not written for joint names."""
+_MAX_LENGTH = 200
+"""Maximum length of a pattern."""
 
 _TOKEN = re.compile(
     r"""\\. | \[\^?\]?(?:\\.|[^\]\\])*\]          # one character, or one of several
@@ -22,37 +22,39 @@ _TOKEN = re.compile(
 )
 
 
-def compiled(pattern: str) -> "re.Pattern[str]":
-    """Return a regular expression.
+def compile_pattern(pattern: str) -> "re.Pattern[str]":
+    """Compile a regular expression.
 
     Raises:
-        ConfigError: if it is none, or one that is not taken here.
+        ConfigError: If the expression is invalid or too long.
     """
-    if len(pattern) > _LONGEST:
-        raise ConfigError(f"a pattern of {len(pattern)} characters; wanted at most {_LONGEST}")
+    if len(pattern) > _MAX_LENGTH:
+        raise ConfigError(
+            f"pattern length: got {len(pattern)} characters; expected at most {_MAX_LENGTH}"
+        )
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error")  # what Python will read differently some day
+            warnings.simplefilter("error")  # deprecated syntax
             return re.compile(pattern)
     except (re.error, OverflowError, RecursionError, Warning) as error:
         raise ConfigError(f"not a regular expression: {error}") from error
 
 
-def ways(pattern: str, longest: int) -> int:
-    """Return in how many ways a pattern could match a name, at most.
+def count_match_paths(pattern: str, name_length: int) -> int:
+    """Return an upper bound of the number of paths in which a pattern can match a name.
 
     Args:
-        pattern: A regular expression that :func:`compiled` has taken.
-        longest: Characters of the longest name.
+        pattern: A regular expression that :func:`compile_pattern` accepts.
+        name_length: Length of the longest name.
 
     Raises:
-        ConfigError: if it repeats a group, which may have no bound, or has a special group.
+        ConfigError: If a group is repeated, or has an unsupported type.
     """
-    # Of each open group: the ways of its alternatives that are over, and of the one that is not.
-    groups, before = [[0, 1]], ""
+    # paths of the finished alternatives and of the current one, for each open group
+    groups, previous = [[0, 1]], ""
     for token in _TOKEN.findall(pattern):
         if token == "(?":
-            raise ConfigError("a group with (?; of those (?: (?= and (?! are taken")
+            raise ConfigError("group (?: expected (?:, (?= or (?!")
         if token[0] == "(":
             groups.append([0, 1])
         elif token == ")":
@@ -60,18 +62,18 @@ def ways(pattern: str, longest: int) -> int:
             groups[-1][1] *= over + last
         elif token == "|":
             groups[-1] = [sum(groups[-1]), 1]
-        elif _repeats(token):
-            if before == ")" and token[0] != "?":
-                raise ConfigError(f"a group that is repeated by {token}; only ? may follow one")
-            groups[-1][1] *= 2 if token[0] == "?" else longest + 1
-        before = token
+        elif _is_quantifier(token):
+            if previous == ")" and token[0] != "?":
+                raise ConfigError(f"quantifier {token} of a group: expected ?")
+            groups[-1][1] *= 2 if token[0] == "?" else name_length + 1
+        previous = token
     return sum(groups[0])
 
 
-def _repeats(token: str) -> bool:
+def _is_quantifier(token: str) -> bool:
     return token[0] in "*+?" or (token[0] == "{" and len(token) > 1)
 
 
-def longest_of(names: Sequence[str]) -> int:
-    """Return the number of characters of the longest name."""
+def max_length(names: Sequence[str]) -> int:
+    """Return the length of the longest name."""
     return max(map(len, names), default=0)

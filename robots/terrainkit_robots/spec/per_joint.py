@@ -1,8 +1,8 @@
-"""Tables by joint: which key of a table each joint takes its value from.
+"""Match the keys of a per-joint table to joints.
 
-A key that is the name of a joint is that joint. Any other is a regular expression, which has to
-match the whole of a name. Every joint has to be matched exactly once, and every key has to match:
-a joint that was forgotten, or a key with a slip in it, is an error and not a zero.
+A key is the name of a joint, or a regular expression that matches whole names. Every joint must be
+matched exactly once, and every key must match a joint, so that a missing joint or a misspelled key
+is an error.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,32 +11,32 @@ from typing import Generic, TypeVar
 
 from terrainkit.errors import ConfigError
 from terrainkit.toml_text import key_text
-from terrainkit_robots.spec.pattern import compiled, longest_of, ways
+from terrainkit_robots.spec.pattern import compile_pattern, count_match_paths, max_length
 from terrainkit_robots.text import closest, names, short
 
 T = TypeVar("T")
 
-_MOST_WAYS = 3_000_000
-"""The patterns of a table may match its joints in so many ways in all: a second of work."""
+_MAX_MATCH_PATHS = 3_000_000
+"""Maximum number of paths in which all patterns of a table can match: about a second."""
 
-_CLOSE = 0.75
-"""Share of common letters from which a joint is what a key was meant for."""
+_MIN_SIMILARITY = 0.75
+"""Minimum similarity of a key to the joint that is suggested for it."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Clash:
-    """A joint that is not matched exactly once, or a key that does not work."""
+class MatchProblem:
+    """A joint that is not matched exactly once, or an invalid key."""
 
     subject: str
-    """The joint, or the key."""
+    """Name of the joint, or the key."""
 
     message: str
-    """What is wrong with it."""
+    """What is wrong."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Matching(Generic[T]):
-    """What the keys of a table match."""
+    """Joints matched by the keys of a table."""
 
     values: Mapping[str, T]
     """Value of each joint that is matched exactly once, in the order of the joints."""
@@ -44,42 +44,41 @@ class Matching(Generic[T]):
     unmatched: tuple[str, ...]
     """Joints that no key matches."""
 
-    doubled: Mapping[str, tuple[str, ...]]
-    """Keys of each joint that is matched by several."""
+    ambiguous: Mapping[str, tuple[str, ...]]
+    """Keys of each joint that several keys match."""
 
-    idle: Mapping[str, str]
-    """Keys that match no joint, with the joint that each may be meant for; empty for none."""
+    unused: Mapping[str, str]
+    """Keys that match no joint, with a suggested joint, which may be empty."""
 
-    refused: Mapping[str, str]
-    """Keys that are no pattern, and why."""
+    invalid: Mapping[str, str]
+    """Keys that are not valid patterns, with the reason."""
 
-    def clashes(self, what: str, *, partial: bool = False) -> Iterator[Clash]:
+    def problems(self, what: str, *, allow_missing: bool = False) -> Iterator[MatchProblem]:
         """Yield what is wrong.
 
         Args:
             what: Name of the table.
-            partial: Whether joints may be left out.
+            allow_missing: Whether joints without a key are allowed.
         """
-        for key, reason in self.refused.items():
-            yield _clash(key, f"{_key(what, key)} is {reason}")
-        for key, meant in self.idle.items():
+        for key, reason in self.invalid.items():
+            yield _problem(key, f"{_key(what, key)}: {reason}")
+        for key, meant in self.unused.items():
             instead = f"; did you mean {meant}?" if meant else ""
-            yield _clash(key, f"{_key(what, key)} matches no joint{instead}")
-        for joint, keys in self.doubled.items():
+            yield _problem(key, f"{_key(what, key)} matches no joint{instead}")
+        for joint, keys in self.ambiguous.items():
             listed = names(map(key_text, keys), separator=" and ")
-            yield _clash(
-                joint, f"joint {short(joint)} is matched by {listed} of {what}; wanted one of them"
-            )
-        if self.unmatched and not partial:
+            message = f"joint {short(joint)} is matched by {listed} of {what}; expected one key"
+            yield _problem(joint, message)
+        if self.unmatched and not allow_missing:
             subject = f"joint {short(self.unmatched[0])} is"
             if len(self.unmatched) > 1:
                 subject = f"joints {names(self.unmatched)} are"
-            message = f"{subject} matched by no key of {what}; wanted one for each joint"
-            yield _clash(self.unmatched[0], message)
+            message = f"{subject} matched by no key of {what}; expected one key per joint"
+            yield _problem(self.unmatched[0], message)
 
 
-def _clash(subject: str, message: str) -> Clash:
-    return Clash(subject=subject, message=message)
+def _problem(subject: str, message: str) -> MatchProblem:
+    return MatchProblem(subject=subject, message=message)
 
 
 def _key(what: str, key: str) -> str:
@@ -90,51 +89,53 @@ def by_joint(table: Mapping[str, T], joints: Sequence[str], what: str = "table")
     """Return the value of each joint, in the order of `joints`.
 
     Args:
-        table: Values by names of joints, or patterns of those.
-        joints: The joints.
-        what: What to call the table in the error.
+        table: Values by joint names or patterns.
+        joints: Names of the joints.
+        what: Name of the table in error messages.
 
     Raises:
-        ConfigError: if a joint is not matched exactly once, or a key matches none.
+        ConfigError: If a joint is not matched exactly once, or a key matches no joint.
     """
     matching = match_joints(table, joints)
-    for clash in matching.clashes(what):
-        raise ConfigError(clash.message)
+    for problem in matching.problems(what):
+        raise ConfigError(problem.message)
     return dict(matching.values)
 
 
 def match_joints(table: Mapping[str, T], joints: Sequence[str]) -> Matching[T]:
-    """Return what the keys of a table match among `joints`."""
+    """Match the keys of a table to joints."""
     keys: dict[str, list[str]] = {joint: [] for joint in joints}
-    idle: dict[str, str] = {}
-    refused: dict[str, str] = {}
-    longest, spent = longest_of(joints), 0
+    unused: dict[str, str] = {}
+    invalid: dict[str, str] = {}
+    name_length, spent = max_length(joints), 0
     for key in table:
         if key in keys:
             keys[key].append(key)
             continue
         try:
-            pattern = compiled(key)
-            cost = ways(key, longest) * len(joints)
-            if spent + cost > _MOST_WAYS:
+            pattern = compile_pattern(key)
+            cost = count_match_paths(key, name_length) * len(joints)
+            if spent + cost > _MAX_MATCH_PATHS:
                 raise ConfigError("slow to match against all joints; use names instead")
             spent += cost
         except ConfigError as error:
-            refused[key] = str(error)
+            invalid[key] = str(error)
             continue
         found = [joint for joint in joints if pattern.fullmatch(joint)]
         for joint in found:
             keys[joint].append(key)
         if not found:
-            idle[key] = closest(key, joints, _CLOSE) if len(idle) < _MOST_MEANT else ""
+            unused[key] = (
+                closest(key, joints, _MIN_SIMILARITY) if len(unused) < _MAX_SUGGESTIONS else ""
+            )
     return Matching(
         values={joint: table[found[0]] for joint, found in keys.items() if len(found) == 1},
         unmatched=tuple(joint for joint, found in keys.items() if not found),
-        doubled={joint: tuple(found) for joint, found in keys.items() if len(found) > 1},
-        idle=idle,
-        refused=refused,
+        ambiguous={joint: tuple(found) for joint, found in keys.items() if len(found) > 1},
+        unused=unused,
+        invalid=invalid,
     )
 
 
-_MOST_MEANT = 20
-"""So many slips get a suggestion: to look for one takes a while."""
+_MAX_SUGGESTIONS = 20
+"""Maximum number of unused keys for which a joint is suggested."""

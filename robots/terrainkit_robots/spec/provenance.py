@@ -1,4 +1,4 @@
-"""Given values: what somebody wrote into a spec, told from what would be derived."""
+"""Mark the values of an edited spec that differ from the derived ones."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -7,12 +7,12 @@ from terrainkit_robots.spec.robot_spec import JOINT_TABLES, Provenance, RobotSpe
 
 
 def with_provenance(spec: RobotSpec, derived: RobotSpec, file: str) -> RobotSpec:
-    """Return a spec whose values have their true origin: as derived, or given.
+    """Return a spec with the provenance of each value: derived, or given in a file.
 
     Args:
-        spec: As it was read. The comments in its file may be those of numbers that were replaced.
-        derived: What would be written without it.
-        file: Where it was read from.
+        spec: The spec as read. The comments in its file may describe replaced values.
+        derived: The spec that would be derived from the robot.
+        file: Name of the file of `spec`.
     """
     given = Provenance(origin="given", reason=f"in {file}")
     origins: dict[str, Provenance] = {}
@@ -24,7 +24,7 @@ def with_provenance(spec: RobotSpec, derived: RobotSpec, file: str) -> RobotSpec
 def _origins(
     name: str, spec: RobotSpec, derived: RobotSpec, given: Provenance
 ) -> Iterator[tuple[str, Provenance]]:
-    """Yield where a field has its value from, and what of it has it from elsewhere."""
+    """Yield the provenance of a field and of its entries that differ from it."""
     mine, theirs = getattr(spec, name), getattr(derived, name)
     known = {k: v for k, v in derived.provenance.items() if k.partition(".")[0] == name}
     if mine == theirs:

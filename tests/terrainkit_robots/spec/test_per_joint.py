@@ -43,16 +43,15 @@ def test_a_pattern_matches_the_whole_name():
         (
             {".*_hip_joint": 1.0},
             "joints FL_calf_joint, FR_calf_joint are matched by no key of stiffness; "
-            "wanted one for each joint",
+            "expected one key per joint",
         ),
         (
             {"FL.*": 1.0, "FR_hip_joint": 1.0},
-            "joint FR_calf_joint is matched by no key of stiffness; wanted one for each joint",
+            "joint FR_calf_joint is matched by no key of stiffness; expected one key per joint",
         ),
         (
             {".*": 1.0, "FL_hip_joint": 2.0},
-            'joint FL_hip_joint is matched by ".*" and FL_hip_joint of stiffness; '
-            "wanted one of them",
+            'joint FL_hip_joint is matched by ".*" and FL_hip_joint of stiffness; expected one key',
         ),
         (
             {".*": 1.0, "FL_hip_jiont": 2.0},
@@ -61,11 +60,11 @@ def test_a_pattern_matches_the_whole_name():
         ({".*": 1.0, "x": 2.0}, "stiffness.x matches no joint"),
         (
             {".*": 1.0, "*_x": 2.0},
-            'stiffness."*_x" is not a regular expression: nothing to repeat at position 0',
+            'stiffness."*_x": not a regular expression: nothing to repeat at position 0',
         ),
         (
             {".*": 1.0, "(a+)+": 2.0},
-            'stiffness."(a+)+" is a group that is repeated by +; only ? may follow one',
+            'stiffness."(a+)+": quantifier + of a group: expected ?',
         ),
     ],
 )
@@ -78,27 +77,29 @@ def test_patterns_that_would_take_long_are_refused_together():
     names = [f"{'a' * 30}{k}" for k in range(20)]
     slow = {f".*.*.*{k}": 1.0 for k in range(20)}
     matching = match_joints({**slow, "a+b": 2.0}, names)
-    assert 0 < len(matching.refused) < 20
-    assert "a+b" in matching.idle
-    assert {"slow to match against all joints; use names instead"} == set(matching.refused.values())
+    assert 0 < len(matching.invalid) < 20
+    assert "a+b" in matching.unused
+    assert {"slow to match against all joints; use names instead"} == set(matching.invalid.values())
 
 
 def test_thousands_of_keys_and_joints_are_no_trouble():
     names = [f"joint_{k}" for k in range(10_000)]
     matching = match_joints({name.upper(): 1.0 for name in names}, names)
     assert len(matching.unmatched) == 10_000
-    assert len(matching.idle) + len(matching.refused) == 10_000
+    assert len(matching.unused) + len(matching.invalid) == 10_000
 
 
 def test_all_clashes_are_told():
     matching = match_joints({"FL.*": 1.0, "FL_hip.*": 2.0, "x": 3.0, "(": 4.0}, JOINTS)
     assert matching.values == {"FL_calf_joint": 1.0}
     assert matching.unmatched == ("FR_hip_joint", "FR_calf_joint")
-    assert matching.doubled == {"FL_hip_joint": ("FL.*", "FL_hip.*")}
-    assert matching.idle == {"x": ""}
-    subjects = [clash.subject for clash in matching.clashes("t")]
+    assert matching.ambiguous == {"FL_hip_joint": ("FL.*", "FL_hip.*")}
+    assert matching.unused == {"x": ""}
+    subjects = [problem.subject for problem in matching.problems("t")]
     assert subjects == ["(", "x", "FL_hip_joint", "FR_hip_joint"]
-    assert [clash.subject for clash in matching.clashes("t", partial=True)] == subjects[:3]
+    assert [problem.subject for problem in matching.problems("t", allow_missing=True)] == subjects[
+        :3
+    ]
 
 
 @given(st.lists(st.text(min_size=1), unique=True, max_size=6))

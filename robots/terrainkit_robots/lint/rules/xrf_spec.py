@@ -146,8 +146,8 @@ def spec_tables(robot: Facts) -> Iterator[Violation]:
     joints = _table_joints(robot)
     for table in (*JOINT_TABLES, "soft_limits"):
         matching = match_joints(getattr(_spec(robot), table), joints)
-        for clash in matching.clashes(table, partial=table == "soft_limits"):
-            yield _report(robot, clash.subject, clash.message)
+        for problem in matching.problems(table, allow_missing=table == "soft_limits"):
+            yield _report(robot, problem.subject, problem.message)
 
 
 @rule("XRF013", "spec-feet", "error", needs=("spec", "legs"))

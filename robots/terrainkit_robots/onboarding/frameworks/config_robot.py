@@ -94,8 +94,8 @@ class ConfigRobot:
 
     def _match(self, field: str, values: Mapping[str, _Value]) -> dict[str, _Value]:
         matching = match_joints(values, self.spec.joint_order)
-        for clash in matching.clashes(field, partial=True):
-            raise ConfigError(clash.message)
+        for problem in matching.problems(field, allow_missing=True):
+            raise ConfigError(problem.message)
         return dict(matching.values)
 
     def provenance_comment(
