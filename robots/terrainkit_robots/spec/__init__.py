@@ -1,1 +1,1 @@
-"""The robot spec, robot.toml: what training needs to know of a robot."""
+"""The spec: what training needs to know of a robot beyond its description."""

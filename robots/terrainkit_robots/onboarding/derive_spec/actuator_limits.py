@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint
-from terrainkit_robots.spec.column import Column, round_digits
+from terrainkit_robots.spec.column import Column, rounded
 from terrainkit_robots.spec.robot_spec import MirrorJoint, Provenance
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def effort_column(
             if math.isfinite(holding) and holding > value:
                 value, reason = holding, f"{_HOLDING_FACTOR:g} times the holding torque"
             origin = _suggested(f"not in the file; {reason}")
-            column.add(joint.name, round_digits(value, 3) or 1.0, origin)
+            column.add(joint.name, rounded(value, 3) or 1.0, origin)
     return column
 
 
@@ -83,11 +83,11 @@ def armature_column(robot: Facts, gains: "Mapping[str, Gain]") -> Column:
     for joint in robot.actuated:
         in_file, required = joint.armature, gains[joint.name].armature
         if 0 < in_file < math.inf and required <= in_file:
-            column.add(joint.name, round_digits(in_file), _from_file(robot))
+            column.add(joint.name, rounded(in_file), _from_file(robot))
             continue
         reason = f"{in_file:.3g} in the file" if in_file > 0 else "not in the file"
         reason += "; required by the gains" if required > 0 else ""
-        column.add(joint.name, round_digits(required, 3), _suggested(reason))
+        column.add(joint.name, rounded(required, 3), _suggested(reason))
     return column
 
 
@@ -125,7 +125,7 @@ def action_scale_column(
         else:
             value = _ACTION_FACTOR * velocity.values[joint.name]
             reason = f"{_ACTION_FACTOR:g} * velocity; the target is a speed without stiffness"
-        column.add(joint.name, round_digits(value, 3), _suggested(reason))
+        column.add(joint.name, rounded(value, 3), _suggested(reason))
     return column
 
 
@@ -135,7 +135,7 @@ def _by_kind(values: Mapping[str, float], joint: Joint) -> float:
 
 def _valid_limit(value: float | None) -> float | None:
     """Return a limit from a file, or None if it is not positive and finite."""
-    return (round_digits(value) or None) if value is not None and 0 < value < math.inf else None
+    return (rounded(value) or None) if value is not None and 0 < value < math.inf else None
 
 
 def _suggested(reason: str) -> Provenance:

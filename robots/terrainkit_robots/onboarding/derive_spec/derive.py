@@ -17,7 +17,7 @@ from terrainkit_robots.onboarding.derive_spec.actuator_limits import (
     velocity_column,
 )
 from terrainkit_robots.onboarding.derive_spec.foot_radius import foot_radius
-from terrainkit_robots.spec.column import Column, collect_provenance, round_digits
+from terrainkit_robots.spec.column import Column, collect_provenance, rounded
 from terrainkit_robots.spec.robot_spec import Origin, Provenance, RobotSpec
 from terrainkit_robots.text import names
 
@@ -108,15 +108,15 @@ def _columns(facts: Facts, gains: "Mapping[str, Gain]") -> dict[str, Column]:
     origin = _pose_provenance(facts)
     for joint in facts.actuated:
         gain = gains[joint.name]
-        pose.add(joint.name, round_digits(facts.positions[joint.name]), origin)
+        pose.add(joint.name, rounded(facts.positions[joint.name]), origin)
         stiffness.add(
             joint.name,
-            round_digits(gain.stiffness, 3),
+            rounded(gain.stiffness, 3),
             _provenance("suggested", gain.reason),
         )
         damping.add(
             joint.name,
-            round_digits(gain.damping, 3),
+            rounded(gain.damping, 3),
             _provenance("suggested", "see stiffness"),
         )
     return {"default_pose": pose, "stiffness": stiffness, "damping": damping}
@@ -142,7 +142,7 @@ def _soft_limits(facts: Facts, pose: Mapping[str, float]) -> dict[str, tuple[flo
             continue
         lower, upper = joint.range
         margin = (1 - _SOFT_LIMIT_FACTOR) / 2 * (upper - lower)
-        soft = round_digits(lower + margin), round_digits(upper - margin)
+        soft = rounded(lower + margin), rounded(upper - margin)
         position = pose[joint.name]
         limits[joint.name] = min(soft[0], position), max(soft[1], position)
     return limits
@@ -162,7 +162,10 @@ def _reset_range(facts: Facts, pose: Mapping[str, float]) -> tuple[tuple[float, 
         if low == lowest > _DEFAULT_RESET_RANGE[0] or high == highest < _DEFAULT_RESET_RANGE[1]
     ]
     default = "{:g} to {:g}".format(*_DEFAULT_RESET_RANGE)
-    return inner, f"{default} as in legged_gym, reduced by the limits of {names(bound, most=2)}"
+    return (
+        inner,
+        f"{default} as in legged_gym, reduced by the limits of {names(bound, max_count=2)}",
+    )
 
 
 def _reset_scale(joint: Joint, position: float) -> tuple[float, float]:
@@ -209,7 +212,7 @@ def _lengths(facts: Facts) -> dict[str, tuple[float, Provenance]]:
     if facts.bodies[0].virtual:  # the base is the world, which has no height
         del found["base_height_target"], found["spawn_height"]
     return {
-        name: (round_digits(value), origin)
+        name: (rounded(value), origin)
         for name, (value, origin) in found.items()
         if value is not None and math.isfinite(value)
     }
