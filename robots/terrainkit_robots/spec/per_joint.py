@@ -12,7 +12,7 @@ from typing import Generic, TypeVar
 from terrainkit.errors import ConfigError
 from terrainkit.toml_text import key_text
 from terrainkit_robots.spec.pattern import compile_pattern, max_matches
-from terrainkit_robots.text import closest, names, short
+from terrainkit_robots.text import closest, names, truncate
 
 T = TypeVar("T")
 
@@ -64,19 +64,19 @@ class JointMatches(Generic[T]):
             partial: Whether joints may be missing.
         """
         for key, reason in self.invalid.items():
-            yield MatchError(name=key, message=f"{table}.{short(key_text(key))} is {reason}")
+            yield MatchError(name=key, message=f"{table}.{truncate(key_text(key))} is {reason}")
         for key, joint in self.unused.items():
             suggestion = f"; did you mean {joint}?" if joint else ""
-            message = f"{table}.{short(key_text(key))} matches no joint{suggestion}"
+            message = f"{table}.{truncate(key_text(key))} matches no joint{suggestion}"
             yield MatchError(name=key, message=message)
         for joint, keys in self.duplicate.items():
             listed = names(map(key_text, keys), separator=" and ")
             message = (
-                f"joint {short(joint)} is matched by {listed} of {table}; expected one of them"
+                f"joint {truncate(joint)} is matched by {listed} of {table}; expected one of them"
             )
             yield MatchError(name=joint, message=message)
         if self.unmatched and not partial:
-            subject = f"joint {short(self.unmatched[0])} is"
+            subject = f"joint {truncate(self.unmatched[0])} is"
             if len(self.unmatched) > 1:
                 subject = f"joints {names(self.unmatched)} are"
             message = f"{subject} matched by no key of {table}; expected one key for each joint"
