@@ -133,15 +133,16 @@ class Evaluate(PolicyCommand):
                 self.evaluation_config(self.seconds),
                 lambda fraction: steps.say(f"rollout: {fraction:.0%} of {self.seconds:g} s"),
             )
-        if self.format == "json" and output is None:
+        if self.format == "json":
             render.report(result.as_json())
-            return 0
-        render.result(summary_line(result))
-        render.table(result_rows(result))
+        else:
+            render.result(summary_line(result))
+            render.table(result_rows(result))
         if output is not None:
             with atomic_write(output, overwrite=self.overwrite) as path:
                 path.write_text(result.as_json(), encoding="utf-8")
-            render.result(f"wrote {output}")
+            if self.format == "table":
+                render.result(f"wrote {output}")
         return 0
 
 

@@ -81,6 +81,11 @@ def test_evaluate_writes_json_to_a_file(here, tmp_path, monkeypatch):
     assert (tmp_path / "result.json").read_text() == before
 
 
+def test_evaluate_prints_and_writes_the_same_json(here, tmp_path):
+    _, out, _ = here("walk", *QUICK, "--format", "json", "-o", "result.json")
+    assert out == (tmp_path / "result.json").read_text()
+
+
 def test_evaluate_loads_the_given_checkpoint(here):
     names = [
         json.loads(here(*run, *QUICK, "--format", "json")[1])["checkpoint"]
