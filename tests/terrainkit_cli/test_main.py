@@ -31,6 +31,11 @@ def test_every_command_has_help_for_every_option(terrainkit, name):
     ("words", "said"),
     [
         (("generat",), "no command 'generat'; did you mean 'generate'? There are: gen"),
+        (
+            ("check-robot", "quadruped", "--format", "jso"),
+            "--format: got 'jso'; did you mean 'json'?",
+        ),
+        (("check-robot", "quadrupd"), "did you mean 'quadruped'? Bundled robots are: biped"),
         (("generate",), "Missing from terrainkit generate: -o PATH"),
         (("generate", "-o", "a.npz", "--row", 3), "no option --row; did you mean --rows?"),
         (

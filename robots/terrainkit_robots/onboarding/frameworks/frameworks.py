@@ -10,7 +10,8 @@ from functools import cache
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from terrainkit.errors import ConfigError, listing
+from terrainkit.errors import ConfigError
+from terrainkit.text import expected_names
 from terrainkit_robots.onboarding import frameworks
 from terrainkit_robots.onboarding.derive_spec.named_bodies import body_name
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
@@ -35,7 +36,8 @@ def config_file_name(framework: str) -> str:
         ConfigError: if the framework is unknown.
     """
     if framework not in framework_names():
-        raise ConfigError(f"framework: got {framework!r}; expected {listing(framework_names())}")
+        expected = expected_names(framework, framework_names(), "expected")
+        raise ConfigError(f"framework: got {framework!r}; {expected}")
     return f"{framework}_config.py"  # a file with the name of the framework would shadow it
 
 
