@@ -133,28 +133,31 @@ class Evaluate(PolicyCommand):
                 self.evaluation_config(self.seconds),
                 lambda fraction: steps.say(f"rollout: {fraction:.0%} of {self.seconds:g} s"),
             )
-        if self.format == "json" and output is None:
+        if self.format == "json":
             render.report(result.as_json())
-            return 0
-        render.result(summary_line(result))
-        render.table(result_rows(result))
+        else:
+            render.result(summary_line(result))
+            render.table(result_rows(result))
         if output is not None:
             with atomic_write(output, overwrite=self.overwrite) as path:
                 path.write_text(result.as_json(), encoding="utf-8")
-            render.result(f"wrote {output}")
+            if self.format == "table":
+                render.result(f"wrote {output}")
         return 0
 
 
 def summary_line(result: "EvaluationResult") -> str:
     """Return the metrics of all robots as one line."""
-    whole = result.metrics
-    success = "" if whole.success is None else f", {_percent(whole.success)} success"
-    error = "; ".join(format_errors(whole))
-    if whole.lin_vel_error is None:
+    from terrainkit_robots.text import count, display_path
+
+    metrics, terrain = result.metrics, display_path(result.config.terrain or "plane")
+    success = "" if metrics.success is None else f", {_percent(metrics.success)} success"
+    error = "; ".join(format_errors(metrics))
+    if metrics.lin_vel_error is None:
         error = "not measured: no robot walked longer than 2 s after a command"
     return (
-        f"{result.robot}, {result.checkpoint}, on {result.config.terrain}: {whole.robots} robots, "
-        f"{whole.falls} fell{success}; error {error}"
+        f"{result.robot}, {result.checkpoint}, on {terrain}: {count(metrics.robots, 'robot')}, "
+        f"{metrics.falls} fell{success}; error {error}"
     )
 
 

@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, get_type_hints
 
 from terrainkit.errors import TerrainkitError
-from terrainkit.text import closest, truncate
+from terrainkit.text import closest, expected_names, truncate
 
 if TYPE_CHECKING:
     from typing import Self
@@ -126,4 +126,12 @@ def _one_line(box: str) -> str:
     parts = " ".join(row if row.strip("─╰╯+- ") else "\n" for row in rows).split("\n")
     texts = [part.strip() for part in parts]
     texts = [text for text in texts if text and not text.startswith(("For full", "Argument help"))]
-    return re.sub(r"^Error parsing (\S+): (?=\1: )", "", ". ".join(texts))
+    text = re.sub(r"^Error parsing (\S+): (?=\1: )", "", ". ".join(texts))
+    choice = re.fullmatch(
+        r"invalid choice '(.*)' for argument '(.*)'\. Expected one of \((.*)\)\.?", text
+    )
+    if choice is None:
+        return text
+    got, option, expected = choice.groups()
+    names = [name for name in re.findall(r"'([^']*)'", expected) if name != "None"]
+    return f"{option}: got {got!r}; {expected_names(got, names, 'expected one of')}"

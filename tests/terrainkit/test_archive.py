@@ -27,7 +27,7 @@ def archive(path):
         yield archive
 
 
-def test_arrays_go_by_their_names(archive):
+def test_archive_lists_array_names(archive):
     assert archive.names() == {"heights", "cell", "lower", "count", "words", "note"}
 
 
@@ -41,13 +41,13 @@ def test_arrays_go_by_their_names(archive):
         ("words", "U", (2,)),
     ],
 )
-def test_an_array_is_read_if_it_is_what_was_expected(archive, key, kind, shape):
+def test_archive_reads_expected_array(archive, key, kind, shape):
     array = archive.array(key, kind, shape)
     assert len(array.shape) == len(shape)
     assert array.dtype.kind == kind[0]
 
 
-def test_values_are_read_as_they_were_written(archive):
+def test_archive_check_value_accepts_equal_values(archive):
     assert archive.array("heights", "f4", (2, 3)).tolist() == [[0, 1, 2], [3, 4, 5]]
     assert archive.array("words", "U", (2,)).tolist() == ["slope", "\N{MOUNTAIN}"]
     assert archive.text("note") == "gr\u00fcn"
@@ -64,34 +64,34 @@ def test_values_are_read_as_they_were_written(archive):
         ("depths", "f4", (2, 3), "has no depths"),
     ],
 )
-def test_an_array_that_is_not_as_expected_is_refused(archive, key, kind, shape, message):
+def test_archive_rejects_unexpected_array(archive, key, kind, shape, message):
     with pytest.raises(MapFileError, match=message):
         archive.array(key, kind, shape)
 
 
-def test_an_array_may_take_its_limit_and_no_more(archive):
+def test_archive_limit_is_inclusive(archive):
     assert archive.array("heights", "f4", (2, 3), limit=24).nbytes == 24
     with pytest.raises(MapFileError, match="heights: got 24 bytes; expected at most 23"):
         archive.array("heights", "f4", (2, 3), limit=23)
 
 
 @pytest.mark.parametrize(("key", "wanted"), [("cell", 0.1), ("lower", (-1.0, 2.0))])
-def test_numbers_as_expected_pass(archive, key, wanted):
+def test_archive_check_value_accepts_rounding(archive, key, wanted):
     archive.check_value(key, wanted)
 
 
 @pytest.mark.parametrize(("key", "wanted"), [("cell", 0.1001), ("lower", (2.0, -1.0))])
-def test_other_numbers_are_refused(archive, key, wanted):
+def test_archive_check_value_rejects_others(archive, key, wanted):
     with pytest.raises(MapFileError, match=f"{key}: got .*; expected .* by its config"):
         archive.check_value(key, wanted)
 
 
-def test_the_name_of_a_file_may_be_a_text(path):
+def test_archive_path_may_be_a_string(path):
     with open_archive(str(path)) as archive:
         assert archive.path == path
 
 
-def test_a_header_that_claims_to_be_huge_is_not_read(tmp_path):
+def test_archive_rejects_huge_header(tmp_path):
     path = tmp_path / "bomb.npz"
     header = b"\x93NUMPY\x02\x00" + (1 << 31).to_bytes(4, "little")
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:

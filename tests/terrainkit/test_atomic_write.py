@@ -37,7 +37,7 @@ def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_what_is_written_is_there_once_the_block_is_through(target):
+def test_atomic_write_creates_file_at_the_end(target):
     with atomic_write(target) as temporary:
         temporary.write_text("new")
         assert not target.exists()
@@ -46,7 +46,7 @@ def test_what_is_written_is_there_once_the_block_is_through(target):
     assert names(target.parent) == ["map.npz"]
 
 
-def test_an_existing_file_is_kept(target):
+def test_atomic_write_keeps_existing_file(target):
     target.write_text("old")
     with pytest.raises(ExportError, match=r"map\.npz exists"):
         write(target)
@@ -54,13 +54,13 @@ def test_an_existing_file_is_kept(target):
     assert names(target.parent) == ["map.npz"]
 
 
-def test_an_existing_file_is_replaced_where_that_is_allowed(target):
+def test_atomic_write_replaces_with_overwrite(target):
     target.write_text("old")
     write(target, overwrite=True)
     assert target.read_text() == "new"
 
 
-def test_a_file_that_appears_meanwhile_is_kept(target):
+def test_atomic_write_keeps_file_created_meanwhile(target):
     with pytest.raises(ExportError, match="exists"):
         write(target, then=lambda _: target.write_text("other"))
     assert target.read_text() == "other"
@@ -68,14 +68,14 @@ def test_a_file_that_appears_meanwhile_is_kept(target):
 
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt, OSError])
-def test_an_error_inside_leaves_nothing_behind(target, error):
+def test_atomic_write_error_leaves_nothing(target, error):
     with pytest.raises((error, ExportError)):
         write(target, then=fail_with(error))
     assert names(target.parent) == []
 
 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt, OSError])
-def test_an_error_inside_leaves_the_file_that_was_there(target, error):
+def test_atomic_write_error_leaves_existing_file(target, error):
     target.write_text("old")
     with pytest.raises((error, ExportError)):
         write(target, then=fail_with(error), overwrite=True)
@@ -83,7 +83,7 @@ def test_an_error_inside_leaves_the_file_that_was_there(target, error):
     assert names(target.parent) == ["map.npz"]
 
 
-def test_a_full_disk_is_an_export_error(target):
+def test_atomic_write_full_disk_is_export_error(target):
     full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     with pytest.raises(ExportError, match=r"cannot write .*map\.npz: No space left on device"):
         write(target, then=fail_with(full))
@@ -91,17 +91,17 @@ def test_a_full_disk_is_an_export_error(target):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
-def test_a_disk_that_fills_up_while_writing_is_an_export_error(target):
+def test_atomic_write_disk_full_during_write(target):
     with pytest.raises(ExportError, match="No space left on device"):
         write(target, then=lambda _: Path("/dev/full").write_text("more"))
 
 
-def test_a_sidecar_moves_along(target):
+def test_atomic_write_moves_sidecar(target):
     write(target, then=write_sidecar)
     assert names(target.parent) == ["map.json", "map.npz"]
 
 
-def test_a_sidecar_replaces_no_file_that_is_there(target):
+def test_atomic_write_keeps_existing_sidecar(target):
     sidecar = target.with_suffix(".json")
     sidecar.write_text("mine")
     with pytest.raises(ExportError, match=r"map\.json exists"):
@@ -110,7 +110,7 @@ def test_a_sidecar_replaces_no_file_that_is_there(target):
     assert names(target.parent) == ["map.json"]
 
 
-def test_a_sidecar_is_replaced_with_the_file_where_that_is_allowed(target):
+def test_atomic_write_replaces_sidecar_with_overwrite(target):
     sidecar = target.with_suffix(".json")
     sidecar.write_text("mine")
     write(target, then=write_sidecar, overwrite=True)
@@ -118,20 +118,20 @@ def test_a_sidecar_is_replaced_with_the_file_where_that_is_allowed(target):
 
 
 @pytest.mark.parametrize("overwrite", [False, True])
-def test_a_folder_is_no_target(target, overwrite):
+def test_atomic_write_rejects_folder(target, overwrite):
     target.mkdir()
     with pytest.raises(ExportError, match=r"cannot write .*map\.npz: it is a folder"):
         write(target, overwrite=overwrite)
     assert names(target.parent) == ["map.npz"]
 
 
-def test_a_missing_folder_is_not_made(tmp_path):
+def test_atomic_write_rejects_missing_folder(tmp_path):
     with pytest.raises(ExportError, match=r"cannot write .*: the folder .*nowhere does not exist"):
         write(tmp_path / "nowhere" / "map.npz")
     assert names(tmp_path) == []
 
 
-def test_a_file_is_no_folder(target):
+def test_atomic_write_rejects_file_as_folder(target):
     target.write_text("old")
     with pytest.raises(ExportError, match="cannot write"):
         write(target / "map.npz")
@@ -139,7 +139,7 @@ def test_a_file_is_no_folder(target):
 
 
 @pytest.mark.parametrize("overwrite", [False, True])
-def test_a_fifo_is_no_target(target, overwrite):
+def test_atomic_write_rejects_fifo(target, overwrite):
     os.mkfifo(target)
     with pytest.raises(ExportError, match="it exists and is not a regular file"):
         write(target, overwrite=overwrite)
@@ -147,14 +147,14 @@ def test_a_fifo_is_no_target(target, overwrite):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
-def test_a_device_is_no_target(target):
+def test_atomic_write_rejects_device(target):
     target.symlink_to("/dev/full")
     with pytest.raises(ExportError, match="it exists and is not a regular file"):
         write(target, overwrite=True)
     assert target.is_char_device()
 
 
-def test_a_link_stays_one_and_what_it_leads_to_is_written(target):
+def test_atomic_write_keeps_symlink(target):
     target.symlink_to("elsewhere.txt")
     write(target)
     assert target.is_symlink()
@@ -163,7 +163,7 @@ def test_a_link_stays_one_and_what_it_leads_to_is_written(target):
         write(target)
 
 
-def test_what_is_written_through_a_link_has_the_name_of_the_link_until_it_is_there(target):
+def test_atomic_write_through_symlink_uses_its_name(target):
     target.symlink_to("blob")
     with atomic_write(target) as path:
         assert path.name == target.name
@@ -172,27 +172,27 @@ def test_what_is_written_through_a_link_has_the_name_of_the_link_until_it_is_the
     assert target.is_symlink()
 
 
-def test_a_link_to_itself_is_an_export_error(target):
+def test_atomic_write_rejects_symlink_to_itself(target):
     target.symlink_to(target.name)
     with pytest.raises(ExportError, match="cannot write"):
         write(target)
     assert target.is_symlink()
 
 
-def test_a_name_too_long_for_the_disk_is_an_export_error(tmp_path):
+def test_atomic_write_rejects_long_name(tmp_path):
     with pytest.raises(ExportError, match=r"cannot write .*: File name too long"):
         write(tmp_path / ("m" * 300))
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_read_only_folder_is_an_export_error(target):
+def test_atomic_write_rejects_read_only_folder(target):
     target.parent.chmod(0o500)
     with pytest.raises(ExportError, match=r"cannot write .*: Permission denied"):
         write(target)
     target.parent.chmod(0o700)
 
 
-def test_others_may_read_what_is_written_as_the_umask_says(target):
+def test_atomic_write_respects_umask(target):
     before = os.umask(0o022)
     write(target)
     os.umask(before)

@@ -47,7 +47,7 @@ def patch(terrain, *, size=(6.0, 4.0), **parameters):
 
 @given(heights=HEIGHTFIELDS, threshold=st.sampled_from([0.5, 1.5, 2.5]))
 @settings(deadline=None, derandomize=True, max_examples=100)
-def test_covered_cells_are_met_and_nothing_stands_above_the_ground(heights, threshold):
+def test_boxes_match_covered_cells(heights, threshold):
     cover = cover_of(heights, threshold)
     on, off = (points_in_cells(cells, 1.0, 0.0) for cells in (cover.covered, ~cover.covered))
     ground = surface_at(heights, on - 0.5, threshold=threshold).height
@@ -58,7 +58,7 @@ def test_covered_cells_are_met_and_nothing_stands_above_the_ground(heights, thre
 
 @given(heights=HEIGHTFIELDS, threshold=st.sampled_from([0.5, 1.5, 2.5]))
 @settings(deadline=None, derandomize=True, max_examples=100)
-def test_a_level_cell_is_level_all_over(heights, threshold):
+def test_level_cells_are_level_everywhere(heights, threshold):
     offsets = np.linspace(0.02, 0.98, 7) - 0.5
     steps = np.stack(np.meshgrid(offsets, offsets), axis=-1).reshape(-1, 2)
     place = (np.argwhere(np.ones(heights.shape))[:, None] + steps).reshape(-1, 2)
@@ -68,24 +68,24 @@ def test_a_level_cell_is_level_all_over(heights, threshold):
 
 @given(heights=HEIGHTFIELDS)
 @settings(deadline=None, derandomize=True, max_examples=50)
-def test_with_a_wall_at_every_step_the_boxes_hold_all_of_the_ground(heights):
+def test_boxes_cover_everything_with_walls_at_steps(heights):
     assert cover_of(heights, 0.5).complete
 
 
-def test_a_step_that_is_no_wall_leaves_the_cells_on_both_sides_to_a_heightfield():
+def test_boxes_exclude_cells_at_ramps():
     heights = np.array([[0], [0], [0], [1], [1]], dtype=np.float32)
     assert level_of(heights, 2.0)[:, 0].tolist() == [True, True, False, False, True]
     assert not cover_of(heights, 2.0).complete
 
 
-def test_a_level_map_is_met_to_a_millimeter_everywhere(level_map):
+def test_boxes_match_a_level_map(level_map):
     cover = level_map.boxes()
     assert cover.complete
     place = points_in_cells(cover.covered, level_map.config.cell, level_map.grid.lower)
     np.testing.assert_allclose(top_at(cover, place), level_map.height(place), atol=1e-3)
 
 
-def test_a_map_with_slopes_is_met_where_it_is_level_and_nowhere_exceeded(terrain_map):
+def test_boxes_never_exceed_a_map_with_slopes(terrain_map):
     cover = terrain_map.boxes()
     assert not cover.complete
     assert 0.5 < cover.covered.mean() < 1.0
@@ -95,14 +95,14 @@ def test_a_map_with_slopes_is_met_where_it_is_level_and_nowhere_exceeded(terrain
     assert (top_at(cover, off) < terrain_map.height(off) + 1e-3).all()
 
 
-def test_every_box_reaches_a_metre_below_the_lowest_ground(level_map):
+def test_boxes_extend_one_meter_below_the_ground(level_map):
     cover = level_map.boxes()
     bottoms = cover.centers[:, 2] - cover.half_sizes[:, 2]
     np.testing.assert_allclose(bottoms, level_map.heights.min() - 1.0)
     assert (cover.half_sizes > 0).all()
 
 
-def test_a_flat_map_is_one_box():
+def test_boxes_of_a_flat_map_are_one():
     config = MapConfig(
         rows=2, cols=3, patch_size=(8.0, 4.0), border=1.0, terrains=(SubTerrain(terrain="flat"),)
     )
@@ -112,36 +112,36 @@ def test_a_flat_map_is_one_box():
 
 
 @pytest.mark.parametrize("steps", [1, 2, 4])
-def test_a_pyramid_of_n_steps_is_a_stack_of_n_plus_1_boxes(steps):
+def test_boxes_of_pyramid_stairs_are_a_stack(steps):
     # Steps of half a metre on either side of the platform, in a patch of 5 m.
     pyramid = patch("pyramid_stairs", size=(5.0, 5.0), step_width=0.5, platform=5.0 - steps)
     assert len(pyramid.boxes().centers) == steps + 1
 
 
-def test_a_pit_is_its_floor_and_four_boxes_around():
+def test_boxes_of_a_pit_are_five():
     pit = patch("pit", depth=1.0, side=2.0)
     assert len(pit.boxes().centers) == 4 + 1
 
 
-def test_an_inverted_pyramid_is_its_floor_and_four_boxes_a_step():
+def test_boxes_of_inverted_pyramid_are_four_per_step():
     bowl = patch("pyramid_stairs", size=(5.0, 5.0), step_width=0.5, platform=2.0, inverted=True)
     assert len(bowl.boxes().centers) == 3 * 4 + 1
 
 
 @pytest.mark.parametrize("inverted", [False, True])
-def test_a_flight_of_stairs_is_a_box_a_tread(inverted):
+def test_boxes_of_stairs_are_one_per_tread(inverted):
     stairs = patch("stairs", step_height=0.2, step_width=0.4, landing=1.0, inverted=inverted)
     assert len(stairs.boxes().centers) == len(np.unique(stairs.heights))
 
 
-def test_a_slope_is_boxes_under_its_level_ends_alone():
+def test_boxes_of_a_slope_are_its_level_ends():
     cover = patch("slope", grade=0.3, landing=1.5).boxes()
     assert len(cover.centers) == 2
     # From the last of 15 cells that leans upwards to the first that is as high as the landing.
     assert np.flatnonzero(~cover.covered.all(axis=1)).tolist() == list(range(14, 45))
 
 
-def test_many_heights_are_covered_too():
+def test_boxes_of_many_heights_match():
     # 60 columns of cells, each a level of its own: more than are searched over the whole block.
     heights = np.repeat(np.arange(60, dtype=np.float32)[:, None], 20, axis=1)
     cover = decompose_boxes(

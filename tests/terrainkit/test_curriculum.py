@@ -11,18 +11,18 @@ def update(levels, distance, command_distance, *, rows=10, seed=0, **options):
     )
 
 
-def test_columns_share_the_environments_in_order():
+def test_assign_levels_shares_columns_in_order():
     _, columns = assign_levels(8, 10, 4, None, seed=0)
     assert columns.tolist() == [0, 0, 1, 1, 2, 2, 3, 3]
 
 
-def test_fewer_environments_than_columns_are_spread_over_them():
+def test_assign_levels_spreads_few_environments():
     _, columns = assign_levels(5, 10, 10, None, seed=0)
     assert columns.tolist() == [0, 2, 4, 6, 8]
 
 
 @pytest.mark.parametrize("num_envs", [1, 7, 19, 20, 21, 4096])
-def test_any_number_of_environments_is_shared_evenly(num_envs):
+def test_assign_levels_is_even_for_any_number(num_envs):
     levels, columns = assign_levels(num_envs, 10, 20, None, seed=0)
     assert levels.shape == columns.shape == (num_envs,)
     assert (np.diff(columns) >= 0).all()
@@ -31,7 +31,7 @@ def test_any_number_of_environments_is_shared_evenly(num_envs):
     assert np.ptp(shares) <= 1
 
 
-def test_no_environments_are_none():
+def test_assign_levels_of_no_environments():
     levels, columns = assign_levels(0, 10, 20, None, seed=0)
     assert levels.shape == columns.shape == (0,)
 
@@ -39,23 +39,23 @@ def test_no_environments_are_none():
 @pytest.mark.parametrize(
     ("highest", "levels"), [(0, {0}), (5, set(range(6))), (None, set(range(10)))]
 )
-def test_levels_are_drawn_up_to_the_highest(highest, levels):
+def test_assign_levels_respects_max_init_level(highest, levels):
     assert set(assign_levels(1000, 10, 20, highest, seed=0)[0].tolist()) == levels
 
 
-def test_levels_are_seeded():
+def test_assign_levels_is_seeded():
     one, again, other = (assign_levels(100, 10, 20, None, seed)[0] for seed in (1, 1, 2))
     assert (one == again).all()
     assert (one != other).any()
 
 
-def test_a_negative_number_of_environments_is_refused():
+def test_assign_levels_rejects_negative_number():
     with pytest.raises(ConfigError, match="num_envs: got -1; expected 0 or more"):
         assign_levels(-1, 10, 20, None, seed=0)
 
 
 @pytest.mark.parametrize("highest", [-1, 10])
-def test_a_level_that_is_not_on_the_map_is_refused(highest):
+def test_assign_levels_rejects_unknown_level(highest):
     with pytest.raises(ConfigError, match=f"max_init_level: got {highest}; expected 0 to 9"):
         assign_levels(8, 10, 20, highest, seed=0)
 
@@ -73,19 +73,19 @@ def test_a_level_that_is_not_on_the_map_is_refused(highest):
         (1.0, 2.1, 4),
     ],
 )
-def test_who_walks_far_moves_up_and_who_falls_short_moves_down(distance, command_distance, level):
+def test_update_levels_moves_up_and_down(distance, command_distance, level):
     assert update([5], [distance], [command_distance]).tolist() == [level]
 
 
-def test_each_environment_moves_on_its_own():
+def test_update_levels_is_per_environment():
     assert update([1, 2, 3], [8.0, 0.0, 3.0], [8.0, 8.0, 5.0]).tolist() == [2, 1, 3]
 
 
-def test_level_zero_is_the_lowest():
+def test_update_levels_stops_at_zero():
     assert update([0], [0.0], [8.0]).tolist() == [0]
 
 
-def test_who_solves_the_last_row_goes_to_one_of_the_last_three():
+def test_update_levels_spreads_solved_over_last_rows():
     solved = update(np.full(300, 9), np.full(300, 8.0), np.full(300, 8.0))
     assert np.bincount(solved, minlength=10)[7:].min() > 60
     assert solved.min() == 7
@@ -94,25 +94,25 @@ def test_who_solves_the_last_row_goes_to_one_of_the_last_three():
 @pytest.mark.parametrize(
     ("rows", "top_levels", "levels"), [(10, 1, {9}), (2, 3, {0, 1}), (1, 3, {0})]
 )
-def test_top_levels_are_at_most_the_rows(rows, top_levels, levels):
+def test_update_levels_limits_top_levels_to_rows(rows, top_levels, levels):
     last = np.full(100, rows - 1)
     solved = update(last, np.full(100, 8.0), np.full(100, 8.0), rows=rows, top_levels=top_levels)
     assert set(solved.tolist()) == levels
 
 
-def test_the_draws_are_seeded_by_a_number_or_several():
+def test_update_levels_accepts_seed_sequences():
     last, far = np.full(100, 9), np.full(100, 8.0)
     assert (update(last, far, far, seed=(0, 1)) == update(last, far, far, seed=(0, 1))).all()
     assert (update(last, far, far, seed=(0, 1)) != update(last, far, far, seed=(0, 2))).any()
 
 
-def test_the_levels_before_are_left_alone():
+def test_update_levels_keeps_its_input():
     before = np.array([1, 2, 3])
     update(before, [8.0, 8.0, 8.0], [8.0, 8.0, 8.0])
     assert before.tolist() == [1, 2, 3]
 
 
-def test_no_environments_have_no_levels():
+def test_update_levels_of_no_environments():
     assert update([], [], []).shape == (0,)
 
 
@@ -120,12 +120,12 @@ def test_no_environments_have_no_levels():
     ("levels", "message"),
     [([0, 10], "levels: got 0 to 10; expected 0 to 9"), ([-1, 3], "levels: got -1 to 3")],
 )
-def test_levels_off_the_map_are_refused(levels, message):
+def test_update_levels_rejects_unknown_levels(levels, message):
     with pytest.raises(ConfigError, match=message):
         update(levels, [0.0, 0.0], [0.0, 0.0])
 
 
-def test_top_levels_below_one_are_refused():
+def test_update_levels_rejects_top_levels_below_one():
     with pytest.raises(ConfigError, match="top_levels: got 0; expected 1 or more"):
         update([0], [0.0], [0.0], top_levels=0)
 
@@ -139,21 +139,21 @@ def careers(can_walk, episodes=120, num_envs=200):
     return levels
 
 
-def test_robots_that_walk_everything_reach_the_top_and_stay_near_it():
+def test_update_levels_perfect_robots_reach_the_top():
     levels = careers(lambda levels, _: levels < 10)
     assert levels.min() >= 7
     assert set(levels.tolist()) == {7, 8, 9}
 
 
-def test_robots_that_fall_now_and_then_stay_near_the_top():
+def test_update_levels_imperfect_robots_stay_near_the_top():
     levels = careers(lambda levels, rng: rng.random(levels.size) < 0.85)
     assert levels.mean() > 7.5
 
 
-def test_robots_settle_at_the_level_they_can_walk():
+def test_update_levels_settle_at_walkable_level():
     levels = careers(lambda levels, _: levels <= 4)
     assert set(levels.tolist()) <= {4, 5}
 
 
-def test_robots_that_walk_nothing_end_at_the_bottom():
+def test_update_levels_standing_robots_end_at_zero():
     assert not careers(lambda levels, _: levels < 0).any()

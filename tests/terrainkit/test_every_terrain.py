@@ -70,7 +70,7 @@ def assert_spawns_are_inside(terrain_map, radius):
 
 @every_plot
 @every_terrain
-def test_heights_are_finite_float32_of_the_shape_of_the_patch(terrain, given_parameters, grid):
+def test_every_terrain_heights_are_finite_float32(terrain, given_parameters, grid):
     for heights in at_every_difficulty(terrain, given_parameters, grid):
         assert heights.dtype == np.float32
         assert heights.shape == grid.shape
@@ -87,7 +87,7 @@ def test_heights_are_finite_float32_of_the_shape_of_the_patch(terrain, given_par
     ],
 )
 @pytest.mark.parametrize("size", [4.0, 7.9])
-def test_a_block_as_wide_as_the_patch_is_refused(terrain, block, size):
+def test_every_terrain_rejects_block_as_wide_as_patch(terrain, block, size):
     grid = Grid(shape=(round(size / 0.1),) * 2, cell=0.1)
     choice = SubTerrain(terrain=terrain, parameters={block: size})
     with pytest.raises(ConfigError, match=f"{block} {size:g} m fills the whole patch of"):
@@ -97,7 +97,7 @@ def test_a_block_as_wide_as_the_patch_is_refused(terrain, block, size):
 @coarse
 @every_plot
 @every_terrain
-def test_every_spawn_is_a_level_disc_on_the_ground(terrain, given_parameters, grid):
+def test_every_terrain_spawn_is_level(terrain, given_parameters, grid):
     terrain_map = map_of(terrain, given_parameters, grid)
     assert_spawns_are_level(terrain_map, 0.5)
     assert_spawns_are_inside(terrain_map, 0.5)
@@ -112,21 +112,21 @@ def test_every_spawn_is_a_level_disc_on_the_ground(terrain, given_parameters, gr
     ],
 )
 @every_terrain
-def test_every_spawn_is_level_whatever_the_map(terrain, given_parameters, rest):
+def test_every_terrain_spawn_is_level_on_any_map(terrain, given_parameters, rest):
     terrain_map = map_of(terrain, given_parameters, Grid(shape=(80, 80), cell=0.1), **rest)
     assert_spawns_are_level(terrain_map, terrain_map.config.spawn_radius)
     assert_spawns_are_inside(terrain_map, terrain_map.config.spawn_radius)
 
 
 @every_terrain
-def test_the_same_draws_make_the_same_bytes(terrain, given_parameters):
+def test_every_terrain_is_deterministic(terrain, given_parameters):
     grid = Grid(shape=(73, 51), cell=0.1)
     once, again = (at_every_difficulty(terrain, given_parameters, grid, seed=3) for _ in "ab")
     assert [heights.tobytes() for heights in once] == [heights.tobytes() for heights in again]
 
 
 @every_terrain
-def test_a_terrain_that_draws_is_another_with_another_seed(terrain, given_parameters):
+def test_every_terrain_depends_on_the_seed(terrain, given_parameters):
     grid, rng = Grid(shape=(80, 80), cell=0.1), np.random.default_rng(1)
     one = SubTerrain(terrain=terrain, parameters=given_parameters).at(1.0)
     heights = one.build(grid, rng)
@@ -136,7 +136,7 @@ def test_a_terrain_that_draws_is_another_with_another_seed(terrain, given_parame
 
 
 @every_terrain
-def test_heights_do_not_hang_on_where_the_patch_stands(terrain, given_parameters):
+def test_every_terrain_is_independent_of_position(terrain, given_parameters):
     here, there = (
         Grid(shape=(80, 80), cell=0.1, lower=lower) for lower in ((0.0, 0.0), (72.0, -13.0))
     )
@@ -147,7 +147,7 @@ def test_heights_do_not_hang_on_where_the_patch_stands(terrain, given_parameters
 
 
 @every_terrain
-def test_numpys_global_random_state_is_neither_read_nor_changed(terrain, given_parameters):
+def test_every_terrain_ignores_global_random_state(terrain, given_parameters):
     grid = Grid(shape=(80, 80), cell=0.1)
     np.random.seed(1)  # noqa: NPY002
     first = at_every_difficulty(terrain, given_parameters, grid)
@@ -159,7 +159,7 @@ def test_numpys_global_random_state_is_neither_read_nor_changed(terrain, given_p
 
 @every_plot
 @every_terrain
-def test_hardness_does_not_fall_as_the_difficulty_rises(terrain, given_parameters, grid):
+def test_every_terrain_measured_difficulty_does_not_decrease(terrain, given_parameters, grid):
     x, y = registry.get_terrain(terrain).at(0.0).spawn(grid)
     start = int(x / grid.cell), int(y / grid.cell)
     hard = [
@@ -177,7 +177,7 @@ def test_hardness_does_not_fall_as_the_difficulty_rises(terrain, given_parameter
     ids=["8x8", "7.3x5.1", "fine", "coarse"],
 )
 @every_terrain
-def test_what_is_built_is_within_a_cell_of_what_is_asked(terrain, given_parameters, shape, cell):
+def test_every_terrain_is_realized_within_a_cell(terrain, given_parameters, shape, cell):
     grid = Grid(shape=shape, cell=cell)
     for difficulty in DIFFICULTIES:
         built = registry.get_terrain(terrain).at(difficulty, given_parameters)
@@ -201,7 +201,7 @@ def test_what_is_built_is_within_a_cell_of_what_is_asked(terrain, given_paramete
         for key in parameters_of(registry.get_terrain(name))
     ],
 )
-def test_a_number_beyond_all_measure_is_built_or_refused(terrain, parameter, value):
+def test_every_terrain_builds_or_rejects_extreme_values(terrain, parameter, value):
     kind = type(parameters_of(registry.get_terrain(terrain))[parameter].easy)
     grid = Grid(shape=(80, 80), cell=0.1)
     try:
@@ -223,7 +223,7 @@ def test_a_number_beyond_all_measure_is_built_or_refused(terrain, parameter, val
     difficulty=st.floats(0, 1),
     radius=st.sampled_from([0.1, 0.3, 0.5]),
 )
-def test_any_patch_is_built_with_room_to_start_or_refused(variant, shape, cell, difficulty, radius):
+def test_every_terrain_builds_or_rejects_any_patch(variant, shape, cell, difficulty, radius):
     terrain, parameters = variant
     grid = Grid(shape=shape, cell=cell)
     config = MapConfig(

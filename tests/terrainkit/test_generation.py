@@ -24,7 +24,7 @@ def sha256(terrain_map):
     return hashlib.sha256(terrain_map.heights.tobytes()).hexdigest()
 
 
-def test_the_default_map_has_the_bytes_it_always_had():
+def test_generate_default_map_has_golden_bytes():
     terrain_map = generate(MapConfig())
     assert terrain_map.heights.shape == (1300, 1300)
     assert sha256(terrain_map) == (
@@ -32,7 +32,7 @@ def test_the_default_map_has_the_bytes_it_always_had():
     )
 
 
-def test_another_process_makes_the_same_bytes():
+def test_generate_is_the_same_in_another_process():
     code = (
         "import hashlib, terrainkit as t;"
         "m = t.generate(t.MapConfig(rows=3, cols=5, preset='rough', border=0.0, seed=3));"
@@ -46,11 +46,11 @@ def test_another_process_makes_the_same_bytes():
     assert other.stdout.strip() == sha256(here)
 
 
-def test_another_seed_makes_other_bytes():
+def test_generate_depends_on_the_seed():
     assert sha256(generate(MapConfig(seed=1))) != sha256(generate(MapConfig(seed=2)))
 
 
-def test_every_part_of_a_map_has_its_shape():
+def test_generate_arrays_have_their_shapes():
     terrain_map = generate(SMALL)
     # 3 x 80 and 4 x 60 cells, and 10 of border on each side.
     assert terrain_map.heights.shape == terrain_map.grid.shape == (260, 260)
@@ -62,7 +62,7 @@ def test_every_part_of_a_map_has_its_shape():
     assert terrain_map.parameters[2, 3].requested["step_height"] == 0.23
 
 
-def test_the_border_is_level_at_zero():
+def test_generate_border_is_level_at_zero():
     heights = generate(SMALL).heights.copy()
     assert heights.any()
     heights[10:-10, 10:-10] = 0.0
@@ -70,7 +70,7 @@ def test_the_border_is_level_at_zero():
 
 
 @pytest.mark.parametrize(("row", "col"), [(0, 0), (1, 2), (2, 0), (2, 3)])
-def test_a_tile_alone_equals_its_slice_of_the_map(row, col):
+def test_make_patch_equals_slice_of_the_map(row, col):
     terrain_map, patch = generate(SMALL), make_patch(SMALL, row, col)
     i, j = 10 + 80 * row, 10 + 60 * col
     assert patch.heights.tobytes() == terrain_map.heights[i : i + 80, j : j + 60].tobytes()
@@ -79,7 +79,7 @@ def test_a_tile_alone_equals_its_slice_of_the_map(row, col):
     assert patch.parameters == terrain_map.parameters[row, col]
 
 
-def test_editing_one_column_leaves_the_others_identical():
+def test_generate_change_of_one_column_is_local():
     edited = SubTerrain(terrain="stairs", parameters={"step_height": 0.3, "inverted": True})
     before = generate(SMALL).heights
     after = generate(replace(SMALL, terrains=(OBSTACLES, edited))).heights
@@ -88,13 +88,13 @@ def test_editing_one_column_leaves_the_others_identical():
     assert (before[:, start:] != after[:, start:]).any()
 
 
-def test_more_rows_leave_the_draws_of_the_first_ones_alone():
+def test_generate_more_rows_keep_the_first_ones():
     few = MapConfig(rows=2, cols=2, border=0.0, terrains=(OBSTACLES,))
     many = MapConfig(rows=5, cols=3, border=0.0, terrains=(OBSTACLES,))
     assert make_patch(few, 0, 1).heights.tobytes() == make_patch(many, 0, 1).heights.tobytes()
 
 
-def test_centered_moves_the_map_and_changes_nothing_else():
+def test_generate_centered_only_moves_the_map():
     corner, middle = generate(SMALL), generate(replace(SMALL, centered=True))
     assert corner.heights.tobytes() == middle.heights.tobytes()
     assert corner.grid.lower == (-1.0, -1.0)
@@ -105,13 +105,13 @@ def test_centered_moves_the_map_and_changes_nothing_else():
 
 
 @pytest.mark.parametrize("mode", Mode.__args__)
-def test_every_mode_makes_a_map(mode):
+def test_generate_supports_every_mode(mode):
     terrain_map = generate(MapConfig(rows=2, cols=2, border=0.0, mode=mode, terrains=(STAIRS,)))
     expected = {"curriculum": {0.0, 1.0}, "selected": {1.0}}.get(mode, {0.5, 0.75, 0.9})
     assert set(terrain_map.difficulty.astype(float).round(6).flat) <= expected
 
 
-def test_a_map_too_large_for_memory_says_what_it_needs_before_it_takes_anything():
+def test_generate_beyond_memory_is_rejected_early():
     config = MapConfig(rows=10_000, cols=10_000, terrains=(STAIRS,))
     tracemalloc.start()
     with pytest.raises(MemoryLimitError, match="a map of 800500 x 800500 samples needs") as caught:
@@ -134,7 +134,7 @@ def test_a_map_too_large_for_memory_says_what_it_needs_before_it_takes_anything(
     ],
     ids=lambda given: " ".join(f"{name}={value}" for name, value in given.items()),
 )
-def test_a_number_beyond_all_measure_makes_a_map_or_is_refused(given):
+def test_generate_builds_or_rejects_extreme_values(given):
     small = {"rows": 1, "cols": 1, "border": 0.0, "terrains": (ROUGH,)}
     try:
         terrain_map = generate(MapConfig(**small | given))
@@ -145,7 +145,7 @@ def test_a_number_beyond_all_measure_makes_a_map_or_is_refused(given):
     assert np.isfinite(terrain_map.height(np.array([[4.0, 4.0]]))).all()
 
 
-def test_numpys_global_random_state_is_neither_read_nor_changed():
+def test_generate_ignores_global_random_state():
     np.random.seed(1)  # noqa: NPY002
     first = generate(SMALL)
     after = np.random.random()  # noqa: NPY002
@@ -154,7 +154,7 @@ def test_numpys_global_random_state_is_neither_read_nor_changed():
     assert sha256(generate(SMALL)) == sha256(first)
 
 
-def test_progress_sees_every_patch():
+def test_generate_progress_wraps_every_patch():
     seen = []
 
     def watch(walk, total):
@@ -167,7 +167,7 @@ def test_progress_sees_every_patch():
     assert seen == [4, (0, 0), (0, 1), (1, 0), (1, 1)]
 
 
-def test_a_step_above_the_amplitude_makes_level_ground_which_is_told():
+def test_generate_warns_of_step_above_amplitude():
     choice = SubTerrain(terrain="rough", parameters={"amplitude": 0.004})
     with pytest.warns(TerrainkitWarning, match=r"height steps .* rough\.amplitude on 1 patch"):
         made = generate(MapConfig(rows=1, cols=1, border=0.0, terrains=(choice,)))
@@ -182,19 +182,19 @@ def test_a_step_above_the_amplitude_makes_level_ground_which_is_told():
         ("stairs", {"landing": 1.0, "step_width": 0.7}),
     ],
 )
-def test_a_robot_that_cannot_start_where_it_should_is_told(terrain, given):
+def test_generate_warns_of_moved_spawn(terrain, given):
     choice = SubTerrain(terrain=terrain, parameters=given)
     config = MapConfig(rows=3, cols=1, border=0.0, difficulty_range=(0.5, 1.0), terrains=(choice,))
     with pytest.warns(TerrainkitWarning, match=f"at the preferred spawn: {terrain} on 3 patch"):
         generate(config)
 
 
-def test_a_preset_with_too_few_columns_warns_once():
+def test_generate_warns_once_of_missing_columns():
     with pytest.warns(TerrainkitWarning, match="2 columns .*no column for rough_slope, ") as caught:
         generate(MapConfig(rows=2, cols=2, preset="rough", border=0.0))
     assert len(caught) == 1
 
 
-def test_a_terrain_that_does_not_fit_fails_the_map():
+def test_generate_rejects_terrain_that_does_not_fit():
     with pytest.raises(ConfigError, match=r"stairs: two landings of 2 m do not fit in a patch 3 m"):
         generate(MapConfig(patch_size=(3.0, 3.0), terrains=(STAIRS,)))

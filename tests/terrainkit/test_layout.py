@@ -52,7 +52,7 @@ def drawn(config):
         ([1], 7, [7]),
     ],
 )
-def test_seats_go_by_largest_remainder(proportions, num_columns, counts):
+def test_allocate_columns_uses_largest_remainder(proportions, num_columns, counts):
     assert allocate_columns(proportions, num_columns) == counts
 
 
@@ -60,7 +60,7 @@ def test_seats_go_by_largest_remainder(proportions, num_columns, counts):
 @given(
     weights=st.lists(st.integers(0, 100), min_size=1, max_size=12), num_columns=st.integers(1, 200)
 )
-def test_every_seat_is_given_and_each_count_is_its_share_rounded(weights, num_columns):
+def test_allocate_columns_rounds_exact_shares(weights, num_columns):
     weights[0] += 1
     counts = allocate_columns([float(w) for w in weights], num_columns)
     assert sum(counts) == num_columns
@@ -69,23 +69,23 @@ def test_every_seat_is_given_and_each_count_is_its_share_rounded(weights, num_co
         assert math.floor(share) <= n <= math.ceil(share)
 
 
-def test_columns_hold_the_terrains_in_the_order_of_the_mix():
+def test_terrain_columns_are_in_order():
     config = MapConfig(cols=6, terrains=mix(gap=3, flat=1, pit=2))
     assert terrain_columns(config) == [0, 0, 0, 1, 2, 2]
 
 
-def test_legged_gyms_ten_columns():
+def test_terrain_columns_of_legged_gym():
     assert terrain_columns(MapConfig()) == [0, 1, 2, 3, 3, 4, 5, 6, 7, 8]
 
 
-def test_a_terrain_of_ones_own_mix_without_a_column_is_an_error_that_names_it():
+def test_terrain_columns_reject_missing_custom_sub_terrain():
     with pytest.raises(
         ConfigError, match=r"2 columns are too few for 3 sub-terrains .*: no column for pit$"
     ):
         terrain_columns(MapConfig(cols=2, terrains=(FLAT, GAP, PIT)))
 
 
-def test_a_terrain_of_a_preset_without_a_column_is_a_warning_that_names_it():
+def test_terrain_columns_warn_of_missing_preset_sub_terrain():
     with pytest.warns(
         TerrainkitWarning,
         match=r"4 columns are too few for 5 sub-terrains .*: no column for wave \(preset rough\)",
@@ -94,34 +94,34 @@ def test_a_terrain_of_a_preset_without_a_column_is_a_warning_that_names_it():
     assert columns == [0, 1, 2, 3]
 
 
-def test_a_terrain_of_proportion_zero_wants_no_column():
+def test_terrain_columns_allow_zero_proportion():
     assert terrain_columns(MapConfig(cols=2, terrains=mix(flat=1, gap=0, pit=1))) == [0, 2]
 
 
 @pytest.mark.parametrize("rows", [2, 3, 7, 10, 49])
 @pytest.mark.parametrize("jitter", [0.0, 1.0])
-def test_difficulty_of_the_first_and_last_row_is_exact(rows, jitter):
+def test_assign_patch_first_and_last_difficulty_are_exact(rows, jitter):
     levels = difficulties(MapConfig(rows=rows, difficulty_jitter=jitter))
     assert levels[0] == 0.0
     assert levels[-1] == 1.0
 
 
-def test_a_difficulty_range_is_met_at_both_ends():
+def test_assign_patch_uses_difficulty_range():
     levels = difficulties(MapConfig(rows=4, difficulty_range=(0.1, 0.7)))
     assert levels == pytest.approx([0.1, 0.3, 0.5, 0.7])
     assert (levels[0], levels[-1]) == (0.1, 0.7)
 
 
-def test_difficulty_rises_in_even_steps():
+def test_assign_patch_difficulty_is_linear():
     assert difficulties(MapConfig(rows=5)) == [0.0, 0.25, 0.5, 0.75, 1.0]
 
 
-def test_one_row_is_the_easy_end():
+def test_assign_patch_single_row_is_easy():
     assert difficulties(MapConfig(rows=1)) == [0.0]
     assert difficulties(MapConfig(rows=1, difficulty_range=(0.4, 0.9))) == [0.4]
 
 
-def test_jitter_moves_the_middle_rows_by_at_most_its_share_of_a_step():
+def test_assign_patch_jitter_is_limited():
     config = MapConfig(rows=5, cols=40, difficulty_jitter=0.5)
     second = [difficulties(config, col)[1] for col in range(40)]
     assert len(set(second)) == 40
@@ -131,18 +131,18 @@ def test_jitter_moves_the_middle_rows_by_at_most_its_share_of_a_step():
     assert max(second) > 0.3
 
 
-def test_jitter_stays_within_the_range():
+def test_assign_patch_jitter_stays_in_range():
     config = MapConfig(rows=3, cols=60, difficulty_jitter=1.0, difficulty_range=(0.2, 0.4))
     assert all(0.2 <= difficulties(config, col)[1] <= 0.4 for col in range(60))
 
 
-def test_jitter_is_seeded():
+def test_assign_patch_jitter_is_seeded():
     one, other = (MapConfig(seed=seed, difficulty_jitter=0.5) for seed in (1, 2))
     assert difficulties(one) == difficulties(one)
     assert difficulties(one) != difficulties(other)
 
 
-def test_randomized_draws_terrains_by_proportion():
+def test_assign_patch_randomized_follows_proportions():
     config = MapConfig(mode="randomized", rows=40, cols=40, terrains=mix(flat=3, gap=1, pit=0))
     kinds = Counter(kind for kind, _ in drawn(config))
     # 1600 draws at 3/4: 1200, with a standard deviation of 17.
@@ -150,29 +150,29 @@ def test_randomized_draws_terrains_by_proportion():
     assert kinds[2] == 0
 
 
-def test_randomized_draws_from_the_difficulties_alone():
+def test_assign_patch_randomized_uses_given_difficulties():
     config = MapConfig(mode="randomized", random_difficulties=(0.1, 0.6), terrains=(FLAT,))
     levels = Counter(level for _, level in drawn(config))
     assert set(levels) == {0.1, 0.6}
     assert min(levels.values()) > 25
 
 
-def test_randomized_is_seeded():
+def test_assign_patch_randomized_is_seeded():
     one, other = (MapConfig(mode="randomized", seed=seed) for seed in (1, 2))
     assert drawn(one) == drawn(one)
     assert drawn(one) != drawn(other)
 
 
-def test_randomized_needs_no_column_for_each_terrain():
+def test_randomized_mode_needs_no_columns():
     config = MapConfig(mode="randomized", rows=20, cols=1, border=0.0, terrains=(FLAT, GAP))
     assert set(generate(config).terrain_types.flat) == {0, 1}
 
 
-def test_randomized_from_a_preset_warns_of_no_missing_columns():
+def test_randomized_mode_does_not_warn():
     terrain_map = generate(MapConfig(mode="randomized", rows=20, cols=2, border=0.0))
     assert len(set(terrain_map.terrain_types.flat)) > 2
 
 
-def test_selected_is_one_terrain_at_one_difficulty():
+def test_selected_mode_is_constant():
     config = MapConfig(mode="selected", selected_difficulty=0.3, terrains=(PIT,))
     assert set(drawn(config)) == {(0, 0.3)}

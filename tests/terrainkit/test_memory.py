@@ -7,25 +7,25 @@ from terrainkit.memory import check_memory
 
 
 @pytest.mark.parametrize("needed", [0, 1 << 20, 1 << 28, (1 << 28) + 1])
-def test_work_that_fits_is_let_through(needed):
+def test_check_memory_accepts_small_work(needed):
     check_memory(needed, "this test")
 
 
 @pytest.mark.parametrize("needed", [2 * psutil.virtual_memory().total, 1 << 62, 10**40])
-def test_work_beyond_the_memory_is_refused_with_both_numbers(needed):
+def test_check_memory_rejects_large_work(needed):
     with pytest.raises(
         MemoryLimitError, match=r"^a lot needs [\d.]+ GB of memory; [\d.]+ GB free$"
     ):
         check_memory(needed, "a lot")
 
 
-def test_the_error_is_one_to_catch_as_memory_error_too():
+def test_check_memory_error_is_a_memory_error():
     with pytest.raises(MemoryError) as error:
         check_memory(1 << 62, "a lot")
     assert isinstance(error.value, TerrainkitError)
 
 
-def test_a_map_beyond_the_memory_is_refused_before_it_is_begun():
+def test_check_memory_rejects_large_map():
     with pytest.raises(MemoryLimitError, match=r"a map of \d+ x \d+ samples needs .* GB of memory"):
         generate(MapConfig(rows=10_000, cols=10_000))
 
@@ -49,7 +49,7 @@ def group(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("name", [".", "job", "job/step"])
-def test_the_limit_of_a_control_group_counts(group, name):
+def test_check_memory_respects_control_group(group, name):
     group("job/step", "max")
     group(name, 3 * 10**9)
     check_memory(9 * 10**8, "a map")
@@ -57,7 +57,7 @@ def test_the_limit_of_a_control_group_counts(group, name):
         check_memory(11 * 10**8, "a map")
 
 
-def test_the_smallest_of_several_counts(group):
+def test_check_memory_uses_smallest_limit(group):
     group(".", 9 * 10**9)
     group("job", 3 * 10**9)
     group("job/step", 8 * 10**9)
@@ -65,7 +65,7 @@ def test_the_smallest_of_several_counts(group):
         check_memory(11 * 10**8, "a map")
 
 
-def test_copies_of_files_are_no_use_of_memory(group):
+def test_check_memory_ignores_page_cache(group):
     group("job", 3 * 10**9, used=28 * 10**8, cached=2 * 10**9)
     check_memory(21 * 10**8, "a map")
     with pytest.raises(MemoryLimitError, match=r"2\.2 GB free"):
@@ -73,11 +73,11 @@ def test_copies_of_files_are_no_use_of_memory(group):
 
 
 @pytest.mark.parametrize("limit", ["max", ""])
-def test_a_control_group_without_a_limit_does_not(group, limit):
+def test_check_memory_ignores_group_without_limit(group, limit):
     group("job", limit, used=1)
     check_memory(3 * 10**8, "a map")
 
 
-def test_a_limit_of_another_group_does_not(group):
+def test_check_memory_ignores_other_groups(group):
     group("other", 1)
     check_memory(3 * 10**8, "a map")

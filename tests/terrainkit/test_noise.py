@@ -15,25 +15,25 @@ def noise(*, seed=0, grid=PLOT, **fields):
     return node_grid(**fields).heights(grid, np.random.default_rng(seed))
 
 
-def test_noise_covers_the_plot():
+def test_value_noise_has_the_grid_shape():
     assert noise().shape == (60, 40)
 
 
 @pytest.mark.parametrize("step", [0.0, 0.005, 0.02, 0.05])
-def test_noise_stays_within_its_amplitude_and_takes_both_signs(step):
+def test_value_noise_is_within_amplitude(step):
     heights = noise(step=step)
     assert np.abs(heights).max() <= 0.05 + 1e-12
     assert heights.min() < -0.02
     assert heights.max() > 0.02
 
 
-def test_draws_are_multiples_of_the_step():
+def test_value_noise_is_a_multiple_of_the_step():
     # With a node at every corner of a cell, a sample is the mean of four nodes.
     quarters = noise(spacing=0.1, step=0.02) / (0.02 / 4)
     assert quarters == pytest.approx(np.round(quarters), abs=1e-9)
 
 
-def test_a_step_below_a_micrometre_is_none():
+def test_value_noise_tiny_step_is_continuous():
     assert (noise(step=9e-7) == noise(step=0.0)).all()
     assert (noise(step=1e-6) != noise(step=0.0)).any()
 
@@ -49,7 +49,7 @@ def test_a_step_below_a_micrometre_is_none():
         (0.0437, 0.0, 0.0437),
     ],
 )
-def test_the_largest_height_is_the_amplitude_in_whole_steps(amplitude, step, largest):
+def test_value_noise_amplitude_is_whole_steps(amplitude, step, largest):
     grid = Grid(shape=(200, 200), cell=0.1)
     assert node_grid(amplitude=amplitude, step=step).realized(grid)["amplitude"] == largest
     heights = noise(spacing=0.1, amplitude=amplitude, step=step, grid=grid)
@@ -58,13 +58,13 @@ def test_the_largest_height_is_the_amplitude_in_whole_steps(amplitude, step, lar
 
 
 @pytest.mark.parametrize("axis", [0, 1])
-def test_between_nodes_the_ground_is_straight_along_either_axis(axis):
+def test_value_noise_is_linear_between_nodes(axis):
     heights = noise(spacing=6.0, step=0.0)
     assert np.abs(np.diff(heights, axis=axis)).max() > 1e-6
     assert np.abs(np.diff(heights, 2, axis=axis)).max() < 1e-12
 
 
-def test_a_whole_number_of_intervals_spans_the_patch():
+def test_value_noise_has_whole_intervals():
     # 6 m at 2.6 m make two intervals of 3 m, so the ground bends at sample 30 and nowhere else.
     heights = noise(spacing=2.6, step=0.0)
     bends = np.abs(np.diff(heights, 2, axis=0)).max(axis=1) > 1e-12
@@ -86,27 +86,27 @@ def test_a_whole_number_of_intervals_spans_the_patch():
         ((80, 80), 0.1, 5e-324, 0.1),
     ],
 )
-def test_the_spacing_is_what_whole_intervals_make_of_it(shape, cell, asked, built):
+def test_value_noise_realized_spacing(shape, cell, asked, built):
     grid = Grid(shape=shape, cell=cell)
     assert node_grid(spacing=asked).realized(grid)["spacing"] == built
 
 
-def test_amplitude_scales_the_pattern_and_does_not_change_it():
+def test_value_noise_amplitude_scales_the_pattern():
     assert noise(amplitude=0.1, step=0.0) == pytest.approx(2 * noise(amplitude=0.05, step=0.0))
 
 
 @pytest.mark.parametrize(("amplitude", "step"), [(0.0, 0.0), (0.1, 0.0), (0.1, 0.005)])
-def test_the_number_of_draws_depends_on_neither_amplitude_nor_step(amplitude, step):
+def test_value_noise_draws_are_independent_of_amplitude(amplitude, step):
     rng, other = np.random.default_rng(3), np.random.default_rng(3)
     node_grid().heights(PLOT, rng)
     node_grid(amplitude=amplitude, step=step).heights(PLOT, other)
     assert rng.random() == other.random()
 
 
-def test_no_amplitude_is_level():
+def test_value_noise_without_amplitude_is_level():
     assert not noise(amplitude=0.0).any()
 
 
-def test_the_seed_decides():
+def test_value_noise_is_seeded():
     assert (noise(seed=1) == noise(seed=1)).all()
     assert (noise(seed=1) != noise(seed=2)).any()

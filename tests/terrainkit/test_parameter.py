@@ -26,13 +26,13 @@ class Hurdle:
 HURDLE = parameter.parameters_of(Hurdle)
 
 
-def test_parameters_keep_the_order_of_the_fields():
+def test_parameters_of_keeps_field_order():
     assert list(HURDLE) == [
         "rise", "width", "gap", "landing", "grade", "spacing", "number", "inverted",
     ]  # fmt: skip
 
 
-def test_a_field_defaults_to_its_hard_end():
+def test_parameter_default_is_the_hard_end():
     hurdle = Hurdle()
     assert hurdle.rise == 0.4
     assert hurdle.width == 0.2
@@ -40,11 +40,11 @@ def test_a_field_defaults_to_its_hard_end():
 
 
 @pytest.mark.parametrize(("difficulty", "rise"), [(0.0, 0.1), (0.5, 0.25), (1.0, 0.4)])
-def test_a_range_is_linear_in_the_difficulty(difficulty, rise):
+def test_parameter_range_is_linear(difficulty, rise):
     assert HURDLE["rise"].at(difficulty) == pytest.approx(rise)
 
 
-def test_counts_and_switches_are_the_same_at_every_difficulty():
+def test_parameter_count_and_switch_are_constant():
     assert HURDLE["number"].at(0.3) == 4
     assert isinstance(HURDLE["number"].at(0.3), int)
     assert HURDLE["inverted"].at(0.3) is False
@@ -52,7 +52,7 @@ def test_counts_and_switches_are_the_same_at_every_difficulty():
 
 @settings(deadline=None, derandomize=True)
 @given(easy=st.floats(-1e6, 1e6), hard=st.floats(-1e6, 1e6), d=st.floats(0, 1))
-def test_both_ends_of_a_range_are_exact_and_the_rest_lies_between(easy, hard, d):
+def test_at_difficulty_is_exact_at_both_ends(easy, hard, d):
     assert parameter.at_difficulty((easy, hard), 0.0) == easy
     assert parameter.at_difficulty((easy, hard), 1.0) == hard
     margin = 1e-9 * (abs(easy) + abs(hard))
@@ -60,7 +60,7 @@ def test_both_ends_of_a_range_are_exact_and_the_rest_lies_between(easy, hard, d)
     assert min(easy, hard) - margin <= between <= max(easy, hard) + margin
 
 
-def test_a_single_value_holds_at_every_difficulty():
+def test_at_difficulty_of_single_value():
     assert parameter.at_difficulty(0.3, 0.7) == 0.3
 
 
@@ -78,11 +78,11 @@ def test_a_single_value_holds_at_every_difficulty():
         ("inverted", True, True),
     ],
 )
-def test_realized_is_what_the_cells_hold(name, value, realized):
+def test_parameter_realized_snaps_to_cells(name, value, realized):
     assert HURDLE[name].realized(value, Grid(shape=(80, 40), cell=0.1)) == realized
 
 
-def test_a_platform_is_a_pair_where_only_one_axis_is_odd():
+def test_parameter_platform_may_be_a_pair():
     assert HURDLE["landing"].realized(3.0, Grid(shape=(80, 51), cell=0.1)) == (3.0, 3.1)
 
 

@@ -11,7 +11,7 @@ PIT = SubTerrain(terrain="pit")
 OBSTACLES = SubTerrain(terrain="obstacles")
 
 
-def test_a_patch_knows_what_it_is():
+def test_make_patch_describes_itself():
     choice = SubTerrain(terrain="pit", name="crater", parameters={"depth": (0.2, 0.6)})
     patch = make_patch(MapConfig(rows=3, cols=2, terrains=(choice,)), 1, 0)
     assert patch.terrain == "crater"
@@ -21,7 +21,7 @@ def test_a_patch_knows_what_it_is():
     assert patch.heights.dtype == np.float32
 
 
-def test_a_patch_stands_in_the_frame_of_the_map():
+def test_make_patch_is_in_the_map_frame():
     config = MapConfig(rows=3, cols=4, patch_size=(8.0, 4.0), terrains=(OBSTACLES,))
     patch = make_patch(config, 2, 3)
     assert patch.grid.lower == pytest.approx((16.0, 12.0))
@@ -29,19 +29,19 @@ def test_a_patch_stands_in_the_frame_of_the_map():
     assert patch.origin == pytest.approx((20.0, 14.0, 0.0))
 
 
-def test_the_origin_of_a_pit_is_on_its_floor():
+def test_make_patch_origin_of_a_pit():
     patch = make_patch(MapConfig(mode="selected", terrains=(PIT,)), 0, 1)
     assert patch.origin == pytest.approx((4.0, 12.0, -1.0))
 
 
-def test_what_was_asked_and_what_was_built_stand_side_by_side():
+def test_make_patch_records_requested_and_realized():
     choice = SubTerrain(terrain="gap", parameters={"width": 0.33, "platform": 3.1, "depth": 2.0})
     parameters = make_patch(MapConfig(terrains=(choice,)), 0, 0).parameters
     assert parameters.requested == {"width": 0.33, "platform": 3.1, "depth": 2.0}
     assert parameters.realized == {"width": 0.3, "platform": 3.2, "depth": 2.0}
 
 
-def test_a_patch_draws_from_the_seed_its_row_and_its_column():
+def test_make_patch_is_seeded_by_row_and_column():
     patch = make_patch(MapConfig(seed=7, terrains=(OBSTACLES,)), 3, 5)
     rng = np.random.default_rng(np.random.SeedSequence([7, 3, 5]))
     # Row 3 of 0 to 9 has difficulty 1/3.
@@ -49,21 +49,21 @@ def test_a_patch_draws_from_the_seed_its_row_and_its_column():
     assert patch.heights.tobytes() == alone.tobytes()
 
 
-def test_no_two_patches_are_alike():
+def test_make_patch_differs_between_patches():
     config = MapConfig(rows=4, cols=4, mode="selected", terrains=(OBSTACLES,))
     patches = [make_patch(config, row, col).heights.tobytes() for row, col in np.ndindex(4, 4)]
     assert len(set(patches)) == 16
 
 
 @pytest.mark.parametrize(("row", "col"), [(3, 0), (0, 4), (-1, 0), (0, -1)])
-def test_a_patch_beyond_the_map_is_an_index_error(row, col):
+def test_make_patch_rejects_unknown_index(row, col):
     with pytest.raises(
         IndexError, match=rf"no patch \({row}, {col}\) in a map of 3 rows and 4 columns"
     ):
         make_patch(MapConfig(rows=3, cols=4, terrains=(PIT,)), row, col)
 
 
-def test_no_room_to_start_is_an_error_that_names_the_terrain():
+def test_make_patch_without_spawn_is_rejected():
     choice = SubTerrain(terrain="rough", name="rubble", parameters={"platform": 0.4})
     with pytest.raises(
         ConfigError,
@@ -72,23 +72,23 @@ def test_no_room_to_start_is_an_error_that_names_the_terrain():
         make_patch(MapConfig(terrains=(choice,)), 9, 0)
 
 
-def test_a_terrain_that_does_not_fit_is_an_error():
+def test_make_patch_rejects_terrain_that_does_not_fit():
     choice = SubTerrain(terrain="pit", parameters={"side": 9.0})
     with pytest.raises(ConfigError, match="pit: side 9 m does not fit in a patch of 8 m x 8 m"):
         make_patch(MapConfig(terrains=(choice,)), 0, 0)
 
 
-def test_a_preset_with_too_few_columns_warns():
+def test_make_patch_warns_of_missing_columns():
     with pytest.warns(TerrainkitWarning, match="no column for wave"):
         make_patch(MapConfig(cols=4, preset="rough"), 0, 0)
 
 
-def test_a_patch_does_not_change():
+def test_patch_is_frozen():
     with pytest.raises(dataclasses.FrozenInstanceError):
         make_patch(MapConfig(terrains=(PIT,)), 0, 0).difficulty = 1.0
 
 
-def test_a_slope_above_the_threshold_would_be_walls():
+def test_make_patch_rejects_slope_above_threshold():
     steep = SubTerrain(terrain="pyramid_slope", parameters={"grade": 0.8})
     config = MapConfig(rows=1, cols=1, terrains=(steep,))
     with pytest.raises(

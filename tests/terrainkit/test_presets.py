@@ -5,14 +5,14 @@ from terrainkit.errors import ConfigError
 from terrainkit.parameter import parameters_of
 
 
-def test_an_unknown_preset_lists_those_that_exist():
+def test_get_preset_unknown_name_lists_presets():
     with pytest.raises(
         ConfigError, match=r"'leggedgym'; did you mean 'legged_gym'\? There are: legged_gym, rough"
     ):
         presets.get_preset("leggedgym")
 
 
-def test_legged_gym_has_its_nine_terrains_in_order():
+def test_get_preset_legged_gym_has_nine_sub_terrains():
     assert [(choice.name, choice.proportion) for choice in presets.get_preset("legged_gym")] == [
         ("pyramid_slope_inverted", 1),
         ("pyramid_slope", 1),
@@ -27,7 +27,7 @@ def test_legged_gym_has_its_nine_terrains_in_order():
 
 
 @pytest.mark.parametrize("name", registry.terrain_names())
-def test_all_holds_every_terrain_and_its_inverse(name):
+def test_get_preset_all_has_every_terrain(name):
     mix = {choice.name: choice for choice in presets.get_preset("all")}
     assert mix[name].at(1.0) == registry.get_terrain(name).at(1.0)
     inverse = mix.get(f"{name}_inverted")
@@ -38,6 +38,6 @@ def test_all_holds_every_terrain_and_its_inverse(name):
 
 
 @pytest.mark.parametrize("name", presets.preset_names())
-def test_every_preset_makes_a_map_with_each_of_its_terrains(name):
+def test_every_preset_generates_a_map(name):
     terrain_map = generate(MapConfig(preset=name, rows=2, cols=20, border=0.0))
     assert set(terrain_map.terrain_types.flat) == set(range(len(terrain_map.terrain_names)))

@@ -16,14 +16,14 @@ def pits():
     return tk.generate(tk.MapConfig(rows=3, cols=1, border=1.0, terrains=(pit,)))
 
 
-def test_x_is_to_the_right(pits):
+def test_preview_x_is_to_the_right(pits):
     picture = render_preview(pits, 520)  # 26 m along x: 20 px for a metre
     left, _, _, above = 250, 60, 30, 70
     first, last = (picture[above + 100, left + 20 + row * 160 + 30].astype(int) for row in (0, 2))
     assert np.abs(last - first).max() > 40
 
 
-def test_y_is_up():
+def test_preview_y_is_up():
     bowl = tk.SubTerrain(terrain="pyramid_slope", name="bowl", parameters={"inverted": True})
     config = tk.MapConfig(
         rows=1,
@@ -38,30 +38,30 @@ def test_y_is_up():
     assert np.abs(top - bottom).max() > 40
 
 
-def test_the_ground_is_at_least_as_wide_as_asked(pits):
+def test_preview_has_the_minimum_width(pits):
     for width in (100, 520, 1000):
         ground = render_preview(pits, width).shape[1] - 250 - 30
         assert width <= ground < 2 * max(width, 260)
 
 
-def test_every_name_is_written_on_the_paper(pits):
+def test_preview_labels_every_column(pits):
     picture = render_preview(pits, 520)
     assert (picture[:, :250] != PAPER).any()
 
 
-def test_ground_that_faces_the_light_is_brighter():
+def test_shaded_relief_is_brighter_toward_the_light():
     x = np.arange(20, dtype=np.float32)[:, None] * np.ones((1, 20), np.float32) * 0.01
     facing, away = shaded_relief(x, 0.1)[10, 10].sum(), shaded_relief(x[::-1], 0.1)[10, 10].sum()
     assert facing > away
 
 
-def test_low_ground_is_bluer_and_high_ground_redder():
+def test_height_colors_are_blue_to_red():
     low, high = height_colors(np.array([-1.0, 1.0]))
     assert low[2] > low[0]
     assert high[0] > high[2]
 
 
-def test_it_is_written_whole(pits, tmp_path):
+def test_write_preview_writes_the_image(pits, tmp_path):
     path = write_preview(pits, tmp_path / "a.png", width=300)
     assert (cv2.imread(str(path))[..., ::-1] == render_preview(pits, 300)).all()
 
@@ -75,13 +75,13 @@ def test_it_is_written_whole(pits, tmp_path):
         ("no/a.png", 300, "does not exist"),
     ],
 )
-def test_bad_input_writes_nothing(pits, tmp_path, name, width, said):
+def test_write_preview_rejects_invalid_input(pits, tmp_path, name, width, said):
     with pytest.raises(ExportError, match=said):
         write_preview(pits, tmp_path / name, width=width)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_existing_picture_stays_unless_told(pits, tmp_path):
+def test_write_preview_keeps_existing_file(pits, tmp_path):
     target = tmp_path / "a.png"
     target.write_text("mine")
     with pytest.raises(ExportError, match="exists"):
@@ -91,7 +91,7 @@ def test_an_existing_picture_stays_unless_told(pits, tmp_path):
     assert target.read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_long_map_stays_within_bounds():
+def test_preview_of_a_long_map_is_limited():
     flat = tk.SubTerrain(terrain="flat")
     config = tk.MapConfig(
         rows=1, cols=300, patch_size=(2.0, 2.0), cell=0.2, border=0.0, terrains=(flat,)

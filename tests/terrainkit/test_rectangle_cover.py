@@ -33,7 +33,7 @@ def cells(spans, shape):
         ("##..## ...... ##..##", 4),
     ],
 )
-def test_a_shape_takes_the_fewest_rectangles(shape, number):
+def test_rectangle_cover_is_minimal_for_simple_shapes(shape, number):
     wanted = mask(shape)
     spans = rectangle_cover(wanted, wanted)
     assert len(spans) == number
@@ -49,11 +49,11 @@ def test_a_shape_takes_the_fewest_rectangles(shape, number):
         ("#...# #...#", "##### #...#", 2),
     ],
 )
-def test_rectangles_may_run_over_what_is_allowed(wanted, allowed, number):
+def test_rectangle_cover_may_use_allowed_cells(wanted, allowed, number):
     assert len(rectangle_cover(mask(wanted), mask(allowed))) == number
 
 
-def test_spans_are_first_index_before_second():
+def test_rectangle_cover_spans_are_first_index_first():
     assert rectangle_cover(mask(".... .###"), mask(".... .###")) == [(1, 2, 1, 4)]
 
 
@@ -68,7 +68,7 @@ MASKS = arrays(
 
 @given(MASKS)
 @settings(deadline=None, derandomize=True, max_examples=150)
-def test_all_wanted_nothing_but_allowed_and_no_rectangle_in_vain(masks):
+def test_rectangle_cover_is_exact_and_not_redundant(masks):
     wanted, allowed = masks
     spans = rectangle_cover(wanted, allowed)
     count = cells(spans, wanted.shape)
@@ -79,7 +79,7 @@ def test_all_wanted_nothing_but_allowed_and_no_rectangle_in_vain(masks):
         assert (alone & wanted[i0:i1, j0:j1]).any()
 
 
-def test_a_large_shape_of_few_rectangles_stays_few():
+def test_rectangle_cover_of_large_shape_is_small():
     wanted = np.zeros((400, 300), dtype=bool)
     wanted[20:380, 30:60] = wanted[20:380, 200:230] = wanted[100:130, 30:230] = True
     assert len(rectangle_cover(wanted, wanted)) == 3

@@ -38,38 +38,38 @@ def moon(tmp_path, monkeypatch):
     sys.modules.pop("terrainkit.terrains.moon", None)
 
 
-def test_names_are_the_files_in_alphabetical_order():
+def test_terrain_names_are_the_modules():
     files = Path(terrains.__path__[0]).glob("*.py")
     assert list(registry.terrain_names()) == sorted({file.stem for file in files} - {"__init__"})
 
 
 @pytest.mark.parametrize("name", registry.terrain_names())
-def test_a_terrain_goes_by_the_name_of_its_file(name):
+def test_get_terrain_uses_the_module_name(name):
     assert registry.get_terrain(name).kind() == name
 
 
-def test_a_terrain_that_uses_another_is_still_found_by_its_own_name():
+def test_get_terrain_ignores_imported_terrains():
     assert registry.get_terrain("rough_slope").__name__ == "RoughSlope"
 
 
-def test_an_unknown_name_lists_those_that_exist():
+def test_get_terrain_unknown_name_lists_terrains():
     with pytest.raises(ConfigError, match=r"did you mean 'stairs'\? There are: flat, .*, wave$"):
         registry.get_terrain("stair")
 
 
-def test_the_name_of_an_inverted_terrain_says_what_to_ask_for():
+def test_get_terrain_suggests_inverted_option():
     with pytest.raises(ConfigError, match=r"use pyramid_stairs with inverted = true$"):
         registry.get_terrain("pyramid_stairs_inverted")
 
 
 @pytest.mark.parametrize("name", ["flat_inverted", "stair_inverted", "_inverted"])
-def test_what_cannot_be_inverted_is_unknown_as_any_other(name):
+def test_get_terrain_without_inverted_is_unknown(name):
     with pytest.raises(ConfigError, match=rf"no terrain '{name}'; there are: flat, gap, .*, wave$"):
         registry.get_terrain(name)
 
 
 @pytest.mark.usefixtures("moon")
-def test_a_new_file_is_a_new_terrain():
+def test_new_module_is_a_terrain():
     assert "moon" in registry.terrain_names()
     terrain = registry.get_terrain("moon").at(0.5)
     heights = terrain.build(Grid(shape=(3, 2), cell=0.1), np.random.default_rng(0))
@@ -90,14 +90,14 @@ class _Turned(Terrain):
         return np.zeros(grid.shape[::-1])
 
 
-def test_a_plain_field_is_named():
+def test_plain_field_is_rejected():
     with pytest.raises(
         ConfigError, match="_Careless: number is a plain field; expected one declared"
     ):
         _Careless()
 
 
-def test_heights_of_another_shape_are_named():
+def test_heights_of_wrong_shape_are_rejected():
     with pytest.raises(ConfigError, match=r"shape \(4, 8\); expected \(8, 4\)"):
         _Turned().build(Grid(shape=(8, 4), cell=1.0), np.random.default_rng(0))
 
@@ -116,14 +116,14 @@ def plugin(monkeypatch):
     registry.get_terrain.cache_clear()
 
 
-def test_a_terrain_of_another_package_is_found_by_its_entry_point(plugin):
+def test_get_terrain_loads_entry_point(plugin):
     plugin("terrainkit.terrains.wave:Wave")
     assert registry.get_terrain("dunes") is registry.get_terrain("wave")
     dunes = SubTerrain(terrain="dunes", parameters={"amplitude": 0.1})
     assert generate(MapConfig(rows=1, cols=1, border=0.0, terrains=(dunes,))).heights.max() > 0.09
 
 
-def test_an_entry_point_that_is_no_terrain_is_named(plugin):
+def test_get_terrain_rejects_other_entry_point(plugin):
     plugin("math:pi")
     with pytest.raises(
         ConfigError, match=r"dunes \(math:pi\): got 3\.14.*; expected a subclass of Terr"
@@ -131,14 +131,14 @@ def test_an_entry_point_that_is_no_terrain_is_named(plugin):
         registry.get_terrain("dunes")
 
 
-def test_terrains_of_other_packages_are_listed_among_those_there_are(plugin):
+def test_get_terrain_error_lists_plugins(plugin):
     plugin("terrainkit.terrains.wave:Wave")
     with pytest.raises(ConfigError, match=r"there are: flat, .*, wave, dunes"):
         registry.get_terrain("moon")
 
 
 @pytest.mark.parametrize("value", ["no_such_package:Dunes", "math:no_such_name"])
-def test_an_entry_point_that_leads_nowhere_is_named(plugin, value):
+def test_get_terrain_reports_broken_entry_point(plugin, value):
     plugin(value)
     with pytest.raises(ConfigError, match=rf"dunes \({value}\) cannot be loaded: "):
         registry.get_terrain("dunes")

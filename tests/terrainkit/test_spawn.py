@@ -31,17 +31,17 @@ def disc(heights, origin, *, radius=0.5, threshold=WALL, grid=PLOT):
     return surface_at(heights, place, threshold=threshold).height
 
 
-def test_on_level_ground_the_origin_is_where_it_is_wanted():
+def test_find_spawn_on_level_ground_is_preferred_point():
     assert spawn(level(0.7), (1.23, 2.71)) == pytest.approx((1.23, 2.71, 0.7))
 
 
-def test_the_origin_is_in_the_frame_of_the_plot():
+def test_find_spawn_is_in_the_map_frame():
     grid = Grid(shape=(40, 40), cell=0.1, lower=(-10.0, 5.0))
     assert spawn(level(grid=grid), (-8.0, 7.0), grid=grid) == (-8.0, 7.0, 0.0)
 
 
 @pytest.mark.parametrize("wanted", [(0.1, 2.0), (3.95, 2.0), (2.0, 0.3), (4.0, 4.0), (-1.0, 2.0)])
-def test_the_disc_stays_inside_the_patch(wanted):
+def test_find_spawn_disc_is_inside_the_patch(wanted):
     x, y, _ = spawn(level(), wanted)
     assert min(x, y) >= 0.5
     assert max(x, y) <= 3.5
@@ -51,7 +51,7 @@ def test_the_disc_stays_inside_the_patch(wanted):
 
 
 @pytest.mark.parametrize("height", [0.3, -0.3])
-def test_a_wall_beside_the_wanted_place_is_given_way_to(height):
+def test_find_spawn_avoids_a_wall(height):
     heights = level()
     heights[21:] = height  # the wall stands at 2.1 m
     x, y, z = spawn(heights)
@@ -60,7 +60,7 @@ def test_a_wall_beside_the_wanted_place_is_given_way_to(height):
     assert z == 0.0
 
 
-def test_the_nearer_side_is_taken():
+def test_find_spawn_takes_the_nearer_side():
     heights = level()
     heights[:18] = 0.3  # the wall stands at 1.8 m
     x, _, z = spawn(heights)
@@ -68,7 +68,7 @@ def test_the_nearer_side_is_taken():
     assert z == 0.0
 
 
-def test_one_high_sample_keeps_the_disc_away():
+def test_find_spawn_avoids_one_high_sample():
     heights = level()
     heights[20, 20] = 0.5  # a post over 2.0 to 2.1 m
     x, y, _ = spawn(heights)
@@ -78,7 +78,7 @@ def test_one_high_sample_keeps_the_disc_away():
 @pytest.mark.parametrize(
     ("sample", "height"), [((25, 22), 0.07), ((24, 24), -5.0), ((14, 17), -5.0)]
 )
-def test_the_disc_is_level_towards_its_diagonals(sample, height):
+def test_find_spawn_disc_is_level_along_diagonals(sample, height):
     heights = level()
     heights[sample] = height
     ground = disc(heights, spawn(heights, threshold=math.inf), threshold=math.inf)
@@ -86,7 +86,7 @@ def test_the_disc_is_level_towards_its_diagonals(sample, height):
 
 
 @pytest.mark.parametrize("sample", [(25, 23), (26, 20), (13, 19), (24, 25)])
-def test_a_sample_without_a_say_in_the_disc_does_not_move_it(sample):
+def test_find_spawn_ignores_samples_without_influence(sample):
     # The disc reaches 5 samples from (19.5, 19.5). The square of (25, 23), one sample to each
     # side, begins at offset (4.5, 2.5), and 4.5^2 + 2.5^2 is above 5^2.
     heights = level()
@@ -104,7 +104,7 @@ def test_a_sample_without_a_say_in_the_disc_does_not_move_it(sample):
     radius=st.sampled_from([0.3, 0.5, 0.7]),
     threshold=st.sampled_from([WALL, math.inf]),
 )
-def test_every_disc_is_level_and_its_origin_on_the_ground(samples, wanted, radius, threshold):
+def test_find_spawn_is_level_and_on_the_ground(samples, wanted, radius, threshold):
     heights = level()
     for i, j, height in samples:
         heights[i, j] = height
@@ -118,7 +118,7 @@ def test_every_disc_is_level_and_its_origin_on_the_ground(samples, wanted, radiu
     assert max(origin[:2]) <= 4.0 - radius
 
 
-def test_a_slope_within_the_tolerance_is_level_enough_and_its_origin_on_it():
+def test_find_spawn_accepts_slope_within_tolerance():
     x = (np.arange(40, dtype=np.float32) + 0.5) * 0.1
     heights = np.broadcast_to(0.005 * x[:, None], PLOT.shape).astype(np.float32)
     # Samples 14 to 25 have a say in the disc, 1.1 m apart: between them it rises by 5.5 mm.
@@ -126,24 +126,24 @@ def test_a_slope_within_the_tolerance_is_level_enough_and_its_origin_on_it():
     assert spawn(heights, tolerance=0.0054) is None
 
 
-def test_no_room_is_none():
+def test_find_spawn_returns_none_without_level_ground():
     heights = level()
     heights[::4] = 0.3
     assert spawn(heights) is None
 
 
 @pytest.mark.parametrize("radius", [2.01, 3.0, 1e300])
-def test_a_disc_larger_than_the_patch_has_no_room(radius):
+def test_find_spawn_returns_none_for_large_disc(radius):
     assert spawn(level(), radius=radius) is None
 
 
-def test_a_platform_larger_than_the_disc_by_a_cell_holds_it():
+def test_find_spawn_fits_platform_of_disc_and_cell():
     heights = level(-5.0)
     heights[14:26, 14:26] = 0.0  # 1.2 m for a disc of 1 m
     assert spawn(heights) == (2.0, 2.0, 0.0)
 
 
-def test_a_platform_smaller_than_the_disc_does_not_hold_it():
+def test_find_spawn_does_not_fit_smaller_platform():
     heights = level(-5.0)
     heights[16:24, 16:24] = 0.0
     x, y, z = spawn(heights)

@@ -32,7 +32,7 @@ def height_at(heights, place, threshold):
         ((0.25, 0.25), 0.5),
     ],
 )
-def test_without_a_wall_a_quad_is_split_from_low_to_high_corner(place, height):
+def test_surface_quad_without_wall_is_two_triangles(place, height):
     assert height_at(quad(0, 1, 2, 3), place, np.inf) == height
 
 
@@ -72,16 +72,16 @@ SADDLE = quad(9, 0, 6, 3)
         (SADDLE, (0.375, 0.625), 3.0),
     ],
 )
-def test_a_quad_with_walls_is_a_fan_around_its_center(heights, place, height):
+def test_surface_quad_with_walls_is_a_fan(heights, place, height):
     assert height_at(heights, place, threshold=2.5) == height
 
 
 @pytest.mark.parametrize("across", [0.0, 0.25, 1.0])
-def test_on_a_wall_the_height_is_that_of_one_side(across):
+def test_surface_on_a_wall_is_one_side(across):
     assert height_at(quad(0, 5, 5, 0), (0.5, across), threshold=1.0) in (0.0, 5.0)
 
 
-def test_samples_are_met_exactly():
+def test_surface_interpolates_samples():
     heights = np.random.default_rng(0).normal(size=(5, 3)).astype(np.float32)
     place = np.argwhere(np.ones(heights.shape)).astype(float)
     assert surface_at(heights, place, threshold=0.5).height.tolist() == heights.ravel().tolist()
@@ -90,7 +90,7 @@ def test_samples_are_met_exactly():
 @pytest.mark.parametrize("side", [-1e-9, 1e-9])
 @given(heights=HEIGHTFIELDS, threshold=THRESHOLDS)
 @settings(deadline=None, derandomize=True, max_examples=60)
-def test_every_edge_reads_the_same_from_both_quads(side, heights, threshold):
+def test_surface_is_continuous_across_edges(side, heights, threshold):
     for turned in (False, True):
         z = heights.T if turned else heights
         start, end = z[:-1], z[1:]
@@ -105,7 +105,7 @@ def test_every_edge_reads_the_same_from_both_quads(side, heights, threshold):
 
 
 @pytest.mark.parametrize("threshold", [0.5, 1.5, np.inf])
-def test_gradient_is_that_of_finite_differences(threshold):
+def test_surface_gradient_matches_finite_differences(threshold):
     rng = np.random.default_rng(0)
     heights = rng.integers(0, 4, size=(12, 9)).astype(np.float32)
     place = rng.uniform(0, [11, 8], size=(1000, 2))
@@ -120,7 +120,7 @@ def test_gradient_is_that_of_finite_differences(threshold):
     ("place", "nearest"),
     [((-3, 0.25), (0, 0.25)), ((9, 1.5), (2, 1.5)), ((0.5, -0.1), (0.5, 0)), ((7, 7), (2, 2))],
 )
-def test_beyond_the_outermost_samples_the_ground_goes_on_level(place, nearest):
+def test_surface_continues_level_beyond_the_samples(place, nearest):
     heights = np.array([[0, 1, 5], [2, 4, 9], [3, 3, 7]], dtype=np.float32)
     assert height_at(heights, place, np.inf) == height_at(heights, nearest, np.inf)
 
@@ -129,13 +129,13 @@ def test_beyond_the_outermost_samples_the_ground_goes_on_level(place, nearest):
     ("place", "gradient"),
     [((-3, 0.5), (0, 5)), ((3, 0.5), (0, 5)), ((0.5, -1), (2, 0)), ((-1, 4), (0, 0))],
 )
-def test_beyond_the_outermost_samples_nothing_rises_outwards(place, gradient):
+def test_surface_has_no_outward_gradient_beyond_samples(place, gradient):
     heights = quad(0, 2, 7, 5)  # 2 along x, 5 along y
     found = surface_at(heights, np.array([place], dtype=float), threshold=np.inf)
     assert found.gradient.tolist() == [list(gradient)]
 
 
-def test_a_single_sample_is_level_ground():
+def test_surface_of_a_single_sample_is_level():
     found = surface_at(np.full((1, 1), 3, np.float32), np.array([[0.3, -8.0]]), threshold=0.1)
     assert found.height.tolist() == [3.0]
     assert found.gradient.tolist() == [[0.0, 0.0]]

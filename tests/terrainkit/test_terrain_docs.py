@@ -8,7 +8,7 @@ from terrainkit.terrain_docs import terrain_doc, terrain_summaries
 
 
 @pytest.mark.parametrize("name", registry.terrain_names())
-def test_every_terrain_and_parameter_has_words_and_a_unit(name):
+def test_terrain_doc_has_text_and_unit(name):
     about = terrain_doc(name)
     assert about.text.partition("\n")[0].endswith(".")
     assert [p.name for p in about.parameters] == list(registry.get_terrain(name).at(0).requested())
@@ -18,13 +18,13 @@ def test_every_terrain_and_parameter_has_words_and_a_unit(name):
         assert ("[m]" in each.text) != (each.name in unitless)
 
 
-def test_a_range_has_two_ends_and_a_value_one():
+def test_terrain_doc_range_has_two_ends():
     step_height, step_width, *_ = terrain_doc("pyramid_stairs").parameters
     assert (step_height.easy, step_height.hard) == ("0.05", "0.23")
     assert (step_width.easy, step_width.hard) == ("0.31", "")
 
 
-def test_a_terrain_of_others_has_the_words_of_its_parent_and_none_are_needed(monkeypatch):
+def test_terrain_doc_inherits_parameter_text(monkeypatch):
     @dataclass(frozen=True, kw_only=True)
     class Hurdles(registry.get_terrain("stairs")):
         """Hurdles."""
@@ -37,11 +37,11 @@ def test_a_terrain_of_others_has_the_words_of_its_parent_and_none_are_needed(mon
     assert words["number"] == ""
 
 
-def test_summaries_are_one_sentence_each():
+def test_terrain_summaries_are_one_sentence():
     assert list(terrain_summaries()) == list(registry.terrain_names())
     assert all(text.count(". ") == 0 for text in terrain_summaries().values())
 
 
-def test_a_terrain_that_there_is_not():
+def test_terrain_doc_unknown_name_is_rejected():
     with pytest.raises(ConfigError, match="no terrain 'moon'; there are: flat, gap"):
         terrain_doc("moon")

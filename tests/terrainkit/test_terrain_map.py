@@ -31,13 +31,13 @@ def with_heights(terrain_map, value):
     )
 
 
-def test_height_at_a_sample_is_the_sample(terrain_map):
+def test_height_at_a_sample(terrain_map):
     x, y = (terrain_map.grid.axis(k) for k in (0, 1))
     xy = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
     np.testing.assert_allclose(terrain_map.height(xy), terrain_map.heights, atol=1e-6)
 
 
-def test_height_stands_where_the_axis_convention_says(terrain_map):
+def test_height_follows_the_axis_convention(terrain_map):
     # Border 1.2 m and cell 0.1 m: cell (30, 45) is centered at x = -1.2 + 3.05, y = -1.2 + 4.55.
     terrain_map = with_heights(terrain_map, 0.0)
     terrain_map.heights[30, 45] = 2.0
@@ -45,17 +45,17 @@ def test_height_stands_where_the_axis_convention_says(terrain_map):
     assert terrain_map.height((3.35, 1.85)) == 0.0
 
 
-def test_first_sample_is_half_a_cell_inside_the_corner(terrain_map):
+def test_first_sample_is_half_a_cell_inside(terrain_map):
     assert terrain_map.first_sample == pytest.approx((-1.15, -1.15))
 
 
 @pytest.mark.parametrize("shape", [(2,), (5, 2), (3, 4, 2), (0, 2)])
-def test_heights_and_normals_come_in_the_shape_of_the_points(terrain_map, shape):
+def test_height_and_normal_keep_the_shape(terrain_map, shape):
     assert terrain_map.height(np.ones(shape)).shape == shape[:-1]
     assert terrain_map.normal(np.ones(shape)).shape == (*shape[:-1], 3)
 
 
-def test_points_may_be_a_list(terrain_map):
+def test_height_accepts_lists(terrain_map):
     points = [[1.0, 2.0], [9.0, 3.0]]
     assert terrain_map.height(points).tolist() == terrain_map.height(np.array(points)).tolist()
 
@@ -72,7 +72,7 @@ def test_points_may_be_a_list(terrain_map):
         ([[0.0, np.inf]], r"\(1, 2\)"),
     ],
 )
-def test_points_that_are_none_are_refused(terrain_map, view, xy, shape):
+def test_height_rejects_invalid_points(terrain_map, view, xy, shape):
     with pytest.raises(
         ConfigError, match=rf"xy: got shape {shape}; expected finite values of shape \(\.\.\., 2\)"
     ):
@@ -80,23 +80,23 @@ def test_points_that_are_none_are_refused(terrain_map, view, xy, shape):
 
 
 @pytest.mark.parametrize("far", [1e3, 1e300])
-def test_height_beyond_the_map_is_that_of_its_edge(slope_map, far):
+def test_height_beyond_the_map_is_that_of_the_edge(slope_map, far):
     assert slope_map.height((far, 1.0)) == slope_map.heights.max() > 1.9
     assert slope_map.height((-far, 1.0)) == 0.0
 
 
-def test_normal_of_level_ground_points_straight_up(slope_map):
+def test_normal_of_level_ground_is_up(slope_map):
     assert slope_map.normal((0.3, 1.0)).tolist() == [0.0, 0.0, 1.0]
 
 
-def test_normal_of_a_slope_leans_downhill(slope_map):
+def test_normal_of_a_slope_is_downhill(slope_map):
     # Grade 0.5 along x: (-0.5, 0, 1) / sqrt(1.25)
     np.testing.assert_allclose(
         slope_map.normal((3.0, 1.0)), np.array([-0.5, 0, 1]) / np.sqrt(1.25), atol=1e-5
     )
 
 
-def test_normal_beyond_the_map_has_nothing_of_the_slope_across_its_edge(slope_map):
+def test_normal_beyond_the_map_has_no_cross_slope(slope_map):
     # Nothing but slope: its first row of samples is where the map ends.
     heights = np.roll(slope_map.heights, -20, axis=0)
     cut_short = dataclasses.replace(slope_map, heights=heights)
@@ -104,7 +104,7 @@ def test_normal_beyond_the_map_has_nothing_of_the_slope_across_its_edge(slope_ma
     assert cut_short.normal((-5.0, 1.0)).tolist() == [0.0, 0.0, 1.0]
 
 
-def test_normals_are_upward_unit_vectors_at_right_angles_to_the_ground(terrain_map):
+def test_normal_is_upward_unit_vector(terrain_map):
     rng = np.random.default_rng(0)
     xy = rng.uniform(terrain_map.grid.lower, terrain_map.grid.upper, size=(500, 2))
     normal = terrain_map.normal(xy)
@@ -115,7 +115,7 @@ def test_normals_are_upward_unit_vectors_at_right_angles_to_the_ground(terrain_m
         np.testing.assert_allclose(rise / 2e-7, -normal[:, k] / normal[:, 2], atol=1e-5)
 
 
-def test_isaac_gym_finds_every_sample_where_the_map_has_it(terrain_map):
+def test_height_field_raw_matches_isaac_gym(terrain_map):
     raw = terrain_map.height_field_raw(vertical_scale=0.001)
     rows, columns = raw.shape  # nbRows, nbColumns
     # add_heightfield reads a flat buffer row by row; rows go along y and columns along x.
@@ -126,7 +126,7 @@ def test_isaac_gym_finds_every_sample_where_the_map_has_it(terrain_map):
     np.testing.assert_allclose(z, terrain_map.height(xy), atol=0.0005 + 1e-6)
 
 
-def test_raw_heights_lie_row_by_row_in_int16(terrain_map):
+def test_height_field_raw_is_int16_by_row(terrain_map):
     raw = terrain_map.height_field_raw()
     assert raw.dtype == np.int16
     assert raw.flags["C_CONTIGUOUS"]
@@ -136,18 +136,18 @@ def test_raw_heights_lie_row_by_row_in_int16(terrain_map):
 @pytest.mark.parametrize(
     ("height", "units"), [(0.0124, 2), (0.0126, 3), (-0.0124, -2), (-0.0126, -3), (0.3, 60)]
 )
-def test_raw_heights_are_rounded_not_truncated(terrain_map, height, units):
+def test_height_field_raw_is_rounded(terrain_map, height, units):
     raw = with_heights(terrain_map, height).height_field_raw(vertical_scale=0.005)
     assert np.unique(raw).tolist() == [units]
 
 
 @pytest.mark.parametrize(("height", "units"), [(163.835, 32767), (-163.84, -32768)])
-def test_raw_heights_may_take_all_of_16_bits(terrain_map, height, units):
+def test_height_field_raw_uses_16_bits(terrain_map, height, units):
     assert with_heights(terrain_map, height).height_field_raw()[0, 0] == units
 
 
 @pytest.mark.parametrize("height", [163.84, -163.85, 1e6])
-def test_raw_heights_beyond_16_bits_are_an_error(terrain_map, height):
+def test_height_field_raw_rejects_overflow(terrain_map, height):
     with pytest.raises(
         ExportError, match=r"do not fit in int16 at vertical_scale 0\.005; expected at least .*"
     ):
@@ -155,7 +155,7 @@ def test_raw_heights_beyond_16_bits_are_an_error(terrain_map, height):
 
 
 @pytest.mark.parametrize("height", [10.0, -10.0, 163.84, 1e6])
-def test_the_vertical_scale_that_the_error_asks_for_is_enough(terrain_map, height):
+def test_height_field_raw_suggested_scale_is_sufficient(terrain_map, height):
     high = with_heights(terrain_map, height)
     with pytest.raises(ExportError) as error:
         high.height_field_raw(vertical_scale=1e-5)
@@ -164,13 +164,13 @@ def test_the_vertical_scale_that_the_error_asks_for_is_enough(terrain_map, heigh
 
 
 @pytest.mark.parametrize("scale", [0.0, -0.005, np.nan, np.inf])
-def test_a_vertical_scale_must_be_above_0(terrain_map, scale):
+def test_height_field_raw_rejects_invalid_scale(terrain_map, scale):
     with pytest.raises(ConfigError, match=f"vertical_scale: got {scale:g}; expected a number > 0"):
         terrain_map.height_field_raw(scale)
 
 
 @pytest.mark.parametrize(("row", "col"), [(0, 0), (1, 0), (0, 1), (1, 2)])
-def test_a_tile_of_the_map_is_the_tile_made_alone(terrain_map, row, col):
+def test_map_patch_equals_make_patch(terrain_map, row, col):
     part, alone = terrain_map.patch(row, col), terrainkit.make_patch(terrain_map.config, row, col)
     assert part.heights.tobytes() == alone.heights.tobytes()
     assert part.origin.tobytes() == alone.origin.tobytes()
@@ -179,7 +179,7 @@ def test_a_tile_of_the_map_is_the_tile_made_alone(terrain_map, row, col):
     assert part.grid == alone.grid
 
 
-def test_a_tile_knows_its_terrain_and_where_it_stands(terrain_map):
+def test_map_patch_has_name_and_position(terrain_map):
     patch = terrain_map.patch(1, 2)
     assert patch.terrain == "rough_slope"
     assert patch.difficulty == 1.0
@@ -189,14 +189,14 @@ def test_a_tile_knows_its_terrain_and_where_it_stands(terrain_map):
 
 
 @pytest.mark.parametrize(("row", "col"), [(2, 0), (0, 3), (-1, 0), (0, -1)])
-def test_there_is_no_tile_beyond_the_rows_and_columns(terrain_map, row, col):
+def test_map_patch_rejects_unknown_index(terrain_map, row, col):
     with pytest.raises(
         IndexError, match=rf"no patch \({row}, {col}\) in a map of 2 rows and 3 columns"
     ):
         terrain_map.patch(row, col)
 
 
-def test_an_environment_starts_on_the_patch_of_its_level_and_column(terrain_map):
+def test_assign_uses_level_and_column(terrain_map):
     start = terrain_map.assign(12, seed=4)
     assert start.columns.tolist() == [0] * 4 + [1] * 4 + [2] * 4
     assert set(start.levels.tolist()) == {0, 1}
@@ -205,26 +205,26 @@ def test_an_environment_starts_on_the_patch_of_its_level_and_column(terrain_map)
         assert origin.tolist() == terrain_map.patch(level, column).origin.tolist()
 
 
-def test_environments_start_no_higher_than_max_init_level(terrain_map):
+def test_assign_respects_max_init_level(terrain_map):
     assert terrain_map.assign(50, max_init_level=0).levels.tolist() == [0] * 50
 
 
-def test_env_origins_stand_on_the_ground(terrain_map):
+def test_env_origins_are_on_the_ground(terrain_map):
     x, y, z = np.moveaxis(terrain_map.env_origins.astype(float), -1, 0)
     np.testing.assert_allclose(terrain_map.height(np.stack([x, y], axis=-1)), z, atol=1e-3)
 
 
-def test_save_writes_and_load_reads(terrain_map, tmp_path):
+def test_save_and_load_round_trip(terrain_map, tmp_path):
     path = terrain_map.save(tmp_path / "map.npz")
     assert type(terrain_map).load(path).heights.tobytes() == terrain_map.heights.tobytes()
 
 
-def test_the_map_updates_levels_as_the_pure_function_does(terrain_map):
+def test_map_update_levels_equals_function(terrain_map):
     # Patches of 8 m: more than 4 m is up, less than half of what was command_distance is down.
     after = terrain_map.update_levels([0, 1, 1], [4.5, 1.0, 3.0], [6.0, 6.0, 4.0], seed=1)
     assert after.tolist() == [1, 0, 1]
 
 
-def test_it_says_what_it_is_in_one_line(terrain_map):
+def test_repr_is_one_line(terrain_map):
     assert repr(terrain_map).startswith("<TerrainMap 2 x 3 patches, (")
     assert "\n" not in repr(terrain_map)

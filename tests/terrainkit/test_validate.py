@@ -36,39 +36,39 @@ def changed(terrain_map, name, index, value):
     ids=["legged_gym", "all", "randomized", "jitter", "one patch"],
 )
 @pytest.mark.filterwarnings("ignore::terrainkit.TerrainkitWarning")
-def test_a_map_of_ours_has_nothing_wrong(config):
+def test_validate_generated_map_has_no_issues(config):
     terrain_map = tk.generate(config)
     assert found(terrain_map) == []
     assert found(terrain_map, terrain_map.mesh(merged=False)) == []
 
 
 @pytest.mark.parametrize("preset", presets.preset_names())
-def test_no_preset_builds_something_else_than_it_asks_for(preset):
+def test_validate_presets_realize_their_parameters(preset):
     terrain_map = tk.generate(tk.MapConfig(rows=10, cols=17, border=0.0, preset=preset))
     assert found(terrain_map) == []
 
 
-def test_a_disc_wider_than_a_patch_is_one_line_in_bounded_time(sound):
+def test_validate_large_disc_is_one_issue(sound):
     config = dataclasses.replace(sound.config, spawn_radius=1e6)
     messages = found(dataclasses.replace(sound, config=config))
     assert ("spawn", "no disc of radius 1e+06 m fits in a patch of 8 m x 8 m") in messages
     assert not any("border" in message for _, message in messages)
 
 
-def test_a_height_that_is_no_number(sound):
+def test_validate_finds_non_finite_height(sound):
     assert found(changed(sound, "heights", (3, 4), np.nan)) == [
         ("finite", "heights: 1 values are not finite, the first at (3, 4)")
     ]
 
 
-def test_an_origin_in_the_air(sound):
+def test_validate_finds_origin_above_ground(sound):
     origin = sound.env_origins[1, 2] + np.float32([0, 0, 0.5])
     assert found(changed(sound, "env_origins", (1, 2), origin)) == [
         ("spawn", "patch (1, 2): the spawn origin is 0.500 m above the ground")
     ]
 
 
-def test_an_origin_on_uneven_ground(sound):
+def test_validate_finds_origin_on_uneven_ground(sound):
     x, y = sound.config.patch_grid(2, 5).center
     origin = [x + 2.0, y, sound.height([x + 2.0, y])]
     ((check, message),) = found(changed(sound, "env_origins", (2, 5), origin))
@@ -78,42 +78,42 @@ def test_an_origin_on_uneven_ground(sound):
     )
 
 
-def test_an_origin_of_another_patch(sound):
+def test_validate_finds_origin_outside_patch(sound):
     findings = found(changed(sound, "env_origins", (0, 0), sound.env_origins[0, 1]))
     assert ("spawn", "patch (0, 0): the spawn origin is outside the patch") in findings
 
 
-def test_a_patch_that_was_edited(sound):
+def test_validate_finds_edited_patch(sound):
     i, j = sound.config.patch_start(1, 6)
     findings = found(changed(sound, "heights", (i + 1, j + 1), 3.0))
     assert [check for check, _ in findings] == ["patches"]
     assert findings[0][1].startswith("patch (1, 6): heights differ by up to 3.")
 
 
-def test_swapped_axes():
+def test_validate_finds_swapped_axes():
     square = tk.generate(tk.MapConfig(rows=10, border=1.0, preset="legged_gym"))
     findings = found(dataclasses.replace(square, heights=square.heights.T.copy()))
     assert any("with axes swapped" in message for _, message in findings)
 
 
-def test_a_border_that_is_not_level(sound):
+def test_validate_finds_uneven_border(sound):
     assert ("patches", "the border is not flat at height 0") in found(
         changed(sound, "heights", (0, 0), 0.01)
     )
 
 
-def test_a_curriculum_that_never_reaches_its_end(sound):
+def test_validate_finds_incomplete_difficulty(sound):
     stale = sound.difficulty * np.float32(0.9)
     findings = found(dataclasses.replace(sound, difficulty=stale))
     assert ("difficulty", "row 2: got difficulty 0.9; expected exactly 1") in findings
 
 
-def test_a_difficulty_that_falls(sound):
+def test_validate_finds_decreasing_difficulty(sound):
     messages = found(changed(sound, "difficulty", (1, 3), 1.5))
     assert ("difficulty", "difficulty decreases from row 1 to row 2 in column 3") in messages
 
 
-def test_a_width_that_the_patch_cannot_hold_is_named():
+def test_validate_finds_deviating_width():
     # A moat of 1 m neighborhood a platform of 3 m: a patch of 8 m x 4 m has 0.5 m for it along y.
     config = tk.MapConfig(
         rows=2, cols=1, patch_size=(8.0, 4.0), terrains=(tk.SubTerrain(terrain="gap"),)
@@ -125,7 +125,7 @@ def test_a_width_that_the_patch_cannot_hold_is_named():
     ]
 
 
-def test_a_mesh_with_a_hole(sound):
+def test_validate_finds_hole_in_mesh(sound):
     mesh = sound.mesh()
     holed = TriMesh(vertices=mesh.vertices, triangles=mesh.triangles[100:])
     messages = " ".join(message for _, message in found(sound, holed))
@@ -133,7 +133,7 @@ def test_a_mesh_with_a_hole(sound):
     assert "the mesh covers" in messages
 
 
-def test_a_mesh_with_a_face_turned_over(sound):
+def test_validate_finds_flipped_face(sound):
     mesh = sound.mesh()
     turned = mesh.triangles.copy()
     turned[0] = turned[0, ::-1]
@@ -142,13 +142,13 @@ def test_a_mesh_with_a_face_turned_over(sound):
     assert any("or by faces of opposite winding" in message for message in messages)
 
 
-def test_a_mesh_of_another_map(sound):
+def test_validate_finds_mesh_of_another_map(sound):
     lifted = sound.mesh().vertices + np.float32([0, 0, 0.25])
     findings = found(sound, TriMesh(vertices=lifted, triangles=sound.mesh().triangles))
     assert [check for check, _ in findings] == ["mesh"]
     assert findings[0][1].startswith("the mesh differs from the heights by up to 0.250 m")
 
 
-def test_a_mesh_without_faces(sound):
+def test_validate_finds_mesh_without_faces(sound):
     empty = TriMesh(vertices=sound.mesh().vertices, triangles=np.empty((0, 3), dtype=np.int32))
     assert found(sound, empty) == [("mesh", "the mesh has no faces")]

@@ -8,29 +8,29 @@ def samples(*rows):
     return np.array(rows, dtype=np.float32)
 
 
-def test_steps_along_x_and_along_y_are_told_apart():
+def test_wall_edges_are_separate_by_axis():
     along_x, along_y = wall_edges(samples([0, 0], [1, 0], [1, 1]), 0.5)
     assert along_x.tolist() == [[True, False], [False, True]]
     assert along_y.tolist() == [[False], [True], [False]]
 
 
-def test_a_step_down_is_a_wall_too():
+def test_wall_edges_include_steps_down():
     along_x, _ = wall_edges(samples([1], [0]), 0.5)
     assert along_x.tolist() == [[True]]
 
 
-def test_a_step_of_exactly_the_threshold_is_no_wall():
+def test_wall_edges_exclude_exact_threshold():
     along_x, _ = wall_edges(samples([0], [0.5], [1.25]), 0.5)
     assert along_x.tolist() == [[False], [True]]
 
 
-def test_no_step_is_a_wall_at_an_infinite_threshold():
+def test_wall_edges_are_none_at_infinite_threshold():
     along_x, along_y = wall_edges(samples([0, 1e30], [-1e30, 0]), np.inf)
     assert not along_x.any()
     assert not along_y.any()
 
 
-def test_a_single_sample_has_no_edges():
+def test_wall_edges_of_a_single_sample():
     along_x, along_y = wall_edges(samples([3]), 0.5)
     assert (along_x.shape, along_y.shape) == ((0, 1), (1, 0))
 
@@ -60,7 +60,7 @@ def walls_on(edges):
         ("four walls", ["0", "1", "2", "3"]),
     ],
 )
-def test_corners_are_joined_by_edges_without_a_wall(case, groups):
+def test_connected_corners_follow_edges_without_walls(case, groups):
     joined = connected_corners(walls_on(WALLS[case]))[0]
     found = {"".join(str(k) for k in np.flatnonzero(row)) for row in joined}
     assert sorted(found) == groups
@@ -76,12 +76,12 @@ def test_corners_are_joined_by_edges_without_a_wall(case, groups):
         ("four walls", [0.0, 1.0, 4.0, 9.0]),
     ],
 )
-def test_joined_corners_bring_one_height_to_the_center(case, centers):
+def test_center_heights_are_equal_for_connected_corners(case, centers):
     corners = np.array([[0.0, 1.0, 4.0, 9.0]])
     assert center_heights(corners, walls_on(WALLS[case])).tolist() == [centers]
 
 
-def test_quads_are_independent_of_one_another():
+def test_center_heights_are_independent_per_quad():
     corners = np.array([[0.0, 1.0, 4.0, 9.0], [5.0, 5.0, 7.0, 7.0]])
     walls = np.concatenate([walls_on([0, 1, 2, 3]), walls_on([1, 3])])
     assert center_heights(corners, walls).tolist() == [[0.0, 1.0, 4.0, 9.0], [5.0, 5.0, 7.0, 7.0]]

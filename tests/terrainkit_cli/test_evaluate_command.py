@@ -68,7 +68,7 @@ def test_evaluate_writes_json_to_a_file(here, tmp_path, monkeypatch):
     words = ("walk", *QUICK, "-o", "result.json")
     code, out, err = here(*words)
     assert (code, err) == (0, "")
-    assert out.startswith("quadruped, model_7.pt, on plane: 1 robots")
+    assert out.startswith("quadruped, model_7.pt, on plane: 1 robot")
     assert out.endswith("wrote result.json\n")
     before = (tmp_path / "result.json").read_text()
     assert json.loads(before)["seconds"] == 0.04
@@ -79,6 +79,11 @@ def test_evaluate_writes_json_to_a_file(here, tmp_path, monkeypatch):
     assert "result.json exists" in one_line(err)
     assert here(*words, "--overwrite")[0] == 0
     assert (tmp_path / "result.json").read_text() == before
+
+
+def test_evaluate_prints_and_writes_the_same_json(here, tmp_path):
+    _, out, _ = here("walk", *QUICK, "--format", "json", "-o", "result.json")
+    assert out == (tmp_path / "result.json").read_text()
 
 
 def test_evaluate_loads_the_given_checkpoint(here):

@@ -65,8 +65,8 @@ def test_export_run_into_its_own_folder(here, run_folder):
     assert first.endswith("45 observations to 12 actions, from model_2.pt")
     assert second.startswith("verified: largest difference from the checkpoint: policy.onnx ")
     assert second.endswith(", policy.pt 0.0e+00")
-    told = json.loads((run_folder / "exported" / "policy.json").read_text())
-    assert told["iteration"] == 2
+    config = json.loads((run_folder / "exported" / "policy.json").read_text())
+    assert config["iteration"] == 2
 
 
 def test_export_checkpoint_by_file_or_iteration(here, run_folder, tmp_path):
@@ -124,7 +124,7 @@ def test_export_map(here, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         ((), "MAP or RUN is missing"),
         (("unicorn",), "no map, run or robot unicorn; robots are: biped"),
@@ -148,7 +148,7 @@ def test_export_map(here, tmp_path):
     ids=lambda value: " ".join(map(str, value))[:40] if isinstance(value, tuple) else "",
 )
 @pytest.mark.usefixtures("run_folder")
-def test_export_rejects_invalid_input(here, tmp_path, words, said):
+def test_export_rejects_invalid_input(here, tmp_path, words, message):
     (tmp_path / "empty").mkdir()
     (tmp_path / "text.txt").write_text("no map")
     if "map.npz" in words:
@@ -159,7 +159,7 @@ def test_export_rejects_invalid_input(here, tmp_path, words, said):
     assert run.returncode == 2
     assert run.stdout == ""
     assert run.stderr.count("\n") == 1
-    assert said in run.stderr
+    assert message in run.stderr
     assert sorted(tmp_path.rglob("*")) == before
 
 
@@ -186,10 +186,10 @@ def test_export_names_the_missing_extra(here, monkeypatch):
 
 
 def test_export_help_covers_maps_and_policies(terrainkit):
-    said = terrainkit("export", "--help").stdout
-    assert "MAP.npz|RUN" in said
-    assert "policy.onnx" in said
-    assert "heightfield" in said
+    message = terrainkit("export", "--help").stdout
+    assert "MAP.npz|RUN" in message
+    assert "policy.onnx" in message
+    assert "heightfield" in message
 
 
 def test_export_map_imports_no_torch(tmp_path, terrainkit):

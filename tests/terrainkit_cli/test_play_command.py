@@ -33,10 +33,10 @@ def one_line(err):
 
 def test_play_writes_a_video_named_as_the_run(here, tmp_path):
     code, out, err = here("walk", *QUICK, *SMALL)
-    if "MuJoCo cannot draw here" in err:
+    if "MuJoCo cannot render here" in err:
         pytest.skip(err)
     assert (code, err) == (0, "")
-    assert "quadruped, model_7.pt, on plane: 1 robots, 0 fell" in out
+    assert "quadruped, model_7.pt, on plane: 1 robot, 0 fell" in out
     assert "wrote walk.mp4: 0.0 s, 0.0 MB" in out
     import cv2
 
@@ -49,7 +49,7 @@ def test_play_writes_a_video_named_as_the_run(here, tmp_path):
 def test_play_bundled_policy_by_name(here, tmp_path):
     words = ("--seconds", "0.2", "--num-envs", "2", *SMALL)
     code, out, err = here("quadruped", *words)
-    if "MuJoCo cannot draw here" in err:
+    if "MuJoCo cannot render here" in err:
         pytest.skip(err)
     assert (code, err) == (0, "")
     assert "on plane: 2 robots, 0 fell" in out
@@ -87,14 +87,14 @@ def test_play_prints_a_line_for_a_plane(here):
 
 
 def test_play_prints_the_table_without_a_renderer(here, tmp_path, monkeypatch):
-    def broken(*_, **__):
-        raise RenderError("MuJoCo cannot draw here")
+    def write_video(*_, **__):
+        raise RenderError("MuJoCo cannot render here")
 
-    monkeypatch.setattr(video, "write_video", broken)
+    monkeypatch.setattr(video, "write_video", write_video)
     code, out, err = here("walk", *QUICK)
     assert code == 2
-    assert "1 robots" in out
-    assert "cannot draw" in one_line(err)
+    assert "1 robot" in out
+    assert "cannot render" in one_line(err)
     assert [each.name for each in tmp_path.iterdir()] == ["walk"]
 
 
@@ -108,10 +108,10 @@ def test_play_checks_the_target_first(here, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         ((), "RUN is missing; expected"),
-        (("walk", "-o", "film.avi"), "ends in .mp4"),
+        (("walk", "-o", "walk.avi"), "ends in .mp4"),
         (("walk", "--size", "99", "64"), "expected two even numbers"),
         (("walk", "--robots", "0"), "robots: got 0"),
         (("walk", "--seconds", "0"), "seconds: got 0"),
@@ -119,10 +119,10 @@ def test_play_checks_the_target_first(here, tmp_path, monkeypatch):
         (("walk", "--viewer", "-o", "a.mp4"), "--viewer: got --output or --no-video"),
     ],
 )
-def test_play_rejects_invalid_input(here, words, told):
+def test_play_rejects_invalid_input(here, words, message):
     code, out, err = here(*words)
     assert (code, out) == (2, "")
-    assert told in one_line(err)
+    assert message in one_line(err)
 
 
 def test_play_viewer_requires_a_display(here, monkeypatch):

@@ -166,7 +166,7 @@ def test_check_robot_without_read_permission(here, folder):
 def test_check_robot_rejects_unknown_format(terrainkit):
     run = terrainkit("check-robot", "good.urdf", "--format", "xml")
     assert (run.returncode, run.stdout, run.stderr.count("\n")) == (2, "", 1)
-    assert "invalid choice 'xml' for argument '--format'" in run.stderr
+    assert "--format: got 'xml'; expected one of: text, json" in run.stderr
 
 
 def test_check_robot_output_replaces_file(here, folder):

@@ -29,3 +29,7 @@ def test_check_robot_accepts_string():
     report = terrainkit_robots.check_robot(str(QUADRUPED))
     assert report.verdict == "pass"
     assert report.facts.model.name == "quadruped"
+
+
+def test_load_robot_accepts_string():
+    assert terrainkit_robots.load_robot(str(QUADRUPED)).name == "quadruped"

@@ -1,8 +1,7 @@
-"""Rooted: a MJCF robot that hangs on the world by a motor's joint, with the world as its base.
+"""Add a base link to an MJCF robot whose first joints connect it to the world.
 
-In MJCF nothing need be below the first joint: a cart slides on the world, a walker of the plane is
-held to it by three joints, and of two arms each is bolted down for itself. A robot has one base in
-every other format.
+MJCF requires no body below the first joint: a cart slides on the world, a planar walker has three
+joints to it, and each of two arms is fixed to it. Other formats require one base link.
 """
 
 import itertools
@@ -15,74 +14,75 @@ if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
 
 WORLD = "world"
-"""What MJCF calls the parent of the first bodies."""
+"""Name of the parent of root bodies in MJCF."""
 
 
 def with_world_base(facts: "Facts", *, floating: bool | None = None) -> "Facts":
-    """Return a robot whose base is the world, if that is what its joints hang on.
+    """Return the robot with the world as its base link, if its joints require that.
 
-    It is the same robot, unless it is of MJCF and its first joint moves it against the world, or
-    several parts with motors are each held by the world. A base that is to move freely is the first
-    body, whatever held it.
+    The robot is unchanged unless it is an MJCF whose first joint moves it relative to the world, or
+    several actuated parts are attached to the world. If the base is to be free, the first body is
+    the base and its joints to the world are removed.
 
     Args:
         facts: The robot.
-        floating: Whether the base is to move freely, as it was told: then nothing holds it.
+        floating: Whether the base is to be free; None if not given.
     """
     model = facts.model
     if model.kind != "mjcf" or not facts.bodies or WORLD in facts.tree.links:
         return facts
     if floating:
-        return _freed(facts)
-    main = facts.bodies[0].top.name
-    holders = {joint.child: joint for joint in model.joints if joint.parent == WORLD}
-    if main not in holders or not _holds(holders[main]):
+        return _with_free_base(facts)
+    base_name = facts.bodies[0].top.name
+    world_joints = {joint.child: joint for joint in model.joints if joint.parent == WORLD}
+    if base_name not in world_joints or not _constrains(world_joints[base_name]):
         return facts
-    driven = [
+    actuated = [
         root
         for root in facts.tree.roots
-        if root == main or (root in holders and _holds(holders[root]) and _is_driven(facts, root))
+        if root == base_name
+        or (root in world_joints and _constrains(world_joints[root]) and _is_actuated(facts, root))
     ]
-    if driven == [main] and not holders[main].moves:
+    if actuated == [base_name] and not world_joints[base_name].moves:
         return facts
     from terrainkit_robots.analysis.facts import Facts
 
-    base = Link(name=WORLD, source=model.source, virtual=True)
-    made = replace(
+    world = Link(name=WORLD, source=model.source, virtual=True)
+    changed = replace(
         model,
-        links=(base, *model.links),
-        joints=tuple(j for j in model.joints if j.parent != WORLD or j.child in driven),
+        links=(world, *model.links),
+        joints=tuple(j for j in model.joints if j.parent != WORLD or j.child in actuated),
         floating=False,
     )
-    return Facts(made, facts.meshes, spec=facts.spec)
+    return Facts(changed, facts.meshes, spec=facts.spec)
 
 
-def _freed(facts: "Facts") -> "Facts":
-    """Return a robot without the joints between the world and the first of its bodies."""
+def _with_free_base(facts: "Facts") -> "Facts":
+    """Return the robot without the joints between the world and its first body."""
     order = [facts.tree.links[name] for name in facts.tree.order]
-    above = {link.name for link in itertools.takewhile(lambda link: link.virtual, order)}
-    if not above or len(above) == len(order):
+    removed = {link.name for link in itertools.takewhile(lambda link: link.virtual, order)}
+    if not removed or len(removed) == len(order):
         return facts
     from terrainkit_robots.analysis.facts import Facts
 
-    made = replace(
+    changed = replace(
         facts.model,
-        links=tuple(link for link in facts.model.links if link.name not in above),
+        links=tuple(link for link in facts.model.links if link.name not in removed),
         joints=tuple(
-            replace(joint, parent=WORLD) if joint.parent in above else joint
+            replace(joint, parent=WORLD) if joint.parent in removed else joint
             for joint in facts.model.joints
         ),
         floating=True,
     )
-    return Facts(made, facts.meshes, spec=facts.spec)
+    return Facts(changed, facts.meshes, spec=facts.spec)
 
 
-def _holds(joint: Joint) -> bool:
+def _constrains(joint: Joint) -> bool:
     return joint.moves or joint.kind == "fixed"
 
 
-def _is_driven(facts: "Facts", root: str) -> bool:
-    """Return whether a motor drives a joint of what is below the world, or holds it."""
+def _is_actuated(facts: "Facts", root: str) -> bool:
+    """Return whether an actuator acts on a joint below a root link, or on the joint above it."""
     motors = {motor.joint for motor in facts.model.actuators}
     stack = [root]
     while stack:

@@ -1,8 +1,8 @@
-"""The normal form: a robot as both formats can hold it, whatever file it came from.
+"""Convert a robot to a canonical form that URDF and MJCF can represent.
 
-Links are those of the main tree, each after its parent. Axes are unit vectors, joints move from
-where the file has its zero, masses are numbers. What neither format can say is left out and told in
-`notes`, never silently.
+Links are those of the main tree, each after its parent. Axes are unit vectors, positions count from
+the zero of the file, and masses are numbers. What cannot be represented is removed and listed in
+`notes`.
 """
 
 import re
@@ -37,46 +37,46 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CanonicalRobot:
-    """A robot that can be written."""
+    """A robot in canonical form."""
 
     model: RobotModel
-    """Its links and joints, depth first; of joints only fixed ones and those with one degree of
-    freedom. `reference` of every joint is 0. `anchor` may be set, and links may be virtual: MJCF
-    holds both, and URDF gets frames for them. Efforts are in the limits, whatever the format, and
-    there is an actuator for each joint that is driven. `floating` is known."""
+    """Links and joints in depth-first order. Joints are fixed or have one degree of freedom, and
+    their `reference` is 0. `anchor` may be nonzero and links may be virtual: MJCF supports both,
+    and URDF gets extra frames. Efforts are stored in the limits, each actuated joint has an
+    actuator, and `floating` is set."""
 
     notes: tuple[str, ...] = ()
-    """What was left out or changed, a sentence each."""
+    """What was removed or changed, one sentence each."""
 
 
 def to_canonical(facts: "Facts", *, floating: bool | None = None) -> CanonicalRobot:
-    """Return a robot in its normal form.
+    """Return a robot in canonical form.
 
     Args:
         facts: The robot.
-        floating: Whether the base moves freely; unless told, as the file says or the legs suggest.
+        floating: Whether the base is free; None to use the file or, if it does not say, the legs.
 
     Raises:
-        RobotFileError: if there is no robot to be written.
+        RobotFileError: If the robot has no links.
     """
     if not facts.bodies:
-        raise RobotFileError(f"{facts.model.file}: there is no link; wanted a robot")
+        raise RobotFileError(f"{facts.model.file}: got no links; expected a robot")
     notes: list[str] = []
-    given, facts = facts, with_world_base(facts, floating=floating)
+    original, facts = facts, with_world_base(facts, floating=floating)
     links = _links(facts, notes)
     joints = _joints(facts, notes)
     floating = has_floating_base(facts) if floating is None else floating
-    driven = {joint.name for joint in facts.actuated}
-    kept = {link.name for link in links}
-    if WORLD in kept:
-        other = free_name(f"{WORLD}_link", kept)
-        notes.append(
-            f"named the link {WORLD} {other}: MuJoCo has a world of its own"
-            if WORLD in given.body_of
-            else f"its base is {other}, which stands for the world; {_hanging(joints)} on it"
-        )
-        links = [replace(each, name=other) if each.name == WORLD else each for each in links]
-        joints = [(_moved(joint, other), before) for joint, before in joints]
+    actuated = {joint.name for joint in facts.actuated}
+    link_names = {link.name for link in links}
+    if WORLD in link_names:
+        new_name = free_name(f"{WORLD}_link", link_names)
+        if WORLD in original.body_of:
+            notes.append(f"renamed link {WORLD} to {new_name}: MuJoCo reserves the name {WORLD}")
+        else:
+            attached = names(joint.name for joint, _ in joints if joint.parent == WORLD)
+            notes.append(f"added the base link {new_name} for the world, with joints {attached}")
+        links = [replace(each, name=new_name) if each.name == WORLD else each for each in links]
+        joints = [(_rename_world(joint, new_name), before) for joint, before in joints]
     model = RobotModel(
         name=plain_name(facts.model),
         kind="urdf",
@@ -92,37 +92,32 @@ def to_canonical(facts: "Facts", *, floating: bool | None = None) -> CanonicalRo
                 effort=joint.limit.effort if joint.limit else None,
             )
             for joint, name_before in joints
-            if joint.moves and name_before in driven
+            if joint.moves and name_before in actuated
         ),
         floating=floating,
         home={name: q for name, q in facts.model.home.items() if name in facts.positions},
-        imu=_imu(facts.model, kept),
-        excluded=frozenset(pair for pair in facts.model.excluded if pair <= kept),
+        imu=_imu(facts.model, link_names),
+        excluded=frozenset(pair for pair in facts.model.excluded if pair <= link_names),
         sources=facts.model.sources,
     )
     return CanonicalRobot(model=model, notes=tuple(notes))
 
 
-def _imu(model: RobotModel, kept: Collection[str]) -> tuple[str, Matrix] | None:
-    return model.imu if model.imu is not None and model.imu[0] in kept else None
+def _imu(model: RobotModel, link_names: Collection[str]) -> tuple[str, Matrix] | None:
+    return model.imu if model.imu is not None and model.imu[0] in link_names else None
 
 
-def _hanging(joints: Sequence[tuple[Joint, str]]) -> str:
-    hanging = [joint.name for joint, _ in joints if joint.parent == WORLD]
-    return f"{names(hanging)} {'is' if len(hanging) == 1 else 'are'}"
-
-
-def _moved(joint: Joint, other: str) -> Joint:
-    """Return a joint that is on the link `other` instead of the world."""
-    parent = other if joint.parent == WORLD else joint.parent
-    return replace(joint, parent=parent, child=other if joint.child == WORLD else joint.child)
+def _rename_world(joint: Joint, new_name: str) -> Joint:
+    """Return a joint with the link `world` renamed."""
+    parent = new_name if joint.parent == WORLD else joint.parent
+    return replace(joint, parent=parent, child=new_name if joint.child == WORLD else joint.child)
 
 
 def has_floating_base(facts: "Facts") -> bool:
-    """Return whether the base of a robot moves freely.
+    """Return whether the base of a robot is free.
 
-    It does if the file says so or the robot has legs or wheels, and if nothing of it has a limit,
-    as with a drone. An arm or a hand is bolted down, even if its last joint turns without end.
+    It is if the file says so, if the robot has legs or wheels, or if none of its joints has limits,
+    as with a drone. An arm or a hand is fixed, even if its last joint is continuous.
     """
     if facts.model.floating is not None:
         return facts.model.floating
@@ -133,68 +128,68 @@ def has_floating_base(facts: "Facts") -> bool:
         return True
     if facts.model.kind == "mjcf" or base == WORLD or not facts.bodies[0].mass:
         return False
-    return not facts.joints or any(_rolls(facts, body) for body in facts.bodies)
+    return not facts.joints or any(_is_wheel_or_propeller(facts, body) for body in facts.bodies)
 
 
-_ENDLESS = 4 * np.pi
-"""A wider range is that of no arm: exporters write 1e16 for a propeller [rad]."""
+_MAX_LIMITED_RANGE = 4 * np.pi
+"""Joints with a wider range are wheels or propellers; exporters write 1e16 for them [rad]."""
 
 
-def _rolls(facts: "Facts", body: Body) -> bool:
-    """Return whether a body is a wheel or a propeller: on the base, or on what steers it."""
+def _is_wheel_or_propeller(facts: "Facts", body: Body) -> bool:
+    """Return whether a body is a wheel or propeller on the base or on a steering body."""
     carrier = facts.physical_parent(body)
     if body.joint is None or body.joint.kind == "prismatic" or carrier is None:
         return False
     lower, upper = body.joint.range or (-np.inf, np.inf)
     near = carrier.index == 0 or carrier.parent == 0
-    return near and upper - lower > _ENDLESS and facts.is_wheel(body)
+    return near and upper - lower > _MAX_LIMITED_RANGE and facts.is_wheel(body)
 
 
 def plain_name(model: RobotModel) -> str:
-    """Return a name for a robot that is one in every format and on every disk."""
+    """Return a robot name that is valid in every format and file system."""
     name = model.name or model.file.stem
     return re.sub(r"[^A-Za-z0-9_.-]+", "_", name).strip("._-") or "robot"
 
 
 def _links(facts: "Facts", notes: list[str]) -> list[Link]:
-    order = {name: place for place, name in enumerate(facts.tree.order)}
+    index = {name: place for place, name in enumerate(facts.tree.order)}
     links = [link for body in facts.bodies for link in body.links]
-    links.sort(key=lambda link: order[link.name])
+    links.sort(key=lambda link: index[link.name])
     left = [name for name in facts.tree.links if name not in facts.body_of]
     if left:
-        notes.append(f"left out {names(left)}: not part of the robot's tree")
-    held = [j.name for j in facts.model.joints if j.moves and j.parent not in facts.body_of]
-    if held:
-        notes.append(f"left out {names(held)}: a joint between the world and the robot")
+        notes.append(f"removed {names(left)}: not part of the kinematic tree")
+    world_joints = [j.name for j in facts.model.joints if j.moves and j.parent not in facts.body_of]
+    if world_joints:
+        notes.append(f"removed {names(world_joints)}: joints between the world and the robot")
     unknown = [link for link in links if has_unknown_inertia(link.inertial)]
     known = _with_mesh_inertia(facts, links) if unknown else links
     return with_valid_inertia(facts.bodies, known, notes)
 
 
 def has_unknown_inertia(inertial: Inertial | None) -> bool:
-    """Return whether a mass or an inertia has to be taken from a mesh."""
+    """Return whether a mass or an inertia depends on a mesh."""
     return inertial is not None and (
         (inertial.mass is not None and np.isnan(inertial.mass))
         or (inertial.inertia is not None and bool(np.isnan(inertial.inertia).any()))
     )
 
 
-_MOST_BODIES = 600
-"""Of a MJCF with more bodies MuJoCo is not asked for masses."""
+_MAX_BODIES = 600
+"""Maximum number of bodies for which MuJoCo computes masses."""
 
 
 def _with_mesh_inertia(facts: "Facts", links: Sequence[Link]) -> list[Link]:
-    """Return links with the inertia that MuJoCo takes from their meshes."""
+    """Return links with the inertia that MuJoCo computes from meshes."""
     import mujoco
 
-    model = _compiled(facts)
-    found = []
+    model = _compile(facts)
+    result = []
     for link in links:
         if has_unknown_inertia(link.inertial):
             assert link.inertial is not None
             if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, link.name) < 0:
                 raise RobotFileError(
-                    f"{facts.model.file}: a body without a name has its mass from a mesh; name it"
+                    f"{facts.model.file}: a body with its mass from a mesh has no name"
                 )
             body = model.body(link.name)
             origin = np.eye(4)
@@ -207,24 +202,24 @@ def _with_mesh_inertia(facts: "Facts", links: Sequence[Link]) -> list[Link]:
                 inertia=np.diag(body.inertia),
             )
             link = replace(link, inertial=inertial)
-        found.append(link)
-    return found
+        result.append(link)
+    return result
 
 
-def _compiled(facts: "Facts") -> Any:
-    """Return what MuJoCo makes of the file, without textures, which may be as large as they like.
+def _compile(facts: "Facts") -> Any:
+    """Compile the file with MuJoCo, without textures, whose size is not limited.
 
     Raises:
-        RobotFileError: if it does not load it.
+        RobotFileError: If MuJoCo rejects the file.
     """
     import mujoco
 
     from terrainkit_robots.quiet_mujoco import quiet_mujoco
 
     file = facts.model.file
-    wanted = f"{file}: masses are to come from meshes"
-    if len(facts.model.links) > _MOST_BODIES:
-        raise RobotFileError(f"{wanted}, and it has more than {_MOST_BODIES} bodies")
+    prefix = f"{file}: cannot compute masses from meshes"
+    if len(facts.model.links) > _MAX_BODIES:
+        raise RobotFileError(f"{prefix}: more than {_MAX_BODIES} bodies")
     try:
         with quiet_mujoco():
             spec = mujoco.MjSpec.from_file(str(file))
@@ -235,37 +230,39 @@ def _compiled(facts: "Facts") -> Any:
             return spec.compile()
     except (ValueError, mujoco.FatalError, mujoco.UnexpectedError) as error:
         reason = " ".join(str(error).split())
-        raise RobotFileError(f"{wanted}, and MuJoCo does not load it: {reason}") from None
+        raise RobotFileError(f"{prefix}: MuJoCo rejects the file: {reason}") from None
 
 
 def _joints(facts: "Facts", notes: list[str]) -> list[tuple[Joint, str]]:
-    """Return the joint above each link but the first, and what it was called before."""
-    order = {name: place for place, name in enumerate(facts.tree.order)}
+    """Return the joint of each link except the base, and its original name."""
+    index = {name: place for place, name in enumerate(facts.tree.order)}
     base = facts.bodies[0].top.name
     bodies = {body.top.name: body for body in facts.bodies}
-    inside = sorted((n for n in facts.body_of if n != base), key=lambda n: order[n])
-    above = [facts.tree.parent_joint[name] for name in inside]
-    uses = Counter(joint.name for joint in above)
-    following = {joint.name for joint in mimic_joints(facts.joints)}
-    taken, found = set[str](), []
-    for joint in above:
+    inside = sorted((n for n in facts.body_of if n != base), key=lambda n: index[n])
+    parent_joints = [facts.tree.parent_joint[name] for name in inside]
+    name_counts = Counter(joint.name for joint in parent_joints)
+    mimic_joint_names = {joint.name for joint in mimic_joints(facts.joints)}
+    used_names, result = set[str](), []
+    for joint in parent_joints:
         name = joint.name or f"{joint.child}_joint"
-        if uses[joint.name] > 1 and name in taken:
-            name = free_name(f"{joint.child}_joint", taken)
-            notes.append(f"named the joint above {joint.child} {name}: there are two {joint.name}")
-        taken.add(name)
-        mimic = joint.mimic if joint.name in following else None
+        if name_counts[joint.name] > 1 and name in used_names:
+            name = free_name(f"{joint.child}_joint", used_names)
+            notes.append(
+                f"renamed the joint of {joint.child} to {name}: duplicate name {joint.name}"
+            )
+        used_names.add(name)
+        mimic = joint.mimic if joint.name in mimic_joint_names else None
         if joint.mimic is not None and mimic is None and joint.moves:
-            notes.append(f"{joint.name} follows no other joint: {_lost(facts, joint.mimic)}")
-        moved = _normal_joint(facts, replace(joint, mimic=mimic), bodies.get(joint.child), notes)
-        found.append((replace(moved, name=name), joint.name))
-    return found
+            notes.append(f"removed the mimic of {joint.name}: {_mimic_problem(facts, joint.mimic)}")
+        moved = _canonical_joint(facts, replace(joint, mimic=mimic), bodies.get(joint.child), notes)
+        result.append((replace(moved, name=name), joint.name))
+    return result
 
 
-def _normal_joint(facts: "Facts", joint: Joint, body: Body | None, notes: list[str]) -> Joint:
+def _canonical_joint(facts: "Facts", joint: Joint, body: Body | None, notes: list[str]) -> Joint:
     if not joint.moves or body is None:
         if joint.kind != "fixed":
-            notes.append(f"fixed {joint.name}: a joint of type {joint.kind!r} has no motor")
+            notes.append(f"fixed {joint.name}: joint type {joint.kind!r} is not supported")
         return replace(joint, kind="fixed", limit=None, mimic=None, anchor=np.zeros(3))
     limits = joint.range
     if limits is None and joint.kind == "revolute":
@@ -291,11 +288,11 @@ def _normal_joint(facts: "Facts", joint: Joint, body: Body | None, notes: list[s
     )
 
 
-def _lost(facts: "Facts", mimic: Mimic) -> str:
-    """Return why a joint follows none."""
-    if any(mimic.joint == other.name for other in facts.joints):
-        return "it would follow itself in the end"
-    return f"there is no {mimic.joint!r}"
+def _mimic_problem(facts: "Facts", mimic: Mimic) -> str:
+    """Return why a mimic is not valid."""
+    if any(mimic.joint == new_name.name for new_name in facts.joints):
+        return "it is part of a cycle"
+    return f"there is no joint {mimic.joint!r}"
 
 
 def _positive(value: float | None) -> float | None:

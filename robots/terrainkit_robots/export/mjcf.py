@@ -1,7 +1,7 @@
-"""MJCF: a robot in its normal form as text, with motors, sensors and a keyframe.
+"""Write a canonical robot as MJCF, with actuators, sensors and a keyframe.
 
-The body that carries the robot is the only one in the world, so that the file can be attached to
-any scene. Shapes weigh nothing: all mass is in the `inertial` of each body, as declared.
+The base is the only body of the world, so that the file can be attached to any scene. Geoms have no
+mass: all mass is in the `inertial` of each body.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,84 +12,81 @@ import numpy as np
 from lxml import etree
 
 from terrainkit_robots.description.model import Geometry, Inertial, Joint, Link, RobotModel
+from terrainkit_robots.description.xml.number_text import number_text
 from terrainkit_robots.export.actuator import ActuatorConfig
 from terrainkit_robots.text import free_name
 from terrainkit_robots.transforms import Matrix, invert_poses, matrix_to_quat
 
-_DIGITS = 10
-"""Significant digits of each number: a nanometre on a robot of a metre."""
-
 FLOOR = "floor"
-"""What the ground is called in the scene."""
+"""Name of the ground geom in the scene."""
 
 _VISUAL_COLOR = "0.75 0.77 0.8 1"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Site:
-    """A frame on a body, with a volume where it senses touch."""
+    """A frame on a body, with a volume if it senses touch."""
 
     name: str
     body: str
     pose: Matrix
-    """Pose in the body's frame, shape (4, 4) [m]."""
+    """Pose in the body frame, shape (4, 4) [m]."""
 
     half_size: tuple[float, ...] = ()
-    """Half lengths of its box [m]; none for a small ball that senses nothing."""
+    """Half lengths of its box [m]; empty for a small sphere that senses nothing."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Extras:
-    """What a MJCF has beyond the robot's body."""
+    """Parts of an MJCF in addition to the bodies of the robot."""
 
     actuators: Mapping[str, ActuatorConfig] = field(default_factory=dict)
     """Controller of each actuated joint, in the order of the actuators."""
 
     feet: tuple[Site, ...] = ()
-    """Where the feet touch: a site and a touch sensor each."""
+    """Sites of the feet, each with a touch sensor."""
 
     imu: Site | None = None
-    """Where orientation, turning and acceleration are sensed."""
+    """Site of the sensors of orientation, angular velocity and acceleration."""
 
     frames: tuple[Site, ...] = ()
-    """Frames that are kept for whoever looks for them by name."""
+    """Frames of links that were merged."""
 
     excluded: Iterable[frozenset[str]] = ()
-    """Pairs of bodies that do not touch each other."""
+    """Pairs of bodies without contacts."""
 
     home: Mapping[str, float] = field(default_factory=dict)
-    """Joint positions of the keyframe [rad] or [m]; joints that are not named are at 0."""
+    """Joint positions of the keyframe [rad] or [m]; other joints are at 0."""
 
     height: float = 0.0
     """Height of the base in the keyframe [m]."""
 
     height_at_zero: float | None = None
-    """Height of the base with all joints at 0, which is where MuJoCo begins unless it is told of
-    the keyframe [m]; as in the keyframe if None."""
+    """Height of the base with all joints at 0 [m], MuJoCo's default state; None for `height`."""
 
     time_step: float = 0.005
-    """[s]"""
+    """Simulation time step [s]."""
 
 
 def mjcf_text(model: RobotModel, extras: Extras) -> str:
     """Return a robot as MJCF.
 
     Args:
-        model: The robot in its normal form; names of mesh files are relative to the MJCF.
-        extras: Motors, sensors, keyframe.
+        model: The robot in canonical form, with mesh files relative to the MJCF.
+        extras: Actuators, sensors and keyframe.
     """
     root = etree.Element("mujoco", model=model.name)
     etree.SubElement(root, "compiler", angle="radian", autolimits="true")
-    # Position control with damping is stable at training's time step only if its derivative is
-    # part of the solution.
-    step = _text(extras.time_step)
+    # Damped position control is stable at the time step of training only with implicit
+    # integration.
+    step = number_text(extras.time_step)
     etree.SubElement(root, "option", timestep=step, integrator="implicitfast")
     _defaults(root)
     names = _assets(root, model)
     world = etree.SubElement(root, "worldbody")
     base = _bodies(world, model, names, extras)
     at_zero = extras.height if extras.height_at_zero is None else extras.height_at_zero
-    base.set("pos", _text([0, 0, at_zero]))
+    base.set("pos", number_text([0, 0, at_zero]))
     if model.floating:
         name = free_name("root", {joint.name for joint in model.joints})
         base.insert(0, etree.Element("freejoint", name=name))
@@ -103,29 +100,31 @@ def mjcf_text(model: RobotModel, extras: Extras) -> str:
     return text + "\n"
 
 
-_EVERYTHING = str(2**31 - 1)
-"""All bits of contype and conaffinity: whatever touches anything touches the ground."""
+_ALL_BITS = str(2**31 - 1)
+"""All bits of contype and conaffinity, so that the ground collides with every colliding geom."""
 
 
 def floor_text() -> str:
-    """Return the ground by itself."""
+    """Return the ground as a geom element."""
     return (
-        f'<geom name="{FLOOR}" type="plane" size="0 0 1" contype="{_EVERYTHING}" '
-        f'conaffinity="{_EVERYTHING}"/>'
+        f'<geom name="{FLOOR}" type="plane" size="0 0 1" contype="{_ALL_BITS}" '
+        f'conaffinity="{_ALL_BITS}"/>'
     )
 
 
 def scene_text(name: str, file: str, *, height: float) -> str:
-    """Return a MJCF with a floor and a light that includes the robot's.
+    """Return an MJCF with a floor and a light that includes the robot.
 
     Args:
-        name: What to call it.
-        file: The robot's MJCF, beside it.
-        height: How tall the robot is, about [m].
+        name: Name of the robot.
+        file: MJCF of the robot in the same folder.
+        height: Approximate height of the robot [m].
     """
     root = etree.Element("mujoco", model=f"{name} scene")
     etree.SubElement(root, "include", file=file)
-    etree.SubElement(root, "statistic", center=_text([0, 0, height / 2]), extent=_text(2 * height))
+    etree.SubElement(
+        root, "statistic", center=number_text([0, 0, height / 2]), extent=number_text(2 * height)
+    )
     visual = etree.SubElement(root, "visual")
     etree.SubElement(visual, "headlight", diffuse="0.6 0.6 0.6", ambient="0.3 0.3 0.3")
     asset = etree.SubElement(root, "asset")
@@ -145,7 +144,7 @@ def scene_text(name: str, file: str, *, height: float) -> str:
     )
     world = etree.SubElement(root, "worldbody")
     etree.SubElement(
-        world, "light", pos=_text([0, 0, 4 * height]), dir="0 0 -1", type="directional"
+        world, "light", pos=number_text([0, 0, 4 * height]), dir="0 0 -1", type="directional"
     )
     etree.SubElement(
         world,
@@ -154,26 +153,21 @@ def scene_text(name: str, file: str, *, height: float) -> str:
         type="plane",
         size="0 0 0.05",
         material="grid",
-        contype=_EVERYTHING,
-        conaffinity=_EVERYTHING,
+        contype=_ALL_BITS,
+        conaffinity=_ALL_BITS,
     )
     etree.indent(root)
     text: str = etree.tostring(root, encoding="unicode")
     return text + "\n"
 
 
-def _named_once(extras: Extras) -> list[Site]:
-    """Return the sites to be written; a frame whose name another site has is left out."""
+def _unique_sites(extras: Extras) -> list[Site]:
+    """Return the sites to write; frames with the name of another site are skipped."""
     imu = () if extras.imu is None else (extras.imu,)
-    found = {site.name: site for site in (*extras.feet, *imu)}
+    sites = {site.name: site for site in (*extras.feet, *imu)}
     for frame in extras.frames:
-        found.setdefault(frame.name, frame)
-    return list(found.values())
-
-
-def _text(value: float | Sequence[float] | Matrix) -> str:
-    numbers = np.atleast_1d(np.asarray(value, dtype=float))
-    return " ".join(f"{number + 0.0:.{_DIGITS}g}" for number in numbers)
+        sites.setdefault(frame.name, frame)
+    return list(sites.values())
 
 
 def _defaults(root: Any) -> None:
@@ -190,20 +184,20 @@ _MeshKey = tuple[str, tuple[float, ...]]
 
 
 def _assets(root: Any, model: RobotModel) -> dict[_MeshKey, str]:
-    """Write the meshes, and return the name of each."""
-    colliding = {_mesh_key(g) for link in model.links for g in link.collisions if g.shape == "mesh"}
-    seen = {_mesh_key(g) for link in model.links for g in link.visuals if g.shape == "mesh"}
-    if not (colliding or seen):
+    """Write the meshes, and return their names."""
+    collision = {_mesh_key(g) for link in model.links for g in link.collisions if g.shape == "mesh"}
+    visual = {_mesh_key(g) for link in model.links for g in link.visuals if g.shape == "mesh"}
+    if not (collision or visual):
         return {}
-    asset, names, taken = etree.SubElement(root, "asset"), dict[_MeshKey, str](), set[str]()
-    for key in sorted(colliding | seen):
+    asset, names, used_names = etree.SubElement(root, "asset"), dict[_MeshKey, str](), set[str]()
+    for key in sorted(collision | visual):
         file, scale = key
-        name = free_name(file.rsplit("/", 1)[-1].rsplit(".", 1)[0], taken)
-        taken.add(name)
+        name = free_name(file.rsplit("/", 1)[-1].rsplit(".", 1)[0], used_names)
+        used_names.add(name)
         names[key] = name
         mesh = etree.SubElement(asset, "mesh", name=name, file=file)
         if scale != (1.0, 1.0, 1.0):
-            mesh.set("scale", _text(scale))
+            mesh.set("scale", number_text(scale))
     return names
 
 
@@ -215,26 +209,28 @@ def _mesh_key(geometry: Geometry) -> _MeshKey:
 def _bodies(world: Any, model: RobotModel, meshes: Mapping[_MeshKey, str], extras: Extras) -> Any:
     """Write all bodies, and return the element of the base."""
     links = {link.name: link for link in model.links}
-    below: dict[str, list[Joint]] = {name: [] for name in links}
+    child_joints: dict[str, list[Joint]] = {name: [] for name in links}
     for joint in model.joints:
-        below[joint.parent].append(joint)
+        child_joints[joint.parent].append(joint)
     sites: dict[str, list[Site]] = {name: [] for name in links}
-    for site in _named_once(extras):
+    for site in _unique_sites(extras):
         sites[site.body].append(site)
-    # A stack, since a chain of links may be longer than Python's own.
+    # A stack instead of recursion: a chain of links may exceed Python's limit.
     base = model.links[0]
     stack: list[tuple[Any, list[Joint], Link]] = [(world, [], base)]
     first = None
-    taken = {FLOOR}
+    used_names = {FLOOR}
     while stack:
         parent, joints, link = stack.pop()
-        if link.virtual and len(below[link.name]) == 1 and joints:
-            (joint,) = below[link.name]
+        if link.virtual and len(child_joints[link.name]) == 1 and joints:
+            (joint,) = child_joints[link.name]
             stack.append((parent, [*joints, joint], links[joint.child]))
             continue
-        body = _body(parent, joints, link, meshes, extras, sites[link.name], taken)
+        body = _body(parent, joints, link, meshes, extras, sites[link.name], used_names)
         first = body if first is None else first
-        stack += [(body, [joint], links[joint.child]) for joint in reversed(below[link.name])]
+        stack += [
+            (body, [joint], links[joint.child]) for joint in reversed(child_joints[link.name])
+        ]
     return first
 
 
@@ -245,30 +241,30 @@ def _body(
     meshes: Mapping[_MeshKey, str],
     extras: Extras,
     sites: Sequence[Site],
-    taken: set[str],
+    used_names: set[str],
 ) -> Any:
     body = etree.SubElement(parent, "body", name=link.name)
-    place = np.eye(4)
+    pose = np.eye(4)
     for joint in joints:
-        place = place @ joint.origin
-    _place(body, place)
+        pose = pose @ joint.origin
+    _place(body, pose)
     if link.inertial is not None and link.inertial.mass:
         _inertial(body, link.inertial)
     elif link.collisions:
-        # MuJoCo makes contacts as soft as what is felt at the place of the mass, which it would
-        # take to be elsewhere.
+        # MuJoCo scales the softness of contacts by the inertia at the center of mass, which would
+        # otherwise be elsewhere.
         middle = np.mean([shape.origin[:3, 3] for shape in link.collisions], axis=0)
-        etree.SubElement(body, "inertial", pos=_text(middle), mass="0", diaginertia="0 0 0")
+        etree.SubElement(body, "inertial", pos=number_text(middle), mass="0", diaginertia="0 0 0")
     for index, joint in enumerate(joints):
         if joint.moves:
-            # Axes of several joints are all given in the frame of the body, at zero.
+            # The axes of all joints are in the frame of the body at zero position.
             after = np.eye(4)
             for later in joints[index + 1 :]:
                 after = after @ later.origin
             _joint(body, joint, invert_poses(after), extras.actuators.get(joint.name))
     for kind, shapes in (("visual", link.visuals), ("collision", link.collisions)):
         for shape in shapes:
-            _geom(body, shape, kind, meshes, taken)
+            _geom(body, shape, kind, meshes, used_names)
     for site in sites:
         _site(body, site)
     return body
@@ -276,65 +272,65 @@ def _body(
 
 def _place(element: Any, pose: Matrix) -> None:
     if np.abs(pose[:3, 3]).max() > 0:
-        element.set("pos", _text(pose[:3, 3]))
+        element.set("pos", number_text(pose[:3, 3]))
     if not np.allclose(pose[:3, :3], np.eye(3), rtol=0, atol=1e-12):
-        element.set("quat", _text(matrix_to_quat(pose[:3, :3])))
+        element.set("quat", number_text(matrix_to_quat(pose[:3, :3])))
 
 
 def _inertial(body: Any, inertial: Inertial) -> None:
     assert inertial.mass is not None
     inertia = np.zeros((3, 3)) if inertial.inertia is None else inertial.inertia
-    turn = inertial.origin[:3, :3]
-    i = turn @ inertia @ turn.T
+    rotation = inertial.origin[:3, :3]
+    i = rotation @ inertia @ rotation.T
     element = etree.SubElement(
-        body, "inertial", pos=_text(inertial.origin[:3, 3]), mass=_text(inertial.mass)
+        body, "inertial", pos=number_text(inertial.origin[:3, 3]), mass=number_text(inertial.mass)
     )
     if inertia.any():
         full = [i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
-        element.set("fullinertia", _text(full))
-    else:  # which MuJoCo takes on what does not move, written so
+        element.set("fullinertia", number_text(full))
+    else:  # accepted by MuJoCo for bodies that do not move
         element.set("diaginertia", "0 0 0")
 
 
-def _joint(body: Any, joint: Joint, frame: Matrix, drive: ActuatorConfig | None) -> None:
+def _joint(body: Any, joint: Joint, frame: Matrix, actuator: ActuatorConfig | None) -> None:
     element = etree.SubElement(body, "joint", name=joint.name)
     if joint.kind == "prismatic":
         element.set("type", "slide")
     anchor = frame[:3, :3] @ joint.anchor + frame[:3, 3]
     if np.abs(anchor).max() > 0:
-        element.set("pos", _text(anchor))
-    element.set("axis", _text(frame[:3, :3] @ joint.direction))
+        element.set("pos", number_text(anchor))
+    element.set("axis", number_text(frame[:3, :3] @ joint.direction))
     if joint.range is not None:
-        element.set("range", _text(joint.range))
+        element.set("range", number_text(joint.range))
     if joint.damping:
-        element.set("damping", _text(joint.damping))
+        element.set("damping", number_text(joint.damping))
     if joint.friction:
-        element.set("frictionloss", _text(joint.friction))
-    armature = joint.armature if drive is None else drive.armature
+        element.set("frictionloss", number_text(joint.friction))
+    armature = joint.armature if actuator is None else actuator.armature
     if armature:
-        element.set("armature", _text(armature))
+        element.set("armature", number_text(armature))
 
 
 def _geom(
-    body: Any, shape: Geometry, kind: str, meshes: Mapping[_MeshKey, str], taken: set[str]
+    body: Any, shape: Geometry, kind: str, meshes: Mapping[_MeshKey, str], used_names: set[str]
 ) -> None:
     geom = etree.SubElement(body, "geom", {"class": kind})
-    if kind == "collision" and shape.name and shape.name not in taken:
+    if kind == "collision" and shape.name and shape.name not in used_names:
         geom.set("name", shape.name)
-        taken.add(shape.name)
+        used_names.add(shape.name)
     if shape.shape == "mesh":
         geom.set("type", "mesh")
         geom.set("mesh", meshes[_mesh_key(shape)])
     else:
         geom.set("type", shape.shape)
-        geom.set("size", _text(shape.size))
+        geom.set("size", number_text(shape.size))
     _place(geom, shape.origin)
     if kind == "collision":
         for attribute in ("contype", "conaffinity"):
             if getattr(shape, attribute) != 1:
                 geom.set(attribute, str(getattr(shape, attribute)))
     elif shape.color is not None:
-        geom.set("rgba", _text(shape.color))
+        geom.set("rgba", number_text(shape.color))
 
 
 def _site(body: Any, site: Site) -> None:
@@ -342,7 +338,7 @@ def _site(body: Any, site: Site) -> None:
     _place(element, site.pose)
     if site.half_size:
         element.set("type", "box")
-        element.set("size", _text(site.half_size))
+        element.set("size", number_text(site.half_size))
 
 
 def _contact(root: Any, extras: Extras) -> None:
@@ -354,17 +350,17 @@ def _contact(root: Any, extras: Extras) -> None:
 
 
 def _equality(root: Any, model: RobotModel) -> None:
-    followers = [joint for joint in model.joints if joint.mimic is not None]
-    if followers:
+    mimic_joints = [joint for joint in model.joints if joint.mimic is not None]
+    if mimic_joints:
         equality = etree.SubElement(root, "equality")
-        for joint in followers:
+        for joint in mimic_joints:
             assert joint.mimic is not None
             etree.SubElement(
                 equality,
                 "joint",
                 joint1=joint.name,
                 joint2=joint.mimic.joint,
-                polycoef=_text([joint.mimic.offset, joint.mimic.multiplier, 0, 0, 0]),
+                polycoef=number_text([joint.mimic.offset, joint.mimic.multiplier, 0, 0, 0]),
             )
 
 
@@ -372,22 +368,22 @@ def _actuators(root: Any, model: RobotModel, extras: Extras) -> None:
     if not extras.actuators:
         return
     joints = {joint.name: joint for joint in model.joints}
-    actuator = etree.SubElement(root, "actuator")
-    for name, drive in extras.actuators.items():
-        kind = "velocity" if drive.is_velocity_control else "position"
-        element = etree.SubElement(actuator, kind, name=name, joint=name)
-        if not drive.is_velocity_control:
-            element.set("kp", _text(drive.stiffness))
-        element.set("kv", _text(drive.damping))
+    section = etree.SubElement(root, "actuator")
+    for name, actuator in extras.actuators.items():
+        kind = "velocity" if actuator.is_velocity_control else "position"
+        element = etree.SubElement(section, kind, name=name, joint=name)
+        if not actuator.is_velocity_control:
+            element.set("kp", number_text(actuator.stiffness))
+        element.set("kv", number_text(actuator.damping))
         limits = (
-            drive.velocity and (-drive.velocity, drive.velocity)
-            if drive.is_velocity_control
+            actuator.velocity and (-actuator.velocity, actuator.velocity)
+            if actuator.is_velocity_control
             else joints[name].range
         )
         if limits:
-            element.set("ctrlrange", _text(limits))
-        if drive.effort is not None:
-            element.set("forcerange", _text([-drive.effort, drive.effort]))
+            element.set("ctrlrange", number_text(limits))
+        if actuator.effort is not None:
+            element.set("forcerange", number_text([-actuator.effort, actuator.effort]))
 
 
 _IMU = (
@@ -396,7 +392,7 @@ _IMU = (
     ("accelerometer", "acceleration"),
     ("velocimeter", "linear_velocity"),
 )
-"""MuJoCo's sensors at the IMU, and what they are called."""
+"""MuJoCo's sensors at the IMU, and their names."""
 
 
 def _sensors(root: Any, extras: Extras) -> None:
@@ -419,10 +415,10 @@ def _keyframe(root: Any, model: RobotModel, extras: Extras) -> None:
         return
     key = etree.SubElement(etree.SubElement(root, "keyframe"), "key", name="home")
     base = [0.0, 0.0, extras.height, 1.0, 0.0, 0.0, 0.0] if model.floating else []
-    key.set("qpos", _text([*base, *(extras.home.get(name, 0.0) for name in order)]))
+    key.set("qpos", number_text([*base, *(extras.home.get(name, 0.0) for name in order)]))
     if extras.actuators:
         targets = (
-            0.0 if drive.is_velocity_control else extras.home.get(name, 0.0)
-            for name, drive in extras.actuators.items()
+            0.0 if actuator.is_velocity_control else extras.home.get(name, 0.0)
+            for name, actuator in extras.actuators.items()
         )
-        key.set("ctrl", _text(list(targets)))
+        key.set("ctrl", number_text(list(targets)))

@@ -1,4 +1,4 @@
-"""Sites: where a robot's feet touch the ground, and where its IMU is."""
+"""Create the sites of the feet and the IMU."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -16,21 +16,22 @@ if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
     from terrainkit_robots.analysis.legs.legs import Leg
 
-_AROUND = 0.002
-"""A foot's site is larger than its shapes by this on each side, so that contacts lie within [m]."""
+_MARGIN = 0.002
+"""Margin by which a foot site exceeds its geometry on each side, so that it contains contacts [m].
+"""
 
 
 def foot_sites(facts: "Facts", feet: Sequence[str] = ()) -> tuple[Site, ...]:
-    """Return a site for each leg, around the shapes that touch the ground at the standing pose.
+    """Return a site for each leg that encloses the geometry in contact with the ground.
 
     Args:
         facts: The robot.
-        feet: What its feet are to be called, links that move with them; else as they were found.
+        feet: Names of the feet, links that are fixed to them; empty to use the detected ones.
     """
     poses = body_poses(facts.bodies, facts.positions)
-    called = {facts.body_of[name].index: name for name in feet}
+    foot_names = {facts.body_of[name].index: name for name in feet}
     return tuple(
-        _foot_site(leg, called.get(leg.limb.chain[-1], leg.foot), facts, poses)
+        _foot_site(leg, foot_names.get(leg.limb.chain[-1], leg.foot), facts, poses)
         for leg in facts.legs
     )
 
@@ -38,18 +39,18 @@ def foot_sites(facts: "Facts", feet: Sequence[str] = ()) -> tuple[Site, ...]:
 def _foot_site(leg: "Leg", foot: str, facts: "Facts", poses: Sequence[Matrix]) -> Site:
     body = facts.bodies[leg.limb.chain[-1]]
     local = _pose_in_body(body, foot)
-    box = bounds(_touching(body, poses[body.index], facts), facts.meshes)
+    box = bounds(_ground_contacts(body, poses[body.index], facts), facts.meshes)
     if box is None:
         return Site(name=foot, body=foot, pose=np.eye(4))
-    place = np.eye(4)
-    place[:3, 3] = box.mean(axis=0)
-    half = np.ptp(box, axis=0) / 2 + _AROUND
-    pose = invert_poses(local) @ place
+    center = np.eye(4)
+    center[:3, 3] = box.mean(axis=0)
+    half = np.ptp(box, axis=0) / 2 + _MARGIN
+    pose = invert_poses(local) @ center
     return Site(name=foot, body=foot, pose=pose, half_size=tuple(half.tolist()))
 
 
-def _touching(body: Body, pose: Matrix, facts: "Facts") -> list[BodyShape]:
-    """Return the shapes of a body that reach as far down as any of them."""
+def _ground_contacts(body: Body, pose: Matrix, facts: "Facts") -> list[BodyShape]:
+    """Return the lowest collision geometry of a body."""
     shapes = [s for s in body.collisions if has_bounds(s.geometry, facts.meshes)]
     depths = [min_height(shape, pose, facts.meshes) for shape in shapes]
     return [
@@ -58,28 +59,28 @@ def _touching(body: Body, pose: Matrix, facts: "Facts") -> list[BodyShape]:
 
 
 def imu_site(facts: "Facts") -> Site:
-    """Return the site of the IMU: where the file has it, else at the base's link of that name.
+    """Return the site of the IMU: as defined in the file, or at a link of the base named imu.
 
-    Where nothing tells, it is at the base's origin, and `imu_notes` says so.
+    Otherwise it is at the origin of the base, and `imu_notes` says so.
     """
     body, pose = _imu(facts) or (_base(facts), np.eye(4))
     return Site(name="imu", body=body.top.name, pose=pose)
 
 
 def imu_notes(facts: "Facts") -> tuple[str, ...]:
-    """Return what to say of an IMU that nobody placed, on a robot that needs one."""
+    """Return a note if a robot with a free base does not define its IMU."""
     if _imu(facts) is not None or facts.model.floating is False:
         return ()
     base = _base(facts).top.name
-    return (f"the IMU is at the origin of {base}: no sensor, site or link says where it is",)
+    return (f"placed the IMU at the origin of {base}: no sensor, site or link defines it",)
 
 
 def _imu(facts: "Facts") -> tuple[Body, Matrix] | None:
-    """Return the body of the IMU and the pose in its frame; None if nothing tells."""
-    told = facts.model.imu
-    if told is not None and told[0] in facts.body_of:
-        body = facts.body_of[told[0]]
-        return body, _pose_in_body(body, told[0]) @ told[1]
+    """Return the body of the IMU and the pose in its frame; None if it is not defined."""
+    imu = facts.model.imu
+    if imu is not None and imu[0] in facts.body_of:
+        body = facts.body_of[imu[0]]
+        return body, _pose_in_body(body, imu[0]) @ imu[1]
     base = _base(facts)
     for link, pose in zip(base.links, base.poses, strict=True):
         if "imu" in link.name.lower():

@@ -1,60 +1,49 @@
-"""Leftovers: what a MJCF says that neither the model of a robot nor a URDF can hold."""
+"""List the elements of an MJCF that are not exported."""
 
 from collections import Counter
-from collections.abc import Sequence
 
 from terrainkit_robots.description.model import RobotModel
 from terrainkit_robots.description.xml.document import parse_xml, read_bytes
-from terrainkit_robots.text import names
+from terrainkit_robots.text import count, names
 
 _SECTIONS = ("tendon", "equality", "deformable", "extension", "custom")
-"""Sections of a MJCF that are not carried over. Its sensors and motors are written anew."""
-
+"""Sections that are not exported. Sensors and actuators are generated."""
 
 _CONTACT = ("friction", "condim", "priority", "solref", "solimp", "solmix", "margin", "gap")
-"""Attributes of shapes that are not carried over: how they feel to what they touch."""
+"""Contact parameters of geoms that are not exported."""
 
 
 def unsupported_elements(model: RobotModel) -> tuple[str, ...]:
-    """Return a sentence for each kind of thing that onboarding a MJCF leaves out."""
+    """Return a note for each kind of MJCF element that is not exported."""
     if model.kind != "mjcf":
         return ()
-    sections, springs, felt = Counter[str](), 0, 0
+    sections, stiffness_count, contact_count = Counter[str](), 0, 0
     for file in model.sources:
         root = parse_xml(file, read_bytes(file)).root
         if root is None:
             continue
         for section in _SECTIONS:
             sections[section] += sum(len(each) for each in root.iter(section))
-        springs += sum(_is_set(joint.get("stiffness")) for joint in root.iter("joint"))
-        felt += sum(any(name in geom.attrib for name in _CONTACT) for geom in root.iter("geom"))
+        stiffness_count += sum(_is_set(joint.get("stiffness")) for joint in root.iter("joint"))
+        contact_count += sum(
+            any(name in geom.attrib for name in _CONTACT) for geom in root.iter("geom")
+        )
     sections["equality"] -= sum(joint.mimic is not None for joint in model.joints)
-    notes = [_section(name, sections[name]) for name in _SECTIONS if sections[name] > 0]
-    if springs:
-        notes.append(f"left out stiffness of joints, which {_setting(springs)}")
-    if felt:
-        notes.append(f"left out friction and contact parameters of shapes, which {_setting(felt)}")
-    idle = [motor.name for motor in model.actuators if not motor.joint]
-    if idle:
-        notes.append(f"left out {_counted(idle)}, which {_drive(idle)} no joint: {names(idle)}")
+    notes = [
+        f"ignored <{name}> ({count(sections[name], 'element')})"
+        for name in _SECTIONS
+        if sections[name] > 0
+    ]
+    if stiffness_count:
+        notes.append(f"ignored stiffness of joints ({count(stiffness_count, 'element')})")
+    if contact_count:
+        notes.append(
+            f"ignored friction and contact parameters of geoms ({count(contact_count, 'element')})"
+        )
+    unused = [actuator.name for actuator in model.actuators if not actuator.joint]
+    if unused:
+        notes.append(f"ignored {count(len(unused), 'actuator')} without a joint: {names(unused)}")
     return tuple(notes)
-
-
-def _setting(number: int) -> str:
-    return "1 element sets" if number == 1 else f"{number} elements set"
-
-
-def _section(name: str, number: int) -> str:
-    what = "the element" if number == 1 else f"{number} elements"
-    return f"left out {what} of <{name}>"
-
-
-def _counted(motors: Sequence[str]) -> str:
-    return "a motor" if len(motors) == 1 else f"{len(motors)} motors"
-
-
-def _drive(motors: Sequence[str]) -> str:
-    return "drives" if len(motors) == 1 else "drive"
 
 
 def _is_set(value: str | None) -> bool:

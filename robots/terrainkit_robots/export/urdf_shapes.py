@@ -1,4 +1,4 @@
-"""Shapes as URDF has them: full lengths, and several for one that it has not."""
+"""Convert geometry to URDF elements."""
 
 from collections.abc import Iterator
 
@@ -7,14 +7,14 @@ from terrainkit_robots.description.xml.number_text import number_text
 from terrainkit_robots.transforms import Matrix
 
 Element = tuple[Matrix, str, dict[str, str]]
-"""Pose in the link, shape (4, 4) [m]; tag; and attributes."""
+"""Pose in the link, shape (4, 4) [m]; tag; attributes."""
 
 
-def elements_of(shape: Geometry) -> Iterator[Element]:
-    """Yield the elements that a shape is made of.
+def to_elements(shape: Geometry) -> Iterator[Element]:
+    """Yield the URDF elements of a geometry.
 
     Raises:
-        ValueError: if URDF has nothing like it.
+        ValueError: If URDF cannot represent it.
     """
     size = shape.size
     match shape.shape:
@@ -26,7 +26,7 @@ def elements_of(shape: Geometry) -> Iterator[Element]:
             attributes = {"radius": number_text(size[0]), "length": number_text(2 * size[1])}
             yield shape.origin, "cylinder", attributes
             if shape.shape == "capsule":
-                yield from _ends_of_capsule(shape)
+                yield from _capsule_caps(shape)
         case "ellipsoid" if len(set(size)) == 1:
             yield shape.origin, "sphere", {"radius": number_text(size[0])}
         case "mesh" | "ellipsoid" if shape.mesh is not None:
@@ -35,12 +35,10 @@ def elements_of(shape: Geometry) -> Iterator[Element]:
                 attributes["scale"] = number_text(shape.mesh.scale)
             yield shape.origin, "mesh", attributes
         case _:
-            raise ValueError(
-                f"a {shape.shape} has no place in a URDF; export_meshes() leaves it out"
-            )
+            raise ValueError(f"shape: got {shape.shape}; expected one that URDF supports")
 
 
-def _ends_of_capsule(shape: Geometry) -> Iterator[Element]:
+def _capsule_caps(shape: Geometry) -> Iterator[Element]:
     for sign in (1, -1):
         end = shape.origin.copy()
         end[:3, 3] += sign * shape.size[1] * end[:3, 2]

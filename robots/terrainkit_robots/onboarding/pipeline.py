@@ -26,7 +26,7 @@ from terrainkit_robots.onboarding.robot_files import (
 )
 
 if TYPE_CHECKING:
-    from terrainkit_robots.export.collision_simplification.simplify import How, Progress
+    from terrainkit_robots.export.collision_simplification.simplify import CollisionMethod, Progress
     from terrainkit_robots.onboarding.verify import Verification
 
 _BLOCKING_RULES = ("XML", "MSH", "TRE", "INR", "JNT001", "JNT004", "JNT007", "JNT013")
@@ -50,7 +50,7 @@ class OnboardOptions:
     """ROS packages, xacro arguments and ignored rules; the settings files above the robot file are
     added. A selection of rules has no effect."""
 
-    collision: "How" = "keep"
+    collision: "CollisionMethod" = "keep"
     """How collision meshes are simplified."""
 
     frameworks: tuple[str, ...] = ()
@@ -151,9 +151,9 @@ def onboard(
     config_names = {name: config_file_name(name) for name in options.frameworks}
     if output is not None:
         check_folder(Path(output), overwrite=options.overwrite)
-    override = None
+    user_spec = None
     if options.spec is not None:
-        override = SpecOverride(spec=RobotSpec.load(options.spec), file=str(options.spec))
+        user_spec = SpecOverride(spec=RobotSpec.load(options.spec), file=str(options.spec))
     options.on_step(f"checking {path.name}")
     report, fixed = _fix_in_memory(path, options)
     for rule in report.crashed:
@@ -167,7 +167,7 @@ def onboard(
         report.facts,
         collision=options.collision,
         floating=options.floating,
-        override=override,
+        user_spec=user_spec,
         cache_dir=options.cache_dir,
         progress=options.progress,
     )
@@ -208,7 +208,8 @@ def _fix_in_memory(path: Path, options: OnboardOptions) -> tuple[Report, tuple[F
     settings = options.settings.over(read_settings(path.parent))
     # All rules are needed to find blocking errors. The written files are simulated, not this one.
     settings = replace(settings, select=(), simulate=False)
-    report, fixed = check_robot(path, settings), ()
+    report = check_robot(path, settings)
+    fixed: tuple[Finding, ...] = ()
     if report.facts.model.kind != "xacro" and any(f.fix is not None for f in report.findings):
         first = report
 

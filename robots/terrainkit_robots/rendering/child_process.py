@@ -6,7 +6,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots import gl_backend
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.text import one_line, short
+from terrainkit_robots.text import one_line, truncate
 
 Frame = NDArray[np.uint8]
 """An RGB image, shape (height, width, 3)."""
@@ -39,17 +39,17 @@ def stream_frames(render: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
     Raises:
         RenderError: if no backend works, a frame takes too long, or `render` raises this error.
     """
-    reasons = []
+    reasons: list[str] = []
     for backend in gl_backend.backends():
         reason = yield from _run_child(render, backend)
         if not reason:
             return
-        reasons.append(f"{backend or 'default backend'}: {short(one_line(reason), 160)}")
+        reasons.append(f"{backend or 'default backend'}: {truncate(one_line(reason), 160)}")
     advice = gl_backend.installation_advice()
     raise RenderError(f"MuJoCo cannot render here ({'; '.join(reasons)}); {advice}")
 
 
-def _run_child(render: Callable[[], Iterator[Frame]], backend: str) -> Iterator[Frame]:
+def _run_child(render: Callable[[], Iterator[Frame]], backend: str) -> Generator[Frame, None, str]:
     """Yield frames, and return why the backend failed, or an empty string."""
     command = [sys.executable, "-P", "-m", "terrainkit_robots.rendering"]
     environment, count = gl_backend.child_environment(backend), 0
@@ -60,8 +60,14 @@ def _run_child(render: Callable[[], Iterator[Frame]], backend: str) -> Iterator[
     ):
         pickle.dump(render, request)
         request.seek(0)
-        pipes = {"stdin": request, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
-        process = subprocess.Popen(command, env=environment, cwd=folder, **pipes)
+        process = subprocess.Popen(
+            command,
+            env=environment,
+            cwd=folder,
+            stdin=request,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        )
         try:
             while isinstance(message := _receive(process), np.ndarray):
                 yield message
@@ -73,7 +79,7 @@ def _run_child(render: Callable[[], Iterator[Frame]], backend: str) -> Iterator[
         raise message
     if message and count:  # another backend would start again with the first frame
         raise RenderError(f"rendering failed after {count} frames: {one_line(message)}")
-    return message
+    return str(message)
 
 
 def _receive(process: subprocess.Popen[bytes]) -> Any:

@@ -35,7 +35,8 @@ FLOOR_COLOR, LINE_COLOR = (0.9, 0.91, 0.92), (0.72, 0.74, 0.77)
 GRID_LINES = 24
 """Number of grid lines on each side of the robot."""
 
-MUJOCO_RGBA, DEFAULT_RGBA = np.float32([0.5, 0.5, 0.5, 1]), np.float32([0.72, 0.74, 0.78, 1])
+MUJOCO_RGBA = np.array([0.5, 0.5, 0.5, 1], np.float32)
+DEFAULT_RGBA = np.array([0.72, 0.74, 0.78, 1], np.float32)
 """Color of geoms without one in the file: in MuJoCo, and here."""
 
 BLACK_LEVEL = 0.1

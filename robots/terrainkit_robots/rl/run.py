@@ -21,6 +21,7 @@ import numpy as np
 
 from terrainkit.atomic_write import atomic_write
 from terrainkit.errors import ConfigError, ExportError, listing
+from terrainkit.text import expected_names
 from terrainkit.toml_text import parse_toml, read_text
 from terrainkit_robots.files import open_regular
 from terrainkit_robots.rl import tasks
@@ -227,10 +228,12 @@ def _resolve_run(name: str | Path) -> tuple[Path, Path | None]:
     except (OSError, ValueError) as error:
         raise ConfigError(f"cannot read {name}: {error}") from error
     if not is_robot:
-        raise ConfigError(
-            f"run: got {name}; expected a folder that terrainkit train wrote, a checkpoint in "
-            f"one, or a robot: {listing(tasks.task_names())}"
+        expected = expected_names(
+            str(name),
+            tasks.task_names(),
+            "expected a folder that terrainkit train wrote, a checkpoint in one, or a robot",
         )
+        raise ConfigError(f"run: got {name}; {expected}")
     shipped = tasks.get_task(str(name)).trained_run
     if not shipped.is_dir():
         raise ConfigError(

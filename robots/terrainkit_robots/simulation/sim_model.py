@@ -26,7 +26,7 @@ from terrainkit_robots.mesh.mesh_cache import MeshError
 from terrainkit_robots.mesh.surface import binary_stl
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.units import PRISMATIC, REVOLUTE, JointUnits
-from terrainkit_robots.text import short
+from terrainkit_robots.text import truncate
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -163,7 +163,7 @@ def _compiler_message(error: str) -> str:
     """Return an error of the compiler on one line, with the element but without line numbers."""
     message, _, location = error.partition("\nElement ")
     name = re.match(r"name '(.*?)(?:', id -?\d+(?:, line -?\d+)?)?$", location, re.DOTALL)
-    subject = f"{short(' '.join(name[1].split()))}: " if name else ""
+    subject = f"{truncate(' '.join(name[1].split()))}: " if name else ""
     return subject + " ".join(message.removeprefix("Error: ").split())
 
 

@@ -1,77 +1,67 @@
-"""Patterns of joint names: regular expressions that cannot take long.
+"""Patterns of joint names: regular expressions whose matching time is bounded.
 
-Python's engine tries one way after another to match, and some expressions have more ways than there
-are seconds: `(a+)+b`, or `.*.*.*.*.*b`. The ways are counted first, from above.
+Python's engine backtracks, and takes exponential time for some expressions: `(a+)+b`, or
+`.*.*.*.*.*b`. An upper bound on the number of ways to match is therefore computed first.
 """
 
 import re
 import warnings
-from collections.abc import Sequence
 
 from terrainkit.errors import ConfigError
 
-_LONGEST = 200
-"""A pattern of more characters was not written for joint names."""
+MAX_LENGTH = 200
+"""Longest pattern [characters]."""
 
 _TOKEN = re.compile(
-    r"""\\. | \[\^?\]?(?:\\.|[^\]\\])*\]          # one character, or one of several
+    r"""\\. | \[\^?\]?(?:\\.|[^\]\\])*\]          # a character, or a character class
       | \(\?[:=!] | \(\? | \( | \) | \|          # groups
-      | (?:[*+?]|\{\d*,?\d*\})[?+]?              # repeats
+      | (?:[*+?]|\{\d*,?\d*\})[?+]?              # quantifiers
       | .""",
     re.DOTALL | re.VERBOSE,
 )
 
 
-def compiled(pattern: str) -> "re.Pattern[str]":
-    """Return a regular expression.
+def compile_pattern(pattern: str) -> "re.Pattern[str]":
+    """Return a compiled regular expression.
 
     Raises:
-        ConfigError: if it is none, or one that is not taken here.
+        ConfigError: if it is invalid, or too long.
     """
-    if len(pattern) > _LONGEST:
-        raise ConfigError(f"a pattern of {len(pattern)} characters; wanted at most {_LONGEST}")
+    if len(pattern) > MAX_LENGTH:
+        raise ConfigError(f"a pattern of {len(pattern)} characters; expected at most {MAX_LENGTH}")
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error")  # what Python will read differently some day
+            warnings.simplefilter("error")  # syntax whose meaning will change
             return re.compile(pattern)
     except (re.error, OverflowError, RecursionError, Warning) as error:
         raise ConfigError(f"not a regular expression: {error}") from error
 
 
-def ways(pattern: str, longest: int) -> int:
-    """Return in how many ways a pattern could match a name, at most.
+def max_matches(pattern: str, max_length: int) -> int:
+    """Return an upper bound on the number of ways in which a pattern can match a name.
 
     Args:
-        pattern: A regular expression that :func:`compiled` has taken.
-        longest: Characters of the longest name.
+        pattern: A pattern that :func:`compile_pattern` accepts.
+        max_length: Number of characters of the longest name.
 
     Raises:
-        ConfigError: if it repeats a group, which may have no bound, or has a special group.
+        ConfigError: if a group is repeated, which has no such bound, or is of a special kind.
     """
-    # Of each open group: the ways of its alternatives that are over, and of the one that is not.
-    groups, before = [[0, 1]], ""
+    # Of each open group: the ways of its finished alternatives, and those of the current one.
+    groups, previous = [[0, 1]], ""
     for token in _TOKEN.findall(pattern):
         if token == "(?":
-            raise ConfigError("a group with (?; of those (?: (?= and (?! are taken")
+            raise ConfigError("a group with (?; expected (?: (?= or (?!")
         if token[0] == "(":
             groups.append([0, 1])
         elif token == ")":
-            over, last = groups.pop()
-            groups[-1][1] *= over + last
+            finished, current = groups.pop()
+            groups[-1][1] *= finished + current
         elif token == "|":
             groups[-1] = [sum(groups[-1]), 1]
-        elif _repeats(token):
-            if before == ")" and token[0] != "?":
+        elif token[0] in "*+?" or (token[0] == "{" and len(token) > 1):
+            if previous == ")" and token[0] != "?":
                 raise ConfigError(f"a group that is repeated by {token}; only ? may follow one")
-            groups[-1][1] *= 2 if token[0] == "?" else longest + 1
-        before = token
+            groups[-1][1] *= 2 if token[0] == "?" else max_length + 1
+        previous = token
     return sum(groups[0])
-
-
-def _repeats(token: str) -> bool:
-    return token[0] in "*+?" or (token[0] == "{" and len(token) > 1)
-
-
-def longest_of(names: Sequence[str]) -> int:
-    """Return the number of characters of the longest name."""
-    return max(map(len, names), default=0)

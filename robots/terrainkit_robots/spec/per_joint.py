@@ -1,8 +1,8 @@
-"""Tables by joint: which key of a table each joint takes its value from.
+"""Tables by joint: the key of a table from which each joint takes its value.
 
-A key that is the name of a joint is that joint. Any other is a regular expression, which has to
-match the whole of a name. Every joint has to be matched exactly once, and every key has to match:
-a joint that was forgotten, or a key with a slip in it, is an error and not a zero.
+A key that is the name of a joint stands for that joint. Any other key is a regular expression that
+must match a whole name. Every joint must be matched exactly once, and every key must match a joint:
+a forgotten joint or a misspelled key is an error, never a zero.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,32 +11,35 @@ from typing import Generic, TypeVar
 
 from terrainkit.errors import ConfigError
 from terrainkit.toml_text import key_text
-from terrainkit_robots.spec.pattern import compiled, longest_of, ways
-from terrainkit_robots.text import closest, names, short
+from terrainkit_robots.spec.pattern import compile_pattern, max_matches
+from terrainkit_robots.text import closest, names, truncate
 
 T = TypeVar("T")
 
-_MOST_WAYS = 3_000_000
-"""The patterns of a table may match its joints in so many ways in all: a second of work."""
+MAX_MATCHES = 3_000_000
+"""Limit on the ways in which the patterns of a table can match its joints: a second of work."""
 
-_CLOSE = 0.75
-"""Share of common letters from which a joint is what a key was meant for."""
+_MIN_RATIO = 0.75
+"""Lowest similarity of a joint and its misspelling, 0 to 1."""
+
+_MAX_SUGGESTIONS = 20
+"""Number of unused keys for which a similar joint is searched, which takes time."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Clash:
-    """A joint that is not matched exactly once, or a key that does not work."""
+class MatchError:
+    """A joint that is not matched exactly once, or an invalid key."""
 
-    subject: str
+    name: str
     """The joint, or the key."""
 
     message: str
-    """What is wrong with it."""
+    """Description of the error."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Matching(Generic[T]):
-    """What the keys of a table match."""
+class JointMatches(Generic[T]):
+    """The joints that the keys of a table match."""
 
     values: Mapping[str, T]
     """Value of each joint that is matched exactly once, in the order of the joints."""
@@ -44,97 +47,88 @@ class Matching(Generic[T]):
     unmatched: tuple[str, ...]
     """Joints that no key matches."""
 
-    doubled: Mapping[str, tuple[str, ...]]
-    """Keys of each joint that is matched by several."""
+    duplicate: Mapping[str, tuple[str, ...]]
+    """Keys of each joint that several keys match."""
 
-    idle: Mapping[str, str]
-    """Keys that match no joint, with the joint that each may be meant for; empty for none."""
+    unused: Mapping[str, str]
+    """Keys that match no joint, each with the most similar joint; empty if there is none."""
 
-    refused: Mapping[str, str]
-    """Keys that are no pattern, and why."""
+    invalid: Mapping[str, str]
+    """Keys that are not valid patterns, and why."""
 
-    def clashes(self, what: str, *, partial: bool = False) -> Iterator[Clash]:
-        """Yield what is wrong.
+    def errors(self, table: str, *, partial: bool = False) -> Iterator[MatchError]:
+        """Yield an error for each joint that is not matched once, and each invalid key.
 
         Args:
-            what: Name of the table.
-            partial: Whether joints may be left out.
+            table: Name of the table.
+            partial: Whether joints may be missing.
         """
-        for key, reason in self.refused.items():
-            yield _clash(key, f"{_key(what, key)} is {reason}")
-        for key, meant in self.idle.items():
-            instead = f"; did you mean {meant}?" if meant else ""
-            yield _clash(key, f"{_key(what, key)} matches no joint{instead}")
-        for joint, keys in self.doubled.items():
+        for key, reason in self.invalid.items():
+            yield MatchError(name=key, message=f"{table}.{truncate(key_text(key))} is {reason}")
+        for key, joint in self.unused.items():
+            suggestion = f"; did you mean {joint}?" if joint else ""
+            message = f"{table}.{truncate(key_text(key))} matches no joint{suggestion}"
+            yield MatchError(name=key, message=message)
+        for joint, keys in self.duplicate.items():
             listed = names(map(key_text, keys), separator=" and ")
-            yield _clash(
-                joint, f"joint {short(joint)} is matched by {listed} of {what}; wanted one of them"
+            message = (
+                f"joint {truncate(joint)} is matched by {listed} of {table}; expected one of them"
             )
+            yield MatchError(name=joint, message=message)
         if self.unmatched and not partial:
-            subject = f"joint {short(self.unmatched[0])} is"
+            subject = f"joint {truncate(self.unmatched[0])} is"
             if len(self.unmatched) > 1:
                 subject = f"joints {names(self.unmatched)} are"
-            message = f"{subject} matched by no key of {what}; wanted one for each joint"
-            yield _clash(self.unmatched[0], message)
+            message = f"{subject} matched by no key of {table}; expected one key for each joint"
+            yield MatchError(name=self.unmatched[0], message=message)
 
 
-def _clash(subject: str, message: str) -> Clash:
-    return Clash(subject=subject, message=message)
-
-
-def _key(what: str, key: str) -> str:
-    return f"{what}.{short(key_text(key))}"
-
-
-def by_joint(table: Mapping[str, T], joints: Sequence[str], what: str = "table") -> dict[str, T]:
+def by_joint(table: Mapping[str, T], joints: Sequence[str], name: str = "table") -> dict[str, T]:
     """Return the value of each joint, in the order of `joints`.
 
     Args:
-        table: Values by names of joints, or patterns of those.
-        joints: The joints.
-        what: What to call the table in the error.
+        table: Values by name or pattern of joints.
+        joints: Names of the joints.
+        name: Name of the table in error messages.
 
     Raises:
-        ConfigError: if a joint is not matched exactly once, or a key matches none.
+        ConfigError: if a joint is not matched exactly once, or a key matches no joint.
     """
-    matching = match_joints(table, joints)
-    for clash in matching.clashes(what):
-        raise ConfigError(clash.message)
-    return dict(matching.values)
+    matches = match_joints(table, joints)
+    for error in matches.errors(name):
+        raise ConfigError(error.message)
+    return dict(matches.values)
 
 
-def match_joints(table: Mapping[str, T], joints: Sequence[str]) -> Matching[T]:
-    """Return what the keys of a table match among `joints`."""
+def match_joints(table: Mapping[str, T], joints: Sequence[str]) -> JointMatches[T]:
+    """Return which joints the keys of a table match."""
     keys: dict[str, list[str]] = {joint: [] for joint in joints}
-    idle: dict[str, str] = {}
-    refused: dict[str, str] = {}
-    longest, spent = longest_of(joints), 0
+    unused: dict[str, str] = {}
+    invalid: dict[str, str] = {}
+    max_length, total = max(map(len, joints), default=0), 0
     for key in table:
         if key in keys:
             keys[key].append(key)
             continue
         try:
-            pattern = compiled(key)
-            cost = ways(key, longest) * len(joints)
-            if spent + cost > _MOST_WAYS:
+            pattern = compile_pattern(key)
+            cost = max_matches(key, max_length) * len(joints)
+            if total + cost > MAX_MATCHES:
                 raise ConfigError("slow to match against all joints; use names instead")
-            spent += cost
+            total += cost
         except ConfigError as error:
-            refused[key] = str(error)
+            invalid[key] = str(error)
             continue
-        found = [joint for joint in joints if pattern.fullmatch(joint)]
-        for joint in found:
+        matched = [joint for joint in joints if pattern.fullmatch(joint)]
+        for joint in matched:
             keys[joint].append(key)
-        if not found:
-            idle[key] = closest(key, joints, _CLOSE) if len(idle) < _MOST_MEANT else ""
-    return Matching(
-        values={joint: table[found[0]] for joint, found in keys.items() if len(found) == 1},
-        unmatched=tuple(joint for joint, found in keys.items() if not found),
-        doubled={joint: tuple(found) for joint, found in keys.items() if len(found) > 1},
-        idle=idle,
-        refused=refused,
+        if not matched:
+            is_searched = len(unused) < _MAX_SUGGESTIONS
+            unused[key] = closest(key, joints, _MIN_RATIO) if is_searched else ""
+    return JointMatches(
+        values={joint: table[matched[0]] for joint, matched in keys.items() if len(matched) == 1},
+        unmatched=tuple(joint for joint, matched in keys.items() if not matched),
+        duplicate={joint: tuple(matched) for joint, matched in keys.items() if len(matched) > 1},
+        unused=unused,
+        invalid=invalid,
     )
-
-
-_MOST_MEANT = 20
-"""So many slips get a suggestion: to look for one takes a while."""

@@ -21,12 +21,12 @@ def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_the_formats_of_the_field_are_there():
+def test_export_has_the_usual_formats():
     assert set(exporters_by_suffix()) >= {".npz", ".png", ".stl", ".ply", ".obj", ".glb", ".xml"}
 
 
 @every_suffix
-def test_an_exporter_takes_a_map_a_path_and_options_by_keyword(suffix):
+def test_exporter_signature_is_uniform(suffix):
     map_, path, *options = inspect.signature(
         exporters_by_suffix()[suffix].export
     ).parameters.values()
@@ -35,7 +35,7 @@ def test_an_exporter_takes_a_map_a_path_and_options_by_keyword(suffix):
 
 
 @every_suffix
-def test_a_file_is_written_where_it_was_asked_for(level_map, tmp_path, suffix):
+def test_export_writes_to_the_given_path(level_map, tmp_path, suffix):
     path = tmp_path / f"map{suffix}"
     assert export(level_map, path) == path
     assert path.stat().st_size > 0
@@ -43,20 +43,20 @@ def test_a_file_is_written_where_it_was_asked_for(level_map, tmp_path, suffix):
 
 
 @every_suffix
-def test_a_suffix_in_capitals_names_the_same_format(level_map, tmp_path, suffix):
+def test_export_accepts_uppercase_suffix(level_map, tmp_path, suffix):
     path = tmp_path / f"MAP{suffix.upper()}"
     assert export(level_map, str(path)) == path
     assert path.is_file()
 
 
 @every_suffix
-def test_the_same_map_gives_the_same_bytes(level_map, tmp_path, suffix):
+def test_export_is_deterministic(level_map, tmp_path, suffix):
     first, second = (export(level_map, tmp_path / f"{name}{suffix}") for name in "ab")
     assert first.read_bytes() == second.read_bytes()
 
 
 @every_suffix
-def test_an_existing_file_is_kept_unless_told(level_map, tmp_path, suffix):
+def test_export_keeps_existing_file_by_default(level_map, tmp_path, suffix):
     path = tmp_path / f"map{suffix}"
     path.write_text("mine")
     with pytest.raises(ExportError, match=rf"map\{suffix} exists"):
@@ -68,7 +68,7 @@ def test_an_existing_file_is_kept_unless_told(level_map, tmp_path, suffix):
 
 
 @pytest.mark.parametrize("name", ["map.usd", "map", "npz", "map.npz.bak", ".npz"])
-def test_an_unknown_suffix_is_an_error_that_lists_those_there_are(level_map, tmp_path, name):
+def test_export_unknown_suffix_lists_formats(level_map, tmp_path, name):
     with pytest.raises(ExportError, match=r"no format for .*; there are: ") as error:
         export(level_map, tmp_path / name)
     assert all(part in str(error.value) for part in (name, *exporters_by_suffix()))
@@ -83,23 +83,21 @@ def test_an_unknown_suffix_is_an_error_that_lists_those_there_are(level_map, tmp
         ("map.npz", "merged", "nothing"),
     ],
 )
-def test_an_unknown_option_is_an_error_that_lists_those_there_are(
-    level_map, tmp_path, name, option, known
-):
+def test_export_unknown_option_lists_options(level_map, tmp_path, name, option, known):
     with pytest.raises(ExportError, match=f"has no option '{option}'; it has: {known}"):
         export(level_map, tmp_path / name, **{option: True})
     assert names(tmp_path) == []
 
 
-def test_the_options_of_a_format_are_known_by_name():
+def test_export_options_lists_names():
     assert export_options(Path("map.glb")) == ("full", "closed", "y_up")
 
 
-def test_formats_of_one_kind_share_an_exporter():
+def test_exporters_by_suffix_share_a_module():
     assert get_exporter(Path("a.stl")) is get_exporter(Path("b.OBJ"))
 
 
-def test_a_target_is_checked_before_a_map_is_made_for_it(tmp_path):
+def test_check_export_rejects_before_generation(tmp_path):
     path = tmp_path / "map.npz"
     check_export(path, 100)
     path.write_text("mine")
@@ -113,7 +111,7 @@ def test_a_target_is_checked_before_a_map_is_made_for_it(tmp_path):
 
 @pytest.mark.parametrize("height", [np.nan, np.inf, 1e30])
 @pytest.mark.parametrize("suffix", [".npz", ".xml", ".stl", ".png"])
-def test_heights_that_no_view_can_hold_are_not_exported(terrain_map, tmp_path, suffix, height):
+def test_export_rejects_non_finite_heights(terrain_map, tmp_path, suffix, height):
     heights = terrain_map.heights.copy()
     heights[3, 4] = height
     broken = dataclasses.replace(terrain_map, heights=heights)

@@ -21,7 +21,7 @@ def points(terrain_map):
 
 @every_suffix
 @pytest.mark.parametrize("merged", [True, False])
-def test_the_mesh_is_the_ground(ray_down, terrain_map, tmp_path, suffix, merged):
+def test_mesh_file_matches_the_ground(ray_down, terrain_map, tmp_path, suffix, merged):
     mesh = saved(terrain_map, tmp_path, suffix, full=not merged)
     assert len(mesh.faces) == len(terrain_map.mesh(merged=merged).triangles)
     xy = points(terrain_map)
@@ -30,7 +30,7 @@ def test_the_mesh_is_the_ground(ray_down, terrain_map, tmp_path, suffix, merged)
 
 
 @every_suffix
-def test_the_mesh_lies_in_the_frame_of_the_map(terrain_map, tmp_path, suffix):
+def test_mesh_file_is_in_the_map_frame(terrain_map, tmp_path, suffix):
     bounds = saved(terrain_map, tmp_path, suffix).bounds
     np.testing.assert_allclose(bounds[:, :2], [[-1.2, -1.2], [17.2, 13.2]], atol=1e-5)
     heights = terrain_map.heights
@@ -39,9 +39,7 @@ def test_the_mesh_lies_in_the_frame_of_the_map(terrain_map, tmp_path, suffix):
 
 @every_suffix
 @pytest.mark.parametrize("merged", [True, False])
-def test_a_closed_mesh_is_a_solid_with_the_ground_on_top(
-    ray_down, terrain_map, tmp_path, suffix, merged
-):
+def test_mesh_file_closed_is_a_solid(ray_down, terrain_map, tmp_path, suffix, merged):
     mesh = saved(terrain_map, tmp_path, suffix, full=not merged, closed=True)
     assert mesh.is_watertight
     assert mesh.is_winding_consistent
@@ -52,7 +50,7 @@ def test_a_closed_mesh_is_a_solid_with_the_ground_on_top(
 
 
 @every_suffix
-def test_y_up_turns_the_map_a_quarter_about_x(ray_down, terrain_map, tmp_path, suffix):
+def test_mesh_file_y_up_rotates_about_x(ray_down, terrain_map, tmp_path, suffix):
     mesh = saved(terrain_map, tmp_path, suffix, closed=True, y_up=True)
     assert mesh.volume > 0  # turned, not mirrored
     # x stays, z is up as y, and y comes out of the picture as -z.
@@ -62,7 +60,7 @@ def test_y_up_turns_the_map_a_quarter_about_x(ray_down, terrain_map, tmp_path, s
     np.testing.assert_allclose(found, terrain_map.height(xy), atol=1e-3)
 
 
-def test_a_glb_says_in_its_extras_what_the_contact_is_like(terrain_map, tmp_path):
+def test_mesh_file_glb_has_friction_extras(terrain_map, tmp_path):
     data = terrain_map.save(tmp_path / "map.glb").read_bytes()
     # A header of 12 bytes, then the length and the kind of the first chunk, which is JSON.
     (length,) = struct.unpack("<I", data[12:16])

@@ -55,20 +55,20 @@ def away_from_walls(terrain_map):
 
 
 @pytest.mark.parametrize("collision", ["hfield", "boxes", "auto"])
-def test_rays_meet_the_ground_farther_than_a_cell_from_walls(terrain_map, tmp_path, collision):
+def test_mjcf_hfield_matches_away_from_walls(terrain_map, tmp_path, collision):
     model = loaded(terrain_map, tmp_path, collision=collision)
     xy = points_in(terrain_map, away_from_walls(terrain_map))
     np.testing.assert_allclose(ray_cast(model, xy), terrain_map.height(xy), atol=1e-3)
 
 
 @pytest.mark.parametrize("collision", ["boxes", "auto"])
-def test_rays_meet_boxes_up_to_their_walls(level_map, tmp_path, collision):
+def test_mjcf_boxes_match_up_to_walls(level_map, tmp_path, collision):
     model = loaded(level_map, tmp_path, collision=collision)
     xy = points_in(level_map, np.ones(level_map.heights.shape, dtype=bool))
     np.testing.assert_allclose(ray_cast(model, xy), level_map.height(xy), atol=1e-3)
 
 
-def test_rays_meet_boxes_up_to_their_walls_beside_a_heightfield(terrain_map, tmp_path):
+def test_mjcf_boxes_match_beside_hfield(terrain_map, tmp_path):
     model = loaded(terrain_map, tmp_path, collision="boxes")
     # The heightfield that holds what is not level leans over the cells next to it.
     xy = points_in(terrain_map, ~binary_dilation(~terrain_map.boxes().covered, AROUND))
@@ -78,7 +78,7 @@ def test_rays_meet_boxes_up_to_their_walls_beside_a_heightfield(terrain_map, tmp
 @pytest.mark.parametrize("centered", [False, True])
 @pytest.mark.parametrize("border", [0.0, 0.1, 0.2, 0.3, 2.0])
 @every_collision
-def test_the_ground_reaches_to_the_edge_of_any_border(tmp_path, border, centered, collision):
+def test_mjcf_ground_extends_to_the_border(tmp_path, border, centered, collision):
     slope = SubTerrain(terrain="slope", parameters={"grade": 0.3, "landing": 1.0})
     pit = SubTerrain(terrain="pit", parameters={"side": 0.5})
     config = MapConfig(
@@ -96,7 +96,7 @@ def test_the_ground_reaches_to_the_edge_of_any_border(tmp_path, border, centered
     np.testing.assert_allclose(ray_cast(model, xy), terrain_map.height(xy), atol=1e-3)
 
 
-def test_rows_of_the_heightfield_lie_along_y_and_columns_along_x(terrain_map, tmp_path):
+def test_mjcf_hfield_rows_are_along_y(terrain_map, tmp_path):
     model = loaded(terrain_map, tmp_path, collision="hfield")
     # 3 patches of 40 cells along y, 2 of 80 along x, and 2 samples of the border on each side.
     assert model.hfield_nrow.tolist() == [3 * 40 + 4]
@@ -105,7 +105,7 @@ def test_rows_of_the_heightfield_lie_along_y_and_columns_along_x(terrain_map, tm
     assert [half_x, half_y] == pytest.approx([163 * 0.1 / 2, 123 * 0.1 / 2])
 
 
-def test_auto_takes_boxes_where_they_hold_all_of_the_ground(level_map, terrain_map, tmp_path):
+def test_mjcf_auto_uses_complete_boxes(level_map, terrain_map, tmp_path):
     assert loaded(level_map, tmp_path).nhfield == 0
     (tmp_path / "terrain.xml").unlink()
     model = loaded(terrain_map, tmp_path)
@@ -113,21 +113,21 @@ def test_auto_takes_boxes_where_they_hold_all_of_the_ground(level_map, terrain_m
     assert model.ngeom == 1 + 4  # and the border
 
 
-def test_a_flat_map_is_one_box(tmp_path):
+def test_mjcf_flat_map_is_one_box(tmp_path):
     flat = generate(MapConfig(rows=2, cols=1, terrains=(SubTerrain(terrain="flat"),)))
     model = loaded(flat, tmp_path)
     assert model.ngeom == 1
     assert ray_cast(model, [(1.0, 2.0), (-24.9, 32.9)]).tolist() == pytest.approx([0.0, 0.0])
 
 
-def test_a_flat_map_is_a_heightfield_too(tmp_path):
+def test_mjcf_flat_map_as_hfield(tmp_path):
     flat = generate(MapConfig(rows=1, cols=1, terrains=(SubTerrain(terrain="flat"),)))
     model = loaded(flat, tmp_path, collision="hfield")
     assert ray_cast(model, [(1.0, 2.0), (-24.9, 32.9)]).tolist() == pytest.approx([0.0, 0.0])
 
 
 @every_collision
-def test_all_geoms_are_on_one_static_body(terrain_map, tmp_path, collision):
+def test_mjcf_geoms_share_one_static_body(terrain_map, tmp_path, collision):
     model = loaded(terrain_map, tmp_path, collision=collision)
     assert set(model.geom_bodyid.tolist()) == {model.body("terrain").id}
     assert model.body_weldid[model.body("terrain").id] == 0
@@ -135,7 +135,7 @@ def test_all_geoms_are_on_one_static_body(terrain_map, tmp_path, collision):
 
 
 @every_collision
-def test_friction_is_that_of_the_config(terrain_map, tmp_path, collision):
+def test_mjcf_friction_is_from_the_config(terrain_map, tmp_path, collision):
     model = loaded(terrain_map, tmp_path, collision=collision)
     np.testing.assert_allclose(model.geom_friction[:, 0], 0.8)
     contact = [
@@ -146,7 +146,7 @@ def test_friction_is_that_of_the_config(terrain_map, tmp_path, collision):
 
 
 @every_collision
-def test_the_same_config_gives_the_same_bytes(terrain_map, tmp_path, collision):
+def test_mjcf_is_deterministic(terrain_map, tmp_path, collision):
     again = generate(terrain_map.config)
     first, second = (
         each.save(tmp_path / f"{k}.xml", collision=collision).read_bytes()
@@ -155,7 +155,7 @@ def test_the_same_config_gives_the_same_bytes(terrain_map, tmp_path, collision):
     assert first == second
 
 
-def test_an_unknown_collision_is_an_error_that_lists_those_there_are(terrain_map, tmp_path):
+def test_mjcf_unknown_collision_lists_options(terrain_map, tmp_path):
     with pytest.raises(ConfigError, match=r"collision: got 'mesh'; .* one of: auto, hfield, boxes"):
         terrain_map.save(tmp_path / "terrain.xml", collision="mesh")
     assert list(tmp_path.iterdir()) == []
@@ -196,9 +196,7 @@ def include(scene, terrain_map, folder, collision):
 
 
 @every_collision
-def test_the_defaults_of_a_robot_leave_the_terrain_alone(
-    scene_with_ball, terrain_map, tmp_path, collision
-):
+def test_mjcf_ignores_defaults_of_a_robot(scene_with_ball, terrain_map, tmp_path, collision):
     model = include(scene_with_ball, terrain_map, tmp_path, collision)
     alone = mujoco.MjModel.from_xml_path(str(tmp_path / "terrain.xml"))
     ground = np.flatnonzero(model.geom_bodyid == model.body("terrain").id)
@@ -210,9 +208,7 @@ def test_the_defaults_of_a_robot_leave_the_terrain_alone(
 
 
 @every_collision
-def test_a_ball_dropped_on_a_spawn_origin_comes_to_rest_there(
-    scene_with_ball, terrain_map, tmp_path, collision
-):
+def test_mjcf_ball_rests_at_spawn_origin(scene_with_ball, terrain_map, tmp_path, collision):
     model = include(scene_with_ball, terrain_map, tmp_path, collision)
     data = mujoco.MjData(model)
     for origin in terrain_map.env_origins.reshape(-1, 3).astype(float):
@@ -229,9 +225,7 @@ TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 
 
 @pytest.mark.skipif(not GO2.is_file(), reason=f"no {GO2}; TERRAINKIT_ROBOTS says where robots are")
 @every_collision
-def test_a_real_robot_dropped_on_a_spawn_origin_lies_on_the_ground(
-    terrain_map, tmp_path, collision
-):
+def test_mjcf_robot_rests_at_spawn_origin(terrain_map, tmp_path, collision):
     # Its meshes are only to look at, and one is missing: any will do.
     (tmp_path / "assets").mkdir()
     for name in re.findall(r'file="(\w+\.obj)"', GO2.read_text()):

@@ -45,19 +45,19 @@ def arrays(path):
         ("boxes", "float32", (0, 10)),
     ],
 )
-def test_an_array_has_the_dtype_and_the_shape_of_the_format(arrays, key, dtype, shape):
+def test_npz_arrays_have_dtype_and_shape(arrays, key, dtype, shape):
     assert arrays[key].dtype == dtype
     assert arrays[key].shape == shape
 
 
 @pytest.mark.parametrize(("key", "dtype"), [("vertices", "float32"), ("triangles", "int32")])
-def test_the_trimesh_is_rows_of_three(arrays, key, dtype):
+def test_npz_trimesh_has_three_columns(arrays, key, dtype):
     assert arrays[key].dtype == dtype
     assert arrays[key].shape[1:] == (3,)
 
 
 @pytest.mark.parametrize(("key", "shape"), [("terrain_names", (3,)), ("config", ())])
-def test_a_text_is_no_object(arrays, key, shape):
+def test_npz_text_is_no_object(arrays, key, shape):
     assert arrays[key].dtype.kind == "U"
     assert arrays[key].shape == shape
 
@@ -77,17 +77,17 @@ def test_a_text_is_no_object(arrays, key, shape):
         ("restitution", 0.1),
     ],
 )
-def test_an_array_says_what_the_map_is(arrays, key, value):
+def test_npz_arrays_describe_the_map(arrays, key, value):
     assert arrays[key].tolist() == value
 
 
-def test_heights_stand_where_cell_and_lower_say(arrays, terrain_map):
+def test_npz_heights_match_cell_and_lower(arrays, terrain_map):
     i, j = np.indices(arrays["heights"].shape)
     xy = arrays["lower"] + (np.stack([i, j], axis=-1) + 0.5) * arrays["cell"]
     np.testing.assert_allclose(terrain_map.height(xy), arrays["heights"], atol=1e-3)
 
 
-def test_the_trimesh_is_the_surface_seen_from_above(arrays, terrain_map, ray_down):
+def test_npz_trimesh_is_the_surface(arrays, terrain_map, ray_down):
     vertices, triangles = arrays["vertices"].astype(float), arrays["triangles"]
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     assert (np.cross(b - a, c - a)[:, 2] > -1e-9).all()
@@ -97,7 +97,7 @@ def test_the_trimesh_is_the_surface_seen_from_above(arrays, terrain_map, ray_dow
     np.testing.assert_allclose(found, terrain_map.height(xy), atol=1e-3)
 
 
-def test_numpy_alone_reads_it_without_unpickling(path):
+def test_npz_loads_with_numpy_without_pickle(path):
     script = (
         "import sys, numpy\n"
         "with numpy.load(sys.argv[1], allow_pickle=False) as archive:\n"
@@ -110,12 +110,12 @@ def test_numpy_alone_reads_it_without_unpickling(path):
     assert done.stdout.split() == ["True", "False"]
 
 
-def test_the_config_in_it_gives_the_same_bytes(arrays, path, tmp_path):
+def test_npz_config_generates_the_same_bytes(arrays, path, tmp_path):
     again = generate(MapConfig.from_toml(str(arrays["config"])))
     assert again.save(tmp_path / "again.npz").read_bytes() == path.read_bytes()
 
 
-def test_what_is_read_is_what_was_written(path, terrain_map):
+def test_npz_round_trip(path, terrain_map):
     read = TerrainMap.load(path)
     for field in dataclasses.fields(TerrainMap):
         found, wanted = (getattr(each, field.name) for each in (read, terrain_map))
@@ -126,12 +126,12 @@ def test_what_is_read_is_what_was_written(path, terrain_map):
             assert np.array_equal(found, wanted)
 
 
-def test_a_map_that_was_read_is_written_again_as_it_was(path, tmp_path):
+def test_npz_loaded_map_saves_the_same_bytes(path, tmp_path):
     again = TerrainMap.load(str(path)).save(tmp_path / "again.npz")
     assert again.read_bytes() == path.read_bytes()
 
 
-def test_the_mesh_is_read_as_it_was_written(path, terrain_map):
+def test_npz_mesh_round_trip(path, terrain_map):
     read, wanted = read_mesh(path), terrain_map.mesh()
     assert read.vertices.tobytes() == wanted.vertices.tobytes()
     assert read.triangles.tobytes() == wanted.triangles.tobytes()
@@ -200,37 +200,37 @@ def refusal(path, read=TerrainMap.load):
     return str(error.value)
 
 
-def test_a_file_that_is_not_there(tmp_path):
+def test_npz_missing_file_is_rejected(tmp_path):
     assert refusal(tmp_path / "none.npz").startswith("no file ")
 
 
-def test_a_folder(tmp_path):
+def test_npz_folder_is_rejected(tmp_path):
     assert "got a special file or folder" in refusal(tmp_path)
 
 
-def test_a_fifo_does_not_block(tmp_path):
+def test_npz_fifo_does_not_block(tmp_path):
     os.mkfifo(tmp_path / "map.npz")
     assert "got a special file or folder" in refusal(tmp_path / "map.npz")
 
 
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="no /dev/zero on this system")
-def test_a_device_is_not_read_without_end():
+def test_npz_device_is_rejected():
     assert "got a special file or folder" in refusal(Path("/dev/zero"))
 
 
 @pytest.mark.parametrize("data", [b"", b"hello\n", b"PK\x03\x04", b"\x93NUMPY", bytes(5000)])
-def test_a_file_of_another_kind(bad, data):
+def test_npz_other_file_is_rejected(bad, data):
     bad.write_bytes(data)
     assert "not an .npz file" in refusal(bad)
 
 
-def test_a_zip_of_another_kind(bad):
+def test_npz_other_zip_is_rejected(bad):
     with zipfile.ZipFile(bad, "w") as archive:
         archive.writestr("readme.txt", "hello")
     assert "not a terrainkit map; format_version is missing" in refusal(bad)
 
 
-def test_an_npz_of_another_kind(bad):
+def test_npz_other_npz_is_rejected(bad):
     np.savez(bad, heights=np.zeros((3, 3)))
     assert "not a terrainkit map; format_version is missing" in refusal(bad)
 
@@ -238,7 +238,7 @@ def test_an_npz_of_another_kind(bad):
 @pytest.mark.parametrize("read", [TerrainMap.load, read_mesh])
 @given(share=st.floats(0.0, 1.0, exclude_max=True))
 @settings(deadline=None, derandomize=True, max_examples=40)
-def test_a_truncated_file(good, bad, read, share):
+def test_npz_truncated_file_is_rejected(good, bad, read, share):
     data = good.read_bytes()
     bad.write_bytes(data[: int(share * len(data))])
     refusal(bad, read)
@@ -246,7 +246,7 @@ def test_a_truncated_file(good, bad, read, share):
 
 @given(share=st.floats(0.0, 1.0, exclude_max=True), flip=st.integers(1, 255))
 @settings(deadline=None, derandomize=True, max_examples=200)
-def test_a_flipped_byte_is_noticed_or_makes_no_difference(good, bad, small_map, share, flip):
+def test_npz_flipped_byte_is_detected_or_harmless(good, bad, small_map, share, flip):
     data = bytearray(good.read_bytes())
     data[int(share * len(data))] ^= flip
     bad.write_bytes(data)
@@ -261,7 +261,7 @@ def test_a_flipped_byte_is_noticed_or_makes_no_difference(good, bad, small_map, 
 
 
 @pytest.mark.parametrize("compression", [zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
-def test_a_compressed_map_is_read_but_not_one_that_is_damaged(good, bad, small_map, compression):
+def test_npz_compressed_map_loads_unless_damaged(good, bad, small_map, compression):
     repack(good, bad, {}, compression)
     assert TerrainMap.load(bad).heights.tobytes() == small_map.heights.tobytes()
     data = bytearray(bad.read_bytes())
@@ -270,7 +270,7 @@ def test_a_compressed_map_is_read_but_not_one_that_is_damaged(good, bad, small_m
     refusal(bad)
 
 
-def test_a_member_whose_name_is_no_text(good, bad):
+def test_npz_invalid_member_name_is_rejected(good, bad):
     data = good.read_bytes()
     with zipfile.ZipFile(good) as archive:
         directory = archive.start_dir
@@ -290,7 +290,7 @@ class Bomb:
 
 
 @pytest.mark.parametrize("key", ["heights", "config", "terrain_names", "format_version"])
-def test_a_pickled_object_is_not_even_unpickled(good, bad, tmp_path, key):
+def test_npz_pickled_object_is_not_unpickled(good, bad, tmp_path, key):
     touched = tmp_path / "touched"
     repack(good, bad, {key: npy(np.array(Bomb(touched), dtype=object))})
     assert f"{key}: got dtype object" in refusal(bad)
@@ -314,13 +314,13 @@ def test_a_pickled_object_is_not_even_unpickled(good, bad, tmp_path, key):
         "parameters",
     ],
 )
-def test_a_missing_array_is_named(good, bad, key):
+def test_npz_missing_array_is_named(good, bad, key):
     repack(good, bad, {key: None})
     assert f"has no {key}" in refusal(bad)
 
 
 @pytest.mark.parametrize("key", ["vertices", "triangles"])
-def test_a_missing_array_of_the_mesh_is_named(good, bad, key):
+def test_npz_missing_mesh_array_is_named(good, bad, key):
     repack(good, bad, {key: None})
     assert f"has no {key}" in refusal(bad, read_mesh)
 
@@ -336,7 +336,7 @@ def test_a_missing_array_of_the_mesh_is_named(good, bad, key):
         ("cell", (1,), r"expected ()"),
     ],
 )
-def test_a_wrong_shape_is_named_with_the_right_one(good, bad, key, shape, wanted):
+def test_npz_wrong_shape_is_named(good, bad, key, shape, wanted):
     with np.load(good) as archive:
         repack(good, bad, {key: npy(np.zeros(shape, dtype=archive[key].dtype))})
     message = refusal(bad)
@@ -356,19 +356,19 @@ def test_a_wrong_shape_is_named_with_the_right_one(good, bad, key, shape, wanted
         ("difficulty", "bool"),
     ],
 )
-def test_a_wrong_dtype_is_named(good, bad, key, dtype):
+def test_npz_wrong_dtype_is_named(good, bad, key, dtype):
     with np.load(good) as archive:
         repack(good, bad, {key: npy(archive[key].astype(dtype))})
     assert f"{key}: got dtype {dtype}" in refusal(bad)
 
 
-def test_another_format_version_is_named_with_the_one_that_is_read(good, bad):
+def test_npz_other_format_version_is_rejected(good, bad):
     repack(good, bad, {"format_version": npy(2)})
     assert "got format version 2; expected 1" in refusal(bad)
 
 
 @pytest.mark.parametrize("kind", [-1, 1, 1000])
-def test_a_terrain_type_must_have_a_name(good, bad, kind):
+def test_npz_terrain_type_out_of_range_is_rejected(good, bad, kind):
     repack(good, bad, {"terrain_types": npy(np.array([[0], [kind]], dtype=np.int32))})
     assert "terrain_types" in refusal(bad)
 
@@ -376,24 +376,24 @@ def test_a_terrain_type_must_have_a_name(good, bad, kind):
 @pytest.mark.parametrize(
     ("key", "value"), [("cell", 0.2), ("border", 0.0), ("lower", [0.0, 0.0]), ("cell", np.nan)]
 )
-def test_numbers_that_contradict_the_config_are_named(good, bad, key, value):
+def test_npz_values_must_match_the_config(good, bad, key, value):
     repack(good, bad, {key: npy(value)})
     assert f"{key}: got {value}; expected" in refusal(bad)
 
 
 @pytest.mark.parametrize("corner", [-1, 1000])
-def test_a_triangle_must_have_its_vertices(good, bad, corner):
+def test_npz_triangle_out_of_range_is_rejected(good, bad, corner):
     repack(good, bad, {"triangles": npy(np.array([[0, 1, corner]], dtype=np.int32))})
     assert "triangles" in refusal(bad, read_mesh)
 
 
-def test_solids_are_not_dropped_in_silence(good, bad):
+def test_npz_solids_are_rejected(good, bad):
     repack(good, bad, {"boxes": npy(np.zeros((2, 10), dtype=np.float32))})
     assert "got 2 solids" in refusal(bad)
 
 
 @pytest.mark.parametrize("text", ["{{{", "hello", "rows = ", "a\0b", '"a\nb" = 1'])
-def test_a_config_that_is_not_toml(good, bad, text):
+def test_npz_invalid_toml_config_is_rejected(good, bad, text):
     repack(good, bad, {"config": npy(text)})
     assert "config: not a TOML file" in refusal(bad)
 
@@ -413,7 +413,7 @@ def test_a_config_that_is_not_toml(good, bad, text):
         ("cell = 0.1", "cell = nan", "cell"),
     ],
 )
-def test_a_config_that_is_none(good, bad, old, new, named):
+def test_npz_invalid_config_is_rejected(good, bad, old, new, named):
     repack(good, bad, {"config": config_with(good, old, new)})
     assert named in refusal(bad)
 
@@ -433,7 +433,7 @@ def test_a_config_that_is_none(good, bad, old, new, named):
     ],
     ids=["none", "table", "empty", "numbers", "bare", "text", "triple", "deep", "long"],
 )
-def test_parameters_that_are_none(good, bad, text):
+def test_npz_invalid_parameters_are_rejected(good, bad, text):
     repack(good, bad, {"parameters": npy(text)})
     assert "parameters cannot be read" in refusal(bad)
 
@@ -443,12 +443,12 @@ def test_parameters_that_are_none(good, bad, text):
     ["", "{", "(" * 500, "[]", "{'descr': 'x', 'fortran_order': False, 'shape': ()}", "x" * 20_000],
     ids=["none", "open", "deep", "list", "no dtype", "long"],
 )
-def test_an_array_whose_header_is_none(good, bad, header):
+def test_npz_invalid_header_is_rejected(good, bad, header):
     repack(good, bad, {"heights": npy_header(header)})
     assert "heights cannot be read" in refusal(bad)
 
 
-def test_a_text_of_characters_that_there_are_not(good, bad):
+def test_npz_invalid_unicode_is_rejected(good, bad):
     repack(good, bad, {"config": npy_that_declares("<U2", ()) + b"\xff" * 8})
     assert "config" in refusal(bad)
 
@@ -456,24 +456,24 @@ def test_a_text_of_characters_that_there_are_not(good, bad):
 # ---- what is too large -------------------------------------------------------------------------
 
 
-def test_heights_larger_than_the_map_are_not_read(good, bad):
+def test_npz_oversized_heights_are_not_read(good, bad):
     repack(good, bad, {"heights": npy_that_declares("<f4", (10**6, 10**6))})
     assert "heights: got shape (1000000, 1000000); expected (42, 12)" in refusal(bad)
 
 
 @pytest.mark.parametrize("key", ["config", "parameters"])
-def test_a_huge_text_is_not_read(good, bad, key):
+def test_npz_oversized_text_is_not_read(good, bad, key):
     repack(good, bad, {key: npy_that_declares("<U400000000", ())})
     assert f"{key}: got 1600000000 bytes" in refusal(bad)
 
 
 @pytest.mark.parametrize(("key", "dtype"), [("vertices", "<f4"), ("triangles", "<i4")])
-def test_a_huge_mesh_is_not_read(good, bad, key, dtype):
+def test_npz_oversized_mesh_is_not_read(good, bad, key, dtype):
     repack(good, bad, {key: npy_that_declares(dtype, (10**12, 3))})
     assert f"{key}: got {10**12 * 12} bytes" in refusal(bad, read_mesh)
 
 
-def test_a_map_beyond_the_memory_is_not_read(good, bad):
+def test_npz_map_beyond_memory_is_not_read(good, bad):
     with np.load(good) as archive:
         config = str(archive["config"]).replace("rows = 2", "rows = 1")
     old = config[config.index("patch_size") : config.index("cell")]

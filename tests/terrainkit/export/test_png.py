@@ -27,18 +27,18 @@ def read(path):
     return sidecar["offset"] + sidecar["scale"] * grey
 
 
-def test_it_is_16_bit_grey_as_wide_as_the_map_is_along_x(picture):
+def test_png_is_16_bit_gray(picture):
     grey, _ = picture
     assert grey.dtype == np.uint16
     assert grey.shape == (144, 184)
 
 
-def test_all_grey_levels_are_used(picture):
+def test_png_uses_all_gray_levels(picture):
     grey, _ = picture
     assert (grey.min(), grey.max()) == (0, 65535)
 
 
-def test_x_goes_right_and_y_up_with_the_sidecar_saying_where(picture, terrain_map):
+def test_png_axes_match_the_sidecar(picture, terrain_map):
     grey, sidecar = picture
     row, column = np.indices(grey.shape)
     first = np.array(sidecar["first_sample"])
@@ -48,7 +48,7 @@ def test_x_goes_right_and_y_up_with_the_sidecar_saying_where(picture, terrain_ma
     np.testing.assert_allclose(heights, expected, atol=1e-3)
 
 
-def test_the_highest_pixel_is_where_the_highest_ground_is(terrain_map, tmp_path):
+def test_png_brightest_pixel_is_highest_ground(terrain_map, tmp_path):
     heights = np.zeros_like(terrain_map.heights)
     heights[20, 30] = 1.0
     path = dataclasses.replace(terrain_map, heights=heights).save(tmp_path / "map.png")
@@ -56,7 +56,7 @@ def test_the_highest_pixel_is_where_the_highest_ground_is(terrain_map, tmp_path)
     assert np.argwhere(read(path) > 0.5).tolist() == [[144 - 1 - 30, 20]]
 
 
-def test_the_sidecar_holds_the_size_and_the_contact(picture):
+def test_png_sidecar_has_size_and_friction(picture):
     _, sidecar = picture
     assert sidecar["size"] == pytest.approx([18.4, 14.4])
     assert sidecar["cell"] == 0.1
@@ -65,12 +65,12 @@ def test_the_sidecar_holds_the_size_and_the_contact(picture):
     assert sidecar["restitution"] == 0.1
 
 
-def test_flat_ground_keeps_its_height(terrain_map, tmp_path):
+def test_png_flat_ground_keeps_its_height(terrain_map, tmp_path):
     path = with_heights(terrain_map, 0.25, 0.25).save(tmp_path / "map.png")
     np.testing.assert_allclose(read(path), 0.25)
 
 
-def test_ground_below_zero_keeps_its_height(terrain_map, tmp_path):
+def test_png_ground_below_zero_keeps_its_height(terrain_map, tmp_path):
     path = with_heights(terrain_map, -7.5, -3.0).save(tmp_path / "map.png")
     heights = read(path)
     assert heights.min() == pytest.approx(-7.5)
@@ -78,7 +78,7 @@ def test_ground_below_zero_keeps_its_height(terrain_map, tmp_path):
 
 
 @pytest.mark.parametrize("height", [100.0, 131.0])
-def test_ground_up_to_131_meters_high_is_held_to_a_millimeter(terrain_map, tmp_path, height):
+def test_png_range_of_131_m_is_accurate(terrain_map, tmp_path, height):
     rng = np.random.default_rng(0)
     heights = rng.uniform(0, height, terrain_map.heights.shape).astype(np.float32)
     heights[0, :2] = 0.0, height
@@ -87,7 +87,7 @@ def test_ground_up_to_131_meters_high_is_held_to_a_millimeter(terrain_map, tmp_p
     np.testing.assert_allclose(read(path)[::-1].T, heights, atol=1e-3 + 1e-5)
 
 
-def test_ground_higher_than_that_is_an_error_and_writes_nothing(terrain_map, tmp_path):
+def test_png_larger_range_writes_nothing(terrain_map, tmp_path):
     with pytest.raises(
         ExportError, match=r"height range: got 131\.2 m; expected at most 131\.07 m"
     ):
@@ -95,7 +95,7 @@ def test_ground_higher_than_that_is_an_error_and_writes_nothing(terrain_map, tmp
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_json_that_is_there_is_kept(terrain_map, tmp_path):
+def test_png_keeps_existing_sidecar(terrain_map, tmp_path):
     (tmp_path / "map.json").write_text("mine")
     with pytest.raises(ExportError, match=r"map\.json exists"):
         terrain_map.save(tmp_path / "map.png")

@@ -30,7 +30,7 @@ def solid_of(build, heights, threshold, cell=1.0):
 @every_mesh
 @any_ground
 @modestly
-def test_the_solid_is_watertight_and_its_faces_point_outwards(build, heights, threshold):
+def test_closed_mesh_is_watertight_and_oriented(build, heights, threshold):
     solid = solid_of(build, heights, threshold)
     assert solid.is_watertight
     assert solid.is_winding_consistent
@@ -41,7 +41,7 @@ def test_the_solid_is_watertight_and_its_faces_point_outwards(build, heights, th
 @every_mesh
 @any_ground
 @modestly
-def test_manifold_takes_the_solid(build, heights, threshold):
+def test_closed_mesh_is_accepted_by_manifold3d(build, heights, threshold):
     solid = solid_of(build, heights, threshold)
     manifold = manifold3d.Manifold(
         manifold3d.Mesh(solid.vertices.astype(np.float32), solid.faces.astype(np.uint32))
@@ -52,7 +52,7 @@ def test_manifold_takes_the_solid(build, heights, threshold):
 
 @any_ground
 @modestly
-def test_merged_and_full_hold_the_same_volume(heights, threshold):
+def test_closed_mesh_volume_does_not_depend_on_merging(heights, threshold):
     full, merged = (solid_of(build, heights, threshold) for build in (full_mesh, merged_mesh))
     assert merged.volume == pytest.approx(full.volume, rel=1e-6)
 
@@ -60,28 +60,28 @@ def test_merged_and_full_hold_the_same_volume(heights, threshold):
 @every_mesh
 @given(heights=HEIGHTFIELDS)
 @modestly
-def test_with_a_wall_at_every_step_each_cell_is_a_column(build, heights):
+def test_closed_mesh_of_walls_is_columns(build, heights):
     # A metre below the lowest; where four walls meet, they stand a little aside.
     columns = (heights.astype(float) - heights.min() + 1.0).sum()
     assert solid_of(build, heights, 0.5).volume == pytest.approx(columns, rel=0.01)
 
 
 @every_mesh
-def test_level_ground_becomes_a_block_one_metre_thick(build):
+def test_closed_mesh_of_level_ground_is_a_block(build):
     solid = solid_of(build, np.full((4, 2), 3.0, dtype=np.float32), 0.1, cell=0.5)
     assert solid.bounds.tolist() == [[0.0, 0.0, 2.0], [2.0, 1.0, 3.0]]
     assert solid.volume == pytest.approx(2.0)
 
 
 @every_mesh
-def test_a_slope_becomes_a_wedge(build):
+def test_closed_mesh_of_a_slope_is_a_wedge(build):
     # Level for half a cell, up by 3 over 3 cells, level for half a cell; 2 cells wide, 1 m below.
     solid = solid_of(build, np.array([[0, 0], [1, 1], [2, 2], [3, 3]], dtype=np.float32), np.inf)
     assert solid.volume == pytest.approx(2 * (0.5 * 1 + 3 * (1 + 4) / 2 + 0.5 * 4))
 
 
 @every_mesh
-def test_the_ground_itself_stays_as_it_is(build):
+def test_closed_mesh_keeps_the_surface(build):
     heights = np.array([[0, 2, 0], [1, 1, 0]], dtype=np.float32)
     surface = build(heights, Grid(shape=heights.shape, cell=1.0), 0.5)
     solid = closed_mesh(surface)
@@ -90,7 +90,7 @@ def test_the_ground_itself_stays_as_it_is(build):
 
 
 @pytest.mark.parametrize("merged", [True, False])
-def test_a_whole_map_is_watertight(terrain_map, merged):
+def test_closed_mesh_of_a_map_is_watertight(terrain_map, merged):
     mesh = terrain_map.mesh(merged=merged, closed=True)
     solid = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False)
     assert solid.is_watertight

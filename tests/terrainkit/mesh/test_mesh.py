@@ -36,7 +36,7 @@ def doubled_normals(mesh):
 
 
 @any_ground
-def test_inner_edges_are_shared_by_two_faces_in_opposite_directions(build, heights, threshold):
+def test_mesh_interior_edges_have_two_faces(build, heights, threshold):
     mesh = mesh_of(build, heights, threshold)
     edges = [tuple(edge) for edge in mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).tolist()]
     assert len(set(edges)) == len(edges)
@@ -48,31 +48,31 @@ def test_inner_edges_are_shared_by_two_faces_in_opposite_directions(build, heigh
 
 
 @any_ground
-def test_no_face_is_without_area(build, heights, threshold):
+def test_mesh_has_no_degenerate_faces(build, heights, threshold):
     normals = doubled_normals(mesh_of(build, heights, threshold))
     assert (np.linalg.norm(normals, axis=1) > 1e-3).all()
 
 
 @any_ground
-def test_no_face_points_down(build, heights, threshold):
+def test_mesh_has_no_downward_faces(build, heights, threshold):
     assert (doubled_normals(mesh_of(build, heights, threshold))[:, 2] > -1e-6).all()
 
 
 @any_ground
-def test_seen_from_above_the_faces_cover_the_map_once(build, heights, threshold):
+def test_mesh_covers_the_map_once(build, heights, threshold):
     area = doubled_normals(mesh_of(build, heights, threshold))[:, 2].sum() / 2
     assert area == pytest.approx(heights.size)
 
 
 @any_ground
-def test_vertices_are_unique_and_all_used(build, heights, threshold):
+def test_mesh_vertices_are_unique_and_used(build, heights, threshold):
     mesh = mesh_of(build, heights, threshold)
     assert len(np.unique(mesh.vertices, axis=0)) == len(mesh.vertices)
     assert np.unique(mesh.triangles).tolist() == list(range(len(mesh.vertices)))
 
 
 @any_ground
-def test_the_faces_are_the_surface(ray_down, build, heights, threshold):
+def test_mesh_matches_the_surface(ray_down, build, heights, threshold):
     mesh = mesh_of(build, heights, threshold)
     # In quarters of the map's cells, off the walls and the diagonals.
     offsets = np.array([(0.03, 0.21), (0.22, 0.16), (0.09, 0.04)])
@@ -84,7 +84,7 @@ def test_the_faces_are_the_surface(ray_down, build, heights, threshold):
 
 
 @every_mesh
-def test_the_faces_are_the_height_of_the_map(ray_down, terrain_map, build):
+def test_mesh_matches_the_map_height(ray_down, terrain_map, build):
     mesh = terrain_map.mesh(merged=build is merged_mesh)
     rng = np.random.default_rng(0)
     xy = rng.uniform(terrain_map.grid.lower, terrain_map.grid.upper, size=(3000, 2))
@@ -93,7 +93,7 @@ def test_the_faces_are_the_height_of_the_map(ray_down, terrain_map, build):
 
 
 @every_mesh
-def test_the_mesh_covers_the_map_to_its_edges(build):
+def test_mesh_extends_to_the_map_edges(build):
     grid = Grid(shape=(4, 2), cell=0.5, lower=(-1.0, 7.0))
     mesh = build(np.zeros(grid.shape, dtype=np.float32), grid, 0.1)
     assert mesh.vertices.min(axis=0).tolist() == [-1.0, 7.0, 0.0]
@@ -104,7 +104,7 @@ def test_the_mesh_covers_the_map_to_its_edges(build):
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("width", [1, 2, 3])
 @pytest.mark.parametrize("height", [0.5, -0.5], ids=["ridge", "gap"])
-def test_a_feature_of_n_cells_is_n_cells_wide(build, axis, width, height):
+def test_mesh_feature_of_n_cells_is_n_cells_wide(build, axis, width, height):
     heights = np.zeros((8, 5), dtype=np.float32)
     heights[3 : 3 + width] = height
     mesh = mesh_of(build, heights if axis == 0 else heights.T, 0.1, cell=0.5)
@@ -116,21 +116,21 @@ def test_a_feature_of_n_cells_is_n_cells_wide(build, axis, width, height):
 
 
 @every_mesh
-def test_there_are_no_walls_at_an_infinite_threshold(build):
+def test_mesh_without_walls_at_infinite_threshold(build):
     heights = np.array([[0, 9, 0], [9, 0, 9], [5, 5, -40]], dtype=np.float32)
     normals = doubled_normals(mesh_of(build, heights, np.inf))
     assert (normals[:, 2] > 0.1).all()
 
 
 @every_mesh
-def test_faces_and_vertices_are_small_numbers(build):
+def test_mesh_has_compact_dtypes(build):
     mesh = mesh_of(build, np.array([[0, 1, 0], [0, 0, 2]], dtype=np.float32), 0.5)
     assert mesh.vertices.dtype == np.float32
     assert mesh.triangles.dtype == np.int32
 
 
 @every_mesh
-def test_a_mesh_beyond_the_memory_is_refused_before_it_is_begun(build):
+def test_mesh_beyond_memory_is_rejected(build):
     heights = np.broadcast_to(np.float32(0), (10**6, 10**6))
     with pytest.raises(MemoryLimitError, match=r"a mesh of 1000000000000 samples needs .* GB"):
         mesh_of(build, heights, 0.1)

@@ -16,19 +16,19 @@ def polygons(*rings, clockwise=False):
     )
 
 
-def test_a_loop_of_four_vertices_is_cut_along_a_diagonal():
+def test_polygons_of_four_vertices_are_split():
     triangles, centers = polygons([3, 4, 6, 5]).triangles(first=10)
     assert triangles.tolist() == [[3, 4, 6], [3, 6, 5]]
     assert len(centers) == 0
 
 
-def test_a_loop_with_more_is_a_fan_around_its_center():
+def test_polygons_of_more_vertices_are_fans():
     triangles, centers = polygons([0, 1, 2, 3, 4]).triangles(first=10)
     assert triangles.tolist() == [[0, 1, 10], [1, 2, 10], [2, 3, 10], [3, 4, 10], [4, 0, 10]]
     assert centers.tolist() == [[0, 0, 0]]
 
 
-def test_only_fans_take_a_center():
+def test_polygons_only_fans_use_a_center():
     triangles, centers = polygons([0, 1, 2, 3], [4, 5, 6, 7, 8], [5, 6, 7, 8, 9]).triangles(
         first=10
     )
@@ -37,7 +37,7 @@ def test_only_fans_take_a_center():
     assert len(triangles) == 2 + 5 + 5
 
 
-def test_clockwise_loops_are_turned():
+def test_polygons_clockwise_order_is_reversed():
     triangles, _ = polygons([3, 4, 6, 5], clockwise=True).triangles(first=10)
     assert triangles.tolist() == [[6, 4, 3], [5, 6, 3]]
 
@@ -50,12 +50,12 @@ def test_clockwise_loops_are_turned():
         ([], [], []),
     ],
 )
-def test_items_are_laid_end_to_end(lengths, owner, place):
+def test_segment_indices_of_consecutive_segments(lengths, owner, place):
     found = segment_indices(np.array(lengths, dtype=np.int64))
     assert [each.tolist() for each in found] == [owner, place]
 
 
-def test_runs_are_told_apart_at_the_ends_of_rows():
+def test_runs_are_separate_at_row_ends():
     mask = np.array([[1, 1, 0, 1], [1, 0, 0, 0], [0, 0, 0, 0], [1, 1, 1, 1]], dtype=bool)
     row, start, stop = runs(mask)
     assert row.tolist() == [0, 0, 1, 3]
@@ -65,7 +65,7 @@ def test_runs_are_told_apart_at_the_ends_of_rows():
 
 @given(mask=arrays(bool, array_shapes(min_dims=2, max_dims=2, max_side=8), elements=st.booleans()))
 @settings(deadline=None, derandomize=True, max_examples=60)
-def test_runs_hold_every_true_once_and_end_at_a_false(mask):
+def test_runs_cover_every_true_value_once(mask):
     row, start, stop = runs(mask)
     count = np.zeros(mask.shape, dtype=int)
     padded = np.pad(mask, ((0, 0), (1, 1)))

@@ -25,7 +25,7 @@ def count(found, shape):
 @pytest.mark.parametrize("find", [Rectangles.level, Rectangles.along_y, Rectangles.along_x])
 @given(mask=MASKS)
 @settings(deadline=None, derandomize=True, max_examples=60)
-def test_each_quad_left_in_the_mask_is_in_one_rectangle(find, mask):
+def test_rectangles_cover_each_remaining_quad_once(find, mask):
     left = mask.copy()
     found = find(left)
     assert np.array_equal(count(found, mask.shape), left)
@@ -33,13 +33,13 @@ def test_each_quad_left_in_the_mask_is_in_one_rectangle(find, mask):
     assert all((i1 - i0) * (j1 - j0) >= 3 for i0, i1, j0, j1 in spans(found))
 
 
-def test_level_quads_of_the_same_columns_are_one_rectangle():
+def test_rectangles_merge_level_quads_of_equal_columns():
     mask = np.zeros((5, 6), dtype=bool)
     mask[1:4, 2:5] = True
     assert spans(Rectangles.level(mask)) == [(1, 4, 2, 5)]
 
 
-def test_rows_of_sloping_quads_stay_one_quad_deep():
+def test_rectangles_of_sloping_quads_are_one_deep():
     mask = np.zeros((4, 6), dtype=bool)
     mask[1:3, 2:5] = True
     assert spans(Rectangles.along_y(mask.copy())) == [(1, 2, 2, 5), (2, 3, 2, 5)]
@@ -54,7 +54,7 @@ def node_grid():
     )
 
 
-def test_a_rim_runs_counterclockwise_over_the_nodes_that_are_kept(node_grid):
+def test_rectangles_boundary_is_counterclockwise(node_grid):
     rectangle = Rectangles.level(np.ones((3, 4), dtype=bool))
     kept = np.zeros((4, 5), dtype=bool)
     rectangle.keep_corners(kept)

@@ -19,7 +19,7 @@ def center_quad(corners, first=100):
     return wall_quads(node_grid, np.array([4]), first)  # the middle one of 3 x 3
 
 
-def test_no_quads_are_no_faces():
+def test_wall_quads_of_no_quads_are_empty():
     triangles, vertices = wall_quads(lattice_of([[0, 0]]), np.array([], dtype=np.int64), 7)
     assert triangles.shape == (0, 3)
     assert vertices.shape == (0, 3)
@@ -36,7 +36,7 @@ def test_no_quads_are_no_faces():
         ((0, 0.0625, 0.125, 0.1875), [0.09375]),  # one wall: (0 + 1 + 2 + 3) / 4 sixteenths
     ],
 )
-def test_the_center_has_one_vertex_for_each_height_there(corners, centers):
+def test_wall_quads_center_has_one_vertex_per_height(corners, centers):
     triangles, vertices = center_quad(corners)
     assert vertices[:, 2].tolist() == centers
     np.testing.assert_allclose(vertices[:, :2], CELL)
@@ -45,7 +45,7 @@ def test_the_center_has_one_vertex_for_each_height_there(corners, centers):
 
 
 @pytest.mark.parametrize("corners", [(1, 0, 1, 0), (0, 1, 0, 1), (3, 0, 2, 1), (0, 3, 1, 2)])
-def test_two_high_corners_that_meet_in_a_point_are_kept_apart(corners):
+def test_wall_quads_separate_touching_high_corners(corners):
     _, vertices = center_quad(corners)
     places = np.unique(vertices[:, :2], axis=0)
     assert len(places) == 2
@@ -56,7 +56,7 @@ def test_two_high_corners_that_meet_in_a_point_are_kept_apart(corners):
 
 
 @pytest.mark.parametrize("corners", [(1, 0, 1, 0), (3, 0, 2, 1)])
-def test_the_low_corners_of_a_saddle_are_joined_below_the_high_ones(corners):
+def test_wall_quads_connect_low_saddle_corners(corners):
     triangles, vertices = center_quad(corners)
     low = 100 + np.flatnonzero(vertices[:, 2] == 0)
     assert len(low) == 2

@@ -32,7 +32,7 @@ def straight_quads():
 
 
 @pytest.mark.parametrize("height", [2.0, -2.0])
-def test_a_straight_wall_is_one_panel_that_faces_the_low_side(normal_y, height):
+def test_wall_runs_panel_faces_the_low_side(normal_y, height):
     node_grid, found, _ = lattice_and_runs(cliff(height), straight_quads(), normal_y=normal_y)
     panels = found.panels()
     corners = node_grid.midpoints()[panels - node_grid.z.size].astype(float)
@@ -42,7 +42,7 @@ def test_a_straight_wall_is_one_panel_that_faces_the_low_side(normal_y, height):
     assert np.delete(doubled, 1 if normal_y else 0, axis=1).tolist() == [[0.0, 0.0]] * 2
 
 
-def test_a_wall_one_quad_long_is_left_alone(normal_y):
+def test_wall_runs_skip_single_quads(normal_y):
     quads = straight_quads()
     quads[1, 1] = False
     _, found, left = lattice_and_runs(cliff(2.0), quads, normal_y=normal_y)
@@ -51,7 +51,7 @@ def test_a_wall_one_quad_long_is_left_alone(normal_y):
     assert left.sum() == 3
 
 
-def test_the_strips_beside_a_wall_keep_the_nodes_that_others_need(normal_y):
+def test_wall_runs_strips_keep_needed_nodes(normal_y):
     node_grid, found, _ = lattice_and_runs(cliff(2.0), straight_quads(), normal_y=normal_y)
     kept = np.zeros(node_grid.z.shape, dtype=bool)
     found.keep_ends(kept)

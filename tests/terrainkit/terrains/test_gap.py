@@ -16,14 +16,14 @@ def moat(heights):
     )
 
 
-def test_a_gap_of_three_tenths_is_three_cells_wide(grid, rng):
+def test_gap_of_0_3_m_is_three_cells(grid, rng):
     heights = Gap(width=0.3, platform=3.0).build(grid, rng)
     # The platform takes cells 25 to 54.
     assert moat(heights) == ([22, 23, 24, 55, 56, 57],) * 2
     assert Gap(width=0.3).realized(grid)["width"] == 0.3
 
 
-def test_the_ground_falls_exactly_where_the_gap_is():
+def test_gap_heights_by_hand():
     sub_terrain = SubTerrain(terrain="gap", parameters={"width": 0.3})
     terrain_map = generate(MapConfig(rows=1, cols=1, border=0.0, terrains=(sub_terrain,)))
     x = np.array([2.199, 2.201, 2.35, 2.499, 2.501, 5.499, 5.501, 5.799, 5.801])
@@ -32,7 +32,7 @@ def test_the_ground_falls_exactly_where_the_gap_is():
     ]  # fmt: skip
 
 
-def test_the_moat_goes_around_the_corners_and_has_a_floor(grid, rng):
+def test_gap_surrounds_the_platform(grid, rng):
     heights = Gap(width=0.3, platform=3.0, depth=2.0).build(grid, rng)
     assert np.unique(heights).tolist() == [-2.0, 0.0]
     # A square of 36 cells less one of 30.
@@ -40,7 +40,7 @@ def test_the_moat_goes_around_the_corners_and_has_a_floor(grid, rng):
 
 
 @pytest.mark.parametrize("meters", [1, 2, 3, 4, 5])
-def test_the_platform_is_as_large_as_asked(meters, grid, rng):
+def test_gap_platform_has_the_requested_side(meters, grid, rng):
     x, y = moat(Gap(width=0.3, platform=float(meters)).build(grid, rng))
     edge = 40 - 5 * meters
     assert x == y == [*range(edge - 3, edge), *range(80 - edge, 83 - edge)]
@@ -49,14 +49,14 @@ def test_the_platform_is_as_large_as_asked(meters, grid, rng):
 @pytest.mark.parametrize(
     ("asked", "built"), [(0.0, 0.0), (0.04, 0.0), (0.05, 0.1), (0.34, 0.3), (0.35, 0.4), (1.0, 1.0)]
 )
-def test_the_width_snaps_to_cells(asked, built, grid, rng):
+def test_gap_width_snaps_to_cells(asked, built, grid, rng):
     gap = Gap(width=asked)
     assert gap.requested()["width"] == asked
     assert gap.realized(grid)["width"] == built
     assert len(moat(gap.build(grid, rng))[0]) * 0.1 == pytest.approx(2 * built)
 
 
-def test_an_odd_patch_has_an_odd_platform(rng):
+def test_gap_odd_patch_has_odd_platform(rng):
     grid = Grid(shape=(73, 51), cell=0.1)
     # 3.1 m, from cell 21 to 51 along x and from 10 to 40 along y.
     x, y = moat(Gap(width=0.2, platform=3.0).build(grid, rng))
@@ -65,7 +65,7 @@ def test_an_odd_patch_has_an_odd_platform(rng):
     assert Gap(platform=3.0).realized(grid)["platform"] == 3.1
 
 
-def test_the_edge_of_a_narrow_patch_ends_the_moat_and_the_record_says_so(rng):
+def test_gap_realized_width_ends_at_the_patch(rng):
     grid = Grid(shape=(80, 40), cell=0.1)
     gap = Gap(width=1.0, platform=3.0)
     x, y = moat(gap.build(grid, rng))
@@ -75,11 +75,11 @@ def test_the_edge_of_a_narrow_patch_ends_the_moat_and_the_record_says_so(rng):
 
 
 @pytest.mark.parametrize(("difficulty", "cells"), [(0.0, 0), (0.3, 3), (0.7, 7), (1.0, 10)])
-def test_the_width_grows_with_the_difficulty(difficulty, cells, grid, rng):
+def test_gap_width_grows_with_difficulty(difficulty, cells, grid, rng):
     assert len(moat(Gap.at(difficulty).build(grid, rng))[0]) == 2 * cells
 
 
-def test_a_platform_larger_than_the_patch_is_an_error(rng):
+def test_gap_platform_larger_than_patch_is_rejected(rng):
     with pytest.raises(
         ConfigError, match=r"gap: platform 4\.5 m does not fit in a patch of 8 m x 4 m"
     ):

@@ -19,19 +19,19 @@ def extent(heights):
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_heights_are_whole_or_half_up_or_down(seed, grid):
+def test_obstacles_have_four_heights(seed, grid):
     levels = set(build(grid, seed, height=0.2).ravel().tolist())
     assert levels <= set(np.float32([-0.2, -0.1, 0.0, 0.1, 0.2]).tolist())
     assert len(levels) > 2
 
 
-def test_every_level_is_drawn(grid):
+def test_obstacles_use_every_height(grid):
     levels = np.concatenate([build(grid, seed, height=0.2).ravel() for seed in SEEDS])
     assert np.unique(levels) == pytest.approx([-0.2, -0.1, 0.0, 0.1, 0.2])
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_block_is_as_wide_as_asked_and_wholly_inside(seed):
+def test_obstacles_have_requested_width(seed):
     grid = Grid(shape=(80, 40), cell=0.1)
     heights = build(grid, seed, number=1, min_width=1.5, max_width=1.5, platform=0.2)
     assert extent(heights)[2:] == (15, 15)
@@ -39,19 +39,19 @@ def test_a_block_is_as_wide_as_asked_and_wholly_inside(seed):
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_sides_lie_between_the_least_and_the_largest(seed, grid):
+def test_obstacles_sides_are_within_limits(seed, grid):
     *_, nx, ny = extent(build(grid, seed, number=1, platform=0.2))
     assert 10 <= nx <= 20
     assert 10 <= ny <= 20
 
 
-def test_sides_take_every_length_between_and_each_axis_its_own(grid):
+def test_obstacles_sides_are_sampled_per_axis(grid):
     sides = np.array([extent(build(grid, seed, number=1, platform=0.2))[2:] for seed in range(150)])
     assert set(sides.ravel()) == set(range(10, 21))
     assert (sides[:, 0] != sides[:, 1]).any()
 
 
-def test_blocks_reach_every_edge_of_the_patch():
+def test_obstacles_reach_every_edge():
     grid = Grid(shape=(30, 25), cell=0.1)
     covered = [build(grid, seed, number=5, platform=0.1) != 0 for seed in range(40)]
     reached = np.any(covered, axis=0)
@@ -61,30 +61,30 @@ def test_blocks_reach_every_edge_of_the_patch():
 
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize(("shape", "side"), [((80, 80), 30), ((80, 40), 30), ((73, 51), 31)])
-def test_the_platform_is_kept_free(shape, side, seed):
+def test_obstacles_leave_the_platform_free(shape, side, seed):
     heights = build(Grid(shape=shape, cell=0.1), seed, platform=3.0, number=60)
     x, y = ((n - side) // 2 for n in shape)
     assert not heights[x : x + side, y : y + side].any()
     assert heights.any()
 
 
-def test_the_pattern_stays_as_the_height_grows(grid):
+def test_obstacles_pattern_is_independent_of_height(grid):
     low, high = build(grid, 3, height=0.1), build(grid, 3, height=0.2)
     assert high == pytest.approx(2 * low)
 
 
-def test_more_blocks_cover_more(grid):
+def test_obstacles_cover_more_with_larger_number(grid):
     few, many = (np.count_nonzero(build(grid, 0, number=number)) for number in (5, 40))
     assert many > few
 
 
 @pytest.mark.parametrize(("difficulty", "height"), [(0.0, 0.05), (0.5, 0.15), (1.0, 0.25)])
-def test_the_height_grows_with_the_difficulty(difficulty, height, grid):
+def test_obstacles_height_grows_with_difficulty(difficulty, height, grid):
     heights = Obstacles.at(difficulty).build(grid, np.random.default_rng(0))
     assert np.abs(heights).max() == pytest.approx(height)
 
 
-def test_widths_snap_to_cells(grid):
+def test_obstacles_widths_snap_to_cells(grid):
     realized = Obstacles(min_width=1.04, max_width=1.96, platform=3.1).realized(grid)
     assert realized["min_width"] == 1.0
     assert realized["max_width"] == 2.0
@@ -99,7 +99,7 @@ def test_widths_snap_to_cells(grid):
         ((80, 19), (1.0, 2.0), r"max_width 2 m; expected .* the patch, 8 m x 1\.9 m"),
     ],
 )
-def test_blocks_that_do_not_fit_are_an_error(shape, widths, message):
+def test_obstacles_invalid_widths_are_rejected(shape, widths, message):
     with pytest.raises(ConfigError, match=f"obstacles: .*{message}"):
         build(
             Grid(shape=shape, cell=0.1), 0, min_width=widths[0], max_width=widths[1], platform=1.0

@@ -16,7 +16,7 @@ from terrainkit.terrains.pit import Pit
         ((80, 51), 4.0, (40, 41)),
     ],
 )
-def test_the_pit_is_square_centered_and_as_large_as_asked(shape, asked, sides, rng):
+def test_pit_is_square_and_centered(shape, asked, sides, rng):
     grid = Grid(shape=shape, cell=0.1)
     pit = Pit(depth=0.6, side=asked)
     low = pit.build(grid, rng) < 0
@@ -27,19 +27,19 @@ def test_the_pit_is_square_centered_and_as_large_as_asked(shape, asked, sides, r
 
 
 @pytest.mark.parametrize(("difficulty", "depth"), [(0.0, 0.0), (0.4, 0.4), (1.0, 1.0)])
-def test_the_pit_deepens_with_the_difficulty(difficulty, depth, grid, rng):
+def test_pit_depth_grows_with_difficulty(difficulty, depth, grid, rng):
     heights = Pit.at(difficulty).build(grid, rng)
     assert heights[40, 40] == pytest.approx(-depth)
     assert heights.max() == 0.0
 
 
-def test_a_pit_as_wide_as_the_patch_is_a_trench_across_it(rng):
+def test_pit_as_wide_as_patch_is_a_trench(rng):
     heights = Pit(depth=1.0, side=4.0).build(Grid(shape=(80, 40), cell=0.1), rng)
     assert (heights[20:60] == -1.0).all()
     assert not heights[:20].any()
     assert not heights[60:].any()
 
 
-def test_a_pit_larger_than_the_patch_is_an_error(rng):
+def test_pit_larger_than_patch_is_rejected(rng):
     with pytest.raises(ConfigError, match=r"pit: side 4\.2 m does not fit in a patch of 8 m x 4 m"):
         Pit(side=4.2).build(Grid(shape=(80, 40), cell=0.1), rng)

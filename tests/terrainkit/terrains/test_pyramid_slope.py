@@ -11,7 +11,7 @@ def quads(heights):
     return np.stack([heights[:-1, :-1], heights[1:, :-1], heights[:-1, 1:], heights[1:, 1:]])
 
 
-def test_a_grade_of_0_4_peaks_at_one_metre(grid, rng):
+def test_pyramid_slope_peak_height(grid, rng):
     heights = PyramidSlope(grade=0.4, platform=3.0).build(grid, rng)
     # From the platform of 3 m to the edge of the 8 m patch are 2.5 m.
     assert heights.max() == pytest.approx(1.0)
@@ -19,7 +19,7 @@ def test_a_grade_of_0_4_peaks_at_one_metre(grid, rng):
 
 
 @pytest.mark.parametrize("shape", [(80, 80), (80, 40), (73, 51)])
-def test_the_grade_is_the_one_asked_everywhere_off_the_platform(shape, rng):
+def test_pyramid_slope_has_constant_grade(shape, rng):
     corners = quads(PyramidSlope(grade=0.4).build(Grid(shape=shape, cell=0.1), rng))
     off = corners.min(axis=0) < corners.max()
     assert off.mean() > 0.5
@@ -38,7 +38,7 @@ def test_the_grade_is_the_one_asked_everywhere_off_the_platform(shape, rng):
         ((80, 51), 3.0, (30, 31)),
     ],
 )
-def test_the_platform_is_level_centered_and_as_large_as_asked(shape, asked, sides, rng):
+def test_pyramid_slope_platform_is_level_and_centered(shape, asked, sides, rng):
     grid = Grid(shape=shape, cell=0.1)
     slope = PyramidSlope(grade=0.4, platform=asked)
     top = slope.build(grid, rng) == slope.build(grid, rng).max()
@@ -49,43 +49,43 @@ def test_the_platform_is_level_centered_and_as_large_as_asked(shape, asked, side
     assert np.broadcast_to(realized, 2) == pytest.approx(np.array(sides) * 0.1)
 
 
-def test_where_the_patch_is_narrower_its_sides_end_higher(rng):
+def test_pyramid_slope_short_sides_end_higher(rng):
     heights = PyramidSlope(grade=0.4).build(Grid(shape=(80, 40), cell=0.1), rng)
     # Along x the ground falls for 2.5 m, along y for 0.5 m.
     assert heights[0, 20] == 0.0
     assert heights[40, 0] == pytest.approx(1.0 - 0.2)
 
 
-def test_all_four_sides_are_alike(grid, rng):
+def test_pyramid_slope_is_symmetric(grid, rng):
     heights = PyramidSlope().build(grid, rng)
     assert (heights == heights.T).all()
     assert (heights == heights[::-1]).all()
 
 
-def test_inverted_is_upside_down(grid, rng):
+def test_pyramid_slope_inverted_is_negated(grid, rng):
     upright = PyramidSlope(grade=0.3).build(grid, rng)
     assert (PyramidSlope(grade=0.3, inverted=True).build(grid, rng) == -upright).all()
 
 
 @pytest.mark.parametrize(("difficulty", "peak"), [(0.0, 0.0), (0.5, 0.5), (1.0, 1.0)])
-def test_the_grade_grows_with_the_difficulty(difficulty, peak, grid, rng):
+def test_pyramid_slope_grade_grows_with_difficulty(difficulty, peak, grid, rng):
     assert PyramidSlope.at(difficulty).build(grid, rng).max() == pytest.approx(peak)
 
 
-def test_a_platform_of_the_whole_patch_is_an_error(grid, rng):
+def test_pyramid_slope_platform_of_whole_patch_is_rejected(grid, rng):
     with pytest.raises(ConfigError, match="platform 8 m fills the whole patch of 8 m x 8"):
         PyramidSlope(grade=0.4, platform=8.0).build(grid, rng)
 
 
 @pytest.mark.parametrize(("shape", "size"), [((80, 80), "8 m x 8 m"), ((90, 80), "9 m x 8 m")])
-def test_a_platform_larger_than_the_patch_is_an_error(shape, size, rng):
+def test_pyramid_slope_platform_larger_than_patch_is_rejected(shape, size, rng):
     with pytest.raises(
         ConfigError, match=rf"pyramid_slope: platform 8\.2 m does not fit in a patch of {size}"
     ):
         PyramidSlope(platform=8.2).build(Grid(shape=shape, cell=0.1), rng)
 
 
-def test_a_platform_smaller_than_a_cell_is_an_error(grid, rng):
+def test_pyramid_slope_platform_below_a_cell_is_rejected(grid, rng):
     with pytest.raises(
         ConfigError, match=r"platform 0\.05 m is smaller than a cell; expected at least 0\.1 m"
     ):

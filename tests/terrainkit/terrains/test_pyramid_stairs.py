@@ -11,7 +11,7 @@ def edges(profile):
     return (np.flatnonzero(np.diff(profile)) + 1).tolist()
 
 
-def test_steps_of_one_height_and_width_up_to_the_platform(grid, rng):
+def test_pyramid_stairs_have_equal_steps(grid, rng):
     heights = PyramidStairs(step_height=0.1, step_width=0.5, platform=3.0).build(grid, rng)
     # 2.5 m from the edge to the platform are five steps of five cells, and five back down.
     up, down = [5, 10, 15, 20, 25], [55, 60, 65, 70, 75]
@@ -19,7 +19,7 @@ def test_steps_of_one_height_and_width_up_to_the_platform(grid, rng):
     assert np.unique(heights) == pytest.approx(0.1 * np.arange(6), abs=1e-6)
 
 
-def test_the_outermost_tread_takes_what_is_left(grid, rng):
+def test_pyramid_stairs_outermost_tread_takes_the_rest(grid, rng):
     heights = PyramidStairs(step_height=0.1, step_width=0.3, platform=3.0).build(grid, rng)
     # 25 cells hold eight steps of three; the outermost tread is four wide, at height 0.
     assert edges(heights[:40, 40]) == [4, 7, 10, 13, 16, 19, 22, 25]
@@ -27,7 +27,7 @@ def test_the_outermost_tread_takes_what_is_left(grid, rng):
     assert heights[40, 40] == pytest.approx(0.8)
 
 
-def test_the_usual_step_of_31_cm_is_built_as_30_cm(grid, rng):
+def test_pyramid_stairs_width_0_31_is_built_as_0_3(grid, rng):
     stairs = PyramidStairs(step_width=0.31)
     assert stairs.requested()["step_width"] == 0.31
     assert stairs.realized(grid)["step_width"] == 0.3
@@ -44,7 +44,7 @@ def test_the_usual_step_of_31_cm_is_built_as_30_cm(grid, rng):
         ((80, 51), 3.0, (30, 31)),
     ],
 )
-def test_the_platform_is_centered_and_as_large_as_asked(shape, asked, sides, rng):
+def test_pyramid_stairs_platform_is_centered(shape, asked, sides, rng):
     grid = Grid(shape=shape, cell=0.1)
     stairs = PyramidStairs(platform=asked)
     heights = stairs.build(grid, rng)
@@ -56,7 +56,7 @@ def test_the_platform_is_centered_and_as_large_as_asked(shape, asked, sides, rng
     assert np.broadcast_to(realized, 2) == pytest.approx(np.array(sides) * 0.1)
 
 
-def test_where_the_patch_is_narrower_the_edge_cuts_the_steps(rng):
+def test_pyramid_stairs_are_cut_at_short_sides(rng):
     stairs = PyramidStairs(step_height=0.1, step_width=0.3)
     heights = stairs.build(Grid(shape=(80, 40), cell=0.1), rng)
     # Along y there are five cells: one step of three and two cells of the next.
@@ -65,35 +65,35 @@ def test_where_the_patch_is_narrower_the_edge_cuts_the_steps(rng):
     assert heights[0, 20] == 0.0
 
 
-def test_all_four_sides_are_alike(grid, rng):
+def test_pyramid_stairs_are_symmetric(grid, rng):
     heights = PyramidStairs().build(grid, rng)
     assert (heights == heights.T).all()
     assert (heights == heights[::-1]).all()
 
 
-def test_inverted_is_upside_down(grid, rng):
+def test_pyramid_stairs_inverted_are_negated(grid, rng):
     upright = PyramidStairs().build(grid, rng)
     assert (PyramidStairs(inverted=True).build(grid, rng) == -upright).all()
 
 
 @pytest.mark.parametrize(("difficulty", "rise"), [(0.0, 0.05), (0.5, 0.14), (1.0, 0.23)])
-def test_the_step_height_grows_with_the_difficulty(difficulty, rise, grid, rng):
+def test_pyramid_stairs_height_grows_with_difficulty(difficulty, rise, grid, rng):
     profile = PyramidStairs.at(difficulty).build(grid, rng)[:40, 40]
     assert np.diff(profile).max() == pytest.approx(rise)
 
 
-def test_a_step_narrower_than_a_cell_is_a_cell_wide_and_the_record_says_so(grid, rng):
+def test_pyramid_stairs_narrow_step_is_one_cell(grid, rng):
     stairs = PyramidStairs(step_width=0.01)
     assert stairs.realized(grid)["step_width"] == 0.1
     assert edges(stairs.build(grid, rng)[:40, 40]) == list(range(1, 26))
 
 
-def test_one_step_is_the_least(grid, rng):
+def test_pyramid_stairs_minimum_is_one_step(grid, rng):
     heights = PyramidStairs(step_height=0.2, step_width=0.3, platform=7.4).build(grid, rng)
     assert np.unique(heights).tolist() == pytest.approx([0.0, 0.2])
 
 
-def test_no_room_for_a_step_is_an_error(grid, rng):
+def test_pyramid_stairs_without_room_are_rejected(grid, rng):
     with pytest.raises(
         ConfigError,
         match=r"pyramid_stairs: no step of 0\.3 m fits between the platform of 7\.6 m and the edge",
@@ -101,7 +101,7 @@ def test_no_room_for_a_step_is_an_error(grid, rng):
         PyramidStairs(step_width=0.3, platform=7.6).build(grid, rng)
 
 
-def test_a_platform_larger_than_the_patch_is_an_error(grid, rng):
+def test_pyramid_stairs_platform_larger_than_patch_is_rejected(grid, rng):
     with pytest.raises(
         ConfigError, match="pyramid_stairs: platform 9 m does not fit in a patch of 8 m x 8 m"
     ):

@@ -15,13 +15,13 @@ def roughness(terrain, grid, seed=0):
 
 
 @pytest.mark.parametrize("inverted", [False, True])
-def test_without_noise_it_is_the_pyramid_slope(inverted, grid):
+def test_rough_slope_without_noise_is_pyramid_slope(inverted, grid):
     terrain = RoughSlope(amplitude=0.0, inverted=inverted)
     assert not roughness(terrain, grid).any()
 
 
 @pytest.mark.parametrize("shape", [(80, 80), (80, 40), (73, 51)])
-def test_noise_stays_within_its_amplitude_on_the_sides(shape):
+def test_rough_slope_noise_is_within_amplitude(shape):
     noise = roughness(RoughSlope(amplitude=0.05), Grid(shape=shape, cell=0.1))
     assert np.abs(noise).max() <= 0.05 + 1e-6
     assert noise.min() < -0.02
@@ -29,7 +29,7 @@ def test_noise_stays_within_its_amplitude_on_the_sides(shape):
 
 
 @pytest.mark.parametrize(("shape", "side"), [((80, 80), 30), ((80, 40), 30), ((73, 51), 31)])
-def test_the_platform_is_level_and_the_sides_are_not(shape, side):
+def test_rough_slope_platform_is_level(shape, side):
     grid = Grid(shape=shape, cell=0.1)
     noise = roughness(RoughSlope(platform=3.0), grid)
     top = np.zeros(shape, dtype=bool)
@@ -39,23 +39,23 @@ def test_the_platform_is_level_and_the_sides_are_not(shape, side):
     assert (noise[~top] != 0).mean() > 0.8
 
 
-def test_the_noise_is_the_same_at_every_grade_and_either_way_up(grid):
+def test_rough_slope_noise_is_independent_of_grade(grid):
     steep, level = RoughSlope(grade=0.4), RoughSlope(grade=0.0)
     below = RoughSlope(grade=0.4, inverted=True)
     assert roughness(steep, grid) == pytest.approx(roughness(level, grid), abs=1e-6)
     assert roughness(below, grid) == pytest.approx(roughness(level, grid), abs=1e-6)
 
 
-def test_another_draw_is_other_noise(grid):
+def test_rough_slope_depends_on_the_generator(grid):
     assert (roughness(RoughSlope(), grid, 1) != roughness(RoughSlope(), grid, 2)).any()
 
 
 @pytest.mark.parametrize(("difficulty", "peak"), [(0.0, 0.0), (0.5, 0.5), (1.0, 1.0)])
-def test_the_grade_grows_with_the_difficulty(difficulty, peak, grid, rng):
+def test_rough_slope_grade_grows_with_difficulty(difficulty, peak, grid, rng):
     assert RoughSlope.at(difficulty).build(grid, rng)[40, 40] == pytest.approx(peak)
 
 
-def test_what_is_built_is_recorded():
+def test_rough_slope_realized_parameters():
     terrain = RoughSlope(grade=0.3, amplitude=0.05, step=0.02, spacing=0.24, platform=2.9)
     assert terrain.realized(Grid(shape=(80, 51), cell=0.1)) == {
         "grade": 0.3,
@@ -68,12 +68,12 @@ def test_what_is_built_is_recorded():
     }
 
 
-def test_a_platform_larger_than_the_patch_is_an_error(grid, rng):
+def test_rough_slope_platform_larger_than_patch_is_rejected(grid, rng):
     with pytest.raises(ConfigError, match="rough_slope: platform 9 m does not fit in a patch"):
         RoughSlope(platform=9.0).build(grid, rng)
 
 
 @pytest.mark.parametrize("spacing", [0.04, 1e-310])
-def test_a_spacing_below_a_cell_is_a_cell(spacing, grid):
+def test_rough_slope_spacing_below_a_cell_is_a_cell(spacing, grid):
     fine, cell = RoughSlope(spacing=spacing), RoughSlope(spacing=0.1)
     assert (roughness(fine, grid) == roughness(cell, grid)).all()

@@ -11,7 +11,7 @@ def risers(heights):
     return (np.flatnonzero(np.diff(heights[:, 0])) + 1).tolist()
 
 
-def test_steps_of_one_height_and_width_between_two_landings(grid, rng):
+def test_stairs_have_equal_steps(grid, rng):
     heights = Stairs(step_height=0.1, step_width=0.4, landing=2.0).build(grid, rng)
     # 4 m between the landings are ten treads of 0.4 m, so eleven risers.
     assert risers(heights) == [20, 24, 28, 32, 36, 40, 44, 48, 52, 56, 60]
@@ -19,21 +19,21 @@ def test_steps_of_one_height_and_width_between_two_landings(grid, rng):
     assert np.unique(heights) == pytest.approx(0.1 * np.arange(12), abs=1e-6)
 
 
-def test_what_the_steps_leave_over_goes_to_the_far_landing(grid, rng):
+def test_stairs_remaining_cells_extend_the_landing(grid, rng):
     heights = Stairs(step_height=0.1, step_width=0.3, landing=2.0).build(grid, rng)
     # 40 cells hold 13 treads of 3, so 14 risers, the last at 20 + 39.
     assert risers(heights) == list(range(20, 60, 3))
     assert heights[59:, 0] == pytest.approx(np.full(21, 1.4))
 
 
-def test_the_usual_step_of_31_cm_is_built_as_30_cm(grid, rng):
+def test_stairs_width_0_31_is_built_as_0_3(grid, rng):
     stairs = Stairs(step_width=0.31)
     assert stairs.requested()["step_width"] == 0.31
     assert stairs.realized(grid)["step_width"] == 0.3
     assert set(np.diff(risers(stairs.build(grid, rng)))) == {3}
 
 
-def test_the_steps_span_the_width(rng):
+def test_stairs_span_the_width(rng):
     heights = Stairs().build(Grid(shape=(73, 51), cell=0.1), rng)
     assert np.ptp(heights, axis=1).max() == 0.0
 
@@ -47,36 +47,36 @@ def test_the_steps_span_the_width(rng):
         ((40, 40), 0.1, 1),  # two landings and nothing between
     ],
 )
-def test_the_number_of_steps_follows_from_the_patch(shape, cell, count, rng):
+def test_stairs_number_of_steps_fills_the_patch(shape, cell, count, rng):
     heights = Stairs(step_height=0.2).build(Grid(shape=shape, cell=cell), rng)
     assert len(risers(heights)) == count
     assert heights.max() == pytest.approx(0.2 * count)
 
 
-def test_inverted_descends_along_x(grid, rng):
+def test_stairs_inverted_descend(grid, rng):
     rising = Stairs().build(grid, rng)
     assert (Stairs(inverted=True).build(grid, rng) == -rising).all()
 
 
 @pytest.mark.parametrize(("difficulty", "rise"), [(0.0, 0.05), (0.5, 0.14), (1.0, 0.23)])
-def test_the_step_height_grows_with_the_difficulty(difficulty, rise, grid, rng):
+def test_stairs_height_grows_with_difficulty(difficulty, rise, grid, rng):
     heights = Stairs.at(difficulty).build(grid, rng)
     assert np.diff(heights[:, 0]).max() == pytest.approx(rise)
 
 
-def test_the_robot_starts_in_the_middle_of_the_lower_landing():
+def test_stairs_spawn_is_on_the_lower_landing():
     grid = Grid(shape=(80, 51), cell=0.1, lower=(16.0, 10.2))
     assert Stairs(landing=2.0).spawn(grid) == pytest.approx((17.0, 12.75))
 
 
-def test_landings_that_do_not_fit_are_an_error(grid, rng):
+def test_stairs_landings_too_long_are_rejected(grid, rng):
     with pytest.raises(
         ConfigError, match=r"stairs: two landings of 4\.1 m do not fit in a patch 8 m long"
     ):
         Stairs(landing=4.1).build(grid, rng)
 
 
-def test_a_step_narrower_than_a_cell_is_a_cell_wide_and_the_record_says_so(grid, rng):
+def test_stairs_narrow_step_is_one_cell(grid, rng):
     stairs = Stairs(step_width=0.04)
     assert stairs.realized(grid)["step_width"] == 0.1
     # 40 cells between the landings, and a riser before and after each.

@@ -17,36 +17,36 @@ def build(grid, seed=0, **parameters):
     return SteppingStones(**parameters).build(grid, np.random.default_rng(seed))
 
 
-def test_rows_of_stones_are_a_stone_deep_and_a_distance_apart(grid):
+def test_stepping_stones_rows_are_equidistant(grid):
     heights = build(grid, stone=0.5, distance=0.3)
     holes = (heights[:, :20] < 0).all(axis=1)  # beside the platform, from 2.0 to 6.0 m
     assert np.flatnonzero(~holes).tolist() == [k for k in range(80) if k % 8 < 5]
 
 
-def test_stones_in_a_row_are_as_wide_and_as_far_apart_as_asked(grid):
+def test_stepping_stones_have_requested_width_and_distance(grid):
     stones = build(grid, stone=0.5, distance=0.3)[:20] == 0
     for row in (0, 8, 16):
         assert set(runs(stones[row])) == {5}
         assert set(runs(~stones[row])) == {3}
 
 
-def test_a_stone_is_square(grid):
+def test_stepping_stones_are_square(grid):
     stones = build(grid, stone=0.5, distance=0.3)[:20] == 0
     assert all((stones[k] == stones[0]).all() for k in range(5))
     assert all((stones[8 + k] == stones[8]).all() for k in range(5))
 
 
-def test_each_row_is_shifted_on_its_own(grid):
+def test_stepping_stones_rows_have_random_offsets(grid):
     stones = build(grid, stone=0.5, distance=0.3, platform=0.2) == 0
     assert len({stones[8 * row].tobytes() for row in range(10)}) > 3
 
 
-def test_stones_are_at_zero_and_holes_at_their_depth(grid):
+def test_stepping_stones_heights_by_hand(grid):
     assert np.unique(build(grid, stone=0.5, distance=0.3)).tolist() == [-10.0, 0.0]
     assert np.unique(build(grid, stone=0.5, distance=0.3, depth=2.5)).tolist() == [-2.5, 0.0]
 
 
-def test_variation_gives_each_stone_its_own_level(grid):
+def test_stepping_stones_variation_differs_by_stone(grid):
     heights = build(grid, stone=0.5, distance=0.3, variation=0.1, platform=0.2)
     tops = heights[heights > -1]
     assert np.abs(tops).max() <= 0.1
@@ -58,7 +58,7 @@ def test_variation_gives_each_stone_its_own_level(grid):
 
 
 @pytest.mark.parametrize(("shape", "sides"), [((80, 80), (40, 40)), ((73, 51), (41, 41))])
-def test_the_platform_is_level_and_centered(shape, sides):
+def test_stepping_stones_platform_is_level_and_centered(shape, sides):
     heights = build(Grid(shape=shape, cell=0.1), stone=0.3, distance=0.4, variation=0.05)
     x, y = ((n - side) // 2 for n, side in zip(shape, sides, strict=True))
     assert not heights[x : x + sides[0], y : y + sides[1]].any()
@@ -66,7 +66,7 @@ def test_the_platform_is_level_and_centered(shape, sides):
     assert (heights[:, y - 1] != 0).all()
 
 
-def test_a_platform_as_wide_as_the_patch_bridges_it():
+def test_stepping_stones_platform_as_wide_as_patch():
     heights = build(Grid(shape=(80, 40), cell=0.1), platform=4.0)
     assert not heights[20:60].any()
     assert heights[:20].min() == -10.0
@@ -81,7 +81,7 @@ def test_a_platform_as_wide_as_the_patch_bridges_it():
         (1.0, (0.075, 0.1), (0.1, 0.1)),
     ],
 )
-def test_stones_shrink_with_the_difficulty(difficulty, asked, built, grid):
+def test_stepping_stones_shrink_with_difficulty(difficulty, asked, built, grid):
     terrain = SteppingStones.at(difficulty)
     assert (terrain.stone, terrain.distance) == pytest.approx(asked)
     realized = terrain.realized(grid)
@@ -92,7 +92,7 @@ def test_stones_shrink_with_the_difficulty(difficulty, asked, built, grid):
 
 
 @pytest.mark.parametrize(("stone", "distance"), [(0.01, 0.3), (0.5, 0.01)])
-def test_a_length_below_a_cell_is_a_cell_and_the_record_says_so(stone, distance, grid):
+def test_stepping_stones_short_length_is_one_cell(stone, distance, grid):
     terrain = SteppingStones(stone=stone, distance=distance)
     realized = terrain.realized(grid)
     assert (realized["stone"], realized["distance"]) == (max(stone, 0.1), max(distance, 0.1))
@@ -101,6 +101,6 @@ def test_a_length_below_a_cell_is_a_cell_and_the_record_says_so(stone, distance,
     assert set(runs(~stones[0])) == {round(max(distance, 0.1) / 0.1)}
 
 
-def test_a_platform_larger_than_the_patch_is_an_error(grid):
+def test_stepping_stones_platform_larger_than_patch_is_rejected(grid):
     with pytest.raises(ConfigError, match="stepping_stones: platform 9 m does not fit"):
         build(grid, platform=9.0)

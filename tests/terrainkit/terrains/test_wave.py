@@ -6,7 +6,7 @@ from terrainkit.grid import Grid
 from terrainkit.terrains.wave import Wave
 
 
-def test_waves_of_four_cells_by_hand(rng):
+def test_wave_of_four_cells_by_hand(rng):
     grid = Grid(shape=(16, 16), cell=0.1)
     heights = Wave(amplitude=0.2, number=4, platform=0.2).build(grid, rng)
     # Samples at 45, 135, 225 and 315 degrees: sines of 0.707 and -0.707, products of 0.5 and -0.5.
@@ -16,7 +16,7 @@ def test_waves_of_four_cells_by_hand(rng):
 
 
 @pytest.mark.parametrize(("number", "shape"), [(1, (80, 80)), (4, (80, 40)), (5, (73, 51))])
-def test_a_whole_number_of_waves_spans_each_side(number, shape, rng):
+def test_wave_number_is_whole_per_side(number, shape, rng):
     heights = Wave(number=number, platform=0.2).build(Grid(shape=shape, cell=0.1), rng)
     # A wave crosses zero in its middle; between two waves it crosses zero too.
     for line in (heights[0], heights[:, 0]):
@@ -25,7 +25,7 @@ def test_a_whole_number_of_waves_spans_each_side(number, shape, rng):
 
 
 @pytest.mark.parametrize("shape", [(80, 80), (80, 40), (73, 51)])
-def test_the_rim_is_at_zero(shape, rng):
+def test_wave_rim_is_zero(shape, rng):
     heights = Wave(amplitude=0.2).build(Grid(shape=shape, cell=0.1), rng)
     # Half a cell outside lies the rim: the sample beyond it mirrors the one inside.
     assert heights[0] == pytest.approx(-heights[-1], abs=1e-6)
@@ -34,7 +34,7 @@ def test_the_rim_is_at_zero(shape, rng):
     assert np.abs(heights[0]).max() <= 0.2 * np.sin(longest) + 1e-6
 
 
-def test_crests_and_troughs_reach_the_amplitude(grid, rng):
+def test_wave_reaches_the_amplitude(grid, rng):
     heights = Wave(amplitude=0.2).build(grid, rng)
     # The highest of 20 samples a wave is 9 degrees off the crest: 0.2 * cos(9 deg)^2 = 0.195.
     assert heights.max() == pytest.approx(0.195, abs=0.002)
@@ -42,7 +42,7 @@ def test_crests_and_troughs_reach_the_amplitude(grid, rng):
 
 
 @pytest.mark.parametrize(("shape", "side"), [((80, 80), 16), ((80, 40), 16), ((73, 51), 15)])
-def test_the_platform_is_level_and_centered(shape, side, rng):
+def test_wave_platform_is_level_and_centered(shape, side, rng):
     # 1.5 m are 15 cells: half-way between 14 and 16, and halves round up.
     grid = Grid(shape=shape, cell=0.1)
     heights = Wave(amplitude=0.2).build(grid, rng)
@@ -53,19 +53,19 @@ def test_the_platform_is_level_and_centered(shape, side, rng):
     assert Wave().realized(grid)["platform"] == pytest.approx(side * 0.1)
 
 
-def test_waves_fade_in_over_a_quarter_of_one(grid, rng):
+def test_wave_fades_over_a_quarter_wave(grid, rng):
     wide, narrow = (Wave(number=4, platform=side).build(grid, rng) for side in (1.6, 0.2))
     # A wave is 2 m, a quarter of it five cells; the platform of 16 cells begins at cell 32.
     assert wide[27:32, 45] / narrow[27:32, 45] == pytest.approx([1.0, 0.8, 0.6, 0.4, 0.2])
 
 
 @pytest.mark.parametrize(("difficulty", "amplitude"), [(0.0, 0.0), (0.5, 0.1), (1.0, 0.2)])
-def test_the_amplitude_grows_with_the_difficulty(difficulty, amplitude, grid, rng):
+def test_wave_amplitude_grows_with_difficulty(difficulty, amplitude, grid, rng):
     heights = Wave.at(difficulty).build(grid, rng)
     assert heights.max() == pytest.approx(0.9755 * amplitude, abs=1e-4)
 
 
-def test_a_wave_needs_four_cells(rng):
+def test_wave_needs_four_cells_per_wave(rng):
     grid = Grid(shape=(40, 15), cell=0.1)
     assert Wave(number=3, platform=0.5).build(grid, rng).any()
     with pytest.raises(
@@ -74,13 +74,13 @@ def test_a_wave_needs_four_cells(rng):
         Wave(number=4, platform=0.5).build(grid, rng)
 
 
-def test_a_count_of_numpys_does_not_overflow(rng):
+def test_wave_numpy_count_does_not_overflow(rng):
     # 64 waves need 256 cells, one more than a uint8 holds.
     grid = Grid(shape=(260, 260), cell=0.1)
     counted = Wave(number=np.uint8(64)).build(grid, rng)
     assert (counted == Wave(number=64).build(grid, rng)).all()
 
 
-def test_a_platform_larger_than_the_patch_is_an_error(grid, rng):
+def test_wave_platform_larger_than_patch_is_rejected(grid, rng):
     with pytest.raises(ConfigError, match="wave: platform 9 m does not fit in a patch"):
         Wave(platform=9.0).build(grid, rng)

@@ -200,7 +200,7 @@ def test_a_mass_from_a_mesh_is_what_mujoco_makes_of_it(tmp_path):
 
 
 def test_there_has_to_be_a_robot(tmp_path):
-    with pytest.raises(RobotFileError, match="wanted a robot"):
+    with pytest.raises(RobotFileError, match="expected a robot"):
         to_canonical(facts(tmp_path, '<robot name="r"/>'))
 
 
@@ -210,7 +210,7 @@ def test_two_joints_of_one_name_get_two(tmp_path):
       <joint name="j" type="fixed"><parent link="a"/><child link="c"/></joint></robot>"""
     form = to_canonical(facts(tmp_path, text))
     assert [joint.name for joint in form.model.joints] == ["j", "c_joint"]
-    assert form.notes == ("named the joint above c c_joint: there are two j",)
+    assert form.notes == ("renamed the joint of c to c_joint: duplicate name j",)
 
 
 @pytest.mark.parametrize(("name", "wanted"), [("my robot/../x", "my_robot_.._x"), ("..", "robot")])
@@ -227,7 +227,7 @@ def test_a_link_called_world_gets_another_name(tmp_path):
     assert [link.name for link in form.model.links] == ["world_link_2", "world_link"]
     assert form.model.joints[0].parent == "world_link_2"
     assert form.model.floating is False
-    assert form.notes == ("named the link world world_link_2: MuJoCo has a world of its own",)
+    assert form.notes == ("renamed link world to world_link_2: MuJoCo reserves the name world",)
 
 
 DYNAMICS = """<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous">
@@ -256,8 +256,8 @@ def test_a_joint_that_follows_itself_or_nobody_is_free_and_told(tmp_path, leads,
     form = to_canonical(facts(tmp_path, text))
     free = [joint.name for joint in form.model.joints if joint.mimic is None]
     assert free == list(notes)
-    why = {"nobody": "there is no 'nobody'"}.get(leads[0], "it would follow itself in the end")
-    assert form.notes == tuple(f"{name} follows no other joint: {why}" for name in notes)
+    why = {"nobody": "there is no joint 'nobody'"}.get(leads[0], "it is part of a cycle")
+    assert form.notes == tuple(f"removed the mimic of {name}: {why}" for name in notes)
 
 
 MESH = '<mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/>'
@@ -277,12 +277,12 @@ def test_a_texture_without_end_costs_nothing(tmp_path):
 def test_a_body_without_a_name_is_told(tmp_path):
     text = f"""<mujoco><asset>{MESH}</asset><worldbody><body>
       <geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
-    with pytest.raises(RobotFileError, match="a body without a name has its mass from a mesh"):
+    with pytest.raises(RobotFileError, match="a body with its mass from a mesh has no name"):
         to_canonical(facts(tmp_path, text))
 
 
 def test_a_mesh_that_mujoco_does_not_find_is_told(tmp_path):
     text = """<mujoco><asset><mesh name="m" file="no.stl"/></asset><worldbody><body name="base">
       <geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
-    with pytest.raises(RobotFileError, match="masses are to come from meshes, and MuJoCo does not"):
+    with pytest.raises(RobotFileError, match="cannot compute masses from meshes: MuJoCo rejects"):
         to_canonical(facts(tmp_path, text))

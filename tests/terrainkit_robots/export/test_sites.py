@@ -49,7 +49,7 @@ def test_a_robot_without_an_imu_has_it_at_its_base(tmp_path):
     assert site.body == "trunk"
     np.testing.assert_allclose(site.pose, np.eye(4))
     assert imu_notes(facts) == (
-        "the IMU is at the origin of trunk: no sensor, site or link says where it is",
+        "placed the IMU at the origin of trunk: no sensor, site or link defines it",
     )
     # An arm that is bolted down has none, and nobody misses it.
     arm = Facts(to_canonical(facts, floating=False).model)
@@ -80,7 +80,7 @@ def test_an_imu_beside_the_robot_is_not_its_own(tmp_path):
     path.write_text(text.replace('name="imu_link"', 'name="cover"'))
     model = to_canonical(Facts(load_robot(path))).model
     assert model.imu is None
-    assert imu_notes(Facts(model))[0].startswith("the IMU is at the origin of trunk")
+    assert imu_notes(Facts(model))[0].startswith("placed the IMU at the origin of trunk")
 
 
 def test_the_imu_of_go2_is_where_its_site_is(robot_file):

@@ -13,9 +13,9 @@ def test_what_is_left_out_of_a_mjcf_is_told(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(MJCF)
     assert unsupported_elements(load_robot(path)) == (
-        "left out the element of <tendon>",
-        "left out the element of <equality>",
-        "left out stiffness of joints, which 1 element sets",
+        "ignored <tendon> (1 element)",
+        "ignored <equality> (1 element)",
+        "ignored stiffness of joints (1 element)",
     )
 
 
@@ -28,8 +28,8 @@ def test_motors_of_tendons_are_told_and_followers_are_none(tmp_path):
     model = load_robot(path)
     assert not model.problems
     assert unsupported_elements(model) == (
-        "left out the element of <tendon>",
-        "left out a motor, which drives no joint: pull",
+        "ignored <tendon> (1 element)",
+        "ignored 1 actuator without a joint: pull",
     )
 
 
@@ -45,5 +45,5 @@ def test_how_shapes_feel_is_left_out_and_told(tmp_path):
         </body></worldbody></mujoco>"""
     )
     assert unsupported_elements(load_robot(path)) == (
-        "left out friction and contact parameters of shapes, which 2 elements set",
+        "ignored friction and contact parameters of geoms (2 elements)",
     )

@@ -26,7 +26,7 @@ from terrainkit_robots.description.model import (
 )
 from terrainkit_robots.export.canonical import to_canonical
 from terrainkit_robots.export.mesh_export.mesh_export import export_meshes
-from terrainkit_robots.export.urdf import NO_EFFORT, NO_RANGE, NO_VELOCITY, urdf_text
+from terrainkit_robots.export.urdf import DEFAULT_EFFORT, DEFAULT_RANGE, DEFAULT_VELOCITY, urdf_text
 from terrainkit_robots.lint.rule import rules
 from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.mesh.mesh_cache import Meshes
@@ -180,14 +180,14 @@ class TestJoints:
         text = urdf_text(robot(link("base"), link("one"), link("two"), link("three"), *bare))
         a, b, c = etree.fromstring(text).findall("joint")
         assert dict(a.find("limit").attrib) == {
-            "effort": f"{NO_EFFORT:g}",
-            "velocity": f"{NO_VELOCITY:g}",
+            "effort": f"{DEFAULT_EFFORT:g}",
+            "velocity": f"{DEFAULT_VELOCITY:g}",
         }
-        assert b.find("limit").get("lower") == f"{-NO_RANGE:g}"
-        assert b.find("limit").get("upper") == f"{NO_RANGE:g}"
+        assert b.find("limit").get("lower") == f"{-DEFAULT_RANGE:g}"
+        assert b.find("limit").get("upper") == f"{DEFAULT_RANGE:g}"
         assert c.get("type") == "continuous"
-        assert "<!-- No largest effort is known, and 1000 stands for it: a, b. -->" in text
-        assert "<!-- No largest velocity is known, and 100 stands for it: a, b. -->" in text
+        assert "<!-- Unknown effort limit, set to 1000: a, b. -->" in text
+        assert "<!-- Unknown velocity limit, set to 100: a, b. -->" in text
         assert compiled(text).njnt == 3
 
     def test_names_do_not_end_a_comment(self):
@@ -238,7 +238,7 @@ class TestJoints:
 
     def test_what_no_normal_form_has_is_refused(self):
         model = robot(link("base"), link("leg"), joint("hip", "ball", "base", "leg"))
-        with pytest.raises(ValueError, match="joint hip is ball"):
+        with pytest.raises(ValueError, match="joint hip: got type ball"):
             urdf_text(model)
 
 

@@ -46,7 +46,7 @@ def test_a_sensor_without_an_inertia_is_a_part_of_the_trunk(tmp_path):
     _, imu = form.model.links
     assert imu.inertial is None
     assert form.notes == (
-        "put the mass of imu on trunk, which they are fixed to: MuJoCo takes no mass without an "
+        "moved the mass of imu to trunk, to which they are fixed: MuJoCo rejects masses without "
         "inertia",
     )
     (before,), (after,) = robot.bodies, Facts(form.model).bodies
@@ -98,7 +98,7 @@ def test_an_inertia_that_is_not_written_is_one_of_zero(tmp_path):
     for form in forms:
         assert form.model.links[1].inertial is None
         assert form.notes == forms[0].notes
-        assert "put the mass of imu on trunk" in form.notes[0]
+        assert "moved the mass of imu to trunk" in form.notes[0]
     bodies = [Facts(form.model).bodies[0] for form in forms]
     np.testing.assert_array_equal(bodies[0].inertia, bodies[1].inertia)
     assert bodies[0].mass == pytest.approx(60.5)

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 import torch
 
-from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
 from terrainkit_robots.policy.export import export_policy
 from terrainkit_robots.rl.config import Env, Runner, Task
 from terrainkit_robots.rl.env import LeggedEnv
@@ -17,29 +16,24 @@ TASK = Task(
 
 
 @pytest.mark.parametrize(
-    ("name", "joints", "observed"), [("go2/urdf/go2.urdf", 12, 45), ("h1/urdf/h1.urdf", 10, 39)]
+    ("name", "joints", "width"), [("go2/urdf/go2.urdf", 12, 45), ("h1/urdf/h1.urdf", 10, 39)]
 )
-def test_real_robot_is_onboarded_and_trained(robot_file, tmp_path, name, joints, observed):
-    """Twenty updates show no walking: that nothing breaks, and that all numbers stay numbers."""
-    folder = tmp_path / "robot"
-    done = onboard(robot_file(name), folder, OnboardOptions(render_images=False))
-    assert done.folder == folder
+def test_real_robot_is_onboarded_trained_exported(
+    robot_file, onboarded, tmp_path, name, joints, width
+):
+    folder = onboarded(robot_file(name)).folder
     robot = Robot.load(folder)
     assert len(robot.spec.joint_order) == joints
     run = create_run(tmp_path / "run", TASK, folder, "plane")
     torch.manual_seed(1)
     env = LeggedEnv(TASK, robot, Plane())
-    assert env.get_observations()["policy"].shape == (16, observed)
     runner = LeggedRunner(env, run.folder)
-    update, losses = runner.alg.update, []
-    runner.alg.update = lambda: losses.append(update()) or losses[-1]
     before = [weight.detach().clone() for weight in runner.alg.actor.mlp.parameters()]
-    runner.learn(20)
-    assert len(losses) == 20
-    assert all(np.isfinite(list(each.values())).all() for each in losses)
+    runner.learn(20)  # too few iterations to walk: weights change and stay finite
     after = list(runner.alg.actor.mlp.parameters())
     assert all(not torch.equal(a, b) for a, b in zip(before, after, strict=True))
+    assert all(torch.isfinite(weight).all() for weight in after)
     assert np.isfinite(env.sim.qpos).all()
-    exported = export_policy(open_run(run.folder), tmp_path / "policy")
-    assert exported.num_observations == observed
-    assert max(exported.errors) <= 1e-5
+    result = export_policy(open_run(run.folder), tmp_path / "policy")
+    assert result.num_observations == width
+    assert max(result.errors) <= 1e-5

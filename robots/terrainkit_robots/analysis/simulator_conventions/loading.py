@@ -18,7 +18,7 @@ from terrainkit_robots.description.model import RobotModel
 from terrainkit_robots.description.xml.document import RobotFileError, parse_xml, read_bytes
 from terrainkit_robots.files import open_regular
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.text import short
+from terrainkit_robots.text import truncate
 
 if TYPE_CHECKING:
     from lxml import etree
@@ -90,7 +90,7 @@ def mujoco_load_error(model: RobotModel) -> LoadError | None:
         informative = (line for line in lines if line and not line.startswith("Element "))
         message = " ".join(next(informative, "no reason").split())
         element = re.search(r"Element name '([^']*)'", text)
-        return LoadError(message=short(message, 200), element=element[1] if element else "")
+        return LoadError(message=truncate(message, 200), element=element[1] if element else "")
     return None
 
 
@@ -126,7 +126,7 @@ def yourdfpy_load_error(model: RobotModel, tree: Tree) -> LoadError | None:
         raise
     except Exception as error:  # yourdfpy has no common base class of its errors
         text = " ".join(str(error).split()) or "no message"
-        return LoadError(message=short(f"{type(error).__name__}: {text}", 200))
+        return LoadError(message=truncate(f"{type(error).__name__}: {text}", 200))
     finally:
         log.setLevel(level)
     return None
@@ -180,7 +180,7 @@ def _check_element(element: "etree._Element") -> None:
             raise NotAttemptedError(f"<{tag} {name}=...> is not passed to MuJoCo")
         is_allocation = tag == "size" and (name.startswith("nuser") or name == "nkey")
         if is_allocation and _size(text) > _MAX_ALLOCATION:
-            raise NotAttemptedError(f"<size {name}={short(text, 20)!r}> is not passed to MuJoCo")
+            raise NotAttemptedError(f"<size {name}={truncate(text, 20)!r}> is not passed to MuJoCo")
     if tag == "texture":
         side = max(_size(attributes.get(name, "1")) for name in ("width", "height"))
         if side * side > _MAX_PIXELS:

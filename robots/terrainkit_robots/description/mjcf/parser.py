@@ -15,7 +15,7 @@ from terrainkit_robots.description.mjcf.tree import MjcfTree, Node, is_allowed, 
 from terrainkit_robots.description.model import Problem
 from terrainkit_robots.description.xml.numbers import parse_numbers, replace_commas
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.text import closest, short
+from terrainkit_robots.text import closest, truncate
 
 if TYPE_CHECKING:
     import mujoco
@@ -140,7 +140,7 @@ def _check_numbers(tree: MjcfTree, node: Node) -> None:
             tree,
             node,
             "XML006",
-            f"{name} of <{node.tag}>: got {short(text, 40)!r}; expected {expected}"
+            f"{name} of <{node.tag}>: got {truncate(text, 40)!r}; expected {expected}"
             + (", with decimal points and separated by spaces" if repaired else ""),
             attribute=name,
             repaired=repaired,
@@ -286,7 +286,7 @@ def _invalid_number(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
         expected = "other numbers"
     else:
         expected = f"{counts[0]} numbers" if counts[0] > 1 else "a number"
-    message = f"{name} of <{node.tag}>: got {short(text, 40)!r}; expected {expected}"
+    message = f"{name} of <{node.tag}>: got {truncate(text, 40)!r}; expected {expected}"
     report(tree, node, "XML006", message, attribute=name, repaired="")
     return True
 

@@ -29,7 +29,7 @@ from terrainkit_robots.description.urdf.tags import has_variable, misspelled_nam
 from terrainkit_robots.description.xml.document import XmlDocument
 from terrainkit_robots.description.xml.number_text import place_text
 from terrainkit_robots.description.xml.numbers import parse_numbers, replace_commas
-from terrainkit_robots.text import short
+from terrainkit_robots.text import truncate
 from terrainkit_robots.transforms import Matrix, matrix_to_rpy, quat_to_matrix, rpy_to_matrix
 
 
@@ -114,7 +114,7 @@ class _Reader:
         self._report(
             "XML006",
             element,
-            f"{name} of <{element.tag}>: got {short(text, 40)!r}; expected {expected}{hint}",
+            f"{name} of <{element.tag}>: got {truncate(text, 40)!r}; expected {expected}{hint}",
             attribute=name,
             repaired=repaired,
         )
@@ -160,7 +160,7 @@ class _Reader:
         if origin.get("rpy") is not None:
             message = "<origin> has quat_xyzw and rpy; expected only one of them"
         elif not 0 < np.linalg.norm(quat) < np.inf:
-            text = short(origin.get("quat_xyzw", ""), 40)
+            text = truncate(origin.get("quat_xyzw", ""), 40)
             message = f"quat_xyzw of <origin>: got {text!r}; expected a nonzero quaternion"
         if message:
             self._report("XML006", origin, message, attribute="quat_xyzw")

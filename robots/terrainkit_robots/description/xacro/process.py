@@ -18,7 +18,7 @@ from xml.dom import expatbuilder
 from xml.parsers import expat
 
 from terrainkit_robots.description.package_resolver import PackageResolver
-from terrainkit_robots.text import short
+from terrainkit_robots.text import truncate
 
 ORIGIN = "terrainkit-origin"
 """Attribute that stores the file and line of an element during the expansion."""
@@ -158,7 +158,7 @@ def _check_expression(text: str) -> None:
             name = node.id
         if name.startswith(_BLOCKED_PREFIXES):
             raise _RejectedError(
-                f"the expression {short(text, 60)} uses {name}, which is not allowed"
+                f"the expression {truncate(text, 60)} uses {name}, which is not allowed"
             )
 
 
@@ -282,14 +282,13 @@ def _error_message(error: BaseException, request: Mapping[str, Any]) -> str:
             case "ExpatError":
                 return f"xacro: malformed XML: {cause}"
         if isinstance(cause, SyntaxError):
-            return (
-                f"xacro: invalid expression {short((cause.text or '').strip(), 60)!r}: {cause.msg}"
-            )
+            expression = truncate((cause.text or "").strip(), 60)
+            return f"xacro: invalid expression {expression!r}: {cause.msg}"
         if isinstance(cause, OSError):
             return f"xacro: cannot read {cause.filename}: {cause.strerror}"
     macro = next(iter(getattr(error, "macros", ())), None)
     words = f"{error}{_in_macro(macro)}" or type(error).__name__
-    return f"xacro: {short(' '.join(words.split()), _MAX_MESSAGE)}"
+    return f"xacro: {truncate(' '.join(words.split()), _MAX_MESSAGE)}"
 
 
 def _in_macro(macro: Any) -> str:

@@ -1,7 +1,7 @@
-"""The process in which CoACD works: a mesh from one file, its convex parts to another.
+"""Run CoACD in a child process: read a mesh from one file, write its convex parts to another.
 
-The library is native code by other hands, and a mesh may end it, or keep it busy for hours; in a
-process of its own neither is the end of the program. Nothing of terrainkit is imported here.
+CoACD is native code that may crash or run for hours on some meshes. Nothing of terrainkit is
+imported here.
 """
 
 import json
@@ -11,7 +11,7 @@ import numpy as np
 
 
 def main(source: str, target: str, parameters: str) -> None:
-    """Decompose the mesh in `source`, and write the parts to `target`."""
+    """Decompose the mesh in `source`, and write its parts to `target`."""
     import coacd
 
     coacd.set_log_level("error")

@@ -1,4 +1,4 @@
-"""Convex parts of a mesh, by CoACD.
+"""Decompose a mesh into convex parts with CoACD.
 
 Xinyue Wei and others, "Approximate Convex Decomposition for 3D Meshes with Collision-Aware
 Concavity and Tree Search", ACM Transactions on Graphics 41 (2022).
@@ -18,8 +18,8 @@ import numpy as np
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots.export.collision_simplification.decomposition_cache import (
     DecompositionCache,
-    packed,
-    unpacked,
+    from_npz,
+    to_npz,
 )
 from terrainkit_robots.export.mesh_export.decimate import decimate
 from terrainkit_robots.mesh.surface import MeshError, Surface
@@ -36,41 +36,40 @@ PARAMETERS: Mapping[str, float | int | bool] = {
     "max_ch_vertex": 64,
     "seed": 0,
 }
-"""CoACD's own threshold; as many parts as a simulator of thousands of robots can bear, each with
-no more corners than PhysX takes on a GPU. The search is a tenth as long as CoACD's own: parts of a
-robot's shells get as close a fit from it, within a few hundredths, in seconds instead of minutes.
-"""
+"""CoACD's default threshold, a number of parts that a simulator of thousands of robots can handle,
+and the maximum number of vertices of PhysX on a GPU. The search is a tenth of CoACD's default,
+which fits the shells of robots equally well within a few percent, in seconds instead of minutes."""
 
-_MOST_FACES = 50_000
-"""A mesh with more is made coarser first; the parts are coarser by far."""
+_MAX_FACES = 50_000
+"""Larger meshes are decimated first."""
 
-_MOST_SECONDS = 300.0
-"""A mesh that takes longer is given up; the worst that was seen took 40."""
+_MAX_SECONDS = 300.0
+"""Time limit of a decomposition [s]; the slowest known mesh takes 40 s."""
 
 
 def convex_parts(surface: Surface, cache: Path | None) -> tuple[Surface, ...]:
-    """Return convex parts that cover a surface, the same ones each time.
+    """Return convex parts that cover a surface; the result is deterministic.
 
     Args:
-        surface: Triangles, welded [m].
-        cache: Folder that keeps parts from one run to the next; None keeps nothing.
+        surface: Welded triangles [m].
+        cache: Folder of the cache; None disables it.
 
     Raises:
-        MeshError: if CoACD fails at it.
-        TerrainkitError: if CoACD is not installed.
+        MeshError: If CoACD fails.
+        TerrainkitError: If CoACD is not installed.
     """
-    kept = DecompositionCache(cache)
+    decompositions = DecompositionCache(cache)
     key = _key(surface)
-    parts = kept.get(key)
+    parts = decompositions.get(key)
     if parts is None:
-        parts = _decomposed(decimate(surface, _MOST_FACES))
-        kept.put(key, parts)
+        parts = _decompose(decimate(surface, _MAX_FACES))
+        decompositions.put(key, parts)
     return parts
 
 
 def _key(surface: Surface) -> str:
-    """Return what the parts follow from: corners, faces, parameters and the version of CoACD."""
-    what = json.dumps([dict(PARAMETERS), _MOST_FACES, _version()], sort_keys=True)
+    """Return a hash of the surface, the parameters and the version of CoACD."""
+    what = json.dumps([dict(PARAMETERS), _MAX_FACES, _version()], sort_keys=True)
     points = np.ascontiguousarray(surface.points, dtype="<f8")
     faces = np.ascontiguousarray(surface.faces, dtype="<i8")
     digest = hashlib.sha256(f"{what} {len(points)} {len(faces)} ".encode())
@@ -84,33 +83,33 @@ def _version() -> str:
         return metadata.version("coacd")
     except metadata.PackageNotFoundError:
         raise TerrainkitError(
-            "convex parts need the package coacd, which is not installed; hulls do not"
+            "convex decomposition needs the package coacd, which is not installed"
         ) from None
 
 
-def _decomposed(surface: Surface) -> tuple[Surface, ...]:
+def _decompose(surface: Surface) -> tuple[Surface, ...]:
     with tempfile.TemporaryDirectory(prefix="terrainkit-") as folder:
         source, target = Path(folder) / "mesh.npz", Path(folder) / "parts.npz"
-        source.write_bytes(packed([surface]))
+        source.write_bytes(to_npz([surface]))
         process = Path(__file__).with_name("coacd_process.py")
-        # -P: the folder of the script is no place to import from
+        # -P: modules are not imported from the folder of the script
         command = [sys.executable, "-P", *map(str, (process, source, target))]
         try:
             subprocess.run(
                 [*command, json.dumps(dict(PARAMETERS))],
                 check=True,
                 capture_output=True,
-                timeout=_MOST_SECONDS,
+                timeout=_MAX_SECONDS,
             )
-            parts = unpacked(target.read_bytes())
+            parts = from_npz(target.read_bytes())
         except subprocess.TimeoutExpired:
-            raise MeshError(f"keeps CoACD busy for over {_MOST_SECONDS:g} s") from None
+            raise MeshError(f"exceeds the CoACD time limit of {_MAX_SECONDS:g} s") from None
         except subprocess.CalledProcessError as error:
-            words = error.stderr.decode(errors="replace").strip().splitlines()
-            reason = words[-1] if words else f"exit code {error.returncode}"
-            raise MeshError(f"is too much for CoACD: {reason}") from None
+            error_lines = error.stderr.decode(errors="replace").strip().splitlines()
+            reason = error_lines[-1] if error_lines else f"exit code {error.returncode}"
+            raise MeshError(f"makes CoACD fail: {reason}") from None
         except OSError as error:
-            raise MeshError(f"did not come back from CoACD: {error}") from None
+            raise MeshError(f"makes CoACD fail: {error}") from None
     if parts is None:
-        raise MeshError("has no convex parts that CoACD finds")
+        raise MeshError("has no convex decomposition")
     return parts

@@ -1,4 +1,4 @@
-"""Convex parts that were found before, kept on disk by what they were made from."""
+"""Cache convex decompositions on disk."""
 
 import io
 import zipfile
@@ -13,10 +13,10 @@ from terrainkit.atomic_write import atomic_write
 from terrainkit.errors import ExportError
 from terrainkit_robots.mesh.surface import Surface
 
-_MOST_BYTES = 64 * 2**20
-"""No parts take more; of a longer file nothing is read."""
+_MAX_BYTES = 64 * 2**20
+"""Maximum size of a cache file."""
 
-_DAMAGED = (
+_NPZ_ERRORS = (
     OSError,
     ValueError,
     KeyError,
@@ -25,7 +25,7 @@ _DAMAGED = (
     zipfile.BadZipFile,
     zlib.error,
 )
-"""What numpy raises of a file that is no archive of arrays any more."""
+"""Exceptions of numpy for a damaged file."""
 
 
 def cache_folder() -> Path:
@@ -36,36 +36,36 @@ def cache_folder() -> Path:
 
 
 class DecompositionCache:
-    """Parts by key; a file that is damaged counts as none."""
+    """Convex parts by key; damaged files are ignored."""
 
     def __init__(self, folder: Path | None) -> None:
-        """Keep parts in `folder`, which is made when it is needed; nowhere without one."""
+        """Create a cache in `folder`, which is created when needed; None disables the cache."""
         self._folder = folder
 
     def get(self, key: str) -> tuple[Surface, ...] | None:
-        """Return the parts of a key; None if there are none."""
+        """Return the parts of a key, or None."""
         if self._folder is None:
             return None
         file = self._folder / f"{key}.npz"
         try:
-            if not file.is_file() or file.stat().st_size > _MOST_BYTES:
+            if not file.is_file() or file.stat().st_size > _MAX_BYTES:
                 return None
-            return unpacked(file.read_bytes())
+            return from_npz(file.read_bytes())
         except OSError:
             return None
 
     def put(self, key: str, parts: Sequence[Surface]) -> None:
-        """Keep parts; where that cannot be done they are made again the next time."""
+        """Store parts; errors are ignored, because parts can be computed again."""
         if self._folder is None:
             return
         with suppress(OSError, ExportError):
             self._folder.mkdir(parents=True, exist_ok=True)
             with atomic_write(self._folder / f"{key}.npz", overwrite=True) as file:
-                file.write_bytes(packed(parts))
+                file.write_bytes(to_npz(parts))
 
 
-def packed(parts: Sequence[Surface]) -> bytes:
-    """Return surfaces as the content of a file."""
+def to_npz(parts: Sequence[Surface]) -> bytes:
+    """Return surfaces as the content of an npz file."""
     arrays = {}
     for k, part in enumerate(parts):
         arrays[f"points_{k}"] = np.asarray(part.points, dtype=np.float64)
@@ -75,8 +75,8 @@ def packed(parts: Sequence[Surface]) -> bytes:
     return stream.getvalue()
 
 
-def unpacked(data: bytes) -> tuple[Surface, ...] | None:
-    """Return the surfaces in the content of a file; None if it is damaged."""
+def from_npz(data: bytes) -> tuple[Surface, ...] | None:
+    """Return the surfaces of an npz file; None if it is damaged."""
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
             count = len(arrays.files) // 2
@@ -84,12 +84,12 @@ def unpacked(data: bytes) -> tuple[Surface, ...] | None:
                 Surface(points=arrays[f"points_{k}"], faces=arrays[f"faces_{k}"])
                 for k in range(count)
             )
-    except _DAMAGED:
+    except _NPZ_ERRORS:
         return None
-    return parts if parts and all(map(_is_sound, parts)) else None
+    return parts if parts and all(map(_is_valid, parts)) else None
 
 
-def _is_sound(part: Surface) -> bool:
+def _is_valid(part: Surface) -> bool:
     points, faces = part.points, part.faces
     shaped = points.ndim == faces.ndim == 2 and points.shape[1] == faces.shape[1] == 3
     return (

@@ -1,8 +1,8 @@
-"""Collision meshes made fit to collide with: hulls, convex parts or primitives in their place.
+"""Replace collision meshes by hulls, convex parts or primitives.
 
-Simulators collide with convex shapes. What they make of a mesh on their own differs, and a gripper
-or a shell that becomes its hull fills what it should leave open; so the shapes are made here once,
-the same for all of them, and how much volume that adds is told.
+Simulators collide with convex shapes, and convert meshes in different ways. A gripper or a shell
+that is replaced by its hull loses its opening. The shapes are therefore created here, the same for
+all simulators, and the change of volume is reported.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -26,87 +26,89 @@ from terrainkit_robots.mesh.surface import (
     signed_volume,
     welded,
 )
+from terrainkit_robots.text import count
 
-How = Literal["keep", "hull", "coacd", "primitives"]
+CollisionMethod = Literal["keep", "hull", "coacd", "primitives"]
 
 Progress = Callable[[Iterable[Any], int], Iterable[Any]]
-"""Draws a bar while it passes on so many things."""
+"""Show a progress bar for an iterable with so many items."""
 
-_HULL_CORNERS = 500
-"""Corners that a hull may have: as close to a limb as can be seen, and quick to collide with."""
+_MAX_HULL_VERTICES = 500
+"""Maximum number of vertices of a hull, which is visually exact and fast to collide with."""
 
-_FAR_FROM_CONVEX = 2.0
-"""A mesh whose hull has more than so many times its volume is decomposed; as MSH014 tells it."""
+_MAX_HULL_RATIO = 2.0
+"""Meshes with a larger ratio of hull volume to volume are decomposed, as in rule MSH014."""
 
-_MOST_WELDED = 500_000
-"""Of more faces the corners are not compared; the mesh is made coarser first."""
+_MAX_WELDED_FACES = 500_000
+"""Larger meshes are decimated before their vertices are merged."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class VolumeError:
-    """How much the volume of a collision mesh has changed."""
+    """Change of the volume of a collision mesh."""
 
     mesh: str
-    """Name of the file, as written."""
+    """File name, as written."""
 
-    became: str
-    """What is in its place, in words: its hull, 5 convex parts, a capsule."""
+    replacement: str
+    """What replaces the mesh, in words."""
 
-    solid: float | None
-    """Volume that the mesh encloses [m3]; None if it is not closed."""
+    original: float | None
+    """Volume of the mesh [m3]; None if it is not closed."""
 
-    treated: float
-    """Volume of what is in its place [m3]; of parts, the sum."""
+    volume: float
+    """Volume of the replacement, the sum of its parts [m3]."""
 
     @property
     def percent(self) -> float | None:
-        """Return by how much the volume has grown [%]; None if the mesh encloses none."""
-        return 100 * (self.treated / self.solid - 1) if self.solid else None
+        """Return the change of volume [%]; None if the volume of the mesh is unknown."""
+        return 100 * (self.volume / self.original - 1) if self.original else None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SimplifiedRobot:
-    """A robot with other collision shapes."""
+    """A robot with simplified collision geometry."""
 
     model: RobotModel
-    """The robot; the new meshes have paths that are on no disk."""
+    """The robot; the files of new meshes exist only in `contents`."""
 
     contents: Mapping[Path, bytes] = field(default_factory=dict)
     """Content of the new meshes by path."""
 
     meshes: Meshes
-    """The robot's mesh files, the new ones included."""
+    """Mesh files of the robot, including the new ones."""
 
     errors: tuple[VolumeError, ...] = ()
-    """One for each mesh that something else is in place of."""
+    """Volume error of each mesh that was replaced."""
 
     notes: tuple[str, ...] = ()
-    """What became of each collision mesh, a sentence each."""
+    """What replaced each collision mesh, one sentence each."""
 
 
 def simplify_collisions(
     model: RobotModel,
     meshes: Meshes,
-    how: How = "keep",
+    method: CollisionMethod = "keep",
     *,
     cache: Path | None = None,
     progress: Progress = lambda items, _: items,
 ) -> SimplifiedRobot:
-    """Return a robot with its collision meshes made fit to collide with.
+    """Simplify the collision meshes of a robot.
 
-    A mesh that cannot be read or is flat stays as it is: it is told when it is packed.
+    Meshes that are flat or cannot be read are unchanged; `export_meshes` reports them.
 
     Args:
         model: The robot.
         meshes: Its mesh files.
-        how: Keep them; their hulls; convex parts by CoACD where the hull has more than twice the
-            volume, else hulls; or for each the primitive that fits best.
-        cache: Folder that keeps convex parts from one run to the next; None keeps nothing.
-        progress: Draws a bar while it passes on the meshes.
+        method: keep: no change; hull: convex hulls; coacd: convex parts for meshes whose hull has
+            more than twice their volume, hulls for the others; primitives: the best fitting
+            primitive.
+        cache: Folder of the decomposition cache; None disables it.
+        progress: Shows a progress bar for the meshes.
     """
-    if how == "keep":
+    if method == "keep":
         return SimplifiedRobot(model=model, meshes=meshes)
-    work = _Work(meshes, how, cache)
+    simplifier = _Simplifier(meshes, method, cache)
     uses = {
         (shape.mesh.path, shape.mesh.scale): shape.mesh
         for link in model.links
@@ -114,71 +116,77 @@ def simplify_collisions(
         if shape.shape == "mesh" and shape.mesh is not None
     }
     for mesh in progress(uses.values(), len(uses)):
-        work.simplify(mesh)
-    links = tuple(work.link(link) for link in model.links)
-    contents = {Path(name): data for name, data in work.names.files.items()}
+        simplifier.simplify(mesh)
+    links = tuple(simplifier.link(link) for link in model.links)
+    contents = {Path(name): data for name, data in simplifier.names.files.items()}
     return SimplifiedRobot(
         model=replace(model, links=links),
         contents=contents,
         meshes=meshes.with_contents(contents),
-        errors=tuple(work.errors),
-        notes=tuple(work.notes),
+        errors=tuple(simplifier.errors),
+        notes=tuple(simplifier.notes),
     )
 
 
-class _Work:
-    """One walk over the collision meshes of a robot."""
+class _Simplifier:
+    """Simplify the collision meshes of one robot."""
 
-    def __init__(self, meshes: Meshes, how: How, cache: Path | None) -> None:
+    def __init__(self, meshes: Meshes, method: CollisionMethod, cache: Path | None) -> None:
         self._meshes = meshes
-        self._how = how
+        self._method = method
         self._cache = cache
         self._shapes: dict[tuple[Path, tuple[float, float, float]], tuple[Geometry, ...]] = {}
-        # on no disk: what is held is read before what is there
-        self.names = FileNames(f".terrainkit-{how}")
+        # a folder that does not exist, because the contents are in memory
+        self.names = FileNames(f".terrainkit-{method}")
         self.errors: list[VolumeError] = []
         self.notes: list[str] = []
 
     def simplify(self, mesh: MeshFile) -> None:
-        """Find what is to be in the place of a mesh."""
+        """Create the replacement of a mesh."""
         try:
             if has_no_volume(self._meshes, mesh):
                 return
-            shapes, became, volume = self._replacement(mesh)
-            solid = self._meshes.solid_volume(mesh)
+            shapes, replacement, volume = self._replacement(mesh)
+            original = self._meshes.solid_volume(mesh)
         except MeshError:
-            return  # stays as it is, and packing tells why
+            return  # unchanged; export_meshes reports the error
         self._shapes[mesh.path, mesh.scale] = shapes
-        error = VolumeError(mesh=mesh.filename, became=became, solid=solid, treated=volume)
-        self.errors.append(error)
-        change = (
-            "which is not closed, so that its volume is not known"
-            if error.percent is None
-            else f"{error.percent:+.1f} % of its volume"
+        error = VolumeError(
+            mesh=mesh.filename, replacement=replacement, original=original, volume=volume
         )
-        self.notes.append(f"{became} in place of the collision mesh {mesh.filename}: {change}")
+        self.errors.append(error)
+        change = "unknown" if error.percent is None else f"{error.percent:+.1f} %"
+        self.notes.append(
+            f"replaced collision mesh {mesh.filename} by {replacement} (volume {change})"
+        )
 
     def link(self, link: Link) -> Link:
-        """Return a link with what is in the place of its collision meshes."""
+        """Return a link with its collision meshes replaced."""
         found: list[Geometry] = []
         for shape in link.collisions:
             mesh = shape.mesh if shape.shape == "mesh" else None
-            instead = self._shapes.get((mesh.path, mesh.scale)) if mesh is not None else None
-            found += [shape] if instead is None else [_instead(shape, each) for each in instead]
-        return replace(link, collisions=tuple(_named_once(found)))
+            replacements = self._shapes.get((mesh.path, mesh.scale)) if mesh is not None else None
+            found += (
+                [shape]
+                if replacements is None
+                else [_replace_shape(shape, each) for each in replacements]
+            )
+        return replace(link, collisions=tuple(_unique_names(found)))
 
     def _replacement(self, mesh: MeshFile) -> tuple[tuple[Geometry, ...], str, float]:
-        """Return shapes in the frame of a mesh, what they are in words, and their volume [m3]."""
-        if self._how == "primitives":
+        """Return the replacement in the frame of a mesh, its description, and its volume [m3]."""
+        if self._method == "primitives":
             return self._primitive(mesh)
-        if self._how == "coacd" and self._is_far_from_convex(mesh):
+        if self._method == "coacd" and self._is_nonconvex(mesh):
             try:
                 return self._parts(mesh)
             except MeshError as error:
-                self.notes.append(f"the collision mesh {mesh.filename} {error}; its hull will do")
-        hull = self._hull(mesh, _HULL_CORNERS)
-        shapes = (self._held(mesh, hull, f"{mesh.path.stem}_hull"),)
-        return shapes, "the hull is", abs(signed_volume(hull))
+                self.notes.append(
+                    f"collision mesh {mesh.filename} {error}; its convex hull is used"
+                )
+        hull = self._hull(mesh, _MAX_HULL_VERTICES)
+        shapes = (self._mesh_in_memory(mesh, hull, f"{mesh.path.stem}_hull"),)
+        return shapes, "its convex hull", abs(signed_volume(hull))
 
     def _primitive(self, mesh: MeshFile) -> tuple[tuple[Geometry, ...], str, float]:
         hull = self._hull(mesh, None)
@@ -186,49 +194,49 @@ class _Work:
         shape = Geometry(
             source=mesh.source, shape=fitted.shape, size=fitted.size, origin=fitted.pose
         )
-        return (shape,), f"a {fitted.shape} is", fitted.volume
+        return (shape,), f"a {fitted.shape}", fitted.volume
 
     def _parts(self, mesh: MeshFile) -> tuple[tuple[Geometry, ...], str, float]:
-        # found as the file has them, and mirrored after, so that left and right parts are alike
+        # decomposed without mirroring, so that left and right parts are mirror images
         x, y, z = map(abs, mesh.scale)
         parts = convex_parts(scaled(self._welded(mesh.path), (x, y, z)), self._cache)
         mirror = tuple(np.sign(mesh.scale).tolist())
         parts = tuple(scaled(part, mirror) for part in parts)
         shapes = tuple(
-            self._held(mesh, part, f"{mesh.path.stem}_part_{k}") for k, part in enumerate(parts, 1)
+            self._mesh_in_memory(mesh, part, f"{mesh.path.stem}_part_{k}")
+            for k, part in enumerate(parts, 1)
         )
-        what = "one convex part is" if len(parts) == 1 else f"{len(parts)} convex parts are"
+        what = count(len(parts), "convex part")
         return shapes, what, sum(abs(signed_volume(part)) for part in parts)
 
-    def _held(self, mesh: MeshFile, surface: Surface, stem: str) -> Geometry:
-        """Return a shape whose mesh is kept in memory."""
-        name = self.names.add(stem, ".stl", binary_stl(surface))
+    def _mesh_in_memory(self, mesh: MeshFile, surface: Surface, name: str) -> Geometry:
+        """Return a mesh geometry whose file is in memory."""
+        name = self.names.add(name, ".stl", binary_stl(surface))
         file = MeshFile(source=mesh.source, filename=name, path=Path(name))
         return Geometry(source=mesh.source, shape="mesh", mesh=file)
 
-    def _hull(self, mesh: MeshFile, most_corners: int | None) -> Surface:
+    def _hull(self, mesh: MeshFile, max_vertices: int | None) -> Surface:
         surface = self._welded(mesh.path)
-        return scaled(convex_hull(surface.points, most_corners), mesh.scale)
+        return scaled(convex_hull(surface.points, max_vertices), mesh.scale)
 
     def _welded(self, path: Path) -> Surface:
         surface = self._meshes.surface(path)
-        if len(surface.faces) > _MOST_WELDED:
-            return welded(decimate(surface, _MOST_WELDED))
+        if len(surface.faces) > _MAX_WELDED_FACES:
+            return welded(decimate(surface, _MAX_WELDED_FACES))
         return self._meshes.welded(path)
 
-    def _is_far_from_convex(self, mesh: MeshFile) -> bool:
-        """Return whether the hull is much larger than what a mesh encloses.
+    def _is_nonconvex(self, mesh: MeshFile) -> bool:
+        """Return whether the volume of the hull is much larger than that of the mesh.
 
-        One that is not closed counts by what its triangles enclose with its middle, which small
-        gaps change little.
+        The volume of an open mesh is computed as if it were closed, which small gaps change little.
         """
         x, y, z = mesh.scale
         enclosed = abs(signed_volume(self._welded(mesh.path)) * x * y * z)
-        return abs(signed_volume(self._hull(mesh, None))) > _FAR_FROM_CONVEX * enclosed
+        return abs(signed_volume(self._hull(mesh, None))) > _MAX_HULL_RATIO * enclosed
 
 
-def _instead(shape: Geometry, other: Geometry) -> Geometry:
-    """Return a shape that is where another is, and collides with what that does."""
+def _replace_shape(shape: Geometry, other: Geometry) -> Geometry:
+    """Return a geometry with another shape at the same place, with the same contact bits."""
     return replace(
         shape,
         shape=other.shape,
@@ -239,8 +247,8 @@ def _instead(shape: Geometry, other: Geometry) -> Geometry:
     )
 
 
-def _named_once(shapes: Iterable[Geometry]) -> Iterable[Geometry]:
-    """Yield shapes of which no two have one name."""
+def _unique_names(shapes: Iterable[Geometry]) -> Iterable[Geometry]:
+    """Yield geometries with unique names."""
     counts: dict[str, int] = {}
     for shape in shapes:
         count = counts[shape.name] = counts.get(shape.name, 0) + 1

@@ -1,26 +1,26 @@
-"""Coarser meshes, for readers that take only so many faces."""
+"""Reduce the number of faces of a mesh."""
 
 from terrainkit_robots.mesh.surface import MeshError, Surface, cluster_vertices
 
-_FINEST = 1024
-"""Cells along the longest side of the first grid that is tried."""
+_MAX_CELLS = 1024
+"""Cells along the longest side of the first grid."""
 
 
-def decimate(surface: Surface, most_faces: int) -> Surface:
-    """Return a surface of at most so many faces; the same one if it has no more.
+def decimate(surface: Surface, max_faces: int) -> Surface:
+    """Return a surface with at most `max_faces` faces, the same surface if it has no more.
 
-    Corners that lie close to each other become one, in ever larger cells of a grid.
+    Vertices in the same grid cell are merged; the cells grow until there are few enough faces.
 
     Raises:
-        MeshError: if nothing is left of it.
+        MeshError: If no triangles are left.
     """
-    cells = _FINEST
-    coarse = surface
-    while len(coarse.faces) > most_faces:
-        coarse = cluster_vertices(surface, cells)
-        # faces grow about as the square of the cells
-        share = most_faces / max(1, len(coarse.faces))
+    cells = _MAX_CELLS
+    result = surface
+    while len(result.faces) > max_faces:
+        result = cluster_vertices(surface, cells)
+        # the number of faces grows about quadratically with the cells
+        share = max_faces / max(1, len(result.faces))
         cells = max(1, int(cells * min(0.9, share**0.5)))
-    if not len(coarse.faces):
-        raise MeshError("has nothing left once its corners are merged")
-    return coarse
+    if not len(result.faces):
+        raise MeshError("has no triangles left after its vertices are merged")
+    return result

@@ -1,18 +1,18 @@
-"""Ellipsoids as meshes, for formats that have none."""
+"""Create meshes of ellipsoids for formats without ellipsoids."""
 
 import numpy as np
 
 from terrainkit_robots.mesh.surface import Surface
 
 _SUBDIVISIONS = 3
-"""Of an icosahedron: 1,280 faces, which reach 99 % of the ellipsoid's volume."""
+"""Subdivisions of an icosahedron: 1,280 faces, with 99 % of the volume of the ellipsoid."""
 
 
 def ellipsoid(radii: tuple[float, ...]) -> Surface:
-    """Return an ellipsoid.
+    """Return the surface of an ellipsoid.
 
     Args:
-        radii: Along x, y and z [m].
+        radii: Radii along x, y and z [m].
     """
     import trimesh
 

@@ -1,53 +1,53 @@
-"""Names of files that are written: safe on every disk and in every format, each content once."""
+"""Choose the names of exported files: valid on every file system, and one per content."""
 
 import hashlib
 import re
 
-_MOST_LETTERS = 80
-"""Longer names are cut: folders of robots are deep, and Windows takes 260 letters in all."""
+_MAX_LENGTH = 80
+"""Maximum length of a name; paths on Windows have at most 260 characters."""
 
-_DEVICES = re.compile(r"(?:con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)
-"""Windows takes these for devices, whatever their suffix."""
+_DEVICE_NAMES = re.compile(r"(?:con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)
+"""Device names on Windows, with any suffix."""
 
 
 class FileNames:
-    """Files of one folder, by name."""
+    """Files of a folder by name."""
 
     def __init__(self, folder: str) -> None:
-        """Start with nothing; `folder` goes before each name, with a slash."""
+        """Create an empty set of files in `folder`."""
         self._folder = folder
-        self._of_content: dict[tuple[str, bytes], str] = {}
-        self._taken: set[str] = set()
+        self._by_content: dict[tuple[str, bytes], str] = {}
+        self._used_stems: set[str] = set()
         self.files: dict[str, bytes] = {}
-        """Content by name, in the order in which it came."""
+        """Content by name, in the order of insertion."""
 
-    def add(self, wanted: str, suffix: str, data: bytes) -> str:
-        """Return the name of a file with this content, which is a new one or the one it has.
+    def add(self, stem: str, suffix: str, data: bytes) -> str:
+        """Add a file, and return its name; equal content shares one file.
 
-        Names differ before their suffix, and not only in capitals: MuJoCo goes by the one, many
-        disks by the other.
+        Names differ before their suffix and in more than letter case, because MuJoCo ignores the
+        suffix and many file systems ignore case.
 
         Args:
-            wanted: What to call it, without suffix; it may be anything.
-            suffix: With its dot.
+            stem: Preferred name without suffix, with any characters.
+            suffix: Suffix with its dot.
             data: Content.
         """
         key = suffix, hashlib.sha256(data).digest()
-        if key not in self._of_content:
-            name = f"{self._folder}/{self._free(_plain(wanted))}{suffix}"
-            self._of_content[key] = name
+        if key not in self._by_content:
+            name = f"{self._folder}/{self._unused_stem(_sanitize(stem))}{suffix}"
+            self._by_content[key] = name
             self.files[name] = data
-        return self._of_content[key]
+        return self._by_content[key]
 
-    def _free(self, stem: str) -> str:
+    def _unused_stem(self, stem: str) -> str:
         free, number = stem, 1
-        while free.lower() in self._taken:
+        while free.lower() in self._used_stems:
             number += 1
             free = f"{stem}_{number}"
-        self._taken.add(free.lower())
+        self._used_stems.add(free.lower())
         return free
 
 
-def _plain(name: str) -> str:
-    plain = re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_-")[:_MOST_LETTERS] or "mesh"
-    return f"{plain}_mesh" if _DEVICES.fullmatch(plain) else plain
+def _sanitize(name: str) -> str:
+    plain = re.sub(r"[^A-Za-z0-9_-]+", "_", name).strip("_-")[:_MAX_LENGTH] or "mesh"
+    return f"{plain}_mesh" if _DEVICE_NAMES.fullmatch(plain) else plain

@@ -1,4 +1,4 @@
-"""Mesh files as every reader takes them: binary STL, right side out, of a bounded size."""
+"""Convert mesh files to binary STL that all simulators accept."""
 
 from dataclasses import dataclass
 
@@ -9,38 +9,36 @@ from terrainkit_robots.export.mesh_export.decimate import decimate
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.mesh.surface import MeshError, Surface, binary_stl, is_flat
 
-MOST_FACES = 200_000
-"""MuJoCo refuses an STL with more."""
+MAX_FACES = 200_000
+"""Maximum number of faces of an STL in MuJoCo."""
 
-_SMALLEST = 1e-15
-"""MuJoCo refuses a mesh that encloses less than its mjMINVAL [m3]."""
+_MIN_VOLUME = 1e-15
+"""MuJoCo rejects meshes with a volume below its mjMINVAL [m3]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeshBytes:
-    """What the file of a mesh is to hold."""
+    """Content of an exported mesh file."""
 
     data: bytes
-    """A binary STL."""
+    """Binary STL."""
 
     scale: tuple[float, float, float]
-    """Factor on each axis that is left to the reader; none below zero."""
+    """Scale that the robot file still has to apply, without negative factors."""
 
     note: str = ""
-    """What became of it that is worth telling, as a sentence without a subject; empty if nothing
-    that anybody would see."""
+    """Visible change of the mesh, as a sentence without its subject; empty if there is none."""
 
 
 def mesh_bytes(meshes: Meshes, mesh: MeshFile) -> MeshBytes:
-    """Return the content of a file that stands for a mesh.
+    """Convert a mesh file to binary STL.
 
-    A sound binary STL stays as it is, byte for byte. Everything else becomes one: COLLADA and
-    others because few read them, OBJ because readers differ in which they take (MuJoCo 4.0 stops
-    at some that name normals, or name them for some faces only), and what is mirrored by a negative
-    scale because they differ in which side of it is out.
+    A valid binary STL is copied byte for byte. Other files are converted: few simulators read
+    COLLADA, simulators differ in the OBJ files that they accept (MuJoCo 4.0 rejects some with
+    normals), and in which side of a mirrored mesh is outside.
 
     Raises:
-        MeshError: if it cannot be read, or has no volume.
+        MeshError: If the mesh cannot be read, or has no volume.
     """
     if has_no_volume(meshes, mesh):
         raise MeshError("is flat")
@@ -48,13 +46,13 @@ def mesh_bytes(meshes: Meshes, mesh: MeshFile) -> MeshBytes:
     header = meshes.header(mesh.path)
     mirrored = min(mesh.scale) < 0
     note = ""
-    if len(surface.faces) > MOST_FACES:
+    if len(surface.faces) > MAX_FACES:
         before = len(surface.faces)
-        surface = decimate(surface, MOST_FACES)
-        note = f"was simplified from {before:,} to {len(surface.faces):,} faces"
+        surface = decimate(surface, MAX_FACES)
+        note = f"was decimated from {before:,} to {len(surface.faces):,} faces"
     elif header.format == "stl" and not mirrored:
         data = meshes.data(mesh.path)
-        if not data.startswith(b"solid"):  # which some readers take for an STL of text
+        if not data.startswith(b"solid"):  # some readers take it for an ASCII STL
             return MeshBytes(data=data, scale=mesh.scale)
     if mirrored:
         data = binary_stl(scaled(surface, mesh.scale))
@@ -63,22 +61,22 @@ def mesh_bytes(meshes: Meshes, mesh: MeshFile) -> MeshBytes:
 
 
 def has_no_volume(meshes: Meshes, mesh: MeshFile) -> bool:
-    """Return whether a mesh, scaled, is flat, or so small that MuJoCo takes it for flat.
+    """Return whether the scaled mesh is flat, or its volume is too small for MuJoCo.
 
     Raises:
-        MeshError: if it cannot be read.
+        MeshError: If the mesh cannot be read.
     """
-    # only corners of triangles count: files have others that nothing is made of
+    # unused vertices do not count
     corners = meshes.vertices(mesh)[meshes.surface(mesh.path).faces]
     if is_flat(corners.reshape(-1, 3)):
         return True
     corners = corners - corners.mean(axis=(0, 1))
     cross = np.cross(corners[:, 1], corners[:, 2])
-    return float(np.abs(np.einsum("ij,ij->i", corners[:, 0], cross)).sum()) / 6 < _SMALLEST
+    return float(np.abs(np.einsum("ij,ij->i", corners[:, 0], cross)).sum()) / 6 < _MIN_VOLUME
 
 
 def scaled(surface: Surface, scale: tuple[float, float, float]) -> Surface:
-    """Return a surface with a scale applied, outside out whether that mirrors it or not."""
+    """Return a scaled surface whose faces point outward even if the scale mirrors it."""
     faces = surface.faces
     if scale[0] * scale[1] * scale[2] < 0:
         faces = faces[:, ::-1]

@@ -1,8 +1,7 @@
-"""Packing: a robot with copies of its mesh files, named relative to where it will be written.
+"""Export the mesh files of a robot as binary STL, named relative to the robot file.
 
-What a reader would refuse is left out and told: simulators stop at the first mesh that is missing
-or flat. A collision mesh is never left out in silence's stead: one that cannot be read is an error,
-and one that is flat becomes the thin box that it looks like.
+Simulators stop at missing or flat meshes. Such visual meshes are removed with a note. An unreadable
+collision mesh is an error, and a flat one is replaced by a thin box.
 """
 
 from collections.abc import Iterator, Mapping
@@ -22,88 +21,88 @@ from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes
 from terrainkit_robots.mesh.surface import binary_stl
 from terrainkit_robots.transforms import Matrix
 
-_THIN = 0.001
-"""Thickness of the box that stands for a flat mesh [m]: about that of the sheets that are drawn so,
-and enough for simulators that step by 5 ms to keep a foot on it."""
+_MIN_THICKNESS = 0.001
+"""Thickness of the box that replaces a flat mesh [m]. Simulators with a time step of 5 ms detect
+contacts with it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RobotWithMeshes:
-    """A robot with its mesh files."""
+    """A robot with its exported mesh files."""
 
     model: RobotModel
-    """The robot; names and paths of its meshes are keys of `files`. An ellipsoid has a mesh as
-    well, for formats that have no such shape."""
+    """The robot; its mesh paths are keys of `files`. Ellipsoids have a mesh for formats without
+    them."""
 
     files: Mapping[str, bytes]
     """Content of each mesh file, a binary STL, by its name with slashes."""
 
     notes: tuple[str, ...] = ()
-    """What was left out or changed, a sentence each."""
+    """What was removed or changed, one sentence each."""
 
 
 def export_meshes(model: RobotModel, meshes: Meshes, *, folder: str = "meshes") -> RobotWithMeshes:
-    """Return a robot with copies of its mesh files.
+    """Export the mesh files of a robot.
 
     Args:
         model: The robot.
         meshes: Its mesh files.
-        folder: What to put before the name of each file, with a slash.
+        folder: Folder of the exported files, relative to the robot file.
 
     Raises:
-        RobotFileError: if a collision mesh is missing or cannot be read.
+        RobotFileError: If a collision mesh is missing or cannot be read.
     """
-    packing = _Packing(model, meshes, folder)
-    links = tuple(packing.link(link) for link in model.links)
+    exporter = _MeshExporter(model, meshes, folder)
+    links = tuple(exporter.link(link) for link in model.links)
     return RobotWithMeshes(
         model=replace(model, links=links),
-        files=packing.names.files,
-        notes=tuple(packing.notes),
+        files=exporter.names.files,
+        notes=tuple(exporter.notes),
     )
 
 
-class _Packing:
-    """One walk over the shapes of a robot; files and notes are gathered on the way."""
+class _MeshExporter:
+    """Export the meshes of one robot, and collect files and notes."""
 
     def __init__(self, model: RobotModel, meshes: Meshes, folder: str) -> None:
         self._model = model
         self._meshes = meshes
-        self._done: dict[tuple[Path, tuple[float, float, float]], MeshBytes | MeshError] = {}
+        self._converted: dict[tuple[Path, tuple[float, float, float]], MeshBytes | MeshError] = {}
         self.names = FileNames(folder)
         self.notes: dict[str, None] = {}
 
     def link(self, link: Link) -> Link:
-        """Return a link with the shapes that can be written."""
+        """Return a link with the geometry that can be exported."""
         return replace(
             link,
-            collisions=tuple(self._shapes(link, link.collisions, collides=True)),
-            visuals=tuple(self._shapes(link, link.visuals, collides=False)),
+            collisions=tuple(self._shapes(link, link.collisions, is_collision=True)),
+            visuals=tuple(self._shapes(link, link.visuals, is_collision=False)),
         )
 
     def _shapes(
-        self, link: Link, shapes: tuple[Geometry, ...], *, collides: bool
+        self, link: Link, shapes: tuple[Geometry, ...], *, is_collision: bool
     ) -> Iterator[Geometry]:
         for shape in shapes:
             if shape.shape == "mesh" and shape.mesh is not None:
-                packed = self._mesh(link, shape, shape.mesh, collides=collides)
+                exported = self._mesh(link, shape, shape.mesh, is_collision=is_collision)
             else:
-                packed = self._primitive(link, shape)
-            if packed is not None:
-                yield packed
+                exported = self._primitive(link, shape)
+            if exported is not None:
+                yield exported
 
-    def _tell(self, note: str) -> None:
-        self.notes[note] = None  # each once, in order
+    def _add_note(self, note: str) -> None:
+        self.notes[note] = None  # unique, in order
 
     def _primitive(self, link: Link, shape: Geometry) -> Geometry | None:
         if not has_bounds(shape, self._meshes) or min(shape.size[:1]) <= 0:
-            what = "shape without a size" if shape.shape == "unknown" else shape.shape
-            self._tell(f"left out a {what} of {link.name}: it has no extent that can be written")
+            what = "geometry of unknown shape" if shape.shape == "unknown" else shape.shape
+            self._add_note(f"removed a {what} of {link.name}: it has no valid size")
             return None
         if shape.shape == "capsule" and shape.size[1] == 0:
             return replace(shape, shape="sphere", size=shape.size[:1])
         if min(shape.size) <= 0:
             sizes = " ".join(f"{size:g}" for size in shape.size)
-            self._tell(f"left out a {shape.shape} of {link.name}: its size is {sizes}")
+            self._add_note(f"removed a {shape.shape} of {link.name}: its size is {sizes}")
             return None
         if shape.shape != "ellipsoid":
             return replace(shape, mesh=None)
@@ -113,57 +112,60 @@ class _Packing:
         return replace(shape, mesh=mesh)
 
     def _mesh(
-        self, link: Link, shape: Geometry, mesh: MeshFile, *, collides: bool
+        self, link: Link, shape: Geometry, mesh: MeshFile, *, is_collision: bool
     ) -> Geometry | None:
         file = Path(mesh.filename.replace("\\", "/")).name or mesh.filename
         try:
             content = self._content(mesh)
         except MeshError as error:
-            if collides and not self._is_flat(mesh):
+            if is_collision and not self._is_flat(mesh):
                 raise RobotFileError(
-                    f"{self._model.file}: collision mesh {mesh.filename} of {link.name} {error}; "
-                    "wanted a mesh that can be read"
+                    f"{self._model.file}: collision mesh {mesh.filename} of {link.name} {error}"
                 ) from None
-            if collides:
-                return self._sheet(link, shape, mesh, file)
-            self._tell(f"left out the visual mesh {file} of {link.name}: it {error}")
+            if is_collision:
+                return self._box_of_flat_mesh(link, shape, mesh, file)
+            self._add_note(f"removed the visual mesh {file} of {link.name}: it {error}")
             return None
         if content.note:
-            self._tell(f"the mesh {file} {content.note}")
+            self._add_note(f"mesh {file} {content.note}")
         if shape.fit_to_mesh:
-            self._tell(
-                f"{link.name} collides with the mesh {file}, to which MuJoCo fitted a primitive"
+            self._add_note(
+                f"{link.name} collides with mesh {file} instead of MuJoCo's fitted primitive"
             )
         name = self.names.add(mesh.path.stem, ".stl", content.data)
-        own = replace(mesh, filename=name, path=Path(name), found_by="path", scale=content.scale)
-        return replace(shape, mesh=own, fit_to_mesh=False)
+        new_mesh = replace(
+            mesh, filename=name, path=Path(name), found_by="path", scale=content.scale
+        )
+        return replace(shape, mesh=new_mesh, fit_to_mesh=False)
 
     def _content(self, mesh: MeshFile) -> MeshBytes:
         key = mesh.path, mesh.scale
-        if key not in self._done:
+        if key not in self._converted:
             try:
-                self._done[key] = mesh_bytes(self._meshes, mesh)
+                self._converted[key] = mesh_bytes(self._meshes, mesh)
             except MeshError as error:
-                self._done[key] = error
-        done = self._done[key]
-        if isinstance(done, MeshError):
-            raise MeshError(*done.args)
-        return done
+                self._converted[key] = error
+        result = self._converted[key]
+        if isinstance(result, MeshError):
+            raise MeshError(*result.args)
+        return result
 
     def _is_flat(self, mesh: MeshFile) -> bool:
         return self._meshes.is_readable(mesh) and has_no_volume(self._meshes, mesh)
 
-    def _sheet(self, link: Link, shape: Geometry, mesh: MeshFile, file: str) -> Geometry | None:
-        """Return a thin box in the place of a flat mesh; none in that of a line or a point."""
+    def _box_of_flat_mesh(
+        self, link: Link, shape: Geometry, mesh: MeshFile, file: str
+    ) -> Geometry | None:
+        """Return a thin box in place of a flat mesh; None for a line or a point."""
         pose, half = oriented_box(self._meshes.vertices(mesh))
-        if np.sort(half)[1] < _THIN / 2:
-            self._tell(f"left out the collision mesh {file} of {link.name}: it has no surface")
+        if np.sort(half)[1] < _MIN_THICKNESS / 2:
+            self._add_note(f"removed the collision mesh {file} of {link.name}: it has no surface")
             return None
-        self._tell(
-            f"the collision mesh {file} of {link.name} is flat; a box {1000 * _THIN:g} mm thick is "
-            "in its place"
+        self._add_note(
+            f"replaced the flat collision mesh {file} of {link.name} by a box of "
+            f"{1000 * _MIN_THICKNESS:g} mm thickness"
         )
-        size = np.maximum(half, _THIN / 2)
+        size = np.maximum(half, _MIN_THICKNESS / 2)
         return _box(shape, pose, size)
 
 

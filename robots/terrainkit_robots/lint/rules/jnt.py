@@ -18,7 +18,7 @@ from terrainkit_robots.lint.rules.inr import (
     implausible_density,
     negative_mass,
 )
-from terrainkit_robots.text import closest, count, names, short
+from terrainkit_robots.text import closest, count, names, truncate
 from terrainkit_robots.transforms import Matrix
 
 _MIN_AXIS_LENGTH = 1e-6
@@ -88,7 +88,7 @@ def unknown_joint_type(robot: Facts) -> Iterator[Violation]:
             yield Violation(
                 subject=joint.name,
                 source=joint.source,
-                message=f"type of joint {joint.name}: got {short(joint.kind, 40)!r}"
+                message=f"type of joint {joint.name}: got {truncate(joint.kind, 40)!r}"
                 f"{f' (did you mean {near}?)' if near else ''}; expected one of "
                 f"{', '.join(sorted(known))}",
             )

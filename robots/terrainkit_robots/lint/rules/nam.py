@@ -10,7 +10,7 @@ from functools import cached_property
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint, Link
 from terrainkit_robots.lint.rule import Violation, rule
-from terrainkit_robots.text import names, short
+from terrainkit_robots.text import names, truncate
 
 _MIN_PAIRS = 4
 """Minimum number of mirrored pairs from which a naming pattern is derived."""
@@ -279,7 +279,8 @@ def invalid_name(robot: Facts) -> Iterator[Violation]:
             subject=first.name,
             source=first.source,
             message=f"{count} with other characters than letters, digits and underscores: "
-            f"{names(renamed)}; USD renames {short(first.name)} to {short(_valid(first.name))}",
+            f"{names(renamed)}; USD renames {truncate(first.name)} to "
+            f"{truncate(_valid(first.name))}",
             measured={"names": len(renamed)},
         )
 
@@ -302,7 +303,7 @@ def _conflict_violation(kind: str, valid: str, same: Sequence[Link | Joint]) -> 
         subject=same[1].name,
         source=same[1].source,
         message=f"names of {kind} {names(item.name for item in same)}: USD renames all of them to "
-        f"{short(valid)}; expected names that stay different",
+        f"{truncate(valid)}; expected names that stay different",
         severity="error",
         measured={"names": len(same)},
     )
@@ -373,7 +374,7 @@ def _other_matches(robot: Facts) -> Iterator[str]:
     matches = [name for name in links if "base" in name]
     extra = [name for name in matches if name not in trunk]
     if not matches:
-        yield f"'base' matches no link; the trunk is {short(robot.bodies[0].top.name)}"
+        yield f"'base' matches no link; the trunk is {truncate(robot.bodies[0].top.name)}"
     elif extra:
         yield f"'base' also matches {names(extra)}, not part of the trunk"
     for word in _LEG_WORDS:

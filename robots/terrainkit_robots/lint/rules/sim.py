@@ -20,7 +20,7 @@ from terrainkit_robots.analysis.simulator_conventions.joint_order import (
     SimulatorOrder,
 )
 from terrainkit_robots.lint.rule import Violation, rule
-from terrainkit_robots.text import names, short
+from terrainkit_robots.text import names, truncate
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.simulator_conventions.loading import LoadError
@@ -253,6 +253,6 @@ def _load_failure(robot: Facts, loader: str, refusal: "LoadError", code: str) ->
     return Violation(
         subject=refusal.element if source is not None else robot.model.title,
         source=source or robot.model.source,
-        message=f"{loader} cannot load the file: {short(refusal.message, 200)}{element}",
+        message=f"{loader} cannot load the file: {truncate(refusal.message, 200)}{element}",
         hint=f"See rule {code}." if code else "",
     )

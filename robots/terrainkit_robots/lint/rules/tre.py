@@ -8,7 +8,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.fix import Fix, InsertChild
 from terrainkit_robots.description.model import Joint, Link
 from terrainkit_robots.lint.rule import Violation, get_rule, rule
-from terrainkit_robots.text import closest, names, short
+from terrainkit_robots.text import closest, names, truncate
 
 _MAX_SUGGESTIONS = 20
 """Maximum number of unknown names for which a similar name is suggested. Generated files may have
@@ -61,7 +61,7 @@ def duplicate_name(robot: Facts) -> Iterator[Violation]:
             yield Violation(
                 subject=name,
                 source=same[1].source,
-                message=f"name {short(name)}: used by {len(same)} {what}, on lines {lines}; "
+                message=f"name {truncate(name)}: used by {len(same)} {what}, on lines {lines}; "
                 "expected unique names",
                 measured={"count": len(same)},
             )
@@ -93,8 +93,8 @@ def unknown_link(robot: Facts) -> Iterator[Violation]:
         yield Violation(
             subject=uses[0][1].name,
             source=uses[0][1].source,
-            message=f"link {short(name)}: does not exist, but is the {joints}; expected a link in "
-            "the file",
+            message=f"link {truncate(name)}: does not exist, but is the {joints}; expected a "
+            "link in the file",
             hint=_suggestion(robot, name) if index < _MAX_SUGGESTIONS else "",
         )
 
@@ -130,7 +130,7 @@ def multiple_parents(robot: Facts) -> Iterator[Violation]:
         yield Violation(
             subject=child,
             source=joints[0].source,
-            message=f"link {short(child)}: child of {len(joints) + 1} joints ({listed}); "
+            message=f"link {truncate(child)}: child of {len(joints) + 1} joints ({listed}); "
             "expected 1",
             measured={"joints": len(joints) + 1},
         )
@@ -185,8 +185,8 @@ def multiple_roots(robot: Facts) -> Iterator[Violation]:
         yield Violation(
             subject=name,
             source=robot.tree.links[name].source,
-            message=f"link {short(name)}: has no parent joint, in addition to the root link "
-            f"{short(root)}; expected 1 root",
+            message=f"link {truncate(name)}: has no parent joint, in addition to the root link "
+            f"{truncate(root)}; expected 1 root",
         )
 
 
@@ -313,9 +313,9 @@ def inner_floating_joint(robot: Facts) -> Iterator[Violation]:
             yield Violation(
                 subject=joint.name,
                 source=joint.source,
-                message=f"type of joint {short(joint.name)} between links {short(joint.parent)} "
-                f"and {short(joint.child)}: got {joint.kind}; expected fixed, revolute, continuous "
-                "or prismatic",
+                message=f"type of joint {truncate(joint.name)} between links "
+                f"{truncate(joint.parent)} and {truncate(joint.child)}: got {joint.kind}; expected "
+                "fixed, revolute, continuous or prismatic",
             )
 
 
@@ -360,8 +360,8 @@ def dummy_root(robot: Facts) -> Iterator[Violation]:
     yield Violation(
         subject=root.name,
         source=root.source,
-        message=f"root link {short(root.name)}: has no mass and no collision shape; the trunk is "
-        f"{short(trunk)}, attached by the fixed joint {short(joint.name)}"
+        message=f"root link {truncate(root.name)}: has no mass and no collision shape; the trunk "
+        f"is {truncate(trunk)}, attached by the fixed joint {truncate(joint.name)}"
         + (", which welds it to the world; expected a floating joint" if is_welded else ""),
         severity="warning" if is_welded else None,
     )

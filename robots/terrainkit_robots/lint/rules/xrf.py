@@ -19,7 +19,7 @@ from terrainkit_robots.lint.compare.body_masses import (
     relative_difference,
 )
 from terrainkit_robots.lint.rule import Severity, Violation, rule
-from terrainkit_robots.text import count, names, short
+from terrainkit_robots.text import count, names, truncate
 from terrainkit_robots.transforms import Matrix
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def _robot_pairs(robot: Facts) -> "RobotPairs":
     pairs = _pair_robots(robot)
     if pairs is None:
         empty = robot if not robot.links else _other(robot)
-        raise CannotCheckError(f"{short(empty.model.file.name)} has no links")
+        raise CannotCheckError(f"{truncate(empty.model.file.name)} has no links")
     return pairs
 
 
@@ -92,7 +92,7 @@ def _other_name(robot: Facts) -> str:
     """Return the name of the other file, with its folder if both files have the same name."""
     other = _other(robot).model.file
     same = other.name == robot.model.file.name
-    return short(str(Path(*other.parts[-2:])) if same else other.name)
+    return truncate(str(Path(*other.parts[-2:])) if same else other.name)
 
 
 def _joint_name(one: Joint, other: Joint) -> str:
@@ -202,7 +202,7 @@ def _mimic_difference(robot: Facts, one: Joint, other: Joint) -> tuple[str, str,
     if ours is None and theirs is None:
         return "", "", None
     if ours is None or theirs is None:
-        texts = [f"a mimic of {short(m.joint)}" if m else "none" for m in (ours, theirs)]
+        texts = [f"a mimic of {truncate(m.joint)}" if m else "none" for m in (ours, theirs)]
         return "mimic", f"{texts[0]} here and {texts[1]} there; expected the same", "warning"
     partner = dict(_robot_pairs(robot).joint_names.pairs)
     same = partner.get(ours.joint, ours.joint) == theirs.joint
@@ -214,7 +214,7 @@ def _mimic_difference(robot: Facts, one: Joint, other: Joint) -> tuple[str, str,
 
 
 def _format_mimic(mimic: Mimic) -> str:
-    return f"{mimic.multiplier:.4g} x {short(mimic.joint)} + {mimic.offset:.4g}"
+    return f"{mimic.multiplier:.4g} x {truncate(mimic.joint)} + {mimic.offset:.4g}"
 
 
 def _axis_angle(robot: Facts, one: Joint, other: Joint) -> float:
@@ -365,7 +365,7 @@ def compare_joint_order(robot: Facts) -> Iterator[Violation]:
         subject=robot.model.title,
         source=robot.model.source,
         message=f"order of the {f'{len(pairs)} common ' if subset else ''}joints: got "
-        f"{names(ours, most=4)} here and {names(theirs, most=4)} in {there}; "
+        f"{names(ours, max_count=4)} here and {names(theirs, max_count=4)} in {there}; "
         f"{_format_order('theirs', 'ours', indices)}",
         measured={"permutation": str(indices), "back": str(_inverse(indices))},
     )
@@ -430,7 +430,7 @@ def _actuator_difference(robot: Facts) -> str:
         return ""
     return (
         f"{_format_order('ctrl', 'joints', indices)}, where joints has the order "
-        f"{names(joints, most=4)} and ctrl the order {names(actuated, most=4)}"
+        f"{names(joints, max_count=4)} and ctrl the order {names(actuated, max_count=4)}"
     )
 
 
@@ -508,13 +508,13 @@ def compare_total_mass(robot: Facts) -> Iterator[Violation]:
     a, b = robot.total_mass, other.total_mass
     for each, mass in ((robot, a), (other, b)):
         if math.isnan(mass):
-            file = short(each.model.file.name)
+            file = truncate(each.model.file.name)
             raise CannotCheckError(f"masses of {file} are computed from mesh files")
     difference = relative_difference(a, b)
     if difference > _MAX_MASS_DIFFERENCE:
         bodies = sorted(pairs.bodies, key=lambda pair: -abs(pair[0].mass - pair[1].mass))
         causes = [
-            f"{short(one.name)} {one.mass:.4g} and {two.mass:.4g} kg"
+            f"{truncate(one.name)} {one.mass:.4g} and {two.mass:.4g} kg"
             for one, two in bodies[:_MAX_LISTED_BODIES]
             if relative_difference(one.mass, two.mass) > _MAX_MASS_DIFFERENCE
         ]
@@ -536,13 +536,13 @@ def _missing_mass(robot: Facts, other: Facts) -> Iterator[Violation]:
         floating = any(joint.kind == "floating" for joint in mjcf.model.joints)
         dropped = dropped_mass(urdf) if mjcf.model.kind == "mjcf" and floating else 0.0
         if dropped > _MAX_MASS_DIFFERENCE * urdf.total_mass:
-            root, file = urdf.bodies[0].top.name, short(urdf.model.file.name)
+            root, file = urdf.bodies[0].top.name, truncate(urdf.model.file.name)
             yield Violation(
                 subject=root,
                 source=robot.model.source,
                 severity="info",
                 message=f"mass that MuJoCo drops when it loads {file}: got {dropped:.5g} of "
-                f"{urdf.total_mass:.5g} kg; expected 0 kg, as for {short(mjcf.model.file.name)} "
+                f"{urdf.total_mass:.5g} kg; expected 0 kg, as for {truncate(mjcf.model.file.name)} "
                 f"with {mjcf.total_mass:.5g} kg; the URDF has no floating joint, so that {root} is "
                 "welded to the world with all links fixed to it",
                 hint="Load the MJCF, or add a floating joint above the base of the URDF.",
@@ -639,7 +639,7 @@ def compare_inertia(robot: Facts) -> Iterator[Violation]:
             continue
         if not (has_valid_inertial(one) and has_valid_inertial(two)):
             continue
-        gap, body, message = body_difference(robot, other, pairs, one, two), short(one.name), ""
+        gap, body, message = body_difference(robot, other, pairs, one, two), truncate(one.name), ""
         if gap.mass > _MAX_MASS_DIFFERENCE:
             if not total_differs:  # else reported by XRF007
                 message = (

@@ -8,7 +8,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.rule import Violation, rule
 from terrainkit_robots.spec.per_joint import match_joints
-from terrainkit_robots.text import closest, names, short
+from terrainkit_robots.text import closest, names, truncate
 
 if TYPE_CHECKING:
     from terrainkit_robots.spec.robot_spec import RobotSpec
@@ -50,7 +50,7 @@ def _report(
     """Return a violation at the joint or link of that name, or at the robot."""
     element = _joints_by_name(robot).get(name) or robot.tree.links.get(name)
     return Violation(
-        subject=short(name) or robot.model.title,
+        subject=truncate(name) or robot.model.title,
         source=element.source if element is not None else robot.model.source,
         message=message,
         certainty="likely" if likely else "proven",
@@ -83,10 +83,10 @@ def spec_joints(robot: Facts) -> Iterator[Violation]:
     for name in order:
         if name in actuated:
             continue
-        got = f"{short(name)}, which has no actuator"
+        got = f"{truncate(name)}, which has no actuator"
         if name not in _joints_by_name(robot):
             misspelled.add(closest(name, unlisted, _MIN_SIMILARITY))
-            got = f"{short(name)}, which is not a joint of the robot{_suggest(name, unlisted)}"
+            got = f"{truncate(name)}, which is not a joint of the robot{_suggest(name, unlisted)}"
         yield _report(robot, name, f"joint_order: got {got}")
     missing = [name for name in unlisted if name not in misspelled]
     if missing:
@@ -122,8 +122,9 @@ def spec_joint_order(robot: Facts) -> Iterator[Violation]:
     yield Violation(
         subject=robot.model.title,
         source=robot.model.source,
-        message=f"joint_order[{first}]: got {short(ours[first])}; expected {short(order[first])}, "
-        f"as in the {elements} of {robot.model.file.name}, or of_file = of_spec[{indices}]",
+        message=f"joint_order[{first}]: got {truncate(ours[first])}; expected "
+        f"{truncate(order[first])}, as in the {elements} of {robot.model.file.name}, or "
+        f"of_file = of_spec[{indices}]",
         measured={"moved": sum(index != k for k, index in enumerate(indices))},
     )
 
@@ -146,8 +147,8 @@ def spec_tables(robot: Facts) -> Iterator[Violation]:
     joints = _table_joints(robot)
     for table in (*JOINT_TABLES, "soft_limits"):
         matching = match_joints(getattr(_spec(robot), table), joints)
-        for clash in matching.clashes(table, partial=table == "soft_limits"):
-            yield _report(robot, clash.subject, clash.message)
+        for error in matching.errors(table, partial=table == "soft_limits"):
+            yield _report(robot, error.name, error.message)
 
 
 @rule("XRF013", "spec-feet", "error", needs=("spec", "legs"))
@@ -172,11 +173,10 @@ def spec_feet(robot: Facts) -> Iterator[Violation]:
     for name in feet:
         index = robot.body_of[name].index
         if index not in leg_ends:
-            message = f"feet: got {short(name)}, which is not the end of a leg; {expected}"
+            message = f"feet: got {truncate(name)}, which is not the end of a leg; {expected}"
         elif index in used:
-            message = (
-                f"feet: got {short(used[index])} and {short(name)} of the same leg; {expected}"
-            )
+            pair = f"{truncate(used[index])} and {truncate(name)}"
+            message = f"feet: got {pair} of the same leg; {expected}"
         else:
             used[index] = name
             continue
@@ -217,7 +217,7 @@ def spec_bodies(robot: Facts) -> Iterator[Violation]:
         for name in bodies:
             if name not in robot.body_of:
                 near = _suggest(name, known)
-                message = f"{field}: got {short(name)}, which is not a link of the robot{near}"
+                message = f"{field}: got {truncate(name)}, which is not a link of the robot{near}"
                 yield _report(robot, name, message)
     for field in ("shanks", "thighs"):
         bodies = fields[field]
@@ -229,8 +229,8 @@ def spec_bodies(robot: Facts) -> Iterator[Violation]:
             carried = [other for other in spec.feet if _is_ancestor(robot, name, other)]
             if carried and foot not in carried:
                 message = (
-                    f"{field}: got {short(name)}, the parent of {names(carried)}, at the index of "
-                    f"{short(foot)}; expected the order of feet"
+                    f"{field}: got {truncate(name)}, the parent of {names(carried)}, at the index "
+                    f"of {truncate(foot)}; expected the order of feet"
                 )
                 yield _report(robot, name, message)
 
@@ -264,7 +264,7 @@ def spec_pose(robot: Facts) -> Iterator[Violation]:
         excess = max(limits[0] - position, position - limits[1])
         if excess > _LIMIT_TOLERANCE:
             message = (
-                f"default_pose of {short(name)}: got {position:.4g} {unit}, {excess:.3g} {unit} "
+                f"default_pose of {truncate(name)}: got {position:.4g} {unit}, {excess:.3g} {unit} "
                 f"outside of the limits; expected {limits[0]:.4g} to {limits[1]:.4g} {unit}"
             )
             limit = limits[1] if position > limits[1] else limits[0]
@@ -302,8 +302,8 @@ def _check_limits(
         limit, unit = limit_of(joints[name]), unit_of(joints[name])
         if limit is not None and limit > 0 and value > _MAX_LIMIT_RATIO * limit:
             message = (
-                f"{table} of {short(name)}: got {value:.4g} {unit}, {value / limit:.3g} times the "
-                f"limit of {robot.model.file.name}; expected at most {limit:.4g} {unit}"
+                f"{table} of {truncate(name)}: got {value:.4g} {unit}, {value / limit:.3g} times "
+                f"the limit of {robot.model.file.name}; expected at most {limit:.4g} {unit}"
             )
             yield _report(robot, name, message, {table: value, "declared": limit})
 
@@ -327,20 +327,22 @@ def spec_mirror(robot: Facts) -> Iterator[Violation]:
         unknown = next((each for each in (name, image.joint) if each not in known), None)
         back = mirror.get(image.joint)
         own = expected.get(name)
-        got = f"{short(image.joint)} with sign {image.sign:+d}"
+        got = f"{truncate(image.joint)} with sign {image.sign:+d}"
         if unknown is not None:
-            message = f"mirror: got {short(unknown)}, which is not an actuated joint"
+            message = f"mirror: got {truncate(unknown)}, which is not an actuated joint"
             yield _report(robot, unknown, message + _suggest(unknown, known))
         elif back is None or back.joint != name or back.sign != image.sign:
-            text = "no entry" if back is None else f"{short(back.joint)} with sign {back.sign:+d}"
+            text = (
+                "no entry" if back is None else f"{truncate(back.joint)} with sign {back.sign:+d}"
+            )
             message = (
-                f"mirror of {short(name)}: got {got}, but {text} for {short(image.joint)}; "
+                f"mirror of {truncate(name)}: got {got}, but {text} for {truncate(image.joint)}; "
                 "expected both to agree"
             )
             yield _report(robot, name, message)
         elif own is not None and own.joint == image.joint and own.sign != image.sign:
             message = (
-                f"mirror of {short(name)}: got {got}; expected sign {own.sign:+d}, as their axes "
-                "require"
+                f"mirror of {truncate(name)}: got {got}; expected sign {own.sign:+d}, as their "
+                "axes require"
             )
             yield _report(robot, name, message)

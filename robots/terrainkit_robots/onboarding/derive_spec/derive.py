@@ -162,7 +162,10 @@ def _reset_range(facts: Facts, pose: Mapping[str, float]) -> tuple[tuple[float, 
         if low == lowest > _DEFAULT_RESET_RANGE[0] or high == highest < _DEFAULT_RESET_RANGE[1]
     ]
     default = "{:g} to {:g}".format(*_DEFAULT_RESET_RANGE)
-    return inner, f"{default} as in legged_gym, reduced by the limits of {names(bound, most=2)}"
+    return (
+        inner,
+        f"{default} as in legged_gym, reduced by the limits of {names(bound, max_count=2)}",
+    )
 
 
 def _reset_scale(joint: Joint, position: float) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.onboarding.frameworks.source import comment, float_literal
 from terrainkit_robots.spec.per_joint import by_joint, match_joints
 from terrainkit_robots.spec.robot_spec import RobotSpec, unit_of
-from terrainkit_robots.text import short
+from terrainkit_robots.text import truncate
 
 _Value = TypeVar("_Value")
 
@@ -37,7 +37,7 @@ class ConfigRobot:
     @property
     def title(self) -> str:
         """Return the name of the robot for messages."""
-        return short(re.sub(r"[^\w .+-]", "_", self.spec.name).strip() or "the robot", 60)
+        return truncate(re.sub(r"[^\w .+-]", "_", self.spec.name).strip() or "the robot", 60)
 
     @cached_property
     def all_bodies(self) -> tuple[str, ...]:
@@ -94,8 +94,8 @@ class ConfigRobot:
 
     def _match(self, field: str, values: Mapping[str, _Value]) -> dict[str, _Value]:
         matching = match_joints(values, self.spec.joint_order)
-        for clash in matching.clashes(field, partial=True):
-            raise ConfigError(clash.message)
+        for error in matching.errors(field, partial=True):
+            raise ConfigError(error.message)
         return dict(matching.values)
 
     def provenance_comment(

@@ -9,8 +9,8 @@ from terrainkit_robots.export.collision_simplification import decomposition_cach
 from terrainkit_robots.export.collision_simplification.decomposition_cache import (
     DecompositionCache,
     cache_folder,
-    packed,
-    unpacked,
+    from_npz,
+    to_npz,
 )
 from terrainkit_robots.mesh.surface import Surface
 
@@ -66,9 +66,9 @@ def test_a_damaged_file_counts_as_none_and_is_written_anew(tmp_path, damage):
     ],
 )
 def test_parts_that_are_none_count_as_damaged(part):
-    assert unpacked(packed([PART])) is not None
-    assert unpacked(packed([PART, part])) is None
-    assert unpacked(packed([])) is None
+    assert from_npz(to_npz([PART])) is not None
+    assert from_npz(to_npz([PART, part])) is None
+    assert from_npz(to_npz([])) is None
 
 
 def test_nothing_is_unpickled(tmp_path):
@@ -84,7 +84,7 @@ def test_nothing_is_unpickled(tmp_path):
 def test_a_long_file_is_not_read(tmp_path, monkeypatch):
     cache = DecompositionCache(tmp_path)
     cache.put("a", [PART])
-    monkeypatch.setattr(module, "_MOST_BYTES", 10)
+    monkeypatch.setattr(module, "_MAX_BYTES", 10)
     assert cache.get("a") is None
 
 

@@ -85,19 +85,18 @@ class TestHull:
     def test_how_much_larger_it_is(self):
         done = treated("hull", mesh("angle.stl", (1, 2, 1)))
         (error,) = done.errors
-        assert error.solid == pytest.approx(8)
-        assert error.treated == pytest.approx(2 * ANGLE.convex_hull.volume)
+        assert error.original == pytest.approx(8)
+        assert error.volume == pytest.approx(2 * ANGLE.convex_hull.volume)
         assert error.percent == pytest.approx(100 * (ANGLE.convex_hull.volume / 4 - 1))
         assert done.notes == (
-            "the hull is in place of the collision mesh angle.stl: "
-            f"{error.percent:+.1f} % of its volume",
+            f"replaced collision mesh angle.stl by its convex hull (volume {error.percent:+.1f} %)",
         )
 
     def test_of_a_mesh_that_is_not_closed(self):
         done = treated("hull", mesh("open.stl"))
-        assert done.errors[0].solid is None
+        assert done.errors[0].original is None
         assert done.errors[0].percent is None
-        assert "which is not closed" in done.notes[0]
+        assert "(volume unknown)" in done.notes[0]
         assert volumes(done) == pytest.approx([0.006])
 
     def test_scales_are_in_the_corners(self):
@@ -128,9 +127,9 @@ class TestCoacd:
     def test_parts_where_it_is_far_from_convex(self, tmp_path):
         done = treated("coacd", mesh("thin.stl", name="shin"), mesh("angle.stl"), cache=tmp_path)
         thin, angle = done.errors
-        assert thin.became == "2 convex parts are"
+        assert thin.replacement == "2 convex parts"
         assert thin.percent == pytest.approx(0, abs=2)
-        assert angle.became == "the hull is"
+        assert angle.replacement == "its convex hull"
         assert [shape.name for shape in shapes(done)] == ["shin", "shin_2", ""]
         assert sum(volumes(done)[:2]) == pytest.approx(THIN.volume, rel=0.02)
         assert len(list(tmp_path.iterdir())) == 1
@@ -147,12 +146,12 @@ class TestCoacd:
 
     def test_the_hull_where_it_fails_and_that_is_told(self, monkeypatch):
         def fail(*_):
-            raise MeshError("is too much for CoACD: no reason")
+            raise MeshError("makes CoACD fail: no reason")
 
         monkeypatch.setattr(module, "convex_parts", fail)
         done = treated("coacd", mesh("thin.stl"))
-        assert done.errors[0].became == "the hull is"
-        expected = "the collision mesh thin.stl is too much for CoACD: no reason; its hull will do"
+        assert done.errors[0].replacement == "its convex hull"
+        expected = "collision mesh thin.stl makes CoACD fail: no reason; its convex hull is used"
         assert done.notes[0] == expected
 
 
@@ -170,9 +169,9 @@ class TestPrimitives:
         assert done.errors == (
             VolumeError(
                 mesh="box.stl",
-                became="a box is",
-                solid=pytest.approx(0.012),
-                treated=pytest.approx(0.012),
+                replacement="a box",
+                original=pytest.approx(0.012),
+                volume=pytest.approx(0.012),
             ),
         )
         assert done.errors[0].percent == pytest.approx(0, abs=0.01)

@@ -114,13 +114,13 @@ class TestMirroredScale:
 
 class TestTooManyFaces:
     def test_are_made_fewer_and_told(self, monkeypatch):
-        monkeypatch.setattr(module, "MOST_FACES", 1000)
+        monkeypatch.setattr(module, "MAX_FACES", 1000)
         ball = trimesh.creation.icosphere(subdivisions=4, radius=0.1)
         data = binary_stl(Surface(points=ball.vertices, faces=ball.faces))
         packed = content(data, "a.stl", (1, 1, -1))
         surface = read(packed)
         assert len(surface.faces) <= 1000
-        assert packed.note == f"was simplified from 5,120 to {len(surface.faces)} faces"
+        assert packed.note == f"was decimated from 5,120 to {len(surface.faces)} faces"
         assert signed_volume(surface) == pytest.approx(ball.volume, rel=0.05)
 
 

@@ -74,31 +74,31 @@ class TestNames:
 class TestLeftOut:
     def test_a_visual_mesh_that_is_not_there(self):
         done = packed(visuals=[mesh("a.stl"), shape("sphere", 0.1)])
-        assert done.notes == ("left out the visual mesh a.stl of leg: it does not exist",)
+        assert done.notes == ("removed the visual mesh a.stl of leg: it does not exist",)
         assert [each.shape for each in done.model.links[0].visuals] == ["sphere"]
 
     def test_a_flat_visual_mesh(self):
         done = packed(visuals=[mesh("a.stl", (1, 0, 1))] * 2, a__stl=BOX)
-        assert done.notes == ("left out the visual mesh a.stl of leg: it is flat",)
+        assert done.notes == ("removed the visual mesh a.stl of leg: it is flat",)
         assert not done.model.links[0].visuals
         assert not done.files
 
     @pytest.mark.parametrize(
         ("given", "note"),
         [
-            (shape("plane"), "left out a plane of leg: it has no extent that can be written"),
+            (shape("plane"), "removed a plane of leg: it has no valid size"),
             (
                 shape("unknown"),
-                "left out a shape without a size of leg: it has no extent that can be written",
+                "removed a geometry of unknown shape of leg: it has no valid size",
             ),
-            (shape("box", 1, 0, 1), "left out a box of leg: its size is 1 0 1"),
+            (shape("box", 1, 0, 1), "removed a box of leg: its size is 1 0 1"),
             (
                 shape("sphere", -1),
-                "left out a sphere of leg: it has no extent that can be written",
+                "removed a sphere of leg: it has no valid size",
             ),
             (
                 shape("cylinder", float("nan"), 1),
-                "left out a cylinder of leg: it has no extent that can be written",
+                "removed a cylinder of leg: it has no valid size",
             ),
         ],
     )
@@ -110,7 +110,8 @@ class TestLeftOut:
 
 class TestCollisionMeshes:
     @pytest.mark.parametrize(
-        ("data", "reason"), [(None, "does not exist"), (b"", "is empty"), (BOX[:-1], "claims")]
+        ("data", "reason"),
+        [(None, "does not exist"), (b"", "is empty"), (BOX[:-1], "header declares")],
     )
     def test_that_cannot_be_read_are_an_error_of_one_line(self, data, reason):
         contents = {} if data is None else {"a__stl": data}
@@ -128,7 +129,7 @@ class TestCollisionMeshes:
         assert sorted(box.size) == pytest.approx([0.0005, 0.05, 0.1])
         assert box.origin[:3, 3] == pytest.approx([1, 2, 3])
         assert box.mesh is None
-        assert "a box 1 mm thick is in its place" in done.notes[0]
+        assert "by a box of 1 mm thickness" in done.notes[0]
 
     def test_of_which_nothing_is_left_are_left_out(self):
         done = packed(collisions=[mesh("a.stl", (1, 0, 0))], a__stl=BOX)
@@ -138,7 +139,7 @@ class TestCollisionMeshes:
     def test_to_which_mujoco_fits_a_primitive_collide_as_they_are(self):
         done = packed(collisions=[mesh("a.stl", fit_to_mesh=True)], a__stl=BOX)
         assert not done.model.links[0].collisions[0].fit_to_mesh
-        assert "to which MuJoCo fitted a primitive" in done.notes[0]
+        assert "instead of MuJoCo's fitted primitive" in done.notes[0]
 
 
 class TestPrimitives:

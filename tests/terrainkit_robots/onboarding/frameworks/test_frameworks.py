@@ -40,7 +40,7 @@ def test_framework_names_include_added_module(tmp_path, monkeypatch, robots):
 def test_framework_names_are_sorted():
     assert framework_names() == ("genesis", "isaaclab", "legged_gym", "leggedgym_ex", "mjlab")
     assert config_file_name("mjlab") == "mjlab_config.py"
-    with pytest.raises(ConfigError, match="got 'gazebo'; expected genesis, isaaclab, "):
+    with pytest.raises(ConfigError, match="got 'gazebo'; expected: genesis, isaaclab, "):
         config_text("gazebo", None)
     with pytest.raises(ConfigError, match="framework: got"):
         config_file_name("../../evil")
