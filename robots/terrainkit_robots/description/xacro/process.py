@@ -17,8 +17,8 @@ from typing import Any
 from xml.dom import expatbuilder
 from xml.parsers import expat
 
+from terrainkit.text import truncate
 from terrainkit_robots.description.package_resolver import PackageResolver
-from terrainkit_robots.text import truncate
 
 ORIGIN = "terrainkit-origin"
 """Attribute that stores the file and line of an element during the expansion."""
