@@ -53,10 +53,6 @@ class Generate(ConfigCommand):
         check_options(command, arguments)
         return command
 
-    def default_config(self) -> MapConfig:
-        """Return the config of --config, or the default one."""
-        return _load_config(self.config) if self.config else MapConfig()
-
     def run(self) -> int:
         """Generate the map, write it, and print the next commands."""
         from terrainkit import export
