@@ -8,7 +8,7 @@ from terrainkit.errors import ConfigError, TerrainkitWarning
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import Run, changed_robot_files, read_checkpoint
 from terrainkit_robots.rl.runner import OBS_GROUPS, check_checkpoint, network_errors, runner_config
-from terrainkit_robots.rl.scene import SPEC_FILE
+from terrainkit_robots.spec.robot import SPEC_FILE
 
 
 def load_policy(run: Run, env: LeggedEnv) -> MLPModel:

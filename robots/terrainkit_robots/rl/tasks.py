@@ -17,7 +17,7 @@ from terrainkit.errors import ConfigError
 from terrainkit.text import expected_names, truncate
 from terrainkit_robots.description import bundled
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.rl.scene import SPEC_FILE
+from terrainkit_robots.spec.robot import SPEC_FILE
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
 if TYPE_CHECKING:
