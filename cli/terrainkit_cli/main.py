@@ -1,4 +1,4 @@
-"""The entry point: find the command, run it, and turn every expected error into one line."""
+"""The entry point: select the command, run it, and report errors as one line."""
 
 import importlib
 import os
@@ -30,17 +30,19 @@ COMMANDS = {
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line, and return its exit code.
 
-    0: done. 1: a check found something. 2: bad input; one line on stderr says what and why.
+    0: success. 1: a check found errors. 2: invalid input; one line on stderr says what and why.
+    128 + n: ended by signal n.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
-    _rename_env(DRAWING)
+    _open_closed_streams()
+    # With this variable, `import mujoco` fails where its graphics library is missing, although few
+    # commands render. gl_backend.py reads the other name.
+    if "MUJOCO_GL" in os.environ:
+        os.environ["TERRAINKIT_MUJOCO_GL"] = os.environ.pop("MUJOCO_GL")
     warnings.showwarning = render.show_warning
+    _handle_signals()
     from terrainkit.errors import TerrainkitError
 
-    # Temporary files are removed when a scheduler or a closed terminal ends the process.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
-    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
-        signal.signal(signal.SIGHUP, lambda *_: sys.exit(129))
     try:
         code = _run(arguments)
         sys.stdout.flush()
@@ -49,9 +51,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         render.error(str(error))
         return 2
     except MemoryError:
-        render.error("out of memory; a smaller map, or a coarser cell, would do")
+        render.error("out of memory; use a smaller map or larger cells")
         return 2
-    except BrokenPipeError:
+    except BrokenPipeError:  # the reader is gone, as in `terrainkit list | head -1`
         render.drop_stdout()
         return 0
     except OSError as error:
@@ -60,21 +62,40 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt:
         render.error("interrupted")
-        return 130
+        return 128 + signal.SIGINT
+    except Terminated as end:
+        render.error(f"ended by {end.signal.name}")
+        return 128 + end.signal
 
 
-DRAWING = "MUJOCO_GL"
-"""The graphics library that MuJoCo draws with."""
+def _open_closed_streams() -> None:
+    """Open closed standard streams, or the next file that is opened takes their place."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))
 
 
-def _rename_env(name: str) -> None:
-    """Move a variable of the environment out of MuJoCo's sight.
+class Terminated(BaseException):
+    """A scheduler or a closed terminal ends the process; temporary files are removed."""
 
-    MuJoCo asks for the graphics library when it is imported, and fails where there is none, even
-    for work that draws nothing. What draws asks for the other name.
-    """
-    if name in os.environ:
-        os.environ[f"TERRAINKIT_{name}"] = os.environ.pop(name)
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.signal = signal.Signals(number)
+
+
+def _handle_signals() -> None:
+    """Raise Terminated on SIGTERM and SIGHUP."""
+    numbers = [signal.SIGTERM]
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
+        numbers.append(signal.SIGHUP)
+
+    def terminate(number: int, _: object) -> None:
+        for each in numbers:  # a second signal would interrupt the cleanup
+            signal.signal(each, lambda *_: None)
+        raise Terminated(number)
+
+    for number in numbers:
+        signal.signal(number, terminate)
 
 
 def _run(arguments: list[str]) -> int:

@@ -7,7 +7,6 @@ versions), `map.toml` (the config of its map, if any), and `model_<iteration>.pt
 import hashlib
 import io
 import re
-import tempfile
 import zipfile
 from collections import deque
 from collections.abc import Mapping
@@ -19,9 +18,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from terrainkit.atomic_write import atomic_write
+from terrainkit.atomic_write import atomic_write, temporary_folder
 from terrainkit.errors import ConfigError, ExportError, listing
 from terrainkit.text import expected_names
+from terrainkit.text import known_names
 from terrainkit.toml_text import parse_toml, read_text
 from terrainkit_robots.files import open_regular
 from terrainkit_robots.rl import tasks
@@ -150,8 +150,8 @@ def write_run_folder(folder: Path, files: Mapping[str, bytes]) -> None:
                 f"{folder} exists; choose another folder, or continue with --resume {folder}"
             )
         folder.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".terrainkit-", dir=folder.parent) as work:
-            made = Path(work) / folder.name
+        with temporary_folder(folder.parent) as work:
+            made = work / folder.name
             made.mkdir()
             for name, data in files.items():
                 (made / name).write_bytes(data)
