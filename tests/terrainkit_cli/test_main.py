@@ -7,28 +7,28 @@ import pytest
 from terrainkit_cli.main import COMMANDS, command
 
 
-def test_without_a_command_it_lists_them(terrainkit):
+def test_no_command_lists_all_commands(terrainkit):
     run = terrainkit()
     assert run.returncode == 0
     for name in COMMANDS:
         assert f"  {name} " in run.stdout
 
 
-def test_version_is_the_one_installed(terrainkit):
+def test_version_is_that_of_the_package(terrainkit):
     assert (
         terrainkit("--version").stdout == f"terrainkit {importlib.metadata.version('terrainkit')}\n"
     )
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_every_command_has_help_for_every_option(terrainkit, name):
+def test_help_documents_every_option(terrainkit, name):
     run = terrainkit(name, "--help")
     assert run.returncode == 0
     assert command(name).__doc__.partition("\n")[0].split(":")[0] in run.stdout
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (("generat",), "no command 'generat'; did you mean 'generate'? There are: gen"),
         (
@@ -47,7 +47,7 @@ def test_every_command_has_help_for_every_option(terrainkit, name):
         (("generate", "-o", "a.npz", "--rows", -3), "rows: got -3; expected"),
         (("generate", "-o", "a.npz", "--cell", "nan"), "cell: got nan; expected"),
         (("generate", "-o", "a.npz", "--cell", "inf"), "cell: got inf; expected"),
-        (("generate", "-o", "a.npz", "--cell", 0.3), "nearest that are: 7.8 m, 8.1 m"),
+        (("generate", "-o", "a.npz", "--cell", 0.3), "of 0.3 m, such as 7.8 m or 8.1 m"),
         (("generate", "-o", "a.npz", "--patch-size", 2, 2), "does not fit in a patch of 2 m x 2 m"),
         (("generate", "-o", "a.npz", "--patch-size", 8), "Expected 2 values"),
         (("generate", "-o", "a.npz", "--rows", 9**30), "beyond 64 bits"),
@@ -87,32 +87,35 @@ def test_every_command_has_help_for_every_option(terrainkit, name):
             "expected one of them",
         ),
         (("generate", "-o", "a.npz", "--terrain", "pit", "--set", "side=2,side=3"), "side twice"),
-        (("generate", "-o", "a.npz", "--terrain", "slope", "--set", "grade=2"), "would be walls"),
+        (
+            ("generate", "-o", "a.npz", "--terrain", "slope", "--set", "grade=2"),
+            "above which slopes become walls",
+        ),
         (("generate", "-o", "a.npz", "--config", "none.toml"), "cannot read none.toml"),
         (("generate", "-o", "a.abc"), "no format for '.abc' (a.abc); there are: "),
         (("generate", "-o", "a"), "no format for 'a name without suffix'"),
-        (("generate", "-o", "nowhere/a.npz"), "there is no folder nowhere"),
+        (("generate", "-o", "nowhere/a.npz"), "the folder nowhere does not exist"),
         (("generate", "-o", "/proc/a.npz"), "cannot write /proc/a.npz"),
         (("list", "moon"), "no terrain 'moon'; there are: flat, gap"),
         (("info", "none.npz"), "no file none.npz"),
         (("info", "none.npz", "--patch", 3), "Expected 2 values"),
-        (("check-map", "."), "is not a file"),
+        (("check-map", "."), "expected an .npz file"),
         (("preview", "none.npz", "-o", "a.png"), "no file none.npz"),
         (("export", "none.npz", "-o", "a.stl"), "no file none.npz"),
     ],
     ids=lambda value: " ".join(map(str, value))[:60] if isinstance(value, tuple) else "",
 )
-def test_bad_input_is_one_line_and_exit_2_and_writes_nothing(terrainkit, tmp_path, words, said):
+def test_invalid_input_is_one_line_on_stderr(terrainkit, tmp_path, words, message):
     run = terrainkit(*words)
     assert run.returncode == 2
     assert run.stdout == ""
     assert run.stderr.count("\n") == 1
     assert run.stderr.startswith("terrainkit: error: ")
-    assert said in run.stderr
+    assert message in run.stderr
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_reader_that_goes_away_is_no_error():
+def test_closed_stdout_is_not_an_error():
     command = f"{sys.executable} -m terrainkit_cli.main list | head -1; exit ${{PIPESTATUS[0]}}"
     run = subprocess.run(
         ["bash", "-c", command], capture_output=True, text=True, timeout=60, check=False
@@ -121,7 +124,7 @@ def test_a_reader_that_goes_away_is_no_error():
     assert run.stderr == ""
 
 
-def test_a_full_standard_output_is_one_line():
+def test_full_stdout_is_one_line():
     command = f"{sys.executable} -m terrainkit_cli.main list > /dev/full"
     run = subprocess.run(
         ["bash", "-c", command], capture_output=True, text=True, timeout=60, check=False

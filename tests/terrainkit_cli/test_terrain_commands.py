@@ -31,7 +31,7 @@ width = 0.3
 """
 
 
-def test_generate_writes_the_map_and_says_what_to_do_next(terrainkit, tmp_path):
+def test_generate_writes_map_and_prints_next_commands(terrainkit, tmp_path):
     run = terrainkit("generate", "--rows", 3, "--cols", 10, "-o", "map.npz")
     assert run.returncode == 0
     assert run.stderr == ""
@@ -40,7 +40,7 @@ def test_generate_writes_the_map_and_says_what_to_do_next(terrainkit, tmp_path):
     assert tk.TerrainMap.load(tmp_path / "map.npz").config == tk.MapConfig(rows=3)
 
 
-def test_every_option_reaches_the_map(terrainkit, tmp_path):
+def test_generate_options_set_the_config(terrainkit, tmp_path):
     terrainkit(
         *("generate", "-o", "a.npz", "--rows", 2, "--cols", 3, "--patch-size", 8, 4, "--cell", 0.2),
         *("--border", 2, "--terrain", "pit", "--set", "depth=0.1:0.6,side=2", "--seed", 9),
@@ -65,7 +65,7 @@ def test_every_option_reaches_the_map(terrainkit, tmp_path):
     )
 
 
-def test_selected_mode_takes_a_terrain_and_its_parameters(terrainkit, tmp_path):
+def test_generate_mode_selected(terrainkit, tmp_path):
     terrainkit(
         *("generate", "-o", "a.npz", "--rows", 2, "--cols", 2, "--border", 0),
         *("--mode", "selected", "--terrain", "pyramid_slope", "--set", "grade=0.25,inverted=true"),
@@ -75,7 +75,7 @@ def test_selected_mode_takes_a_terrain_and_its_parameters(terrainkit, tmp_path):
     assert terrain_map.env_origins[..., 2] == pytest.approx(-0.625)
 
 
-def test_options_go_before_the_config_file(terrainkit, tmp_path):
+def test_generate_options_override_config_file(terrainkit, tmp_path):
     (tmp_path / "my.toml").write_text(CONFIG)
     terrainkit("generate", "-o", "a.npz", "--config", "my.toml", "--rows", 4)
     terrain_map = tk.TerrainMap.load(tmp_path / "a.npz")
@@ -84,7 +84,7 @@ def test_options_go_before_the_config_file(terrainkit, tmp_path):
     assert terrain_map.terrain_names == ("stairs", "moat")
 
 
-def test_flag_of_the_config_file_can_be_cleared(terrainkit, tmp_path):
+def test_generate_flag_overrides_config_file(terrainkit, tmp_path):
     (tmp_path / "my.toml").write_text(f"centered = true\n{CONFIG}")
     terrainkit("generate", "-o", "a.npz", "--config=my.toml")
     terrainkit("generate", "-o", "b.npz", "--config", "my.toml", "--no-centered")
@@ -92,7 +92,7 @@ def test_flag_of_the_config_file_can_be_cleared(terrainkit, tmp_path):
     assert centered == [True, False]
 
 
-def test_the_config_in_a_map_makes_the_same_bytes_again(terrainkit, tmp_path, small):
+def test_generate_from_map_config_gives_same_bytes(terrainkit, tmp_path, small):
     (tmp_path / "again.toml").write_text(str(np.load(tmp_path / small)["config"]))
     terrainkit("generate", "-o", "again.npz", "--config", "again.toml")
     one, two = (
@@ -101,7 +101,7 @@ def test_the_config_in_a_map_makes_the_same_bytes_again(terrainkit, tmp_path, sm
     assert one == two
 
 
-def test_a_map_is_a_config_too(terrainkit, tmp_path, small):
+def test_generate_config_accepts_a_map(terrainkit, tmp_path, small):
     terrainkit("generate", "-o", "other.npz", "--config", small, "--seed", 8)
     config = tk.TerrainMap.load(tmp_path / small).config
     other = tk.TerrainMap.load(tmp_path / "other.npz").config
@@ -111,7 +111,7 @@ def test_a_map_is_a_config_too(terrainkit, tmp_path, small):
 WIDE_CELLS = ("--rows", 2, "--cell", 1, "--terrain", "pyramid_stairs")
 
 
-def test_cells_too_coarse_for_what_was_asked_are_a_warning(terrainkit):
+def test_generate_warns_of_coarse_cells(terrainkit):
     run = terrainkit("generate", "-o", "a.npz", *WIDE_CELLS)
     assert run.returncode == 0
     assert (
@@ -120,7 +120,7 @@ def test_cells_too_coarse_for_what_was_asked_are_a_warning(terrainkit):
     assert run.stderr.count("\n") == 1
 
 
-def test_ended_by_a_signal_it_leaves_nothing_behind(tmp_path):
+def test_generate_removes_files_after_signal(tmp_path):
     command = [sys.executable, "-m", "terrainkit_cli.main", "generate", "-o", "a.npz"]
     command += ["--rows", "40", "--cols", "40"]
     run = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL)
@@ -132,7 +132,7 @@ def test_ended_by_a_signal_it_leaves_nothing_behind(tmp_path):
 
 
 @pytest.mark.parametrize("line", ["rowz = 3", "rows = 'three'", "preset = 'moon'", "rows ="])
-def test_a_wrong_config_file_is_one_line(terrainkit, tmp_path, line):
+def test_generate_invalid_config_is_one_line(terrainkit, tmp_path, line):
     (tmp_path / "my.toml").write_text(line)
     run = terrainkit("generate", "-o", "a.npz", "--config", "my.toml")
     assert run.returncode == 2
@@ -141,7 +141,7 @@ def test_a_wrong_config_file_is_one_line(terrainkit, tmp_path, line):
     assert not (tmp_path / "a.npz").exists()
 
 
-def test_an_existing_file_stays_unless_told(terrainkit, tmp_path):
+def test_generate_keeps_existing_file(terrainkit, tmp_path):
     (tmp_path / "a.npz").write_text("mine")
     run = terrainkit("generate", "-o", "a.npz", "--rows", 1)
     assert run.returncode == 2
@@ -151,7 +151,7 @@ def test_an_existing_file_stays_unless_told(terrainkit, tmp_path):
     assert tk.TerrainMap.load(tmp_path / "a.npz").config.rows == 1
 
 
-def test_a_terrain_that_a_preset_has_no_column_for_is_a_warning(terrainkit):
+def test_generate_warns_of_preset_without_column(terrainkit):
     run = terrainkit("generate", "-o", "a.npz", "--rows", 1, "--cols", 2, "--preset", "stairs")
     assert run.returncode == 0
     assert run.stderr == (
@@ -160,7 +160,7 @@ def test_a_terrain_that_a_preset_has_no_column_for_is_a_warning(terrainkit):
     )
 
 
-def test_a_full_disk_is_one_line_and_leaves_nothing(tmp_path):
+def test_generate_full_disk_is_one_line(tmp_path):
     limit = "ulimit -f 64; trap '' XFSZ; exec "  # 64 KiB, and an error instead of a signal
     command = f"{sys.executable} -m terrainkit_cli.main generate -o a.npz --rows 1"
     run = subprocess.run(
@@ -176,7 +176,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_long_map_shows_a_bar_on_a_terminal_only(tmp_path):
+def test_generate_progress_bar_needs_terminal(tmp_path):
     import pty
 
     command = [sys.executable, "-m", "terrainkit_cli.main", "generate", "-o", "a.npz"]
@@ -201,12 +201,12 @@ def test_list_names_every_terrain(terrainkit):
         assert any(line.startswith(f"{name} ") for line in lines)
 
 
-def test_list_of_one_shows_its_parameters(terrainkit):
+def test_list_terrain_shows_parameters(terrainkit):
     lines = [line.split() for line in terrainkit("list", "pyramid_stairs").stdout.splitlines()]
     assert ["step_height", "0.05", "0.23", "Rise", "of", "a", "step", "[m]."] in lines
 
 
-def test_info_says_what_the_map_is(terrainkit, small):
+def test_info_describes_the_map(terrainkit, small):
     said = terrainkit("info", small).stdout
     assert "2 x 5 of 8 m x 6 m" in said
     assert "82 x" not in said
@@ -214,7 +214,7 @@ def test_info_says_what_the_map_is(terrainkit, small):
     assert "rough_slope" in said
 
 
-def test_info_of_a_patch_shows_asked_and_built(terrainkit):
+def test_info_patch_shows_requested_and_realized(terrainkit):
     terrainkit("generate", "-o", "a.npz", "--rows", 2, "--cols", 1, "--terrain", "stairs")
     lines = [
         line.split() for line in terrainkit("info", "a.npz", "--patch", 1, 0).stdout.split("\n")
@@ -222,14 +222,14 @@ def test_info_of_a_patch_shows_asked_and_built(terrainkit):
     assert ["step_width", "0.31", "0.3"] in lines
 
 
-def test_info_of_a_patch_that_is_not_there(terrainkit, small):
+def test_info_unknown_patch_is_rejected(terrainkit, small):
     for patch in ((2, 0), (-1, -1)):
         run = terrainkit("info", small, "--patch", *patch)
         assert run.returncode == 2
         assert f"no patch {patch} in a map of 2 rows and 5 columns" in run.stderr
 
 
-def test_preview_is_a_picture_of_the_width_asked(terrainkit, tmp_path, small):
+def test_preview_has_the_given_width(terrainkit, tmp_path, small):
     run = terrainkit("preview", small, "-o", "a.png", "--width", 400)
     assert run.returncode == 0
     picture = cv2.imread(str(tmp_path / "a.png"))
@@ -245,19 +245,19 @@ def test_export_writes_every_format(terrainkit, tmp_path, small, name):
     assert (tmp_path / name).stat().st_size > 1000
 
 
-def test_an_option_of_another_format_is_an_error(terrainkit, small):
+def test_export_rejects_option_of_other_format(terrainkit, small):
     run = terrainkit("export", small, "-o", "a.stl", "--collision", "boxes")
     assert run.returncode == 2
     assert ".stl has no option 'collision'; it has: full, closed, y_up" in run.stderr
 
 
-def test_check_finds_nothing_wrong_with_a_map_of_ours(terrainkit, small):
+def test_check_map_accepts_generated_map(terrainkit, small):
     run = terrainkit("check-map", small)
     assert run.returncode == 0
     assert "no problems found" in run.stdout
 
 
-def test_check_of_a_broken_map_exits_1_with_what_is_wrong(terrainkit, tmp_path, small):
+def test_check_map_reports_issues(terrainkit, tmp_path, small):
     arrays = dict(np.load(tmp_path / small))
     arrays["env_origins"][1, 2, 2] += 0.2
     np.savez(tmp_path / "broken.npz", **arrays)
@@ -267,7 +267,7 @@ def test_check_of_a_broken_map_exits_1_with_what_is_wrong(terrainkit, tmp_path, 
     assert "broken.npz: 1 findings" in run.stdout
 
 
-def test_help_and_generate_import_nothing_heavy(tmp_path):
+def test_generate_avoids_slow_imports(tmp_path):
     code = (
         "import sys; from terrainkit_cli.main import main;"
         f"main(['generate', '-o', {str(Path(tmp_path) / 'a.npz')!r}, '--rows', '1']);"

@@ -56,7 +56,7 @@ def make_map(folder: Path) -> Path:
     return generate(config).save(folder / "map.npz")
 
 
-def test_the_headline_of_the_project(train, tmp_path, capsys):
+def test_train_on_a_map(train, tmp_path, capsys):
     make_map(tmp_path)
     words = ("--num-envs", 4, "--max-iterations", 2, "--rewards.tracking-lin-vel", 1.25)
     assert train("quadruped", "--terrain", "map.npz", *words) == 0
@@ -72,7 +72,7 @@ def test_the_headline_of_the_project(train, tmp_path, capsys):
     assert "level stairs" in said.err
 
 
-def test_a_run_is_gone_on_with(train, tmp_path, capsys):
+def test_train_resumes_a_run(train, tmp_path, capsys):
     words = ("--num-envs", 4, "--seed", 3, "--log-dir", "run")
     assert train("quadruped", "--max-iterations", 1, *words) == 0
     assert train("--resume", "run", "--max-iterations", 2, quick=()) == 0
@@ -87,9 +87,7 @@ def test_a_run_is_gone_on_with(train, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
 )
-def test_interrupting_writes_a_checkpoint_and_says_how_to_go_on(
-    train, tmp_path, capsys, monkeypatch, number, code
-):
+def test_interrupt_saves_a_checkpoint(train, tmp_path, capsys, monkeypatch, number, code):
     @contextmanager
     def interrupting():
         yield lambda progress: signal.raise_signal(number) if progress.iteration == 2 else None
@@ -102,7 +100,7 @@ def test_interrupting_writes_a_checkpoint_and_says_how_to_go_on(
     )
 
 
-def test_a_full_disk_is_one_line(train, tmp_path, capsys):
+def test_full_disk_is_one_line(train, tmp_path, capsys):
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
     try:
@@ -150,7 +148,7 @@ def without_origins(folder: Path) -> None:
         (("quadruped", "--config", "gone.toml"), "cannot read gone.toml"),
     ],
 )
-def test_what_is_wrong_is_said_in_one_line(train, tmp_path, capsys, words, said):
+def test_invalid_input_is_one_line(train, tmp_path, capsys, words, said):
     assert train(*words) == 2
     error = capsys.readouterr().err
     assert error.startswith("terrainkit: error: ")
@@ -162,7 +160,7 @@ def test_what_is_wrong_is_said_in_one_line(train, tmp_path, capsys, words, said)
 @pytest.mark.parametrize(
     ("make", "said"), [(another_version, "version"), (without_origins, "env_origins")]
 )
-def test_a_map_that_is_wrong_is_said_in_one_line(train, tmp_path, capsys, make, said):
+def test_invalid_map_is_one_line(train, tmp_path, capsys, make, said):
     make(tmp_path)
     assert train("quadruped", "--terrain", "map.npz") == 2
     error = capsys.readouterr().err
@@ -171,13 +169,13 @@ def test_a_map_that_is_wrong_is_said_in_one_line(train, tmp_path, capsys, make, 
     assert [path.name for path in tmp_path.iterdir()] == ["map.npz"]
 
 
-def test_a_missing_extra_says_what_to_install(train, capsys, monkeypatch):
+def test_missing_extra_names_the_package(train, capsys, monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
     assert train("quadruped") == 2
     assert "pip install 'terrainkit[train]'" in capsys.readouterr().err
 
 
-def test_what_only_videos_need_is_wanted_only_for_them(monkeypatch):
+def test_video_packages_are_optional(monkeypatch):
     monkeypatch.delenv("OMP_WAIT_POLICY", raising=False)
     found = importlib.util.find_spec
     monkeypatch.setattr(
@@ -189,7 +187,7 @@ def test_what_only_videos_need_is_wanted_only_for_them(monkeypatch):
         require_training("imageio_ffmpeg")
 
 
-def test_a_task_file_comes_before_options(train, tmp_path):
+def test_options_override_task_file(train, tmp_path):
     (tmp_path / "task.toml").write_text("[rewards]\ntorques = -0.5\ndof_vel = -0.25\n")
     words = ("--config", "task.toml", "--rewards.torques", "-0.125", "--num-envs", 4)
     assert train("quadruped", *words, "--max-iterations", 1, "--log-dir", "run") == 0
@@ -213,7 +211,7 @@ PROGRESS = TrainingProgress(
 )
 
 
-def test_without_a_terminal_progress_is_a_line_now_and_then(capsys):
+def test_progress_without_terminal_is_sparse(capsys):
     with render.training() as watch:
         for iteration in range(1, 24):
             watch(
@@ -233,7 +231,7 @@ def test_without_a_terminal_progress_is_a_line_now_and_then(capsys):
     )
 
 
-def test_what_robots_are_rewarded_for_is_a_line_less_often(capsys):
+def test_reward_lines_are_sparse(capsys):
     with render.training() as watch:
         for iteration in range(1, 101):
             watch(TrainingProgress(**{**vars(PROGRESS), "iteration": iteration}))
@@ -242,7 +240,7 @@ def test_what_robots_are_rewarded_for_is_a_line_less_often(capsys):
     assert terms == [f"iteration 50/400: {told}", f"iteration 100/400: {told}"]
 
 
-def test_on_a_terminal_progress_is_a_table(monkeypatch):
+def test_progress_on_terminal_is_a_table(monkeypatch):
     class Terminal(io.StringIO):
         def isatty(self) -> bool:
             return True

@@ -31,7 +31,7 @@ def facts(tmp_path, text):
     return Facts(load_robot(path))
 
 
-def brought_in(tmp_path, text, **options):
+def onboard_text(tmp_path, text, **options):
     robot = facts(tmp_path, text)
     folder = tmp_path / "robot"
     done = onboard(robot.model.file, folder, OnboardOptions(render_images=False, **options))
@@ -39,7 +39,7 @@ def brought_in(tmp_path, text, **options):
 
 
 def test_a_cart_slides_on_the_world(tmp_path):
-    done, spec = brought_in(tmp_path, CART)
+    done, spec = onboard_text(tmp_path, CART)
     assert [joint.name for joint in done.robot.facts.joints] == ["slider", "hinge"]
     assert (spec.joint_order, spec.floating, spec.base) == (("slider",), False, "cart")
     assert done.robot.notes == (
@@ -49,14 +49,14 @@ def test_a_cart_slides_on_the_world(tmp_path):
 
 
 def test_two_arms_are_one_robot(tmp_path):
-    done, spec = brought_in(tmp_path, ARMS)
+    done, spec = onboard_text(tmp_path, ARMS)
     assert spec.joint_order == ("left_joint", "right_joint")
     assert len(done.robot.facts.links) == 4
 
 
 @pytest.mark.parametrize("floating", [None, True])
 def test_a_walker_of_the_plane_keeps_its_joints_unless_it_is_set_free(tmp_path, floating):
-    done, spec = brought_in(tmp_path, WALKER, floating=floating)
+    done, spec = onboard_text(tmp_path, WALKER, floating=floating)
     moving = [joint.name for joint in done.robot.facts.joints]
     assert moving == (["elbow"] if floating else ["z", "x", "turn", "elbow"])
     assert (spec.floating, spec.base) == (bool(floating), "torso")

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 import torch
 
-from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
 from terrainkit_robots.policy.export import export_policy
 from terrainkit_robots.rl.config import Env, Runner, Task
 from terrainkit_robots.rl.env import LeggedEnv
@@ -19,9 +18,10 @@ TASK = Task(
 @pytest.mark.parametrize(
     ("name", "joints", "width"), [("go2/urdf/go2.urdf", 12, 45), ("h1/urdf/h1.urdf", 10, 39)]
 )
-def test_real_robot_is_onboarded_trained_exported(robot_file, tmp_path, name, joints, width):
-    folder = tmp_path / "robot"
-    onboard(robot_file(name), folder, OnboardOptions(render_images=False))
+def test_real_robot_is_onboarded_trained_exported(
+    robot_file, onboarded, tmp_path, name, joints, width
+):
+    folder = onboarded(robot_file(name)).folder
     robot = Robot.load(folder)
     assert len(robot.spec.joint_order) == joints
     run = create_run(tmp_path / "run", TASK, folder, "plane")

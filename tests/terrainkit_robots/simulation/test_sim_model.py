@@ -121,12 +121,12 @@ def test_sim_model_with_fixed_base_has_no_floor(arm):
 def test_sim_model_error_is_one_line(arm, name):
     with pytest.raises(CannotCheckError) as caught:
         make_sim_model(arm(name=name, ixx="1.0"))
-    told = str(caught.value)
-    assert told.startswith(f"MuJoCo cannot simulate it: {name[:50]}")
-    assert told.endswith(": inertia must satisfy A + B >= C; use 'balanceinertia' to fix")
-    assert "\n" not in told
-    assert "Element" not in told
-    assert len(told) < 300
+    error = str(caught.value)
+    assert error.startswith(f"MuJoCo cannot simulate it: {name[:50]}")
+    assert error.endswith(": inertia must satisfy A + B >= C; use 'balanceinertia' to fix")
+    assert "\n" not in error
+    assert "Element" not in error
+    assert len(error) < 300
 
 
 def test_sim_model_rejects_many_bodies(tmp_path):

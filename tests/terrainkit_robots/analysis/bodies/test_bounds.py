@@ -23,10 +23,10 @@ BAR = (
 class Counting(Meshes):
     """Mesh files that count how often vertices are requested."""
 
-    asked = 0
+    requests = 0
 
     def vertices(self, mesh):
-        self.asked += 1
+        self.requests += 1
         return super().vertices(mesh)
 
 
@@ -58,13 +58,13 @@ def test_box_if_includes_joints_on_the_body(robot):
 def test_box_if_skips_unneeded_meshes(robot):
     facts = robot(BALL.format("collision"), BAR.format("visual"))
     assert facts.body_bounds.box_if(facts.bodies[1], longer_than(0.1)) is None
-    assert facts.meshes.asked == 0
+    assert facts.meshes.requests == 0
 
 
 def test_box_if_opens_needed_meshes(robot):
     facts = robot(BALL.format("collision"), BAR.format("visual"))
     assert facts.body_bounds.box_if(facts.bodies[1], longer_than(0.9)) is None
-    assert facts.meshes.asked > 0
+    assert facts.meshes.requests > 0
 
 
 def test_box_if_returns_box_when_condition_holds(robot):
@@ -90,18 +90,18 @@ def test_shape_box_prefers_collision_shapes(robot):
     facts = robot(BALL.format("collision"), BAR.format("visual"))
     box = facts.body_bounds.shape_box(facts.bodies[1], always)
     assert box == pytest.approx(np.array([[-0.1] * 3, [0.1] * 3]))
-    assert facts.meshes.asked == 0
+    assert facts.meshes.requests == 0
 
 
 def test_shape_box_opens_visual_mesh_only_if_needed(robot):
     facts = robot(BAR.format("visual"))
-    asked = []
+    requests = []
     assert (
-        facts.body_bounds.shape_box(facts.bodies[1], lambda length: bool(asked.append(length)))
+        facts.body_bounds.shape_box(facts.bodies[1], lambda length: bool(requests.append(length)))
         is None
     )
-    assert asked == [pytest.approx(0.5)]
-    assert facts.meshes.asked == 0
+    assert requests == [pytest.approx(0.5)]
+    assert facts.meshes.requests == 0
     assert facts.body_bounds.shape_box(facts.bodies[1], always)[1, 2] == pytest.approx(2.0)
 
 

@@ -48,7 +48,7 @@ def test_mimic_positions_broadcast(tmp_path):
 @pytest.mark.parametrize(
     "mimics",
     [
-        ("", "", follows("nobody", 2, 1)),
+        ("", "", follows("unknown", 2, 1)),
         ("", "", follows("jC", 2, 1)),  # itself
         (follows("jB"), follows("jC"), follows("jA", 2, 1)),  # a cycle
         ("", "", follows("", 2, 1)),

@@ -73,5 +73,5 @@ CHAIN = """
 
 def test_positions_of_chained_mimic_joints(robot, spec):
     assert robot(CHAIN).positions == {"jA": 1.0, "jB": 1.5, "jC": -3.0}
-    told = robot(CHAIN, spec=spec(joint_order=("jA",), default_pose={"jA": 2.0}))
-    assert told.positions == {"jA": 2.0, "jB": 2.5, "jC": -5.0}
+    specified = robot(CHAIN, spec=spec(joint_order=("jA",), default_pose={"jA": 2.0}))
+    assert specified.positions == {"jA": 2.0, "jB": 2.5, "jC": -5.0}
