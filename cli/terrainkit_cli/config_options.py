@@ -115,11 +115,9 @@ class TaskCommand(ConfigCommand):
         own = _filter_args(arguments, [*option_names(cls), *_HELP], flags)
         words = [word for word in own if word not in _HELP]
         try:
-            command = parse(cls, "", words)
+            task = parse(cls, "", words).default_config()
         except UsageError:
-            command = cls()  # the error is reported when all words are parsed
-        try:
-            task = command.default_config()
+            task = Task()  # the error is reported when all words are parsed
         except ConfigError:
             if words == own:
                 raise

@@ -17,9 +17,10 @@ from terrainkit_cli.terrain_commands import written
 
 @dataclass(frozen=True, kw_only=True)
 class Export(Command):
-    """Export a map (.xml for MuJoCo, .stl, .ply, .obj, .glb, .png), or a trained policy.
+    """Export a map for simulators and 3D tools, or a policy for deployment.
 
-    A map (.npz) is exported in the format named by the suffix of --output.
+    A map (.npz) is written as .xml (MuJoCo), .stl, .ply, .obj, .glb or .png: the suffix of
+    --output selects the format.
 
     A policy is exported from a run: a folder written by terrainkit train, a checkpoint in one, or
     the name of a robot with a bundled policy. The output folder gets policy.onnx, policy.pt

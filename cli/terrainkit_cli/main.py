@@ -6,25 +6,34 @@ import signal
 import sys
 import warnings
 from collections.abc import Sequence
+from pathlib import Path
 
 from terrainkit_cli import parse, render
 
-COMMANDS = {
-    "generate": "terrain_commands",
-    "list": "terrain_commands",
-    "info": "terrain_commands",
-    "preview": "terrain_commands",
-    "export": "export_command",
-    "check-map": "terrain_commands",
-    "check-robot": "robot_commands",
-    "rule": "robot_commands",
-    "onboard": "onboard_command",
-    "train": "train_command",
-    "smoke-test": "smoke_test_command",
-    "evaluate": "evaluate_command",
-    "play": "play_command",
+COMMAND_GROUPS = {
+    "Terrain": {
+        "generate": "terrain_commands",
+        "list": "terrain_commands",
+        "info": "terrain_commands",
+        "preview": "terrain_commands",
+        "check-map": "terrain_commands",
+        "export": "export_command",
+    },
+    "Robots": {
+        "check-robot": "robot_commands",
+        "rule": "robot_commands",
+        "onboard": "onboard_command",
+        "smoke-test": "smoke_test_command",
+    },
+    "Policies": {
+        "train": "train_command",
+        "evaluate": "evaluate_command",
+        "play": "play_command",
+    },
 }
 """Module of each command, so that only the one in use is imported."""
+
+COMMANDS = {name: module for group in COMMAND_GROUPS.values() for name, module in group.items()}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -72,7 +81,7 @@ def _open_closed_streams() -> None:
     """Open closed standard streams, or the next file that is opened takes their place."""
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))
+            setattr(sys, name, Path(os.devnull).open(mode))  # noqa: SIM115
 
 
 class Terminated(BaseException):
@@ -104,17 +113,28 @@ def _run(arguments: list[str]) -> int:
 
     name = arguments[0] if arguments else "--help"
     if name in ("-h", "--help"):
-        render.overview({name: command(name).__doc__ or "" for name in COMMANDS})
+        _print_overview()
         return 0
     if name == "--version":
         render.result(f"terrainkit {__version__}")
         return 0
     if name not in COMMANDS:
-        expected = expected_names(name, COMMANDS)
-        raise parse.UsageError(f"no command {truncate(repr(name))}; {expected}")
+        known = expected_names(name, COMMANDS)
+        raise parse.UsageError(f"no command {truncate(repr(name))}; {known}")
     options = command(name).options(arguments[1:])
-    parsed = parse.parse(options, f"terrainkit {name}", arguments[1:])
-    return parsed.run()
+    return parse.parse(options, f"terrainkit {name}", arguments[1:]).run()
+
+
+def _print_overview() -> None:
+    render.result("usage: terrainkit COMMAND [OPTIONS]\n")
+    render.result("Generate terrain for legged robots, check robot files, and train policies.\n")
+    rows: list[tuple[str, str]] = []
+    for group, names in COMMAND_GROUPS.items():
+        summaries = ((command(name).__doc__ or "").partition("\n")[0] for name in names)
+        rows += [(f"{group}:", ""), *zip((f"  {name}" for name in names), summaries, strict=True)]
+    render.table(rows)
+    render.result("\nterrainkit COMMAND --help lists the options of a command.")
+    render.result("terrainkit --version prints the version.")
 
 
 def command(name: str) -> type[parse.Command]:

@@ -257,12 +257,12 @@ def _check_output(output: Path, inputs: Sequence[Path]) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Rule(Command):
-    """Print what a rule of check-robot checks, why it matters, and how to fix its findings."""
+    """Explain a rule of check-robot: what it checks, why, and how to fix findings."""
 
     code: Annotated[
         str, tyro.conf.Positional, tyro.conf.arg(metavar="CODE", help_behavior_hint="")
     ] = ""
-    """Code or name of the rule."""
+    """Code or name of the rule; without it, all rules are listed."""
 
     all: bool = False
     """List all rules."""

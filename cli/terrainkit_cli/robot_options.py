@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from terrainkit.errors import ConfigError
+from terrainkit.text import expected_names
 
 if TYPE_CHECKING:
     StringList = list[str]
@@ -51,7 +52,6 @@ def find_robot(name: str) -> Path:
     Raises:
         ConfigError: if neither exists, or the file cannot be accessed.
     """
-    from terrainkit.text import expected_names
     from terrainkit_robots.description import bundled
 
     path = Path(name)

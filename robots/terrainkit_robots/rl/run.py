@@ -21,7 +21,6 @@ import numpy as np
 from terrainkit.atomic_write import atomic_write, temporary_folder
 from terrainkit.errors import ConfigError, ExportError, listing
 from terrainkit.text import expected_names
-from terrainkit.text import known_names
 from terrainkit.toml_text import parse_toml, read_text
 from terrainkit_robots.files import open_regular
 from terrainkit_robots.rl import tasks
