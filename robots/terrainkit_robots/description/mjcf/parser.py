@@ -123,7 +123,7 @@ def _check_numbers(tree: MjcfTree, node: Node) -> None:
     MuJoCo reports only one at a time, and accepts NaN.
     """
     for name, text in list(node.attributes.items()):
-        if name not in _COUNTS or node.tag == "flag":  # which has message
+        if name not in _COUNTS or node.tag == "flag":  # its attributes are words
             continue
         message = text.lower().replace("+", "").split()
         if name in _INFINITE_ALLOWED and any(word in ("inf", "-inf") for word in message):
@@ -433,7 +433,7 @@ _REPAIRS: tuple[tuple[str, _Repair], ...] = (
 """Patterns of MuJoCo's messages and their repairs; the first repair that succeeds is used."""
 
 
-# What MuJoCo knows
+# MuJoCo schema
 
 
 @cache
