@@ -5,6 +5,9 @@ from terrainkit_robots.description import bundled
 QUADRUPED = bundled.find("quadruped")
 """The URDF of the bundled quadruped; its MJCF is in the same folder."""
 
+BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]
+"""Names of all bundled files, such as `quadruped.xml`. `robot_file` finds them."""
+
 ARM = """<robot name="arm">
   <link name="stand"><inertial><mass value="5"/>
     <inertia ixx="0.05" iyy="0.05" izz="0.05" ixy="0" ixz="0" iyz="0"/></inertial>

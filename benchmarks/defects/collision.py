@@ -23,7 +23,9 @@ def _add_shape(robot: Mutant, link: str, shape: str, position: np.ndarray) -> No
 @mutation("COL001", "error", "shank and foot without collision shapes")
 def no_shank_collision(robot: Mutant) -> Subjects:
     foot = robot.pick(robot.feet())
-    shank = child(robot.pick(j for j in robot.knee_joints() if _has_foot(robot, child(j), foot)))
+    shank = child(
+        robot.pick(j for j in robot.knee_joints() if foot in _links_below(robot, child(j)))
+    )
     names = {*robot.body_names(shank), *robot.body_names(foot)}
     for link in robot.links("collision"):
         if link.get("name") in names or link.get("name") in _links_below(robot, shank):
@@ -38,10 +40,6 @@ def _links_below(robot: Mutant, link: str) -> list[str]:
             child(joint) for joint in robot.joints() if joint.find("parent").get("link") == name
         ]
     return found
-
-
-def _has_foot(robot: Mutant, link: str, foot: str) -> bool:
-    return foot in _links_below(robot, link)
 
 
 @mutation("COL001", "error", "all feet without collision shapes")

@@ -5,7 +5,6 @@
 
 import dataclasses
 import inspect
-from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar, get_origin
@@ -31,18 +30,13 @@ _UNSET = object()
 
 @dataclass(frozen=True, kw_only=True)
 class ConfigCommand(Command):
-    """A command with an option for each value of a config."""
+    """A command with an option for each value of a config; `with_options` adds them."""
 
     defaults: ClassVar[Config]
     """The config whose values the options change."""
 
-    @abstractmethod
-    def default_config(self) -> Config:
-        """Return the config whose values the options change.
-
-        Raises:
-            ConfigError: if it cannot be read.
-        """
+    values: ClassVar[Any]
+    """The arguments of the options; :meth:`with_options` makes it a field."""
 
     @classmethod
     def with_options(
@@ -74,16 +68,15 @@ class ConfigCommand(Command):
         Raises:
             ConfigError: if a value is invalid.
         """
-        return _overrides("", self.defaults, self.values) if hasattr(self, "values") else {}
+        return _overrides("", self.defaults, self.values)
 
     def changed_config(self) -> Any:
         """Return the config with the values on the command line.
 
         Raises:
-            ConfigError: as :meth:`default_config`, or if a value is invalid.
+            ConfigError: if a value is invalid.
         """
-        config = self.defaults if hasattr(self, "values") else self.default_config()
-        return with_values(config, self.overrides())
+        return with_values(self.defaults, self.overrides())
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""The commands that make, look at and check maps."""
+"""The commands for maps: generate, list, info, preview and check-map."""
 
 import sys
 from collections.abc import Sequence
@@ -52,10 +52,6 @@ class Generate(ConfigCommand):
         command = cls.with_options(config, exclude=("terrains",))
         check_options(command, arguments)
         return command
-
-    def default_config(self) -> MapConfig:
-        """Return the config of --config, or the default one."""
-        return _load_config(self.config) if self.config else MapConfig()
 
     def run(self) -> int:
         """Generate the map, write it, and print the next commands."""
@@ -117,10 +113,10 @@ class List(Command):
     terrain: Annotated[
         str, tyro.conf.Positional, tyro.conf.arg(metavar="[TERRAIN]", help_behavior_hint="")
     ] = ""
-    """A terrain, for its parameters."""
+    """Name of a terrain, to print its parameters."""
 
     def run(self) -> int:
-        """Print a table."""
+        """Print the terrains and presets, or the parameters of a terrain."""
         from terrainkit.terrain_docs import terrain_doc, terrain_summaries
 
         if not self.terrain:
@@ -145,13 +141,13 @@ class List(Command):
 
 
 _WHOLE_MAP = (-sys.maxsize, -sys.maxsize)
-"""No patch in particular, and none that one would ask for; not None, since tyro's errors about a
-union name its members."""
+"""Value of --patch if it is not given; not None, since tyro's errors about a union name its
+members."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Info(Command):
-    """Print what a map holds."""
+    """Print the size, terrains and difficulty of a map, or one patch."""
 
     map: MapFile
     """The map."""
@@ -159,7 +155,7 @@ class Info(Command):
     patch: Annotated[tuple[int, int], tyro.conf.arg(metavar="ROW COL", help_behavior_hint="")] = (
         _WHOLE_MAP
     )
-    """Row and column of a patch, for its parameters as asked and as built."""
+    """Row and column of a patch, to print its requested and realized parameters."""
 
     def run(self) -> int:
         """Print the size of the map and its columns, or one patch."""
@@ -215,17 +211,17 @@ def _print_patch(terrain_map: TerrainMap, row: int, col: int) -> None:
         f"patch ({row}, {col}): {patch.terrain} at difficulty {patch.difficulty:.3f}, "
         f"spawn origin ({x:g}, {y:g}, {z:g})\n"
     )
-    rows = [("parameter", "asked", "built")]
-    for name, asked in patch.parameters.requested.items():
-        built = patch.parameters.realized[name]
-        text = " x ".join(f"{v:g}" for v in built) if isinstance(built, tuple) else f"{built:g}"
-        rows.append((name, f"{asked:g}", text))
+    rows = [("parameter", "requested", "realized")]
+    for name, requested in patch.parameters.requested.items():
+        realized = patch.parameters.realized[name]
+        values = realized if isinstance(realized, tuple) else (realized,)
+        rows.append((name, f"{requested:g}", " x ".join(f"{value:g}" for value in values)))
     render.table(rows)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Preview(Command):
-    """Draw a map from above: relief, names, levels and spawn origins."""
+    """Render a map from above: relief, terrain names, levels and spawn origins."""
 
     map: MapFile
     """The map."""
@@ -234,13 +230,13 @@ class Preview(Command):
     """The .png to write."""
 
     width: int = 1600
-    """Least width of the ground in the picture [px]."""
+    """Minimum width of the map in the image [pixels]."""
 
     overwrite: bool = False
     """Replace an existing file."""
 
     def run(self) -> int:
-        """Draw the picture and write it."""
+        """Render the image and write it."""
         from terrainkit.preview import write_preview
 
         terrain_map = TerrainMap.load(self.map)
@@ -273,7 +269,7 @@ class CheckMap(Command):
 
 
 def written(terrain_map: TerrainMap, path: Path) -> str:
-    """Return what to say of a map that was written."""
+    """Return the message about a written map."""
     config, grid = terrain_map.config, terrain_map.grid
     return (
         f"wrote {path}: {config.rows} x {config.cols} patches of {_size_text(*config.patch_size)}, "

@@ -3,9 +3,7 @@
 from collections.abc import Container, Iterable
 from pathlib import Path
 
-from terrainkit.text import closest, truncate
-
-__all__ = ["closest", "count", "display_path", "free_name", "names", "one_line", "truncate"]
+from terrainkit.text import truncate
 
 
 def names(words: Iterable[str], max_count: int = 6, separator: str = ", ") -> str:

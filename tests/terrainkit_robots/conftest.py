@@ -24,9 +24,14 @@ ROBOTS = Path(os.environ.get("TERRAINKIT_ROBOTS", _PROJECT.parent / "shared" / "
 
 @pytest.fixture(scope="session")
 def robot_file() -> Callable[[str], Path]:
-    """Return the path of a robot file such as `go2/urdf/go2.urdf`; skip if it is not available."""
+    """Return the path of a robot file, such as the bundled `quadruped.xml` or `go2/urdf/go2.urdf`.
+
+    The test is skipped if a robot that is not bundled is missing.
+    """
 
     def find(name: str) -> Path:
+        if "/" not in name:
+            return bundled_robots.find(Path(name).stem).with_suffix(Path(name).suffix)
         if not (ROBOTS / name).exists():
             pytest.skip(f"{name} is not in {ROBOTS}; set TERRAINKIT_ROBOTS to a folder with robots")
         return ROBOTS / name

@@ -151,9 +151,9 @@ def onboard(
     config_names = {name: config_file_name(name) for name in options.frameworks}
     if output is not None:
         check_folder(Path(output), overwrite=options.overwrite)
-    override = None
+    user_spec = None
     if options.spec is not None:
-        override = SpecOverride(spec=RobotSpec.load(options.spec), file=str(options.spec))
+        user_spec = SpecOverride(spec=RobotSpec.load(options.spec), file=str(options.spec))
     options.on_step(f"checking {path.name}")
     report, fixed = _fix_in_memory(path, options)
     for rule in report.crashed:
@@ -167,7 +167,7 @@ def onboard(
         report.facts,
         collision=options.collision,
         floating=options.floating,
-        override=override,
+        user_spec=user_spec,
         cache_dir=options.cache_dir,
         progress=options.progress,
     )

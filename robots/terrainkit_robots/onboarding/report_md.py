@@ -30,12 +30,12 @@ if TYPE_CHECKING:
 def report_markdown(result: "OnboardResult") -> str:
     """Return the text of report.md for a robot that was written."""
     assert result.robot is not None
-    robot, verification = result.robot, result.verification
+    robot, checks = result.robot, result.verification
     sections = (
         _overview(result, robot),
         _changes(result, robot),
-        _standing(verification, robot),
-        _comparison(verification),
+        _standing(checks, robot),
+        _comparison(checks),
         _joints(robot),
         _simulators(robot),
         _findings(result),
@@ -122,22 +122,21 @@ def _fix(finding: "Finding") -> tuple[str, str]:
     return finding.code, f"{finding.subject}: {text}" if finding.subject else text
 
 
-def _standing(verification: "Verification | None", robot: "RobotFiles") -> Iterator[str]:
+def _standing(checks: "Verification | None", robot: "RobotFiles") -> Iterator[str]:
     if not robot.facts.legs:
         return
     yield "## Standing test\n"
-    if verification is None or verification.standing is None:
-        has_error = verification is not None and verification.error
-        reason = f": {cell(verification.error)}" if verification and has_error else ""
+    if checks is None or checks.standing is None:
+        reason = f": {cell(checks.error)}" if checks is not None and checks.error else ""
         yield f"It was not simulated{reason}.\n"
         return
-    locked = verification.joints_locked
+    locked = checks.joints_locked
     how = "with locked joints" if locked else "at its default pose, with the gains below"
-    outcome = "It stands" if verification.is_stable else "It does not stand"
+    outcome = "It stands" if checks.is_stable else "It does not stand"
     yield f"**{outcome}**, {how}, in MuJoCo:\n"
     has_slides = any(joint.kind == "prismatic" for joint in robot.facts.joints)
     unit = "rad or m" if has_slides else "rad"
-    rows = _standing_rows(verification.standing, unit, locked=locked)
+    rows = _standing_rows(checks.standing, unit, locked=locked)
     yield from _table([("quantity", "value"), *rows])
 
 
@@ -160,8 +159,8 @@ def _standing_rows(
     yield "largest joint position error", f"{format_number(standing.joint_error, 2)} {unit}"
 
 
-def _comparison(verification: "Verification | None") -> Iterator[str]:
-    if verification is None or not verification.equivalences:
+def _comparison(checks: "Verification | None") -> Iterator[str]:
+    if checks is None or not checks.equivalences:
         return
     yield "## Comparison with the source\n"
     rows = [
@@ -172,7 +171,7 @@ def _comparison(verification: "Verification | None") -> Iterator[str]:
             f"{1000 * each.distance:.2g} mm at {each.link}",
             f"{math.degrees(each.angle):.2g} deg at {each.angle_link}",
         )
-        for each in verification.equivalences
+        for each in checks.equivalences
     ]
     yield "Largest errors at random poses.\n"
     yield from _table([("file", "mass", "joint inertia", "link position", "link rotation"), *rows])

@@ -65,7 +65,7 @@ def make_robot_files(
     *,
     collision: "CollisionMethod" = "keep",
     floating: bool | None = None,
-    override: SpecOverride | None = None,
+    user_spec: SpecOverride | None = None,
     cache_dir: Path | None = None,
     progress: "Progress" = lambda items, _: items,
 ) -> RobotFiles:
@@ -76,7 +76,7 @@ def make_robot_files(
         collision: How collision meshes are simplified.
         floating: Whether the base is floating; by default as in the overriding spec or the file,
             or as the legs suggest.
-        override: Values that replace the derived ones.
+        user_spec: Values that replace the derived ones.
         cache_dir: Folder that caches convex decompositions between runs.
         progress: Wraps an iterable of collision meshes to display a progress bar.
 
@@ -89,8 +89,8 @@ def make_robot_files(
     from terrainkit_robots.export.unsupported import unsupported_elements
     from terrainkit_robots.export.urdf import urdf_text
 
-    if floating is None and override is not None:
-        floating = override.spec.floating
+    if floating is None and user_spec is not None:
+        floating = user_spec.spec.floating
     canonical = to_canonical(source, floating=floating)
     simplified = simplify_collisions(
         canonical.model, source.meshes, collision, cache=cache_dir, progress=progress
@@ -98,9 +98,9 @@ def make_robot_files(
     exported = export_meshes(simplified.model, simplified.meshes)
     meshes = Meshes({Path(name): data for name, data in exported.files.items()})
     spec_notes: tuple[str, ...] = ()
-    if override is not None:
-        spec_notes = _check_override(Facts(exported.model, meshes, spec=override.spec), override)
-    spec = _make_spec(Facts(exported.model, meshes), override)
+    if user_spec is not None:
+        spec_notes = _check_user_spec(Facts(exported.model, meshes, spec=user_spec.spec), user_spec)
+    spec = _make_spec(Facts(exported.model, meshes), user_spec)
     facts = Facts(_set_motor_limits(exported.model, spec), meshes, spec=spec)
     excluded, contact_notes = _excluded_contacts(facts)
     texts = {
@@ -125,7 +125,7 @@ def make_robot_files(
     )
 
 
-def _make_spec(facts: Facts, override: SpecOverride | None) -> "RobotSpec":
+def _make_spec(facts: Facts, user_spec: SpecOverride | None) -> "RobotSpec":
     """Return the derived spec, with the values of the overriding spec.
 
     Raises:
@@ -141,13 +141,13 @@ def _make_spec(facts: Facts, override: SpecOverride | None) -> "RobotSpec":
         raise ExportError(f"{facts.model.file}: cannot derive PD gains: {error}") from None
     floating = bool(facts.model.floating)
     derived = derive_spec(facts, gains=gains, floating=floating, urdf=URDF, mjcf=MJCF)
-    if override is None:
+    if user_spec is None:
         return derived
-    spec = replace(override.spec, floating=floating, urdf=URDF, mjcf=MJCF)
-    return with_provenance(spec, derived, override.file)
+    spec = replace(user_spec.spec, floating=floating, urdf=URDF, mjcf=MJCF)
+    return with_provenance(spec, derived, user_spec.file)
 
 
-def _check_override(facts: Facts, override: SpecOverride) -> tuple[str, ...]:
+def _check_user_spec(facts: Facts, user_spec: SpecOverride) -> tuple[str, ...]:
     """Return the warnings of the lint rules for the overriding spec.
 
     Raises:
@@ -156,10 +156,10 @@ def _check_override(facts: Facts, override: SpecOverride) -> tuple[str, ...]:
     from terrainkit_robots.lint.rule import rules
     from terrainkit_robots.lint.runner import lint
 
-    file, joints = override.file, set(override.spec.joint_order)
+    file, joints = user_spec.file, set(user_spec.spec.joint_order)
     if joints and joints.isdisjoint(joint.name for joint in facts.joints):
         raise ConfigError(
-            f"{file} belongs to {override.spec.name}: none of its joints is in {facts.model.title}"
+            f"{file} belongs to {user_spec.spec.name}: none of its joints is in {facts.model.title}"
         )
     findings = lint(facts, [rule for rule in rules() if "spec" in rule.needs]).findings
     errors = [finding for finding in findings if finding.severity == "error"]

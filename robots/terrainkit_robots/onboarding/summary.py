@@ -24,7 +24,7 @@ def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
         return
     yield "wrote", _list_files(result.robot)
     yield "compared", _compare_files(result.verification)
-    yield "standing", _assess_standing(result.verification, result.robot)
+    yield "standing", _standing_text(result.verification, result.robot)
     if result.configs:
         yield "configs", names(result.configs)
     pictures = f"{count(len(result.images), 'picture')} in report.md"
@@ -53,8 +53,8 @@ def _list_files(robot: "RobotFiles") -> str:
     return f"{names(texts)}{more}"
 
 
-def _compare_files(verification: "Verification") -> str:
-    equivalences = verification.equivalences
+def _compare_files(checks: "Verification") -> str:
+    equivalences = checks.equivalences
     distance = max(each.distance for each in equivalences)
     mass = max(abs(each.mass) for each in equivalences)
     files = " and ".join(each.file for each in equivalences)
@@ -64,15 +64,15 @@ def _compare_files(verification: "Verification") -> str:
     )
 
 
-def _assess_standing(verification: "Verification", robot: "RobotFiles") -> str:
-    standing = verification.standing
-    if verification.error:
-        return f"not simulated: {verification.error}"
+def _standing_text(checks: "Verification", robot: "RobotFiles") -> str:
+    standing = checks.standing
+    if checks.error:
+        return f"not simulated: {checks.error}"
     if standing is None:
         return f"not simulated: the robot has {'a fixed base' if robot.facts.legs else 'no legs'}"
     locked = "with locked joints, since bipeds need a controller to balance"
-    how = locked if verification.joints_locked else "with the gains of robot.toml"
-    if verification.failures:
-        return f"NO: {standing.seconds:g} s {how}; {'; '.join(verification.failures)}"
+    how = locked if checks.joints_locked else "with the gains of robot.toml"
+    if checks.failures:
+        return f"NO: {standing.seconds:g} s {how}; {'; '.join(checks.failures)}"
     tilt = f"tilt {math.degrees(standing.tilt):.1f} degrees"
     return f"yes: {standing.seconds:g} s {how}, {tilt}, only the feet touch the ground"

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import TerrainkitError
+from terrainkit.text import truncate
 from terrainkit_robots import gl_backend
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.text import one_line, truncate
+from terrainkit_robots.text import one_line
 
 Frame = NDArray[np.uint8]
 """An RGB image, shape (height, width, 3)."""

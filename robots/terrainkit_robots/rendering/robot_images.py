@@ -18,6 +18,7 @@ from terrainkit_robots.rendering.renderer import (
     make_renderer,
     update_scene,
 )
+from terrainkit_robots.text import one_line
 
 FloatArray = NDArray[np.float64]
 
@@ -76,7 +77,7 @@ def robot_frames(file: Path, size: tuple[int, int]) -> Iterator[Frame]:
     try:
         model = mujoco.MjModel.from_xml_path(str(file))
     except ValueError as error:
-        raise RenderError(f"MuJoCo cannot load {file.name}: {error}") from None
+        raise RenderError(f"MuJoCo cannot load {file.name}: {one_line(str(error))}") from None
     data = mujoco.MjData(model)
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, 0)

@@ -14,14 +14,15 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from terrainkit.atomic_write import atomic_write, temporary_folder
 from terrainkit.errors import ConfigError, ExportError, listing
+from terrainkit.schema import Config
 from terrainkit.text import expected_names
-from terrainkit.toml_text import parse_toml, read_text
+from terrainkit.toml_text import read_text
 from terrainkit_robots.files import open_regular
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Task
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 
 RUN_FILE, TASK_FILE, MAP_FILE = "run.toml", "task.toml", "map.toml"
 FORMAT_VERSION = 1
-"""Version of the files of a run and of the checkpoint format."""
+"""Version of the checkpoint format."""
 
 CHECKPOINT_FORMAT = "terrainkit checkpoint"
 CHECKPOINT_KEYS = {
@@ -49,6 +50,28 @@ CHECKPOINT_KEYS = {
 
 MAX_CHECKPOINT_SIZE = 1 << 32
 """Largest checkpoint that is read [bytes]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunInfo(Config):
+    """The content of `run.toml`: what a run was made from."""
+
+    format_version: Literal[1] = 1
+    """Version of the files of a run."""
+    robot: str
+    """Name of a registered task, or the absolute path of the robot's folder."""
+    terrain: str
+    """`plane`, or the path of a map, its config, or a MuJoCo model."""
+    terrain_sha256: str | None = None
+    """Digest of a MuJoCo model."""
+    seed: int
+    """Seed of all random numbers."""
+    started: str
+    """Date and time."""
+    versions: Mapping[str, str]
+    """Versions of the packages."""
+    robot_sha256: Mapping[str, str] | None = None
+    """Digests of the robot's spec and model."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -112,22 +135,18 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
         ExportError: If the folder is not empty, or cannot be written.
     """
     robot_folder, source = tasks.get_task(robot_name).folder, resolve_terrain(terrain)
-    about = {
-        "format_version": FORMAT_VERSION,
-        "robot": resolve_robot(robot_name),
-        "terrain": source,
-        **({"terrain_sha256": _sha256(Path(source))} if source.endswith(".xml") else {}),
-        "seed": task.runner.seed,
-        "begun": datetime.now().astimezone().isoformat(timespec="seconds"),
-        "versions": {
-            name: version(name) for name in ("terrainkit", "mujoco", "rsl-rl-lib", "torch")
-        },
-        "robot_sha256": _robot_digests(robot_folder),
-    }
-    import tomlkit
-
+    packages = ("terrainkit", "mujoco", "rsl-rl-lib", "torch")
+    info = RunInfo(
+        robot=resolve_robot(robot_name),
+        terrain=source,
+        terrain_sha256=_sha256(Path(source)) if source.endswith(".xml") else None,
+        seed=task.runner.seed,
+        started=datetime.now().astimezone().isoformat(timespec="seconds"),
+        versions={name: version(name) for name in packages},
+        robot_sha256=_robot_digests(robot_folder),
+    )
     files = {
-        RUN_FILE: tomlkit.dumps(about),
+        RUN_FILE: info.to_toml(),
         TASK_FILE: task.to_toml(),
         SPEC_FILE: read_text(robot_folder / SPEC_FILE),
     }
@@ -179,14 +198,8 @@ def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
         ConfigError: If there is no such run or checkpoint, or its robot is missing.
     """
     folder, named = _resolve_run(name)
-    about = _read_about(folder)
-    for key in ("robot", "terrain"):
-        if not isinstance(about.get(key), str):
-            raise ConfigError(
-                f"{folder / RUN_FILE}: {key}: got {about.get(key, 'nothing')!r}; expected a string"
-            )
-    robot_name, terrain = about["robot"], about["terrain"]
-    found = tasks.get_task(robot_name)
+    info = _load_info(folder)
+    terrain, found = info.terrain, tasks.get_task(info.robot)
     robot = Robot.from_spec(RobotSpec.load(folder / SPEC_FILE), found.folder)
     if not robot.mjcf.is_file():
         raise ConfigError(f"the robot of {folder} is missing: there is no file {robot.mjcf}")
@@ -207,7 +220,7 @@ def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
         folder=folder,
         task=Task.load(folder / TASK_FILE, found.task),
         robot=robot,
-        robot_name=robot_name,
+        robot_name=info.robot,
         terrain=terrain,
         checkpoint=selected,
     )
@@ -252,8 +265,8 @@ def changed_robot_files(run: Run) -> tuple[str, ...]:
     Raises:
         ConfigError: If a file cannot be read.
     """
-    recorded = _read_about(run.folder).get("robot_sha256")
-    if not isinstance(recorded, dict):  # a run of an earlier version
+    recorded = _load_info(run.folder).robot_sha256
+    if recorded is None:
         return ()
     current = _robot_digests(tasks.get_task(run.robot_name).folder)
     names = sorted({*recorded, *current})
@@ -272,7 +285,7 @@ def is_same_terrain(run: Run, terrain: str | Path) -> bool:
         from terrainkit.config import MapConfig
 
         return _map_config(source) == MapConfig.load(config_file)
-    recorded = _read_about(run.folder).get("terrain_sha256")
+    recorded = _load_info(run.folder).terrain_sha256
     return source == run.terrain and recorded in (None, recorded and _sha256(Path(source)))
 
 
@@ -434,15 +447,10 @@ def _sha256(path: Path) -> str:
         raise ConfigError(f"cannot read {path}: {error.strerror or error}") from error
 
 
-def _read_about(folder: Path) -> dict[str, Any]:
-    path = folder / RUN_FILE
-    if not path.is_file():
+def _load_info(folder: Path) -> RunInfo:
+    if not (folder / RUN_FILE).is_file():
         raise ConfigError(f"{folder} has no {RUN_FILE}; terrainkit train writes such a folder")
-    about = parse_toml(read_text(path))
-    if about.get("format_version") != FORMAT_VERSION:
-        got = about.get("format_version", "nothing")
-        raise ConfigError(f"{path}: format_version: got {got!r}; expected {FORMAT_VERSION}")
-    return dict(about)
+    return RunInfo.load(folder / RUN_FILE)
 
 
 def _map_config(terrain: str) -> "MapConfig | None":

@@ -263,7 +263,7 @@ class LeggedRunner(OnPolicyRunner):
             self.alg.load(state, {**parts, "optimizer": optimizer}, strict)
             if not is_resumable:
                 return {}
-            processes = state["processes"]  # processes in excess share the last state
+            processes = state["processes"]  # additional processes use the last state
             process = processes[min(self.gpu_global_rank, len(processes) - 1)]
             if load_cfg is None:
                 self.current_learning_iteration = state["iteration"]

@@ -27,6 +27,9 @@ SPEC_FILE = "robot.toml"
 CONTACT_FORCE_BIT, NET_FORCE = 2, 3
 """`intprm[0]` and `intprm[1]` of a contact sensor: report the force, summed over all contacts."""
 
+SOLE = "sole of "
+"""Prefix of the sites at the feet."""
+
 ALL_BITS = 0x7FFFFFFF
 """A `conaffinity` that matches every `contype`."""
 
@@ -272,9 +275,9 @@ def _add_sensors(robot: Robot, scene: Any) -> dict[str, slice]:
     for foot in robot.spec.feet:
         geoms = [geom for geom in scene.body(foot).geoms if geom.contype or geom.conaffinity]
         center = np.mean([geom.pos for geom in geoms], axis=0) if geoms else np.zeros(3)
-        scene.body(foot).add_site(name=_sole(foot), pos=center, group=4)
+        scene.body(foot).add_site(name=SOLE + foot, pos=center, group=4)
     sensor, body, site = mujoco.mjtSensor, mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_SITE
-    spec, soles = robot.spec, [_sole(foot) for foot in robot.spec.feet]
+    spec, soles = robot.spec, [SOLE + foot for foot in robot.spec.feet]
     kinds = {
         "foot_position": (sensor.mjSENS_FRAMEPOS, site, soles),
         "foot_velocity": (sensor.mjSENS_FRAMELINVEL, site, soles),
@@ -295,10 +298,6 @@ def _add_sensors(robot: Robot, scene: Any) -> dict[str, slice]:
     return ranges
 
 
-def _sole(foot: str) -> str:
-    return f"sole of {foot}"
-
-
 def _sole_depth(robot: Robot, model: Any, home: Any) -> FloatArray:
     import mujoco
 
@@ -308,6 +307,6 @@ def _sole_depth(robot: Robot, model: Any, home: Any) -> FloatArray:
     depths = []
     for foot in robot.spec.feet:
         geoms = np.flatnonzero(collides(model) & (model.geom_bodyid == model.body(foot).id))
-        height = data.site(_sole(foot)).xpos[2]
+        height = data.site(SOLE + foot).xpos[2]
         depths.append(max((height - lowest_point(model, data, int(g)) for g in geoms), default=0.0))
     return np.array(depths, np.float32)

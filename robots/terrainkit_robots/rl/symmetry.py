@@ -44,12 +44,10 @@ class SignedPermutation:
 
 
 class MirrorMaps(NamedTuple):
-    """The mirror maps of an environment."""
+    """The mirror map of each observation group, and that of the actions."""
 
     groups: dict[str, SignedPermutation]
-    """Of each observation group."""
     actions: SignedPermutation
-    """Of the actions."""
 
 
 def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
@@ -61,12 +59,7 @@ def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
     joints = _joint_map(env.robot)
     _check_control(env, joints)
     cfg = env.cfg.terrain
-    fixed = {
-        "vector": _map([0, 1, 2], [1, -1, 1]),
-        "axial": _map([0, 1, 2], [-1, 1, -1]),
-        "command": _map([0, 1, 2], [1, -1, -1]),
-        "joints": joints,
-    }
+    signs = {"vector": [1, -1, 1], "axial": [-1, 1, -1], "command": [1, -1, -1]}
     groups = {}
     for name, group in env.obs_groups.items():
         index, sign, start = [], [], 0
@@ -79,7 +72,8 @@ def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
             elif term.symmetry == "feet":
                 part = _foot_map(env)
             else:
-                part = fixed[term.symmetry]
+                is_joints = term.symmetry == "joints"
+                part = joints if is_joints else _map(range(3), signs[term.symmetry])
             if len(part.index) != width:
                 raise ConfigError(
                     f"observation {term.name}: got {width} numbers; the symmetry "

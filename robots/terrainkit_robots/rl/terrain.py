@@ -164,15 +164,10 @@ def _add_material(spec: Any) -> None:
     """Add a checkered material, on which motion is visible."""
     import mujoco
 
-    spec.add_texture(
-        name="ground",
-        type=mujoco.mjtTexture.mjTEXTURE_2D,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
-        rgb1=[0.62, 0.65, 0.68],
-        rgb2=[0.54, 0.57, 0.6],
-        width=300,
-        height=300,
-    )
+    texture = spec.add_texture(name="ground", type=mujoco.mjtTexture.mjTEXTURE_2D)
+    texture.builtin = mujoco.mjtBuiltin.mjBUILTIN_CHECKER
+    texture.rgb1, texture.rgb2 = [0.62, 0.65, 0.68], [0.54, 0.57, 0.6]
+    texture.width = texture.height = 300
     material = spec.add_material(name="ground", texrepeat=[1, 1], texuniform=True)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "ground"
 

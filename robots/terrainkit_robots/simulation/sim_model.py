@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from terrainkit.text import truncate
 from terrainkit_robots.analysis.bodies.bodies import merge_bodies
 from terrainkit_robots.analysis.bodies.tree import build_tree
 from terrainkit_robots.analysis.cached_fact import cached_fact
@@ -26,7 +27,6 @@ from terrainkit_robots.mesh.mesh_cache import MeshError
 from terrainkit_robots.mesh.surface import binary_stl
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.units import PRISMATIC, REVOLUTE, JointUnits
-from terrainkit_robots.text import truncate
 
 if TYPE_CHECKING:
     from pathlib import Path

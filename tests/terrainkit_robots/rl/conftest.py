@@ -1,12 +1,11 @@
 """Small robots, terrains, tasks and environments.
 
-`calm` tasks have no randomization, so that values can be computed by hand. Fixtures that tests
+`nominal_task` has no randomization, so that values can be computed by hand. Fixtures that tests
 modify are made for each test; the others are shared in the session.
 """
 
 import sys
 from collections.abc import Callable
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -22,14 +21,9 @@ from terrainkit_robots.rl.config import (
     Env,
     InitState,
     Noise,
-    Normalization,
-    Policy,
-    Runner,
     Task,
 )
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.run import Run, create_run
-from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import MapTerrain, Plane, Terrain
@@ -156,7 +150,7 @@ def map_ground(mixed_map: TerrainMap) -> Terrain:
 
 
 @pytest.fixture(scope="session")
-def calm() -> Callable[..., Task]:
+def nominal_task() -> Callable[..., Task]:
     """Return a function that makes tasks without randomization, noise and pushes."""
 
     def make(num_envs: int = 4, **sections: Any) -> Task:
@@ -182,7 +176,7 @@ def calm() -> Callable[..., Task]:
 
 
 @pytest.fixture(scope="session")
-def lively() -> Callable[..., Task]:
+def random_task() -> Callable[..., Task]:
     """Return a function that makes tasks of few robots with all randomization."""
 
     def make(num_envs: int = 4, num_threads: int = 1, **sections: Any) -> Task:
@@ -192,41 +186,9 @@ def lively() -> Callable[..., Task]:
 
 
 @pytest.fixture
-def run_of(lively: Callable[..., Task], tmp_path: Path) -> Callable[..., Run]:
-    """Return a function that makes runs without a checkpoint."""
-    numbers = count()
-
-    def make(ground: str | Path = "plane", **sections: Any) -> Run:
-        folder = tmp_path / "runs" / str(next(numbers))
-        return create_run(folder, lively(**sections), "quadruped", ground)
-
-    return make
-
-
-@pytest.fixture
-def map_file(mixed_map: TerrainMap, tmp_path: Path) -> Path:
-    return mixed_map.save(tmp_path / "map.npz")
-
-
-@pytest.fixture(scope="session")
-def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of a run with two checkpoints; tests must not modify it."""
-    task = Task(
-        env=Env(num_envs=4, num_threads=1),
-        policy=Policy(actor_hidden_dims=(16, 16), critic_hidden_dims=(16, 16)),
-        normalization=Normalization(clip_actions=0.3),  # so that the clip is at work
-        runner=Runner(num_steps_per_env=4, save_interval=1),
-    )
-    run = create_run(tmp_path_factory.mktemp("runs") / "run", task, "quadruped", "plane")
-    torch.manual_seed(1)
-    LeggedRunner(LeggedEnv(run.task, run.robot, Plane()), run.folder).learn(2)
-    return run.folder
-
-
-@pytest.fixture
-def standing(quadruped: Robot, calm: Callable[..., Task]) -> LeggedEnv:
+def standing(quadruped: Robot, nominal_task: Callable[..., Task]) -> LeggedEnv:
     """Return an environment with four quadrupeds at rest on a plane."""
-    env = LeggedEnv(calm(), quadruped, Plane())
+    env = LeggedEnv(nominal_task(), quadruped, Plane())
     for _ in range(50):
         env.step(torch.zeros(4, 12))
     return env

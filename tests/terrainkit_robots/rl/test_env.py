@@ -23,33 +23,33 @@ SHORT = Env(num_envs=5, num_threads=1, episode_length_s=0.4)
 
 class TestEnvOnPlane(VecEnvContract):
     @pytest.fixture
-    def env(self, quadruped, lively):
-        return LeggedEnv(lively(env=SHORT), quadruped, Plane())
+    def env(self, quadruped, random_task):
+        return LeggedEnv(random_task(env=SHORT), quadruped, Plane())
 
 
 class TestEnvOnMap(VecEnvContract):
     @pytest.fixture
-    def env(self, quadruped, lively, map_ground):
-        return LeggedEnv(lively(env=SHORT), quadruped, map_ground)
+    def env(self, quadruped, random_task, map_ground):
+        return LeggedEnv(random_task(env=SHORT), quadruped, map_ground)
 
 
 class TestEnvWithBiped(VecEnvContract):
     @pytest.fixture
-    def env(self, biped, lively, map_ground):
-        return LeggedEnv(lively(env=SHORT), biped, map_ground)
+    def env(self, biped, random_task, map_ground):
+        return LeggedEnv(random_task(env=SHORT), biped, map_ground)
 
 
 class TestEnvWithWheel(VecEnvContract):
     @pytest.fixture
-    def env(self, cart, lively):
-        task = lively(env=SHORT, commands=Commands(heading_command=True, resampling_time=0.1))
+    def env(self, cart, random_task):
+        task = random_task(env=SHORT, commands=Commands(heading_command=True, resampling_time=0.1))
         return LeggedEnv(task, cart, Plane())
 
 
 class TestEnvWithTorqueControl(VecEnvContract):
     @pytest.fixture
-    def env(self, quadruped, lively):
-        task = lively(env=SHORT, control=Control(control_type="T"))
+    def env(self, quadruped, random_task):
+        task = random_task(env=SHORT, control=Control(control_type="T"))
         return LeggedEnv(task, quadruped, Plane())
 
 
@@ -73,28 +73,28 @@ def record(env, actions):
 
 
 class TestObservations:
-    def test_widths(self, quadruped, biped, calm, map_ground):
-        env = LeggedEnv(calm(), quadruped, Plane())
+    def test_widths(self, quadruped, biped, nominal_task, map_ground):
+        env = LeggedEnv(nominal_task(), quadruped, Plane())
         assert env.get_observations()["policy"].shape == (4, 45)
         # Plus velocity 3, friction, mass, center of mass 3, offsets 12, push 3, forces 12.
         assert env.get_observations()["privileged"].shape == (4, 45 + 3 + 1 + 1 + 3 + 12 + 3 + 12)
-        env = LeggedEnv(calm(), quadruped, map_ground)
+        env = LeggedEnv(nominal_task(), quadruped, map_ground)
         assert env.get_observations()["policy"].shape == (4, 45 + 187)
-        env = LeggedEnv(calm(), biped, Plane())
+        env = LeggedEnv(nominal_task(), biped, Plane())
         joints = len(biped.default_pose)
         assert env.get_observations()["policy"].shape == (4, 9 + 3 * joints)
 
-    def test_height_scan_follows_the_setting(self, quadruped, calm, map_ground):
-        seen = calm(terrain=Terrain(measure_heights=True))
+    def test_height_scan_follows_the_setting(self, quadruped, nominal_task, map_ground):
+        seen = nominal_task(terrain=Terrain(measure_heights=True))
         assert LeggedEnv(seen, quadruped, Plane()).get_observations()["policy"].shape == (4, 232)
-        unseen = calm(terrain=Terrain(measure_heights=False))
+        unseen = nominal_task(terrain=Terrain(measure_heights=False))
         env = LeggedEnv(unseen, quadruped, map_ground)
         assert env.get_observations()["policy"].shape == (4, 45)
 
     @pytest.mark.parametrize("on_map", [False, True])
-    def test_foot_forces_are_in_units_of_weight(self, quadruped, calm, map_ground, on_map):
+    def test_foot_forces_are_in_units_of_weight(self, quadruped, nominal_task, map_ground, on_map):
         # The model's total mass includes that of the ground, thousands of tons.
-        env = LeggedEnv(calm(), quadruped, map_ground if on_map else Plane())
+        env = LeggedEnv(nominal_task(), quadruped, map_ground if on_map else Plane())
         env.curriculum.levels[:] = 0
         env.reset()
         for _ in range(50):
@@ -102,17 +102,17 @@ class TestObservations:
         up = observed["privileged"][:, -12:].reshape(4, 4, 3)[..., 2]
         np.testing.assert_allclose(up.sum(axis=1), 1, atol=0.03)
 
-    def test_commands_are_those_of_the_next_step(self, quadruped, lively):
-        task = lively(commands=Commands(resampling_time=0.06), num_envs=8)
+    def test_commands_are_those_of_the_next_step(self, quadruped, random_task):
+        task = random_task(commands=Commands(resampling_time=0.06), num_envs=8)
         env = LeggedEnv(task, quadruped, Plane())
         for _ in range(10):
             observed = env.get_observations()["policy"][:, :3] / torch.tensor([2, 2, 0.25])
             np.testing.assert_allclose(observed, env.commands, atol=1e-6)
             stand(env)
 
-    def test_heading_command_is_observed_at_reset(self, quadruped, lively):
+    def test_heading_command_is_observed_at_reset(self, quadruped, random_task):
         commands = Commands(heading_command=True, standing=0.0, resampling_time=100.0)
-        env = LeggedEnv(lively(16, commands=commands), quadruped, Plane())
+        env = LeggedEnv(random_task(16, commands=commands), quadruped, Plane())
         first = env.commands[:, 2].copy()
         stand(env)
         # Robots hardly turn in 20 ms, so the commands hardly change.
@@ -120,8 +120,8 @@ class TestObservations:
 
 
 class TestTermination:
-    def test_time_out_is_not_a_fall(self, quadruped, calm):
-        env = LeggedEnv(calm(2), quadruped, Plane())
+    def test_time_out_is_not_a_fall(self, quadruped, nominal_task):
+        env = LeggedEnv(nominal_task(2), quadruped, Plane())
         assert env.max_episode_length == 1000
         for k in range(999):
             _, _, dones, extras = stand(env)
@@ -132,9 +132,9 @@ class TestTermination:
         assert extras["log"]["Episode/falls"] == 0
 
     @pytest.mark.parametrize("how", ["back", "side", "outside", "velocity", "position"])
-    def test_fall_resets_only_its_environment(self, quadruped, calm, mixed_map, how):
-        env = LeggedEnv(calm(4), quadruped, MapTerrain(mixed_map))
-        twin = LeggedEnv(calm(4), quadruped, MapTerrain(mixed_map))
+    def test_fall_resets_only_its_environment(self, quadruped, nominal_task, mixed_map, how):
+        env = LeggedEnv(nominal_task(4), quadruped, MapTerrain(mixed_map))
+        twin = LeggedEnv(nominal_task(4), quadruped, MapTerrain(mixed_map))
         for each in (env, twin):
             for _ in range(5):
                 stand(each)
@@ -165,16 +165,16 @@ class TestTermination:
         assert torch.equal(rewards[others], expected_rewards[others])
         np.testing.assert_array_equal(env.sim.qpos[others], twin.sim.qpos[others])
 
-    def test_tilt_terminates_beyond_its_limit(self, quadruped, calm):
-        env = LeggedEnv(calm(3, termination=Termination(tilt=0.5)), quadruped, Plane())
+    def test_tilt_terminates_beyond_its_limit(self, quadruped, nominal_task):
+        env = LeggedEnv(nominal_task(3, termination=Termination(tilt=0.5)), quadruped, Plane())
         for k, tilt in enumerate((0.0, 0.45, 0.55)):
             env.sim.qpos[k, 2] = 2.0
             env.sim.qpos[k, 3:7] = (np.cos(tilt / 2), 0, np.sin(tilt / 2), 0)
         _, _, dones, _ = stand(env)
         assert dones.tolist() == [False, False, True]
 
-    def test_base_contact_terminates(self, quadruped, calm):
-        env = LeggedEnv(calm(2, termination=Termination(tilt=3.1)), quadruped, Plane())
+    def test_base_contact_terminates(self, quadruped, nominal_task):
+        env = LeggedEnv(nominal_task(2, termination=Termination(tilt=3.1)), quadruped, Plane())
         env.sim.qpos[1, 2:7] = (0.06, 0, 1, 0, 0)
         fell = []
         for _ in range(10):
@@ -185,17 +185,17 @@ class TestTermination:
                 break
         assert fell[-1] == [False, True]
 
-    def test_unstable_states_always_terminate(self, quadruped, calm):
-        env = LeggedEnv(calm(3), quadruped, Plane())
+    def test_unstable_states_always_terminate(self, quadruped, nominal_task):
+        env = LeggedEnv(nominal_task(3), quadruped, Plane())
         for value in (np.nan, 1e12, np.nan, 1e9, np.inf):
             env.sim.qvel[1, 7] = value
             _, rewards, dones, _ = stand(env)
             assert dones.tolist() == [False, True, False], value
             assert torch.isfinite(rewards).all()
 
-    def test_unstable_state_gets_only_termination_reward(self, quadruped, calm):
+    def test_unstable_state_gets_only_termination_reward(self, quadruped, nominal_task):
         # Its state is that of MuJoCo's reset, which must not be rewarded.
-        env = LeggedEnv(calm(3, rewards=Rewards(termination=-3.0)), quadruped, Plane())
+        env = LeggedEnv(nominal_task(3, rewards=Rewards(termination=-3.0)), quadruped, Plane())
         env.sim.qvel[1, 7] = np.nan
         _, rewards, dones, extras = stand(env)
         assert dones.tolist() == [False, True, False]
@@ -205,9 +205,9 @@ class TestTermination:
         assert set(paid.values()) == {0}
         assert (rewards[[0, 2]] > 0).all()
 
-    def test_unstable_state_is_no_curriculum_success(self, quadruped, calm, map_ground):
+    def test_unstable_state_is_no_curriculum_success(self, quadruped, nominal_task, map_ground):
         # MuJoCo moves the robot to the world's origin, far from its start.
-        env = LeggedEnv(calm(4), quadruped, map_ground)
+        env = LeggedEnv(nominal_task(4), quadruped, map_ground)
         env.curriculum.levels[:] = 1
         env.reset()
         env.sim.qvel[2, 7] = np.nan
@@ -216,8 +216,8 @@ class TestTermination:
         assert env.curriculum.levels[2] <= 1
         assert np.nansum(env.curriculum.success) == 0
 
-    def test_termination_reward_has_the_tasks_scale(self, quadruped, calm):
-        task = calm(2, rewards=Rewards(termination=-100.0, only_positive_rewards=True))
+    def test_termination_reward_has_the_tasks_scale(self, quadruped, nominal_task):
+        task = nominal_task(2, rewards=Rewards(termination=-100.0, only_positive_rewards=True))
         env = LeggedEnv(task, quadruped, Plane())
         env.sim.qpos[1, 2:7] = (1.0, 0, 1, 0, 0)
         _, rewards, dones, _ = stand(env)
@@ -225,8 +225,8 @@ class TestTermination:
         assert rewards[0] >= 0
         assert rewards[1] == pytest.approx(-2.0, abs=0.1)
 
-    def test_fall_in_last_step_is_no_time_out(self, quadruped, calm):
-        env = LeggedEnv(calm(2), quadruped, Plane())
+    def test_fall_in_last_step_is_no_time_out(self, quadruped, nominal_task):
+        env = LeggedEnv(nominal_task(2), quadruped, Plane())
         env.episode_length_buf = torch.tensor([999, 999])
         env.sim.qpos[1, 2:7] = (1.0, 0, 1, 0, 0)
         _, _, dones, extras = stand(env)
@@ -235,8 +235,8 @@ class TestTermination:
 
 
 class TestLog:
-    def test_logged_rewards_are_per_second(self, quadruped, calm):
-        env = LeggedEnv(calm(2), quadruped, Plane())
+    def test_logged_rewards_are_per_second(self, quadruped, nominal_task):
+        env = LeggedEnv(nominal_task(2), quadruped, Plane())
         total = sum(stand(env)[1] for _ in range(9))
         env.episode_length_buf = torch.tensor([0, 999])
         _, rewards, _, extras = stand(env)
@@ -244,50 +244,51 @@ class TestLog:
         logged = {k: v for k, v in extras["log"].items() if k.startswith("Episode/rew_")}
         assert sum(logged.values()) == pytest.approx(float(total[1]) / (10 * 0.02), rel=1e-4)
 
-    def test_every_reward_is_logged(self, quadruped, calm):
-        env = LeggedEnv(calm(2), quadruped, Plane())
+    def test_every_reward_is_logged(self, quadruped, nominal_task):
+        env = LeggedEnv(nominal_task(2), quadruped, Plane())
         env.episode_length_buf = torch.tensor([0, 999])
         log = stand(env)[3]["log"]
         assert {f"Episode/rew_{name}" for name in env.rewards} <= set(log)
 
-    def test_log_has_levels_on_a_map(self, quadruped, calm, map_ground):
-        env = LeggedEnv(calm(4), quadruped, map_ground)
+    def test_log_has_levels_on_a_map(self, quadruped, nominal_task, map_ground):
+        env = LeggedEnv(nominal_task(4), quadruped, map_ground)
         env.episode_length_buf = torch.tensor([0, 999, 0, 0])
         log = stand(env)[3]["log"]
         assert {"Curriculum/level_stairs", "Curriculum/level_rough_slope"} <= set(log)
 
-    def test_log_omits_terrains_without_robots(self, quadruped, calm, map_ground):
+    def test_log_omits_terrains_without_robots(self, quadruped, nominal_task, map_ground):
         # With one robot, the second column of the map is empty.
-        env = LeggedEnv(calm(1), quadruped, map_ground)
+        env = LeggedEnv(nominal_task(1), quadruped, map_ground)
         env.episode_length_buf = torch.tensor([999])
         log = stand(env)[3]["log"]
         assert np.isfinite(list(log.values())).all()
 
-    def test_no_log_without_resets(self, quadruped, calm):
-        assert "log" not in stand(LeggedEnv(calm(2), quadruped, Plane()))[3]
+    def test_no_log_without_resets(self, quadruped, nominal_task):
+        assert "log" not in stand(LeggedEnv(nominal_task(2), quadruped, Plane()))[3]
 
 
 class TestSeeds:
-    def test_same_seed_gives_same_rollout(self, quadruped, lively, map_ground):
-        task = lively(6, runner=Runner(seed=3))
+    def test_same_seed_gives_same_rollout(self, quadruped, random_task, map_ground):
+        task = random_task(6, runner=Runner(seed=3))
         first, second = (LeggedEnv(task, quadruped, map_ground) for _ in range(2))
         actions = acts(first, 25)
         assert record(first, actions) == record(second, actions)
 
-    def test_other_seed_gives_other_rollout(self, quadruped, lively, map_ground):
+    def test_other_seed_gives_other_rollout(self, quadruped, random_task, map_ground):
         first, second = (
-            LeggedEnv(lively(6, runner=Runner(seed=seed)), quadruped, map_ground) for seed in (3, 4)
+            LeggedEnv(random_task(6, runner=Runner(seed=seed)), quadruped, map_ground)
+            for seed in (3, 4)
         )
         assert not torch.equal(
             first.get_observations()["policy"], second.get_observations()["policy"]
         )
         assert not np.array_equal(first.params.friction, second.params.friction)
 
-    def test_global_random_states_are_untouched(self, quadruped, lively):
+    def test_global_random_states_are_untouched(self, quadruped, random_task):
         np.random.seed(0)  # noqa: NPY002
         torch.manual_seed(0)
         before = np.random.get_state()[1].copy(), torch.get_rng_state().clone()  # noqa: NPY002
-        env = LeggedEnv(lively(3), quadruped, Plane())
+        env = LeggedEnv(random_task(3), quadruped, Plane())
         stand(env)
         assert np.array_equal(np.random.get_state()[1], before[0])  # noqa: NPY002
         assert torch.equal(torch.get_rng_state(), before[1])
@@ -295,11 +296,11 @@ class TestSeeds:
 
 class TestStateDict:
     @pytest.mark.parametrize("on_map", [False, True])
-    def test_resume_is_bit_identical(self, quadruped, lively, map_ground, on_map):
+    def test_resume_is_bit_identical(self, quadruped, random_task, map_ground, on_map):
         ground = map_ground if on_map else Plane()
         domain_rand = DomainRand(push_interval_s=0.3)
         # Short commands and episodes, so that everything random is sampled again.
-        task = lively(
+        task = random_task(
             env=Env(num_envs=6, num_threads=1, episode_length_s=0.7),
             commands=Commands(
                 resampling_time=0.2, heading_command=True, curriculum=True, max_curriculum=2.0
@@ -318,8 +319,8 @@ class TestStateDict:
             assert torch.equal(other.get_observations()[name], group), name
         assert record(other, actions[21:]) == expected
 
-    def test_saved_state_is_a_copy(self, quadruped, lively):
-        env = LeggedEnv(lively(3), quadruped, Plane())
+    def test_saved_state_is_a_copy(self, quadruped, random_task):
+        env = LeggedEnv(random_task(3), quadruped, Plane())
         actions = acts(env, 20)
         record(env, actions[:5])
         saved = env.state_dict()
@@ -327,8 +328,8 @@ class TestStateDict:
         env.load_state_dict(saved)
         assert record(env, actions[5:]) == expected
 
-    def test_state_survives_a_checkpoint_file(self, quadruped, lively, map_ground, tmp_path):
-        env = LeggedEnv(lively(3), quadruped, map_ground)
+    def test_state_survives_a_checkpoint_file(self, quadruped, random_task, map_ground, tmp_path):
+        env = LeggedEnv(random_task(3), quadruped, map_ground)
         actions = acts(env, 10)
         record(env, actions[:5])
         save_checkpoint(tmp_path / "model_5.pt", {"env": env.state_dict()})
@@ -336,20 +337,20 @@ class TestStateDict:
         env.load_state_dict(torch.load(tmp_path / "model_5.pt", weights_only=True)["env"])
         assert record(env, actions[5:]) == expected
 
-    def test_load_keeps_replaced_episode_lengths(self, quadruped, lively):
-        env = LeggedEnv(lively(3), quadruped, Plane())
+    def test_load_keeps_replaced_episode_lengths(self, quadruped, random_task):
+        env = LeggedEnv(random_task(3), quadruped, Plane())
         env.episode_length_buf = torch.tensor([5, 6, 7])
         stand(env)
         saved = env.state_dict()
-        other = LeggedEnv(lively(3), quadruped, Plane())
+        other = LeggedEnv(random_task(3), quadruped, Plane())
         other.load_state_dict(saved)
         assert other.episode_length_buf.tolist() == [6, 7, 8]
 
-    def test_other_num_envs_keeps_only_curricula(self, quadruped, lively, map_ground):
-        env = LeggedEnv(lively(4), quadruped, map_ground)
+    def test_other_num_envs_keeps_only_curricula(self, quadruped, random_task, map_ground):
+        env = LeggedEnv(random_task(4), quadruped, map_ground)
         env.curriculum.levels[:] = 2
         env.velocity_command.lin_vel_x = (-1.3, 1.3)
-        other = LeggedEnv(lively(7), quadruped, map_ground)
+        other = LeggedEnv(random_task(7), quadruped, map_ground)
         other.load_state_dict(env.state_dict())
         assert (other.curriculum.levels == 2).all()
         assert other.velocity_command.lin_vel_x == (-1.3, 1.3)
@@ -359,32 +360,32 @@ class TestStateDict:
     @pytest.mark.parametrize(
         ("part", "name"), [("arrays", "steps_until_push"), ("state", "push_vel")]
     )
-    def test_load_rejects_other_version(self, quadruped, lively, part, name):
-        saved = LeggedEnv(lively(3), quadruped, Plane()).state_dict()
+    def test_load_rejects_other_version(self, quadruped, random_task, part, name):
+        saved = LeggedEnv(random_task(3), quadruped, Plane()).state_dict()
         del saved[part][name]
         with pytest.raises(ConfigError, match="written by another version of terrainkit"):
-            LeggedEnv(lively(3), quadruped, Plane()).load_state_dict(saved)
-        LeggedEnv(lively(4), quadruped, Plane()).load_state_dict(saved)
+            LeggedEnv(random_task(3), quadruped, Plane()).load_state_dict(saved)
+        LeggedEnv(random_task(4), quadruped, Plane()).load_state_dict(saved)
 
-    def test_load_rejects_other_rewards(self, quadruped, lively):
-        saved = LeggedEnv(lively(3), quadruped, Plane()).state_dict()
-        task = lively(3, rewards=Rewards(termination=-1.0))
+    def test_load_rejects_other_rewards(self, quadruped, random_task):
+        saved = LeggedEnv(random_task(3), quadruped, Plane()).state_dict()
+        task = random_task(3, rewards=Rewards(termination=-1.0))
         with pytest.raises(ConfigError, match="rew_termination belongs to another robot or task"):
             LeggedEnv(task, quadruped, Plane()).load_state_dict(saved)
 
-    def test_load_rejects_other_robot_or_map(self, quadruped, biped, lively, map_ground):
-        saved = LeggedEnv(lively(3), quadruped, Plane()).state_dict()
+    def test_load_rejects_other_robot_or_map(self, quadruped, biped, random_task, map_ground):
+        saved = LeggedEnv(random_task(3), quadruped, Plane()).state_dict()
         with pytest.raises(ConfigError, match="another robot"):
-            LeggedEnv(lively(3), biped, Plane()).load_state_dict(saved)
+            LeggedEnv(random_task(3), biped, Plane()).load_state_dict(saved)
         with pytest.raises(ConfigError, match="the checkpoint's map has 1 x 1 patches"):
-            LeggedEnv(lively(3), quadruped, map_ground).load_state_dict(saved)
+            LeggedEnv(random_task(3), quadruped, map_ground).load_state_dict(saved)
 
 
 class TestSetCommands:
     HELD = np.float32([[0.5, -0.3, 0.2]] * 4)
 
-    def test_fixed_commands_are_never_resampled(self, quadruped, lively):
-        task = lively(commands=Commands(resampling_time=0.04))
+    def test_fixed_commands_are_never_resampled(self, quadruped, random_task):
+        task = random_task(commands=Commands(resampling_time=0.04))
         env = LeggedEnv(task, quadruped, Plane())
         env.set_commands(self.HELD)
         for _ in range(10):
@@ -393,15 +394,15 @@ class TestSetCommands:
             stand(env)
             np.testing.assert_allclose(env.state.commands, self.HELD)
 
-    def test_fixed_commands_survive_a_reset(self, quadruped, lively):
-        env = LeggedEnv(lively(), quadruped, Plane())
+    def test_fixed_commands_survive_a_reset(self, quadruped, random_task):
+        env = LeggedEnv(random_task(), quadruped, Plane())
         env.set_commands(self.HELD)
         env.reset()
         np.testing.assert_allclose(env.commands, self.HELD)
         np.testing.assert_allclose(env.state.commands, self.HELD)
 
-    def test_none_returns_to_random_commands(self, quadruped, lively):
-        env = LeggedEnv(lively(commands=Commands(standing=0.0)), quadruped, Plane())
+    def test_none_returns_to_random_commands(self, quadruped, random_task):
+        env = LeggedEnv(random_task(commands=Commands(standing=0.0)), quadruped, Plane())
         env.set_commands(self.HELD)
         env.set_commands(None)
         assert (env.commands[:, :2] != self.HELD[:, :2]).any(axis=1).all()
@@ -415,8 +416,8 @@ class TestSetCommands:
 
 
 class TestReset:
-    def test_robots_start_at_their_origins(self, quadruped, calm, map_ground):
-        env = LeggedEnv(calm(6), quadruped, map_ground)
+    def test_robots_start_at_their_origins(self, quadruped, nominal_task, map_ground):
+        env = LeggedEnv(nominal_task(6), quadruped, map_ground)
         env.curriculum.levels[:] = [0, 1, 2, 0, 1, 2]
         env.curriculum.columns[:] = [0, 0, 0, 1, 1, 1]
         for _ in range(3):
@@ -427,12 +428,12 @@ class TestReset:
         np.testing.assert_allclose(env.state.base_pos[:, :2], expected[:, :2], atol=1e-5)
         np.testing.assert_allclose(env.state.base_pos[:, 2] - expected[:, 2], 0.346, atol=0.07)
 
-    def test_initial_levels_fit_the_map(self, quadruped, calm, map_ground):
-        env = LeggedEnv(calm(50), quadruped, map_ground)
+    def test_initial_levels_fit_the_map(self, quadruped, nominal_task, map_ground):
+        env = LeggedEnv(nominal_task(50), quadruped, map_ground)
         assert env.curriculum.levels.max() <= 2
 
-    def test_initial_levels_respect_max_init_level(self, quadruped, calm, map_ground):
-        env = LeggedEnv(calm(50, terrain=Terrain(max_init_level=0)), quadruped, map_ground)
+    def test_initial_levels_respect_max_init_level(self, quadruped, nominal_task, map_ground):
+        env = LeggedEnv(nominal_task(50, terrain=Terrain(max_init_level=0)), quadruped, map_ground)
         assert (env.curriculum.levels == 0).all()
 
 
@@ -442,11 +443,11 @@ DQ = np.array([2.0, -1.0, 0.5])
 
 
 @pytest.fixture
-def torques(cart, calm):
+def torques(cart, nominal_task):
     """Return the torques of an action in one physics step, from `Q` and `DQ` in the air."""
 
     def act(action, offset=(0.0, 0.0, 0.0), **settings):
-        env = LeggedEnv(calm(1, control=Control(**settings)), cart, Plane())
+        env = LeggedEnv(nominal_task(1, control=Control(**settings)), cart, Plane())
         sim, scene = env.sim, env.scene
         sim.qpos[0] = scene.home
         sim.qpos[0, 2] = 5.0
@@ -527,7 +528,7 @@ class TestTorqueControl:
         np.testing.assert_allclose(torques((-9, 9, 9), control_type="T"), [-3, 5, 6])
 
 
-def test_zero_action_is_the_default_pose(quadruped, calm):
-    env = LeggedEnv(calm(2), quadruped, Plane())
+def test_zero_action_is_the_default_pose(quadruped, nominal_task):
+    env = LeggedEnv(nominal_task(2), quadruped, Plane())
     ctrl = env.to_ctrl(np.zeros((2, 12), np.float32))
     np.testing.assert_allclose(ctrl, np.tile(quadruped.default_pose, (2, 1)))

@@ -334,8 +334,8 @@ def default_ground():
 
 
 @pytest.fixture(scope="module")
-def plane_scene(quadruped, calm):
-    return build_scene(quadruped, Plane(), calm())
+def plane_scene(quadruped, nominal_task):
+    return build_scene(quadruped, Plane(), nominal_task())
 
 
 def drawn(robot, scene, ground, settings, origins, seed=0):
@@ -418,9 +418,9 @@ class TestSampleResetState:
 
 class TestResetOnTerrain:
     @pytest.mark.parametrize("name", ["quadruped", "biped"])
-    def test_feet_are_on_the_ground_at_origin(self, name, calm, default_ground, request):
+    def test_feet_are_on_the_ground_at_origin(self, name, nominal_task, default_ground, request):
         rows, cols = default_ground.env_origins.shape[:2]
-        env = LeggedEnv(calm(rows * cols), request.getfixturevalue(name), default_ground)
+        env = LeggedEnv(nominal_task(rows * cols), request.getfixturevalue(name), default_ground)
         everywhere(env)
         np.testing.assert_allclose(
             env.sim.qpos[:, :2], env.curriculum.env_origins[:, :2], atol=1e-6
@@ -430,25 +430,25 @@ class TestResetOnTerrain:
             assert found == [touching] * len(found)
 
     @pytest.mark.parametrize("name", ["quadruped", "biped"])
-    def test_no_geom_is_below_the_ground(self, name, lively, default_ground, request):
+    def test_no_geom_is_below_the_ground(self, name, random_task, default_ground, request):
         rows, cols = default_ground.env_origins.shape[:2]
-        env = LeggedEnv(lively(rows * cols), request.getfixturevalue(name), default_ground)
+        env = LeggedEnv(random_task(rows * cols), request.getfixturevalue(name), default_ground)
         for _ in range(3):
             everywhere(env)
             depths = np.array([deepest(env, qpos) for qpos in env.sim.qpos])
             assert depths.min() > -0.02, f"{np.mean(depths < -0.02):.0%} are deeper"
 
-    def test_robots_start_beside_the_origin(self, quadruped, lively, default_ground):
+    def test_robots_start_beside_the_origin(self, quadruped, random_task, default_ground):
         rows, cols = default_ground.env_origins.shape[:2]
-        env = LeggedEnv(lively(rows * cols), quadruped, default_ground)
+        env = LeggedEnv(random_task(rows * cols), quadruped, default_ground)
         everywhere(env)
         offset = np.abs(env.sim.qpos[:, :2] - env.curriculum.env_origins[:, :2])
         assert (offset <= 0.5 + 1e-6).all()
         assert (offset.max(axis=1) > 0.1).mean() > 0.3
 
-    def test_no_robot_falls_at_once(self, quadruped, lively, default_ground):
+    def test_no_robot_falls_at_once(self, quadruped, random_task, default_ground):
         rows, cols = default_ground.env_origins.shape[:2]
-        env = LeggedEnv(lively(rows * cols), quadruped, default_ground)
+        env = LeggedEnv(random_task(rows * cols), quadruped, default_ground)
         everywhere(env)
         fallen = np.zeros(rows * cols, bool)
         for _ in range(10):

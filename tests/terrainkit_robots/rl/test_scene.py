@@ -14,8 +14,8 @@ from terrainkit_robots.rl.terrain import MapTerrain, ModelTerrain, Plane
 
 
 @pytest.fixture(scope="module")
-def scene(cart, calm):
-    return build_scene(cart, Plane(), calm())
+def scene(cart, nominal_task):
+    return build_scene(cart, Plane(), nominal_task())
 
 
 def weight_of(scene):
@@ -63,12 +63,12 @@ class TestActuators:
         assert (scene.model.dof_frictionloss == 0).all()
         assert (scene.model.dof_armature[:6] == 0).all()
 
-    def test_joint_friction_can_be_kept(self, cart, calm):
-        scene = build_scene(cart, Plane(), calm(asset=Asset(joint_friction=True)))
+    def test_joint_friction_can_be_kept(self, cart, nominal_task):
+        scene = build_scene(cart, Plane(), nominal_task(asset=Asset(joint_friction=True)))
         np.testing.assert_allclose(scene.model.dof_frictionloss[scene.joint_qvel], 0.3)
 
-    def test_torque_control_adds_plain_motors(self, cart, calm):
-        model = build_scene(cart, Plane(), calm(control=Control(control_type="T"))).model
+    def test_torque_control_adds_plain_motors(self, cart, nominal_task):
+        model = build_scene(cart, Plane(), nominal_task(control=Control(control_type="T"))).model
         np.testing.assert_allclose(model.actuator_gainprm[:, 0], 1)
         assert (model.actuator_biasprm == 0).all()
 
@@ -100,19 +100,19 @@ class TestIndices:
             last = block.stop
         assert last == scene.model.nsensordata
 
-    def test_sensors_of_terrain_do_not_shift_ranges(self, cart, calm, tmp_path):
+    def test_sensors_of_terrain_do_not_shift_ranges(self, cart, nominal_task, tmp_path):
         path = tmp_path / "ground.xml"
         path.write_text(
             '<mujoco><worldbody><geom type="plane" size="5 5 0.1"/></worldbody>'
             "<sensor><clock/></sensor></mujoco>"
         )
         ground = ModelTerrain(path, cell=0.1, half_size=1.0)
-        scene = build_scene(cart, ground, calm())
+        scene = build_scene(cart, ground, nominal_task())
         foot = scene.model.sensor("foot_position_sole of wheel")
         assert foot.adr[0] == scene.sensors["foot_position"].start
 
-    def test_options_are_the_tasks(self, cart, calm):
-        task = calm(sim=Sim(dt=0.002, iterations=7, ls_iterations=9))
+    def test_options_are_the_tasks(self, cart, nominal_task):
+        task = nominal_task(sim=Sim(dt=0.002, iterations=7, ls_iterations=9))
         option = build_scene(cart, Plane(), task).model.opt
         assert option.timestep == 0.002
         assert option.iterations == 7
@@ -132,14 +132,16 @@ class TestCollisions:
     def test_no_self_collisions_by_default(self, scene):
         assert contacts(scene.model, self.folded(scene)) == set()
 
-    def test_self_collisions_can_be_enabled(self, cart, calm):
-        scene = build_scene(cart, Plane(), calm(asset=Asset(self_collisions=True)))
+    def test_self_collisions_can_be_enabled(self, cart, nominal_task):
+        scene = build_scene(cart, Plane(), nominal_task(asset=Asset(self_collisions=True)))
         touching = contacts(scene.model, self.folded(scene))
         assert any("ground" not in "".join(pair) for pair in touching)
 
     @pytest.mark.parametrize("self_collisions", [False, True])
-    def test_all_solid_geoms_touch_the_ground(self, cart, calm, self_collisions):
-        scene = build_scene(cart, Plane(), calm(asset=Asset(self_collisions=self_collisions)))
+    def test_all_solid_geoms_touch_the_ground(self, cart, nominal_task, self_collisions):
+        scene = build_scene(
+            cart, Plane(), nominal_task(asset=Asset(self_collisions=self_collisions))
+        )
         qpos = scene.home.copy()
         qpos[2] = -0.5
         touching = {
@@ -151,23 +153,23 @@ class TestCollisions:
         assert {"hull", "front_leg", "front_ball", "rear_leg", "tire"} <= touching
         assert "paint" not in touching
 
-    def test_collisions_of_feet_and_termination_bodies_only(self, cart, calm):
+    def test_collisions_of_feet_and_termination_bodies_only(self, cart, nominal_task):
         touching = []
         for collisions in ("all", "feet_and_termination"):
-            task = calm(asset=Asset(collisions=collisions), rewards=Rewards(collision=0.0))
+            task = nominal_task(asset=Asset(collisions=collisions), rewards=Rewards(collision=0.0))
             scene = build_scene(cart, Plane(), task)
             bodies = scene.model.geom_bodyid[scene.geoms]
             touching.append({scene.model.body(k).name for k in bodies})
         assert touching == [{"trunk", "front", "rear", "wheel"}, {"trunk", "front", "wheel"}]
 
     @pytest.mark.parametrize("affinity", [(1, 1), (0, 1), (1, 0), (2, 4), (8, 0)])
-    def test_contact_with_any_terrain_bits(self, cart, calm, tmp_path, affinity):
+    def test_contact_with_any_terrain_bits(self, cart, nominal_task, tmp_path, affinity):
         path = tmp_path / "ground.xml"
         path.write_text(
             '<mujoco><worldbody><geom name="floor" type="plane" size="5 5 0.1" '
             f'contype="{affinity[0]}" conaffinity="{affinity[1]}"/></worldbody></mujoco>'
         )
-        scene = build_scene(cart, ModelTerrain(path, cell=0.1, half_size=1.0), calm())
+        scene = build_scene(cart, ModelTerrain(path, cell=0.1, half_size=1.0), nominal_task())
         qpos = scene.home.copy()
         qpos[2] = 0.15
         assert any("ground/floor" in pair for pair in contacts(scene.model, qpos))
@@ -187,9 +189,9 @@ class TestForces:
         assert (standing.state.penalized_force == 0).all()
 
     @pytest.mark.parametrize("collision", ["hfield", "boxes"])
-    def test_feet_carry_the_robot_on_a_map(self, quadruped, calm, mixed_map, collision):
+    def test_feet_carry_the_robot_on_a_map(self, quadruped, nominal_task, mixed_map, collision):
         # The order of the two geoms depends on their types; the force must not.
-        env = LeggedEnv(calm(6), quadruped, MapTerrain(mixed_map, collision))
+        env = LeggedEnv(nominal_task(6), quadruped, MapTerrain(mixed_map, collision))
         env.curriculum.levels[:] = 0
         env.reset()
         for _ in range(60):
@@ -198,8 +200,8 @@ class TestForces:
             env.state.foot_force.sum(axis=1)[:, 2], weight_of(env.scene), rtol=0.02
         )
 
-    def test_trunk_carries_a_robot_on_its_back(self, cart, calm):
-        scene = build_scene(cart, Plane(), calm(1))
+    def test_trunk_carries_a_robot_on_its_back(self, cart, nominal_task):
+        scene = build_scene(cart, Plane(), nominal_task(1))
         sim = Simulation(scene, 1, 1)
         sim.qpos[0] = scene.home
         sim.qpos[0, 2:7] = (0.06, 0, 1, 0, 0)
@@ -222,13 +224,13 @@ class TestBuildSceneErrors:
             ({"mjcf": "gone.xml"}, "MuJoCo cannot read .*gone.xml"),
         ],
     )
-    def test_build_scene_rejects_mismatched_spec(self, cart, calm, changes, message):
+    def test_build_scene_rejects_mismatched_spec(self, cart, nominal_task, changes, message):
         other = Robot.from_spec(replace(cart.spec, **changes), cart.mjcf.parent)
         with pytest.raises(ConfigError, match=message) as caught:
-            build_scene(other, Plane(), calm())
+            build_scene(other, Plane(), nominal_task())
         assert "\n" not in str(caught.value)
 
-    def test_build_scene_rejects_unknown_joint(self, cart, calm):
+    def test_build_scene_rejects_unknown_joint(self, cart, nominal_task):
         tables = {
             name: {".*": 0.5}
             for name in (
@@ -239,9 +241,9 @@ class TestBuildSceneErrors:
         tables["soft_limits"] = {".*": (-1.0, 1.0)}
         spec = replace(cart.spec, joint_order=("wheel_axle", "fore_hinge"), **tables)
         with pytest.raises(ConfigError, match=r"joint 'fore_hinge'; cart\.xml has: "):
-            build_scene(Robot.from_spec(spec, cart.mjcf.parent), Plane(), calm())
+            build_scene(Robot.from_spec(spec, cart.mjcf.parent), Plane(), nominal_task())
 
-    def test_build_scene_rejects_other_moving_bodies(self, cart, calm, tmp_path):
+    def test_build_scene_rejects_other_moving_bodies(self, cart, nominal_task, tmp_path):
         # qpos must start with the base.
         text = cart.mjcf.read_text().replace(
             '<body name="trunk"',
@@ -249,13 +251,13 @@ class TestBuildSceneErrors:
         )
         (tmp_path / "cart.xml").write_text(text.partition("<keyframe>")[0] + "</mujoco>")
         with pytest.raises(ConfigError, match="trunk") as caught:
-            build_scene(Robot.from_spec(cart.spec, tmp_path), Plane(), calm())
+            build_scene(Robot.from_spec(cart.spec, tmp_path), Plane(), nominal_task())
         assert "\n" not in str(caught.value)
 
-    def test_build_scene_rejects_malformed_mjcf(self, cart, calm, tmp_path):
+    def test_build_scene_rejects_malformed_mjcf(self, cart, nominal_task, tmp_path):
         (tmp_path / "cart.xml").write_text("<mujoco><worldbody>")
         with pytest.raises(ConfigError, match="MuJoCo cannot read"):
-            build_scene(Robot.from_spec(cart.spec, tmp_path), Plane(), calm())
+            build_scene(Robot.from_spec(cart.spec, tmp_path), Plane(), nominal_task())
         assert not (tmp_path / "MUJOCO_LOG.TXT").exists()
 
 

@@ -17,8 +17,8 @@ from terrainkit_robots.rl.terrain import MapTerrain, Plane
 
 
 @pytest.fixture
-def sim(cart, calm):
-    scene = build_scene(cart, Plane(), calm())
+def sim(cart, nominal_task):
+    scene = build_scene(cart, Plane(), nominal_task())
     sim = Simulation(scene, 3, 1)
     start = np.tile(scene.home, (3, 1))
     start[:, 2] = [0.3, 0.5, 0.7]
@@ -101,9 +101,9 @@ class TestUnstable:
             ids = np.array([1])
             sim.reset(ids, sim.scene.home[None], np.zeros((1, sim.scene.model.nv)))
 
-    def test_other_simulations_are_unaffected(self, cart, calm):
+    def test_other_simulations_are_unaffected(self, cart, nominal_task):
         def run(bad):
-            scene = build_scene(cart, Plane(), calm())
+            scene = build_scene(cart, Plane(), nominal_task())
             sim = Simulation(scene, 3, 1)
             sim.qpos[:] = scene.home + 0.3
             if bad:
@@ -120,9 +120,9 @@ class TestUnstable:
         assert list(tmp_path.iterdir()) == []
 
 
-def test_num_threads_does_not_change_results(quadruped, lively, mixed_map):
+def test_num_threads_does_not_change_results(quadruped, random_task, mixed_map):
     def run(threads):
-        env = LeggedEnv(lively(9, num_threads=threads), quadruped, MapTerrain(mixed_map))
+        env = LeggedEnv(random_task(9, num_threads=threads), quadruped, MapTerrain(mixed_map))
         made = torch.Generator().manual_seed(0)
         return [
             (observed["privileged"].numpy().tobytes(), rewards.numpy().tobytes())
@@ -136,9 +136,9 @@ def test_num_threads_does_not_change_results(quadruped, lively, mixed_map):
 
 class TestApplyParamsToEnv:
     @pytest.fixture
-    def varied(self, cart, calm):
+    def varied(self, cart, nominal_task):
         return LeggedEnv(
-            calm(
+            nominal_task(
                 5,
                 domain_rand=DomainRand(
                     friction=(0.2, 1.5),
@@ -207,8 +207,8 @@ class TestApplyParamsToEnv:
         np.testing.assert_array_equal(model.geom_friction[ground], nominal.geom_friction[ground])
         np.testing.assert_array_equal(model.geom_friction[:, 1:], nominal.geom_friction[:, 1:])
 
-    def test_no_randomization_keeps_the_model(self, cart, calm):
-        env = LeggedEnv(calm(2), cart, Plane())
+    def test_no_randomization_keeps_the_model(self, cart, nominal_task):
+        env = LeggedEnv(nominal_task(2), cart, Plane())
         model = env.sim.batch.get_model(1)
         for name in (
             "body_mass",
@@ -222,16 +222,18 @@ class TestApplyParamsToEnv:
                 getattr(model, name), getattr(env.scene.model, name), rtol=1e-6, err_msg=name
             )
 
-    def test_negative_base_mass_is_rejected(self, cart, calm, tmp_path, monkeypatch):
+    def test_negative_base_mass_is_rejected(self, cart, nominal_task, tmp_path, monkeypatch):
         # The base weighs 4 kg.
         monkeypatch.chdir(tmp_path)
         with pytest.raises(ConfigError, match="added_mass") as caught:
-            LeggedEnv(calm(2, domain_rand=DomainRand(added_mass=(-6.0, -5.0))), cart, Plane())
+            LeggedEnv(
+                nominal_task(2, domain_rand=DomainRand(added_mass=(-6.0, -5.0))), cart, Plane()
+            )
         assert "\n" not in str(caught.value)
         assert list(tmp_path.iterdir()) == []
 
-    def test_added_mass_changes_contact_forces(self, quadruped, calm):
-        task = calm(3, domain_rand=DomainRand(
+    def test_added_mass_changes_contact_forces(self, quadruped, nominal_task):
+        task = nominal_task(3, domain_rand=DomainRand(
             friction=None, added_mass=(-2.0, 3.0), com_shift=0.0, gains=None,
             motor_strength=None, joint_offset=0.0, push_interval_s=0.0,
         ))  # fmt: skip

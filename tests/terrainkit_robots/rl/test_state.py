@@ -13,9 +13,9 @@ from terrainkit_robots.rl.terrain import Plane
 
 
 @pytest.fixture
-def moving(cart, calm):
+def moving(cart, nominal_task):
     """Return carts that tumble in the air."""
-    env = LeggedEnv(calm(5), cart, Plane())
+    env = LeggedEnv(nominal_task(5), cart, Plane())
     rng = np.random.default_rng(2)
     env.sim.qpos[:, 2] = 2.0
     env.sim.qvel[:] = rng.normal(size=env.sim.qvel.shape)
@@ -79,8 +79,8 @@ class TestStateAgainstMujoco:
 
 
 class TestByHand:
-    def test_state_at_rest(self, cart, calm):
-        state = LeggedEnv(calm(2), cart, Plane()).state
+    def test_state_at_rest(self, cart, nominal_task):
+        state = LeggedEnv(nominal_task(2), cart, Plane()).state
         np.testing.assert_allclose(state.base_pos, [[0, 0, 0.24]] * 2, atol=1e-6)
         np.testing.assert_allclose(state.base_height, [0.24] * 2, atol=1e-6)
         np.testing.assert_allclose(state.projected_gravity, [[0, 0, -1]] * 2, atol=1e-7)
@@ -92,8 +92,8 @@ class TestByHand:
         wheel = 0.24 - 0.2 * np.cos(0.2) - 0.03
         np.testing.assert_allclose(state.foot_height[:, 0], wheel, atol=1e-5)
 
-    def test_dof_acc_is_finite_difference(self, cart, calm):
-        env = LeggedEnv(calm(2), cart, Plane())
+    def test_dof_acc_is_finite_difference(self, cart, nominal_task):
+        env = LeggedEnv(nominal_task(2), cart, Plane())
         before = env.state.dof_vel.copy()
         for _ in range(3):
             env.step(torch.full((2, 3), 0.2))
@@ -101,23 +101,23 @@ class TestByHand:
             np.testing.assert_allclose(env.state.dof_acc, expected, rtol=1e-4, atol=1e-4)
             before = env.state.dof_vel.copy()
 
-    def test_last_actions_are_kept(self, cart, calm):
-        env = LeggedEnv(calm(2), cart, Plane())
+    def test_last_actions_are_kept(self, cart, nominal_task):
+        env = LeggedEnv(nominal_task(2), cart, Plane())
         for value in (0.1, 0.2, 0.3):
             env.step(torch.full((2, 3), value))
         np.testing.assert_allclose(env.state.actions, 0.3)
         np.testing.assert_allclose(env.state.last_actions, 0.2)
         np.testing.assert_allclose(env.state.last_last_actions, 0.1)
 
-    def test_torques_are_in_spec_order(self, cart, calm):
-        env = LeggedEnv(calm(1), cart, Plane())
+    def test_torques_are_in_spec_order(self, cart, nominal_task):
+        env = LeggedEnv(nominal_task(1), cart, Plane())
         env.sim.qpos[:, 2] = 2.0
         env.step(torch.tensor([[50.0, 0.0, 0.0]]))  # the wheel only
         assert env.state.torques[0, 0] == pytest.approx(3.0)
         assert np.abs(env.state.torques[0, 1:]).max() < 1.0
 
-    def test_air_time_counts_until_contact(self, quadruped, calm):
-        env = LeggedEnv(calm(1), quadruped, Plane())
+    def test_air_time_counts_until_contact(self, quadruped, nominal_task):
+        env = LeggedEnv(nominal_task(1), quadruped, Plane())
         env.sim.qpos[:, 2] = 0.6
         flown = 0
         while not env.state.first_contact.any():
@@ -138,8 +138,8 @@ class TestByHand:
             standing.step(torch.zeros(4, 12))
             assert not standing.state.first_contact.any()
 
-    def test_push_adds_to_world_velocity(self, cart, calm):
-        task = calm(
+    def test_push_adds_to_world_velocity(self, cart, nominal_task):
+        task = nominal_task(
             64,
             domain_rand=DomainRand(
                 friction=None, added_mass=None, com_shift=0, gains=None, motor_strength=None,
@@ -161,8 +161,8 @@ class TestByHand:
         np.testing.assert_array_equal(seen[0], ~seen[1])
         np.testing.assert_array_equal(seen[2:], seen[:2])
 
-    def test_joint_offset_is_observed(self, cart, calm):
-        task = calm(
+    def test_joint_offset_is_observed(self, cart, nominal_task):
+        task = nominal_task(
             2,
             domain_rand=DomainRand(
                 friction=None, added_mass=None, com_shift=0, gains=None, motor_strength=None,
@@ -178,8 +178,8 @@ class TestByHand:
 
 
 class TestStateCopies:
-    def test_state_is_unchanged_by_later_steps(self, quadruped, lively):
-        env = LeggedEnv(lively(3), quadruped, Plane())
+    def test_state_is_unchanged_by_later_steps(self, quadruped, random_task):
+        env = LeggedEnv(random_task(3), quadruped, Plane())
         env.step(torch.zeros(3, 12))
         kept = env.state
         before = {field.name: getattr(kept, field.name).copy() for field in fields(State)}
@@ -188,9 +188,9 @@ class TestStateCopies:
         for name, value in before.items():
             np.testing.assert_array_equal(getattr(kept, name), value, err_msg=name)
 
-    def test_state_shares_no_memory(self, quadruped, lively):
+    def test_state_shares_no_memory(self, quadruped, random_task):
         # A reward that modifies the state must not change the simulation.
-        env = LeggedEnv(lively(3), quadruped, Plane())
+        env = LeggedEnv(random_task(3), quadruped, Plane())
         env.step(torch.zeros(3, 12))
         own = [env.sim.batch.state, *vars(env.params).values(), env.commands]
         own += [env.joint_offset, env.pushes.velocity, env.sensors.air_time, env.actions]
@@ -198,29 +198,31 @@ class TestStateCopies:
             value = getattr(env.state, field.name)
             assert not any(np.shares_memory(value, other) for other in own), field.name
 
-    def test_state_is_single_precision(self, quadruped, calm, map_ground):
-        env = LeggedEnv(calm(3), quadruped, map_ground)
+    def test_state_is_single_precision(self, quadruped, nominal_task, map_ground):
+        env = LeggedEnv(nominal_task(3), quadruped, map_ground)
         env.step(torch.zeros(3, 12))
         for field in fields(State):
             value = getattr(env.state, field.name)
             assert value.dtype in (np.float32, np.bool_), field.name
 
-    def test_update_replaces_some_rows(self, quadruped, lively):
-        first = LeggedEnv(lively(4), quadruped, Plane()).state
+    def test_update_replaces_some_rows(self, quadruped, random_task):
+        first = LeggedEnv(random_task(4), quadruped, Plane()).state
         before = first.base_pos.copy()
-        other = LeggedEnv(lively(2, init_state=InitState(position=3.0)), quadruped, Plane()).state
+        other = LeggedEnv(
+            random_task(2, init_state=InitState(position=3.0)), quadruped, Plane()
+        ).state
         first.update(np.array([1, 3]), other)
         np.testing.assert_array_equal(first.base_pos[[1, 3]], other.base_pos)
         np.testing.assert_array_equal(first.base_pos[[0, 2]], before[[0, 2]])
 
-    def test_state_after_reset_is_fresh(self, quadruped, calm):
-        env = LeggedEnv(calm(3), quadruped, Plane())
+    def test_state_after_reset_is_fresh(self, quadruped, nominal_task):
+        env = LeggedEnv(nominal_task(3), quadruped, Plane())
         for _ in range(30):
             env.step(torch.full((3, 12), 0.5))
         env.sim.qpos[1, 3:7] = (0, 1, 0, 0)  # on its back: a fall
         _, _, dones, _ = env.step(torch.zeros(3, 12))
         assert dones.tolist() == [False, True, False]
-        new = LeggedEnv(calm(3), quadruped, Plane()).state
+        new = LeggedEnv(nominal_task(3), quadruped, Plane()).state
         for field in fields(State):
             if field.name in ("commands", "foot_height", "foot_vel"):
                 continue

@@ -181,7 +181,7 @@ def test_task_of_the_guide_can_be_trained(guide):
     assert (guide.name, guide.folder) == ("trotter", QUADRUPED)
     assert guide.task.rewards.trot == 0.5
     text = guide.task.to_toml()
-    assert "# One diagonal pair of feet on the ground" in text
+    assert "# One diagonal pair of feet is on the ground" in text
     assert Task.from_toml(text.replace("trot = 0.5", "trot = 2.0"), guide.task).rewards.trot == 2.0
     task = replace(guide.task, env=Env(num_envs=4, num_threads=1))
     env = LeggedEnv(task, scene.Robot.load(guide.folder), Plane())

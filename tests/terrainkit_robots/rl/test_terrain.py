@@ -337,8 +337,10 @@ class TestHeightScan:
 
     @pytest.mark.parametrize("yaw", [0.0, 0.7, 2.5, -1.6])
     @pytest.mark.parametrize("tilt", [0.0, 0.2])
-    def test_height_scan_matches_rays(self, quadruped, calm, mixed_map, yaw, tilt):
-        env = LeggedEnv(calm(1, init_state=InitState(position=0)), quadruped, MapTerrain(mixed_map))
+    def test_height_scan_matches_rays(self, quadruped, nominal_task, mixed_map, yaw, tilt):
+        env = LeggedEnv(
+            nominal_task(1, init_state=InitState(position=0)), quadruped, MapTerrain(mixed_map)
+        )
         quat = np.zeros(4)
         turn = np.array([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)])
         pitch = np.array([np.cos(tilt / 2), 0, np.sin(tilt / 2), 0])
@@ -350,8 +352,8 @@ class TestHeightScan:
         np.testing.assert_allclose(state.height_scan[0], self.cast(env, yaw), atol=EXACT)
         assert np.ptp(state.height_scan) > 0.05
 
-    def test_base_height_is_above_the_ground(self, quadruped, calm, mixed_map):
-        env = LeggedEnv(calm(6), quadruped, MapTerrain(mixed_map))
+    def test_base_height_is_above_the_ground(self, quadruped, nominal_task, mixed_map):
+        env = LeggedEnv(nominal_task(6), quadruped, MapTerrain(mixed_map))
         env.sim.qpos[:, :2] += np.random.default_rng(0).uniform(-1, 1, (6, 2))
         state = env._compute_state(np.arange(6))
         under = rays(
@@ -359,7 +361,7 @@ class TestHeightScan:
         )
         np.testing.assert_allclose(state.base_height, env.sim.qpos[:, 2] - under, atol=EXACT)
 
-    def test_no_height_scan_on_a_plane(self, quadruped, calm):
-        env = LeggedEnv(calm(1), quadruped, Plane())
+    def test_no_height_scan_on_a_plane(self, quadruped, nominal_task):
+        env = LeggedEnv(nominal_task(1), quadruped, Plane())
         assert env.get_observations()["policy"].shape == (1, 45)
         assert env.state.height_scan.shape == (1, 0)

@@ -1,7 +1,6 @@
 import math
 import re
 from functools import cache
-from pathlib import Path
 
 import pytest
 
@@ -14,8 +13,7 @@ from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import TIME_STEP, make_sim_model
 from terrainkit_robots.simulation.time_step import max_stable_time_step
-
-BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]
+from tests.robots import BUNDLED
 
 # Published gains by joint, stiffness and damping: a1 of walk-these-ways, anymal_c and cassie of
 # legged_gym, go2, h1 and g1 of unitree_rl_gym and Isaac Lab.
@@ -111,13 +109,8 @@ def written(folder, text):
     return read(path)
 
 
-def path_of(name, robot_file):
-    stem, suffix = Path(name).stem, Path(name).suffix
-    return bundled.find(stem).with_suffix(suffix) if name in BUNDLED else robot_file(name)
-
-
 def facts_of(name, robot_file):
-    path = path_of(name, robot_file)
+    path = robot_file(name)
     return repaired(path) if name in INVALID else read(path)
 
 

@@ -1,6 +1,5 @@
 import math
 from functools import cache
-from pathlib import Path
 
 import pytest
 
@@ -15,7 +14,6 @@ from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import make_sim_model
 from terrainkit_robots.simulation.standing import contact_areas, stand_test
 
-BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]
 QUADRUPEDS = ["a1/urdf/a1.urdf", "go2/urdf/go2.urdf", "go2_mjcf/go2.xml"]
 BIPEDS = ["h1/h1.xml", "g1/g1_29dof.urdf"]
 
@@ -26,8 +24,7 @@ def read(path):
 
 
 def facts_of(name, robot_file):
-    stem, suffix = Path(name).stem, Path(name).suffix
-    return read(bundled.find(stem).with_suffix(suffix) if name in BUNDLED else robot_file(name))
+    return read(robot_file(name))
 
 
 def stand(facts, **keys):

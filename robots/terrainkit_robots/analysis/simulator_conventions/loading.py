@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from terrainkit.text import truncate
 from terrainkit_robots.analysis.bodies.tree import Tree
 from terrainkit_robots.description.mjcf.tree import MAX_ELEMENTS, is_allowed
 from terrainkit_robots.description.model import RobotModel
 from terrainkit_robots.description.xml.document import RobotFileError, parse_xml, read_bytes
 from terrainkit_robots.files import open_regular
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.text import truncate
 
 if TYPE_CHECKING:
     from lxml import etree

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 
+from terrainkit.text import truncate
 from terrainkit_robots.description.model import (
     Geometry,
     Inertial,
@@ -29,7 +30,6 @@ from terrainkit_robots.description.urdf.tags import has_variable, misspelled_nam
 from terrainkit_robots.description.xml.document import XmlDocument
 from terrainkit_robots.description.xml.number_text import place_text
 from terrainkit_robots.description.xml.numbers import parse_numbers, replace_commas
-from terrainkit_robots.text import truncate
 from terrainkit_robots.transforms import Matrix, matrix_to_rpy, quat_to_matrix, rpy_to_matrix
 
 

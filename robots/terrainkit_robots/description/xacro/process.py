@@ -17,8 +17,8 @@ from typing import Any
 from xml.dom import expatbuilder
 from xml.parsers import expat
 
+from terrainkit.text import truncate
 from terrainkit_robots.description.package_resolver import PackageResolver
-from terrainkit_robots.text import truncate
 
 ORIGIN = "terrainkit-origin"
 """Attribute that stores the file and line of an element during the expansion."""
@@ -162,7 +162,7 @@ def _check_expression(text: str) -> None:
             )
 
 
-# PackageResolver
+# Packages
 
 
 def _install_find(
@@ -287,13 +287,9 @@ def _error_message(error: BaseException, request: Mapping[str, Any]) -> str:
         if isinstance(cause, OSError):
             return f"xacro: cannot read {cause.filename}: {cause.strerror}"
     macro = next(iter(getattr(error, "macros", ())), None)
-    words = f"{error}{_in_macro(macro)}" or type(error).__name__
-    return f"xacro: {truncate(' '.join(words.split()), _MAX_MESSAGE)}"
-
-
-def _in_macro(macro: Any) -> str:
     name = macro.body.getAttribute("name") if macro is not None else ""
-    return f" of macro {name}" if name else ""
+    words = f"{error} of macro {name}" if name else str(error) or type(error).__name__
+    return f"xacro: {truncate(' '.join(words.split()), _MAX_MESSAGE)}"
 
 
 def _chain(error: BaseException | None) -> Iterator[BaseException]:

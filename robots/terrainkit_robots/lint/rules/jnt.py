@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from terrainkit.text import closest, truncate
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.joint_roles import robot_joints
@@ -18,7 +19,7 @@ from terrainkit_robots.lint.rules.inr import (
     implausible_density,
     negative_mass,
 )
-from terrainkit_robots.text import closest, count, names, truncate
+from terrainkit_robots.text import count, names
 from terrainkit_robots.transforms import Matrix
 
 _MIN_AXIS_LENGTH = 1e-6

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from difflib import SequenceMatcher
 from functools import cached_property
 
+from terrainkit.text import truncate
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint, Link
 from terrainkit_robots.lint.rule import Violation, rule
-from terrainkit_robots.text import names, truncate
+from terrainkit_robots.text import names
 
 _MIN_PAIRS = 4
 """Minimum number of mirrored pairs from which a naming pattern is derived."""

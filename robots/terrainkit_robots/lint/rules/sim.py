@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from terrainkit.text import truncate
 from terrainkit_robots.analysis.bodies.joint_order import permutation
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
@@ -20,7 +21,7 @@ from terrainkit_robots.analysis.simulator_conventions.joint_order import (
     SimulatorOrder,
 )
 from terrainkit_robots.lint.rule import Violation, rule
-from terrainkit_robots.text import names, truncate
+from terrainkit_robots.text import names
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.simulator_conventions.loading import LoadError

@@ -2,13 +2,14 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from terrainkit.text import closest, truncate
 from terrainkit_robots.analysis.bodies.tree import Tree
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.fix import Fix, InsertChild
 from terrainkit_robots.description.model import Joint, Link
 from terrainkit_robots.lint.rule import Violation, get_rule, rule
-from terrainkit_robots.text import closest, names, truncate
+from terrainkit_robots.text import names
 
 _MAX_SUGGESTIONS = 20
 """Maximum number of unknown names for which a similar name is suggested. Generated files may have

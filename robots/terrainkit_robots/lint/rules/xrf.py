@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from terrainkit.text import truncate
 from terrainkit_robots.analysis.bodies.joint_order import is_reordered, permutation
 from terrainkit_robots.analysis.cached_fact import cached_fact
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
@@ -19,7 +20,7 @@ from terrainkit_robots.lint.compare.body_masses import (
     relative_difference,
 )
 from terrainkit_robots.lint.rule import Severity, Violation, rule
-from terrainkit_robots.text import count, names, truncate
+from terrainkit_robots.text import count, names
 from terrainkit_robots.transforms import Matrix
 
 if TYPE_CHECKING:

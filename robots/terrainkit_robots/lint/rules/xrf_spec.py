@@ -3,12 +3,13 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from terrainkit.text import closest, truncate
 from terrainkit_robots.analysis.bodies.joint_order import is_reordered, permutation
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.rule import Violation, rule
 from terrainkit_robots.spec.per_joint import match_joints
-from terrainkit_robots.text import closest, names, truncate
+from terrainkit_robots.text import names
 
 if TYPE_CHECKING:
     from terrainkit_robots.spec.robot_spec import RobotSpec

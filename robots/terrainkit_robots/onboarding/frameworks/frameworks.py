@@ -29,20 +29,20 @@ def framework_names() -> tuple[str, ...]:
     return tuple(sorted(name for name in modules if hasattr(_get_module(name), "LEGGED_ONLY")))
 
 
-def config_file_name(framework: str) -> str:
+def config_file_name(name: str) -> str:
     """Return the file name of a configuration.
 
     Raises:
         ConfigError: if the framework is unknown.
     """
-    if framework not in framework_names():
-        expected = expected_names(framework, framework_names(), "expected")
-        raise ConfigError(f"framework: got {framework!r}; {expected}")
-    return f"{framework}_config.py"  # a file with the name of the framework would shadow it
+    if name not in framework_names():
+        expected = expected_names(name, framework_names(), "expected")
+        raise ConfigError(f"framework: got {name!r}; {expected}")
+    return f"{name}_config.py"  # a file with the name of the framework would shadow it
 
 
 def config_text(
-    framework: str,
+    name: str,
     spec: RobotSpec,
     *,
     bodies: Sequence[str] = (),
@@ -52,7 +52,7 @@ def config_text(
     """Return the configuration of a robot, a Python file for the folder of its robot.toml.
 
     Args:
-        framework: The name of a framework.
+        name: The name of a framework.
         spec: The spec of the robot.
         bodies: Names of all bodies after fixed joints are merged, by default those in the spec.
             legged_gym finds bodies by substrings, which must not match other bodies.
@@ -63,21 +63,21 @@ def config_text(
     Raises:
         ConfigError: if the framework is unknown, or does not support the robot.
     """
-    config_file_name(framework)
+    config_file_name(name)
     robot = ConfigRobot(spec=spec, bodies=bodies, limits=limits, passive_joints=passive_joints)
-    module = _get_module(framework)
+    module = _get_module(name)
     if module.LEGGED_ONLY:
-        others = [name for name in framework_names() if not _get_module(name).LEGGED_ONLY]
-        check_legs(robot, framework, others)
+        others = [other for other in framework_names() if not _get_module(other).LEGGED_ONLY]
+        check_legs(robot, name, others)
     make_text: Callable[[ConfigRobot], str] = module.config_text
     return make_text(robot)
 
 
-def robot_config_text(framework: str, facts: "Facts", spec: RobotSpec) -> str:
+def robot_config_text(name: str, facts: "Facts", spec: RobotSpec) -> str:
     """Return the configuration of a robot whose facts are known.
 
     Args:
-        framework: The name of a framework.
+        name: The name of a framework.
         facts: Facts of the robot in robot.urdf.
         spec: The spec of the robot.
 
@@ -86,7 +86,7 @@ def robot_config_text(framework: str, facts: "Facts", spec: RobotSpec) -> str:
     """
     joints = facts.model.joints
     return config_text(
-        framework,
+        name,
         spec,
         bodies=(*(body_name(body) for body in facts.bodies), *spec.feet),
         limits={joint.name: joint.range for joint in joints if joint.range is not None},

@@ -29,12 +29,12 @@ HERE = [
 """The statement that finds the folder of the configuration."""
 
 
-def check_legs(robot: ConfigRobot, framework: str, others: Sequence[str]) -> None:
+def check_legs(robot: ConfigRobot, name: str, others: Sequence[str]) -> None:
     """Check that a robot can be trained to walk.
 
     Args:
         robot: The robot.
-        framework: Name of the framework.
+        name: Name of the framework.
         others: Frameworks that support other robots.
 
     Raises:
@@ -44,17 +44,17 @@ def check_legs(robot: ConfigRobot, framework: str, others: Sequence[str]) -> Non
     spec = robot.spec
     if not spec.feet or not spec.joint_order:
         raise ConfigError(
-            f"{robot.title} has no legs, but {framework} requires a legged robot; "
+            f"{robot.title} has no legs, but {name} requires a legged robot; "
             f"other frameworks: {listing(others)}"
         )
     if robot.passive_joints:
         raise ConfigError(
-            f"{names(robot.passive_joints)} of {robot.title} have no actuator, but {framework} "
+            f"{names(robot.passive_joints)} of {robot.title} have no actuator, but {name} "
             f"actuates all joints; other frameworks: {listing(others)}"
         )
     if not spec.floating:
         raise ConfigError(
-            f"the base of {robot.title} is fixed, but {framework} requires a floating base"
+            f"the base of {robot.title} is fixed, but {name} requires a floating base"
         )
     if spec.spawn_height is None or spec.base_height_target is None:
         raise ConfigError(f"{robot.title} has no spawn_height or base_height_target")

@@ -7,10 +7,9 @@ import pytest
 
 from terrainkit_robots.analysis.bodies.kinematics import ancestors, body_poses, joint_axis
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
+from tests.robots import BUNDLED
 
-BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]
 URDFS = [
     "a1/urdf/a1.urdf",
     "go2/urdf/go2.urdf",
@@ -31,11 +30,6 @@ MJCFS = [
 def facts(text, name="robot.urdf"):
     file = Path("/robots") / name
     return Facts(load_robot(file, contents={file: text.encode()}))
-
-
-def path_of(name, robot_file):
-    stem, suffix = Path(name).stem, Path(name).suffix
-    return bundled.find(stem).with_suffix(suffix) if name in BUNDLED else robot_file(name)
 
 
 def random_positions(joints, rng):
@@ -153,7 +147,7 @@ def test_body_poses_of_long_chain():
 @pytest.mark.parametrize("name", URDFS)
 def test_body_poses_match_yourdfpy(name, robot_file):
     yourdfpy = pytest.importorskip("yourdfpy")
-    path = path_of(name, robot_file)
+    path = robot_file(name)
     robot = Facts(load_robot(path))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -208,7 +202,7 @@ def without_meshes(path):
 
 @pytest.mark.parametrize("name", MJCFS)
 def test_body_poses_match_mujoco(name, robot_file):
-    path = path_of(name, robot_file)
+    path = robot_file(name)
     robot, model = Facts(load_robot(path)), without_meshes(path)
     rng = np.random.default_rng(0)
     for _ in range(5):

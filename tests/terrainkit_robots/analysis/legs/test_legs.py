@@ -7,11 +7,9 @@ import pytest
 from lxml import etree
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 
 FILE = Path("/robots/robot.urdf")
-BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]
 
 DOG = ("roll", "hip", "knee")
 HUMAN = ("hip", "roll", "yaw", "knee", "ankle", "roll")
@@ -48,11 +46,6 @@ KNOWN = {
 URDFS = [name for name in KNOWN if name.endswith(".urdf")]
 
 
-def path_of(name, robot_file):
-    stem, suffix = Path(name).stem, Path(name).suffix
-    return bundled.find(stem).with_suffix(suffix) if name in BUNDLED else robot_file(name)
-
-
 def facts(text, file=FILE):
     return Facts(
         load_robot(file, contents={file: text if isinstance(text, bytes) else text.encode()})
@@ -62,7 +55,7 @@ def facts(text, file=FILE):
 @pytest.mark.parametrize("name", KNOWN)
 def test_legs_of_published_robots(name, robot_file):
     feet, roles, length = KNOWN[name]
-    legs = Facts(load_robot(path_of(name, robot_file))).legs
+    legs = Facts(load_robot(robot_file(name))).legs
     assert [leg.foot for leg in legs] == feet
     assert {leg.roles for leg in legs} == {roles}
     for leg in legs:
@@ -73,7 +66,7 @@ def test_legs_of_published_robots(name, robot_file):
 
 
 def test_leg_joint_by_role(robot_file):
-    leg = Facts(load_robot(path_of("h1/urdf/h1.urdf", robot_file))).legs[0]
+    leg = Facts(load_robot(robot_file("h1/urdf/h1.urdf"))).legs[0]
     assert leg.joint("yaw").name == "left_hip_yaw_joint"
     assert leg.joint("hip").name == "left_hip_pitch_joint"
     assert leg.joint("knee").name == "left_knee_joint"
@@ -126,7 +119,7 @@ def original(robot_file):
 
     def parsed(name):
         if name not in read:
-            path = path_of(name, robot_file)
+            path = robot_file(name)
             root = etree.parse(str(path)).getroot()
             for visual in list(root.iter("visual")):
                 visual.getparent().remove(visual)

@@ -15,9 +15,9 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.stance import GRAVITY, compute_stance, ground_forces
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
+from tests.robots import BUNDLED
 
 FILE = Path("/robots/robot.urdf")
-BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]
 ROBOTS = [
     "a1/urdf/a1.urdf",
     "go2/urdf/go2.urdf",
@@ -29,11 +29,6 @@ ROBOTS = [
     *BUNDLED,
 ]
 every_robot = pytest.mark.parametrize("name", ROBOTS)
-
-
-def path_of(name, robot_file):
-    stem, suffix = Path(name).stem, Path(name).suffix
-    return bundled.find(stem).with_suffix(suffix) if name in BUNDLED else robot_file(name)
 
 
 @cache
@@ -107,7 +102,7 @@ def on_the_ground(model, data):
 
 @every_robot
 def test_stance_height_touches_ground_in_mujoco(name, robot_file):
-    path = path_of(name, robot_file)
+    path = robot_file(name)
     stance, model = read(path).stance, compiled(path)
     assert on_the_ground(model, placed(model, stance, stance.height + 1e-4)) == []
     touching = on_the_ground(model, placed(model, stance, stance.height - 1e-4))
@@ -136,7 +131,7 @@ def same_torques(facts, model):
 
 @every_robot
 def test_stance_torques_match_mujoco(name, robot_file):
-    path = path_of(name, robot_file)
+    path = robot_file(name)
     same_torques(read(path), compiled(path))
 
 
@@ -165,7 +160,7 @@ def test_stance_torque_of_waist_matches_mujoco(tmp_path):
 
 @every_robot
 def test_stance_center_matches_mujoco(name, robot_file):
-    path = path_of(name, robot_file)
+    path = robot_file(name)
     facts = read(path)
     data = placed(compiled(path), facts.stance, 0.0)
     trunk = data.body(facts.bodies[0].top.name).id
@@ -174,7 +169,7 @@ def test_stance_center_matches_mujoco(name, robot_file):
 
 @every_robot
 def test_stance_of_published_robots_is_valid(name, robot_file):
-    facts = read(path_of(name, robot_file))
+    facts = read(robot_file(name))
     stance = facts.stance
     assert stance.margin > 0.02
     assert len(stance.contacts) == len(facts.legs)
@@ -356,7 +351,7 @@ def test_ground_forces_are_balanced(feet):
 
 @every_robot
 def test_force_points_are_within_soles(name, robot_file):
-    facts = read(path_of(name, robot_file))
+    facts = read(robot_file(name))
     stance = facts.stance
     poses = body_poses(facts.bodies, stance.positions)
     for leg, place in zip(facts.legs, stance.force_points, strict=True):

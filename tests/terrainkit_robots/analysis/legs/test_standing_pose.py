@@ -36,7 +36,7 @@ every_urdf = pytest.mark.parametrize("name", URDFS)
 
 
 def load(name, robot_file):
-    return read(bundled.find(Path(name).stem) if "/" not in name else robot_file(name))
+    return read(robot_file(name))
 
 
 @cache

@@ -10,9 +10,9 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.symmetry.mirror import Mirror, swap_sides
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
+from tests.robots import BUNDLED
 
 FILE = Path("/robots/robot.urdf")
-BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]
 PAIRS = {
     "a1/urdf/a1.urdf": 6,
     "go2/urdf/go2.urdf": 6,
@@ -29,9 +29,7 @@ every_robot = pytest.mark.parametrize("name", PAIRS)
 
 
 def load(name, robot_file):
-    stem, suffix = Path(name).stem, Path(name).suffix
-    path = bundled.find(stem).with_suffix(suffix) if name in BUNDLED else robot_file(name)
-    return Facts(load_robot(path))
+    return Facts(load_robot(robot_file(name)))
 
 
 def facts(*joints):
