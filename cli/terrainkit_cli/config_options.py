@@ -86,10 +86,10 @@ class TaskCommand(ConfigCommand):
     robot: Annotated[
         str, tyro.conf.Positional, tyro.conf.arg(metavar="ROBOT", help_behavior_hint="")
     ] = ""
-    """Name of a task, or a folder of terrainkit onboard."""
+    """Name of a bundled task, or a folder written by terrainkit onboard."""
 
     config: Text = ""
-    """TOML file with values of the task; options override it."""
+    """Values of the task (.toml); options override them."""
 
     ALIASES: ClassVar[Mapping[str, str]] = {}
     """Shorter options of values of the task."""

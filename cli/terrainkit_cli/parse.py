@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+import inspect
 import io
 import re
 import sys
@@ -65,15 +66,18 @@ def parse(command: type[_Command], prog: str, arguments: list[str]) -> _Command:
     """
     import tyro
 
+    # tyro would keep some line breaks of docstrings.
+    paragraphs = (inspect.getdoc(command) or "").split("\n\n")
+    description = "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
     if {"-h", "--help"} & set(arguments):
-        docs = field_docs(command)  # tyro would keep the line breaks of docstrings
+        docs = field_docs(command)
         for field in dataclasses.fields(command):
             field.metadata = MappingProxyType({"help": docs.get(field.name, "")})
     stdout, stderr = io.TextIOWrapper(io.BytesIO(), sys.stdout.encoding), io.StringIO()
     stdout.isatty = sys.stdout.isatty  # type: ignore[method-assign]  # for colors
     try:
         with contextlib.redirect_stdout(stdout), contextlib.redirect_stderr(stderr):
-            return tyro.cli(command, prog=prog, args=arguments)
+            return tyro.cli(command, prog=prog, description=description, args=arguments)
     except SystemExit as end:
         if end.code in (0, None):
             stdout.seek(0)

@@ -153,7 +153,7 @@ class Steps:
     def __init__(self, status: "Status | None") -> None:
         self._status = status
 
-    def say(self, step: str) -> None:
+    def update(self, step: str) -> None:
         """Show a step."""
         if self._status is not None:
             self._status.update(step)

@@ -113,7 +113,7 @@ def test_check_robot_formats_several_files(here):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ((), "FILE is missing"),
+        ((), "FILE: missing"),
         (
             ("none.urdf",),
             "robot file: got none.urdf, which does not exist; bundled robots are: ",
@@ -342,7 +342,7 @@ def test_rule_all_lists_rules(here):
     ("words", "said"),
     [
         (("INR002", "--all"), "got CODE and --all; expected one of them"),
-        (("INR999",), "no rule 'INR999'; did you mean 'INR00"),
+        (("INR999",), "no rule 'INR999'; there are: XML001"),
     ],
 )
 def test_rule_rejects_unknown_code(here, words, said):
