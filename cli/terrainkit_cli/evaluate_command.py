@@ -10,7 +10,14 @@ import tyro
 from terrainkit.errors import ConfigError
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
-from terrainkit_cli.robot_options import UNSET, Checkpoint, Output, optional_number, text_option
+from terrainkit_cli.robot_options import (
+    UNSET,
+    Checkpoint,
+    Flag,
+    Output,
+    optional_number,
+    text_option,
+)
 
 if TYPE_CHECKING:
     from terrainkit_robots.policy.evaluate import (
@@ -35,31 +42,31 @@ class PolicyCommand(Command):
     policy."""
 
     terrain: Annotated[str, text_option("TERRAIN")] = ""
-    """Terrain: plane, a map (.npz), a map config (.toml), or a MuJoCo model (.xml); by default the
-    terrain of the training."""
+    """plane, a map (.npz), a map config (.toml), or a MuJoCo model (.xml); by default, the terrain
+    of the training."""
 
     command: Annotated[
         tuple[float, float, float],
         tyro.conf.arg(metavar="VX VY YAW", help_behavior_hint=""),
     ] = _NO_COMMAND
-    """Command for all robots: forward and left velocity [m/s], yaw velocity [rad/s]."""
+    """The same command for all robots: forward and left velocity [m/s], yaw velocity [rad/s]."""
 
-    random_commands: bool = False
+    random_commands: Flag = False
     """Sample commands as in training."""
 
     num_envs: Annotated[
         int, tyro.conf.arg(metavar="INT", help_behavior_hint="(default: depends on the terrain)")
     ] = UNSET
-    """Number of robots."""
+    """Number of simulated robots."""
 
     checkpoint: Checkpoint = UNSET
     """The checkpoint to load."""
 
     seed: int = 1
-    """Seed of the start positions and of random commands."""
+    """Seed of the initial positions and of random commands."""
 
-    device: str = "cpu"
-    """Device of the policy, as torch names it."""
+    device: Annotated[str, text_option("DEVICE")] = "cpu"
+    """Device of the policy: cpu (the default), cuda, cuda:1."""
 
     def load_run(self) -> "Run":
         """Return the run.
@@ -70,7 +77,7 @@ class PolicyCommand(Command):
         from terrainkit_cli.training_extra import require_training
 
         if not self.policy:
-            raise ConfigError("RUN is missing; expected a run, a checkpoint, or a robot's name")
+            raise ConfigError("RUN: missing; expected a run, a checkpoint, or the name of a robot")
         require_training()
         from terrainkit_robots.rl.run import open_run
 
@@ -114,7 +121,7 @@ class Evaluate(PolicyCommand):
     output: Output = ""
     """Write the result to this file, as JSON."""
 
-    overwrite: bool = False
+    overwrite: Flag = False
     """Replace an existing file."""
 
     def run(self) -> int:
@@ -131,7 +138,7 @@ class Evaluate(PolicyCommand):
             result = evaluate(
                 run,
                 self.evaluation_config(self.seconds),
-                lambda fraction: steps.say(f"rollout: {fraction:.0%} of {self.seconds:g} s"),
+                lambda fraction: steps.update(f"rollout: {fraction:.0%} of {self.seconds:g} s"),
             )
         if self.format == "json":
             render.report(result.as_json())

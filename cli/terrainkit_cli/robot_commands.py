@@ -12,6 +12,7 @@ from terrainkit.errors import ConfigError, TerrainkitError
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import (
+    Flag,
     Output,
     Packages,
     StringList,
@@ -21,7 +22,7 @@ from terrainkit_cli.robot_options import (
     parse_ignore,
     parse_packages,
     parse_xacro_arguments,
-    repeatable,
+    repeated_option,
     split_commas,
 )
 
@@ -41,8 +42,9 @@ class CheckRobot(Command):
 
     Default options are read from [tool.terrainkit.check-robot] in pyproject.toml or [check-robot]
     in terrainkit.toml, in the folder of the robot or above it: select, ignore, package, xacro-arg,
-    strict, simulation. A comment in the robot file suppresses a rule for the element that it is
-    in, on the same line as, or above:
+    strict, simulation. A comment suppresses a rule for the element that contains it, that is on
+    the same line, or that follows it:
+
     <!-- terrainkit: ignore INR004 the reason -->
     """
 
@@ -59,43 +61,43 @@ class CheckRobot(Command):
     output: Output = ""
     """Write the report to this file. An existing file is replaced."""
 
-    select: Annotated[StringList, *repeatable("CODES")] = field(default_factory=list)
+    select: Annotated[StringList, *repeated_option("CODES")] = field(default_factory=list)
     """Run only these rules: comma-separated codes, prefixes of codes, or names."""
 
-    ignore: Annotated[StringList, *repeatable("CODES=REASON")] = field(default_factory=list)
+    ignore: Annotated[StringList, *repeated_option("CODES=REASON")] = field(default_factory=list)
     """Do not run these rules; the reason is printed in the report."""
 
     package: Packages = field(default_factory=list)
     """Folder of a ROS package, for package:// and $(find ...)."""
 
     xacro_arg: XacroArguments = field(default_factory=list)
-    """Value of a xacro argument."""
+    """Value of a xacro argument of the file."""
 
     against: Text = ""
-    """Another file of the same robot to compare with: URDF, xacro or MJCF."""
+    """Compare with another file of the same robot: URDF, xacro or MJCF."""
 
     spec: Text = ""
-    """The robot.toml of the robot to compare with."""
+    """Compare with the robot.toml of the robot."""
 
-    simulation: bool = True
+    simulation: Flag = True
     """Run the rules that simulate the robot (drop test, standing test, joint sweep)."""
 
-    strict: bool = False
+    strict: Flag = False
     """Exit with code 1 if there are warnings."""
 
-    fix: bool = False
-    """Apply the fixes that do not change the robot for any parser that can read the file."""
+    fix: Flag = False
+    """Apply the safe fixes: they do not change the robot for any parser that reads the file."""
 
-    unsafe_fixes: bool = False
+    unsafe_fixes: Flag = False
     """Also apply fixes that change a number, a shape or another file. Review the result."""
 
-    diff: bool = False
-    """Print the changes of --fix or --unsafe-fixes without writing them."""
+    diff: Flag = False
+    """Print the changes of --fix or --unsafe-fixes, and write nothing."""
 
     def run(self) -> int:
         """Check each file and print the reports."""
         if not self.files:
-            raise ConfigError("FILE is missing; expected robot files, quadruped or biped")
+            raise ConfigError("FILE: missing; expected robot files, quadruped, or biped")
         if self.diff and self.format != "text":
             raise ConfigError(f"--diff prints a diff and cannot be combined with {self.format}")
         if len(self.files) > 1 and (self.against or self.spec):
@@ -257,14 +259,14 @@ def _check_output(output: Path, inputs: Sequence[Path]) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Rule(Command):
-    """Print what a rule of check-robot checks, why it matters, and how to fix its findings."""
+    """Explain a rule of check-robot: what it checks, why, and how to fix findings."""
 
     code: Annotated[
         str, tyro.conf.Positional, tyro.conf.arg(metavar="CODE", help_behavior_hint="")
     ] = ""
-    """Code or name of the rule."""
+    """Code or name of the rule; without it, all rules are listed."""
 
-    all: bool = False
+    all: Flag = False
     """List all rules."""
 
     def run(self) -> int:

@@ -19,7 +19,7 @@ from terrainkit_cli.robot_options import (
     parse_ignore,
     parse_packages,
     parse_xacro_arguments,
-    repeatable,
+    repeated_option,
 )
 from terrainkit_cli.training_extra import require_training
 
@@ -51,7 +51,7 @@ class SmokeTest(Command):
     output: Output = ""
     """Write the report to this file; an existing file is replaced."""
 
-    ignore: Annotated[StringList, *repeatable("CODES=REASON")] = field(default_factory=list)
+    ignore: Annotated[StringList, *repeated_option("CODES=REASON")] = field(default_factory=list)
     """For robot files: rules to ignore, with the reason."""
 
     package: Packages = field(default_factory=list)
@@ -70,7 +70,7 @@ class SmokeTest(Command):
         results: dict[str, SmokeTestResult] = {}
         with render.steps() as steps:
             for name in self.robots:
-                steps.say(f"smoke test of {name}")
+                steps.update(f"smoke test of {name}")
                 try:
                     results[name] = self._smoke_test(name)
                 except TerrainkitError as error:
@@ -92,7 +92,7 @@ class SmokeTest(Command):
 
     def _check_options(self) -> None:
         if not self.robots:
-            raise ConfigError("ROBOT is missing; expected a name, a folder, or a robot file")
+            raise ConfigError("ROBOT: missing; expected a name, a folder, or a robot file")
         if self.spec and len(self.robots) > 1:
             raise ConfigError(f"--spec: got {len(self.robots)} robots; expected one")
         names = "package", "xacro-arg", "ignore", "spec"

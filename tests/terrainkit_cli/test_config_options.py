@@ -165,13 +165,13 @@ def test_onboarded_folder_has_the_default_task(tmp_path):
     [
         (
             ("quadruped", "--rewards.traking-lin-vel", "1"),
-            r"^no option --rewards\.traking-lin-vel; did you mean --rewards\.tracking-lin-vel\?; ",
+            r"^no option --rewards\.traking-lin-vel; did you mean --rewards\.tracking-lin-vel\?$",
         ),
         (("quadruped", "--rewards.wheel-slip", "1"), r"^no option --rewards\.wheel-slip"),
         (("quadruped", "--reward.torques", "1"), r"did you mean --rewards\.torques\?"),
-        (("quadruped", "--rewards.torques"), r"Missing value for argument '--rewards\.torques'"),
-        (("quadruped", "--terain", "x"), r"^no option --terain; did you mean --terrain\?; --help"),
-        (("quadruped", "rough.npz"), r"Unrecognized .*rough\.npz"),
+        (("quadruped", "--rewards.torques"), r"^--rewards\.torques: too few values; expected 1"),
+        (("quadruped", "--terain", "x"), r"^no option --terain; did you mean --terrain\?$"),
+        (("quadruped", "rough.npz"), r"^got rough\.npz; expected no more arguments"),
     ],
 )
 def test_unknown_option_suggests_nearest_one(words, told):

@@ -106,7 +106,7 @@ def test_evaluate_bundled_policy_by_name(here):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ((), "RUN is missing; expected"),
+        ((), "RUN: missing; expected"),
         (("walk", "--checkpoint", "5"), "expected one of: 3, 7"),
         (("walk", "--seconds", "-1"), "seconds: got -1.0; expected a number > 0"),
         (("walk", "--checkpoint", "-5"), "expected one of: 3, 7"),

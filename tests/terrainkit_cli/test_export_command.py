@@ -126,13 +126,13 @@ def test_export_map(here, tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ((), "MAP or RUN is missing"),
+        ((), "MAP.npz or RUN: missing"),
         (("unicorn",), "no map, run or robot unicorn; robots are: biped"),
         (("none.npz", "-o", "a.stl"), "no file none.npz"),
         (("none.pt",), "run: got none.pt"),
         (("empty",), "empty has no run.toml"),
         (("text.txt", "-o", "a.stl"), "text.txt"),
-        (("map.npz",), "--output is missing; expected a file"),
+        (("map.npz",), "--output: missing; expected a file"),
         (
             ("map.npz", "-o", "a.xml", "--checkpoint", 3),
             "--checkpoint: got the map map.npz",

@@ -91,7 +91,7 @@ def test_onboard_does_not_suggest_force_without_robot(here, tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ([], "FILE is missing"),
+        ([], "FILE: missing"),
         (["nothing.urdf"], "robot file: got nothing.urdf"),
         (["arm.urdf", "-o", "no/where"], "the folder no does not exist"),
         (["arm.urdf", "-o", "arm.urdf"], "is not a folder"),

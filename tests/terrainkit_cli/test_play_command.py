@@ -110,7 +110,7 @@ def test_play_checks_the_target_first(here, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ((), "RUN is missing; expected"),
+        ((), "RUN: missing; expected"),
         (("walk", "-o", "walk.avi"), "ends in .mp4"),
         (("walk", "--size", "99", "64"), "expected two even numbers"),
         (("walk", "--robots", "0"), "robots: got 0"),

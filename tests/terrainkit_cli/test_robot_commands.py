@@ -113,7 +113,7 @@ def test_check_robot_formats_several_files(here):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ((), "FILE is missing"),
+        ((), "FILE: missing"),
         (
             ("none.urdf",),
             "robot file: got none.urdf, which does not exist; bundled robots are: ",

@@ -134,7 +134,7 @@ def test_file_options_are_passed_on(here, calls, tmp_path):
     [
         (("a", "--format", "sarif"), "sarif"),
         (("a", "b", "--spec", "c.toml"), "--spec: got 2 robots; expected one"),
-        ((), "ROBOT is missing"),
+        ((), "ROBOT: missing"),
         (("a", "--package", "my=."), "--package: got no robot file among a"),
         (("a", "b", "--xacro-arg", "arm:=false"), "--xacro-arg: got no robot file among a, b"),
         (("a", "--ignore", "MSH=no meshes"), "--ignore: got no robot file"),

@@ -245,6 +245,22 @@ def test_export_writes_every_format(terrainkit, tmp_path, small, name):
     assert (tmp_path / name).stat().st_size > 1000
 
 
+@pytest.mark.parametrize(
+    ("collision", "is_hinted"), [((), True), ("hfield", False), ("boxes", False)]
+)
+def test_export_hints_at_other_collision(terrainkit, collision, is_hinted):
+    terrainkit("generate", "-o", "a.npz", "--rows", 1, "--cols", 1, "--terrain", "rough_slope")
+    options = ("--collision", collision) if collision else ()
+    run = terrainkit("export", "a.npz", "-o", "a.xml", *options)
+    assert run.returncode == 0, run.stderr
+    assert ("--collision boxes" in run.stdout) == is_hinted
+
+
+def test_generate_quotes_paths_in_commands(terrainkit):
+    run = terrainkit("generate", "-o", "my map.npz", "--rows", 1)
+    assert "terrainkit preview 'my map.npz' -o" in run.stdout
+
+
 def test_export_rejects_option_of_other_format(terrainkit, small):
     run = terrainkit("export", small, "-o", "a.stl", "--collision", "boxes")
     assert run.returncode == 2
@@ -254,7 +270,7 @@ def test_export_rejects_option_of_other_format(terrainkit, small):
 def test_check_map_accepts_generated_map(terrainkit, small):
     run = terrainkit("check-map", small)
     assert run.returncode == 0
-    assert "no problems found" in run.stdout
+    assert "no issues" in run.stdout
 
 
 def test_check_map_reports_issues(terrainkit, tmp_path, small):
@@ -264,7 +280,7 @@ def test_check_map_reports_issues(terrainkit, tmp_path, small):
     run = terrainkit("check-map", "broken.npz")
     assert run.returncode == 1
     assert "spawn: patch (1, 2): the spawn origin is 0.200 m above the ground" in run.stdout
-    assert "broken.npz: 1 findings" in run.stdout
+    assert run.stdout.endswith("broken.npz: 1 issue\n")
 
 
 def test_generate_avoids_slow_imports(tmp_path):

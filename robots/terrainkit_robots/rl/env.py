@@ -35,7 +35,7 @@ BoolArray = NDArray[np.bool_]
 
 
 class LeggedEnv(VecEnv):
-    """Legged robots as rsl-rl's `VecEnv`: numpy inside, fresh tensors at the border."""
+    """Legged robots as rsl-rl's `VecEnv`; returned tensors are never modified later."""
 
     def __init__(self, task: Task, robot: Robot, terrain: Terrain, device: str = "cpu") -> None:
         """Build the simulations and reset every environment.
@@ -79,7 +79,7 @@ class LeggedEnv(VecEnv):
         self.joint_offset = np.zeros((n, joints), np.float32)
         self.rewards = active_rewards(task.rewards)
         self.episode_sums = {name: np.zeros(n, np.float32) for name in self.rewards}
-        self.commands = self.velocity_command.commands  # live
+        self.commands = self.velocity_command.commands  # a view of the current commands
 
         # A motor receives offset + scale * action.
         kind, scale = task.control.control_type, task.control.action_scale
@@ -95,7 +95,7 @@ class LeggedEnv(VecEnv):
 
     @property
     def episode_length_buf(self) -> torch.Tensor:
-        """Length of each episode so far [steps], shape (n,); live."""
+        """View of the length of each episode so far [steps], shape (n,)."""
         return torch.from_numpy(self.episode_length)
 
     @episode_length_buf.setter
@@ -329,7 +329,7 @@ class LeggedEnv(VecEnv):
         self._observations = TensorDict(groups, batch_size=[self.num_envs]).to(self.device)
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
-        """Return the arrays to save by name; live."""
+        """Return views of the arrays to save, by name."""
         arrays = {
             "physics": self.sim.batch.state,
             "episode_length": self.episode_length,

@@ -7,7 +7,6 @@ versions), `map.toml` (the config of its map, if any), and `model_<iteration>.pt
 import hashlib
 import io
 import re
-import tempfile
 import zipfile
 from collections import deque
 from collections.abc import Mapping
@@ -19,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from terrainkit.atomic_write import atomic_write
+from terrainkit.atomic_write import atomic_write, temporary_folder
 from terrainkit.errors import ConfigError, ExportError, listing
 from terrainkit.schema import Config
 from terrainkit.text import expected_names
@@ -169,8 +168,8 @@ def write_run_folder(folder: Path, files: Mapping[str, bytes]) -> None:
                 f"{folder} exists; choose another folder, or continue with --resume {folder}"
             )
         folder.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".terrainkit-", dir=folder.parent) as work:
-            made = Path(work) / folder.name
+        with temporary_folder(folder.parent) as work:
+            made = work / folder.name
             made.mkdir()
             for name, data in files.items():
                 (made / name).write_bytes(data)

@@ -245,7 +245,7 @@ class LeggedRunner(OnPolicyRunner):
                 self.alg.load(state, {**parts, "optimizer": False}, strict)
                 return {}
             self.alg.load(state, parts, strict)
-            processes = state["processes"]  # processes in excess share the last state
+            processes = state["processes"]  # additional processes use the last state
             process = processes[min(self.gpu_global_rank, len(processes) - 1)]
             if load_cfg is not None:
                 if load_cfg.get("curriculum"):

@@ -17,7 +17,7 @@ Ids = NDArray[np.int64]
 
 
 class Simulation:
-    """n simulations of a scene; the bound arrays change with every step."""
+    """n simulations of a scene; its arrays are views that change with every step."""
 
     def __init__(self, scene: Scene, num_envs: int, num_threads: int = 0) -> None:
         """Allocate the simulations in the model's default state."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.surface import HeightfieldSurface
+from terrainkit.text import closest
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.geoms import measure_heights
 
@@ -180,7 +181,8 @@ def load_terrain(source: str | Path, collision: Collision = "auto") -> Terrain:
         if not path.is_file():
             raise ConfigError(f"there is no file {path}")
         return ModelTerrain(path)
+    suggestion = " did you mean 'plane'?" if closest(str(source), ["plane"]) else ""
     raise ConfigError(
-        f"terrain: got {str(source)!r}; expected plane, a map (.npz), the config of a map (.toml), "
-        "or a MuJoCo model (.xml)"
+        f"terrain: got {str(source)!r};{suggestion} expected plane, a map (.npz), "
+        "the config of a map (.toml), or a MuJoCo model (.xml)"
     )

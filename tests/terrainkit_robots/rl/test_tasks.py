@@ -33,8 +33,8 @@ def plugin(monkeypatch):
 
     def install(value):
         point = importlib.metadata.EntryPoint("rover", value, tasks.ENTRY_POINTS)
-        found = {tasks.ENTRY_POINTS: (point,)}
-        monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: found[group])
+        points = importlib.metadata.EntryPoints((point,))
+        monkeypatch.setattr(importlib.metadata, "entry_points", points.select)
 
     return install
 
