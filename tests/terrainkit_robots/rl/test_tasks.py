@@ -165,7 +165,7 @@ def guide(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(rewards, "REWARDS", dict(rewards.REWARDS))
     found = (importlib.metadata.EntryPoint(name, module, tasks.ENTRY_POINTS),)
-    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: found)  # noqa: ARG005
+    monkeypatch.setattr(importlib.metadata, "entry_points", points.select)
     yield get_task(name)
     for loaded in (module, module.partition(".")[0]):
         sys.modules.pop(loaded, None)
