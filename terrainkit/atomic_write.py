@@ -1,9 +1,9 @@
 """Write files atomically: completely or not at all."""
 
 import os
+import secrets
 import shutil
 import socket
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -74,8 +74,10 @@ def temporary_folder(parent: Path) -> Iterator[Path]:
         pid = stale.name.removeprefix(prefix).partition("-")[0]
         if pid.isdecimal() and not _is_running(int(pid)):
             shutil.rmtree(stale, ignore_errors=True)
-    folder = Path(tempfile.mkdtemp(prefix=f"{prefix}{os.getpid()}-", dir=parent))
+    # Named before it exists, so that a signal during its creation cannot leave it behind.
+    folder = parent / f"{prefix}{os.getpid()}-{secrets.token_hex(4)}"
     try:
+        folder.mkdir(mode=0o700)
         yield folder
     finally:
         shutil.rmtree(folder, ignore_errors=True)
