@@ -1,4 +1,4 @@
-"""The values of a config as options: `--rows 4`, `--rewards.tracking-lin-vel 1.5`.
+"""Command-line options for the values of a config, such as `--rewards.tracking-lin-vel 1.5`.
 
 `--help` shows the values that the options change: those of the task or the file that is named.
 """

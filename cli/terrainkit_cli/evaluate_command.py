@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from terrainkit_robots.rl.run import Run
 
 _NO_COMMAND = (-math.inf, -math.inf, -math.inf)
-"""No command; not None, since tyro's errors about a union name its members."""
+"""Value of --command if it is not given; with None, tyro's errors name the types of a union."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,10 +106,10 @@ class PolicyCommand(Command):
 class Evaluate(PolicyCommand):
     """Measure how well a policy walks: velocity errors, falls, success by terrain and level.
 
-    On a plane each robot gets a command of a grid over the ranges of the task. On a map the robots
-    walk forward from every patch, each until it has crossed half a patch. There is no noise, no
-    push and no domain randomization. The first 2 s after a command are not measured, nor is
-    anything after a fall. The same seed gives the same result.
+    On a plane, the commands of the robots form a grid over the command ranges of the task. On a
+    map, robots walk forward from the spawn origin of every patch until they have crossed half of
+    it. The rollout has no noise, pushes or domain randomization. The first 2 s after a command are
+    not measured, and nothing is measured after a fall. The same seed gives the same result.
     """
 
     seconds: float = 20.0
@@ -125,7 +125,7 @@ class Evaluate(PolicyCommand):
     """Replace an existing file."""
 
     def run(self) -> int:
-        """Evaluate, and print or write the result."""
+        """Evaluate the policy, and print or write the result."""
         from terrainkit.atomic_write import atomic_write, check_target
 
         output = Path(self.output) if self.output else None

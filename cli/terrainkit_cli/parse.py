@@ -1,4 +1,4 @@
-"""Command-line arguments to a command: a frozen dataclass whose docstrings are its help."""
+"""Parse command-line arguments into a command, a dataclass whose docstrings are its help."""
 
 import contextlib
 import dataclasses

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 class Play(PolicyCommand):
     """Show how a policy walks: a video (.mp4), and a table of errors, falls and success.
 
-    On a plane the robots walk in formation, with --command or a sequence of commands. On a map
-    there is one robot per patch, and the video follows some of them on different terrains.
+    On a plane, the robots walk in formation, with --command or a sequence of commands. On a map,
+    one robot walks on each patch, and the video follows some of them on different terrains.
     """
 
     seconds: float = 12.0
@@ -40,7 +40,7 @@ class Play(PolicyCommand):
     """Size of the video [pixels]."""
 
     video: Flag = True
-    """Write a video, not only print the table."""
+    """Write a video; --no-video only prints the table."""
 
     viewer: Flag = False
     """Show one robot in MuJoCo's viewer until its window is closed, and write nothing."""

@@ -42,8 +42,8 @@ class CheckRobot(Command):
 
     Default options are read from [tool.terrainkit.check-robot] in pyproject.toml or [check-robot]
     in terrainkit.toml, in the folder of the robot or above it: select, ignore, package, xacro-arg,
-    strict, simulation. A comment suppresses a rule for the element that contains it, that is on
-    the same line, or that follows it:
+    strict, simulation. A comment suppresses a rule for the element that contains it, for those
+    on the same line, and for the next one:
 
     <!-- terrainkit: ignore INR004 the reason -->
     """
@@ -262,7 +262,7 @@ class Rule(Command):
     """Explain a rule of check-robot: what it checks, why, and how to fix findings."""
 
     code: Annotated[
-        str, tyro.conf.Positional, tyro.conf.arg(metavar="CODE", help_behavior_hint="")
+        str, tyro.conf.Positional, tyro.conf.arg(metavar="[CODE]", help_behavior_hint="")
     ] = ""
     """Code or name of the rule; without it, all rules are listed."""
 

@@ -34,8 +34,10 @@ SCHEMA_VERSION = 2
 class SmokeTest(Command):
     """Check in seconds whether a robot can be trained: it stands, gets rewards, and learns.
 
-    Robot files are onboarded into a temporary folder first. Exit code 0: every robot can be
-    trained. 1: a check failed. 2: a robot cannot be read, or an option is invalid.
+    Robot files are onboarded into a temporary folder first.
+
+    Exit code 0: every robot can be trained. 1: a check failed. 2: a robot cannot be read, or an
+    option is invalid.
     """
 
     robots: Annotated[

@@ -115,7 +115,7 @@ def _parameters(text: str) -> dict[str, Value | Range]:
 
 @dataclass(frozen=True, kw_only=True)
 class List(Command):
-    """List the terrains, or the parameters of one."""
+    """List the terrains and presets, or the parameters of a terrain."""
 
     terrain: Annotated[
         str, tyro.conf.Positional, tyro.conf.arg(metavar="[TERRAIN]", help_behavior_hint="")
@@ -148,8 +148,7 @@ class List(Command):
 
 
 _WHOLE_MAP = (-sys.maxsize, -sys.maxsize)
-"""Value of --patch if it is not given; not None, since tyro's errors about a union name its
-members."""
+"""Value of --patch if it is not given; with None, tyro's errors name the types of a union."""
 
 
 @dataclass(frozen=True, kw_only=True)

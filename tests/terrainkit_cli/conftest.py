@@ -36,8 +36,8 @@ def called(capsys) -> Callable[..., Run]:
     def run(*words: object) -> Run:
         capsys.readouterr()
         code = main([str(word) for word in words])
-        said = capsys.readouterr()
-        return Run(words, code, said.out, said.err)
+        captured = capsys.readouterr()
+        return Run(words, code, captured.out, captured.err)
 
     return run
 

@@ -86,7 +86,7 @@ def test_export_checkpoint_by_file_or_iteration(here, run_folder, tmp_path):
 
 
 @pytest.mark.usefixtures("run_folder")
-def test_export_overwrites_only_if_told(here, tmp_path):
+def test_export_overwrites_with_option_only(here, tmp_path):
     assert here("export", "run", "-o", "policy").returncode == 0
     (tmp_path / "policy" / "policy.pt").write_bytes(b"mine")
     run = here("export", "run", "-o", "policy")

@@ -38,7 +38,7 @@ def calls(monkeypatch):
     return calls
 
 
-def test_failed_check_is_shown_with_its_expectation(here, tmp_path):
+def test_smoke_test_shows_expectation_of_failed_check(here, tmp_path):
     shutil.copytree(get_task("quadruped").folder, tmp_path / "mine")
     spec = tmp_path / "mine" / "robot.toml"
     text = spec.read_text()
@@ -56,7 +56,7 @@ def test_failed_check_is_shown_with_its_expectation(here, tmp_path):
     assert lines[-1].startswith("quadruped: 1 of ")
 
 
-def test_exit_code_is_the_worst_result(here, calls):
+def test_smoke_test_exit_code_is_worst_result(here, calls):
     for words, code in (
         (("good",), 0),
         (("bad",), 1),
@@ -72,7 +72,7 @@ def test_exit_code_is_the_worst_result(here, calls):
 
 
 @pytest.mark.usefixtures("calls")
-def test_text_report_lists_the_checks(here):
+def test_smoke_test_text_lists_checks(here):
     assert here("good", "bad").stdout == (
         "robot     GOOD (good)\n"
         "\n"
@@ -91,7 +91,7 @@ def test_text_report_lists_the_checks(here):
 
 
 @pytest.mark.usefixtures("calls")
-def test_json_report_is_a_document_per_robot(here):
+def test_smoke_test_json_has_document_per_robot(here):
     run = here("bad", "--format", "json")
     assert run.returncode == 1
     document = json.loads(run.stdout)
@@ -109,7 +109,7 @@ def test_json_report_is_a_document_per_robot(here):
 
 
 @pytest.mark.usefixtures("calls")
-def test_report_is_written_to_a_file(here, tmp_path):
+def test_smoke_test_writes_report_to_file(here, tmp_path):
     run = here("good", "bad", "--format", "json", "-o", "report.json")
     assert run.returncode == 1
     assert run.stdout == "wrote report.json: GOOD can be trained, BAD: 1 of 2 checks failed\n"
@@ -117,7 +117,7 @@ def test_report_is_written_to_a_file(here, tmp_path):
     assert [json.loads(line)["file"] for line in lines] == ["good", "bad"]
 
 
-def test_file_options_are_passed_on(here, calls, tmp_path):
+def test_smoke_test_passes_file_options(here, calls, tmp_path):
     (tmp_path / "meshes").mkdir()
     (tmp_path / "a").touch()
     words = ("--package", "my=meshes", "--xacro-arg", "arm:=false", "--ignore", "MSH=no meshes")
@@ -143,7 +143,7 @@ def test_file_options_are_passed_on(here, calls, tmp_path):
         (("a", "-o", "."), "it is a folder"),
     ],
 )
-def test_invalid_options_are_rejected_before_the_test(here, calls, words, message):
+def test_smoke_test_rejects_options_first(here, calls, words, message):
     run = here(*words)
     assert run.returncode == 2
     assert run.stdout == ""
@@ -152,7 +152,7 @@ def test_invalid_options_are_rejected_before_the_test(here, calls, words, messag
     assert calls == []
 
 
-def test_unknown_robot_is_one_line(here):
+def test_smoke_test_rejects_unknown_robot(here):
     run = here("unicorn")
     assert run.returncode == 2
     assert run.stdout == ""
@@ -160,7 +160,7 @@ def test_unknown_robot_is_one_line(here):
     assert "biped, quadruped" in run.stderr
 
 
-def test_missing_extra_is_named(here, monkeypatch):
+def test_smoke_test_names_missing_extra(here, monkeypatch):
     monkeypatch.setattr(training_extra, "_PACKAGES", ("no_such_package",))
     run = here("quadruped")
     assert run.returncode == 2

@@ -207,11 +207,11 @@ def test_list_terrain_shows_parameters(terrainkit):
 
 
 def test_info_describes_the_map(terrainkit, small):
-    said = terrainkit("info", small).stdout
-    assert "2 x 5 of 8 m x 6 m" in said
-    assert "82 x" not in said
-    assert "180 x 320, one every 0.1 m" in said  # 2 x 80 and 5 x 60 cells, and 10 on each side
-    assert "rough_slope" in said
+    output = terrainkit("info", small).stdout
+    assert "2 x 5 of 8 m x 6 m" in output
+    assert "82 x" not in output
+    assert "180 x 320, one every 0.1 m" in output  # 2 x 80 and 5 x 60 cells, and 10 on each side
+    assert "rough_slope" in output
 
 
 def test_info_patch_shows_requested_and_realized(terrainkit):
