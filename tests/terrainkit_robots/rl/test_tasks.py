@@ -164,7 +164,8 @@ def guide(tmp_path, monkeypatch):
     path.write_text(code[0])
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(rewards, "REWARDS", dict(rewards.REWARDS))
-    found = (importlib.metadata.EntryPoint(name, module, tasks.ENTRY_POINTS),)
+    point = importlib.metadata.EntryPoint(name, module, tasks.ENTRY_POINTS)
+    points = importlib.metadata.EntryPoints((point,))
     monkeypatch.setattr(importlib.metadata, "entry_points", points.select)
     yield get_task(name)
     for loaded in (module, module.partition(".")[0]):
