@@ -157,14 +157,9 @@ class LeggedRunner(OnPolicyRunner):
         progress_callback: ProgressCallback | None = None,
         should_stop: Callable[[], object] = lambda: False,
     ) -> None:
-        """Create the networks.
+        """Create the networks; without a `folder`, no checkpoints and logs are written.
 
-        Args:
-            env: The environment.
-            folder: Folder for checkpoints and logs; None writes nothing.
-            device: Device of the networks: `cpu`, `cuda`, `cuda:1`.
-            progress_callback: Called after each iteration.
-            should_stop: Called before each iteration; True stops with a checkpoint.
+        `should_stop` is called before each iteration: True stops training with a checkpoint.
         """
         self.folder = folder
         self._progress_callback, self._should_stop = progress_callback, should_stop

@@ -363,7 +363,7 @@ class TestStateDict:
     def test_load_rejects_other_version(self, quadruped, random_task, part, name):
         saved = LeggedEnv(random_task(3), quadruped, Plane()).state_dict()
         del saved[part][name]
-        with pytest.raises(ConfigError, match=f"{name} belongs to another .* version of terrainkit"):
+        with pytest.raises(ConfigError, match=f"{name} belongs .* version of terrainkit"):
             LeggedEnv(random_task(3), quadruped, Plane()).load_state_dict(saved)
         LeggedEnv(random_task(4), quadruped, Plane()).load_state_dict(saved)
 
