@@ -13,10 +13,10 @@ from terrainkit_cli import render
 from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import (
     Flag,
+    InputPath,
     Output,
     Packages,
     StringList,
-    Text,
     XacroArguments,
     find_robot,
     parse_ignore,
@@ -62,7 +62,7 @@ class Onboard(Command):
     """Type of the base: floating, or fixed to the world. With auto, it is floating if the file
     says so, or if the robot has legs or wheels."""
 
-    spec: Text = ""
+    spec: InputPath = ""
     """A robot.toml whose values override the derived ones, such as one that you have edited."""
 
     unsafe_fixes: Flag = False

@@ -13,10 +13,10 @@ from terrainkit_cli import render
 from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import (
     Flag,
+    InputPath,
     Output,
     Packages,
     StringList,
-    Text,
     XacroArguments,
     find_robot,
     parse_ignore,
@@ -73,10 +73,10 @@ class CheckRobot(Command):
     xacro_arg: XacroArguments = field(default_factory=list)
     """Value of a xacro argument of the file."""
 
-    against: Text = ""
+    against: InputPath = ""
     """Compare with another file of the same robot: URDF, xacro or MJCF."""
 
-    spec: Text = ""
+    spec: InputPath = ""
     """Compare with the robot.toml of the robot."""
 
     simulation: Flag = True

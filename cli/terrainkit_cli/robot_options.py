@@ -29,7 +29,7 @@ def text_option(metavar: str, *aliases: str) -> object:
 
 Packages = Annotated[StringList, *repeated_option("NAME=DIR")]
 XacroArguments = Annotated[StringList, *repeated_option("NAME:=VALUE")]
-Text = Annotated[str, text_option("PATH")]
+InputPath = Annotated[str, text_option("PATH")]
 Output = Annotated[str, text_option("PATH", "-o")]
 
 Flag = Annotated[bool, tyro.conf.arg(help_behavior_hint=lambda text: f"(default: {text.lower()})")]
