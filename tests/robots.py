@@ -2,10 +2,10 @@
 
 from terrainkit_robots.description import bundled
 
-QUADRUPED = bundled.find("quadruped")
+QUADRUPED = bundled.urdf_path("quadruped")
 """The URDF of the bundled quadruped; its MJCF is in the same folder."""
 
-BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]
+BUNDLED = [f"{name}{suffix}" for name in bundled.robot_names() for suffix in (".urdf", ".xml")]
 """Names of all bundled files, such as `quadruped.xml`. `robot_file` finds them."""
 
 ARM = """<robot name="arm">

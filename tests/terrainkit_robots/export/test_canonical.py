@@ -54,7 +54,7 @@ def test_canonical_robot_is_equivalent(name, robot_file):
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
 @pytest.mark.parametrize("suffix", [".urdf", ".xml"])
 def test_canonical_bundled_robot_is_equivalent(name, suffix):
-    check_same(Facts(load_robot(bundled.find(name).with_suffix(suffix))))
+    check_same(Facts(load_robot(bundled.urdf_path(name).with_suffix(suffix))))
 
 
 def check_same(source):
