@@ -24,9 +24,9 @@ from terrainkit_robots.policy.smoke_test import (
 from terrainkit_robots.rl.config import Control, Env, Rewards, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.rewards import REWARDS
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.spec.robot import Robot
 
 TASK = Task(env=Env(num_envs=16, num_threads=1))
 

@@ -15,8 +15,8 @@ from terrainkit_robots.rl.commands import VelocityCommand, sample_commands, uses
 from terrainkit_robots.rl.config import Commands, Control, DomainRand, Env, InitState, Rewards, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.rewards import REWARDS
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import quat_to_yaw
 
 torch.set_num_threads(1)

@@ -14,8 +14,8 @@ from terrainkit_robots.rl.commands import VelocityCommand, sample_commands
 from terrainkit_robots.rl.config import Commands, DomainRand, Env, InitState, Task, Terrain
 from terrainkit_robots.rl.curriculum import TerrainCurriculum
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.spec.robot import Robot
 
 torch.set_num_threads(1)
 

@@ -20,9 +20,10 @@ from terrainkit_robots.rl.events import (
     sample_params,
     sample_reset_state,
 )
-from terrainkit_robots.rl.scene import Robot, build_scene
+from terrainkit_robots.rl.scene import build_scene
 from terrainkit_robots.rl.simulation import Simulation
 from terrainkit_robots.rl.terrain import MapTerrain, Plane
+from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import quat_to_yaw
 
 _NONE = DomainRand(

@@ -18,9 +18,9 @@ from terrainkit_robots.rl.observations import (
     policy_group,
     privileged_group,
 )
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.spec.robot import Robot
 
 torch.set_num_threads(1)
 

@@ -16,9 +16,9 @@ from terrainkit_robots.rl import rewards as module
 from terrainkit_robots.rl.config import Env, Rewards, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.rewards import REWARDS, active_rewards, reward
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.spec.robot import Robot
 
 torch.set_num_threads(1)
 

@@ -33,8 +33,8 @@ def plugin(monkeypatch):
 
     def install(value):
         point = importlib.metadata.EntryPoint("rover", value, tasks.ENTRY_POINTS)
-        found = {tasks.ENTRY_POINTS: (point,)}
-        monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: found[group])
+        points = importlib.metadata.EntryPoints((point,))
+        monkeypatch.setattr(importlib.metadata, "entry_points", points.select)
 
     return install
 
@@ -164,8 +164,9 @@ def guide(tmp_path, monkeypatch):
     path.write_text(code[0])
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(rewards, "REWARDS", dict(rewards.REWARDS))
-    found = (importlib.metadata.EntryPoint(name, module, tasks.ENTRY_POINTS),)
-    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: found)  # noqa: ARG005
+    point = importlib.metadata.EntryPoint(name, module, tasks.ENTRY_POINTS)
+    points = importlib.metadata.EntryPoints((point,))
+    monkeypatch.setattr(importlib.metadata, "entry_points", points.select)
     yield get_task(name)
     for loaded in (module, module.partition(".")[0]):
         sys.modules.pop(loaded, None)
