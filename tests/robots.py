@@ -8,6 +8,19 @@ QUADRUPED = bundled.urdf_path("quadruped")
 BUNDLED = [f"{name}{suffix}" for name in bundled.robot_names() for suffix in (".urdf", ".xml")]
 """Names of all bundled files, such as `quadruped.xml`. `robot_file` finds them."""
 
+REAL_ROBOTS = [
+    "a1/urdf/a1.urdf",
+    "go2/urdf/go2.urdf",
+    "go2_mjcf/go2.xml",
+    "h1/urdf/h1.urdf",
+    "h1/h1.xml",
+    "g1/g1_29dof.urdf",
+    "g1/g1_29dof.xml",
+    "anymal_c/urdf/anymal_c.urdf",
+    "cassie/urdf/cassie.urdf",
+]
+"""Robot files of other projects. `robot_file` finds them, or skips the test."""
+
 ARM = """<robot name="arm">
   <link name="stand"><inertial><mass value="5"/>
     <inertia ixx="0.05" iyy="0.05" izz="0.05" ixy="0" ixz="0" iyz="0"/></inertial>
