@@ -156,7 +156,7 @@ class CheckRobot(Command):
         from terrainkit_robots.lint.settings import read_settings
 
         path = find_robot(name)
-        is_bundled = path == bundled.find(name)
+        is_bundled = path == bundled.urdf_path(name)
         settings = options.over(read_settings(Path() if is_bundled else path.parent))
         against = find_robot(self.against) if self.against else None
 

@@ -61,9 +61,9 @@ def find_robot(name: str) -> Path:
     try:
         if path.is_file():
             return path
-        bundled_path = bundled.find(name)
+        bundled_path = bundled.urdf_path(name)
         if bundled_path is None and not path.exists():
-            expected = expected_names(name, bundled.names(), "bundled robots are")
+            expected = expected_names(name, bundled.robot_names(), "bundled robots are")
             raise ConfigError(f"robot file: got {name}, which does not exist; {expected}")
     except OSError as error:
         raise ConfigError(f"cannot read {name}: {error.strerror or error}") from error

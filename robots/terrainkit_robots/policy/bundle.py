@@ -5,8 +5,8 @@ from pathlib import Path
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.rl import run as runs
-from terrainkit_robots.rl.scene import SPEC_FILE
 from terrainkit_robots.rl.tasks import task_names
+from terrainkit_robots.spec.robot import SPEC_FILE
 
 
 def bundle_policy(run: runs.Run, folder: Path) -> runs.Run:

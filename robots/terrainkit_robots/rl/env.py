@@ -21,11 +21,12 @@ from terrainkit_robots.rl.observations import (
     uses_height_scan,
 )
 from terrainkit_robots.rl.rewards import active_rewards
-from terrainkit_robots.rl.scene import Robot, build_scene
+from terrainkit_robots.rl.scene import build_scene
 from terrainkit_robots.rl.simulation import Simulation, check_env_memory
 from terrainkit_robots.rl.state import Sensors, State
 from terrainkit_robots.rl.terminations import terrain_out_of_bounds
 from terrainkit_robots.rl.terrain import Terrain
+from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import quat_to_yaw
 
 FloatArray = NDArray[np.float32]

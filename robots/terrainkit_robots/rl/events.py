@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import DomainRand, InitState
-from terrainkit_robots.rl.scene import Robot, Scene
+from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.simulation import Simulation
 from terrainkit_robots.rl.terrain import Terrain
+from terrainkit_robots.spec.robot import Robot
 
 FloatArray = NDArray[np.float32]
 Ids = NDArray[np.int64]

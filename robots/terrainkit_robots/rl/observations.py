@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.state import State
+from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import quat_rotate_inverse
 
 FloatArray = NDArray[np.float32]

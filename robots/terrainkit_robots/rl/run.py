@@ -26,7 +26,7 @@ from terrainkit.toml_text import read_text
 from terrainkit_robots.files import open_regular
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.rl.scene import SPEC_FILE, Robot
+from terrainkit_robots.spec.robot import SPEC_FILE, Robot
 from terrainkit_robots.spec.robot_spec import RobotSpec
 from terrainkit_robots.text import free_name
 

@@ -5,6 +5,7 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,29 +38,27 @@ class Terrain(ABC):
     is_flat: bool = False
     """Whether the ground is level everywhere, so that a height scan carries no information."""
 
+    _surface: HeightfieldSurface
+
     @abstractmethod
     def spec(self) -> Any:
         """Return the terrain as an `mujoco.MjSpec`."""
 
-    @abstractmethod
     def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Return the height at points [m], broadcast over `x` and `y`."""
+        return self._surface.height(x, y)
 
 
 class Plane(Terrain):
     """An infinite plane at height 0."""
 
     is_flat = True
+    env_origins = np.zeros((1, 1, 3), np.float32)
     terrain_names = np.array([["plane"]])
     lower, upper = (-np.inf, -np.inf), (np.inf, np.inf)
 
-    def __init__(self) -> None:
-        self.env_origins = np.zeros((1, 1, 3), np.float32)
-
     def spec(self) -> Any:
         """Return a plane with a checkered surface."""
-        import mujoco
-
         spec = mujoco.MjSpec()
         _add_material(spec)
         plane = mujoco.mjtGeom.mjGEOM_PLANE
@@ -96,8 +95,6 @@ class MapTerrain(Terrain):
 
     def spec(self) -> Any:
         """Return the map as terrainkit exports it for MuJoCo."""
-        import mujoco
-
         with tempfile.TemporaryDirectory() as folder:
             path = self._map.save(Path(folder) / "ground.xml", collision=self._collision)
             spec = mujoco.MjSpec.from_file(str(path))
@@ -105,10 +102,6 @@ class MapTerrain(Terrain):
         for geom in spec.geoms:
             geom.material, geom.rgba = "ground", [1, 1, 1, 1]
         return spec
-
-    def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Return the height of the surface that MuJoCo collides with."""
-        return self._surface.height(x, y)
 
 
 class ModelTerrain(Terrain):
@@ -119,11 +112,8 @@ class ModelTerrain(Terrain):
     def __init__(self, path: Path, *, cell: float = 0.05, half_size: float = 20.0) -> None:
         """Measure the square of `half_size` [m] around the origin with samples every `cell` [m].
 
-        Raises:
-            ConfigError: If MuJoCo cannot read the model, or there is no ground at the origin.
+        Heights are accurate to the size of a cell at edges.
         """
-        import mujoco
-
         self._path = path
         try:
             with quiet_mujoco():
@@ -141,29 +131,20 @@ class ModelTerrain(Terrain):
             raise ConfigError(f"{path}: no ground at the origin, where robots spawn")
         # Where there is no ground, robots fall: any height far below will do.
         heights = np.where(np.isnan(heights), np.nanmin(heights) - 10, heights)
+        corner = (float(axis[0]), float(axis[0]))
         self._surface = HeightfieldSurface(
-            heights=heights.astype(np.float32),
-            first_sample=(float(axis[0]), float(axis[0])),
-            cell=cell,
+            heights=heights.astype(np.float32), first_sample=corner, cell=cell
         )
         self.env_origins = np.array([[[0, 0, center]]], np.float32)
         self.lower, self.upper = (-half_size, -half_size), (half_size, half_size)
 
     def spec(self) -> Any:
         """Return the model."""
-        import mujoco
-
         return mujoco.MjSpec.from_file(str(self._path))
-
-    def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Return the height, accurate to the size of a cell at edges."""
-        return self._surface.height(x, y)
 
 
 def _add_material(spec: Any) -> None:
     """Add a checkered material, on which motion is visible."""
-    import mujoco
-
     texture = spec.add_texture(name="ground", type=mujoco.mjtTexture.mjTEXTURE_2D)
     texture.builtin = mujoco.mjtBuiltin.mjBUILTIN_CHECKER
     texture.rgb1, texture.rgb2 = [0.62, 0.65, 0.68], [0.54, 0.57, 0.6]

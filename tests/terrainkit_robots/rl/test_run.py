@@ -33,8 +33,8 @@ from terrainkit_robots.rl.run import (
     rewrite_task,
     save_checkpoint,
 )
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.terrain import load_terrain
+from terrainkit_robots.spec.robot import Robot
 
 
 @pytest.fixture
