@@ -32,12 +32,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Onboard(Command):
-    """Convert a URDF, xacro or MJCF file into a folder that is ready for training.
+    """Convert a robot file into a folder that is ready for training.
 
-    The command checks the file, applies safe fixes and derives a default pose and PD gains. The
-    folder contains robot.toml (pose, gains, names: edit it), robot.urdf, robot.xml, scene.xml,
-    meshes, and report.md with pictures. The robot is then simulated to test that it stands. The
-    input file is never changed.
+    The command checks the file (URDF, xacro or MJCF), applies safe fixes and derives a default pose
+    and PD gains. The folder contains robot.toml (pose, gains, names: edit it), robot.urdf,
+    robot.xml, scene.xml, meshes, and report.md with pictures. The robot is then simulated to test
+    that it stands. The input file is never changed.
 
     Exit code 0: success. 1: errors remain in the file, or the robot does not stand. 2: a file
     cannot be read or written, or an option is invalid.

@@ -32,9 +32,10 @@ SCHEMA_VERSION = 2
 
 @dataclass(frozen=True, kw_only=True)
 class SmokeTest(Command):
-    """Check in seconds whether a robot can be trained: it stands, gets rewards, and learns.
+    """Check in seconds whether a robot can be trained.
 
-    Robot files are onboarded into a temporary folder first.
+    The robot must stand, get rewards, and learn. Robot files are onboarded into a temporary folder
+    first.
 
     Exit code 0: every robot can be trained. 1: a check failed. 2: a robot cannot be read, or an
     option is invalid.
