@@ -176,8 +176,8 @@ class RobotSpec(Config):
     """Mirror image of each actuated joint that has one, by name."""
 
     provenance: Mapping[Name, Provenance] = field(default_factory=dict)
-    """Origin of the values, by the name of the field, or by `field.key` for an entry of a table that
-    differs, such as `effort.FL_calf_joint`."""
+    """Origin of the values, by the name of the field, or by `field.key` for a differing entry of a
+    table, such as `effort.FL_calf_joint`."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
