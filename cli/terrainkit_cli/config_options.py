@@ -15,7 +15,7 @@ from terrainkit.errors import ConfigError
 from terrainkit.schema import Config, field_docs, field_types
 from terrainkit.type_hint import NONE, convert, parse_hint
 from terrainkit_cli.parse import Command, UsageError, check_options, option_names, parse, value_of
-from terrainkit_cli.robot_options import Text
+from terrainkit_cli.robot_options import InputPath
 
 if TYPE_CHECKING:
     from typing import Self
@@ -88,7 +88,7 @@ class TaskCommand(ConfigCommand):
     ] = ""
     """Name of a bundled task, or a folder written by terrainkit onboard."""
 
-    config: Text = ""
+    config: InputPath = ""
     """Values of the task (.toml); options override them."""
 
     ALIASES: ClassVar[Mapping[str, str]] = {}

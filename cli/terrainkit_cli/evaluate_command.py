@@ -104,7 +104,7 @@ class PolicyCommand(Command):
 
 @dataclass(frozen=True, kw_only=True)
 class Evaluate(PolicyCommand):
-    """Measure how well a policy walks: velocity errors, falls, success by terrain and level.
+    """Measure the velocity errors, falls and success of a policy.
 
     On a plane, the commands of the robots form a grid over the command ranges of the task. On a
     map, robots walk forward from the spawn origin of every patch until they have crossed half of

@@ -17,7 +17,7 @@ from terrainkit_cli.terrain_commands import written
 
 @dataclass(frozen=True, kw_only=True)
 class Export(Command):
-    """Export a map for simulators and 3D tools, or a policy for deployment.
+    """Export a map to other formats, or a policy to ONNX.
 
     A map (.npz) is written as .xml (MuJoCo), .stl, .ply, .obj, .glb or .png: the suffix of
     --output selects the format.

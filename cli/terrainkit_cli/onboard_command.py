@@ -13,10 +13,10 @@ from terrainkit_cli import render
 from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import (
     Flag,
+    InputPath,
     Output,
     Packages,
     StringList,
-    Text,
     XacroArguments,
     find_robot,
     parse_ignore,
@@ -32,12 +32,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Onboard(Command):
-    """Convert a URDF, xacro or MJCF file into a folder that is ready for training.
+    """Convert a robot file into a folder that is ready for training.
 
-    The command checks the file, applies safe fixes and derives a default pose and PD gains. The
-    folder contains robot.toml (pose, gains, names: edit it), robot.urdf, robot.xml, scene.xml,
-    meshes, and report.md with pictures. The robot is then simulated to test that it stands. The
-    input file is never changed.
+    The command checks the file (URDF, xacro or MJCF), applies safe fixes and derives a default pose
+    and PD gains. The folder contains robot.toml (pose, gains, names: edit it), robot.urdf,
+    robot.xml, scene.xml, meshes, and report.md with pictures. The robot is then simulated to test
+    that it stands. The input file is never changed.
 
     Exit code 0: success. 1: errors remain in the file, or the robot does not stand. 2: a file
     cannot be read or written, or an option is invalid.
@@ -62,7 +62,7 @@ class Onboard(Command):
     """Type of the base: floating, or fixed to the world. With auto, it is floating if the file
     says so, or if the robot has legs or wheels."""
 
-    spec: Text = ""
+    spec: InputPath = ""
     """A robot.toml whose values override the derived ones, such as one that you have edited."""
 
     unsafe_fixes: Flag = False

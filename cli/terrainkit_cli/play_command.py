@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Play(PolicyCommand):
-    """Show how a policy walks: a video (.mp4), and a table of errors, falls and success.
+    """Record a video of a policy, and print its errors and falls.
 
     On a plane, the robots walk in formation, with --command or a sequence of commands. On a map,
     one robot walks on each patch, and the video follows some of them on different terrains.

@@ -13,10 +13,10 @@ from terrainkit_cli import render
 from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import (
     Flag,
+    InputPath,
     Output,
     Packages,
     StringList,
-    Text,
     XacroArguments,
     find_robot,
     parse_ignore,
@@ -35,17 +35,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class CheckRobot(Command):
-    """Check URDF, xacro and MJCF files for errors that break training or simulation.
+    """Check URDF, xacro and MJCF files for errors.
+
+    The rules find errors that break training or simulation, from XML syntax to the behavior in
+    simulation; `terrainkit rule` lists them.
 
     Exit code 0: no errors, and no warnings with --strict. 1: errors were found. 2: a file cannot
     be read, or an option is invalid; the other files are still checked.
 
     Default options are read from [tool.terrainkit.check-robot] in pyproject.toml or [check-robot]
     in terrainkit.toml, in the folder of the robot or above it: select, ignore, package, xacro-arg,
-    strict, simulation. A comment suppresses a rule for the element that contains it, for those
-    on the same line, and for the next one:
+    strict, simulation.
 
-    <!-- terrainkit: ignore INR004 the reason -->
+    The comment <!-- terrainkit: ignore INR004 the reason --> suppresses a rule for the element that
+    contains it, for those on the same line, and for the next one.
     """
 
     files: Annotated[
@@ -73,10 +76,10 @@ class CheckRobot(Command):
     xacro_arg: XacroArguments = field(default_factory=list)
     """Value of a xacro argument of the file."""
 
-    against: Text = ""
+    against: InputPath = ""
     """Compare with another file of the same robot: URDF, xacro or MJCF."""
 
-    spec: Text = ""
+    spec: InputPath = ""
     """Compare with the robot.toml of the robot."""
 
     simulation: Flag = True
@@ -156,7 +159,7 @@ class CheckRobot(Command):
         from terrainkit_robots.lint.settings import read_settings
 
         path = find_robot(name)
-        is_bundled = path == bundled.find(name)
+        is_bundled = path == bundled.urdf_path(name)
         settings = options.over(read_settings(Path() if is_bundled else path.parent))
         against = find_robot(self.against) if self.against else None
 
@@ -259,7 +262,7 @@ def _check_output(output: Path, inputs: Sequence[Path]) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Rule(Command):
-    """Explain a rule of check-robot: what it checks, why, and how to fix findings."""
+    """Explain a rule of check-robot, or list all rules."""
 
     code: Annotated[
         str, tyro.conf.Positional, tyro.conf.arg(metavar="[CODE]", help_behavior_hint="")

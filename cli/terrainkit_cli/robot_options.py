@@ -29,7 +29,7 @@ def text_option(metavar: str, *aliases: str) -> object:
 
 Packages = Annotated[StringList, *repeated_option("NAME=DIR")]
 XacroArguments = Annotated[StringList, *repeated_option("NAME:=VALUE")]
-Text = Annotated[str, text_option("PATH")]
+InputPath = Annotated[str, text_option("PATH")]
 Output = Annotated[str, text_option("PATH", "-o")]
 
 Flag = Annotated[bool, tyro.conf.arg(help_behavior_hint=lambda text: f"(default: {text.lower()})")]
@@ -61,9 +61,9 @@ def find_robot(name: str) -> Path:
     try:
         if path.is_file():
             return path
-        bundled_path = bundled.find(name)
+        bundled_path = bundled.urdf_path(name)
         if bundled_path is None and not path.exists():
-            expected = expected_names(name, bundled.names(), "bundled robots are")
+            expected = expected_names(name, bundled.robot_names(), "bundled robots are")
             raise ConfigError(f"robot file: got {name}, which does not exist; {expected}")
     except OSError as error:
         raise ConfigError(f"cannot read {name}: {error.strerror or error}") from error

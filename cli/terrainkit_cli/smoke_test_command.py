@@ -11,10 +11,10 @@ from terrainkit.errors import ConfigError, TerrainkitError, listing
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import (
+    InputPath,
     Output,
     Packages,
     StringList,
-    Text,
     XacroArguments,
     parse_ignore,
     parse_packages,
@@ -32,9 +32,10 @@ SCHEMA_VERSION = 2
 
 @dataclass(frozen=True, kw_only=True)
 class SmokeTest(Command):
-    """Check in seconds whether a robot can be trained: it stands, gets rewards, and learns.
+    """Check in seconds whether a robot can be trained.
 
-    Robot files are onboarded into a temporary folder first.
+    The robot must stand, get rewards, and learn. Robot files are onboarded into a temporary folder
+    first.
 
     Exit code 0: every robot can be trained. 1: a check failed. 2: a robot cannot be read, or an
     option is invalid.
@@ -62,7 +63,7 @@ class SmokeTest(Command):
     xacro_arg: XacroArguments = field(default_factory=list)
     """For robot files: value of a xacro argument."""
 
-    spec: Text = ""
+    spec: InputPath = ""
     """For a robot file: a robot.toml whose values override the derived ones."""
 
     def run(self) -> int:
@@ -131,10 +132,12 @@ def summary(result: "SmokeTestResult") -> str:
 
 def as_text(results: "dict[str, SmokeTestResult]") -> str:
     """Return a table of checks for each robot, with the expectation of failed ones."""
+    from terrainkit_robots.text import display_path
+
     blocks = []
     for name, result in results.items():
         width = max(len(check.name) for check in result.checks)
-        lines = [f"robot     {result.robot} ({name})", ""]
+        lines = [f"robot     {result.robot} ({display_path(name)})", ""]
         for check in result.checks:
             word = "ok  " if check.passed else "FAIL"
             lines.append(f"{word}  {check.name.ljust(width)}  {check.measured}")

@@ -227,7 +227,7 @@ def _print_patch(terrain_map: TerrainMap, row: int, col: int) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Preview(Command):
-    """Render a map from above: relief, terrain names, levels and spawn origins."""
+    """Render a map from above, with terrain names and spawn origins."""
 
     map: MapFile
     """The map, a file written by terrainkit generate."""

@@ -107,13 +107,15 @@ def _print_result(result: "TrainResult", task: "Task") -> None:
     """Print the result and the next commands."""
     if result.folder is None:  # only the first of several processes prints
         return
+    from terrainkit_robots.text import count
+
     run = quote(str(result.folder))
     whole = task.runner.max_iterations
     if result.iteration < whole:
         render.result(f"stopped after {result.iteration} of {whole} iterations: {run}")
         render.result(f"continue: terrainkit train --resume {run}")
         return
-    render.result(f"trained {whole} iterations: {run}")
+    render.result(f"trained {count(whole, 'iteration')}: {run}")
     render.result(
         f"next: terrainkit play {run}  (record a video)\n"
         f"      terrainkit evaluate {run}  (measure it)\n"

@@ -11,7 +11,7 @@ from terrainkit.errors import ConfigError
 from terrainkit.schema import field_types, flatten
 from terrainkit_cli.config_options import TaskCommand
 from terrainkit_cli.parse import UsageError, parse
-from terrainkit_cli.robot_options import Output, Text
+from terrainkit_cli.robot_options import InputPath, Output
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Commands, Env, Rewards, Task
 from terrainkit_robots.rl.tasks import get_task, register_task
@@ -24,7 +24,7 @@ class Train(TaskCommand):
     On a ground.
     """
 
-    terrain: Text = ""
+    terrain: InputPath = ""
     """The ground: an option that is called as a section is."""
 
     named: Annotated[str, tyro.conf.arg(name="robot")] = ""

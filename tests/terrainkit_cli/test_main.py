@@ -13,6 +13,9 @@ def test_no_command_lists_all_commands(terrainkit):
     assert run.returncode == 0
     for name in COMMANDS:
         assert f"  {name} " in run.stdout
+    lines = run.stdout.splitlines()
+    assert len(lines) <= 24  # a terminal
+    assert max(map(len, lines)) <= 80
 
 
 def test_version_is_that_of_the_package(terrainkit):
@@ -22,10 +25,11 @@ def test_version_is_that_of_the_package(terrainkit):
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_help_documents_every_option(terrainkit, name):
+def test_help_describes_command_in_80_columns(terrainkit, name):
     run = terrainkit(name, "--help")
     assert run.returncode == 0
-    assert command(name).__doc__.partition("\n")[0].split(":")[0] in run.stdout
+    assert command(name).__doc__.partition("\n")[0] in run.stdout
+    assert max(map(len, run.stdout.splitlines())) <= 80
 
 
 @pytest.mark.parametrize(

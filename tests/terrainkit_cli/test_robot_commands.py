@@ -84,7 +84,7 @@ def test_check_robot_continues_after_missing_file(here):
     assert run.stderr.startswith("terrainkit: error: robot file: got none.urdf")
 
 
-@pytest.mark.parametrize("name", bundled.names())
+@pytest.mark.parametrize("name", bundled.robot_names())
 def test_check_robot_finds_bundled_robot(here, name):
     run = here("check-robot", name, "--strict")
     assert run.returncode == 0, run.stdout

@@ -15,8 +15,8 @@ from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.runner import INTERNAL_ERROR, lint
 
-URDF = (bundled.find("quadruped") or Path()).read_text()
-MJCF = (bundled.find("quadruped") or Path()).with_suffix(".xml").read_text()
+URDF = (bundled.urdf_path("quadruped") or Path()).read_text()
+MJCF = (bundled.urdf_path("quadruped") or Path()).with_suffix(".xml").read_text()
 
 SECONDS, BYTES = 10, 2 * 2**30
 """What checking any file may take."""

@@ -14,22 +14,22 @@ from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.onboarding.robot_files import make_robot_files
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
-every_robot = pytest.mark.parametrize("name", bundled.names())
+every_robot = pytest.mark.parametrize("name", bundled.robot_names())
 every_format = pytest.mark.parametrize("suffix", [".urdf", ".xml"])
 
 HINGE = mujoco.mjtJoint.mjJNT_HINGE
 
 
 def compiled(name, suffix=".xml"):
-    return mujoco.MjModel.from_xml_path(str(bundled.find(name).with_suffix(suffix)))
+    return mujoco.MjModel.from_xml_path(str(bundled.urdf_path(name).with_suffix(suffix)))
 
 
 def urdf(name):
-    return ElementTree.parse(bundled.find(name)).getroot()
+    return ElementTree.parse(bundled.urdf_path(name)).getroot()
 
 
 def facts(name, suffix):
-    return Facts(load_robot(bundled.find(name).with_suffix(suffix)))
+    return Facts(load_robot(bundled.urdf_path(name).with_suffix(suffix)))
 
 
 def hinges(model):
@@ -80,14 +80,14 @@ def shapes(model, body, collide):
 
 @every_robot
 def test_find_by_name(name):
-    assert bundled.find(name).is_file()
-    assert bundled.find(name).with_suffix(".xml").is_file()
+    assert bundled.urdf_path(name).is_file()
+    assert bundled.urdf_path(name).with_suffix(".xml").is_file()
     assert urdf(name).get("name") == name
 
 
 @pytest.mark.parametrize("name", ["", "quadruped.urdf", "../quadruped", "hexapod"])
 def test_find_unknown_name(name):
-    assert bundled.find(name) is None
+    assert bundled.urdf_path(name) is None
 
 
 @every_robot
@@ -162,7 +162,9 @@ def test_kinematics_match_mujoco(name, suffix):
 def test_yourdfpy_matches_mujoco(name):
     yourdfpy = pytest.importorskip("yourdfpy")
     model = compiled(name)
-    robot = yourdfpy.URDF.load(str(bundled.find(name)), build_scene_graph=True, load_meshes=False)
+    robot = yourdfpy.URDF.load(
+        str(bundled.urdf_path(name)), build_scene_graph=True, load_meshes=False
+    )
     for positions in random_poses(model, count=5):
         robot.update_cfg(positions)
         data = at(model, positions)
@@ -225,7 +227,7 @@ def _half_height(model, geom):
 
 def standing(name, stiffness, damping):
     """Return a model on a plane, held at its home pose for two seconds, its data, what touched."""
-    spec = mujoco.MjSpec.from_file(str(bundled.find(name).with_suffix(".xml")))
+    spec = mujoco.MjSpec.from_file(str(bundled.urdf_path(name).with_suffix(".xml")))
     spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1])
     model = spec.compile()
     model.dof_damping[6:] = damping
@@ -327,13 +329,13 @@ def test_check_robot_has_no_findings(name, suffix):
 
 @every_robot
 def test_spec_is_derived_except_edits(name):
-    spec = RobotSpec.load(bundled.find(name).with_name("robot.toml"))
+    spec = RobotSpec.load(bundled.urdf_path(name).with_name("robot.toml"))
     derived = make_robot_files(facts(name, ".urdf")).spec
     edited = {key for key, told in spec.provenance.items() if told.origin == "given"}
     for each in dataclasses.fields(RobotSpec):
         own, other = getattr(spec, each.name), getattr(derived, each.name)
         if each.name in ("urdf", "mjcf"):
-            assert own == bundled.find(name).with_suffix(Path(other).suffix).name
+            assert own == bundled.urdf_path(name).with_suffix(Path(other).suffix).name
         elif each.name == "provenance":
             assert {k: v for k, v in own.items() if k.partition(".")[0] not in edited} == {
                 k: v for k, v in other.items() if k.partition(".")[0] not in edited
@@ -345,7 +347,7 @@ def test_spec_is_derived_except_edits(name):
 @every_robot
 @every_format
 def test_check_robot_has_no_findings_for_spec(name, suffix):
-    path = bundled.find(name)
+    path = bundled.urdf_path(name)
     spec = RobotSpec.load(path.with_name("robot.toml"))
     robot = Facts(load_robot(path.with_suffix(suffix)), spec=spec)
     loud = [f for f in lint(robot).findings if f.severity != "info"]
@@ -354,9 +356,9 @@ def test_check_robot_has_no_findings_for_spec(name, suffix):
 
 @every_robot
 def test_spec_names_exist_in_model(name):
-    spec = RobotSpec.load(bundled.find(name).with_name("robot.toml"))
+    spec = RobotSpec.load(bundled.urdf_path(name).with_name("robot.toml"))
     model = compiled(name)
-    assert (bundled.find(name).parent / spec.mjcf).is_file()
+    assert (bundled.urdf_path(name).parent / spec.mjcf).is_file()
     assert list(spec.joint_order) == hinges(model)
     named = {spec.base, *spec.feet, *spec.shanks, *spec.thighs}
     named |= {*spec.termination_contacts, *spec.penalized_contacts}
@@ -370,5 +372,5 @@ def test_spec_names_exist_in_model(name):
 
 @every_robot
 def test_spec_file_is_normalized(name):
-    path = bundled.find(name).with_name("robot.toml")
+    path = bundled.urdf_path(name).with_name("robot.toml")
     assert path.read_text() == RobotSpec.load(path).to_toml()

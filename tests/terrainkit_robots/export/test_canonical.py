@@ -9,6 +9,7 @@ from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.xml.document import RobotFileError
 from terrainkit_robots.export.canonical import to_canonical
+from tests.robots import REAL_ROBOTS
 
 MASS = '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>'
 
@@ -33,20 +34,7 @@ def link_poses(robot, positions):
     }
 
 
-ROBOTS = [
-    "a1/urdf/a1.urdf",
-    "go2/urdf/go2.urdf",
-    "go2_mjcf/go2.xml",
-    "h1/urdf/h1.urdf",
-    "h1/h1.xml",
-    "g1/g1_29dof.urdf",
-    "g1/g1_29dof.xml",
-    "anymal_c/urdf/anymal_c.urdf",
-    "cassie/urdf/cassie.urdf",
-]
-
-
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", REAL_ROBOTS)
 def test_canonical_robot_is_equivalent(name, robot_file):
     check_same(Facts(load_robot(robot_file(name))))
 
@@ -54,7 +42,7 @@ def test_canonical_robot_is_equivalent(name, robot_file):
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
 @pytest.mark.parametrize("suffix", [".urdf", ".xml"])
 def test_canonical_bundled_robot_is_equivalent(name, suffix):
-    check_same(Facts(load_robot(bundled.find(name).with_suffix(suffix))))
+    check_same(Facts(load_robot(bundled.urdf_path(name).with_suffix(suffix))))
 
 
 def check_same(source):

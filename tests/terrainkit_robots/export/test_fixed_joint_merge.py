@@ -13,7 +13,7 @@ from terrainkit_robots.quiet_mujoco import quiet_mujoco
 
 @pytest.fixture
 def facts():
-    return Facts(to_canonical(Facts(load_robot(bundled.find("quadruped")))).model)
+    return Facts(to_canonical(Facts(load_robot(bundled.urdf_path("quadruped")))).model)
 
 
 def test_fixed_links_are_merged(facts):

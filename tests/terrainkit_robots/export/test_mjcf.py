@@ -23,7 +23,7 @@ def written(model, **extras):
 
 @pytest.fixture
 def quadruped():
-    facts = Facts(load_robot(bundled.find("quadruped")))
+    facts = Facts(load_robot(bundled.urdf_path("quadruped")))
     return Facts(to_canonical(facts).model)
 
 

@@ -9,7 +9,7 @@ from terrainkit_robots.export.sites import foot_sites, imu_notes, imu_site
 
 
 def facts_of(name):
-    return Facts(load_robot(bundled.find(name)))
+    return Facts(load_robot(bundled.urdf_path(name)))
 
 
 def test_site_encloses_ball_foot():

@@ -34,7 +34,7 @@ def test_actuators_of_tendons(tmp_path):
 
 
 def test_urdf_has_no_unsupported_elements():
-    assert unsupported_elements(load_robot(bundled.find("quadruped"))) == ()
+    assert unsupported_elements(load_robot(bundled.urdf_path("quadruped"))) == ()
 
 
 def test_contact_parameters(tmp_path):

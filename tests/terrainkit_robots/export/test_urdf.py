@@ -376,7 +376,7 @@ def test_axis_with_offset():
 
 
 def test_text_is_deterministic():
-    model = to_canonical(Facts(load_robot(bundled.find("biped")))).model
+    model = to_canonical(Facts(load_robot(bundled.urdf_path("biped")))).model
     assert urdf_text(model) == urdf_text(model)
 
 

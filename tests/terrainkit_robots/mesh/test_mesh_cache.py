@@ -13,6 +13,7 @@ from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.mesh import mesh_cache as module
 from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes, TooLargeError
 from terrainkit_robots.mesh.surface import Surface, binary_stl
+from tests.robots import REAL_ROBOTS
 
 
 def stl_of(mesh):
@@ -187,17 +188,6 @@ class TestLimits:
         assert Meshes().hull_volume(mesh()) == pytest.approx(6.0)
 
 
-HEALTHY = (
-    "a1/urdf/a1.urdf",
-    "go2/urdf/go2.urdf",
-    "go2_mjcf/go2.xml",
-    "h1/urdf/h1.urdf",
-    "h1/h1.xml",
-    "g1/g1_29dof.urdf",
-    "g1/g1_29dof.xml",
-    "anymal_c/urdf/anymal_c.urdf",
-    "cassie/urdf/cassie.urdf",
-)
 AGREED = {
     # a mesh that is named and not there: MuJoCo does not load this file
     ("go2_mjcf/go2.xml", "MSH001", "base_4.obj"),
@@ -214,7 +204,7 @@ AGREED = {
 class TestRobots:
     """What the rules make of robots that other people published."""
 
-    @pytest.mark.parametrize("name", HEALTHY)
+    @pytest.mark.parametrize("name", REAL_ROBOTS)
     def test_only_known_findings(self, robot_file, name):
         own = [rule for rule in rules() if rule.family == "MSH" and rule.severity != "info"]
         findings = lint(Facts(load_robot(robot_file(name))), own).findings

@@ -222,7 +222,7 @@ def quick(monkeypatch):
 @pytest.mark.usefixtures("quick")
 def test_smoke_test_onboards_a_file(tmp_path):
     urdf = tmp_path / "quadruped.urdf"
-    shutil.copy(bundled.find("quadruped"), urdf)
+    shutil.copy(bundled.urdf_path("quadruped"), urdf)
     before = urdf.read_bytes()
     result = smoke_test(str(urdf))
     assert result.passed, failed(result)
@@ -234,7 +234,7 @@ def test_smoke_test_onboards_a_file(tmp_path):
 @pytest.mark.usefixtures("quick")
 def test_smoke_test_rejects_a_file_with_errors(tmp_path):
     urdf = tmp_path / "bad.urdf"
-    text = bundled.find("quadruped").read_text()
+    text = bundled.urdf_path("quadruped").read_text()
     urdf.write_text(text.replace('<mass value="', '<mass value="-', 1))
     (check,) = smoke_test(str(urdf)).checks
     assert (check.name, check.passed) == ("can be onboarded", False)

@@ -194,7 +194,7 @@ def make_env(num_envs: int = 4, **changes: Any) -> LeggedEnv:
         domain_rand=DomainRand(push_interval_s=0, joint_offset=0),
         control=Control(decimation=changes.pop("decimation", 4)),
     )
-    robot = Robot.load(Path(str(bundled.find("quadruped"))).parent)
+    robot = Robot.load(Path(str(bundled.urdf_path("quadruped"))).parent)
     ground = changes.pop("ground", Plane())
     return LeggedEnv(replace(task, **changes), robot, ground)
 

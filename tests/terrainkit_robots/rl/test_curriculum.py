@@ -348,7 +348,9 @@ class TestInEnvironment:
             init_state=InitState(lin_vel=0, ang_vel=0, yaw=0),
             domain_rand=DomainRand(push_interval_s=0),
         )
-        env = LeggedEnv(task, Robot.load(Path(str(bundled.find("quadruped"))).parent), Patches())
+        env = LeggedEnv(
+            task, Robot.load(Path(str(bundled.urdf_path("quadruped"))).parent), Patches()
+        )
         env.curriculum.levels[:] = 4
         env.reset()
         return env

@@ -38,7 +38,7 @@ _NONE = DomainRand(
 
 
 def robot_named(name: str) -> Robot:
-    return Robot.load(Path(str(bundled.find(name))).parent)
+    return Robot.load(Path(str(bundled.urdf_path(name))).parent)
 
 
 def physics_of(kind: Literal["P", "V", "T"] = "P", n: int = 5) -> Simulation:

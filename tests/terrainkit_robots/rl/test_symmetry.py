@@ -45,7 +45,7 @@ def make_env(name: str, ground: Terrain | None = None, robot: Robot | None = Non
 
 
 def robot_named(name: str) -> Robot:
-    return Robot.load(Path(str(bundled.find(name))).parent)
+    return Robot.load(Path(str(bundled.urdf_path(name))).parent)
 
 
 def mirror_physics(env: LeggedEnv, mirror: MirrorMaps, *, turn: bool = True) -> None:

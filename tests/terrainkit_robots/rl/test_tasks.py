@@ -39,10 +39,10 @@ def plugin(monkeypatch):
     return install
 
 
-@pytest.mark.parametrize("name", bundled.names())
+@pytest.mark.parametrize("name", bundled.robot_names())
 def test_bundled_robots_have_a_task(name):
     found = get_task(name)
-    assert (found.name, found.folder) == (name, bundled.find(name).parent)
+    assert (found.name, found.folder) == (name, bundled.urdf_path(name).parent)
     assert name in task_names()
     read = scene.Robot.load(found.folder)
     assert read.mjcf.is_file()

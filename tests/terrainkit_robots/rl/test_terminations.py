@@ -81,7 +81,7 @@ def make_env(ground: Plane | None = None, **changes: Any) -> LeggedEnv:
         domain_rand=DomainRand(push_interval_s=0),
         **changes,
     )
-    robot = Robot.load(Path(str(bundled.find("quadruped"))).parent)
+    robot = Robot.load(Path(str(bundled.urdf_path("quadruped"))).parent)
     return LeggedEnv(task, robot, ground or Plane())
 
 

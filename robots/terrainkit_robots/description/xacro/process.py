@@ -171,7 +171,7 @@ def _install_find(
     """Resolve `$(find ...)` without ROS."""
     searches = {str(file): PackageResolver(file, packages)}
 
-    def find(name: str) -> str:
+    def find_package(name: str) -> str:
         at = str((xacro.filestack or [None])[-1] or file)
         for start in dict.fromkeys(
             (str(file), at)
@@ -184,8 +184,8 @@ def _install_find(
             f"package {name}: not found; pass its folder with --package {name}=FOLDER"
         )
 
-    substitution_args._eval_find = find
-    substitution_args._eval_dict["find"] = find  # for $(eval ...)
+    substitution_args._eval_find = find_package
+    substitution_args._eval_dict["find"] = find_package  # for $(eval ...)
 
 
 # Locations of elements
