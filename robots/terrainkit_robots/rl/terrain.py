@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.surface import HeightfieldSurface
+from terrainkit.text import closest
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.geoms import measure_heights
 
