@@ -90,7 +90,7 @@ class Train(TaskCommand):
 
     def _robot(self, run: "Run | None") -> str:
         if self.robot or run is not None:
-            return self.robot or run.robot_name  # type: ignore[union-attr]
+            return self.robot or run.info.robot  # type: ignore[union-attr]
         from terrainkit.errors import listing
         from terrainkit_robots.rl.tasks import task_names
 

@@ -61,7 +61,7 @@ def test_train_on_a_map(train, tmp_path, capsys):
     words = ("--num-envs", 4, "--max-iterations", 2, "--rewards.tracking-lin-vel", 1.25)
     assert train("quadruped", "--terrain", "map.npz", *words) == 0
     run = open_run(run_of(tmp_path))
-    assert run.robot_name == "quadruped"
+    assert run.info.robot == "quadruped"
     assert run.terrain == str(tmp_path / "map.npz")
     assert run.task.rewards.tracking_lin_vel == 1.25
     assert run.task.env.num_envs == 4

@@ -18,14 +18,13 @@ def bundle_policy(run: runs.Run, folder: Path) -> runs.Run:
     """
     if run.checkpoint is None:
         raise ConfigError(f"run {run.folder}: got no checkpoint; expected a trained run")
-    if run.robot_name not in task_names():
-        raise ConfigError(f"robot: got {run.robot_name}; expected one of {listing(task_names())}")
+    if run.info.robot not in task_names():
+        raise ConfigError(f"robot: got {run.info.robot}; expected one of {listing(task_names())}")
     is_plane = run.terrain == "plane"
     names = [runs.TASK_FILE, SPEC_FILE] + [runs.MAP_FILE] * (not is_plane)
     if not (run.folder / names[-1]).is_file():
         raise ConfigError(f"terrain: got {run.terrain}; expected plane or a map with a config")
-    info = runs.RunInfo.load(run.folder / runs.RUN_FILE)
-    info = replace(info, terrain="plane" if is_plane else runs.MAP_FILE)
+    info = replace(run.info, terrain="plane" if is_plane else runs.MAP_FILE)
     state = runs.policy_state(runs.read_checkpoint(run.checkpoint))
     files = {name: (run.folder / name).read_bytes() for name in names}
     runs.write_run_folder(folder, files | {runs.RUN_FILE: info.to_toml().encode()})

@@ -24,7 +24,7 @@ def load_policy(run: Run, env: LeggedEnv) -> MLPModel:
         raise ConfigError(f"run {run.folder}: got no checkpoint; expected a trained run")
     # The run has its own copy of the spec, so only a change of the model matters.
     if files := [name for name in changed_robot_files(run) if name != SPEC_FILE]:
-        message = f"{run.robot_name}: {' and '.join(files)} changed after {run.folder} was trained"
+        message = f"{run.info.robot}: {' and '.join(files)} changed after {run.folder} was trained"
         warnings.warn(message, TerrainkitWarning, stacklevel=2)
     state = read_checkpoint(run.checkpoint)
     check_checkpoint(run.checkpoint, state, env, OBS_GROUPS["actor"])

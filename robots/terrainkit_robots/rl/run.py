@@ -34,10 +34,7 @@ if TYPE_CHECKING:
     from terrainkit.config import MapConfig
 
 RUN_FILE, TASK_FILE, MAP_FILE = "run.toml", "task.toml", "map.toml"
-FORMAT_VERSION = 1
-"""Version of the checkpoint format."""
-
-CHECKPOINT_FORMAT = "terrainkit checkpoint"
+CHECKPOINT_HEADER = {"format": "terrainkit checkpoint", "version": 1}
 CHECKPOINT_KEYS = {
     "iteration": int,
     "robot": str,
@@ -47,9 +44,6 @@ CHECKPOINT_KEYS = {
     "critic_state_dict": dict,
 }
 """Keys of every checkpoint, and their types; a checkpoint of training has more."""
-
-MAX_CHECKPOINT_SIZE = 1 << 32
-"""Largest checkpoint that is read [bytes]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,12 +74,12 @@ class Run:
 
     folder: Path
     """Folder of the run."""
+    info: RunInfo
+    """What it was made from."""
     task: Task
     """Its task."""
     robot: Robot
     """The robot, with the spec it was trained with."""
-    robot_name: str
-    """Name of a registered robot, or the absolute path of its folder."""
     terrain: str
     """The terrain, as `load_terrain` takes it: `plane` or a path."""
     checkpoint: Path | None
@@ -118,11 +112,7 @@ def resolve_terrain(terrain: str | Path) -> str:
 
 
 def resolve_robot(robot: str | Path) -> str:
-    """Return the robot as a run records it: a registered name, or its folder's absolute path.
-
-    Raises:
-        ConfigError: If there is no such robot.
-    """
+    """Return the robot as a run records it: a registered name, or its folder's absolute path."""
     found = tasks.get_task(robot)
     return str(robot) if str(robot) in tasks.task_names() else str(found.folder.resolve())
 
@@ -157,11 +147,7 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
 
 
 def write_run_folder(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write a new folder with some files, completely or not at all.
-
-    Raises:
-        ExportError: If the folder is not empty, or cannot be written.
-    """
+    """Write a new folder with some files, completely or not at all."""
     try:
         if folder.is_dir() and any(folder.iterdir()):
             raise ExportError(
@@ -180,12 +166,6 @@ def write_run_folder(folder: Path, files: Mapping[str, bytes]) -> None:
         raise ExportError(f"cannot write {folder}: {error.strerror or error}") from error
 
 
-def rewrite_task(run: Run, task: Task) -> None:
-    """Replace the task in a run's folder."""
-    with atomic_write(run.folder / TASK_FILE, overwrite=True) as path:
-        path.write_text(task.to_toml(), encoding="utf-8")
-
-
 def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
     """Open a run.
 
@@ -197,8 +177,10 @@ def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
     Raises:
         ConfigError: If there is no such run or checkpoint, or its robot is missing.
     """
-    folder, named = _resolve_run(name)
-    info = _load_info(folder)
+    folder, selected = _resolve_run(name)
+    if not (folder / RUN_FILE).is_file():
+        raise ConfigError(f"{folder} has no {RUN_FILE}; terrainkit train writes such a folder")
+    info = RunInfo.load(folder / RUN_FILE)
     terrain, found = info.terrain, tasks.get_task(info.robot)
     robot = Robot.from_spec(RobotSpec.load(folder / SPEC_FILE), found.folder)
     if not robot.mjcf.is_file():
@@ -208,21 +190,20 @@ def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
         file, config = folder / terrain, folder / MAP_FILE
         terrain = resolve_terrain(config if config.is_file() and not file.is_file() else file)
     saved = checkpoints(folder)
-    if checkpoint is not None and checkpoint not in saved:
-        raise ConfigError(
-            f"{folder}: got checkpoint {checkpoint}; expected one of: {listing(map(str, saved))}"
-        )
-    if checkpoint is None:
-        selected = named or (saved[max(saved)] if saved else None)
-    else:
+    if checkpoint is not None:
+        if checkpoint not in saved:
+            iterations = listing(map(str, saved))
+            raise ConfigError(
+                f"{folder}: got checkpoint {checkpoint}; expected one of: {iterations}"
+            )
         selected = saved[checkpoint]
     return Run(
         folder=folder,
+        info=info,
         task=Task.load(folder / TASK_FILE, found.task),
         robot=robot,
-        robot_name=info.robot,
         terrain=terrain,
-        checkpoint=selected,
+        checkpoint=selected or (saved[max(saved)] if saved else None),
     )
 
 
@@ -256,36 +237,25 @@ def _resolve_run(name: str | Path) -> tuple[Path, Path | None]:
 
 def is_shipped(run: Run) -> bool:
     """Return whether a run is part of a package, so that its folder must not be written."""
-    return run.folder.resolve() == tasks.get_task(run.robot_name).trained_run.resolve()
+    return run.folder.resolve() == tasks.get_task(run.info.robot).trained_run.resolve()
 
 
 def changed_robot_files(run: Run) -> tuple[str, ...]:
-    """Return the names of the robot's files that differ from those it was trained with.
-
-    Raises:
-        ConfigError: If a file cannot be read.
-    """
-    recorded = _load_info(run.folder).robot_sha256
+    """Return the names of the robot's files that differ from those it was trained with."""
+    recorded = run.info.robot_sha256
     if recorded is None:
         return ()
-    current = _robot_digests(tasks.get_task(run.robot_name).folder)
+    current = _robot_digests(tasks.get_task(run.info.robot).folder)
     names = sorted({*recorded, *current})
     return tuple(name for name in names if recorded.get(name) != current.get(name))
 
 
 def is_same_terrain(run: Run, terrain: str | Path) -> bool:
-    """Return whether a terrain is the run's; maps with the same config are the same.
-
-    Raises:
-        ConfigError: If a file cannot be read.
-        MapFileError: If the map cannot be read.
-    """
-    source, config_file = resolve_terrain(terrain), run.folder / MAP_FILE
-    if config_file.is_file():
-        from terrainkit.config import MapConfig
-
-        return _map_config(source) == MapConfig.load(config_file)
-    recorded = _load_info(run.folder).terrain_sha256
+    """Return whether a terrain is the run's; maps with the same config are the same."""
+    source, config = resolve_terrain(terrain), run.folder / MAP_FILE
+    if config.is_file():
+        return _map_config(source) == _map_config(str(config))
+    recorded = run.info.terrain_sha256
     return source == run.terrain and recorded in (None, recorded and _sha256(Path(source)))
 
 
@@ -300,7 +270,7 @@ def can_continue(run: Run, robot: str | Path, terrain: str | Path, task: Task) -
     if (
         replace(task, env=env, runner=run.task.runner) != run.task
         or resolve_terrain(terrain) != run.terrain
-        or resolve_robot(robot) != run.robot_name
+        or resolve_robot(robot) != run.info.robot
     ):
         return False
     if not is_same_terrain(run, terrain):
@@ -310,7 +280,7 @@ def can_continue(run: Run, robot: str | Path, terrain: str | Path, task: Task) -
         )
     if files := changed_robot_files(run):
         raise ConfigError(
-            f"{' and '.join(files)} of {run.robot_name} changed since {run.folder} was trained; "
+            f"{' and '.join(files)} of {run.info.robot} changed since {run.folder} was trained; "
             "with a copy of the robot in another folder, a new run starts with its networks"
         )
     return "processes" in read_checkpoint(last_checkpoint(run))
@@ -329,45 +299,33 @@ def parts_to_load(run: Run, terrain: str | Path, task: Task) -> dict[str, bool]:
 
 
 def last_checkpoint(run: Run) -> Path:
-    """Return the selected checkpoint of a run.
-
-    Raises:
-        ConfigError: If there is none.
-    """
+    """Return the selected checkpoint of a run; raise ConfigError if there is none."""
     if run.checkpoint is None:
         raise ConfigError(f"{run.folder} has no checkpoint yet; train it first")
     return run.checkpoint
 
 
 def run_folder(
-    folder: Path | None,
-    robot: str | Path,
-    terrain: str | Path,
-    task: Task,
-    continued: Run | None,
+    folder: Path | None, robot: str | Path, terrain: str | Path, task: Task, continued: Run | None
 ) -> Path:
     """Return the folder to write: that of the continued run, unless it has later checkpoints."""
     if folder is None and continued is not None:
         saved = checkpoints(continued.folder)
         if saved and saved[max(saved)] == continued.checkpoint:
             if task != continued.task:
-                rewrite_task(continued, task)
+                with atomic_write(continued.folder / TASK_FILE, overwrite=True) as path:
+                    path.write_text(task.to_toml(), encoding="utf-8")
             return continued.folder
     folder = folder or default_folder(tasks.get_task(robot).name)
     return create_run(folder, task, robot, terrain).folder
 
 
 def save_checkpoint(path: Path, state: Mapping[str, Any]) -> None:
-    """Write a checkpoint completely, or not at all; see `LeggedRunner.state_dict`.
-
-    Raises:
-        ExportError: If the file cannot be written.
-    """
+    """Write a checkpoint completely, or not at all; see `LeggedRunner.state_dict`."""
     import torch
 
     data = io.BytesIO()  # torch itself aborts the process on a full disk
-    header = {"format": CHECKPOINT_FORMAT, "version": FORMAT_VERSION}
-    torch.save(_to_plain({**header, **state}), data)
+    torch.save(_to_plain({**CHECKPOINT_HEADER, **state}), data)
     with atomic_write(path, overwrite=True) as target:
         target.write_bytes(data.getbuffer())
 
@@ -383,8 +341,6 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     try:
         if path.exists() and not path.is_file():
             raise ConfigError(f"{path} is not a file; expected a checkpoint")
-        if path.stat().st_size > MAX_CHECKPOINT_SIZE:
-            raise ConfigError(f"{path}: over {MAX_CHECKPOINT_SIZE} bytes; expected a checkpoint")
         with zipfile.ZipFile(path) as file:  # compressed parts could expand to any size
             if any(part.compress_type != zipfile.ZIP_STORED for part in file.infolist()):
                 raise ConfigError(f"{path} is not a checkpoint of terrainkit: it is compressed")
@@ -393,18 +349,12 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
         raise ConfigError(f"cannot read {path}: {error.strerror or error}") from error
     except ConfigError:
         raise
-    except Exception as error:  # whatever torch raises for a damaged file
+    except Exception as error:  # torch's errors for damaged files have no common class
         raise ConfigError(f"{path} is not a checkpoint of terrainkit, or is damaged") from error
-    return _checked(path, state)
-
-
-def _checked(path: Path, state: Any) -> dict[str, Any]:
-    """Return a checkpoint's content after checking its keys."""
-    if not isinstance(state, dict) or state.get("format") != CHECKPOINT_FORMAT:
+    if not isinstance(state, dict) or state.get("format") != CHECKPOINT_HEADER["format"]:
         raise ConfigError(f"{path} is not a checkpoint of terrainkit")
-    if state.get("version") != FORMAT_VERSION:
-        got = state.get("version", "nothing")
-        raise ConfigError(f"{path}: version: got {got!r}; expected {FORMAT_VERSION}")
+    if (got := state.get("version")) != CHECKPOINT_HEADER["version"]:
+        raise ConfigError(f"{path}: version: got {got!r}; expected 1")
     for key, kind in CHECKPOINT_KEYS.items():
         if not isinstance(state.get(key), kind):
             raise ConfigError(f"{path}: {key} is missing or not a {kind.__name__}")
@@ -433,10 +383,8 @@ def _to_plain(value: Any) -> Any:
 
 def _robot_digests(folder: Path) -> dict[str, str]:
     """Return the SHA-256 of a robot's spec and model by file name."""
-    return {
-        name: _sha256(folder / name)
-        for name in (SPEC_FILE, RobotSpec.load(folder / SPEC_FILE).mjcf)
-    }
+    files = (SPEC_FILE, RobotSpec.load(folder / SPEC_FILE).mjcf)
+    return {name: _sha256(folder / name) for name in files}
 
 
 def _sha256(path: Path) -> str:
@@ -445,12 +393,6 @@ def _sha256(path: Path) -> str:
             return hashlib.sha256(file.read()).hexdigest()
     except OSError as error:
         raise ConfigError(f"cannot read {path}: {error.strerror or error}") from error
-
-
-def _load_info(folder: Path) -> RunInfo:
-    if not (folder / RUN_FILE).is_file():
-        raise ConfigError(f"{folder} has no {RUN_FILE}; terrainkit train writes such a folder")
-    return RunInfo.load(folder / RUN_FILE)
 
 
 def _map_config(terrain: str) -> "MapConfig | None":

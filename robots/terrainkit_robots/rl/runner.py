@@ -157,14 +157,9 @@ class LeggedRunner(OnPolicyRunner):
         progress_callback: ProgressCallback | None = None,
         should_stop: Callable[[], object] = lambda: False,
     ) -> None:
-        """Create the networks.
+        """Create the networks; without a `folder`, no checkpoints and logs are written.
 
-        Args:
-            env: The environment.
-            folder: Folder for checkpoints and logs; None writes nothing.
-            device: Device of the networks: `cpu`, `cuda`, `cuda:1`.
-            progress_callback: Called after each iteration.
-            should_stop: Called before each iteration; True stops with a checkpoint.
+        `should_stop` is called before each iteration: True stops training with a checkpoint.
         """
         self.folder = folder
         self._progress_callback, self._should_stop = progress_callback, should_stop
@@ -174,12 +169,7 @@ class LeggedRunner(OnPolicyRunner):
         self.logger = MetricsLogger(self)
 
     def learn(self, num_learning_iterations: int, init_at_random_ep_len: bool = False) -> None:
-        """Train for some iterations, with the first episodes cut to random lengths if requested.
-
-        Raises:
-            ConfigError: If training diverges.
-            ExportError: If a checkpoint cannot be written.
-        """
+        """Train for some iterations, with the first episodes cut to random lengths if requested."""
         self._first = self._completed = self.current_learning_iteration
         self._last, self._start_time = self._first + num_learning_iterations, time.perf_counter()
         self.logger.log_dir = None if self.folder is None else str(self.folder)
@@ -233,9 +223,6 @@ class LeggedRunner(OnPolicyRunner):
         By default training continues exactly; with another number of environments, only the
         networks and the curricula do. A checkpoint of a policy alone has only networks.
         `load_cfg` selects parts: `actor`, `critic`, `optimizer`, `curriculum` (terrain levels).
-
-        Raises:
-            ConfigError: If it is no checkpoint, or belongs to another robot, task or map.
         """
         state = read_checkpoint(Path(path))
         check_checkpoint(Path(path), state, self.env, list(self.env.obs_groups))
@@ -448,11 +435,7 @@ def single_torch_thread() -> Iterator[None]:
 
 
 def resolve_device(name: str) -> str:
-    """Return the device `name`: `cpu`, `cuda` or `cuda:1`; under torchrun, this process's GPU.
-
-    Raises:
-        ConfigError: If there is no such device.
-    """
+    """Return the device `name`: `cpu`, `cuda` or `cuda:1`; under torchrun, this process's GPU."""
     gpus = [f"cuda:{k}" for k in range(torch.cuda.device_count())]
     if name in ("cpu", "cpu:0"):
         return "cpu"

@@ -114,6 +114,8 @@ class ModelTerrain(Terrain):
 
         Heights are accurate to the size of a cell at edges.
         """
+        if not path.is_file():
+            raise ConfigError(f"there is no file {path}")
         self._path = path
         try:
             with quiet_mujoco():
@@ -165,21 +167,17 @@ def load_terrain(source: str | Path, collision: Collision = "auto") -> Terrain:
         ConfigError: If `source` is none of these.
         MapFileError: If the map is missing, truncated or of another version.
     """
+    path = Path(source)
     if collision == "plane" or str(source) == "plane":
         return Plane()
-    path = Path(source)
-    if path.suffix == ".npz":
-        from terrainkit.terrain_map import TerrainMap
+    if path.suffix in (".npz", ".toml"):
+        from terrainkit import MapConfig, TerrainMap, generate
 
-        return MapTerrain(TerrainMap.load(path), collision)
-    if path.suffix == ".toml":
-        from terrainkit.config import MapConfig
-        from terrainkit.generation import generate
-
-        return MapTerrain(generate(MapConfig.load(path)), collision)
+        is_map = path.suffix == ".npz"
+        return MapTerrain(
+            TerrainMap.load(path) if is_map else generate(MapConfig.load(path)), collision
+        )
     if path.suffix == ".xml":
-        if not path.is_file():
-            raise ConfigError(f"there is no file {path}")
         return ModelTerrain(path)
     suggestion = " did you mean 'plane'?" if closest(str(source), ["plane"]) else ""
     raise ConfigError(
