@@ -30,7 +30,7 @@ def terrainkit(tmp_path) -> Callable[..., Run]:
 
 
 @pytest.fixture
-def called(capsys) -> Callable[..., Run]:
+def run_main(capsys) -> Callable[..., Run]:
     """Run `terrainkit` in this process: torch takes seconds to import."""
 
     def run(*words: object) -> Run:
@@ -43,8 +43,8 @@ def called(capsys) -> Callable[..., Run]:
 
 
 @pytest.fixture
-def small(terrainkit) -> str:
-    """Make a small map with four terrains, and return its name."""
+def small_map(terrainkit) -> str:
+    """Generate a small map with four terrains, and return its name."""
     run = terrainkit("generate", "-o", "small.npz", *SMALL)
     assert run.returncode == 0, run.stderr
     return "small.npz"

@@ -25,7 +25,7 @@ class Train(TaskCommand):
     """
 
     terrain: InputPath = ""
-    """The ground: an option that is called as a section is."""
+    """The ground: an option with the name of a section."""
 
     named: Annotated[str, tyro.conf.arg(name="robot")] = ""
     """An option with another name than its field."""

@@ -14,12 +14,12 @@ QUICK = ("--seconds", "0.04", "--num-envs", "1")
 
 
 @pytest.fixture
-def here(walking, monkeypatch, called):
+def here(walking, monkeypatch, run_main):
     """Run `terrainkit evaluate` in a folder with a run `walk`."""
     monkeypatch.chdir(walking.parent)
 
     def run(*words):
-        done = called("evaluate", *words)
+        done = run_main("evaluate", *words)
         return done.returncode, done.stdout, done.stderr
 
     return run

@@ -39,10 +39,10 @@ def trained(tmp_path_factory):
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch, called):
+def here(tmp_path, monkeypatch, run_main):
     """Run `terrainkit` in an empty folder."""
     monkeypatch.chdir(tmp_path)
-    return called
+    return run_main
 
 
 @pytest.fixture

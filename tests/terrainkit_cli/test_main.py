@@ -178,7 +178,7 @@ def test_full_stdout_is_one_line():
     assert run.stderr == "terrainkit: error: No space left on device\n"
 
 
-@pytest.mark.usefixtures("small")
+@pytest.mark.usefixtures("small_map")
 @pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
 @pytest.mark.parametrize(
     "words",

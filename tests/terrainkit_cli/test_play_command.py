@@ -14,12 +14,12 @@ SMALL = ("--size", "96", "64")
 
 
 @pytest.fixture
-def here(walking, monkeypatch, called):
+def here(walking, monkeypatch, run_main):
     """Run `terrainkit play` in a folder with a run `walk`."""
     monkeypatch.chdir(walking.parent)
 
     def run(*words):
-        done = called("play", *words)
+        done = run_main("play", *words)
         return done.returncode, done.stdout, done.stderr
 
     return run

@@ -16,10 +16,10 @@ BAD = Check("observation policy", False, "44 numbers", "45 numbers")
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch, called):
+def here(tmp_path, monkeypatch, run_main):
     """Run `terrainkit smoke-test` in an empty folder."""
     monkeypatch.chdir(tmp_path)
-    return lambda *words: called("smoke-test", *words)
+    return lambda *words: run_main("smoke-test", *words)
 
 
 @pytest.fixture
@@ -167,5 +167,5 @@ def test_smoke_test_names_missing_extra(here, monkeypatch):
     assert "no_such_package, which is not installed: pip install 'terrainkit[train]'" in run.stderr
 
 
-def test_check_robot_has_no_train_smoke_option(called):
-    assert called("check-robot", "quadruped", "--train-smoke").returncode == 2
+def test_check_robot_has_no_train_smoke_option(run_main):
+    assert run_main("check-robot", "quadruped", "--train-smoke").returncode == 2
