@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.rendering.appearance import set_appearance
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.terrain import Terrain
 from terrainkit_robots.simulation.geoms import collides, lowest_point
@@ -141,6 +142,7 @@ def build_scene(robot: Robot, terrain: Terrain, task: Task) -> Scene:
                     joint.frictionloss = 0
         _add_actuators(robot, scene, task)
         sensors = _add_sensors(robot, scene)
+        set_appearance(scene)  # for videos and the viewer
         try:
             model = scene.compile()
         except ValueError as error:
@@ -173,7 +175,7 @@ def _attach(robot: Robot, terrain: Terrain, task: Task) -> tuple[Any, Any]:
         raise ConfigError(
             f"MuJoCo cannot read {robot.mjcf}: {' '.join(str(error).split())}"
         ) from None
-    for element in (*spec.actuators, *spec.sensors, *spec.keys, *spec.cameras, *spec.lights):
+    for element in (*spec.actuators, *spec.sensors, *spec.keys, *spec.cameras):
         spec.delete(element)
     ground = terrain.spec()
     for each in (spec, ground):  # both, or MuJoCo warns about differences
