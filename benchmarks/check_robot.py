@@ -17,7 +17,7 @@ def run() -> Iterator[tuple[str, float]]:
     robots = Path(os.environ.get("TERRAINKIT_ROBOTS", _SHARED))
     for name, path in {
         "go2": robots / "go2" / "urdf" / "go2.urdf",
-        "quadruped": bundled.find("quadruped"),
+        "quadruped": bundled.urdf_path("quadruped"),
     }.items():
         if path is None or not path.exists():
             continue

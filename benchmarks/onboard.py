@@ -41,7 +41,7 @@ def run() -> Iterator[tuple[str, float]]:
     program = str(Path(sys.executable).with_name("terrainkit"))
     for name, path in {
         "go2": robots / "go2" / "urdf" / "go2.urdf",
-        "quadruped": bundled.find("quadruped"),
+        "quadruped": bundled.urdf_path("quadruped"),
     }.items():
         if path is None or not path.exists():
             continue

@@ -94,7 +94,7 @@ class Result:
 
 def robots() -> list[Path]:
     """Return the files of the original robots, URDF first."""
-    bundled_files = [path for name in bundled.names() if (path := bundled.find(name))]
+    bundled_files = [path for name in bundled.robot_names() if (path := bundled.urdf_path(name))]
     others = [ROBOTS / name for name in (*URDF, *MJCF)]
     existing = [path for path in others if path.is_file()]
     return sorted(

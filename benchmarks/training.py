@@ -17,9 +17,9 @@ from clock import seconds
 import terrainkit
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import MapTerrain, Plane, Terrain
+from terrainkit_robots.spec.robot import Robot
 
 _NUM_ENVS = 512
 _NUM_STEPS = 60

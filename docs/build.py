@@ -216,7 +216,7 @@ def draw_pictures() -> None:
 
 
 def draw_robot(name: str) -> None:
-    found = bundled.find(name)
+    found = bundled.urdf_path(name)
     assert found is not None
     views = render_robot(found.with_suffix(".xml"), size=(400, 340)).values()
     pictures = [cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR) for png in views]

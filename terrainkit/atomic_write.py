@@ -1,16 +1,14 @@
 """Write files atomically: completely or not at all."""
 
 import os
+import secrets
 import shutil
 import socket
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from terrainkit.errors import ExportError
-
-_PREFIX = ".terrainkit-"
 
 
 @contextmanager
@@ -18,7 +16,7 @@ def atomic_write(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
     """Yield a temporary path to write to, and move it to `path` when the block ends.
 
     Files that the block writes beside the temporary path, such as a sidecar, are moved as well. If
-    the block raises, nothing changes. Temporary folders of killed processes are removed.
+    the block raises, nothing changes.
 
     Raises:
         ExportError: if a target exists and `overwrite` is not set, or cannot be written.
@@ -32,25 +30,19 @@ def atomic_write(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
         raise ExportError(f"cannot write {path}: {error}") from error
     if path.is_symlink():
         raise ExportError(f"cannot write {path}: the link points to itself")
-    remove_stale_folders(path.parent)
     try:
         # On the same file system as the target, so that moving is a rename.
-        folder = make_temporary_folder(path.parent)
+        with temporary_folder(path.parent) as folder:
+            yield folder / name  # the suffix may select the format
+            if name != path.name:
+                (folder / name).rename(folder / path.name)
+            written = sorted(folder.iterdir())
+            for file in written:
+                check_target(path.with_name(file.name), overwrite=overwrite)
+            for file in written:
+                file.replace(path.with_name(file.name))
     except OSError as error:
         raise ExportError(f"cannot write {path}: {error.strerror or error}") from error
-    try:
-        yield folder / name  # the suffix may select the format
-        if name != path.name:
-            (folder / name).rename(folder / path.name)
-        written = sorted(folder.iterdir())
-        for file in written:
-            check_target(path.with_name(file.name), overwrite=overwrite)
-        for file in written:
-            file.replace(path.with_name(file.name))
-    except OSError as error:
-        raise ExportError(f"cannot write {path}: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def check_target(path: Path, *, overwrite: bool) -> None:
@@ -70,22 +62,25 @@ def check_target(path: Path, *, overwrite: bool) -> None:
         raise ExportError(f"cannot write {path}: {error.strerror or error}") from error
 
 
-def make_temporary_folder(parent: Path) -> Path:
-    """Create a temporary folder in `parent`, whose name records the host and the process."""
-    return Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{_host()}-{os.getpid()}-", dir=parent))
+@contextmanager
+def temporary_folder(parent: Path) -> Iterator[Path]:
+    """Yield a new folder in `parent`, which is removed when the block ends.
 
-
-def remove_stale_folders(parent: Path) -> None:
-    """Remove the temporary folders in `parent` that killed processes of this host have left."""
-    prefix = f"{_PREFIX}{_host()}-"
-    for folder in parent.glob(f"{prefix}*-*"):
-        pid = folder.name.removeprefix(prefix).partition("-")[0]
+    Its name records the host and the process, so that the folders of killed processes of this host
+    can be removed first.
+    """
+    prefix = f".terrainkit-{''.join(filter(str.isalnum, socket.gethostname()))}-"
+    for stale in parent.glob(f"{prefix}*-*"):
+        pid = stale.name.removeprefix(prefix).partition("-")[0]
         if pid.isdecimal() and not _is_running(int(pid)):
-            shutil.rmtree(folder, ignore_errors=True)
-
-
-def _host() -> str:
-    return "".join(c for c in socket.gethostname() if c.isalnum())
+            shutil.rmtree(stale, ignore_errors=True)
+    # Named before it exists, so that a signal during its creation cannot leave it behind.
+    folder = parent / f"{prefix}{os.getpid()}-{secrets.token_hex(4)}"
+    try:
+        folder.mkdir(mode=0o700)
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _is_running(pid: int) -> bool:

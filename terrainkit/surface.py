@@ -125,8 +125,9 @@ class HeightfieldSurface:
         near, far = flat[corner], flat[corner + (ny + 1)]
         side = flat[corner + np.where(u > v, ny, 1)]  # the triangle's corner off the diagonal
         high, low = np.maximum(u, v), np.minimum(u, v)
-        height = near + high * (side - near) + low * (far - side)
+        height: NDArray[np.float32] = near + high * (side - near) + low * (far - side)
         if self.box_tops is None:
             return height
         nearest = (i + (u >= 0.5)) * ny + j + (v >= 0.5)
-        return np.maximum(self.box_tops.reshape(-1)[nearest], height)
+        above: NDArray[np.float32] = np.maximum(self.box_tops.reshape(-1)[nearest], height)
+        return above

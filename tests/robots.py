@@ -2,11 +2,24 @@
 
 from terrainkit_robots.description import bundled
 
-QUADRUPED = bundled.find("quadruped")
+QUADRUPED = bundled.urdf_path("quadruped")
 """The URDF of the bundled quadruped; its MJCF is in the same folder."""
 
-BUNDLED = [f"{name}{suffix}" for name in bundled.names() for suffix in (".urdf", ".xml")]
+BUNDLED = [f"{name}{suffix}" for name in bundled.robot_names() for suffix in (".urdf", ".xml")]
 """Names of all bundled files, such as `quadruped.xml`. `robot_file` finds them."""
+
+REAL_ROBOTS = [
+    "a1/urdf/a1.urdf",
+    "go2/urdf/go2.urdf",
+    "go2_mjcf/go2.xml",
+    "h1/urdf/h1.urdf",
+    "h1/h1.xml",
+    "g1/g1_29dof.urdf",
+    "g1/g1_29dof.xml",
+    "anymal_c/urdf/anymal_c.urdf",
+    "cassie/urdf/cassie.urdf",
+]
+"""Robot files of other projects. `robot_file` finds them, or skips the test."""
 
 ARM = """<robot name="arm">
   <link name="stand"><inertial><mass value="5"/>

@@ -100,7 +100,7 @@ def my_robot():
     """Write the robot of the example: two numbers exchanged, and a 2 instead of a 1."""
     from terrainkit_robots.description import bundled
 
-    path = bundled.find("quadruped")
+    path = bundled.urdf_path("quadruped")
     assert path is not None
     text = path.read_text()
     limits = 'lower="-2.7227" upper="-0.83776"', 'lower="-0.83776" upper="-2.7227"'
@@ -158,7 +158,7 @@ def healthy_robots():
     """Write the robot files of the examples; each is the bundled quadruped."""
     from terrainkit_robots.description import bundled
 
-    path = bundled.find("quadruped")
+    path = bundled.urdf_path("quadruped")
     assert path is not None
     for name in ("my_robot.urdf", "go2.urdf"):
         Path(name).write_text(path.read_text())

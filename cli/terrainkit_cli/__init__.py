@@ -1,1 +1,1 @@
-"""The `terrainkit` command: tyro reads its arguments, `render` alone prints."""
+"""The `terrainkit` command. Only `render` prints."""

@@ -1,4 +1,4 @@
-"""The values of a config as options: `--rows 4`, `--rewards.tracking-lin-vel 1.5`.
+"""Command-line options for the values of a config, such as `--rewards.tracking-lin-vel 1.5`.
 
 `--help` shows the values that the options change: those of the task or the file that is named.
 """
@@ -15,7 +15,7 @@ from terrainkit.errors import ConfigError
 from terrainkit.schema import Config, field_docs, field_types
 from terrainkit.type_hint import NONE, convert, parse_hint
 from terrainkit_cli.parse import Command, UsageError, check_options, option_names, parse, value_of
-from terrainkit_cli.robot_options import Text
+from terrainkit_cli.robot_options import InputPath
 
 if TYPE_CHECKING:
     from typing import Self
@@ -86,10 +86,10 @@ class TaskCommand(ConfigCommand):
     robot: Annotated[
         str, tyro.conf.Positional, tyro.conf.arg(metavar="ROBOT", help_behavior_hint="")
     ] = ""
-    """Name of a task, or a folder of terrainkit onboard."""
+    """Name of a bundled task, or a folder written by terrainkit onboard."""
 
-    config: Text = ""
-    """TOML file with values of the task; options override it."""
+    config: InputPath = ""
+    """Values of the task (.toml); options override them."""
 
     ALIASES: ClassVar[Mapping[str, str]] = {}
     """Shorter options of values of the task."""
@@ -108,11 +108,9 @@ class TaskCommand(ConfigCommand):
         own = _filter_args(arguments, [*option_names(cls), *_HELP], flags)
         words = [word for word in own if word not in _HELP]
         try:
-            command = parse(cls, "", words)
+            task = parse(cls, "", words).default_config()
         except UsageError:
-            command = cls()  # the error is reported when all words are parsed
-        try:
-            task = command.default_config()
+            task = Task()  # the error is reported when all words are parsed
         except ConfigError:
             if words == own:
                 raise

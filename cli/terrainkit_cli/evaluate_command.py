@@ -10,7 +10,14 @@ import tyro
 from terrainkit.errors import ConfigError
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
-from terrainkit_cli.robot_options import UNSET, Checkpoint, Output, optional_number, text_option
+from terrainkit_cli.robot_options import (
+    UNSET,
+    Checkpoint,
+    Flag,
+    Output,
+    optional_number,
+    text_option,
+)
 
 if TYPE_CHECKING:
     from terrainkit_robots.policy.evaluate import (
@@ -21,7 +28,7 @@ if TYPE_CHECKING:
     from terrainkit_robots.rl.run import Run
 
 _NO_COMMAND = (-math.inf, -math.inf, -math.inf)
-"""No command; not None, since tyro's errors about a union name its members."""
+"""Value of --command if it is not given; with None, tyro's errors name the types of a union."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,31 +42,31 @@ class PolicyCommand(Command):
     policy."""
 
     terrain: Annotated[str, text_option("TERRAIN")] = ""
-    """Terrain: plane, a map (.npz), a map config (.toml), or a MuJoCo model (.xml); by default the
-    terrain of the training."""
+    """plane, a map (.npz), a map config (.toml), or a MuJoCo model (.xml); by default, the terrain
+    of the training."""
 
     command: Annotated[
         tuple[float, float, float],
         tyro.conf.arg(metavar="VX VY YAW", help_behavior_hint=""),
     ] = _NO_COMMAND
-    """Command for all robots: forward and left velocity [m/s], yaw velocity [rad/s]."""
+    """The same command for all robots: forward and left velocity [m/s], yaw velocity [rad/s]."""
 
-    random_commands: bool = False
+    random_commands: Flag = False
     """Sample commands as in training."""
 
     num_envs: Annotated[
         int, tyro.conf.arg(metavar="INT", help_behavior_hint="(default: depends on the terrain)")
     ] = UNSET
-    """Number of robots."""
+    """Number of simulated robots."""
 
     checkpoint: Checkpoint = UNSET
     """The checkpoint to load."""
 
     seed: int = 1
-    """Seed of the start positions and of random commands."""
+    """Seed of the initial positions and of random commands."""
 
-    device: str = "cpu"
-    """Device of the policy, as torch names it."""
+    device: Annotated[str, text_option("DEVICE")] = "cpu"
+    """Device of the policy: cpu (the default), cuda, cuda:1."""
 
     def load_run(self) -> "Run":
         """Return the run.
@@ -70,7 +77,7 @@ class PolicyCommand(Command):
         from terrainkit_cli.training_extra import require_training
 
         if not self.policy:
-            raise ConfigError("RUN is missing; expected a run, a checkpoint, or a robot's name")
+            raise ConfigError("RUN: missing; expected a run, a checkpoint, or the name of a robot")
         require_training()
         from terrainkit_robots.rl.run import open_run
 
@@ -97,12 +104,12 @@ class PolicyCommand(Command):
 
 @dataclass(frozen=True, kw_only=True)
 class Evaluate(PolicyCommand):
-    """Measure how well a policy walks: velocity errors, falls, success by terrain and level.
+    """Measure the velocity errors, falls and success of a policy.
 
-    On a plane each robot gets a command of a grid over the ranges of the task. On a map the robots
-    walk forward from every patch, each until it has crossed half a patch. There is no noise, no
-    push and no domain randomization. The first 2 s after a command are not measured, nor is
-    anything after a fall. The same seed gives the same result.
+    On a plane, the commands of the robots form a grid over the command ranges of the task. On a
+    map, robots walk forward from the spawn origin of every patch until they have crossed half of
+    it. The rollout has no noise, pushes or domain randomization. The first 2 s after a command are
+    not measured, and nothing is measured after a fall. The same seed gives the same result.
     """
 
     seconds: float = 20.0
@@ -114,11 +121,11 @@ class Evaluate(PolicyCommand):
     output: Output = ""
     """Write the result to this file, as JSON."""
 
-    overwrite: bool = False
+    overwrite: Flag = False
     """Replace an existing file."""
 
     def run(self) -> int:
-        """Evaluate, and print or write the result."""
+        """Evaluate the policy, and print or write the result."""
         from terrainkit.atomic_write import atomic_write, check_target
 
         output = Path(self.output) if self.output else None
@@ -131,7 +138,7 @@ class Evaluate(PolicyCommand):
             result = evaluate(
                 run,
                 self.evaluation_config(self.seconds),
-                lambda fraction: steps.say(f"rollout: {fraction:.0%} of {self.seconds:g} s"),
+                lambda fraction: steps.update(f"rollout: {fraction:.0%} of {self.seconds:g} s"),
             )
         if self.format == "json":
             render.report(result.as_json())

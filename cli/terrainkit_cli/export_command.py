@@ -11,15 +11,16 @@ from terrainkit.terrain_map import TerrainMap
 from terrainkit.text import expected_names, truncate
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
-from terrainkit_cli.robot_options import UNSET, Checkpoint, optional_number, text_option
+from terrainkit_cli.robot_options import UNSET, Checkpoint, Flag, optional_number, text_option
 from terrainkit_cli.terrain_commands import written
 
 
 @dataclass(frozen=True, kw_only=True)
 class Export(Command):
-    """Export a map (.xml for MuJoCo, .stl, .ply, .obj, .glb, .png), or a trained policy.
+    """Export a map to other formats, or a policy to ONNX.
 
-    A map (.npz) is exported in the format named by the suffix of --output.
+    A map (.npz) is written as .xml (MuJoCo), .stl, .ply, .obj, .glb or .png: the suffix of
+    --output selects the format.
 
     A policy is exported from a run: a folder written by terrainkit train, a checkpoint in one, or
     the name of a robot with a bundled policy. The output folder gets policy.onnx, policy.pt
@@ -36,35 +37,37 @@ class Export(Command):
     """The map or the run."""
 
     output: Annotated[str, text_option("PATH", "-o")] = ""
-    """Where to write. For a map, a file whose suffix names the format. For a policy, a folder; by
-    default `exported` in the folder of the run, or ROBOT_policy for a bundled policy."""
+    """For a map: the file to write. For a policy: the folder to write, by default `exported` in
+    the folder of the run, or ROBOT_policy for a bundled policy."""
 
     collision: Annotated[
         Literal["auto", "hfield", "boxes"] | None,
         tyro.conf.arg(metavar="{auto,hfield,boxes}", help_behavior_hint="(default: auto)"),
     ] = None
-    """For .xml: one heightfield, or boxes with vertical walls where the terrain is level. auto
+    """For .xml: export the terrain as one heightfield, or as boxes, whose walls are vertical. auto
     selects boxes if a moderate number of them covers the whole terrain."""
 
-    full: bool = False
+    full: Flag = False
     """For meshes: write two triangles per cell instead of merging coplanar faces."""
 
-    closed: bool = False
+    closed: Flag = False
     """For meshes: add a skirt and a bottom, for a watertight solid."""
 
-    y_up: bool = False
+    y_up: Flag = False
     """For meshes: rotate the map so that y is up, as glTF viewers and game engines expect."""
 
     checkpoint: Checkpoint = UNSET
     """For a run: the checkpoint to export."""
 
-    overwrite: bool = False
+    overwrite: Flag = False
     """Replace existing files."""
 
     def run(self) -> int:
         """Export the map or the policy."""
         if not self.source:
-            raise ConfigError("MAP or RUN is missing; expected a map, a run, or a robot's name")
+            raise ConfigError(
+                "MAP.npz or RUN: missing; expected a map, a run, or the name of a robot"
+            )
         if is_run(self.source):
             self._export_policy()
         else:
@@ -85,16 +88,15 @@ class Export(Command):
             raise ConfigError(f"--checkpoint: got the map {self.source}; expected a run")
         terrain_map = TerrainMap.load(self.source)
         if not self.output:
-            raise ConfigError(
-                "--output is missing; expected a file, whose suffix names the format of the map"
-            )
+            raise ConfigError("--output: missing; expected a file, whose suffix selects the format")
         output = Path(self.output)
         terrain_map.save(output, overwrite=self.overwrite, **self._map_options())
         render.result(written(terrain_map, output))
-        if output.suffix == ".xml" and "<hfield" in output.read_text():
+        is_auto = self.collision in (None, "auto")
+        if output.suffix == ".xml" and is_auto and "<hfield" in output.read_text():
             render.result(
-                "walls of the heightfield are one cell wide; "
-                "--collision boxes makes them vertical where the terrain is level"
+                "the terrain is a heightfield, whose walls are one cell wide; "
+                "with --collision boxes, walls are vertical where the terrain is level"
             )
 
     def _export_policy(self) -> None:

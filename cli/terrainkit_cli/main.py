@@ -1,4 +1,4 @@
-"""The entry point: find the command, run it, and turn every expected error into one line."""
+"""The entry point: select the command, run it, and report errors as one line."""
 
 import importlib
 import os
@@ -6,41 +6,52 @@ import signal
 import sys
 import warnings
 from collections.abc import Sequence
+from pathlib import Path
 
 from terrainkit_cli import parse, render
 
-COMMANDS = {
-    "generate": "terrain_commands",
-    "list": "terrain_commands",
-    "info": "terrain_commands",
-    "preview": "terrain_commands",
-    "export": "export_command",
-    "check-map": "terrain_commands",
-    "check-robot": "robot_commands",
-    "rule": "robot_commands",
-    "onboard": "onboard_command",
-    "train": "train_command",
-    "smoke-test": "smoke_test_command",
-    "evaluate": "evaluate_command",
-    "play": "play_command",
+COMMAND_GROUPS = {
+    "Terrain": {
+        "generate": "terrain_commands",
+        "list": "terrain_commands",
+        "info": "terrain_commands",
+        "preview": "terrain_commands",
+        "check-map": "terrain_commands",
+        "export": "export_command",
+    },
+    "Robots": {
+        "check-robot": "robot_commands",
+        "rule": "robot_commands",
+        "onboard": "onboard_command",
+        "smoke-test": "smoke_test_command",
+    },
+    "Policies": {
+        "train": "train_command",
+        "evaluate": "evaluate_command",
+        "play": "play_command",
+    },
 }
 """Module of each command, so that only the one in use is imported."""
+
+COMMANDS = {name: module for group in COMMAND_GROUPS.values() for name, module in group.items()}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line, and return its exit code.
 
-    0: done. 1: a check found something. 2: bad input; one line on stderr says what and why.
+    0: success. 1: a check found errors. 2: invalid input; one line on stderr says what and why.
+    128 + n: ended by signal n.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
-    _rename_env(DRAWING)
+    _open_closed_streams()
+    # With this variable, `import mujoco` fails where its graphics library is missing, although few
+    # commands render. gl_backend.py reads the other name.
+    if "MUJOCO_GL" in os.environ:
+        os.environ["TERRAINKIT_MUJOCO_GL"] = os.environ.pop("MUJOCO_GL")
     warnings.showwarning = render.show_warning
+    _handle_signals()
     from terrainkit.errors import TerrainkitError
 
-    # Temporary files are removed when a scheduler or a closed terminal ends the process.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
-    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
-        signal.signal(signal.SIGHUP, lambda *_: sys.exit(129))
     try:
         code = _run(arguments)
         sys.stdout.flush()
@@ -49,9 +60,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         render.error(str(error))
         return 2
     except MemoryError:
-        render.error("out of memory; a smaller map, or a coarser cell, would do")
+        render.error("out of memory; use a smaller map or larger cells")
         return 2
-    except BrokenPipeError:
+    except BrokenPipeError:  # the reader is gone, as in `terrainkit list | head -1`
         render.drop_stdout()
         return 0
     except OSError as error:
@@ -60,21 +71,40 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt:
         render.error("interrupted")
-        return 130
+        return 128 + signal.SIGINT
+    except Terminated as end:
+        render.error(f"ended by {end.signal.name}")
+        return 128 + end.signal
 
 
-DRAWING = "MUJOCO_GL"
-"""The graphics library that MuJoCo draws with."""
+def _open_closed_streams() -> None:
+    """Open closed standard streams, or the next file that is opened takes their place."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open(mode))  # noqa: SIM115
 
 
-def _rename_env(name: str) -> None:
-    """Move a variable of the environment out of MuJoCo's sight.
+class Terminated(BaseException):
+    """A scheduler or a closed terminal ends the process; temporary files are removed."""
 
-    MuJoCo asks for the graphics library when it is imported, and fails where there is none, even
-    for work that draws nothing. What draws asks for the other name.
-    """
-    if name in os.environ:
-        os.environ[f"TERRAINKIT_{name}"] = os.environ.pop(name)
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.signal = signal.Signals(number)
+
+
+def _handle_signals() -> None:
+    """Raise Terminated on SIGTERM and SIGHUP."""
+    numbers = [signal.SIGTERM]
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
+        numbers.append(signal.SIGHUP)
+
+    def terminate(number: int, _: object) -> None:
+        for each in numbers:  # a second signal would interrupt the cleanup
+            signal.signal(each, lambda *_: None)
+        raise Terminated(number)
+
+    for number in numbers:
+        signal.signal(number, terminate)
 
 
 def _run(arguments: list[str]) -> int:
@@ -83,17 +113,28 @@ def _run(arguments: list[str]) -> int:
 
     name = arguments[0] if arguments else "--help"
     if name in ("-h", "--help"):
-        render.overview({name: command(name).__doc__ or "" for name in COMMANDS})
+        _print_overview()
         return 0
     if name == "--version":
         render.result(f"terrainkit {__version__}")
         return 0
     if name not in COMMANDS:
-        expected = expected_names(name, COMMANDS)
-        raise parse.UsageError(f"no command {truncate(repr(name))}; {expected}")
+        known = expected_names(name, COMMANDS)
+        raise parse.UsageError(f"no command {truncate(repr(name))}; {known}")
     options = command(name).options(arguments[1:])
-    parsed = parse.parse(options, f"terrainkit {name}", arguments[1:])
-    return parsed.run()
+    return parse.parse(options, f"terrainkit {name}", arguments[1:]).run()
+
+
+def _print_overview() -> None:
+    render.result("usage: terrainkit COMMAND [OPTIONS]\n")
+    render.result("Generate terrain for legged robots, check robot files, and train policies.\n")
+    rows: list[tuple[str, str]] = []
+    for group, names in COMMAND_GROUPS.items():
+        summaries = ((command(name).__doc__ or "").partition("\n")[0] for name in names)
+        rows += [(f"{group}:", ""), *zip((f"  {name}" for name in names), summaries, strict=True)]
+    render.table(rows)
+    render.result("\nterrainkit COMMAND --help lists the options of a command.")
+    render.result("terrainkit --version prints the version.")
 
 
 def command(name: str) -> type[parse.Command]:

@@ -12,16 +12,17 @@ from terrainkit.errors import ConfigError
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import (
+    Flag,
+    InputPath,
     Output,
     Packages,
     StringList,
-    Text,
     XacroArguments,
     find_robot,
     parse_ignore,
     parse_packages,
     parse_xacro_arguments,
-    repeatable,
+    repeated_option,
     split_commas,
 )
 
@@ -31,12 +32,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Onboard(Command):
-    """Convert a URDF, xacro or MJCF file into a folder that is ready for training.
+    """Convert a robot file into a folder that is ready for training.
 
-    The command checks the file, applies safe fixes and derives a default pose and PD gains. The
-    folder contains robot.toml (pose, gains, names: edit it), robot.urdf, robot.xml, scene.xml,
-    meshes, and report.md with pictures. The robot is then simulated to test that it stands. The
-    input file is never changed.
+    The command checks the file (URDF, xacro or MJCF), applies safe fixes and derives a default pose
+    and PD gains. The folder contains robot.toml (pose, gains, names: edit it), robot.urdf,
+    robot.xml, scene.xml, meshes, and report.md with pictures. The robot is then simulated to test
+    that it stands. The input file is never changed.
 
     Exit code 0: success. 1: errors remain in the file, or the robot does not stand. 2: a file
     cannot be read or written, or an option is invalid.
@@ -48,43 +49,43 @@ class Onboard(Command):
     """The robot file, or the name of a bundled robot: quadruped, biped."""
 
     output: Output = ""
-    """Folder to write. Default: a folder with the name of the robot."""
+    """Folder to write; by default, a folder with the name of the robot."""
 
     collision: Literal["keep", "hull", "coacd", "primitives"] = "keep"
     """Simplify collision meshes: keep them; replace them by their convex hulls; decompose
     nonconvex meshes into convex parts with CoACD; or fit a box, cylinder, capsule or sphere."""
 
-    config: Annotated[StringList, *repeatable("FRAMEWORK")] = field(default_factory=list)
+    config: Annotated[StringList, *repeated_option("FRAMEWORK")] = field(default_factory=list)
     """Also write a configuration for: legged_gym, leggedgym_ex, isaaclab, mjlab, genesis."""
 
     base: Literal["auto", "floating", "fixed"] = "auto"
-    """Whether the base is floating or fixed to the world. With auto, the base is floating if the
-    file says so, or if the robot has legs or wheels."""
+    """Type of the base: floating, or fixed to the world. With auto, it is floating if the file
+    says so, or if the robot has legs or wheels."""
 
-    spec: Text = ""
+    spec: InputPath = ""
     """A robot.toml whose values override the derived ones, such as one that you have edited."""
 
-    unsafe_fixes: bool = False
+    unsafe_fixes: Flag = False
     """Also apply fixes that change a number, a shape or a mesh. The input file is not changed."""
 
-    force: bool = False
-    """Continue although errors remain in the XML, the tree, joints, meshes or masses. The result
-    may be a different robot."""
+    force: Flag = False
+    """Continue even if errors remain in the XML, the tree, joints, meshes or masses. The result
+    may differ from the robot."""
 
-    overwrite: bool = False
+    overwrite: Flag = False
     """Replace the folder if it contains an onboarded robot."""
 
-    pictures: bool = True
-    """Render pictures."""
+    pictures: Flag = True
+    """Render the pictures of report.md."""
 
-    ignore: Annotated[StringList, *repeatable("CODES=REASON")] = field(default_factory=list)
+    ignore: Annotated[StringList, *repeated_option("CODES=REASON")] = field(default_factory=list)
     """Ignore these rules; the reason is written to the report."""
 
     package: Packages = field(default_factory=list)
     """Folder of a ROS package, for package:// and $(find ...)."""
 
     xacro_arg: XacroArguments = field(default_factory=list)
-    """Value of a xacro argument."""
+    """Value of a xacro argument of the file."""
 
     def run(self) -> int:
         """Onboard the robot and print a summary."""
@@ -92,7 +93,7 @@ class Onboard(Command):
         from terrainkit_robots.onboarding.summary import summarize
 
         if not self.file:
-            raise ConfigError("FILE is missing; expected a robot file, quadruped or biped")
+            raise ConfigError("FILE: missing; expected a robot file, quadruped, or biped")
         output = Path(self.output) if self.output else None
         with render.steps() as steps:
             result = onboard(find_robot(self.file), output, self._options(steps))
@@ -132,7 +133,7 @@ class Onboard(Command):
             render_images=self.pictures,
             cache_dir=cache_folder(),
             progress=partial(steps.bar, of="collision meshes"),
-            on_step=steps.say,
+            on_step=steps.update,
         )
 
     def _advice(self, result: "OnboardResult") -> str:

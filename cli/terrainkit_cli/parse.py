@@ -1,17 +1,22 @@
-"""Command-line arguments to a command: a frozen dataclass whose docstrings are its help."""
+"""Parse command-line arguments into a command, a dataclass whose docstrings are its help."""
 
 import contextlib
 import dataclasses
+import inspect
 import io
 import re
+import sys
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, get_type_hints
 
 from terrainkit.errors import TerrainkitError
+from terrainkit.schema import field_docs
 from terrainkit.text import closest, expected_names, truncate
+from terrainkit_cli import render
 
 if TYPE_CHECKING:
     from typing import Self
@@ -61,14 +66,25 @@ def parse(command: type[_Command], prog: str, arguments: list[str]) -> _Command:
     """
     import tyro
 
-    stderr = io.StringIO()
+    # tyro would keep some line breaks of docstrings.
+    paragraphs = (inspect.getdoc(command) or "").split("\n\n")
+    description = "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
+    if {"-h", "--help"} & set(arguments):
+        docs = field_docs(command)
+        for field in dataclasses.fields(command):
+            field.metadata = MappingProxyType({"help": docs.get(field.name, "")})
+    stdout, stderr = io.TextIOWrapper(io.BytesIO(), sys.stdout.encoding), io.StringIO()
+    stdout.isatty = sys.stdout.isatty  # type: ignore[method-assign]  # for colors
     try:
-        with contextlib.redirect_stderr(stderr):
-            return tyro.cli(command, prog=prog, args=arguments)
+        with contextlib.redirect_stdout(stdout), contextlib.redirect_stderr(stderr):
+            return tyro.cli(command, prog=prog, description=description, args=arguments)
     except SystemExit as end:
         if end.code in (0, None):
+            stdout.seek(0)
+            render.help_page(stdout.read())
+            sys.stdout.flush()
             raise
-        raise UsageError(f"{_one_line(stderr.getvalue())}; see {prog} --help") from None
+        raise UsageError(f"{_error_message(stderr.getvalue())}; see {prog} --help") from None
 
 
 def value_of(word: str) -> str | float | bool | None:
@@ -109,29 +125,49 @@ def option_names(command: type[Any], prefix: str = "", *, flags_only: bool = Fal
 
 
 def check_options(command: type[Command], arguments: Sequence[str]) -> None:
-    """Raise UsageError if an option is unknown, on one line; tyro's message fills a page."""
+    """Raise UsageError if an option is unknown; tyro's message fills a page."""
     known = [*option_names(command), "--help"]
     for word in arguments:
         name = word.partition("=")[0]
         if name.startswith("--") and name.replace("_", "-") not in known:
             near = closest(name.replace("_", "-"), known)
-            meant = f"; did you mean {near}?" if near else ""
-            raise UsageError(f"no option {truncate(name)}{meant}; --help lists the options")
+            hint = f"did you mean {near}?" if near else "--help lists the options"
+            raise UsageError(f"no option {truncate(name)}; {hint}")
 
 
-def _one_line(box: str) -> str:
-    """Return the text in tyro's box as one line, without its title and its closing advice."""
+def _error_message(box: str) -> str:
+    """Return the message in a box of tyro on one line, worded like the other errors."""
     # A terminal that is not UTF-8 gets a box of other characters.
     rows = [row.strip("│| ") for row in box.splitlines()[1:]]
     parts = " ".join(row if row.strip("─╰╯+- ") else "\n" for row in rows).split("\n")
     texts = [part.strip() for part in parts]
     texts = [text for text in texts if text and not text.startswith(("For full", "Argument help"))]
     text = re.sub(r"^Error parsing (\S+): (?=\1: )", "", ". ".join(texts))
-    choice = re.fullmatch(
-        r"invalid choice '(.*)' for argument '(.*)'\. Expected one of \((.*)\)\.?", text
-    )
-    if choice is None:
-        return text
-    got, option, expected = choice.groups()
-    names = [name for name in re.findall(r"'([^']*)'", expected) if name != "None"]
-    return f"{option}: got {got!r}; {expected_names(got, names, 'expected one of')}"
+    for pattern, message in _MESSAGES.items():
+        if match := re.match(pattern, text):
+            return message(*match.groups())
+    return text
+
+
+def _choice_message(value: str, option: str, choices: str) -> str:
+    names = [name for name in re.findall(r"'([^']*)'", choices) if name != "None"]
+    return f"{option}: got {value!r}; {expected_names(value, names, 'expected one of')}"
+
+
+_MESSAGES: dict[str, Callable[..., str]] = {
+    r"invalid choice '(.*)' for argument '(.*)'\. Expected one of \((.*)\)": _choice_message,
+    r"Missing value for argument '(.*)'\. Expected (\d+)": "{}: too few values; expected {}".format,
+    r"Missing from [\w -]+: (?:-\w \S+, )?(\S+)": "{}: missing".format,
+    r"Error parsing (\S+): Could not parse arguments \[(.*?)\] .*\[(.*)\]": (
+        "{}: got {}; expected {}".format
+    ),
+    r"Error parsing (\S+): invalid literal for int\(\) .*: (.*)": (
+        "{}: got {}; expected an integer".format
+    ),
+    r"Error parsing (\S+): could not convert string to float: (.*)": (
+        "{}: got {}; expected a number".format
+    ),
+    r"Unrecognized options: (-.*)": "no option {}".format,
+    r"Unrecognized options: (.*)": "got {}; expected no more arguments".format,
+}
+"""Patterns of tyro's errors, and functions that return the message for their groups."""

@@ -9,7 +9,7 @@ import tyro
 from terrainkit.errors import ConfigError
 from terrainkit_cli import render
 from terrainkit_cli.evaluate_command import PolicyCommand, result_rows, summary_line
-from terrainkit_cli.robot_options import Output
+from terrainkit_cli.robot_options import Flag, Output
 from terrainkit_cli.training_extra import require_training
 
 if TYPE_CHECKING:
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Play(PolicyCommand):
-    """Show how a policy walks: a video (.mp4), and a table of errors, falls and success.
+    """Record a video of a policy, and print its errors and falls.
 
-    On a plane the robots walk in formation, with --command or a sequence of commands. On a map
-    there is one robot per patch, and the video follows some of them on different terrains.
+    On a plane, the robots walk in formation, with --command or a sequence of commands. On a map,
+    one robot walks on each patch, and the video follows some of them on different terrains.
     """
 
     seconds: float = 12.0
@@ -39,13 +39,13 @@ class Play(PolicyCommand):
     ] = (640, 360)
     """Size of the video [pixels]."""
 
-    video: bool = True
-    """Write a video, not only print the table."""
+    video: Flag = True
+    """Write a video; --no-video only prints the table."""
 
-    viewer: bool = False
+    viewer: Flag = False
     """Show one robot in MuJoCo's viewer until its window is closed, and write nothing."""
 
-    overwrite: bool = False
+    overwrite: Flag = False
     """Replace an existing video."""
 
     def run(self) -> int:
@@ -73,7 +73,7 @@ class Play(PolicyCommand):
                 video=self.video,
                 robots=self.robots,
                 size=self.size,
-                progress=lambda fraction: steps.say(
+                progress=lambda fraction: steps.update(
                     f"rollout: {fraction:.0%} of {self.seconds:g} s"
                 ),
             )

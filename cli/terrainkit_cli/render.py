@@ -1,13 +1,16 @@
-"""Printing: results on stdout, everything else on stderr."""
+"""Print results on stdout, and everything else on stderr."""
 
 import io
 import os
+import re
 import shutil
 import sys
+import textwrap
 import time
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, TextIO, TypeVar
 
 if TYPE_CHECKING:
@@ -19,13 +22,13 @@ if TYPE_CHECKING:
 
 _T = TypeVar("_T")
 
-_PATIENCE = 0.5
-"""How long a walk may take before it shows a progress bar [s]."""
+BAR_DELAY = 0.5
+"""Time after which a progress bar appears [s]."""
 
 
 def result(text: str) -> None:
     """Print a result."""
-    print(text)
+    print(_relative_paths(text))
 
 
 def table(rows: Sequence[Sequence[str]]) -> None:
@@ -36,16 +39,16 @@ def table(rows: Sequence[Sequence[str]]) -> None:
         print("  ".join(cells).rstrip())
 
 
-def overview(commands: Mapping[str, str]) -> None:
-    """Print what commands there are, with the first line of the help of each."""
-    print("usage: terrainkit COMMAND ...\n")
-    print("For legged robots: terrain to train on, and checks of the robot before it is trained.\n")
-    table([(f"  {name}", text.partition("\n")[0]) for name, text in commands.items()])
-    print("\nterrainkit COMMAND --help says more; terrainkit --version says which this is.")
+def help_page(text: str) -> None:
+    """Print a help page; lines wider than the terminal are wrapped, except styled ones."""
+    columns = width()
+    for line in text.splitlines():
+        is_long = len(line) > columns and "\x1b" not in line
+        print(textwrap.fill(line, columns) if is_long else line.rstrip())
 
 
 def report(text: str) -> None:
-    """Print a text that ends its lines itself; what the terminal cannot write is escaped."""
+    """Print a text that ends with a newline; characters unknown to the terminal are escaped."""
     _escape_unknown()
     print(text, end="")
 
@@ -62,28 +65,42 @@ def styled(lines: "Iterator[tuple[Span, ...]]") -> None:
 
 
 def has_colors() -> bool:
-    """Whether the results are read on a terminal that has colors."""
+    """Return whether stdout is a terminal with colors."""
     return sys.stdout.isatty() and os.environ.get("TERM") != "dumb" and "NO_COLOR" not in os.environ
 
 
 def width() -> int:
-    """Return how wide the text of a report is to be: as the terminal, and neither tiny nor huge."""
+    """Return the width of a report: that of the terminal, from 60 to 120 columns."""
     return min(max(shutil.get_terminal_size().columns, 60), 120)
 
 
 def note(message: str) -> None:
-    """Print a remark beside the result."""
-    print(f"terrainkit: {message}", file=sys.stderr)
+    """Print a remark on stderr."""
+    _print_message(message)
+
+
+def error(message: str) -> None:
+    """Print an error on stderr, as one line."""
+    _print_message(f"error: {' '.join(message.split())}")
+
+
+def _print_message(message: str) -> None:
+    with suppress(OSError):  # such as that of a closed terminal
+        print(f"terrainkit: {_relative_paths(message)}", file=sys.stderr, flush=True)
+
+
+def _relative_paths(text: str) -> str:
+    """Return a text in which paths below the working directory are relative to it."""
+    try:
+        folder = re.escape(str(Path.cwd()))
+    except OSError:  # it has been removed
+        return text
+    return re.sub(rf"(?<![\w./~-]){folder}/(?=[\w.])", "", text)
 
 
 def _escape_unknown() -> None:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
-
-
-def error(message: str) -> None:
-    """Print an error, as one line."""
-    print(f"terrainkit: error: {' '.join(message.split())}", file=sys.stderr)
 
 
 def show_warning(
@@ -94,29 +111,29 @@ def show_warning(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """Print a warning, as one line; stands in for `warnings.showwarning`."""
+    """Print a warning as one line; replaces `warnings.showwarning`."""
     from terrainkit.errors import TerrainkitWarning
 
     if issubclass(category, TerrainkitWarning):
-        print(f"terrainkit: warning: {message}", file=sys.stderr)
+        _print_message(f"warning: {message}")
     else:
         text = warnings.formatwarning(message, category, filename, lineno, line)
         print(text, end="", file=file or sys.stderr)
 
 
-def progress(walk: Iterable[_T], total: int, *, of: str = "patches") -> Iterator[_T]:
-    """Return `walk` with a bar on stderr, if that is a terminal and the walk takes long."""
-    steps = iter(walk)
-    return _with_bar_when_slow(steps, total, of) if sys.stderr.isatty() else steps
+def progress(items: Iterable[_T], total: int, *, of: str = "patches") -> Iterator[_T]:
+    """Return `items`, with a progress bar on stderr if that is a terminal and they take long."""
+    items = iter(items)
+    return _with_delayed_bar(items, total, of) if sys.stderr.isatty() else items
 
 
-def _with_bar_when_slow(walk: Iterator[_T], total: int, of: str) -> Iterator[_T]:
+def _with_delayed_bar(items: Iterator[_T], total: int, of: str) -> Iterator[_T]:
     start = time.monotonic()
-    done = 0
-    for item in walk:
+    completed = 0
+    for item in items:
         yield item
-        done += 1
-        if time.monotonic() - start > _PATIENCE:
+        completed += 1
+        if time.monotonic() - start > BAR_DELAY:
             break
     else:
         return
@@ -124,36 +141,36 @@ def _with_bar_when_slow(walk: Iterator[_T], total: int, of: str) -> Iterator[_T]
     from rich.progress import Progress
 
     with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(of, total=total, completed=done)
-        for item in walk:
+        task = bar.add_task(of, total=total, completed=completed)
+        for item in items:
             yield item
             bar.advance(task)
 
 
 class Steps:
-    """What is done next, shown on stderr while it is done, if that is a terminal."""
+    """Shows the current step of a command on stderr, if that is a terminal."""
 
     def __init__(self, status: "Status | None") -> None:
         self._status = status
 
-    def say(self, step: str) -> None:
+    def update(self, step: str) -> None:
         """Show a step."""
         if self._status is not None:
             self._status.update(step)
 
-    def bar(self, walk: Iterable[_T], total: int, *, of: str) -> Iterator[_T]:
-        """Yield what `walk` does, with a bar in the place of the step."""
+    def bar(self, items: Iterable[_T], total: int, *, of: str) -> Iterator[_T]:
+        """Yield `items`, with a progress bar in place of the step."""
         if self._status is None:
-            yield from walk
+            yield from items
             return
-        self._status.stop()  # only one thing at a time can move on a terminal
-        yield from progress(walk, total, of=of)
+        self._status.stop()  # a terminal shows either a status or a bar
+        yield from progress(items, total, of=of)
         self._status.start()
 
 
 @contextmanager
 def steps() -> Iterator[Steps]:
-    """Yield what shows the steps of a work."""
+    """Yield an object that shows the steps of a command."""
     if not sys.stderr.isatty():
         yield Steps(None)
         return
@@ -164,18 +181,17 @@ def steps() -> Iterator[Steps]:
 
 
 def drop_stdout() -> None:
-    """Let the interpreter close stdout in peace once its reader has gone."""
+    """Discard further output, so that no error is printed at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-_LINE_EVERY, _TERMS_EVERY = 10, 50
-"""Iterations of training between lines, where there is no terminal to show each on: of how it goes,
-and of what robots succeed in and are rewarded for."""
+LINE_INTERVAL, TERMS_INTERVAL = 10, 50
+"""Iterations between lines without a terminal: those of progress, those of success and rewards."""
 
 
 @contextmanager
 def training() -> "Iterator[ProgressCallback]":
-    """Yield what shows the progress of training on stderr: live, or as a line now and then."""
+    """Yield a callback that shows the progress of training on stderr, live if it is a terminal."""
     if not sys.stderr.isatty():
         yield _training_line
         return
@@ -187,31 +203,31 @@ def training() -> "Iterator[ProgressCallback]":
 
 
 def _training_line(progress: "TrainingProgress") -> None:
-    done = progress.iteration
-    if done % _LINE_EVERY and done != progress.max_iterations:
-        return
-    facts = ", ".join(f"{name} {value}" for name, value in _training_facts(progress))
-    print(f"iteration {done}/{progress.max_iterations}: {facts}", file=sys.stderr, flush=True)
-    if done % _TERMS_EVERY and done != progress.max_iterations:
-        return
-    terms = [f"success {name} {rate:.0%}" for name, rate in progress.success.items()]
-    terms += [f"{name} {reward:+.3f} /s" for name, reward in progress.rewards.items()]
-    if terms:
-        told = ", ".join(terms)
-        print(f"iteration {done}/{progress.max_iterations}: {told}", file=sys.stderr, flush=True)
+    iteration, last = progress.iteration, progress.max_iterations
+    lines = []
+    if iteration % LINE_INTERVAL == 0 or iteration == last:
+        lines.append([f"{name} {value}" for name, value in _training_metrics(progress)])
+    if iteration % TERMS_INTERVAL == 0 or iteration == last:
+        terms = [f"success {name} {rate:.0%}" for name, rate in progress.success.items()]
+        lines.append(
+            terms + [f"{name} {value:+.3f} /s" for name, value in progress.rewards.items()]
+        )
+    with suppress(OSError):  # such as that of a closed terminal
+        for line in filter(None, lines):
+            print(f"iteration {iteration}/{last}: {', '.join(line)}", file=sys.stderr, flush=True)
 
 
-def _training_facts(progress: "TrainingProgress") -> list[tuple[str, str]]:
-    """Return what is said of training in both ways."""
-    facts = [
+def _training_metrics(progress: "TrainingProgress") -> list[tuple[str, str]]:
+    """Return names and values of the metrics that both formats show."""
+    metrics = [
         ("env steps/s", f"{progress.steps_per_second:.0f}"),
         ("to go", _clock(progress.eta)),
         ("noise std", f"{progress.noise_std:.2f}"),
     ]
     if progress.reward is not None and progress.episode_length is not None:
-        facts.insert(2, ("reward", f"{progress.reward:.2f}"))
-        facts.insert(3, ("episode", f"{progress.episode_length:.1f} s"))
-    return facts + [(f"level {name}", f"{level:.1f}") for name, level in progress.levels.items()]
+        metrics.insert(2, ("reward", f"{progress.reward:.2f}"))
+        metrics.insert(3, ("episode", f"{progress.episode_length:.1f} s"))
+    return metrics + [(f"level {name}", f"{level:.1f}") for name, level in progress.levels.items()]
 
 
 def _training_table(progress: "TrainingProgress") -> "Table":
@@ -222,7 +238,7 @@ def _training_table(progress: "TrainingProgress") -> "Table":
     table = Table(title=title, caption=where, show_header=False, title_justify="left")
     table.add_column()
     table.add_column(justify="right")
-    for name, value in _training_facts(progress):
+    for name, value in _training_metrics(progress):
         rate = progress.success.get(name.removeprefix("level "))
         reached = "" if rate is None or not name.startswith("level ") else f"  {rate:.0%} succeed"
         table.add_row(name, value + reached)
@@ -234,6 +250,6 @@ def _training_table(progress: "TrainingProgress") -> "Table":
 
 
 def _clock(seconds: float) -> str:
-    """Return a time such as 1:02:03."""
+    """Return a duration as text, such as 1:02:03."""
     minutes, rest = divmod(round(seconds), 60)
     return f"{minutes // 60}:{minutes % 60:02}:{rest:02}"

@@ -12,16 +12,17 @@ from terrainkit.errors import ConfigError, TerrainkitError
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import (
+    Flag,
+    InputPath,
     Output,
     Packages,
     StringList,
-    Text,
     XacroArguments,
     find_robot,
     parse_ignore,
     parse_packages,
     parse_xacro_arguments,
-    repeatable,
+    repeated_option,
     split_commas,
 )
 
@@ -34,16 +35,20 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class CheckRobot(Command):
-    """Check URDF, xacro and MJCF files for errors that break training or simulation.
+    """Check URDF, xacro and MJCF files for errors.
+
+    The rules find errors that break training or simulation, from XML syntax to the behavior in
+    simulation; `terrainkit rule` lists them.
 
     Exit code 0: no errors, and no warnings with --strict. 1: errors were found. 2: a file cannot
     be read, or an option is invalid; the other files are still checked.
 
     Default options are read from [tool.terrainkit.check-robot] in pyproject.toml or [check-robot]
     in terrainkit.toml, in the folder of the robot or above it: select, ignore, package, xacro-arg,
-    strict, simulation. A comment in the robot file suppresses a rule for the element that it is
-    in, on the same line as, or above:
-    <!-- terrainkit: ignore INR004 the reason -->
+    strict, simulation.
+
+    The comment <!-- terrainkit: ignore INR004 the reason --> suppresses a rule for the element that
+    contains it, for those on the same line, and for the next one.
     """
 
     files: Annotated[
@@ -59,43 +64,43 @@ class CheckRobot(Command):
     output: Output = ""
     """Write the report to this file. An existing file is replaced."""
 
-    select: Annotated[StringList, *repeatable("CODES")] = field(default_factory=list)
+    select: Annotated[StringList, *repeated_option("CODES")] = field(default_factory=list)
     """Run only these rules: comma-separated codes, prefixes of codes, or names."""
 
-    ignore: Annotated[StringList, *repeatable("CODES=REASON")] = field(default_factory=list)
+    ignore: Annotated[StringList, *repeated_option("CODES=REASON")] = field(default_factory=list)
     """Do not run these rules; the reason is printed in the report."""
 
     package: Packages = field(default_factory=list)
     """Folder of a ROS package, for package:// and $(find ...)."""
 
     xacro_arg: XacroArguments = field(default_factory=list)
-    """Value of a xacro argument."""
+    """Value of a xacro argument of the file."""
 
-    against: Text = ""
-    """Another file of the same robot to compare with: URDF, xacro or MJCF."""
+    against: InputPath = ""
+    """Compare with another file of the same robot: URDF, xacro or MJCF."""
 
-    spec: Text = ""
-    """The robot.toml of the robot to compare with."""
+    spec: InputPath = ""
+    """Compare with the robot.toml of the robot."""
 
-    simulation: bool = True
+    simulation: Flag = True
     """Run the rules that simulate the robot (drop test, standing test, joint sweep)."""
 
-    strict: bool = False
+    strict: Flag = False
     """Exit with code 1 if there are warnings."""
 
-    fix: bool = False
-    """Apply the fixes that do not change the robot for any parser that can read the file."""
+    fix: Flag = False
+    """Apply the safe fixes: they do not change the robot for any parser that reads the file."""
 
-    unsafe_fixes: bool = False
+    unsafe_fixes: Flag = False
     """Also apply fixes that change a number, a shape or another file. Review the result."""
 
-    diff: bool = False
-    """Print the changes of --fix or --unsafe-fixes without writing them."""
+    diff: Flag = False
+    """Print the changes of --fix or --unsafe-fixes, and write nothing."""
 
     def run(self) -> int:
         """Check each file and print the reports."""
         if not self.files:
-            raise ConfigError("FILE is missing; expected robot files, quadruped or biped")
+            raise ConfigError("FILE: missing; expected robot files, quadruped, or biped")
         if self.diff and self.format != "text":
             raise ConfigError(f"--diff prints a diff and cannot be combined with {self.format}")
         if len(self.files) > 1 and (self.against or self.spec):
@@ -154,7 +159,7 @@ class CheckRobot(Command):
         from terrainkit_robots.lint.settings import read_settings
 
         path = find_robot(name)
-        is_bundled = path == bundled.find(name)
+        is_bundled = path == bundled.urdf_path(name)
         settings = options.over(read_settings(Path() if is_bundled else path.parent))
         against = find_robot(self.against) if self.against else None
 
@@ -257,14 +262,14 @@ def _check_output(output: Path, inputs: Sequence[Path]) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Rule(Command):
-    """Print what a rule of check-robot checks, why it matters, and how to fix its findings."""
+    """Explain a rule of check-robot, or list all rules."""
 
     code: Annotated[
-        str, tyro.conf.Positional, tyro.conf.arg(metavar="CODE", help_behavior_hint="")
+        str, tyro.conf.Positional, tyro.conf.arg(metavar="[CODE]", help_behavior_hint="")
     ] = ""
-    """Code or name of the rule."""
+    """Code or name of the rule; without it, all rules are listed."""
 
-    all: bool = False
+    all: Flag = False
     """List all rules."""
 
     def run(self) -> int:

@@ -1,4 +1,4 @@
-"""Options that several robot commands have."""
+"""Options that several commands share."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from terrainkit.errors import ConfigError
+from terrainkit.text import expected_names
 
 if TYPE_CHECKING:
     StringList = list[str]
@@ -15,7 +16,7 @@ else:
     StringList = list
 
 
-def repeatable(metavar: str) -> tuple[object, ...]:
+def repeated_option(metavar: str) -> tuple[object, ...]:
     """Return the annotations of an option that can be repeated."""
     hint = "(may be repeated)"
     return tyro.conf.UseAppendAction, tyro.conf.arg(metavar=metavar, help_behavior_hint=hint)
@@ -26,10 +27,13 @@ def text_option(metavar: str, *aliases: str) -> object:
     return tyro.conf.arg(metavar=metavar, aliases=list(aliases), help_behavior_hint="")
 
 
-Packages = Annotated[StringList, *repeatable("NAME=DIR")]
-XacroArguments = Annotated[StringList, *repeatable("NAME:=VALUE")]
-Text = Annotated[str, text_option("PATH")]
+Packages = Annotated[StringList, *repeated_option("NAME=DIR")]
+XacroArguments = Annotated[StringList, *repeated_option("NAME:=VALUE")]
+InputPath = Annotated[str, text_option("PATH")]
 Output = Annotated[str, text_option("PATH", "-o")]
+
+Flag = Annotated[bool, tyro.conf.arg(help_behavior_hint=lambda text: f"(default: {text.lower()})")]
+"""An option --x or --no-x."""
 
 UNSET = -1
 """Default of optional numbers; with None, tyro would print the types of a union in errors."""
@@ -51,16 +55,15 @@ def find_robot(name: str) -> Path:
     Raises:
         ConfigError: if neither exists, or the file cannot be accessed.
     """
-    from terrainkit.text import expected_names
     from terrainkit_robots.description import bundled
 
     path = Path(name)
     try:
         if path.is_file():
             return path
-        bundled_path = bundled.find(name)
+        bundled_path = bundled.urdf_path(name)
         if bundled_path is None and not path.exists():
-            expected = expected_names(name, bundled.names(), "bundled robots are")
+            expected = expected_names(name, bundled.robot_names(), "bundled robots are")
             raise ConfigError(f"robot file: got {name}, which does not exist; {expected}")
     except OSError as error:
         raise ConfigError(f"cannot read {name}: {error.strerror or error}") from error

@@ -11,15 +11,15 @@ from terrainkit.errors import ConfigError, TerrainkitError, listing
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import (
+    InputPath,
     Output,
     Packages,
     StringList,
-    Text,
     XacroArguments,
     parse_ignore,
     parse_packages,
     parse_xacro_arguments,
-    repeatable,
+    repeated_option,
 )
 from terrainkit_cli.training_extra import require_training
 
@@ -32,10 +32,13 @@ SCHEMA_VERSION = 2
 
 @dataclass(frozen=True, kw_only=True)
 class SmokeTest(Command):
-    """Check in seconds whether a robot can be trained: it stands, gets rewards, and learns.
+    """Check in seconds whether a robot can be trained.
 
-    Robot files are onboarded into a temporary folder first. Exit code 0: every robot can be
-    trained. 1: a check failed. 2: a robot cannot be read, or an option is invalid.
+    The robot must stand, get rewards, and learn. Robot files are onboarded into a temporary folder
+    first.
+
+    Exit code 0: every robot can be trained. 1: a check failed. 2: a robot cannot be read, or an
+    option is invalid.
     """
 
     robots: Annotated[
@@ -51,7 +54,7 @@ class SmokeTest(Command):
     output: Output = ""
     """Write the report to this file; an existing file is replaced."""
 
-    ignore: Annotated[StringList, *repeatable("CODES=REASON")] = field(default_factory=list)
+    ignore: Annotated[StringList, *repeated_option("CODES=REASON")] = field(default_factory=list)
     """For robot files: rules to ignore, with the reason."""
 
     package: Packages = field(default_factory=list)
@@ -60,7 +63,7 @@ class SmokeTest(Command):
     xacro_arg: XacroArguments = field(default_factory=list)
     """For robot files: value of a xacro argument."""
 
-    spec: Text = ""
+    spec: InputPath = ""
     """For a robot file: a robot.toml whose values override the derived ones."""
 
     def run(self) -> int:
@@ -70,7 +73,7 @@ class SmokeTest(Command):
         results: dict[str, SmokeTestResult] = {}
         with render.steps() as steps:
             for name in self.robots:
-                steps.say(f"smoke test of {name}")
+                steps.update(f"smoke test of {name}")
                 try:
                     results[name] = self._smoke_test(name)
                 except TerrainkitError as error:
@@ -92,7 +95,7 @@ class SmokeTest(Command):
 
     def _check_options(self) -> None:
         if not self.robots:
-            raise ConfigError("ROBOT is missing; expected a name, a folder, or a robot file")
+            raise ConfigError("ROBOT: missing; expected a name, a folder, or a robot file")
         if self.spec and len(self.robots) > 1:
             raise ConfigError(f"--spec: got {len(self.robots)} robots; expected one")
         names = "package", "xacro-arg", "ignore", "spec"
@@ -129,10 +132,12 @@ def summary(result: "SmokeTestResult") -> str:
 
 def as_text(results: "dict[str, SmokeTestResult]") -> str:
     """Return a table of checks for each robot, with the expectation of failed ones."""
+    from terrainkit_robots.text import display_path
+
     blocks = []
     for name, result in results.items():
         width = max(len(check.name) for check in result.checks)
-        lines = [f"robot     {result.robot} ({name})", ""]
+        lines = [f"robot     {result.robot} ({display_path(name)})", ""]
         for check in result.checks:
             word = "ok  " if check.passed else "FAIL"
             lines.append(f"{word}  {check.name.ljust(width)}  {check.measured}")

@@ -1,9 +1,10 @@
-"""The commands that make, look at and check maps."""
+"""The commands for maps: generate, list, info, preview and check-map."""
 
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
@@ -17,6 +18,7 @@ from terrainkit.terrain_map import TerrainMap
 from terrainkit_cli import render
 from terrainkit_cli.config_options import ConfigCommand
 from terrainkit_cli.parse import Command, check_options, value_of, word_after
+from terrainkit_cli.robot_options import Flag
 
 if TYPE_CHECKING:
     from typing import Self
@@ -27,21 +29,26 @@ Output = Annotated[Path, tyro.conf.arg(aliases=["-o"])]
 
 @dataclass(frozen=True, kw_only=True)
 class Generate(ConfigCommand):
-    """Generate a map and write it to a file."""
+    """Generate a map of terrain patches and write it to a file.
+
+    Rows of patches are difficulty levels, columns are terrains. --config, --terrain and --preset
+    select the terrains; the options from --rows on are the values of the map config.
+    """
 
     output: Output
-    """File to write; its suffix is the format (.npz holds everything)."""
+    """File to write. The suffix selects the format: .npz for a complete map, which the other
+    commands read; .xml (MuJoCo), .stl, .ply, .obj, .glb or .png for other programs."""
 
     config: Annotated[str, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = ""
-    """TOML file of a map, or a map in .npz with its config; options override it."""
+    """Map config (.toml), or a map (.npz) whose config is used; options override it."""
 
     terrain: Annotated[str, tyro.conf.arg(metavar="NAME", help_behavior_hint="")] = ""
-    """Terrain of the whole map; `terrainkit list` prints the names."""
+    """Use only this terrain, not a preset; `terrainkit list` prints the names."""
 
     set: Annotated[str, tyro.conf.arg(metavar="NAME=VALUE,...", help_behavior_hint="")] = ""
-    """Parameters of --terrain: name=value, or name=easy:hard for a range, separated by commas."""
+    """Parameters of --terrain: NAME=VALUE, or NAME=EASY:HARD for a range over the difficulty."""
 
-    overwrite: bool = False
+    overwrite: Flag = False
     """Replace an existing file."""
 
     @classmethod
@@ -60,17 +67,17 @@ class Generate(ConfigCommand):
 
         config = self.changed_config()
         samples = config.grid.shape[0] * config.grid.shape[1]
-        export.check_export(
-            self.output, samples, overwrite=self.overwrite
-        )  # fail before generating
+        # Fail before generating.
+        export.check_export(self.output, samples, overwrite=self.overwrite)
         terrain_map = generate(config, progress=render.progress)
         terrain_map.save(self.output, overwrite=self.overwrite)
         render.result(written(terrain_map, self.output))
         if self.output.suffix == ".npz":
+            path = quote(str(self.output))
             render.result(
-                f"next: terrainkit preview {self.output} -o preview.png  (look at it)\n"
-                f"      terrainkit export {self.output} -o map.xml  (MuJoCo; or .stl, .ply ...)\n"
-                f'      terrainkit.TerrainMap.load("{self.output}")  (Python; numpy.load too)'
+                f"next: terrainkit preview {path} -o preview.png  (render it)\n"
+                f"      terrainkit export {path} -o map.xml  (MuJoCo; or .stl, .ply, ...)\n"
+                f"      terrainkit.TerrainMap.load({str(self.output)!r})  (Python; or numpy.load)"
             )
         return 0
 
@@ -108,15 +115,15 @@ def _parameters(text: str) -> dict[str, Value | Range]:
 
 @dataclass(frozen=True, kw_only=True)
 class List(Command):
-    """List the terrains, or the parameters of one."""
+    """List the terrains and presets, or the parameters of a terrain."""
 
     terrain: Annotated[
         str, tyro.conf.Positional, tyro.conf.arg(metavar="[TERRAIN]", help_behavior_hint="")
     ] = ""
-    """A terrain, for its parameters."""
+    """Name of a terrain, to print its parameters."""
 
     def run(self) -> int:
-        """Print a table."""
+        """Print the terrains and presets, or the parameters of a terrain."""
         from terrainkit.terrain_docs import terrain_doc, terrain_summaries
 
         if not self.terrain:
@@ -141,21 +148,20 @@ class List(Command):
 
 
 _WHOLE_MAP = (-sys.maxsize, -sys.maxsize)
-"""No patch in particular, and none that one would ask for; not None, since tyro's errors about a
-union name its members."""
+"""Value of --patch if it is not given; with None, tyro's errors name the types of a union."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Info(Command):
-    """Print what a map holds."""
+    """Print the size, terrains and difficulty of a map, or one patch."""
 
     map: MapFile
-    """The map."""
+    """The map, a file written by terrainkit generate."""
 
     patch: Annotated[tuple[int, int], tyro.conf.arg(metavar="ROW COL", help_behavior_hint="")] = (
         _WHOLE_MAP
     )
-    """Row and column of a patch, for its parameters as asked and as built."""
+    """Row and column of a patch, to print its requested and realized parameters."""
 
     def run(self) -> int:
         """Print the size of the map and its columns, or one patch."""
@@ -211,32 +217,32 @@ def _print_patch(terrain_map: TerrainMap, row: int, col: int) -> None:
         f"patch ({row}, {col}): {patch.terrain} at difficulty {patch.difficulty:.3f}, "
         f"spawn origin ({x:g}, {y:g}, {z:g})\n"
     )
-    rows = [("parameter", "asked", "built")]
-    for name, asked in patch.parameters.requested.items():
-        built = patch.parameters.realized[name]
-        text = " x ".join(f"{v:g}" for v in built) if isinstance(built, tuple) else f"{built:g}"
-        rows.append((name, f"{asked:g}", text))
+    rows = [("parameter", "requested", "realized")]
+    for name, requested in patch.parameters.requested.items():
+        realized = patch.parameters.realized[name]
+        values = realized if isinstance(realized, tuple) else (realized,)
+        rows.append((name, f"{requested:g}", " x ".join(f"{value:g}" for value in values)))
     render.table(rows)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Preview(Command):
-    """Draw a map from above: relief, names, levels and spawn origins."""
+    """Render a map from above, with terrain names and spawn origins."""
 
     map: MapFile
-    """The map."""
+    """The map, a file written by terrainkit generate."""
 
     output: Output
-    """The .png to write."""
+    """The image to write (.png)."""
 
     width: int = 1600
-    """Least width of the ground in the picture [px]."""
+    """Minimum width of the map in the image [pixels]."""
 
-    overwrite: bool = False
+    overwrite: Flag = False
     """Replace an existing file."""
 
     def run(self) -> int:
-        """Draw the picture and write it."""
+        """Render the image and write it."""
         from terrainkit.preview import write_preview
 
         terrain_map = TerrainMap.load(self.map)
@@ -247,29 +253,33 @@ class Preview(Command):
 
 @dataclass(frozen=True, kw_only=True)
 class CheckMap(Command):
-    """Validate a map: spawn origins, patches, sizes, difficulty, mesh."""
+    """Validate a map: spawn origins, patches, sizes, difficulty, mesh.
+
+    Exit code 0: no issues. 1: the map has issues. 2: the file cannot be read.
+    """
 
     map: MapFile
-    """The map."""
+    """The map, a file written by terrainkit generate."""
 
     def run(self) -> int:
         """Print the issues, and return 1 if there are any."""
         from terrainkit.export.npz import read_mesh
         from terrainkit.validate import validate
+        from terrainkit_robots.text import count
 
         terrain_map = TerrainMap.load(self.map)
-        findings = validate(terrain_map, read_mesh(self.map))
-        for finding in findings:
-            render.result(f"{finding.check}: {finding.message}")
-        if findings:
-            render.result(f"\n{self.map}: {len(findings)} findings")
+        issues = validate(terrain_map, read_mesh(self.map))
+        for issue in issues:
+            render.result(f"{issue.check}: {issue.message}")
+        if issues:
+            render.result(f"\n{self.map}: {count(len(issues), 'issue')}")
             return 1
-        render.result(f"{self.map}: {terrain_map.difficulty.size} patches, no problems found")
+        render.result(f"{self.map}: {terrain_map.difficulty.size} patches, no issues")
         return 0
 
 
 def written(terrain_map: TerrainMap, path: Path) -> str:
-    """Return what to say of a map that was written."""
+    """Return the message about a written map."""
     config, grid = terrain_map.config, terrain_map.grid
     return (
         f"wrote {path}: {config.rows} x {config.cols} patches of {_size_text(*config.patch_size)}, "

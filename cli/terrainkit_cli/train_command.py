@@ -24,10 +24,12 @@ class Train(TaskCommand):
     """Train a policy for a robot on a terrain, and save it as a run.
 
     A run is a folder with the task, checkpoints (model_100.pt is the one after 100 iterations) and
-    TensorBoard logs. ctrl-C saves a checkpoint too. Training is deterministic: the same seed and
-    number of threads give the same policy.
+    TensorBoard logs. Ctrl-C writes a checkpoint and stops. Training is deterministic: the same seed
+    and number of threads give the same policy. With torchrun, each process simulates a part of the
+    environments.
 
-    With torchrun, the environments are distributed over its processes.
+    The options of the groups below are the values of the task; the defaults shown are those of
+    ROBOT, --resume and --config.
     """
 
     ALIASES: ClassVar[Mapping[str, str]] = {
@@ -37,19 +39,19 @@ class Train(TaskCommand):
     }
 
     terrain: Annotated[str, text_option("TERRAIN")] = ""
-    """A map (.npz), a map config (.toml), a MuJoCo model (.xml), or plane, which is the default."""
+    """plane (the default), a map (.npz), a map config (.toml), or a MuJoCo model (.xml)."""
 
     log_dir: Annotated[str, text_option("FOLDER")] = ""
-    """Folder of the run, which must be empty; the default is logs/ROBOT/DATE-TIME."""
+    """Folder of the run, new or empty; by default logs/ROBOT/DATE-TIME."""
 
     resume: Annotated[str, text_option("RUN")] = ""
-    """Resume a run: its folder, or one of its checkpoints. Robot, terrain and task are those of
-    the run unless given. Training continues in the same folder, exactly as without interruption.
-    With another terrain or task, a new run starts with the networks of the run and, unless
-    --algorithm.learning-rate or .schedule differ, its last learning rate."""
+    """Continue a run: its folder, or one of its checkpoints. Robot, terrain and task default to
+    those of the run. Training continues in the same folder, as if it had not been interrupted.
+    With another terrain or task, a new run starts with the networks of this run and, unless
+    --algorithm.learning-rate or --algorithm.schedule differ, its last learning rate."""
 
     device: Annotated[str, text_option("DEVICE")] = "cpu"
-    """Device of the networks: cpu, cuda, cuda:1. The physics runs on the CPU."""
+    """Device of the networks: cpu (the default), cuda, cuda:1. The physics runs on the CPU."""
 
     def default_config(self) -> "Task":
         """Return the task before options: that of the run, or of the robot; then --config."""
@@ -61,14 +63,14 @@ class Train(TaskCommand):
         return Task.load(self.config, task) if self.config else task
 
     def run(self) -> int:
-        """Train, and say what to do next."""
+        """Train, and print the next commands."""
         require_training()
         from terrainkit_robots.rl.train import train
 
         run = self._resume_run
         robot, terrain, task = self._robot(run), self._terrain(run), self.changed_config()
         with render.training() as show_progress:
-            trained = train(
+            result = train(
                 robot,
                 terrain,
                 task,
@@ -77,10 +79,10 @@ class Train(TaskCommand):
                 device=self.device,
                 progress_callback=show_progress,
             )
-        _print_result(trained, task)
-        return 128 + trained.signal if trained.signal else 0
+        _print_result(result, task)
+        return 128 + result.signal if result.signal else 0
 
-    @cached_property  # read once, or a checkpoint that is written meanwhile would count for a part
+    @cached_property  # read once: training may write a checkpoint in between
     def _resume_run(self) -> "Run | None":
         from terrainkit_robots.rl.run import open_run
 
@@ -88,12 +90,12 @@ class Train(TaskCommand):
 
     def _robot(self, run: "Run | None") -> str:
         if self.robot or run is not None:
-            return self.robot or run.robot_name  # type: ignore[union-attr]
+            return self.robot or run.info.robot  # type: ignore[union-attr]
         from terrainkit.errors import listing
         from terrainkit_robots.rl.tasks import task_names
 
         raise ConfigError(
-            "ROBOT: missing; expected a folder of terrainkit onboard, or one of: "
+            "ROBOT: missing; expected a folder written by terrainkit onboard, or one of: "
             f"{listing(task_names())}"
         )
 
@@ -101,20 +103,22 @@ class Train(TaskCommand):
         return self.terrain or ("plane" if run is None else run.terrain)
 
 
-def _print_result(trained: "TrainResult", task: "Task") -> None:
-    """Say what was done, and what can be done with it."""
-    if trained.folder is None:  # the first of several processes says it
+def _print_result(result: "TrainResult", task: "Task") -> None:
+    """Print the result and the next commands."""
+    if result.folder is None:  # only the first of several processes prints
         return
-    run = quote(str(trained.folder))
+    from terrainkit_robots.text import count
+
+    run = quote(str(result.folder))
     whole = task.runner.max_iterations
-    if trained.iteration < whole:
-        render.result(f"stopped after {trained.iteration} of {whole} iterations: {run}")
-        render.result(f"go on: terrainkit train --resume {run}")
+    if result.iteration < whole:
+        render.result(f"stopped after {result.iteration} of {whole} iterations: {run}")
+        render.result(f"continue: terrainkit train --resume {run}")
         return
-    render.result(f"trained {whole} iterations: {run}")
+    render.result(f"trained {count(whole, 'iteration')}: {run}")
     render.result(
-        f"next: terrainkit play {run}  (look at it)\n"
+        f"next: terrainkit play {run}  (record a video)\n"
         f"      terrainkit evaluate {run}  (measure it)\n"
         f"      terrainkit export {run}  (ONNX, TorchScript)\n"
-        f"      tensorboard --logdir {run}  (its curves)"
+        f"      tensorboard --logdir {run}  (learning curves)"
     )

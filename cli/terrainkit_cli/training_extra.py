@@ -1,4 +1,4 @@
-"""The extra `train`: what the commands that train robots need, and the others do not."""
+"""The optional dependencies of the commands that train or run policies: the extra `train`."""
 
 import importlib.util
 import os
@@ -6,23 +6,23 @@ import os
 from terrainkit.errors import ConfigError
 
 _PACKAGES = ("torch", "rsl_rl", "tensordict", "tensorboard")
-"""Packages of the extra that training imports."""
+"""Packages that training imports."""
 
 
-def require_training(*more: str) -> None:
-    """Make ready for training, or raise an error that says what to install; imports no torch.
+def require_training(*packages: str) -> None:
+    """Check that the packages of training are installed, without importing them.
 
     Args:
-        *more: Packages of the extra that this command needs besides.
+        *packages: Further packages of the extra that the command needs.
 
     Raises:
         ConfigError: if a package is missing.
     """
-    missing = [name for name in (*_PACKAGES, *more) if importlib.util.find_spec(name) is None]
+    missing = [name for name in (*_PACKAGES, *packages) if importlib.util.find_spec(name) is None]
     if missing:
         raise ConfigError(
             f"this needs {', '.join(missing)}, which is not installed: "
             "pip install 'terrainkit[train]'"
         )
-    # Waiting threads of torch slow the physics down; this must be set before torch is imported.
+    # Busy-waiting threads of torch slow the physics down. torch reads this when it is imported.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")

@@ -1,4 +1,4 @@
-"""Suppress the warnings that MuJoCo writes to MUJOCO_LOG.TXT in the working directory."""
+"""Run MuJoCo without its log file."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def quiet_mujoco() -> Iterator[None]:
-    """Ignore MuJoCo's warnings within a block."""
+    """Discard MuJoCo's warnings, which it would write to MUJOCO_LOG.TXT in the current folder."""
     import mujoco
 
     previous = mujoco.get_mju_user_warning()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from terrainkit.atomic_write import atomic_write, make_temporary_folder
+from terrainkit.atomic_write import atomic_write, temporary_folder
 from terrainkit.errors import ExportError
 
 
@@ -202,14 +202,13 @@ def test_atomic_write_respects_umask(target):
 def test_atomic_write_removes_folders_of_killed_processes(tmp_path):
     dead = subprocess.Popen([sys.executable, "-c", ""])
     dead.wait()
-    own = make_temporary_folder(tmp_path)
-    stale = own.with_name(own.name.replace(f"-{os.getpid()}-", f"-{dead.pid}-"))
-    stale.mkdir()
-    (stale / "map.npz").write_text("half")
     foreign = tmp_path / ".terrainkit-otherhost-1-abc"
     foreign.mkdir()
-    with atomic_write(tmp_path / "a.txt") as path:
-        path.write_text("whole")
-    assert sorted(each.name for each in tmp_path.iterdir()) == sorted(
-        ["a.txt", foreign.name, own.name]
-    )
+    with temporary_folder(tmp_path) as own:
+        stale = own.with_name(own.name.replace(f"-{os.getpid()}-", f"-{dead.pid}-"))
+        stale.mkdir()
+        (stale / "map.npz").write_text("half")
+        with atomic_write(tmp_path / "a.txt") as path:
+            path.write_text("whole")
+        assert {each.name for each in tmp_path.iterdir()} == {"a.txt", foreign.name, own.name}
+    assert not own.exists()

@@ -30,21 +30,21 @@ def terrainkit(tmp_path) -> Callable[..., Run]:
 
 
 @pytest.fixture
-def called(capsys) -> Callable[..., Run]:
+def run_main(capsys) -> Callable[..., Run]:
     """Run `terrainkit` in this process: torch takes seconds to import."""
 
     def run(*words: object) -> Run:
         capsys.readouterr()
         code = main([str(word) for word in words])
-        said = capsys.readouterr()
-        return Run(words, code, said.out, said.err)
+        captured = capsys.readouterr()
+        return Run(words, code, captured.out, captured.err)
 
     return run
 
 
 @pytest.fixture
-def small(terrainkit) -> str:
-    """Make a small map with four terrains, and return its name."""
+def small_map(terrainkit) -> str:
+    """Generate a small map with four terrains, and return its name."""
     run = terrainkit("generate", "-o", "small.npz", *SMALL)
     assert run.returncode == 0, run.stderr
     return "small.npz"

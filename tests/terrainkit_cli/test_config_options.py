@@ -11,7 +11,7 @@ from terrainkit.errors import ConfigError
 from terrainkit.schema import field_types, flatten
 from terrainkit_cli.config_options import TaskCommand
 from terrainkit_cli.parse import UsageError, parse
-from terrainkit_cli.robot_options import Output, Text
+from terrainkit_cli.robot_options import InputPath, Output
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Commands, Env, Rewards, Task
 from terrainkit_robots.rl.tasks import get_task, register_task
@@ -24,8 +24,8 @@ class Train(TaskCommand):
     On a ground.
     """
 
-    terrain: Text = ""
-    """The ground: an option that is called as a section is."""
+    terrain: InputPath = ""
+    """The ground: an option with the name of a section."""
 
     named: Annotated[str, tyro.conf.arg(name="robot")] = ""
     """An option with another name than its field."""
@@ -77,7 +77,7 @@ def changes(command):
     return {name: new for name, new in flatten(command.changed_config()) if new != before[name]}
 
 
-def test_each_value_of_the_task_has_an_option():
+def test_task_command_has_option_for_each_value():
     words = (
         "quadruped --rewards.tracking-lin-vel 1.25 --commands.lin-vel-x -1 2 --terrain rough.npz "
         "--terrain.collision plane --rewards.dof-acc -1e-8 --domain-rand.friction none "
@@ -114,7 +114,7 @@ def words_of(name, annotation, value):
     return ["--" + ".".join([*sections, last]), *words]
 
 
-def test_every_default_can_be_given():
+def test_task_command_accepts_every_default():
     words = ["quadruped"]
     for name, value in flatten(Task()):
         section = getattr(Task(), name.partition(".")[0])
@@ -123,7 +123,7 @@ def test_every_default_can_be_given():
     assert parse_words(*words).changed_config() == Task()
 
 
-def test_robot_may_come_last():
+def test_task_command_accepts_robot_last():
     made = parse_words(
         "--rewards.tracking-lin-vel", "2", "--commands.lin-vel-y", "0", "1", "quadruped"
     )
@@ -134,7 +134,7 @@ def test_robot_may_come_last():
     assert parse_words().robot == ""
 
 
-def test_options_override_file_and_task(tmp_path, rover):
+def test_task_command_options_override_file(tmp_path, rover):
     path = tmp_path / "mine.toml"
     path.write_text("laps = 4\n[rewards]\nwheel_slip = -3\ntorques = -1\n")
     made = parse_words("rover", "--config", str(path), "--rewards.torques", "-2")
@@ -145,13 +145,13 @@ def test_options_override_file_and_task(tmp_path, rover):
 
 
 @pytest.mark.parametrize("words", [("rover", "--laps", "5"), ("--laps", "5", "rover")])
-def test_custom_task_has_its_own_options(rover, words):
+def test_task_command_options_of_custom_task(rover, words):
     made = parse_words(*words, "--rewards.wheel-slip", "-1", "--rewards.tracking-lin-vel", "3")
     rewards = RoverRewards(wheel_slip=-1.0, tracking_lin_vel=3.0)
     assert made.changed_config() == replace(rover.task, laps=5, rewards=rewards)
 
 
-def test_onboarded_folder_has_the_default_task(tmp_path):
+def test_task_command_onboarded_folder_has_default_task(tmp_path):
     folder = tmp_path / "mine"
     folder.mkdir()
     shutil.copy(get_task("quadruped").folder / "robot.toml", folder)
@@ -161,27 +161,27 @@ def test_onboarded_folder_has_the_default_task(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (
             ("quadruped", "--rewards.traking-lin-vel", "1"),
-            r"^no option --rewards\.traking-lin-vel; did you mean --rewards\.tracking-lin-vel\?; ",
+            r"^no option --rewards\.traking-lin-vel; did you mean --rewards\.tracking-lin-vel\?$",
         ),
         (("quadruped", "--rewards.wheel-slip", "1"), r"^no option --rewards\.wheel-slip"),
         (("quadruped", "--reward.torques", "1"), r"did you mean --rewards\.torques\?"),
-        (("quadruped", "--rewards.torques"), r"Missing value for argument '--rewards\.torques'"),
-        (("quadruped", "--terain", "x"), r"^no option --terain; did you mean --terrain\?; --help"),
-        (("quadruped", "rough.npz"), r"Unrecognized .*rough\.npz"),
+        (("quadruped", "--rewards.torques"), r"^--rewards\.torques: too few values; expected 1"),
+        (("quadruped", "--terain", "x"), r"^no option --terain; did you mean --terrain\?$"),
+        (("quadruped", "rough.npz"), r"^got rough\.npz; expected no more arguments"),
     ],
 )
-def test_unknown_option_suggests_nearest_one(words, told):
-    with pytest.raises(UsageError, match=told) as error:
+def test_task_command_suggests_nearest_option(words, message):
+    with pytest.raises(UsageError, match=message) as error:
         parse_words(*words)
     assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (("--rewards.torques", "x"), r"^--rewards\.torques: got 'x'; expected a number$"),
         (
@@ -209,12 +209,12 @@ def test_unknown_option_suggests_nearest_one(words, told):
         (("--env.episode-length-s", "0.001"), r"^env\.episode_length_s: got 0\.001; expected at"),
     ],
 )
-def test_invalid_value_is_named(words, told):
-    with pytest.raises(ConfigError, match=told):
+def test_task_command_rejects_invalid_value(words, message):
+    with pytest.raises(ConfigError, match=message):
         parse_words("quadruped", *words).changed_config()
 
 
-def test_unknown_robot_or_file_is_rejected(tmp_path):
+def test_task_command_rejects_unknown_robot_or_file(tmp_path):
     with pytest.raises(ConfigError, match=r"folder 'quadrupd'; did you mean 'quadruped'\?"):
         parse_words("quadrupd", "--rewards.torques", "1")
     with pytest.raises(ConfigError, match=r"cannot read .*missing\.toml"):
@@ -222,29 +222,29 @@ def test_unknown_robot_or_file_is_rejected(tmp_path):
 
 
 @pytest.mark.usefixtures("rover")
-def test_help_shows_values_of_the_task(capsys):
+def test_task_command_help_shows_task_values(capsys):
     with pytest.raises(SystemExit) as end:
         parse_words("rover", "--help")
     assert end.value.code in (0, None)
-    told = " ".join(capsys.readouterr().out.replace("│", " ").split())
-    assert "Train a policy. On a ground." in told
-    assert "--terrain PATH The ground: an option" in told
-    assert "--env.num-envs INT Number of parallel environments" in told
-    assert "(default: 17)" in told
-    assert "--rewards.wheel-slip FLOAT Wheels that slide. (default: -0.5)" in told
-    assert "--laps INT A value that is in no section. (default: 3)" in told
-    assert "--domain-rand.friction FLOAT FLOAT|none" in told
-    assert "(default: 0.5 1.25)" in told
+    output = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert "Train a policy. On a ground." in output
+    assert "--terrain PATH The ground: an option" in output
+    assert "--env.num-envs INT Number of parallel environments" in output
+    assert "(default: 17)" in output
+    assert "--rewards.wheel-slip FLOAT Wheels that slide. (default: -0.5)" in output
+    assert "--laps INT A value that is in no section. (default: 3)" in output
+    assert "--domain-rand.friction FLOAT FLOAT|none" in output
+    assert "(default: 0.5 1.25)" in output
 
 
-def test_help_works_without_a_valid_task(capsys):
+def test_task_command_help_ignores_invalid_task(capsys):
     for words in (("--help",), ("-h", "no_such_robot")):
         with pytest.raises(SystemExit):
             parse_words(*words)
         assert "--rewards.tracking-lin-vel FLOAT" in capsys.readouterr().out
 
 
-def test_torch_mujoco_typeguard_are_not_imported():
+def test_task_command_avoids_slow_imports():
     code = (
         "import sys; from dataclasses import dataclass\n"
         "from terrainkit_cli.config_options import TaskCommand\n"
@@ -258,7 +258,7 @@ def test_torch_mujoco_typeguard_are_not_imported():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_flags_can_be_set_and_cleared(tmp_path):
+def test_task_command_flags_set_and_clear(tmp_path):
     path = tmp_path / "task.toml"
     path.write_text("[asset]\nself_collisions = true\n")
     words = ("quadruped", "--config", str(path))

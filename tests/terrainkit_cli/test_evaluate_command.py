@@ -14,12 +14,12 @@ QUICK = ("--seconds", "0.04", "--num-envs", "1")
 
 
 @pytest.fixture
-def here(walking, monkeypatch, called):
+def here(walking, monkeypatch, run_main):
     """Run `terrainkit evaluate` in a folder with a run `walk`."""
     monkeypatch.chdir(walking.parent)
 
     def run(*words):
-        done = called("evaluate", *words)
+        done = run_main("evaluate", *words)
         return done.returncode, done.stdout, done.stderr
 
     return run
@@ -106,7 +106,7 @@ def test_evaluate_bundled_policy_by_name(here):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ((), "RUN is missing; expected"),
+        ((), "RUN: missing; expected"),
         (("walk", "--checkpoint", "5"), "expected one of: 3, 7"),
         (("walk", "--seconds", "-1"), "seconds: got -1.0; expected a number > 0"),
         (("walk", "--checkpoint", "-5"), "expected one of: 3, 7"),
@@ -152,7 +152,7 @@ def make_result(metrics, **groups):
     )
 
 
-def test_headline_shows_missing_errors():
+def test_summary_line_shows_missing_errors():
     assert summary_line(make_result(make_metrics())) == (
         "hare, model_1.pt, on hill.npz: 4 robots, 4 fell, 25% success; "
         "error not measured: no robot walked longer than 2 s after a command"
@@ -161,7 +161,7 @@ def test_headline_shows_missing_errors():
     assert "error 0.123 m/s (- averaged over 1 s)" in line
 
 
-def test_rows_by_terrain_show_success_by_level():
+def test_result_rows_show_success_by_level():
     terrain, both = make_metrics(terrain="flat"), make_metrics(terrain="flat", level=1, success=1)
     levels = [make_metrics(level=0), make_metrics(level=1)]
     groups = {"by_terrain": [terrain], "by_level": levels, "by_terrain_and_level": [both]}

@@ -39,10 +39,10 @@ def trained(tmp_path_factory):
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch, called):
+def here(tmp_path, monkeypatch, run_main):
     """Run `terrainkit` in an empty folder."""
     monkeypatch.chdir(tmp_path)
-    return called
+    return run_main
 
 
 @pytest.fixture
@@ -86,7 +86,7 @@ def test_export_checkpoint_by_file_or_iteration(here, run_folder, tmp_path):
 
 
 @pytest.mark.usefixtures("run_folder")
-def test_export_overwrites_only_if_told(here, tmp_path):
+def test_export_overwrites_with_option_only(here, tmp_path):
     assert here("export", "run", "-o", "policy").returncode == 0
     (tmp_path / "policy" / "policy.pt").write_bytes(b"mine")
     run = here("export", "run", "-o", "policy")
@@ -126,13 +126,13 @@ def test_export_map(here, tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ((), "MAP or RUN is missing"),
+        ((), "MAP.npz or RUN: missing"),
         (("unicorn",), "no map, run or robot unicorn; robots are: biped"),
         (("none.npz", "-o", "a.stl"), "no file none.npz"),
         (("none.pt",), "run: got none.pt"),
         (("empty",), "empty has no run.toml"),
         (("text.txt", "-o", "a.stl"), "text.txt"),
-        (("map.npz",), "--output is missing; expected a file"),
+        (("map.npz",), "--output: missing; expected a file"),
         (
             ("map.npz", "-o", "a.xml", "--checkpoint", 3),
             "--checkpoint: got the map map.npz",

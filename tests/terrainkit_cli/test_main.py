@@ -1,4 +1,5 @@
 import importlib.metadata
+import signal
 import subprocess
 import sys
 
@@ -12,6 +13,9 @@ def test_no_command_lists_all_commands(terrainkit):
     assert run.returncode == 0
     for name in COMMANDS:
         assert f"  {name} " in run.stdout
+    lines = run.stdout.splitlines()
+    assert len(lines) <= 24  # a terminal
+    assert max(map(len, lines)) <= 80
 
 
 def test_version_is_that_of_the_package(terrainkit):
@@ -21,10 +25,11 @@ def test_version_is_that_of_the_package(terrainkit):
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_help_documents_every_option(terrainkit, name):
+def test_help_describes_command_in_80_columns(terrainkit, name):
     run = terrainkit(name, "--help")
     assert run.returncode == 0
-    assert command(name).__doc__.partition("\n")[0].split(":")[0] in run.stdout
+    assert command(name).__doc__.partition("\n")[0] in run.stdout
+    assert max(map(len, run.stdout.splitlines())) <= 80
 
 
 @pytest.mark.parametrize(
@@ -35,8 +40,7 @@ def test_help_documents_every_option(terrainkit, name):
             ("check-robot", "quadruped", "--format", "jso"),
             "--format: got 'jso'; did you mean 'json'?",
         ),
-        (("check-robot", "quadrupd"), "did you mean 'quadruped'? Bundled robots are: biped"),
-        (("generate",), "Missing from terrainkit generate: -o PATH"),
+        (("generate",), "error: --output: missing; see terrainkit generate --help"),
         (("generate", "-o", "a.npz", "--row", 3), "no option --row; did you mean --rows?"),
         (
             ("generate", "-o", "a.npz", "--rows", "three"),
@@ -49,7 +53,7 @@ def test_help_documents_every_option(terrainkit, name):
         (("generate", "-o", "a.npz", "--cell", "inf"), "cell: got inf; expected"),
         (("generate", "-o", "a.npz", "--cell", 0.3), "of 0.3 m, such as 7.8 m or 8.1 m"),
         (("generate", "-o", "a.npz", "--patch-size", 2, 2), "does not fit in a patch of 2 m x 2 m"),
-        (("generate", "-o", "a.npz", "--patch-size", 8), "Expected 2 values"),
+        (("generate", "-o", "a.npz", "--patch-size", 8), "too few values; expected 2"),
         (("generate", "-o", "a.npz", "--rows", 9**30), "beyond 64 bits"),
         (
             ("generate", "-o", "a.npz", "--rows", 9**6),
@@ -98,7 +102,28 @@ def test_help_documents_every_option(terrainkit, name):
         (("generate", "-o", "/proc/a.npz"), "cannot write /proc/a.npz"),
         (("list", "moon"), "no terrain 'moon'; there are: flat, gap"),
         (("info", "none.npz"), "no file none.npz"),
-        (("info", "none.npz", "--patch", 3), "Expected 2 values"),
+        (("info", "none.npz", "--patch", 3), "--patch: too few values; expected 2"),
+        (("info", "none.npz", "--patch", "x", "y"), "--patch: got 'x', 'y'; expected int, int"),
+        (("info", "none.npz", "more"), "got more; expected no more arguments"),
+        (
+            ("preview", "none.npz", "-o", "a.png", "--width", "x"),
+            "--width: got 'x'; expected an integer",
+        ),
+        (("list", "pyramid_stair"), "did you mean 'pyramid_stairs'? There are: "),
+        (("generate", "-o", "a.npz", "--preset", "legged_gim"), "did you mean 'legged_gym'?"),
+        (("generate", "-o", "a.npz", "--mode", "curiculum"), "did you mean 'curriculum'?"),
+        (("check-robot", "quadrupd"), "did you mean 'quadruped'? Bundled robots are: biped"),
+        (("check-robot", "quadruped", "-x"), "no option -x"),
+        (("check-robot", "quadruped", "--format", "jsn"), "--format: got 'jsn'; did you mean"),
+        (("onboard", "quadrupd"), "did you mean 'quadruped'?"),
+        (("onboard", "quadruped", "--config", "isaclab"), "did you mean 'isaaclab'?"),
+        (("rule", "INR0011"), "did you mean 'INR011'?"),
+        (("train", "quadrupd"), "did you mean 'quadruped'?"),
+        (("train", "quadruped", "more"), "got more; expected no more arguments"),
+        (("train", "quadruped", "--terrain", "plain"), "did you mean 'plane'?"),
+        (("evaluate", "quadruped_mp"), "did you mean 'quadruped_map'?"),
+        (("export", "quadrupd"), "did you mean 'quadruped'?"),
+        (("evaluate", "quadruped", "--seconds", "x"), "--seconds: got 'x'; expected a number"),
         (("check-map", "."), "expected an .npz file"),
         (("preview", "none.npz", "-o", "a.png"), "no file none.npz"),
         (("export", "none.npz", "-o", "a.stl"), "no file none.npz"),
@@ -115,19 +140,79 @@ def test_invalid_input_is_one_line_on_stderr(terrainkit, tmp_path, words, messag
     assert list(tmp_path.iterdir()) == []
 
 
-def test_closed_stdout_is_not_an_error():
-    command = f"{sys.executable} -m terrainkit_cli.main list | head -1; exit ${{PIPESTATUS[0]}}"
-    run = subprocess.run(
-        ["bash", "-c", command], capture_output=True, text=True, timeout=60, check=False
+def bash(command: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [
+            "bash",
+            "-c",
+            f'terrainkit() {{ {sys.executable} -m terrainkit_cli.main "$@"; }}; {command}',
+        ],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
     )
-    assert run.returncode == 0
-    assert run.stderr == ""
+
+
+@pytest.mark.parametrize("command", ["list", "check-robot --help"])
+def test_pipe_without_reader_is_not_an_error(command):
+    run = bash(f"terrainkit {command} | true; exit ${{PIPESTATUS[0]}}")
+    assert (run.returncode, run.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("command", ["list", "check-robot --help", "check-robot quadruped"])
+def test_closed_stdout_is_not_an_error(command):
+    run = bash(f"terrainkit {command} >&-")
+    assert (run.returncode, run.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("redirection", ["2>&-", "2>/dev/full", ">&- 2>&-"])
+def test_error_without_stderr_exits_2(redirection):
+    run = bash(f"terrainkit lst {redirection}")
+    assert (run.returncode, run.stdout, run.stderr) == (2, "", "")
 
 
 def test_full_stdout_is_one_line():
-    command = f"{sys.executable} -m terrainkit_cli.main list > /dev/full"
-    run = subprocess.run(
-        ["bash", "-c", command], capture_output=True, text=True, timeout=60, check=False
-    )
+    run = bash("terrainkit list > /dev/full")
     assert run.returncode == 2
     assert run.stderr == "terrainkit: error: No space left on device\n"
+
+
+@pytest.mark.usefixtures("small_map")
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("generate", "-o", "a.npz", "--rows", "1"),
+        ("export", "small.npz", "-o", "a.stl"),
+        ("check-robot", "unnamed.urdf", "--fix"),
+        ("onboard", "quadruped", "--no-pictures"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_signal_removes_temporary_files(tmp_path, words, name):
+    (tmp_path / "unnamed.urdf").write_text("<robot><link name='base'/></robot>")
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    script = (
+        "import os, pathlib, signal, sys; from terrainkit_cli.main import main;"
+        f"pathlib.Path.replace = lambda *_: os.kill(os.getpid(), signal.{name});"
+        "sys.exit(main(sys.argv[1:]))"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", script, *words],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert run.returncode == 128 + signal.Signals[name]
+    assert run.stderr.splitlines()[-1] == f"terrainkit: error: ended by {name}"
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_messages_show_relative_paths(terrainkit, tmp_path):
+    run = terrainkit("generate", "-o", tmp_path / "a.npz", "--rows", 1)
+    assert run.stdout.startswith("wrote a.npz: ")
+    run = terrainkit("generate", "-o", tmp_path / "a.npz", "--rows", 1)
+    assert run.stderr.startswith("terrainkit: error: a.npz exists;")

@@ -20,8 +20,8 @@ def here(tmp_path, monkeypatch, capsys):
     def run(*words):
         capsys.readouterr()
         code = main(["onboard", *words])
-        said = capsys.readouterr()
-        return code, said.out, said.err
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
 
     return run
 
@@ -91,7 +91,7 @@ def test_onboard_does_not_suggest_force_without_robot(here, tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ([], "FILE is missing"),
+        ([], "FILE: missing"),
         (["nothing.urdf"], "robot file: got nothing.urdf"),
         (["arm.urdf", "-o", "no/where"], "the folder no does not exist"),
         (["arm.urdf", "-o", "arm.urdf"], "is not a folder"),
@@ -183,9 +183,9 @@ def test_onboard_ignores_rule_selection_of_settings(here, tmp_path):
 def test_onboard_help_lists_frameworks(capsys):
     with pytest.raises(SystemExit):
         main(["onboard", "--help"])
-    said = " ".join(capsys.readouterr().out.split())
+    output = " ".join(capsys.readouterr().out.split())
     for name in framework_names():
-        assert name in said
+        assert name in output
 
 
 def test_onboard_without_opengl_skips_pictures(tmp_path):
@@ -205,13 +205,11 @@ from terrainkit_cli.main import main
 from terrainkit_robots.onboarding import folder, pipeline
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs ignore SIGINT
-whole = folder.write_files
-
-def written_then_interrupted(*arguments):
-    whole(*arguments)
+def write_then_interrupt(*arguments):
+    folder.write_files(*arguments)
     os.kill(os.getpid(), signal.SIGINT)
 
-pipeline.write_files = written_then_interrupted
+pipeline.write_files = write_then_interrupt
 sys.exit(main(["onboard", "quadruped", "-o", "robot"]))
 """
 

@@ -14,12 +14,12 @@ SMALL = ("--size", "96", "64")
 
 
 @pytest.fixture
-def here(walking, monkeypatch, called):
+def here(walking, monkeypatch, run_main):
     """Run `terrainkit play` in a folder with a run `walk`."""
     monkeypatch.chdir(walking.parent)
 
     def run(*words):
-        done = called("play", *words)
+        done = run_main("play", *words)
         return done.returncode, done.stdout, done.stderr
 
     return run
@@ -110,7 +110,7 @@ def test_play_checks_the_target_first(here, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ((), "RUN is missing; expected"),
+        ((), "RUN: missing; expected"),
         (("walk", "-o", "walk.avi"), "ends in .mp4"),
         (("walk", "--size", "99", "64"), "expected two even numbers"),
         (("walk", "--robots", "0"), "robots: got 0"),

@@ -39,8 +39,8 @@ def here(tmp_path, monkeypatch, capsys):
     def run(*words):
         capsys.readouterr()
         code = main([str(word) for word in words])
-        said = capsys.readouterr()
-        return subprocess.CompletedProcess(words, code, said.out, said.err)
+        captured = capsys.readouterr()
+        return subprocess.CompletedProcess(words, code, captured.out, captured.err)
 
     monkeypatch.chdir(tmp_path)
     return run
@@ -84,7 +84,7 @@ def test_check_robot_continues_after_missing_file(here):
     assert run.stderr.startswith("terrainkit: error: robot file: got none.urdf")
 
 
-@pytest.mark.parametrize("name", bundled.names())
+@pytest.mark.parametrize("name", bundled.robot_names())
 def test_check_robot_finds_bundled_robot(here, name):
     run = here("check-robot", name, "--strict")
     assert run.returncode == 0, run.stdout
@@ -111,9 +111,9 @@ def test_check_robot_formats_several_files(here):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
-        ((), "FILE is missing"),
+        ((), "FILE: missing"),
         (
             ("none.urdf",),
             "robot file: got none.urdf, which does not exist; bundled robots are: ",
@@ -140,7 +140,7 @@ def test_check_robot_formats_several_files(here):
     ],
     ids=lambda value: " ".join(map(str, value))[:60] if isinstance(value, tuple) else "",
 )
-def test_check_robot_rejects_input(here, folder, words, said):
+def test_check_robot_rejects_input(here, folder, words, message):
     os.mkfifo(folder / "fifo")
     before = sorted(folder.iterdir())
     run = here("check-robot", *words)
@@ -148,7 +148,7 @@ def test_check_robot_rejects_input(here, folder, words, said):
     assert run.stdout == ""
     assert run.stderr.count("\n") == 1
     assert run.stderr.startswith("terrainkit: error: ")
-    assert said in run.stderr
+    assert message in run.stderr
     assert sorted(folder.iterdir()) == before
 
 
@@ -339,17 +339,17 @@ def test_rule_all_lists_rules(here):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (("INR002", "--all"), "got CODE and --all; expected one of them"),
         (("INR999",), "no rule 'INR999'; there are: XML001"),
     ],
 )
-def test_rule_rejects_unknown_code(here, words, said):
+def test_rule_rejects_unknown_code(here, words, message):
     run = here("rule", *words)
     assert (run.returncode, run.stdout) == (2, "")
     assert run.stderr.count("\n") == 1
-    assert said in run.stderr
+    assert message in run.stderr
 
 
 def test_check_robot_offers_every_format():

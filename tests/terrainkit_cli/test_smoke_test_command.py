@@ -16,10 +16,10 @@ BAD = Check("observation policy", False, "44 numbers", "45 numbers")
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch, called):
+def here(tmp_path, monkeypatch, run_main):
     """Run `terrainkit smoke-test` in an empty folder."""
     monkeypatch.chdir(tmp_path)
-    return lambda *words: called("smoke-test", *words)
+    return lambda *words: run_main("smoke-test", *words)
 
 
 @pytest.fixture
@@ -38,7 +38,7 @@ def calls(monkeypatch):
     return calls
 
 
-def test_failed_check_is_shown_with_its_expectation(here, tmp_path):
+def test_smoke_test_shows_expectation_of_failed_check(here, tmp_path):
     shutil.copytree(get_task("quadruped").folder, tmp_path / "mine")
     spec = tmp_path / "mine" / "robot.toml"
     text = spec.read_text()
@@ -56,7 +56,7 @@ def test_failed_check_is_shown_with_its_expectation(here, tmp_path):
     assert lines[-1].startswith("quadruped: 1 of ")
 
 
-def test_exit_code_is_the_worst_result(here, calls):
+def test_smoke_test_exit_code_is_worst_result(here, calls):
     for words, code in (
         (("good",), 0),
         (("bad",), 1),
@@ -72,7 +72,7 @@ def test_exit_code_is_the_worst_result(here, calls):
 
 
 @pytest.mark.usefixtures("calls")
-def test_text_report_lists_the_checks(here):
+def test_smoke_test_text_lists_checks(here):
     assert here("good", "bad").stdout == (
         "robot     GOOD (good)\n"
         "\n"
@@ -91,7 +91,7 @@ def test_text_report_lists_the_checks(here):
 
 
 @pytest.mark.usefixtures("calls")
-def test_json_report_is_a_document_per_robot(here):
+def test_smoke_test_json_has_document_per_robot(here):
     run = here("bad", "--format", "json")
     assert run.returncode == 1
     document = json.loads(run.stdout)
@@ -109,7 +109,7 @@ def test_json_report_is_a_document_per_robot(here):
 
 
 @pytest.mark.usefixtures("calls")
-def test_report_is_written_to_a_file(here, tmp_path):
+def test_smoke_test_writes_report_to_file(here, tmp_path):
     run = here("good", "bad", "--format", "json", "-o", "report.json")
     assert run.returncode == 1
     assert run.stdout == "wrote report.json: GOOD can be trained, BAD: 1 of 2 checks failed\n"
@@ -117,7 +117,7 @@ def test_report_is_written_to_a_file(here, tmp_path):
     assert [json.loads(line)["file"] for line in lines] == ["good", "bad"]
 
 
-def test_file_options_are_passed_on(here, calls, tmp_path):
+def test_smoke_test_passes_file_options(here, calls, tmp_path):
     (tmp_path / "meshes").mkdir()
     (tmp_path / "a").touch()
     words = ("--package", "my=meshes", "--xacro-arg", "arm:=false", "--ignore", "MSH=no meshes")
@@ -134,7 +134,7 @@ def test_file_options_are_passed_on(here, calls, tmp_path):
     [
         (("a", "--format", "sarif"), "sarif"),
         (("a", "b", "--spec", "c.toml"), "--spec: got 2 robots; expected one"),
-        ((), "ROBOT is missing"),
+        ((), "ROBOT: missing"),
         (("a", "--package", "my=."), "--package: got no robot file among a"),
         (("a", "b", "--xacro-arg", "arm:=false"), "--xacro-arg: got no robot file among a, b"),
         (("a", "--ignore", "MSH=no meshes"), "--ignore: got no robot file"),
@@ -143,7 +143,7 @@ def test_file_options_are_passed_on(here, calls, tmp_path):
         (("a", "-o", "."), "it is a folder"),
     ],
 )
-def test_invalid_options_are_rejected_before_the_test(here, calls, words, message):
+def test_smoke_test_rejects_options_first(here, calls, words, message):
     run = here(*words)
     assert run.returncode == 2
     assert run.stdout == ""
@@ -152,7 +152,7 @@ def test_invalid_options_are_rejected_before_the_test(here, calls, words, messag
     assert calls == []
 
 
-def test_unknown_robot_is_one_line(here):
+def test_smoke_test_rejects_unknown_robot(here):
     run = here("unicorn")
     assert run.returncode == 2
     assert run.stdout == ""
@@ -160,12 +160,12 @@ def test_unknown_robot_is_one_line(here):
     assert "biped, quadruped" in run.stderr
 
 
-def test_missing_extra_is_named(here, monkeypatch):
+def test_smoke_test_names_missing_extra(here, monkeypatch):
     monkeypatch.setattr(training_extra, "_PACKAGES", ("no_such_package",))
     run = here("quadruped")
     assert run.returncode == 2
     assert "no_such_package, which is not installed: pip install 'terrainkit[train]'" in run.stderr
 
 
-def test_check_robot_has_no_train_smoke_option(called):
-    assert called("check-robot", "quadruped", "--train-smoke").returncode == 2
+def test_check_robot_has_no_train_smoke_option(run_main):
+    assert run_main("check-robot", "quadruped", "--train-smoke").returncode == 2

@@ -61,15 +61,15 @@ def test_train_on_a_map(train, tmp_path, capsys):
     words = ("--num-envs", 4, "--max-iterations", 2, "--rewards.tracking-lin-vel", 1.25)
     assert train("quadruped", "--terrain", "map.npz", *words) == 0
     run = open_run(run_of(tmp_path))
-    assert run.robot_name == "quadruped"
+    assert run.info.robot == "quadruped"
     assert run.terrain == str(tmp_path / "map.npz")
     assert run.task.rewards.tracking_lin_vel == 1.25
     assert run.task.env.num_envs == 4
     assert run.checkpoint.name == "model_2.pt"
-    said = capsys.readouterr()
-    assert said.out.startswith("trained 2 iterations: logs/quadruped/")
-    assert said.err.startswith("iteration 2/2: env steps/s ")
-    assert "level stairs" in said.err
+    captured = capsys.readouterr()
+    assert captured.out.startswith("trained 2 iterations: logs/quadruped/")
+    assert captured.err.startswith("iteration 2/2: env steps/s ")
+    assert "level stairs" in captured.err
 
 
 def test_train_resumes_a_run(train, tmp_path, capsys):
@@ -87,7 +87,7 @@ def test_train_resumes_a_run(train, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
 )
-def test_interrupt_saves_a_checkpoint(train, tmp_path, capsys, monkeypatch, number, code):
+def test_train_interrupt_saves_checkpoint(train, tmp_path, capsys, monkeypatch, number, code):
     @contextmanager
     def interrupting():
         yield lambda progress: signal.raise_signal(number) if progress.iteration == 2 else None
@@ -96,11 +96,11 @@ def test_interrupt_saves_a_checkpoint(train, tmp_path, capsys, monkeypatch, numb
     assert train("quadruped", "--num-envs", 4, "--max-iterations", 9, "--log-dir", "my run") == code
     assert list(checkpoints(tmp_path / "my run")) == [2]
     assert capsys.readouterr().out == (
-        "stopped after 2 of 9 iterations: 'my run'\ngo on: terrainkit train --resume 'my run'\n"
+        "stopped after 2 of 9 iterations: 'my run'\ncontinue: terrainkit train --resume 'my run'\n"
     )
 
 
-def test_full_disk_is_one_line(train, tmp_path, capsys):
+def test_train_full_disk_is_one_line(train, tmp_path, capsys):
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
     try:
@@ -115,7 +115,7 @@ def test_full_disk_is_one_line(train, tmp_path, capsys):
     assert checkpoints(tmp_path / "run") == {}
 
 
-def another_version(folder: Path) -> None:
+def with_other_version(folder: Path) -> None:
     path = make_map(folder)
     arrays = dict(np.load(path))
     np.savez(path, **(arrays | {"format_version": np.int64(2)}))
@@ -129,9 +129,9 @@ def without_origins(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
-        ((), "ROBOT: missing; expected a folder of terrainkit onboard, or one of: biped,"),
+        ((), "ROBOT: missing; expected a folder written by terrainkit onboard, or one of: biped,"),
         (("rover",), "no task or robot folder 'rover'"),
         (("quadruped", "--terrain", "moon"), "terrain: got 'moon'; expected plane, a map (.npz)"),
         (("quadruped", "--terrain", "gone.npz"), "no file gone.npz"),
@@ -148,34 +148,34 @@ def without_origins(folder: Path) -> None:
         (("quadruped", "--config", "gone.toml"), "cannot read gone.toml"),
     ],
 )
-def test_invalid_input_is_one_line(train, tmp_path, capsys, words, said):
+def test_train_rejects_invalid_input(train, tmp_path, capsys, words, message):
     assert train(*words) == 2
     error = capsys.readouterr().err
     assert error.startswith("terrainkit: error: ")
     assert error.count("\n") == 1
-    assert said in error
+    assert message in error
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
-    ("make", "said"), [(another_version, "version"), (without_origins, "env_origins")]
+    ("make", "message"), [(with_other_version, "version"), (without_origins, "env_origins")]
 )
-def test_invalid_map_is_one_line(train, tmp_path, capsys, make, said):
+def test_train_rejects_invalid_map(train, tmp_path, capsys, make, message):
     make(tmp_path)
     assert train("quadruped", "--terrain", "map.npz") == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1
-    assert said in error
+    assert message in error
     assert [path.name for path in tmp_path.iterdir()] == ["map.npz"]
 
 
-def test_missing_extra_names_the_package(train, capsys, monkeypatch):
+def test_train_names_missing_extra(train, capsys, monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
     assert train("quadruped") == 2
     assert "pip install 'terrainkit[train]'" in capsys.readouterr().err
 
 
-def test_video_packages_are_optional(monkeypatch):
+def test_train_works_without_video_packages(monkeypatch):
     monkeypatch.delenv("OMP_WAIT_POLICY", raising=False)
     found = importlib.util.find_spec
     monkeypatch.setattr(
@@ -187,7 +187,7 @@ def test_video_packages_are_optional(monkeypatch):
         require_training("imageio_ffmpeg")
 
 
-def test_options_override_task_file(train, tmp_path):
+def test_train_options_override_task_file(train, tmp_path):
     (tmp_path / "task.toml").write_text("[rewards]\ntorques = -0.5\ndof_vel = -0.25\n")
     words = ("--config", "task.toml", "--rewards.torques", "-0.125", "--num-envs", 4)
     assert train("quadruped", *words, "--max-iterations", 1, "--log-dir", "run") == 0
@@ -211,7 +211,7 @@ PROGRESS = TrainingProgress(
 )
 
 
-def test_progress_without_terminal_is_sparse(capsys):
+def test_training_progress_lines_are_sparse(capsys):
     with render.training() as watch:
         for iteration in range(1, 24):
             watch(
@@ -231,16 +231,16 @@ def test_progress_without_terminal_is_sparse(capsys):
     )
 
 
-def test_reward_lines_are_sparse(capsys):
+def test_training_reward_lines_are_sparse(capsys):
     with render.training() as watch:
         for iteration in range(1, 101):
             watch(TrainingProgress(**{**vars(PROGRESS), "iteration": iteration}))
     terms = [line for line in capsys.readouterr().err.splitlines() if "env steps/s" not in line]
-    told = "success stairs 75%, tracking_lin_vel +0.500 /s, torques -0.062 /s"
-    assert terms == [f"iteration 50/400: {told}", f"iteration 100/400: {told}"]
+    rewards = "success stairs 75%, tracking_lin_vel +0.500 /s, torques -0.062 /s"
+    assert terms == [f"iteration 50/400: {rewards}", f"iteration 100/400: {rewards}"]
 
 
-def test_progress_on_terminal_is_a_table(monkeypatch):
+def test_training_progress_on_terminal_is_table(monkeypatch):
     class Terminal(io.StringIO):
         def isatty(self) -> bool:
             return True

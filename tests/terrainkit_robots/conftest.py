@@ -31,7 +31,7 @@ def robot_file() -> Callable[[str], Path]:
 
     def find(name: str) -> Path:
         if "/" not in name:
-            return bundled_robots.find(Path(name).stem).with_suffix(Path(name).suffix)
+            return bundled_robots.urdf_path(Path(name).stem).with_suffix(Path(name).suffix)
         if not (ROBOTS / name).exists():
             pytest.skip(f"{name} is not in {ROBOTS}; set TERRAINKIT_ROBOTS to a folder with robots")
         return ROBOTS / name
@@ -61,7 +61,7 @@ def sliding_shanks(tmp_path_factory: pytest.TempPathFactory) -> Path:
         r'<axis xyz="0 1 0"/>(\s*)<limit [^>]*/>',
         r'\1"prismatic"\2<axis xyz="0 0 1"/>\3'
         '<limit lower="-0.05" upper="0.1" effort="500" velocity="2"/>',
-        bundled_robots.find("quadruped").read_text(),
+        bundled_robots.urdf_path("quadruped").read_text(),
         flags=re.DOTALL,
     )
     assert count == 4

@@ -91,14 +91,9 @@ class PackageResolver:
         written = _join(self._folder, name)
         if name and "\0" not in name and exists(written):
             return written, "path"
-        found = self._resolve_ignore_case(name) or self._search_nearby(name)
+        found = None if is_absolute(name) else find_ignore_case(self._folder, name)
+        found = found or self._search_nearby(name)
         return (found, "search") if found else (written, "nothing")
-
-    def _resolve_ignore_case(self, name: str) -> Path | None:
-        """Return the file whose name differs only in letter case or in backslashes."""
-        if is_absolute(name):
-            return None
-        return find_ignore_case(self._folder, name)
 
     def _search_nearby(self, name: str) -> Path | None:
         """Return a file in a nearby folder whose path has the same end."""

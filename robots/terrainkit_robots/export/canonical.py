@@ -7,7 +7,7 @@ the zero of the file, and masses are numbers. What cannot be represented is remo
 
 import re
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +29,7 @@ from terrainkit_robots.description.xml.document import RobotFileError
 from terrainkit_robots.export.base_link import WORLD, with_world_base
 from terrainkit_robots.export.valid_inertia import with_valid_inertia
 from terrainkit_robots.text import free_name, names
-from terrainkit_robots.transforms import Matrix, quat_to_matrix
+from terrainkit_robots.transforms import quat_to_matrix
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
@@ -77,6 +77,7 @@ def to_canonical(facts: "Facts", *, floating: bool | None = None) -> CanonicalRo
             notes.append(f"added the base link {new_name} for the world, with joints {attached}")
         links = [replace(each, name=new_name) if each.name == WORLD else each for each in links]
         joints = [(_rename_world(joint, new_name), before) for joint, before in joints]
+    imu = facts.model.imu
     model = RobotModel(
         name=plain_name(facts.model),
         kind="urdf",
@@ -96,15 +97,11 @@ def to_canonical(facts: "Facts", *, floating: bool | None = None) -> CanonicalRo
         ),
         floating=floating,
         home={name: q for name, q in facts.model.home.items() if name in facts.positions},
-        imu=_imu(facts.model, link_names),
+        imu=imu if imu is not None and imu[0] in link_names else None,
         excluded=frozenset(pair for pair in facts.model.excluded if pair <= link_names),
         sources=facts.model.sources,
     )
     return CanonicalRobot(model=model, notes=tuple(notes))
-
-
-def _imu(model: RobotModel, link_names: Collection[str]) -> tuple[str, Matrix] | None:
-    return model.imu if model.imu is not None and model.imu[0] in link_names else None
 
 
 def _rename_world(joint: Joint, new_name: str) -> Joint:
@@ -290,7 +287,7 @@ def _canonical_joint(facts: "Facts", joint: Joint, body: Body | None, notes: lis
 
 def _mimic_problem(facts: "Facts", mimic: Mimic) -> str:
     """Return why a mimic is not valid."""
-    if any(mimic.joint == new_name.name for new_name in facts.joints):
+    if any(mimic.joint == joint.name for joint in facts.joints):
         return "it is part of a cycle"
     return f"there is no joint {mimic.joint!r}"
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from terrainkit_robots.analysis.inertia.merged_inertia import merged_inertia
-from terrainkit_robots.description.model import Geometry, Joint, Link, RobotModel
+from terrainkit_robots.description.model import Geometry, Link, RobotModel
 from terrainkit_robots.transforms import Matrix
 
 
@@ -44,13 +44,17 @@ def merge_fixed_joints(model: RobotModel, *, keep: Collection[str] = ()) -> Merg
             frames[link.name] = (body, pose @ joint.origin)
         body, pose = frames[link.name]
         parts_of_body.setdefault(body, []).append((link, pose))
+    joints = []
+    for joint in model.joints:
+        if joint.child in parts_of_body:
+            body, pose = frames[joint.parent]
+            joints.append(replace(joint, parent=body, origin=pose @ joint.origin))
+    pairs = (frozenset(frames[link][0] for link in pair) for pair in model.excluded)
     merged_model = replace(
         model,
         links=tuple(_body(parts) for parts in parts_of_body.values()),
-        joints=tuple(
-            _attach_to_body(joint, frames) for joint in model.joints if joint.child in parts_of_body
-        ),
-        excluded=_excluded_bodies(model.excluded, frames),
+        joints=tuple(joints),
+        excluded=frozenset(pair for pair in pairs if len(pair) == 2),
     )
     return MergedRobot(model=merged_model, frames=frames)
 
@@ -70,16 +74,3 @@ def _body(parts: Sequence[tuple[Link, Matrix]]) -> Link:
 
 def _move_geometry(shape: Geometry, pose: Matrix) -> Geometry:
     return replace(shape, origin=pose @ shape.origin)
-
-
-def _attach_to_body(joint: Joint, frames: Mapping[str, tuple[str, Matrix]]) -> Joint:
-    body, pose = frames[joint.parent]
-    return replace(joint, parent=body, origin=pose @ joint.origin)
-
-
-def _excluded_bodies(
-    pairs: Collection[frozenset[str]], frames: Mapping[str, tuple[str, Matrix]]
-) -> frozenset[frozenset[str]]:
-    """Return the pairs of bodies that contain pairs of links."""
-    bodies = (frozenset(frames[link][0] for link in pair) for pair in pairs)
-    return frozenset(pair for pair in bodies if len(pair) == 2)

@@ -44,12 +44,12 @@ DEFAULT_RANGE = 1000.0
 joint would be locked."""
 
 _MUJOCO_COMPILER = {
-    # links that fixed joints hold stay bodies, so that feet keep their names
+    # links with fixed joints remain bodies, so that feet keep their names
     "fusestatic": "false",
     "discardvisual": "false",
     "strippath": "false",
     "balanceinertia": "false",
-    # shapes weigh zero: all mass is declared
+    # geoms have no mass: all mass is declared
     "inertiafromgeom": "false",
 }
 

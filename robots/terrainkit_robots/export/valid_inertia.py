@@ -107,10 +107,14 @@ def _merge_into_heaviest(
 ) -> Mapping[str, Link]:
     """Return the links of a body, with rejected masses moved to the heaviest link."""
     rejected = [name for name, link in links.items() if _is_rejected(link)]
-    with_mass = [name for name, link in links.items() if _has_mass(link.inertial)]
+    with_mass = {
+        name: link.inertial.mass or 0.0
+        for name, link in links.items()
+        if link.inertial is not None and _has_mass(link.inertial)
+    }
     if not rejected or len(with_mass) < 2:
         return links
-    heaviest = max(with_mass, key=lambda name: _mass(links[name]))
+    heaviest = max(with_mass, key=with_mass.__getitem__)
     merged = [name for name in rejected if name != heaviest]
     to_heaviest = invert_poses(poses[heaviest])
     inertials = {name: links[name].inertial for name in (heaviest, *merged)}
@@ -125,7 +129,3 @@ def _merge_into_heaviest(
     )
     result = dict(links) | {name: replace(links[name], inertial=None) for name in merged}
     return result | {heaviest: replace(links[heaviest], inertial=total)}
-
-
-def _mass(link: Link) -> float:
-    return (link.inertial.mass if link.inertial else None) or 0.0

@@ -197,10 +197,10 @@ def get_rule(code_or_name: str) -> Rule:
     Raises:
         ConfigError: if there is no such rule.
     """
-    known = {key: rule for rule in rules() for key in (rule.code.lower(), rule.name)}
-    found = known.get(code_or_name.lower())
-    if found is None:
-        codes = [rule.code for rule in rules()]
-        suggestion = expected_names(code_or_name, codes, closest_name=closest(code_or_name, known))
-        raise ConfigError(f"no rule {code_or_name!r}; {suggestion}")
-    return found
+    known = {key: rule for rule in rules() for key in (rule.code, rule.name)}
+    for key, rule in known.items():
+        if key.lower() == code_or_name.lower():
+            return rule
+    codes = [rule.code for rule in rules()]
+    suggestion = expected_names(code_or_name, codes, closest_name=closest(code_or_name, known))
+    raise ConfigError(f"no rule {code_or_name!r}; {suggestion}")

@@ -84,9 +84,9 @@ def _apply_suppressions(
 ) -> tuple[list[Finding], list[Suppressed]]:
     """Split the findings of a report into those that remain and those that are suppressed."""
     by_rule: dict[tuple[Path, str], list[SuppressionComment]] = {}
-    for comment in comments:
-        if comment.error is None:
-            by_rule.setdefault((comment.file, comment.code), []).append(comment)
+    for each in comments:
+        if each.error is None:
+            by_rule.setdefault((each.file, each.code), []).append(each)
     kept: list[Finding] = []
     suppressed: list[Suppressed] = []
     for finding in report.findings:

@@ -1,11 +1,10 @@
 """The folder of an onboarded robot, which is written completely or not at all."""
 
-import shutil
-import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+from terrainkit.atomic_write import temporary_folder
 from terrainkit.errors import ExportError
 from terrainkit_robots.text import free_name, names
 
@@ -106,19 +105,14 @@ def new_folder(target: Path, *, overwrite: bool = False) -> Iterator[Path]:
     check_folder(target, overwrite=overwrite)
     try:
         # In the same parent folder, so that the final move is a rename on the same disk.
-        work = Path(tempfile.mkdtemp(prefix=".terrainkit-", dir=target.parent))
+        with temporary_folder(target.parent) as work:
+            folder = work / target.name
+            folder.mkdir()
+            yield folder
+            check_folder(target, overwrite=overwrite)
+            _replace_folder(target, folder, work / "before")
     except OSError as error:
         raise ExportError(f"cannot write {target}: {error.strerror or error}") from error
-    folder = work / target.name
-    try:
-        folder.mkdir()
-        yield folder
-        check_folder(target, overwrite=overwrite)
-        _replace_folder(target, folder, work / "before")
-    except OSError as error:
-        raise ExportError(f"cannot write {target}: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(work, ignore_errors=True)
 
 
 def _replace_folder(target: Path, folder: Path, old: Path) -> None:

@@ -1,14 +1,12 @@
 """Bundle a policy: copy the part of a run that is shipped with the package."""
 
+from dataclasses import replace
 from pathlib import Path
 
-import tomlkit
-
 from terrainkit.errors import ConfigError, listing
-from terrainkit.toml_text import parse_toml
 from terrainkit_robots.rl import run as runs
-from terrainkit_robots.rl.scene import SPEC_FILE
 from terrainkit_robots.rl.tasks import task_names
+from terrainkit_robots.spec.robot import SPEC_FILE
 
 
 def bundle_policy(run: runs.Run, folder: Path) -> runs.Run:
@@ -20,16 +18,15 @@ def bundle_policy(run: runs.Run, folder: Path) -> runs.Run:
     """
     if run.checkpoint is None:
         raise ConfigError(f"run {run.folder}: got no checkpoint; expected a trained run")
-    if run.robot_name not in task_names():
-        raise ConfigError(f"robot: got {run.robot_name}; expected one of {listing(task_names())}")
+    if run.info.robot not in task_names():
+        raise ConfigError(f"robot: got {run.info.robot}; expected one of {listing(task_names())}")
     is_plane = run.terrain == "plane"
     names = [runs.TASK_FILE, SPEC_FILE] + [runs.MAP_FILE] * (not is_plane)
     if not (run.folder / names[-1]).is_file():
         raise ConfigError(f"terrain: got {run.terrain}; expected plane or a map with a config")
-    about = parse_toml((run.folder / runs.RUN_FILE).read_text(encoding="utf-8"))
-    about["terrain"] = "plane" if is_plane else runs.MAP_FILE
+    info = replace(run.info, terrain="plane" if is_plane else runs.MAP_FILE)
     state = runs.policy_state(runs.read_checkpoint(run.checkpoint))
     files = {name: (run.folder / name).read_bytes() for name in names}
-    runs.write_run_folder(folder, files | {runs.RUN_FILE: tomlkit.dumps(about).encode()})
+    runs.write_run_folder(folder, files | {runs.RUN_FILE: info.to_toml().encode()})
     runs.save_checkpoint(folder / runs.checkpoint_name(state["iteration"]), state)
     return runs.open_run(folder)

@@ -7,8 +7,8 @@ from rsl_rl.models import MLPModel
 from terrainkit.errors import ConfigError, TerrainkitWarning
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import Run, changed_robot_files, read_checkpoint
-from terrainkit_robots.rl.runner import OBS_GROUPS, actor_config, check_checkpoint, network_errors
-from terrainkit_robots.rl.scene import SPEC_FILE
+from terrainkit_robots.rl.runner import OBS_GROUPS, check_checkpoint, network_errors, runner_config
+from terrainkit_robots.spec.robot import SPEC_FILE
 
 
 def load_policy(run: Run, env: LeggedEnv) -> MLPModel:
@@ -24,12 +24,13 @@ def load_policy(run: Run, env: LeggedEnv) -> MLPModel:
         raise ConfigError(f"run {run.folder}: got no checkpoint; expected a trained run")
     # The run has its own copy of the spec, so only a change of the model matters.
     if files := [name for name in changed_robot_files(run) if name != SPEC_FILE]:
-        message = f"{run.robot_name}: {' and '.join(files)} changed after {run.folder} was trained"
+        message = f"{run.info.robot}: {' and '.join(files)} changed after {run.folder} was trained"
         warnings.warn(message, TerrainkitWarning, stacklevel=2)
     state = read_checkpoint(run.checkpoint)
     check_checkpoint(run.checkpoint, state, env, OBS_GROUPS["actor"])
     with network_errors(run.checkpoint):
-        obs, config = env.get_observations(), actor_config(run.task)
-        actor = MLPModel(obs, OBS_GROUPS, "actor", env.num_actions, **config)
+        config = runner_config(run.task)["actor"]
+        config.pop("class_name")
+        actor = MLPModel(env.get_observations(), OBS_GROUPS, "actor", env.num_actions, **config)
         actor.load_state_dict(state["actor_state_dict"])
     return actor.to(env.device).eval()

@@ -19,11 +19,11 @@ from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.runner import LeggedRunner, single_torch_thread
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.simulation.geoms import lowest_point
+from terrainkit_robots.spec.robot import Robot
 
 MAX_FOOT_HEIGHT, MAX_FOOT_DEPTH, MIN_BASE_HEIGHT = 0.02, 0.001, 0.5
 """Limits of a foot above and below the ground [m], and of the base, relative to its target."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from terrainkit_robots.rendering import appearance
 from terrainkit_robots.rendering.child_process import Frame, RenderError, stream_frames
 from terrainkit_robots.simulation.geoms import lowest_point
+from terrainkit_robots.text import one_line
 
 DEFAULT_SIZE = (480, 420)
 """Width and height of a picture [pixels]."""
@@ -54,7 +55,7 @@ def robot_frames(file: Path, size: tuple[int, int]) -> Iterator[Frame]:
     try:
         model = _load_model(file)
     except ValueError as error:
-        raise RenderError(f"MuJoCo cannot load {file.name}: {error}") from None
+        raise RenderError(f"MuJoCo cannot load {file.name}: {one_line(str(error))}") from None
     data = mujoco.MjData(model)
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, 0)

@@ -280,7 +280,6 @@ class Normalization(Config):
     """Scales and limits of observations and actions."""
 
     obs_scales: ObsScales = field(default_factory=ObsScales)
-    """Scales of the observations."""
     clip_observations: PositiveFloat = 100.0
     """Largest observation."""
     clip_actions: PositiveFloat = 100.0
@@ -386,35 +385,20 @@ class Task(Config):
     """Configuration of training. SI units and radians."""
 
     env: Env = field(default_factory=Env)
-    """Environments and episodes."""
     terrain: Terrain = field(default_factory=Terrain)
-    """Terrain, terrain curriculum and height scan."""
     init_state: InitState = field(default_factory=InitState)
-    """Random initial state of an episode."""
     control: Control = field(default_factory=Control)
-    """Actions and PD control."""
     asset: Asset = field(default_factory=Asset)
-    """Parts of the robot that are simulated."""
     commands: Commands = field(default_factory=Commands)
-    """Ranges from which velocity commands are sampled."""
     domain_rand: DomainRand = field(default_factory=DomainRand)
-    """Domain randomization."""
     rewards: Rewards = field(default_factory=Rewards)
-    """Scales and parameters of the rewards."""
     termination: Termination = field(default_factory=Termination)
-    """Conditions that end an episode as a fall."""
     normalization: Normalization = field(default_factory=Normalization)
-    """Scales and limits of observations and actions."""
     noise: Noise = field(default_factory=Noise)
-    """Noise on observations."""
     sim: Sim = field(default_factory=Sim)
-    """Physics simulation."""
     policy: Policy = field(default_factory=Policy)
-    """Actor and critic networks."""
     algorithm: Algorithm = field(default_factory=Algorithm)
-    """PPO."""
     runner: Runner = field(default_factory=Runner)
-    """Length of training, checkpoints and logging."""
 
     def __post_init__(self) -> None:
         """Validate the sections, and values that depend on each other."""

@@ -28,9 +28,8 @@ class TerrainCurriculum:
 
     def __init__(self, terrain: Terrain, num_envs: int, max_init_level: int, seed: int) -> None:
         rows, cols = terrain.env_origins.shape[:2]
-        self.levels, self.columns = assign_levels(
-            num_envs, rows, cols, min(max_init_level, rows - 1), seed
-        )
+        max_level = min(max_init_level, rows - 1)
+        self.levels, self.columns = assign_levels(num_envs, rows, cols, max_level, seed)
         # Displacement that the commands of the episode integrate to [m].
         self.commanded = np.zeros((num_envs, 2))
         # Running success rate of each patch, NaN without episodes.
@@ -59,13 +58,9 @@ class TerrainCurriculum:
         *,
         update_levels: bool,
     ) -> None:
-        """Record the success of complete episodes, and update the terrain levels.
+        """Record the success of complete episodes, and update the terrain levels if requested.
 
-        Args:
-            env_ids: Environments whose episode ended, shape (k,).
-            distance: Distance from the start position [m], shape (k,).
-            fallen: Whether the episode ended with a fall, shape (k,).
-            update_levels: Whether robots change levels.
+        `distance` from the start [m] and `fallen` have the shape (k,) of `env_ids`.
         """
         commanded = np.linalg.norm(self.commanded[env_ids], axis=1)
         crossed = distance > self._terrain.patch_length / 2
@@ -116,16 +111,12 @@ class TerrainCurriculum:
         }
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Continue from a checkpoint; with another number of robots, keep only their levels.
-
-        Raises:
-            ConfigError: If the checkpoint's map has other rows or columns.
-        """
+        """Continue from a checkpoint; with another number of robots, keep only their levels."""
         rows, cols = self.success.shape
         if state["success"].shape != self.success.shape:
+            got = " x ".join(map(str, state["success"].shape))
             raise ConfigError(
-                f"the checkpoint's map has {state['success'].shape[0]} x "
-                f"{state['success'].shape[1]} patches; this one has {rows} x {cols}"
+                f"the checkpoint's map has {got} patches; this one has {rows} x {cols}"
             )
         levels, columns = np.asarray(state["levels"]), np.asarray(state["columns"])
         if ((levels < 0) | (levels >= rows) | (columns < 0) | (columns >= cols)).any():

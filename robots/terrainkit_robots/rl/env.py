@@ -21,11 +21,12 @@ from terrainkit_robots.rl.observations import (
     uses_height_scan,
 )
 from terrainkit_robots.rl.rewards import active_rewards
-from terrainkit_robots.rl.scene import Robot, build_scene
+from terrainkit_robots.rl.scene import build_scene
 from terrainkit_robots.rl.simulation import Simulation, check_env_memory
 from terrainkit_robots.rl.state import Sensors, State
 from terrainkit_robots.rl.terminations import terrain_out_of_bounds
 from terrainkit_robots.rl.terrain import Terrain
+from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import quat_to_yaw
 
 FloatArray = NDArray[np.float32]
@@ -34,15 +35,10 @@ BoolArray = NDArray[np.bool_]
 
 
 class LeggedEnv(VecEnv):
-    """Legged robots as rsl-rl's `VecEnv`: numpy inside, fresh tensors at the border."""
+    """Legged robots as rsl-rl's `VecEnv`; returned tensors are never modified later."""
 
     def __init__(self, task: Task, robot: Robot, terrain: Terrain, device: str = "cpu") -> None:
-        """Build the simulations and reset every environment.
-
-        Raises:
-            ConfigError: If the robot does not fit the task.
-            MemoryLimitError: If the environments do not fit in memory.
-        """
+        """Build the simulations and reset every environment."""
         self.cfg, self.robot, self.terrain, self.device = task, robot, terrain, device
         self.num_envs, self.num_actions = task.env.num_envs, len(robot.default_pose)
         self.max_episode_length = task.max_episode_length
@@ -66,11 +62,7 @@ class LeggedEnv(VecEnv):
         self.curriculum = TerrainCurriculum(
             terrain, self.num_envs, task.terrain.max_init_level, task.runner.seed
         )
-        self._init_buffers()
-        self.reset()
-
-    def _init_buffers(self) -> None:
-        n, joints, task, robot = self.num_envs, self.num_actions, self.cfg, self.robot
+        n, joints = self.num_envs, self.num_actions
         self.episode_length = np.zeros(n, np.int64)  # rsl-rl may set it to random lengths
         self.steps_since_reset = np.zeros_like(self.episode_length)
         self.start_pos = np.zeros((n, 2))  # base position at the last reset
@@ -78,7 +70,7 @@ class LeggedEnv(VecEnv):
         self.joint_offset = np.zeros((n, joints), np.float32)
         self.rewards = active_rewards(task.rewards)
         self.episode_sums = {name: np.zeros(n, np.float32) for name in self.rewards}
-        self.commands = self.velocity_command.commands  # live
+        self.commands = self.velocity_command.commands  # a view of the current commands
 
         # A motor receives offset + scale * action.
         kind, scale = task.control.control_type, task.control.action_scale
@@ -91,10 +83,11 @@ class LeggedEnv(VecEnv):
         scales = default if scale is None else np.full(joints, scale)
         self.action_scale = scales.astype(np.float32)
         self.action_offset = np.where(positional, robot.default_pose, np.float32(0))
+        self.reset()
 
     @property
     def episode_length_buf(self) -> torch.Tensor:
-        """Length of each episode so far [steps], shape (n,); live."""
+        """View of the length of each episode so far [steps], shape (n,)."""
         return torch.from_numpy(self.episode_length)
 
     @episode_length_buf.setter
@@ -112,9 +105,6 @@ class LeggedEnv(VecEnv):
 
         Returns:
             Observations, rewards (n,), dones (n,), and extras with `time_outs` and `log`.
-
-        Raises:
-            ConfigError: If an action is not finite.
         """
         self._apply_actions(actions)
         self.pushes.apply(self.rng, self.sim.qvel)
@@ -151,14 +141,14 @@ class LeggedEnv(VecEnv):
 
     def set_commands(self, commands: FloatArray | None) -> None:
         """Fix the commands, shape (n, 3); None returns to random commands."""
-        released = commands is None and self.velocity_command.fixed is not None
+        if commands is None and self.velocity_command.fixed is None:
+            return
         self.velocity_command.fixed = commands
-        if released:
+        if commands is None:
             self.velocity_command.resample(self.rng, np.arange(self.num_envs))
-        if released or commands is not None:
-            self.velocity_command.update_heading(self._yaw())
-            np.copyto(self.state.commands, self.commands)
-            self._compute_observations()
+        self.velocity_command.update_heading(self._yaw())
+        np.copyto(self.state.commands, self.commands)
+        self._compute_observations()
 
     def to_ctrl(self, actions: FloatArray) -> FloatArray:
         """Return the motors' setpoints for actions of shape (n, j)."""
@@ -253,11 +243,9 @@ class LeggedEnv(VecEnv):
         # A robot that left the map crossed its patch, even if the patch is wider than long.
         distance[terrain_out_of_bounds(base_pos, self.terrain)] = self.terrain.patch_length
         distance[unstable[env_ids]] = 0  # MuJoCo moved these to the world's origin
+        update, ended = self.cfg.terrain.curriculum, env_ids[complete]
         self.curriculum.on_episode_end(
-            env_ids[complete],
-            distance[complete],
-            fallen[complete],
-            update_levels=self.cfg.terrain.curriculum,
+            ended, distance[complete], fallen[complete], update_levels=update
         )
         return log if self.terrain.is_flat else log | self.curriculum.log()
 
@@ -298,26 +286,22 @@ class LeggedEnv(VecEnv):
         }
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Continue from a state; with another number of environments, keep only the curricula.
-
-        Raises:
-            ConfigError: If the state belongs to another robot or map.
-        """
+        """Continue from a state; with another number of environments, keep only the curricula."""
         self.curriculum.load_state_dict(state["curriculum"])
         self.velocity_command.lin_vel_x = tuple(state["lin_vel_x"])
         arrays, saved = self._arrays(), state["arrays"]
         if len(saved["episode_length"]) != self.num_envs:
             self.reset()
             return
-        required = {name for name in arrays if not name.startswith("rew_")}
-        if required - saved.keys() or vars(self.state).keys() != state["state"].keys():
-            raise ConfigError(
-                "the checkpoint was written by another version of terrainkit; with another "
-                "env.num_envs, its networks and curricula can be used"
-            )
+        wrong = [name for name in vars(self.state) if name not in state["state"]]
         for name, array in arrays.items():
             if name not in saved or tuple(saved[name].shape) != array.shape:
-                raise ConfigError(f"the checkpoint's {name} belongs to another robot or task")
+                wrong.append(name)
+        if wrong:
+            raise ConfigError(
+                f"the checkpoint's {wrong[0]} belongs to another robot, task or version of "
+                "terrainkit; with another env.num_envs, its networks and curricula can be used"
+            )
         for name, array in arrays.items():
             array[...] = saved[name].numpy()
         apply_params(self.sim, self.params)
@@ -328,7 +312,7 @@ class LeggedEnv(VecEnv):
         self._observations = TensorDict(groups, batch_size=[self.num_envs]).to(self.device)
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
-        """Return the arrays to save by name; live."""
+        """Return views of the arrays to save, by name."""
         arrays = {
             "physics": self.sim.batch.state,
             "episode_length": self.episode_length,

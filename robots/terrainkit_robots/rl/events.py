@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import DomainRand, InitState
-from terrainkit_robots.rl.scene import Robot, Scene
+from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.simulation import Simulation
 from terrainkit_robots.rl.terrain import Terrain
+from terrainkit_robots.spec.robot import Robot
 
 FloatArray = NDArray[np.float32]
 Ids = NDArray[np.int64]
@@ -64,13 +65,8 @@ def sample_params(
 
 
 def apply_params(sim: Simulation, params: RandomizedParams) -> None:
-    """Write the parameters of each robot to its simulation.
-
-    Raises:
-        ConfigError: If the mass of a base is not positive.
-    """
-    batch, scene, model = sim.batch, sim.scene, sim.scene.model
-    base = scene.base
+    """Write the parameters of each robot to its simulation."""
+    batch, scene, model, base = sim.batch, sim.scene, sim.scene.model, sim.scene.base
     min_mass = float(model.body_mass[base] + params.added_mass.min())
     if min_mass <= 0:
         raise ConfigError(
@@ -88,8 +84,7 @@ def apply_params(sim: Simulation, params: RandomizedParams) -> None:
     # MuJoCo's affine actuators: force = gain * ctrl + bias . (1, q, dq).
     gain, bias = batch.expand("actuator_gainprm"), batch.expand("actuator_biasprm")
     k, d, s = params.stiffness, params.damping, params.strength
-    has_stiffness = model.actuator_biasprm[:, 1] != 0
-    has_damping = model.actuator_biasprm[:, 2] != 0
+    has_stiffness, has_damping = model.actuator_biasprm[:, 1:3].T != 0
     factor = np.where(has_stiffness, k, np.where(has_damping, d, 1))
     gain[:, :, 0] = model.actuator_gainprm[:, 0] * factor * s
     bias[:, :, 1] = model.actuator_biasprm[:, 1] * k * s
@@ -142,7 +137,12 @@ def sample_reset_state(
     count, limit = len(env_origins), cfg.position
     qpos = np.tile(scene.home, (count, 1))
     offset = rng.uniform(-limit, limit, (count, 2)).astype(np.float32)
-    ring_x, ring_y = _footprint(robot)
+    # Points that cover the area of the feet at any heading.
+    radius = 0.5 * max(float(robot.spec.leg_length or 0.4), float(robot.spec.stance_width or 0.2))
+    angle = np.arange(8) * (np.pi / 4)
+    circle = np.stack([np.cos(angle), np.sin(angle)])
+    rings = np.concatenate([np.zeros((2, 1)), radius / 2 * circle, radius * circle], axis=1)
+    ring_x, ring_y = rings.astype(np.float32)
     for factor in (0.5, 0.0, 1.0):  # the last pass checks the origin itself
         x, y = (env_origins[:, :2] + offset).T
         height = terrain.height(x[:, None] + ring_x, y[:, None] + ring_y)
@@ -162,12 +162,3 @@ def sample_reset_state(
     qvel[:, :3] = rng.uniform(-cfg.lin_vel, cfg.lin_vel, (count, 3))
     qvel[:, 3:6] = rng.uniform(-cfg.ang_vel, cfg.ang_vel, (count, 3))
     return qpos, qvel
-
-
-def _footprint(robot: Robot) -> FloatArray:
-    """Return points that cover the area of the feet at any heading [m], shape (2, p)."""
-    radius = 0.5 * max(float(robot.spec.leg_length or 0.4), float(robot.spec.stance_width or 0.2))
-    angle = np.arange(8) * (np.pi / 4)
-    circle = np.stack([np.cos(angle), np.sin(angle)])
-    rings = [np.zeros((2, 1)), radius / 2 * circle, radius * circle]
-    return np.concatenate(rings, axis=1).astype(np.float32)

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.state import State
+from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import quat_rotate_inverse
 
 FloatArray = NDArray[np.float32]
@@ -23,7 +23,7 @@ HEIGHT_SCAN_OFFSET = 0.5
 """Base height above the ground that is observed as 0 [m], as in legged_gym."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class ObservationTerm:
     """One term of an observation group."""
 
@@ -31,12 +31,12 @@ class ObservationTerm:
     """Name in logs and exports."""
     function: Callable[[State], FloatArray]
     """Computes the term, shape (n, width)."""
+    symmetry: Literal["scalar", "vector", "axial", "command", "joints", "feet", "scan"] = "scalar"
+    """How the term transforms when left and right are swapped; see :mod:`.symmetry`."""
     scale: tuple[float, ...] | float = 1.0
     """Scale factor, or one per number."""
     noise: float = 0.0
     """Half range of the uniform noise, added before scaling."""
-    symmetry: Literal["scalar", "vector", "axial", "command", "joints", "feet", "scan"] = "scalar"
-    """How the term transforms when left and right are swapped; see :mod:`.symmetry`."""
 
 
 def uses_height_scan(task: Task, *, is_flat: bool) -> bool:
@@ -47,55 +47,29 @@ def uses_height_scan(task: Task, *, is_flat: bool) -> bool:
 
 def policy_group(robot: Robot, task: Task, *, scan: bool) -> tuple[ObservationTerm, ...]:
     """Return the policy's terms: 45 numbers for 12 joints, and 187 with the height scan."""
-    term, scales, noise = ObservationTerm, task.normalization.obs_scales, task.noise
-    level = noise.noise_level
+    term, scales = ObservationTerm, task.normalization.obs_scales
+    noise = {key: task.noise.noise_level * value for key, value in vars(task.noise).items()}
+    command_scale = (scales.lin_vel, scales.lin_vel, scales.ang_vel)
+    # The angle of a wheel grows without bound and carries no information.
+    dof_pos_scale = tuple(np.where(robot.wheels, 0.0, scales.dof_pos).tolist())
+
+    def dof_pos(state: State) -> FloatArray:
+        return state.dof_pos + state.joint_offset - robot.default_pose
+
+    def height_scan(state: State) -> FloatArray:
+        return np.clip(state.height_scan - np.float32(HEIGHT_SCAN_OFFSET), -1, 1)
+
     group = (
-        term(
-            name="commands",
-            function=lambda state: state.commands,
-            scale=(scales.lin_vel, scales.lin_vel, scales.ang_vel),
-            symmetry="command",
-        ),
-        term(
-            name="projected_gravity",
-            function=lambda state: state.projected_gravity,
-            noise=level * noise.gravity,
-            symmetry="vector",
-        ),
-        term(
-            name="base_ang_vel",
-            function=lambda state: state.base_ang_vel,
-            scale=scales.ang_vel,
-            noise=level * noise.ang_vel,
-            symmetry="axial",
-        ),
-        term(
-            name="dof_pos",
-            function=lambda state: state.dof_pos + state.joint_offset - robot.default_pose,
-            # The angle of a wheel grows without bound and carries no information.
-            scale=tuple(np.where(robot.wheels, 0.0, scales.dof_pos).tolist()),
-            noise=level * noise.dof_pos,
-            symmetry="joints",
-        ),
-        term(
-            name="dof_vel",
-            function=lambda state: state.dof_vel,
-            scale=scales.dof_vel,
-            noise=level * noise.dof_vel,
-            symmetry="joints",
-        ),
-        term(name="actions", function=lambda state: state.actions, symmetry="joints"),
+        term("commands", lambda s: s.commands, "command", command_scale),
+        term("projected_gravity", lambda s: s.projected_gravity, "vector", 1.0, noise["gravity"]),
+        term("base_ang_vel", lambda s: s.base_ang_vel, "axial", scales.ang_vel, noise["ang_vel"]),
+        term("dof_pos", dof_pos, "joints", dof_pos_scale, noise["dof_pos"]),
+        term("dof_vel", lambda s: s.dof_vel, "joints", scales.dof_vel, noise["dof_vel"]),
+        term("actions", lambda s: s.actions, "joints"),
     )
-    if not scan:
-        return group
-    height_scan = term(
-        name="height_scan",
-        function=lambda state: np.clip(state.height_scan - np.float32(HEIGHT_SCAN_OFFSET), -1, 1),
-        scale=scales.height_measurements,
-        noise=level * noise.height_measurements,
-        symmetry="scan",
-    )
-    return (*group, height_scan)
+    scan_scale, scan_noise = scales.height_measurements, noise["height_measurements"]
+    scan_term = term("height_scan", height_scan, "scan", scan_scale, scan_noise)
+    return (*group, scan_term) if scan else group
 
 
 def privileged_group(
@@ -111,21 +85,16 @@ def privileged_group(
         quat = np.repeat(state.base_quat, feet, axis=0)
         return quat_rotate_inverse(quat, state.foot_force.reshape(-1, 3)).reshape(n, -1)
 
-    term = ObservationTerm
+    term, lin_vel_scale = ObservationTerm, task.normalization.obs_scales.lin_vel
     return (
         *(replace(each, noise=0.0) for each in policy_group(robot, task, scan=scan)),
-        term(
-            name="base_lin_vel",
-            function=lambda state: state.base_lin_vel,
-            scale=task.normalization.obs_scales.lin_vel,
-            symmetry="vector",
-        ),
-        term(name="friction", function=lambda state: state.friction),
-        term(name="added_mass", function=lambda state: state.added_mass),
-        term(name="com_shift", function=lambda state: state.com_shift, scale=10, symmetry="vector"),
-        term(name="joint_offset", function=lambda state: state.joint_offset, symmetry="joints"),
-        term(name="push_vel", function=push_vel, symmetry="vector"),
-        term(name="foot_force", function=foot_force, scale=1 / weight, symmetry="feet"),
+        term("base_lin_vel", lambda s: s.base_lin_vel, "vector", lin_vel_scale),
+        term("friction", lambda s: s.friction),
+        term("added_mass", lambda s: s.added_mass),
+        term("com_shift", lambda s: s.com_shift, "vector", 10),
+        term("joint_offset", lambda s: s.joint_offset, "joints"),
+        term("push_vel", push_vel, "vector"),
+        term("foot_force", foot_force, "feet", 1 / weight),
     )
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit_robots.rl.config import Rewards
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.state import State
+from terrainkit_robots.spec.robot import Robot
 
 FloatArray = NDArray[np.float32]
 

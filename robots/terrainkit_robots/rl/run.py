@@ -7,7 +7,6 @@ versions), `map.toml` (the config of its map, if any), and `model_<iteration>.pt
 import hashlib
 import io
 import re
-import tempfile
 import zipfile
 from collections import deque
 from collections.abc import Mapping
@@ -15,18 +14,19 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from terrainkit.atomic_write import atomic_write
+from terrainkit.atomic_write import atomic_write, temporary_folder
 from terrainkit.errors import ConfigError, ExportError, listing
+from terrainkit.schema import Config
 from terrainkit.text import expected_names
-from terrainkit.toml_text import parse_toml, read_text
+from terrainkit.toml_text import read_text
 from terrainkit_robots.files import open_regular
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.rl.scene import SPEC_FILE, Robot
+from terrainkit_robots.spec.robot import SPEC_FILE, Robot
 from terrainkit_robots.spec.robot_spec import RobotSpec
 from terrainkit_robots.text import free_name
 
@@ -34,10 +34,7 @@ if TYPE_CHECKING:
     from terrainkit.config import MapConfig
 
 RUN_FILE, TASK_FILE, MAP_FILE = "run.toml", "task.toml", "map.toml"
-FORMAT_VERSION = 1
-"""Version of the files of a run and of the checkpoint format."""
-
-CHECKPOINT_FORMAT = "terrainkit checkpoint"
+CHECKPOINT_HEADER = {"format": "terrainkit checkpoint", "version": 1}
 CHECKPOINT_KEYS = {
     "iteration": int,
     "robot": str,
@@ -48,8 +45,27 @@ CHECKPOINT_KEYS = {
 }
 """Keys of every checkpoint, and their types; a checkpoint of training has more."""
 
-MAX_CHECKPOINT_SIZE = 1 << 32
-"""Largest checkpoint that is read [bytes]."""
+
+@dataclass(frozen=True, kw_only=True)
+class RunInfo(Config):
+    """The content of `run.toml`: what a run was made from."""
+
+    format_version: Literal[1] = 1
+    """Version of the files of a run."""
+    robot: str
+    """Name of a registered task, or the absolute path of the robot's folder."""
+    terrain: str
+    """`plane`, or the path of a map, its config, or a MuJoCo model."""
+    terrain_sha256: str | None = None
+    """Digest of a MuJoCo model."""
+    seed: int
+    """Seed of all random numbers."""
+    started: str
+    """Date and time."""
+    versions: Mapping[str, str]
+    """Versions of the packages."""
+    robot_sha256: Mapping[str, str] | None = None
+    """Digests of the robot's spec and model."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,12 +74,12 @@ class Run:
 
     folder: Path
     """Folder of the run."""
+    info: RunInfo
+    """What it was made from."""
     task: Task
     """Its task."""
     robot: Robot
     """The robot, with the spec it was trained with."""
-    robot_name: str
-    """Name of a registered robot, or the absolute path of its folder."""
     terrain: str
     """The terrain, as `load_terrain` takes it: `plane` or a path."""
     checkpoint: Path | None
@@ -96,11 +112,7 @@ def resolve_terrain(terrain: str | Path) -> str:
 
 
 def resolve_robot(robot: str | Path) -> str:
-    """Return the robot as a run records it: a registered name, or its folder's absolute path.
-
-    Raises:
-        ConfigError: If there is no such robot.
-    """
+    """Return the robot as a run records it: a registered name, or its folder's absolute path."""
     found = tasks.get_task(robot)
     return str(robot) if str(robot) in tasks.task_names() else str(found.folder.resolve())
 
@@ -113,22 +125,18 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
         ExportError: If the folder is not empty, or cannot be written.
     """
     robot_folder, source = tasks.get_task(robot_name).folder, resolve_terrain(terrain)
-    about = {
-        "format_version": FORMAT_VERSION,
-        "robot": resolve_robot(robot_name),
-        "terrain": source,
-        **({"terrain_sha256": _sha256(Path(source))} if source.endswith(".xml") else {}),
-        "seed": task.runner.seed,
-        "begun": datetime.now().astimezone().isoformat(timespec="seconds"),
-        "versions": {
-            name: version(name) for name in ("terrainkit", "mujoco", "rsl-rl-lib", "torch")
-        },
-        "robot_sha256": _robot_digests(robot_folder),
-    }
-    import tomlkit
-
+    packages = ("terrainkit", "mujoco", "rsl-rl-lib", "torch")
+    info = RunInfo(
+        robot=resolve_robot(robot_name),
+        terrain=source,
+        terrain_sha256=_sha256(Path(source)) if source.endswith(".xml") else None,
+        seed=task.runner.seed,
+        started=datetime.now().astimezone().isoformat(timespec="seconds"),
+        versions={name: version(name) for name in packages},
+        robot_sha256=_robot_digests(robot_folder),
+    )
     files = {
-        RUN_FILE: tomlkit.dumps(about),
+        RUN_FILE: info.to_toml(),
         TASK_FILE: task.to_toml(),
         SPEC_FILE: read_text(robot_folder / SPEC_FILE),
     }
@@ -139,19 +147,15 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
 
 
 def write_run_folder(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write a new folder with some files, completely or not at all.
-
-    Raises:
-        ExportError: If the folder is not empty, or cannot be written.
-    """
+    """Write a new folder with some files, completely or not at all."""
     try:
         if folder.is_dir() and any(folder.iterdir()):
             raise ExportError(
                 f"{folder} exists; choose another folder, or continue with --resume {folder}"
             )
         folder.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".terrainkit-", dir=folder.parent) as work:
-            made = Path(work) / folder.name
+        with temporary_folder(folder.parent) as work:
+            made = work / folder.name
             made.mkdir()
             for name, data in files.items():
                 (made / name).write_bytes(data)
@@ -160,12 +164,6 @@ def write_run_folder(folder: Path, files: Mapping[str, bytes]) -> None:
             made.rename(folder)
     except OSError as error:
         raise ExportError(f"cannot write {folder}: {error.strerror or error}") from error
-
-
-def rewrite_task(run: Run, task: Task) -> None:
-    """Replace the task in a run's folder."""
-    with atomic_write(run.folder / TASK_FILE, overwrite=True) as path:
-        path.write_text(task.to_toml(), encoding="utf-8")
 
 
 def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
@@ -179,15 +177,11 @@ def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
     Raises:
         ConfigError: If there is no such run or checkpoint, or its robot is missing.
     """
-    folder, named = _resolve_run(name)
-    about = _read_about(folder)
-    for key in ("robot", "terrain"):
-        if not isinstance(about.get(key), str):
-            raise ConfigError(
-                f"{folder / RUN_FILE}: {key}: got {about.get(key, 'nothing')!r}; expected a string"
-            )
-    robot_name, terrain = about["robot"], about["terrain"]
-    found = tasks.get_task(robot_name)
+    folder, selected = _resolve_run(name)
+    if not (folder / RUN_FILE).is_file():
+        raise ConfigError(f"{folder} has no {RUN_FILE}; terrainkit train writes such a folder")
+    info = RunInfo.load(folder / RUN_FILE)
+    terrain, found = info.terrain, tasks.get_task(info.robot)
     robot = Robot.from_spec(RobotSpec.load(folder / SPEC_FILE), found.folder)
     if not robot.mjcf.is_file():
         raise ConfigError(f"the robot of {folder} is missing: there is no file {robot.mjcf}")
@@ -196,21 +190,20 @@ def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
         file, config = folder / terrain, folder / MAP_FILE
         terrain = resolve_terrain(config if config.is_file() and not file.is_file() else file)
     saved = checkpoints(folder)
-    if checkpoint is not None and checkpoint not in saved:
-        raise ConfigError(
-            f"{folder}: got checkpoint {checkpoint}; expected one of: {listing(map(str, saved))}"
-        )
-    if checkpoint is None:
-        selected = named or (saved[max(saved)] if saved else None)
-    else:
+    if checkpoint is not None:
+        if checkpoint not in saved:
+            iterations = listing(map(str, saved))
+            raise ConfigError(
+                f"{folder}: got checkpoint {checkpoint}; expected one of: {iterations}"
+            )
         selected = saved[checkpoint]
     return Run(
         folder=folder,
+        info=info,
         task=Task.load(folder / TASK_FILE, found.task),
         robot=robot,
-        robot_name=robot_name,
         terrain=terrain,
-        checkpoint=selected,
+        checkpoint=selected or (saved[max(saved)] if saved else None),
     )
 
 
@@ -244,36 +237,25 @@ def _resolve_run(name: str | Path) -> tuple[Path, Path | None]:
 
 def is_shipped(run: Run) -> bool:
     """Return whether a run is part of a package, so that its folder must not be written."""
-    return run.folder.resolve() == tasks.get_task(run.robot_name).trained_run.resolve()
+    return run.folder.resolve() == tasks.get_task(run.info.robot).trained_run.resolve()
 
 
 def changed_robot_files(run: Run) -> tuple[str, ...]:
-    """Return the names of the robot's files that differ from those it was trained with.
-
-    Raises:
-        ConfigError: If a file cannot be read.
-    """
-    recorded = _read_about(run.folder).get("robot_sha256")
-    if not isinstance(recorded, dict):  # a run of an earlier version
+    """Return the names of the robot's files that differ from those it was trained with."""
+    recorded = run.info.robot_sha256
+    if recorded is None:
         return ()
-    current = _robot_digests(tasks.get_task(run.robot_name).folder)
+    current = _robot_digests(tasks.get_task(run.info.robot).folder)
     names = sorted({*recorded, *current})
     return tuple(name for name in names if recorded.get(name) != current.get(name))
 
 
 def is_same_terrain(run: Run, terrain: str | Path) -> bool:
-    """Return whether a terrain is the run's; maps with the same config are the same.
-
-    Raises:
-        ConfigError: If a file cannot be read.
-        MapFileError: If the map cannot be read.
-    """
-    source, config_file = resolve_terrain(terrain), run.folder / MAP_FILE
-    if config_file.is_file():
-        from terrainkit.config import MapConfig
-
-        return _map_config(source) == MapConfig.load(config_file)
-    recorded = _read_about(run.folder).get("terrain_sha256")
+    """Return whether a terrain is the run's; maps with the same config are the same."""
+    source, config = resolve_terrain(terrain), run.folder / MAP_FILE
+    if config.is_file():
+        return _map_config(source) == _map_config(str(config))
+    recorded = run.info.terrain_sha256
     return source == run.terrain and recorded in (None, recorded and _sha256(Path(source)))
 
 
@@ -288,7 +270,7 @@ def can_continue(run: Run, robot: str | Path, terrain: str | Path, task: Task) -
     if (
         replace(task, env=env, runner=run.task.runner) != run.task
         or resolve_terrain(terrain) != run.terrain
-        or resolve_robot(robot) != run.robot_name
+        or resolve_robot(robot) != run.info.robot
     ):
         return False
     if not is_same_terrain(run, terrain):
@@ -298,7 +280,7 @@ def can_continue(run: Run, robot: str | Path, terrain: str | Path, task: Task) -
         )
     if files := changed_robot_files(run):
         raise ConfigError(
-            f"{' and '.join(files)} of {run.robot_name} changed since {run.folder} was trained; "
+            f"{' and '.join(files)} of {run.info.robot} changed since {run.folder} was trained; "
             "with a copy of the robot in another folder, a new run starts with its networks"
         )
     return "processes" in read_checkpoint(last_checkpoint(run))
@@ -317,45 +299,33 @@ def parts_to_load(run: Run, terrain: str | Path, task: Task) -> dict[str, bool]:
 
 
 def last_checkpoint(run: Run) -> Path:
-    """Return the selected checkpoint of a run.
-
-    Raises:
-        ConfigError: If there is none.
-    """
+    """Return the selected checkpoint of a run; raise ConfigError if there is none."""
     if run.checkpoint is None:
         raise ConfigError(f"{run.folder} has no checkpoint yet; train it first")
     return run.checkpoint
 
 
 def run_folder(
-    folder: Path | None,
-    robot: str | Path,
-    terrain: str | Path,
-    task: Task,
-    continued: Run | None,
+    folder: Path | None, robot: str | Path, terrain: str | Path, task: Task, continued: Run | None
 ) -> Path:
     """Return the folder to write: that of the continued run, unless it has later checkpoints."""
     if folder is None and continued is not None:
         saved = checkpoints(continued.folder)
         if saved and saved[max(saved)] == continued.checkpoint:
             if task != continued.task:
-                rewrite_task(continued, task)
+                with atomic_write(continued.folder / TASK_FILE, overwrite=True) as path:
+                    path.write_text(task.to_toml(), encoding="utf-8")
             return continued.folder
     folder = folder or default_folder(tasks.get_task(robot).name)
     return create_run(folder, task, robot, terrain).folder
 
 
 def save_checkpoint(path: Path, state: Mapping[str, Any]) -> None:
-    """Write a checkpoint completely, or not at all; see `LeggedRunner.state_dict`.
-
-    Raises:
-        ExportError: If the file cannot be written.
-    """
+    """Write a checkpoint completely, or not at all; see `LeggedRunner.state_dict`."""
     import torch
 
     data = io.BytesIO()  # torch itself aborts the process on a full disk
-    header = {"format": CHECKPOINT_FORMAT, "version": FORMAT_VERSION}
-    torch.save(_to_plain({**header, **state}), data)
+    torch.save(_to_plain({**CHECKPOINT_HEADER, **state}), data)
     with atomic_write(path, overwrite=True) as target:
         target.write_bytes(data.getbuffer())
 
@@ -371,8 +341,6 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     try:
         if path.exists() and not path.is_file():
             raise ConfigError(f"{path} is not a file; expected a checkpoint")
-        if path.stat().st_size > MAX_CHECKPOINT_SIZE:
-            raise ConfigError(f"{path}: over {MAX_CHECKPOINT_SIZE} bytes; expected a checkpoint")
         with zipfile.ZipFile(path) as file:  # compressed parts could expand to any size
             if any(part.compress_type != zipfile.ZIP_STORED for part in file.infolist()):
                 raise ConfigError(f"{path} is not a checkpoint of terrainkit: it is compressed")
@@ -381,18 +349,12 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
         raise ConfigError(f"cannot read {path}: {error.strerror or error}") from error
     except ConfigError:
         raise
-    except Exception as error:  # whatever torch raises for a damaged file
+    except Exception as error:  # torch's errors for damaged files have no common class
         raise ConfigError(f"{path} is not a checkpoint of terrainkit, or is damaged") from error
-    return _checked(path, state)
-
-
-def _checked(path: Path, state: Any) -> dict[str, Any]:
-    """Return a checkpoint's content after checking its keys."""
-    if not isinstance(state, dict) or state.get("format") != CHECKPOINT_FORMAT:
+    if not isinstance(state, dict) or state.get("format") != CHECKPOINT_HEADER["format"]:
         raise ConfigError(f"{path} is not a checkpoint of terrainkit")
-    if state.get("version") != FORMAT_VERSION:
-        got = state.get("version", "nothing")
-        raise ConfigError(f"{path}: version: got {got!r}; expected {FORMAT_VERSION}")
+    if (got := state.get("version")) != CHECKPOINT_HEADER["version"]:
+        raise ConfigError(f"{path}: version: got {got!r}; expected 1")
     for key, kind in CHECKPOINT_KEYS.items():
         if not isinstance(state.get(key), kind):
             raise ConfigError(f"{path}: {key} is missing or not a {kind.__name__}")
@@ -421,10 +383,8 @@ def _to_plain(value: Any) -> Any:
 
 def _robot_digests(folder: Path) -> dict[str, str]:
     """Return the SHA-256 of a robot's spec and model by file name."""
-    return {
-        name: _sha256(folder / name)
-        for name in (SPEC_FILE, RobotSpec.load(folder / SPEC_FILE).mjcf)
-    }
+    files = (SPEC_FILE, RobotSpec.load(folder / SPEC_FILE).mjcf)
+    return {name: _sha256(folder / name) for name in files}
 
 
 def _sha256(path: Path) -> str:
@@ -433,17 +393,6 @@ def _sha256(path: Path) -> str:
             return hashlib.sha256(file.read()).hexdigest()
     except OSError as error:
         raise ConfigError(f"cannot read {path}: {error.strerror or error}") from error
-
-
-def _read_about(folder: Path) -> dict[str, Any]:
-    path = folder / RUN_FILE
-    if not path.is_file():
-        raise ConfigError(f"{folder} has no {RUN_FILE}; terrainkit train writes such a folder")
-    about = parse_toml(read_text(path))
-    if about.get("format_version") != FORMAT_VERSION:
-        got = about.get("format_version", "nothing")
-        raise ConfigError(f"{path}: format_version: got {got!r}; expected {FORMAT_VERSION}")
-    return dict(about)
 
 
 def _map_config(terrain: str) -> "MapConfig | None":

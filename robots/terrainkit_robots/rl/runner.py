@@ -3,6 +3,7 @@
 import os
 import signal
 import statistics
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -27,9 +28,9 @@ from terrainkit_robots.rl.run import checkpoint_name, read_checkpoint, save_chec
 OBS_GROUPS = {"actor": ["policy"], "critic": ["privileged"]}
 """Observation groups of each network."""
 
-LOGGER_VALUES = ("tot_timesteps", "tot_time", "rewbuffer", "lenbuffer")
+LOGGER_STATE = ("tot_timesteps", "tot_time", "rewbuffer", "lenbuffer")
 LOGGER_BUFFERS = ("cur_reward_sum", "cur_episode_length")
-"""Attributes of rsl-rl's logger that are part of a checkpoint."""
+"""Attributes of rsl-rl's logger in a checkpoint; the latter have a value per environment."""
 
 SIGNAL_INTERVAL = 1.0
 """Signals within this time of the first count as one [s]: torchrun and schedulers repeat them."""
@@ -81,11 +82,7 @@ class MetricsLogger(Logger):
         super().__init__(None, runner.cfg, env.cfg, env.num_envs, *world, runner.device)
 
     def init_logging_writer(self) -> None:
-        """Open the log files.
-
-        Raises:
-            ConfigError: If wandb does not start.
-        """
+        """Open the log files."""
         try:
             with redirect_stdout(None):
                 super().init_logging_writer()
@@ -124,14 +121,9 @@ class MetricsLogger(Logger):
             super().log(**values)
         self._runner.finish_iteration(values["it"], values["collect_time"], values["learn_time"])
 
-    def latest(self, prefix: str) -> dict[str, float]:
-        """Return the latest means of the values whose names start with `prefix`."""
-        means = self.means.items()
-        return {key.removeprefix(prefix): mean for key, mean in means if key.startswith(prefix)}
-
     def state_dict(self) -> dict[str, Any]:
         """Return the buffers, for a checkpoint."""
-        return {name: getattr(self, name) for name in (*LOGGER_VALUES, *LOGGER_BUFFERS)}
+        return {name: getattr(self, name) for name in (*LOGGER_STATE, *LOGGER_BUFFERS)}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore the buffers; those per environment only if their number is the same."""
@@ -146,7 +138,7 @@ class MetricsLogger(Logger):
         return []  # a run.toml records the versions; the user's git repository is not touched
 
 
-class _StopTraining(Exception):  # noqa: N818
+class _Stop(Exception):  # noqa: N818
     """Leaves rsl-rl's loop after an iteration."""
 
 
@@ -165,77 +157,59 @@ class LeggedRunner(OnPolicyRunner):
         progress_callback: ProgressCallback | None = None,
         should_stop: Callable[[], object] = lambda: False,
     ) -> None:
-        """Create the networks.
+        """Create the networks; without a `folder`, no checkpoints and logs are written.
 
-        Args:
-            env: The environment.
-            folder: Folder for checkpoints and logs; None writes nothing.
-            device: Device of the networks: `cpu`, `cuda`, `cuda:1`.
-            progress_callback: Called after each iteration.
-            should_stop: Called before each iteration; True stops with a checkpoint.
+        `should_stop` is called before each iteration: True stops training with a checkpoint.
         """
         self.folder = folder
         self._progress_callback, self._should_stop = progress_callback, should_stop
-        self._saved: Path | None = None
         with redirect_stdout(None):
             super().__init__(env, runner_config(env.cfg), None, device)
         self.is_main_process = self.gpu_global_rank == 0
         self.logger = MetricsLogger(self)
 
     def learn(self, num_learning_iterations: int, init_at_random_ep_len: bool = False) -> None:
-        """Train for some iterations, with the first episodes cut to random lengths if requested.
-
-        Raises:
-            ConfigError: If training diverges.
-            ExportError: If a checkpoint cannot be written.
-        """
-        self._first, self._start_time = self.current_learning_iteration, time.perf_counter()
-        self._last = self._first + num_learning_iterations
-        self._completed, self._saved = self._first, None
+        """Train for some iterations, with the first episodes cut to random lengths if requested."""
+        self._first = self._completed = self.current_learning_iteration
+        self._last, self._start_time = self._first + num_learning_iterations, time.perf_counter()
         self.logger.log_dir = None if self.folder is None else str(self.folder)
         if self._stop_requested():
             self.save()
             return
         self.current_learning_iteration += 1  # rsl-rl's first iteration has the number 0
-        quiet = redirect_stdout(None) if self.is_distributed else nullcontext()
-        with _quiet_thread_errors(), quiet:
-            try:
+        # TensorBoard's thread prints an OSError, which the next log call raises again.
+        hook = threading.excepthook
+        threading.excepthook = lambda args: None if args.exc_type is OSError else hook(args)
+        try:
+            with redirect_stdout(None) if self.is_distributed else nullcontext(), suppress(_Stop):
                 super().learn(num_learning_iterations, init_at_random_ep_len)
-            except _StopTraining:
-                pass
-            except RuntimeError:  # torch cannot sample from weights that are not finite
-                self.check_weights()
-                raise
-            finally:
-                with suppress(OSError):  # on a full disk, the first error says so
-                    self.logger.stop_logging_writer()
+        except RuntimeError:  # torch cannot sample from weights that are not finite
+            self.check_weights()
+            raise
+        finally:
+            with suppress(OSError):  # on a full disk, the first error says so
+                self.logger.stop_logging_writer()
+            threading.excepthook = hook
 
     def finish_iteration(self, iteration: int, collect_time: float, learn_time: float) -> None:
         """Report the progress, write a checkpoint if one is due, and stop if requested."""
         self._completed = iteration
         if self.is_main_process and self._progress_callback is not None:
             self._progress_callback(self._progress(collect_time, learn_time))
-        stop = iteration < self._last and self._stop_requested()
-        if stop or iteration == self._last or iteration % self.cfg["save_interval"] == 0:
+        stop = iteration == self._last or self._stop_requested()
+        if stop or iteration % self.env.cfg.runner.save_interval == 0:
             self.save()
         if stop:
-            raise _StopTraining
+            raise _Stop
 
-    def save(self, path: str | None = None, infos: dict[str, Any] | None = None) -> None:
-        """Write a checkpoint to the folder; every process must call this.
-
-        Raises:
-            ExportError: If the file cannot be written.
-        """
-        name = checkpoint_name(self.current_learning_iteration)
-        target = None if self.folder is None else Path(path or self.folder / name)
-        if path is not None and target == self._saved:
-            return  # rsl-rl saves, in one process, what `finish_iteration` has just saved
-        state = self.state_dict()
-        if target is not None and self.is_main_process:
-            save_checkpoint(target, state | (infos or {}))
-            self._saved = target
-            self.logger.save_model(str(target), self.current_learning_iteration)
+    def save(self, path: str | Path | None = None, infos: dict[str, Any] | None = None) -> None:
+        """Write a checkpoint, by default to the folder; every process must call this."""
+        state = self.state_dict() | (infos or {})
+        if path is None and self.folder is not None:
+            path = self.folder / checkpoint_name(self.current_learning_iteration)
+        if path is not None and self.is_main_process:
+            save_checkpoint(Path(path), state)
+            self.logger.save_model(str(path), self.current_learning_iteration)
 
     def load(
         self,
@@ -249,36 +223,32 @@ class LeggedRunner(OnPolicyRunner):
         By default training continues exactly; with another number of environments, only the
         networks and the curricula do. A checkpoint of a policy alone has only networks.
         `load_cfg` selects parts: `actor`, `critic`, `optimizer`, `curriculum` (terrain levels).
-
-        Raises:
-            ConfigError: If it is no checkpoint, or belongs to another robot, task or map.
         """
-        path = Path(path)
-        state = read_checkpoint(path)
-        check_checkpoint(path, state, self.env, list(self.env.obs_groups))
-        with network_errors(path):
-            is_resumable = "processes" in state
-            parts = load_cfg or {"actor": True, "critic": True, "optimizer": True}
-            optimizer = is_resumable and parts.get("optimizer")
-            self.alg.load(state, {**parts, "optimizer": optimizer}, strict)
-            if not is_resumable:
+        state = read_checkpoint(Path(path))
+        check_checkpoint(Path(path), state, self.env, list(self.env.obs_groups))
+        parts = load_cfg or {"actor": True, "critic": True, "optimizer": True}
+        with network_errors(Path(path)):
+            if "processes" not in state:
+                self.alg.load(state, {**parts, "optimizer": False}, strict)
                 return {}
-            processes = state["processes"]  # processes in excess share the last state
+            self.alg.load(state, parts, strict)
+            processes = state["processes"]  # additional processes use the last state
             process = processes[min(self.gpu_global_rank, len(processes) - 1)]
-            if load_cfg is None:
-                self.current_learning_iteration = state["iteration"]
-                self.env.load_state_dict(process["env"])
-                self.logger.load_state_dict(state["logger"])
-                if len(processes) == self.gpu_world_size:
-                    torch.set_rng_state(process["random"]["cpu"])
-                    if self.device != "cpu" and "cuda" in process["random"]:
-                        torch.cuda.set_rng_state(process["random"]["cuda"], self.device)
-                else:  # processes that share a state must sample differently
-                    seed = [self.env.cfg.runner.seed, state["iteration"]]
-                    self.env.rng = np.random.default_rng(seed)
-            elif parts.get("curriculum"):
-                self.env.curriculum.load_state_dict(process["env"]["curriculum"])
-                self.env.reset()
+            if load_cfg is not None:
+                if load_cfg.get("curriculum"):
+                    self.env.curriculum.load_state_dict(process["env"]["curriculum"])
+                    self.env.reset()
+                return {}
+            self.current_learning_iteration = state["iteration"]
+            self.env.load_state_dict(process["env"])
+            self.logger.load_state_dict(state["logger"])
+            if len(processes) != self.gpu_world_size:  # those that share a state sample differently
+                seed = [self.env.cfg.runner.seed, state["iteration"]]
+                self.env.rng = np.random.default_rng(seed)
+                return {}
+            torch.set_rng_state(process["random"]["cpu"])
+            if self.device != "cpu" and "cuda" in process["random"]:
+                torch.cuda.set_rng_state(process["random"]["cuda"], self.device)
         return {}
 
     def state_dict(self) -> dict[str, Any]:
@@ -288,28 +258,24 @@ class LeggedRunner(OnPolicyRunner):
             process["random"]["cuda"] = torch.cuda.get_rng_state(self.device)
         processes: list[Any] = [process]
         if self.is_distributed:
-            gathered: list[Any] | None = [None] * self.gpu_world_size
-            gathered = gathered if self.is_main_process else None
-            torch.distributed.gather_object(process, gathered, dst=0)
-            processes = gathered or processes
+            processes *= self.gpu_world_size
+            target = processes if self.is_main_process else None
+            torch.distributed.gather_object(process, target, dst=0)
         return {
             "iteration": self.current_learning_iteration,
             "robot": self.env.robot.spec.name,
             "joints": list(self.env.robot.spec.joint_order),
-            "observed": observation_widths(self.env),
+            "observed": {k: v.shape[1] for k, v in self.env.get_observations().items()},
             **self.alg.save(),
             "processes": processes,
             "logger": self.logger.state_dict(),
         }
 
     def _stop_requested(self) -> bool:
-        requested = bool(self._should_stop())
-        if not self.is_distributed:
-            return requested
-        # A signal may reach one process first; all must stop after the same iteration.
-        anyone = torch.tensor(float(requested), device=self.device)
-        torch.distributed.all_reduce(anyone, op=torch.distributed.ReduceOp.MAX)
-        return bool(anyone)
+        requested = torch.tensor(float(bool(self._should_stop())), device=self.device)
+        if self.is_distributed:  # a signal may reach one process first; all stop together
+            torch.distributed.all_reduce(requested, op=torch.distributed.ReduceOp.MAX)
+        return bool(requested)
 
     def check_weights(self) -> None:
         """Raise ConfigError if a weight of the networks is not finite."""
@@ -321,10 +287,15 @@ class LeggedRunner(OnPolicyRunner):
             )
 
     def _progress(self, collect_time: float, learn_time: float) -> TrainingProgress:
-        env, logger, seconds = self.env, self.logger, collect_time + learn_time
-        steps = self.cfg["num_steps_per_env"] * env.num_envs * self.gpu_world_size
+        logger, seconds = self.logger, collect_time + learn_time
+        steps = self.cfg["num_steps_per_env"] * self.env.num_envs * self.gpu_world_size
         pace = (time.perf_counter() - self._start_time) / (self._completed - self._first)
-        lengths = [env.cfg.dt * steps for steps in logger.lenbuffer]
+        lengths = [self.env.cfg.dt * steps for steps in logger.lenbuffer]
+
+        def means(prefix: str) -> dict[str, float]:
+            found = {k: mean for k, mean in logger.means.items() if k.startswith(prefix)}
+            return {key.removeprefix(prefix): mean for key, mean in found.items()}
+
         return TrainingProgress(
             folder=self.folder,
             iteration=self._completed,
@@ -335,9 +306,9 @@ class LeggedRunner(OnPolicyRunner):
             reward=statistics.mean(logger.rewbuffer) if lengths else None,
             episode_length=statistics.mean(lengths) if lengths else None,
             noise_std=self.alg.get_policy().output_std.detach().mean().item(),
-            rewards=logger.latest("Episode/rew_"),
-            levels=logger.latest("Curriculum/level_"),
-            success=logger.latest("Curriculum/success_"),
+            rewards=means("Episode/rew_"),
+            levels=means("Curriculum/level_"),
+            success=means("Curriculum/success_"),
         )
 
     def _configure_multi_gpu(self) -> None:
@@ -364,21 +335,27 @@ def runner_config(task: Task) -> dict[str, Any]:
         "use_mirror_loss": symmetry == "loss",
         "mirror_loss_coeff": coefficient,
     }
-    wandb = {"class_name": "WandbLogWriter", "project_name": "terrainkit"}
-    critic = {
-        "hidden_dims": list(policy.critic_hidden_dims),
+    distribution = {
+        "class_name": "GaussianDistribution",
+        "init_std": policy.init_noise_std,
+        "std_type": "scalar",
+    }
+    network = {
+        "class_name": "MLPModel",
         "activation": policy.activation,
         "obs_normalization": policy.obs_normalization,
     }
+    actor = {"hidden_dims": list(policy.actor_hidden_dims), "distribution_cfg": distribution}
+    wandb = {"class_name": "WandbLogWriter", "project_name": "terrainkit"}
     return {
         "num_steps_per_env": runner.num_steps_per_env,
-        "save_interval": runner.save_interval,
+        "save_interval": sys.maxsize,  # `LeggedRunner.finish_iteration` saves, in all processes
         "seed": runner.seed,
         "logger": wandb if runner.logger == "wandb" else "tensorboard",
         "check_for_nan": False,  # `MetricsLogger` names the rewards that are not finite
-        "obs_groups": {name: list(groups) for name, groups in OBS_GROUPS.items()},
-        "actor": {"class_name": "MLPModel", **actor_config(task)},
-        "critic": {"class_name": "MLPModel", **critic},
+        "obs_groups": OBS_GROUPS,
+        "actor": network | actor,
+        "critic": network | {"hidden_dims": list(policy.critic_hidden_dims)},
         "algorithm": {
             "class_name": "PPO",
             **algorithm,
@@ -388,41 +365,22 @@ def runner_config(task: Task) -> dict[str, Any]:
     }
 
 
-def actor_config(task: Task) -> dict[str, Any]:
-    """Return the configuration of rsl-rl's actor network."""
-    return {
-        "hidden_dims": list(task.policy.actor_hidden_dims),
-        "activation": task.policy.activation,
-        "obs_normalization": task.policy.obs_normalization,
-        "distribution_cfg": {
-            "class_name": "GaussianDistribution",
-            "init_std": task.policy.init_noise_std,
-            "std_type": "scalar",
-        },
-    }
-
-
-def observation_widths(env: LeggedEnv) -> dict[str, int]:
-    """Return the width of each observation group."""
-    return {name: values.shape[1] for name, values in env.get_observations().items()}
-
-
 def check_checkpoint(
     path: Path, state: Mapping[str, Any], env: LeggedEnv, groups: Sequence[str]
 ) -> None:
     """Raise ConfigError unless a checkpoint has the joints and observations of an environment."""
-    joints, widths = list(env.robot.spec.joint_order), observation_widths(env)
+    joints = list(env.robot.spec.joint_order)
     if state["joints"] != joints:
         raise ConfigError(
             f"{path} belongs to another robot, {state['robot']}: got the joints "
             f"{listing(map(str, state['joints']))}; expected {listing(joints)}"
         )
     for name in groups:
-        if (got := state["observed"].get(name)) != widths[name]:
+        got, width = state["observed"].get(name), env.get_observations()[name].shape[1]
+        if got != width:
             raise ConfigError(
                 f"{path} belongs to another task: got {got} {name} observations; expected "
-                f"{widths[name]}. To continue on a map after a plane, set terrain.measure_heights "
-                "on both"
+                f"{width}. To continue on a map after a plane, set terrain.measure_heights on both"
             )
 
 
@@ -466,17 +424,6 @@ def stop_on_signal() -> Iterator[Callable[[], int]]:
 
 
 @contextmanager
-def _quiet_thread_errors() -> Iterator[None]:
-    """Keep TensorBoard's thread from printing an OSError that the next log call raises again."""
-    previous = threading.excepthook
-    threading.excepthook = lambda args: None if args.exc_type is OSError else previous(args)
-    try:
-        yield
-    finally:
-        threading.excepthook = previous
-
-
-@contextmanager
 def single_torch_thread() -> Iterator[None]:
     """Limit torch to one thread, which is fastest for networks as small as these."""
     previous = torch.get_num_threads()
@@ -488,11 +435,7 @@ def single_torch_thread() -> Iterator[None]:
 
 
 def resolve_device(name: str) -> str:
-    """Return the device `name`: `cpu`, `cuda` or `cuda:1`; under torchrun, this process's GPU.
-
-    Raises:
-        ConfigError: If there is no such device.
-    """
+    """Return the device `name`: `cpu`, `cuda` or `cuda:1`; under torchrun, this process's GPU."""
     gpus = [f"cuda:{k}" for k in range(torch.cuda.device_count())]
     if name in ("cpu", "cpu:0"):
         return "cpu"

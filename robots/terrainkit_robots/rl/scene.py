@@ -5,9 +5,9 @@ bundled and hand-written robots are trained alike.
 """
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,13 +17,7 @@ from terrainkit_robots.rendering.appearance import set_appearance
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.terrain import Terrain
 from terrainkit_robots.simulation.geoms import collides, lowest_point
-from terrainkit_robots.spec.per_joint import match_joints
-from terrainkit_robots.spec.robot_spec import RobotSpec
-
-FloatArray = NDArray[np.float32]
-
-SPEC_FILE = "robot.toml"
-"""File name of the spec in a robot's folder."""
+from terrainkit_robots.spec.robot import Robot
 
 CONTACT_FORCE_BIT, NET_FORCE = 2, 3
 """`intprm[0]` and `intprm[1]` of a contact sensor: report the force, summed over all contacts."""
@@ -33,71 +27,6 @@ SOLE = "sole of "
 
 ALL_BITS = 0x7FFFFFFF
 """A `conaffinity` that matches every `contype`."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Robot:
-    """A robot as arrays, with j joints in the order of its actions."""
-
-    spec: RobotSpec
-    """Its spec."""
-    mjcf: Path
-    """Its MuJoCo model."""
-    default_pose: FloatArray
-    """Default joint positions [rad], shape (j,)."""
-    wheels: NDArray[np.bool_]
-    """Joints with damping but no stiffness, shape (j,)."""
-    effort: FloatArray
-    """Torque limits [N m], shape (j,)."""
-    velocity: FloatArray
-    """Velocity limits [rad/s], shape (j,)."""
-    lower: FloatArray
-    """Lower soft limits [rad], -inf without one, shape (j,)."""
-    upper: FloatArray
-    """Upper soft limits [rad], shape (j,)."""
-
-    @classmethod
-    def from_spec(cls, spec: RobotSpec, folder: Path) -> "Robot":
-        """Return the robot that a spec in `folder` describes.
-
-        Raises:
-            ConfigError: If the spec is incomplete.
-        """
-        if not spec.floating:
-            raise ConfigError(f"base of {spec.name}: got a fixed base; expected a floating base")
-        if not spec.feet:
-            raise ConfigError(f"feet of {spec.name}: got none; expected one for each leg")
-        if spec.spawn_height is None or spec.base_height_target is None:
-            raise ConfigError(
-                f"the spec of {spec.name} lacks spawn_height or base_height_target; "
-                "terrainkit onboard measures both"
-            )
-
-        def array(table: str) -> FloatArray:
-            return np.array(list(spec.per_joint(table).values()), np.float32)
-
-        soft = match_joints(spec.soft_limits, spec.joint_order).values
-        limits = [soft.get(name, (-np.inf, np.inf)) for name in spec.joint_order]
-        lower, upper = np.array(limits, np.float32).T
-        return cls(
-            spec=spec,
-            mjcf=folder / spec.mjcf,
-            default_pose=array("default_pose"),
-            wheels=(array("stiffness") == 0) & (array("damping") > 0),
-            effort=array("effort"),
-            velocity=array("velocity"),
-            lower=lower,
-            upper=upper,
-        )
-
-    @classmethod
-    def load(cls, folder: Path) -> "Robot":
-        """Load the robot in an onboarded folder.
-
-        Raises:
-            ConfigError: If there is no robot.toml, or it is incomplete.
-        """
-        return cls.from_spec(RobotSpec.load(folder / SPEC_FILE), folder)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -124,22 +53,11 @@ class Scene:
 
 
 def build_scene(robot: Robot, terrain: Terrain, task: Task) -> Scene:
-    """Build the scene of a task.
-
-    Raises:
-        ConfigError: If MuJoCo rejects the robot, or the spec does not match it.
-    """
+    """Build the scene of a task; raise ConfigError if MuJoCo rejects it, or the spec differs."""
     with quiet_mujoco():
-        scene, base = _attach(robot, terrain, task)
-        _check_spec(robot, scene, base)
-        _set_collisions(robot, base, task)
-        armature = robot.spec.per_joint("armature")
-        for joint in base.find_all("joint"):
-            if joint.name in armature:
-                joint.armature = armature[joint.name]
-                joint.actfrclimited = False  # the spec's effort is the limit
-                if not task.asset.joint_friction:
-                    joint.frictionloss = 0
+        scene = _attach(robot, terrain, task)
+        base = _base(robot, scene)
+        _set_joints_and_collisions(robot, base, task)
         _add_actuators(robot, scene, task)
         sensors = _add_sensors(robot, scene)
         set_appearance(scene)  # for videos and the viewer
@@ -147,16 +65,16 @@ def build_scene(robot: Robot, terrain: Terrain, task: Task) -> Scene:
             model = scene.compile()
         except ValueError as error:
             raise ConfigError(f"{robot.mjcf}: {' '.join(str(error).split())}") from None
-    joint_qpos = np.array([model.joint(name).qposadr[0] for name in robot.spec.joint_order])
+    joints = [model.joint(name).id for name in robot.spec.joint_order]
     home = model.qpos0.copy()
     home[:7] = (0, 0, 0, 1, 0, 0, 0)
-    home[joint_qpos] = robot.default_pose
+    home[model.jnt_qposadr[joints]] = robot.default_pose
     base_id = model.body(robot.spec.base).id
     of_robot = model.body_rootid[model.geom_bodyid] == model.body_rootid[base_id]
     return Scene(
         model=model,
-        joint_qpos=joint_qpos,
-        joint_qvel=np.array([model.joint(name).dofadr[0] for name in robot.spec.joint_order]),
+        joint_qpos=model.jnt_qposadr[joints],
+        joint_qvel=model.jnt_dofadr[joints],
         base=base_id,
         geoms=np.flatnonzero(collides(model) & of_robot),
         home=home,
@@ -165,70 +83,68 @@ def build_scene(robot: Robot, terrain: Terrain, task: Task) -> Scene:
     )
 
 
-def _attach(robot: Robot, terrain: Terrain, task: Task) -> tuple[Any, Any]:
-    """Return the spec of robot and terrain, and the robot's base in it."""
-    import mujoco
-
+def _attach(robot: Robot, terrain: Terrain, task: Task) -> Any:
+    """Return the MjSpec of robot and terrain."""
     try:
         spec = mujoco.MjSpec.from_file(str(robot.mjcf))
     except ValueError as error:
-        raise ConfigError(
-            f"MuJoCo cannot read {robot.mjcf}: {' '.join(str(error).split())}"
-        ) from None
-    for element in (*spec.actuators, *spec.sensors, *spec.keys, *spec.cameras):
-        spec.delete(element)
+        reason = " ".join(str(error).split())
+        raise ConfigError(f"MuJoCo cannot read {robot.mjcf}: {reason}") from None
     ground = terrain.spec()
-    for each in (spec, ground):  # both, or MuJoCo warns about differences
+    for each in (spec, ground):  # options of both, or MuJoCo warns about differences
         each.option = mujoco.MjSpec().option  # gravity, wind: the same for every robot
-        option = each.option
-        option.timestep = task.sim.dt
-        option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-        option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
-        option.iterations = task.sim.iterations
-        option.ls_iterations = task.sim.ls_iterations
-    for element in (*ground.actuators, *ground.sensors, *ground.keys):
-        ground.delete(element)  # they would precede the robot's
+        each.option.timestep = task.sim.dt
+        each.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        each.option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
+        each.option.iterations = task.sim.iterations
+        each.option.ls_iterations = task.sim.ls_iterations
+        for element in (*each.actuators, *each.sensors, *each.keys):
+            each.delete(element)
+    for camera in spec.cameras:
+        spec.delete(camera)
     for geom in ground.geoms:
         if geom.conaffinity:
             geom.contype |= 1  # robots without self-collision touch only geoms with a contype
     # The terrain is attached to the robot, so the robot's names keep their form.
     spec.attach(ground, frame=spec.worldbody.add_frame(), prefix="ground/")
-    base = spec.body(robot.spec.base)
+    return spec
+
+
+def _base(robot: Robot, scene: Any) -> Any:
+    """Return the robot's base after checking that the spec matches the model."""
+    spec, file, free = robot.spec, robot.mjcf, mujoco.mjtJoint.mjJNT_FREE
+    base = scene.body(spec.base)
     if base is None:
-        raise ConfigError(f"{robot.mjcf} has no body {robot.spec.base!r}, the base of its spec")
-    return spec, base
-
-
-def _check_spec(robot: Robot, scene: Any, base: Any) -> None:
-    """Check that the spec matches the robot's model."""
-    import mujoco
-
-    spec, free_type = robot.spec, mujoco.mjtJoint.mjJNT_FREE
-    free = [joint for joint in base.joints if joint.type == free_type]
-    if len(free) != 1 or len(base.joints) != 1:
-        raise ConfigError(f"{robot.mjcf}: {spec.base} has no freejoint of its own; expected one")
-    first = scene.joints[0]
-    if first.name != free[0].name or first.parent.name != spec.base:
-        raise ConfigError(f"{robot.mjcf}: a joint precedes {spec.base}; expected the base first")
-    joints = [joint.name for joint in scene.joints if joint.type != free_type]
-    unknown = [name for name in spec.joint_order if name not in joints]
-    if unknown:
+        raise ConfigError(f"{file} has no body {spec.base!r}, the base of its spec")
+    if [joint.type for joint in base.joints] != [free]:
+        raise ConfigError(f"{file}: {spec.base} has no freejoint of its own; expected one")
+    if scene.joints[0].parent.name != spec.base:
+        raise ConfigError(f"{file}: a joint precedes {spec.base}; expected the base first")
+    joints = [joint.name for joint in scene.joints if joint.type != free]
+    if unknown := [name for name in spec.joint_order if name not in joints]:
         raise ConfigError(
             f"the spec of {spec.name} has the joint {unknown[0]!r}; "
-            f"{robot.mjcf.name} has: {listing(joints)}"
+            f"{file.name} has: {listing(joints)}"
         )
     bodies = [body.name for body in base.find_all("body")] + [base.name]
     for field in ("feet", "termination_contacts", "penalized_contacts"):
-        for name in getattr(spec, field):
-            if name not in bodies:
-                raise ConfigError(
-                    f"{field} of {spec.name}: got {name!r}; the bodies of "
-                    f"{robot.mjcf.name} are: {listing(bodies)}"
-                )
+        if unknown := [name for name in getattr(spec, field) if name not in bodies]:
+            raise ConfigError(
+                f"{field} of {spec.name}: got {unknown[0]!r}; the bodies of {file.name} are: "
+                f"{listing(bodies)}"
+            )
+    return base
 
 
-def _set_collisions(robot: Robot, base: Any, task: Task) -> None:
-    """Enable collisions with the terrain, and with the robot itself if the task says so."""
+def _set_joints_and_collisions(robot: Robot, base: Any, task: Task) -> None:
+    """Set armature and friction of the joints, and what the geoms collide with."""
+    armature = robot.spec.per_joint("armature")
+    for joint in base.find_all("joint"):
+        if joint.name in armature:
+            joint.armature = armature[joint.name]
+            joint.actfrclimited = False  # the spec's effort is the limit
+            if not task.asset.joint_friction:
+                joint.frictionloss = 0
     bodies = {*robot.spec.feet, *robot.spec.termination_contacts}
     for geom in base.find_all("geom"):
         if not geom.contype and not geom.conaffinity:
@@ -236,16 +152,13 @@ def _set_collisions(robot: Robot, base: Any, task: Task) -> None:
         if task.asset.collisions != "all" and geom.parent.name not in bodies:
             geom.contype = geom.conaffinity = 0
             continue
-        geom.contype = int(task.asset.self_collisions)
-        geom.conaffinity = ALL_BITS
+        geom.contype, geom.conaffinity = int(task.asset.self_collisions), ALL_BITS
         geom.condim = 3
         geom.priority = 1  # the robot's friction counts, not the larger of two
 
 
 def _add_actuators(robot: Robot, scene: Any, task: Task) -> None:
     """Add a motor for each joint; MuJoCo evaluates its controller in every physics step."""
-    import mujoco
-
     spec, control = robot.spec, task.control
     default = mujoco.MjSpec().default.actuator
     stiffness, damping = spec.per_joint("stiffness"), spec.per_joint("damping")
@@ -272,14 +185,12 @@ def _add_actuators(robot: Robot, scene: Any, task: Task) -> None:
 
 def _add_sensors(robot: Robot, scene: Any) -> dict[str, slice]:
     """Add the sensors, and return the range of each kind in sensordata."""
-    import mujoco
-
-    for foot in robot.spec.feet:
+    spec, soles = robot.spec, [SOLE + foot for foot in robot.spec.feet]
+    for foot in spec.feet:
         geoms = [geom for geom in scene.body(foot).geoms if geom.contype or geom.conaffinity]
         center = np.mean([geom.pos for geom in geoms], axis=0) if geoms else np.zeros(3)
         scene.body(foot).add_site(name=SOLE + foot, pos=center, group=4)
     sensor, body, site = mujoco.mjtSensor, mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_SITE
-    spec, soles = robot.spec, [SOLE + foot for foot in robot.spec.feet]
     kinds = {
         "foot_position": (sensor.mjSENS_FRAMEPOS, site, soles),
         "foot_velocity": (sensor.mjSENS_FRAMELINVEL, site, soles),
@@ -300,13 +211,10 @@ def _add_sensors(robot: Robot, scene: Any) -> dict[str, slice]:
     return ranges
 
 
-def _sole_depth(robot: Robot, model: Any, home: Any) -> FloatArray:
-    import mujoco
-
-    data = mujoco.MjData(model)
+def _sole_depth(robot: Robot, model: Any, home: Any) -> NDArray[np.float32]:
+    data, depths = mujoco.MjData(model), []
     data.qpos[:] = home
     mujoco.mj_kinematics(model, data)
-    depths = []
     for foot in robot.spec.feet:
         geoms = np.flatnonzero(collides(model) & (model.geom_bodyid == model.body(foot).id))
         height = data.site(SOLE + foot).xpos[2]

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,22 +10,17 @@ from terrainkit.errors import ConfigError, MemoryLimitError
 from terrainkit.memory import check_memory
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.rl.scene import Robot, Scene
+from terrainkit_robots.rl.scene import Scene
+from terrainkit_robots.spec.robot import Robot
 
 Ids = NDArray[np.int64]
 
 
 class Simulation:
-    """n simulations of a scene; the bound arrays change with every step."""
+    """n simulations of a scene; its arrays are views that change with every step."""
 
     def __init__(self, scene: Scene, num_envs: int, num_threads: int = 0) -> None:
-        """Allocate the simulations in the model's default state.
-
-        Raises:
-            ConfigError: If this version of MuJoCo has no batches.
-        """
-        import mujoco
-
+        """Allocate the simulations in the model's default state."""
         try:
             from mujoco.batch import Batch
         except ImportError:
@@ -32,18 +28,9 @@ class Simulation:
                 f"MuJoCo: got version {mujoco.__version__}; expected 3.17 or newer, which steps "
                 "many simulations at once: pip install 'terrainkit[train]'"
             ) from None
-        warning = mujoco.mjtWarning
-        self._unstable = [
-            int(each)
-            for each in (
-                warning.mjWARN_BADQPOS,
-                warning.mjWARN_BADQVEL,
-                warning.mjWARN_BADQACC,
-                warning.mjWARN_BADCTRL,
-            )
-        ]
+        warnings = (f"mjWARN_BAD{name}" for name in ("QPOS", "QVEL", "QACC", "CTRL"))
+        self._unstable = [int(getattr(mujoco.mjtWarning, name)) for name in warnings]
         self._stage = mujoco.mjtStage.mjSTAGE_VEL
-        self._no_stage = mujoco.mjtStage.mjSTAGE_NONE
         self.scene = scene
         self.batch = Batch(scene.model, num_envs, num_threads)
         self.qpos: NDArray[np.float64] = self.batch.bind("qpos")
@@ -67,7 +54,7 @@ class Simulation:
 
     def reset(self, env_ids: Ids, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> None:
         """Reset the simulations `env_ids` (sorted) to positions (k, nq) and velocities (k, nv)."""
-        self.batch.reset(env_ids, stage=self._no_stage)
+        self.batch.reset(env_ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
         self.qpos[env_ids] = qpos
         self.qvel[env_ids] = qvel
         self.forward(env_ids)
@@ -84,11 +71,7 @@ class Simulation:
 
 
 def check_env_memory(task: Task, robot: Robot, *, scan: bool, ngeom: int) -> None:
-    """Check that training with the task's environments fits in memory.
-
-    Raises:
-        MemoryLimitError: If it does not fit; the message names a number of environments that does.
-    """
+    """Raise MemoryLimitError with a number of environments that fits, unless the task's do."""
     num_envs, message = task.env.num_envs, ""
     while num_envs:
         try:

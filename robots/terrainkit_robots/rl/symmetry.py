@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit_robots.rl.scene import Robot
+from terrainkit_robots.spec.robot_spec import MirrorJoint, RobotSpec
 
 if TYPE_CHECKING:
     from terrainkit_robots.rl.env import LeggedEnv
@@ -29,14 +29,12 @@ TOLERANCE = 1e-3
 scale, gains and effort, relative."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class SignedPermutation:
     """Maps w numbers: number k of the result is `sign[k]` times number `index[k]`."""
 
     index: NDArray[np.int64]
-    """Source of each number, shape (w,)."""
     sign: FloatArray
-    """+1 or -1, shape (w,)."""
 
     def __call__(self, values: FloatArray) -> FloatArray:
         """Return the mirrored values, shape (n, w)."""
@@ -56,9 +54,8 @@ def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
     Raises:
         ConfigError: If left and right of the robot or its height scan differ.
     """
-    joints = _joint_map(env.robot)
+    joints, cfg = _joint_map(env.robot.spec), env.cfg.terrain
     _check_control(env, joints)
-    cfg = env.cfg.terrain
     signs = {"vector": [1, -1, 1], "axial": [-1, 1, -1], "command": [1, -1, -1]}
     groups = {}
     for name, group in env.obs_groups.items():
@@ -71,9 +68,10 @@ def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
                 part = _scan_map(cfg.measured_points_x, cfg.measured_points_y)
             elif term.symmetry == "feet":
                 part = _foot_map(env)
+            elif term.symmetry == "joints":
+                part = joints
             else:
-                is_joints = term.symmetry == "joints"
-                part = joints if is_joints else _map(range(3), signs[term.symmetry])
+                part = _map(range(3), signs[term.symmetry])
             if len(part.index) != width:
                 raise ConfigError(
                     f"observation {term.name}: got {width} numbers; the symmetry "
@@ -86,8 +84,7 @@ def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
     return MirrorMaps(groups, joints)
 
 
-Tensors = tuple[torch.Tensor, torch.Tensor]
-_cache: "WeakKeyDictionary[LeggedEnv, tuple[dict[str, Tensors], Tensors]]" = WeakKeyDictionary()
+_cache: "WeakKeyDictionary[LeggedEnv, MirrorMaps]" = WeakKeyDictionary()
 
 
 def augment(
@@ -95,68 +92,48 @@ def augment(
 ) -> tuple[TensorDict | None, torch.Tensor | None]:
     """Return observations and actions followed by their mirror images.
 
-    This is rsl-rl's `data_augmentation_func`.
-
-    Args:
-        env: The environment they come from.
-        obs: Observations of n robots, or None.
-        actions: Actions, shape (n, j), or None.
+    This is rsl-rl's `data_augmentation_func`; either argument may be None.
     """
-
-    def tensors(permutation: SignedPermutation) -> Tensors:
-        index, sign = torch.from_numpy(permutation.index), torch.from_numpy(permutation.sign)
-        return index.to(env.device), sign.to(env.device)
-
-    def doubled(values: torch.Tensor, index: torch.Tensor, sign: torch.Tensor) -> torch.Tensor:
-        return torch.cat([values, values.index_select(1, index) * sign])
-
     if env not in _cache:
-        groups, joints = mirror_maps(env)
-        _cache[env] = {name: tensors(each) for name, each in groups.items()}, tensors(joints)
-    obs_maps, action_map = _cache[env]
+        _cache[env] = mirror_maps(env)
+    maps = _cache[env]
+
+    def doubled(values: torch.Tensor, image: SignedPermutation) -> torch.Tensor:
+        index, sign = (torch.from_numpy(each).to(values.device) for each in vars(image).values())
+        return torch.cat([values, values[:, index] * sign])
+
     if obs is not None:
-        for name in obs.keys() - obs_maps.keys():
-            expected = listing(env.obs_groups)
-            raise ConfigError(f"observation group: got {name!r}; expected one of: {expected}")
+        if unknown := obs.keys() - maps.groups.keys():
+            expected = listing(maps.groups)
+            raise ConfigError(f"observation group: got {min(unknown)!r}; expected: {expected}")
         obs = TensorDict(
-            {name: doubled(values, *obs_maps[name]) for name, values in obs.items()},
+            {name: doubled(values, maps.groups[name]) for name, values in obs.items()},
             batch_size=[2 * obs.batch_size[0]],
             device=obs.device,
         )
-    return obs, None if actions is None else doubled(actions, *action_map)
+    return obs, None if actions is None else doubled(actions, maps.actions)
 
 
 def _map(index: Sequence[int] | NDArray[np.int64], sign: ArrayLike) -> SignedPermutation:
-    return SignedPermutation(index=np.array(index, np.int64), sign=np.array(sign, np.float32))
+    return SignedPermutation(np.array(index, np.int64), np.array(sign, np.float32))
 
 
-def _joint_map(robot: Robot) -> SignedPermutation:
+def _joint_map(spec: RobotSpec) -> SignedPermutation:
     """Return the map of one number per joint."""
-    spec, mirror = robot.spec, robot.spec.mirror
-    missing = [name for name in spec.joint_order if name not in mirror]
-    if missing:
+    names, mirror = list(spec.joint_order), spec.mirror
+    if missing := [name for name in names if name not in mirror]:
         raise ConfigError(
             f"mirror of {spec.name}: symmetry needs a pair for each joint; it has none for: "
             f"{listing(missing)}"
         )
-    position = {name: k for k, name in enumerate(spec.joint_order)}
-    pairs = [mirror[name] for name in spec.joint_order]
-    for name, pair in zip(spec.joint_order, pairs, strict=True):
-        back = mirror.get(pair.joint)
-        if (
-            pair.joint not in position
-            or back is None
-            or (back.joint, back.sign)
-            != (
-                name,
-                pair.sign,
-            )
-        ):
+    for name in names:
+        pair = mirror[name]
+        if pair.joint not in names or mirror[pair.joint] != MirrorJoint(joint=name, sign=pair.sign):
             raise ConfigError(
                 f"mirror of {spec.name}: {name} is paired with {pair.joint!r}, which is not a "
                 f"joint that is paired with {name} with the sign {pair.sign}"
             )
-    return _map([position[pair.joint] for pair in pairs], [pair.sign for pair in pairs])
+    return _map([names.index(mirror[n].joint) for n in names], [mirror[n].sign for n in names])
 
 
 def _check_control(env: "LeggedEnv", joints: SignedPermutation) -> None:
@@ -168,14 +145,10 @@ def _check_control(env: "LeggedEnv", joints: SignedPermutation) -> None:
         "damping": -model.actuator_biasprm[:, 2],
         "effort": model.actuator_forcerange[:, 1],
     }
-    checks = [
-        ("default_pose", pose, pose[joints.index] * joints.sign, np.full(len(pose), TOLERANCE))
-    ]
+    checks = [("default_pose", pose, joints(pose[None])[0], np.full(len(pose), TOLERANCE))]
     checks += [(t, own, own[joints.index], TOLERANCE * np.abs(own)) for t, own in tables.items()]
     for table, own, mirrored, tolerance in checks:
-        different = np.flatnonzero(np.abs(own - mirrored) > tolerance)
-        if len(different):
-            k = int(different[0])
+        for k in np.flatnonzero(np.abs(own - mirrored) > tolerance):
             raise ConfigError(
                 f"symmetry: {table} differs between left and right: {names[k]} has {own[k]:.6g}, "
                 f"the mirror image of {names[joints.index[k]]} {mirrored[k]:.6g}"
@@ -187,13 +160,12 @@ def _foot_map(env: "LeggedEnv") -> SignedPermutation:
     spec, model = env.robot.spec, env.scene.model
     chains = []
     for foot in spec.feet:
-        chain, body = set(), model.body(foot).id
-        while body not in (0, env.scene.base):
-            start, count = model.body_jntadr[body], model.body_jntnum[body]
-            chain |= {model.joint(k).name for k in range(start, start + count)}
-            body = model.body_parentid[body]
+        chain, body = set(), model.body(foot)
+        while body.id not in (0, env.scene.base):
+            chain |= {model.joint(body.jntadr[0] + k).name for k in range(body.jntnum[0])}
+            body = model.body(body.parentid[0])
         chains.append(chain & set(spec.joint_order))
-    pairs = []
+    index = []
     for foot, chain in zip(spec.feet, chains, strict=True):
         image = {spec.mirror[name].joint for name in chain}
         found = [k for k, other in enumerate(chains) if other == image]
@@ -202,20 +174,18 @@ def _foot_map(env: "LeggedEnv") -> SignedPermutation:
                 f"symmetry: the foot {foot} of {spec.name} has {len(found)} mirror images; "
                 f"expected 1 of: {listing(spec.feet)}"
             )
-        pairs.append(found[0])
-    index = (3 * np.array(pairs)[:, None] + np.arange(3)).ravel()
-    return _map(index, np.tile([1, -1, 1], len(pairs)))
+        index += [3 * found[0] + axis for axis in range(3)]
+    return _map(index, [1, -1, 1] * len(chains))
 
 
 def _scan_map(x: Sequence[float], y: Sequence[float]) -> SignedPermutation:
     """Return the map of the height scan, whose points are ordered by x, then y."""
     lateral = np.array(y)
     error = np.abs(lateral[:, None] + lateral)
-    unpaired = np.flatnonzero(error.min(axis=1) > TOLERANCE)
-    if len(unpaired):
+    for k in np.flatnonzero(error.min(axis=1) > TOLERANCE):
         raise ConfigError(
-            f"terrain.measured_points_y: got {lateral[unpaired[0]]:g} without "
-            f"{-lateral[unpaired[0]]:g}; symmetry expects the same points on both sides"
+            f"terrain.measured_points_y: got {lateral[k]:g} without {-lateral[k]:g}; "
+            "symmetry expects the same points on both sides"
         )
     index = np.arange(len(x))[:, None] * len(lateral) + error.argmin(axis=1)
     return _map(index.ravel(), np.ones(index.size))

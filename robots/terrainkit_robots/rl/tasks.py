@@ -10,18 +10,15 @@ bundled robots are TOML files beside them. The folder of an onboarded robot need
 """
 
 from dataclasses import dataclass
+from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from terrainkit.errors import ConfigError
 from terrainkit.text import expected_names, truncate
 from terrainkit_robots.description import bundled
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.rl.scene import SPEC_FILE
+from terrainkit_robots.spec.robot import SPEC_FILE
 from terrainkit_robots.spec.robot_spec import RobotSpec
-
-if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
 
 ENTRY_POINTS = "terrainkit.tasks"
 """Entry point group in which other packages name their tasks."""
@@ -37,8 +34,7 @@ class TaskSpec:
     """A robot, and the configuration of its training."""
 
     name: str
-    """Name of the task. For a folder it is the name in its robot.toml, which a registered task may
-    have too: store the folder to find it again."""
+    """Name of the task; for a folder, the name in its robot.toml, which a task may have too."""
     folder: Path
     """Folder with robot.toml."""
     task: Task
@@ -67,16 +63,15 @@ def register_task(name: str, folder: str | Path, task: Task | None = None) -> Ta
     if not isinstance(task, Task):
         raise ConfigError(f"task {name}: got {task!r}; expected an instance of Task")
     spec = TaskSpec(name=name, folder=Path(folder).absolute(), task=task)
-    registered = _registered.setdefault(name, spec)
-    if registered.folder != spec.folder:
-        raise ConfigError(f"task {name}: registered with {registered.folder}; expected a new name")
+    if (other := _registered.get(name, spec)).folder != spec.folder:
+        raise ConfigError(f"task {name}: registered with {other.folder}; expected a new name")
     _registered[name] = spec
     return spec
 
 
 def task_names() -> tuple[str, ...]:
     """Return the names of all tasks in alphabetical order; imports no module of a task."""
-    return tuple(sorted({*_registered, *_plugins()}))
+    return tuple(sorted({*_registered, *metadata.entry_points(group=ENTRY_POINTS).names}))
 
 
 def get_task(name_or_folder: str | Path) -> TaskSpec:
@@ -87,41 +82,28 @@ def get_task(name_or_folder: str | Path) -> TaskSpec:
     Raises:
         ConfigError: if there is neither, listing the known names, or it cannot be loaded.
     """
-    name = str(name_or_folder)
-    if name not in _registered and (plugin := _plugins().get(name)) is not None:
-        _load_plugin(plugin)
+    name, folder = str(name_or_folder), Path(name_or_folder)
+    if name not in _registered:
+        for plugin in metadata.entry_points(group=ENTRY_POINTS, name=name):
+            _load_plugin(plugin)
     if name in _registered:
         return _registered[name]
-    folder = Path(name_or_folder)
     try:
-        if folder.is_dir():
-            if not (folder / SPEC_FILE).exists():
-                raise ConfigError(
-                    f"{folder} has no {SPEC_FILE}; expected a folder of terrainkit onboard"
-                )
-            spec = RobotSpec.load(folder / SPEC_FILE)
-            return TaskSpec(name=spec.name, folder=folder.absolute(), task=Task())
+        if not folder.is_dir():
+            expected = expected_names(name, task_names(), "tasks are")
+            raise ConfigError(f"no task or robot folder {truncate(repr(name))}; {expected}")
+        if not (folder / SPEC_FILE).exists():
+            raise ConfigError(
+                f"{folder} has no {SPEC_FILE}; expected a folder of terrainkit onboard"
+            )
     except OSError as error:
         raise ConfigError(f"cannot read {truncate(name)}: {error.strerror or error}") from error
-    raise ConfigError(
-        f"no task or robot folder {truncate(repr(name))}; "
-        f"{expected_names(name, task_names(), 'tasks are')}"
-    )
+    spec = RobotSpec.load(folder / SPEC_FILE)
+    return TaskSpec(name=spec.name, folder=folder.absolute(), task=Task())
 
 
-def _plugins() -> dict[str, "EntryPoint"]:
-    """Return the entry point of each task of another installed package, by name."""
-    from importlib.metadata import entry_points
-
-    return {point.name: point for point in entry_points(group=ENTRY_POINTS)}
-
-
-def _load_plugin(plugin: "EntryPoint") -> None:
-    """Import the module that registers the task of an entry point.
-
-    Raises:
-        ConfigError: if the import fails, or the module does not register the task.
-    """
+def _load_plugin(plugin: metadata.EntryPoint) -> None:
+    """Import the module that registers the task of an entry point."""
     try:
         plugin.load()
     except Exception as error:  # a module of another package may raise anything

@@ -5,11 +5,13 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.surface import HeightfieldSurface
+from terrainkit.text import closest
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.geoms import measure_heights
 
@@ -36,29 +38,27 @@ class Terrain(ABC):
     is_flat: bool = False
     """Whether the ground is level everywhere, so that a height scan carries no information."""
 
+    _surface: HeightfieldSurface
+
     @abstractmethod
     def spec(self) -> Any:
         """Return the terrain as an `mujoco.MjSpec`."""
 
-    @abstractmethod
     def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Return the height at points [m], broadcast over `x` and `y`."""
+        return self._surface.height(x, y)
 
 
 class Plane(Terrain):
     """An infinite plane at height 0."""
 
     is_flat = True
+    env_origins = np.zeros((1, 1, 3), np.float32)
     terrain_names = np.array([["plane"]])
     lower, upper = (-np.inf, -np.inf), (np.inf, np.inf)
 
-    def __init__(self) -> None:
-        self.env_origins = np.zeros((1, 1, 3), np.float32)
-
     def spec(self) -> Any:
         """Return a plane with a checkered surface."""
-        import mujoco
-
         spec = mujoco.MjSpec()
         _add_material(spec)
         plane = mujoco.mjtGeom.mjGEOM_PLANE
@@ -95,8 +95,6 @@ class MapTerrain(Terrain):
 
     def spec(self) -> Any:
         """Return the map as terrainkit exports it for MuJoCo."""
-        import mujoco
-
         with tempfile.TemporaryDirectory() as folder:
             path = self._map.save(Path(folder) / "ground.xml", collision=self._collision)
             spec = mujoco.MjSpec.from_file(str(path))
@@ -104,10 +102,6 @@ class MapTerrain(Terrain):
         for geom in spec.geoms:
             geom.material, geom.rgba = "ground", [1, 1, 1, 1]
         return spec
-
-    def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Return the height of the surface that MuJoCo collides with."""
-        return self._surface.height(x, y)
 
 
 class ModelTerrain(Terrain):
@@ -118,11 +112,10 @@ class ModelTerrain(Terrain):
     def __init__(self, path: Path, *, cell: float = 0.05, half_size: float = 20.0) -> None:
         """Measure the square of `half_size` [m] around the origin with samples every `cell` [m].
 
-        Raises:
-            ConfigError: If MuJoCo cannot read the model, or there is no ground at the origin.
+        Heights are accurate to the size of a cell at edges.
         """
-        import mujoco
-
+        if not path.is_file():
+            raise ConfigError(f"there is no file {path}")
         self._path = path
         try:
             with quiet_mujoco():
@@ -140,29 +133,20 @@ class ModelTerrain(Terrain):
             raise ConfigError(f"{path}: no ground at the origin, where robots spawn")
         # Where there is no ground, robots fall: any height far below will do.
         heights = np.where(np.isnan(heights), np.nanmin(heights) - 10, heights)
+        corner = (float(axis[0]), float(axis[0]))
         self._surface = HeightfieldSurface(
-            heights=heights.astype(np.float32),
-            first_sample=(float(axis[0]), float(axis[0])),
-            cell=cell,
+            heights=heights.astype(np.float32), first_sample=corner, cell=cell
         )
         self.env_origins = np.array([[[0, 0, center]]], np.float32)
         self.lower, self.upper = (-half_size, -half_size), (half_size, half_size)
 
     def spec(self) -> Any:
         """Return the model."""
-        import mujoco
-
         return mujoco.MjSpec.from_file(str(self._path))
-
-    def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Return the height, accurate to the size of a cell at edges."""
-        return self._surface.height(x, y)
 
 
 def _add_material(spec: Any) -> None:
     """Add a checkered material, on which motion is visible."""
-    import mujoco
-
     texture = spec.add_texture(name="ground", type=mujoco.mjtTexture.mjTEXTURE_2D)
     texture.builtin = mujoco.mjtBuiltin.mjBUILTIN_CHECKER
     texture.rgb1, texture.rgb2 = [0.62, 0.65, 0.68], [0.54, 0.57, 0.6]
@@ -183,23 +167,20 @@ def load_terrain(source: str | Path, collision: Collision = "auto") -> Terrain:
         ConfigError: If `source` is none of these.
         MapFileError: If the map is missing, truncated or of another version.
     """
+    path = Path(source)
     if collision == "plane" or str(source) == "plane":
         return Plane()
-    path = Path(source)
-    if path.suffix == ".npz":
-        from terrainkit.terrain_map import TerrainMap
+    if path.suffix in (".npz", ".toml"):
+        from terrainkit import MapConfig, TerrainMap, generate
 
-        return MapTerrain(TerrainMap.load(path), collision)
-    if path.suffix == ".toml":
-        from terrainkit.config import MapConfig
-        from terrainkit.generation import generate
-
-        return MapTerrain(generate(MapConfig.load(path)), collision)
+        is_map = path.suffix == ".npz"
+        return MapTerrain(
+            TerrainMap.load(path) if is_map else generate(MapConfig.load(path)), collision
+        )
     if path.suffix == ".xml":
-        if not path.is_file():
-            raise ConfigError(f"there is no file {path}")
         return ModelTerrain(path)
+    suggestion = " did you mean 'plane'?" if closest(str(source), ["plane"]) else ""
     raise ConfigError(
-        f"terrain: got {str(source)!r}; expected plane, a map (.npz), the config of a map (.toml), "
-        "or a MuJoCo model (.xml)"
+        f"terrain: got {str(source)!r};{suggestion} expected plane, a map (.npz), "
+        "the config of a map (.toml), or a MuJoCo model (.xml)"
     )

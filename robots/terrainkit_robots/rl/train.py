@@ -17,8 +17,7 @@ from terrainkit_robots.rl.run import (
     parts_to_load,
     run_folder,
 )
-from terrainkit_robots.rl.scene import Robot
-from terrainkit_robots.rl.terrain import load_terrain
+from terrainkit_robots.spec.robot import Robot
 
 if TYPE_CHECKING:
     from terrainkit_robots.rl.runner import ProgressCallback
@@ -74,6 +73,7 @@ def train(
         resolve_device,
         stop_on_signal,
     )
+    from terrainkit_robots.rl.terrain import load_terrain
 
     task = tasks.get_task(robot).task if task is None else task
     if task.runner.logger == "wandb" and find_spec("wandb") is None:

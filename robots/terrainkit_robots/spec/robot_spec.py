@@ -31,7 +31,7 @@ Name = Annotated[
     Meta(
         min_length=1,
         pattern=r"^[^\0\ud800-\udfff]+$",
-        description="a non-empty string without NUL and surrogates",
+        description="a non-empty string",
     ),
 ]
 Names = Annotated[tuple[Name, ...], UNIQUE]
@@ -48,11 +48,11 @@ Height = Annotated[float, Meta(extra={"unit": "m"})]
 Length = Annotated[float, Meta(ge=0, extra={"unit": "m"})]
 
 _HEAD = """\
-# {name} as training sees it. SI units, radians, z up; edit what you like.
+# The spec of {name} for training. SI units, radians, z up. You can edit every value.
 #
-# In a table by joint a key is the name of a joint, or a regular expression that matches the whole
-# of it, such as ".*_hip_joint"; every joint has to be matched exactly once. Beside each number are
-# its unit and where it came from when this file was written; the table [provenance] keeps that.
+# In a table by joint, a key is the name of a joint or a regular expression that matches the whole
+# name, such as ".*_hip_joint". Each joint must be matched exactly once. The comments state the unit
+# of each number, and its origin when this file was written, as does the table [provenance].
 """
 
 
@@ -88,7 +88,7 @@ class MirrorJoint(Config):
 
 @dataclass(frozen=True, kw_only=True)
 class RobotSpec(Config):
-    """A robot as training sees it. SI units and radians.
+    """What training needs to know about a robot besides its description. SI units and radians.
 
     The tables need not name all joints: an edited file is read first and checked then.
 
@@ -100,37 +100,37 @@ class RobotSpec(Config):
     """Name of the robot."""
 
     urdf: Name
-    """Its URDF, relative to the folder of the spec."""
+    """URDF file, relative to the folder of the spec."""
 
     mjcf: Name
-    """Its MJCF, relative to the folder of the spec."""
+    """MJCF file, relative to the folder of the spec."""
 
     floating: bool
-    """Whether the base moves freely; False for an arm that is bolted down."""
+    """Whether the base moves freely; false for a robot with a fixed base, such as an arm."""
 
     joint_order: Names
     """The actuated joints in the order of actions, observations and MuJoCo's actuators."""
 
     base: Name
-    """Body that carries the limbs."""
+    """Body whose pose is the pose of the robot."""
 
     feet: Names = ()
-    """Bodies that touch the ground, one a leg, in the order of the legs."""
+    """Bodies that touch the ground, one per leg, in the order of the legs."""
 
     shanks: Names = ()
-    """Bodies below the knees, one a leg, in the order of `feet`."""
+    """Bodies below the knees, one per leg, in the order of `feet`."""
 
     thighs: Names = ()
-    """Bodies between hip and knee, one a leg, in the order of `feet`."""
+    """Bodies between hip and knee, one per leg, in the order of `feet`."""
 
     termination_contacts: Names = ()
     """Bodies whose contact with the ground ends an episode."""
 
     penalized_contacts: Names = ()
-    """Bodies whose contacts cost reward."""
+    """Bodies whose contacts are penalized."""
 
     default_pose: Mapping[Name, Position]
-    """Position of each joint that actions are added to."""
+    """Position of each joint that its action is added to."""
 
     stiffness: Mapping[Name, Stiffness]
     """Proportional gain of each joint."""
@@ -139,45 +139,45 @@ class RobotSpec(Config):
     """Derivative gain of each joint."""
 
     effort: Mapping[Name, Effort]
-    """Largest torque or force of each joint."""
+    """Maximum torque or force of each joint."""
 
     velocity: Mapping[Name, Velocity]
-    """Largest speed of each joint."""
+    """Maximum velocity of each joint."""
 
     armature: Mapping[Name, Armature]
-    """Inertia of each motor's rotor, reflected to the joint."""
+    """Rotor inertia of each motor, reflected to the joint."""
 
     action_scale: Mapping[Name, Scale]
-    """Change of a joint's target for an action of 1; of a joint without stiffness, such as a wheel,
-    the target is a speed."""
+    """Change of a joint's position target for an action of 1; of its velocity target if it has no
+    stiffness, such as a wheel."""
 
     soft_limits: Mapping[Name, Annotated[tuple[Position, Position], SORTED]]
-    """Lower and upper position of each joint with limits, that rewards keep it within."""
+    """Lower and upper position that rewards keep each joint with limits within."""
 
     reset_range: Annotated[tuple[Factor, Factor], SORTED] = (0.5, 1.5)
-    """Factors on the default pose between which a joint starts an episode."""
+    """Range of the factors by which the default pose is scaled at a reset."""
 
     base_height_target: Height | None = None
-    """Height of the base's origin above the ground that rewards ask for."""
+    """Target height of the base's origin above the ground for rewards."""
 
     spawn_height: Height | None = None
-    """Height of the base's origin above the ground at which the robot is let go."""
+    """Height of the base's origin above the ground at a reset."""
 
     leg_length: Length | None = None
-    """From hip over knee and ankle to the contact, mean of the legs."""
+    """Length from the hip via knee and ankle to the contact point, mean of all legs."""
 
     stance_width: Length | None = None
-    """Distance between the feet that are farthest apart to the left and right."""
+    """Lateral distance between the outermost feet."""
 
     foot_radius: Length | None = None
-    """Radius of a ball foot; of a flat sole half of its width."""
+    """Radius of a spherical foot, or half of the width of a flat sole."""
 
     mirror: Mapping[Name, MirrorJoint] = field(default_factory=dict)
-    """The twin of each actuated joint that has one, by name."""
+    """Mirror image of each actuated joint that has one, by name."""
 
     provenance: Mapping[Name, Provenance] = field(default_factory=dict)
-    """Where values came from: by the name of the field, and by `field.key` what differs in a table,
-    such as `effort.FL_calf_joint`."""
+    """Origin of the values, by the name of the field, or by `field.key` for a differing entry of a
+    table, such as `effort.FL_calf_joint`."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -137,7 +137,7 @@ def test_actuated_joints_of_mjcf(actuators, driven):
 
 
 def test_positions_equal_keyframe():
-    path = bundled.find("quadruped").with_suffix(".xml")
+    path = bundled.urdf_path("quadruped").with_suffix(".xml")
     robot = Facts(load_robot(path))
     assert robot.positions == {each.name: robot.model.home[each.name] for each in robot.joints}
     assert robot.stance.positions == robot.positions
@@ -189,7 +189,7 @@ def test_facts_of_thousands_of_links():
 @pytest.mark.parametrize("value", ["1e29", "-1e29", "1e-300", "0"])
 @pytest.mark.parametrize("attribute", ["mass value", "xyz", "rpy", "radius", "lower", "ixx"])
 def test_facts_and_rules_survive_extreme_numbers(value, attribute):
-    text = bundled.find("quadruped").read_text()
+    text = bundled.urdf_path("quadruped").read_text()
     name = attribute.split()[-1]
     start = text.index(f"<mass {name}=" if " " in attribute else f"{name}=", text.index("<joint"))
     begin = text.index('"', start) + 1

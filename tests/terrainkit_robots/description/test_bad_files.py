@@ -15,8 +15,8 @@ from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.runner import INTERNAL_ERROR, lint
 
-URDF = (bundled.find("quadruped") or Path()).read_text()
-MJCF = (bundled.find("quadruped") or Path()).with_suffix(".xml").read_text()
+URDF = (bundled.urdf_path("quadruped") or Path()).read_text()
+MJCF = (bundled.urdf_path("quadruped") or Path()).with_suffix(".xml").read_text()
 
 SECONDS, BYTES = 10, 2 * 2**30
 """What checking any file may take."""
@@ -48,7 +48,7 @@ fuzz = settings(
 @pytest.mark.parametrize(("text", "name"), [(URDF, "r.urdf"), (MJCF, "r.xml")])
 @fuzz
 @given(data=st.data())
-def test_values_that_are_nasty(text, name, tmp_path, data):
+def test_extreme_values(text, name, tmp_path, data):
     values = [i for i in range(len(text)) if text.startswith('="', i)]
     for _ in range(data.draw(st.integers(1, 4))):
         start = data.draw(st.sampled_from(values)) + 2
@@ -61,7 +61,7 @@ def test_values_that_are_nasty(text, name, tmp_path, data):
 @pytest.mark.parametrize(("text", "name"), [(URDF, "r.urdf"), (MJCF, "r.xml")])
 @fuzz
 @given(data=st.data())
-def test_elements_that_are_lost_doubled_or_swapped(text, name, tmp_path, data):
+def test_missing_duplicate_and_swapped_elements(text, name, tmp_path, data):
     lines = text.splitlines(keepends=True)
     for _ in range(data.draw(st.integers(1, 4))):
         a = data.draw(st.integers(0, len(lines) - 1))
@@ -85,7 +85,7 @@ def test_elements_that_are_lost_doubled_or_swapped(text, name, tmp_path, data):
 @pytest.mark.parametrize(("text", "name"), [(URDF, "r.urdf"), (MJCF, "r.xml")])
 @fuzz
 @given(data=st.data())
-def test_bytes_that_are_broken(text, name, tmp_path, data):
+def test_corrupt_bytes(text, name, tmp_path, data):
     raw = bytearray(text.encode())
     for _ in range(data.draw(st.integers(1, 10))):
         place = data.draw(st.integers(0, len(raw) - 1))
@@ -96,7 +96,7 @@ def test_bytes_that_are_broken(text, name, tmp_path, data):
 
 @fuzz
 @given(raw=st.binary(max_size=200))
-def test_bytes_of_no_meaning(tmp_path, raw):
+def test_random_bytes(tmp_path, raw):
     (tmp_path / "r.urdf").write_bytes(raw)
     assert check(tmp_path / "r.urdf") & {"XML001", "XML002", "XML009"}
 
@@ -220,7 +220,7 @@ def run(file: Path) -> tuple[int, str, str]:
 
 
 @pytest.mark.parametrize("name", [*BY_HAND, "binary", "large"])
-def test_a_bad_file_is_a_finding(folder, name):
+def test_bad_file_is_a_finding(folder, name):
     code, out, err = run(folder / f"{name}.urdf")
     assert code in (0, 1)
     assert "Traceback" not in err
@@ -230,7 +230,7 @@ def test_a_bad_file_is_a_finding(folder, name):
 
 
 @pytest.mark.parametrize("name", ["no-such-file", ".", "pipe", "locked.urdf"])
-def test_what_cannot_be_opened_is_one_line(folder, name):
+def test_open_error_is_one_line(folder, name):
     if name == "locked.urdf":
         if os.geteuid() == 0:
             pytest.skip("root may read every file")

@@ -14,22 +14,22 @@ from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.onboarding.robot_files import make_robot_files
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
-every_robot = pytest.mark.parametrize("name", bundled.names())
+every_robot = pytest.mark.parametrize("name", bundled.robot_names())
 every_format = pytest.mark.parametrize("suffix", [".urdf", ".xml"])
 
 HINGE = mujoco.mjtJoint.mjJNT_HINGE
 
 
 def compiled(name, suffix=".xml"):
-    return mujoco.MjModel.from_xml_path(str(bundled.find(name).with_suffix(suffix)))
+    return mujoco.MjModel.from_xml_path(str(bundled.urdf_path(name).with_suffix(suffix)))
 
 
 def urdf(name):
-    return ElementTree.parse(bundled.find(name)).getroot()
+    return ElementTree.parse(bundled.urdf_path(name)).getroot()
 
 
 def facts(name, suffix):
-    return Facts(load_robot(bundled.find(name).with_suffix(suffix)))
+    return Facts(load_robot(bundled.urdf_path(name).with_suffix(suffix)))
 
 
 def hinges(model):
@@ -79,19 +79,19 @@ def shapes(model, body, collide):
 
 
 @every_robot
-def test_robots_are_found_by_name(name):
-    assert bundled.find(name).is_file()
-    assert bundled.find(name).with_suffix(".xml").is_file()
+def test_find_by_name(name):
+    assert bundled.urdf_path(name).is_file()
+    assert bundled.urdf_path(name).with_suffix(".xml").is_file()
     assert urdf(name).get("name") == name
 
 
 @pytest.mark.parametrize("name", ["", "quadruped.urdf", "../quadruped", "hexapod"])
-def test_other_names_are_not_found(name):
-    assert bundled.find(name) is None
+def test_find_unknown_name(name):
+    assert bundled.urdf_path(name) is None
 
 
 @every_robot
-def test_both_formats_have_the_same_bodies_and_joints_in_the_same_order(name):
+def test_formats_have_same_bodies_and_joints(name):
     one, other = compiled(name, ".urdf"), compiled(name, ".xml")
     assert bodies(one) == bodies(other) == [link.get("name") for link in urdf(name).iter("link")]
     assert hinges(one) == hinges(other)
@@ -99,7 +99,7 @@ def test_both_formats_have_the_same_bodies_and_joints_in_the_same_order(name):
 
 
 @every_robot
-def test_both_formats_have_the_same_masses(name):
+def test_formats_have_same_masses(name):
     one, other = compiled(name, ".urdf"), compiled(name, ".xml")
     declared = [float(mass.get("value")) for mass in urdf(name).iter("mass")]
     np.testing.assert_allclose(one.body_mass[1:], declared, rtol=1e-12)
@@ -110,7 +110,7 @@ def test_both_formats_have_the_same_masses(name):
 
 
 @every_robot
-def test_both_formats_have_the_same_shapes(name):
+def test_formats_have_same_geometry(name):
     one, other = compiled(name, ".urdf"), compiled(name, ".xml")
     for body in bodies(one):
         for collide in (False, True):
@@ -121,7 +121,7 @@ def test_both_formats_have_the_same_shapes(name):
 
 
 @every_robot
-def test_both_formats_have_the_same_limits_torques_and_friction(name):
+def test_formats_have_same_joint_properties(name):
     model = compiled(name)
     motors = [model.actuator(i) for i in range(model.nu)]
     assert [model.joint(motor.trnid[0]).name for motor in motors] == hinges(model)
@@ -138,7 +138,7 @@ def test_both_formats_have_the_same_limits_torques_and_friction(name):
 
 
 @every_robot
-def test_both_formats_move_alike(name):
+def test_formats_have_same_kinematics(name):
     one, other = compiled(name, ".urdf"), compiled(name, ".xml")
     for positions in random_poses(other):
         first, second = at(one, positions), at(other, positions)
@@ -148,7 +148,7 @@ def test_both_formats_move_alike(name):
 
 @every_robot
 @every_format
-def test_own_kinematics_agree_with_mujoco(name, suffix):
+def test_kinematics_match_mujoco(name, suffix):
     model, robot = compiled(name, suffix), facts(name, suffix)
     for positions in random_poses(model):
         data = at(model, positions)
@@ -159,10 +159,12 @@ def test_own_kinematics_agree_with_mujoco(name, suffix):
 
 
 @every_robot
-def test_yourdfpy_agrees_with_mujoco(name):
+def test_yourdfpy_matches_mujoco(name):
     yourdfpy = pytest.importorskip("yourdfpy")
     model = compiled(name)
-    robot = yourdfpy.URDF.load(str(bundled.find(name)), build_scene_graph=True, load_meshes=False)
+    robot = yourdfpy.URDF.load(
+        str(bundled.urdf_path(name)), build_scene_graph=True, load_meshes=False
+    )
     for positions in random_poses(model, count=5):
         robot.update_cfg(positions)
         data = at(model, positions)
@@ -174,7 +176,7 @@ def test_yourdfpy_agrees_with_mujoco(name):
 
 @every_robot
 @every_format
-def test_right_is_left_mirrored(name, suffix):
+def test_left_and_right_are_mirror_images(name, suffix):
     model = compiled(name, suffix)
     mirror = np.array([1, -1, 1])
     sides = {"FL_": "FR_", "RL_": "RR_", "left_": "right_"}
@@ -207,7 +209,7 @@ def test_inertias_are_physical(name, suffix):
 
 
 @every_robot
-def test_feet_of_the_home_pose_touch_the_ground_and_nothing_else_touches(name):
+def test_only_feet_touch_ground_in_home_pose(name):
     model = compiled(name)
     data = at(model, home(model), model.key("home").qpos[2])
     feet = [g for g in range(model.ngeom) if model.geom_priority[g] == 1]
@@ -225,7 +227,7 @@ def _half_height(model, geom):
 
 def standing(name, stiffness, damping):
     """Return a model on a plane, held at its home pose for two seconds, its data, what touched."""
-    spec = mujoco.MjSpec.from_file(str(bundled.find(name).with_suffix(".xml")))
+    spec = mujoco.MjSpec.from_file(str(bundled.urdf_path(name).with_suffix(".xml")))
     spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1])
     model = spec.compile()
     model.dof_damping[6:] = damping
@@ -263,7 +265,7 @@ CALF = {"effort": 45.43, "velocity": 15.7}
 
 
 @every_robot
-def test_figures_of_links_and_joints_are_those_published(name, robot_file):
+def test_values_match_published_robot(name, robot_file):
     source = ElementTree.parse(robot_file(PUBLISHED[name])).getroot()
     published = {e.get("name"): e for tag in ("link", "joint") for e in source.findall(tag)}
     # The right leg is the left one mirrored, which another test sees to; in G1's own file it is so
@@ -290,14 +292,14 @@ def numbers(element):
     return {key: value[0] if len(value) == 1 else value for key, value in values.items()}
 
 
-def test_the_calf_has_the_power_of_the_thigh():
+def test_calf_has_power_of_thigh():
     limits = {j.get("name"): j.find("limit") for j in urdf("quadruped").findall("joint")}
     thigh, calf = numbers(limits["FL_thigh_joint"]), numbers(limits["FL_calf_joint"])
     power = thigh["effort"] * thigh["velocity"]
     assert calf["effort"] * calf["velocity"] == pytest.approx(power, rel=1e-3)
 
 
-def test_the_pelvis_of_the_biped_is_the_published_upper_body_at_zero(robot_file):
+def test_biped_pelvis_is_published_upper_body(robot_file):
     published = Facts(load_robot(robot_file(PUBLISHED["biped"])))
     upper = [
         (body, body.zero_pose)
@@ -319,21 +321,21 @@ def test_the_pelvis_of_the_biped_is_the_published_upper_body_at_zero(robot_file)
 
 @every_robot
 @every_format
-def test_check_robot_has_nothing_to_say(name, suffix):
+def test_check_robot_has_no_findings(name, suffix):
     report = lint(facts(name, suffix))
     loud = [f for f in report.findings if f.severity != "info"]
     assert not loud, "\n".join(f"{f.code} {f.subject}: {f.message}" for f in loud)
 
 
 @every_robot
-def test_the_spec_is_what_onboarding_would_derive_but_for_what_was_edited(name):
-    spec = RobotSpec.load(bundled.find(name).with_name("robot.toml"))
+def test_spec_is_derived_except_edits(name):
+    spec = RobotSpec.load(bundled.urdf_path(name).with_name("robot.toml"))
     derived = make_robot_files(facts(name, ".urdf")).spec
     edited = {key for key, told in spec.provenance.items() if told.origin == "given"}
     for each in dataclasses.fields(RobotSpec):
         own, other = getattr(spec, each.name), getattr(derived, each.name)
         if each.name in ("urdf", "mjcf"):
-            assert own == bundled.find(name).with_suffix(Path(other).suffix).name
+            assert own == bundled.urdf_path(name).with_suffix(Path(other).suffix).name
         elif each.name == "provenance":
             assert {k: v for k, v in own.items() if k.partition(".")[0] not in edited} == {
                 k: v for k, v in other.items() if k.partition(".")[0] not in edited
@@ -344,8 +346,8 @@ def test_the_spec_is_what_onboarding_would_derive_but_for_what_was_edited(name):
 
 @every_robot
 @every_format
-def test_check_robot_has_nothing_to_say_of_the_spec(name, suffix):
-    path = bundled.find(name)
+def test_check_robot_has_no_findings_for_spec(name, suffix):
+    path = bundled.urdf_path(name)
     spec = RobotSpec.load(path.with_name("robot.toml"))
     robot = Facts(load_robot(path.with_suffix(suffix)), spec=spec)
     loud = [f for f in lint(robot).findings if f.severity != "info"]
@@ -353,10 +355,10 @@ def test_check_robot_has_nothing_to_say_of_the_spec(name, suffix):
 
 
 @every_robot
-def test_the_spec_names_bodies_and_joints_of_the_model(name):
-    spec = RobotSpec.load(bundled.find(name).with_name("robot.toml"))
+def test_spec_names_exist_in_model(name):
+    spec = RobotSpec.load(bundled.urdf_path(name).with_name("robot.toml"))
     model = compiled(name)
-    assert (bundled.find(name).parent / spec.mjcf).is_file()
+    assert (bundled.urdf_path(name).parent / spec.mjcf).is_file()
     assert list(spec.joint_order) == hinges(model)
     named = {spec.base, *spec.feet, *spec.shanks, *spec.thighs}
     named |= {*spec.termination_contacts, *spec.penalized_contacts}
@@ -369,6 +371,6 @@ def test_the_spec_names_bodies_and_joints_of_the_model(name):
 
 
 @every_robot
-def test_the_spec_is_as_it_would_be_written(name):
-    path = bundled.find(name).with_name("robot.toml")
+def test_spec_file_is_normalized(name):
+    path = bundled.urdf_path(name).with_name("robot.toml")
     assert path.read_text() == RobotSpec.load(path).to_toml()

@@ -13,7 +13,7 @@ from terrainkit_robots.description.model import Joint, Source
         ("prismatic", ("m", "N", "m/s")),
     ],
 )
-def test_what_a_joint_is_measured_in(kind, units):
+def test_joint_units(kind, units):
     source = Source(file=Path("robot.urdf"), line=1)
     joint = Joint(name="j", source=source, kind=kind, parent="a", child="b")
     assert (joint.unit, joint.effort_unit, joint.speed_unit) == units

@@ -47,7 +47,7 @@ def same(found, path):
     return os.path.realpath(found[0]) == os.path.realpath(path)
 
 
-class TestPlainNames:
+class TestPaths:
     def test_relative_to_the_file(self, place):
         robot, mesh = place("dog/urdf/dog.urdf", "dog/meshes/foot.stl")
         assert resolve("../meshes/foot.stl", robot, {}) == (
@@ -61,39 +61,39 @@ class TestPlainNames:
         assert resolve(str(mesh), robot, {}) == (mesh, "path")
         assert resolve(f"file://{mesh}", robot, {}) == (mesh, "path")
 
-    def test_file_address_with_a_space(self, place):
+    def test_file_uri_with_space(self, place):
         robot, mesh = place("dog.urdf", "my foot.stl")
         assert resolve(f"file://{mesh.parent}/my%20foot.stl", robot, {}) == (mesh, "path")
 
     @pytest.mark.parametrize("name", ["../Meshes/FOOT.STL", "..\\meshes\\foot.stl"])
-    def test_in_other_letters(self, place, name):
+    def test_ignores_case(self, place, name):
         robot, mesh = place("dog/urdf/dog.urdf", "dog/meshes/foot.stl")
         found = resolve(name, robot, {})
         assert found[1] == "search"
         assert same(found, mesh)
 
-    def test_of_two_that_differ_in_case_none_is_taken(self, place):
+    def test_ambiguous_case_is_not_resolved(self, place):
         robot, *_ = place("dog.urdf", "a/foot.stl", "a/FOOT.stl")
         assert resolve("a/Foot.stl", robot, {})[1] == "nothing"
 
     @pytest.mark.parametrize(
         "name", ["/home/x/dog/meshes/foot.stl", "C:\\x\\dog\\meshes\\foot.stl", "meshes/foot.stl"]
     )
-    def test_found_by_the_end_of_its_path(self, place, name):
+    def test_found_by_path_suffix(self, place, name):
         robot, mesh = place("dog/urdf/dog.urdf", "dog/meshes/foot.stl")
         found = resolve(name, robot, {})
         assert found[1] == "search"
         assert same(found, mesh)
 
-    def test_what_is_nowhere_is_where_it_should_be(self, place):
+    def test_missing_file_has_expected_path(self, place):
         (robot,) = place("dog/dog.urdf")
         assert resolve("a/foot.stl", robot, {}) == (robot.parent / "a/foot.stl", "nothing")
 
-    def test_an_address_is_not_fetched(self, place):
+    def test_url_is_not_downloaded(self, place):
         robot, _ = place("dog.urdf", "foot.stl")
         assert resolve("https://example.org/foot.stl", robot, {})[1] == "nothing"
 
-    def test_a_pipe_is_something(self, place):
+    def test_pipe_exists(self, place):
         (robot,) = place("dog.urdf")
         os.mkfifo(robot.parent / "foot.stl")
         assert resolve("foot.stl", robot, {}) == (robot.parent / "foot.stl", "path")
@@ -108,7 +108,7 @@ class TestPackageNames:
         found = resolve(name, robot, {"dog": mesh.parents[1]})
         assert found == (mesh, "package")
 
-    def test_a_given_one_is_the_only_one(self, place):
+    def test_given_package_has_precedence(self, place):
         robot, _, mesh = place("dog/dog.urdf", "dog/foot.stl", "b/foot.stl")
         assert resolve("package://dog/foot.stl", robot, {"dog": mesh.parent}) == (mesh, "package")
         assert resolve("package://dog/foot.stl", robot, {"dog": Path("nowhere")}) == (
@@ -116,34 +116,34 @@ class TestPackageNames:
             "search",
         )
 
-    def test_by_the_package_above(self, place):
+    def test_package_xml_in_parent_folder(self, place):
         robot, _, mesh = place("dog/urdf/dog.urdf", "dog/package.xml", "dog/m/foot.stl")
         found = resolve("package://dog_pkg/m/foot.stl", robot, {})
         assert found[1] == "package"
         assert same(found, mesh)
 
-    def test_by_the_name_of_a_folder_above(self, place):
+    def test_name_of_parent_folder(self, place):
         robot, mesh = place("dog/urdf/dog.urdf", "dog/m/foot.stl")
         found = resolve("package://dog/m/foot.stl", robot, {})
         assert found[1] == "search"
         assert same(found, mesh)
 
-    def test_in_a_folder_beside(self, place):
+    def test_sibling_folder(self, place):
         robot, mesh = place("ws/a/urdf/dog.urdf", "ws/dog_meshes/m/foot.stl")
         found = resolve("package://dog_meshes/m/foot.stl", robot, {})
         assert same(found, mesh)
 
-    def test_in_a_package_beside(self, place):
+    def test_sibling_package(self, place):
         robot, _, mesh = place("ws/a/urdf/dog.urdf", "ws/b/package.xml", "ws/b/m/foot.stl")
         found = resolve("package://b_pkg/m/foot.stl", robot, {})
         assert found[1] == "package"
         assert same(found, mesh)
 
-    def test_a_package_without_the_file_gives_way_to_one_with_it(self, place):
+    def test_package_with_file_is_preferred(self, place):
         robot, mesh = place("dog/dog/dog.urdf", "dog/m/foot.stl")
         assert same(resolve("package://dog/m/foot.stl", robot, {}), mesh)
 
-    def test_a_renamed_folder_is_known_by_what_is_in_it(self, place):
+    def test_renamed_package_folder(self, place):
         robot, mesh = place("dog-main/urdf/dog.urdf", "dog-main/m/foot.stl")
         found = resolve("package://dog_description/m/foot.stl", robot, {})
         assert found[1] == "search"
@@ -152,26 +152,26 @@ class TestPackageNames:
     @pytest.mark.parametrize(
         ("variable", "folder"), [("ROS_PACKAGE_PATH", "src"), ("AMENT_PREFIX_PATH", "src/share")]
     )
-    def test_in_the_paths_of_ros(self, place, monkeypatch, tmp_path, variable, folder):
+    def test_ros_environment_variables(self, place, monkeypatch, tmp_path, variable, folder):
         robot, mesh = place("far/from/all/of/it/dog.urdf", f"{folder}/dog/m/foot.stl")
         monkeypatch.setenv(variable, f"/nowhere{os.pathsep}{tmp_path / 'src'}")
         assert resolve("package://dog/m/foot.stl", robot, {}) == (mesh, "package")
 
-    def test_in_other_letters(self, place):
+    def test_ignores_case(self, place):
         robot, mesh = place("dog/urdf/dog.urdf", "dog/m/foot.stl")
         assert same(resolve("package://dog/M/Foot.STL", robot, {}), mesh)
 
-    def test_a_package_that_is_found_without_the_file(self, place):
+    def test_package_without_file(self, place):
         robot, _ = place("dog/urdf/dog.urdf", "dog/package.xml")
         found = resolve("package://dog_pkg/m/foot.stl", robot, {})
         assert found[1] == "package"
         assert not found[0].exists()
 
-    def test_the_name_of_the_file_in_the_place_of_the_package(self, place):
+    def test_file_name_instead_of_package(self, place):
         robot, mesh = place("dog.urdf", "wheel.obj")
         assert resolve("package://wheel.obj", robot, {}) == (mesh, "search")
 
-    def test_find(self, place):
+    def test_find_package(self, place):
         robot, package = place("dog/urdf/dog.urdf", "dog/package.xml")
         found = find_package("dog_pkg", robot, {})
         assert found is not None
@@ -180,7 +180,7 @@ class TestPackageNames:
         assert find_package("cat", robot, {"cat": Path("x")}) == Path("x")
 
 
-class TestMalice:
+class TestUntrustedNames:
     NAMES = (
         "",
         "\0",
@@ -208,7 +208,7 @@ class TestMalice:
     )
 
     @pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
-    def test_no_name_is_too_much(self, place, name):
+    def test_hostile_names(self, place, name):
         (robot,) = place("a/dog.urdf")
         (robot.parent / "loop").symlink_to("loop")
         path, _ = resolve(name, robot, {})
@@ -223,12 +223,12 @@ class TestMalice:
             assert found_by in ("path", "package", "search", "nothing")
             filename_on_disk(name, path)
 
-    def test_a_folder_that_is_a_loop(self, place):
+    def test_symbolic_link_cycle(self, place):
         (robot,) = place("a/dog.urdf")
         (robot.parent / "loop").symlink_to("loop")
         assert resolve("package://cat/x", robot.parent / "loop/dog.urdf", {})[1] == "nothing"
 
-    def test_a_package_xml_that_is_a_pipe_or_not_of_text(self, place):
+    def test_package_xml_is_pipe_or_binary(self, place):
         robot, package = place("a/dog.urdf", "b/package.xml")
         os.mkfifo(robot.parent / "package.xml")
         package.write_bytes(bytes(range(256)) * 1000)
@@ -236,7 +236,7 @@ class TestMalice:
 
 
 class TestPackages:
-    def test_a_package_is_searched_for_once(self, place, monkeypatch):
+    def test_package_search_is_cached(self, place, monkeypatch):
         robot, _ = place("dog/urdf/dog.urdf", "dog/m/foot.stl")
         packages = PackageResolver(robot, {})
         first = packages.resolve("package://dog/m/foot.stl")
@@ -244,7 +244,7 @@ class TestPackages:
         assert packages.resolve("package://dog/m/foot.stl") == first
 
 
-def test_folders_in_turn(place):
+def test_resolve_in_folders(place):
     first, second = place("a/foot.stl", "b/hand.stl")
     folders = (first.parent, second.parent)
     assert resolve_in(folders, "foot.stl") == (first, "path")
@@ -271,12 +271,12 @@ def test_folders_in_turn(place):
         ("C:\\x\\Meshes\\foot.stl", None),
     ],
 )
-def test_right_letters(place, name, right):
+def test_filename_on_disk(place, name, right):
     (mesh,) = place("x/meshes/foot.stl")
     assert filename_on_disk(name, mesh) == right
 
 
-def test_right_letters_where_case_does_not_count(place, monkeypatch):
+def test_filename_on_disk_case_insensitive(place, monkeypatch):
     # On a Mac a file is found under any letters, so that only its folder knows its name.
     (mesh,) = place("x/meshes/foot.stl")
     asked = mesh.parents[1] / "Meshes/FOOT.stl"
@@ -288,7 +288,7 @@ def test_right_letters_where_case_does_not_count(place, monkeypatch):
     assert filename_on_disk("Meshes/FOOT.stl", asked) == "meshes/foot.stl"
 
 
-def test_kinds_of_names():
+def test_is_absolute_and_is_package_uri():
     assert all(map(is_absolute, ["/a", "file:///a", "C:\\a", "c:/a", "~/a", "\\\\server\\a"]))
     assert not any(map(is_absolute, ["a", "./a", "../a", "package://a/b", "file://a", ""]))
     assert all(map(is_package_uri, ["package://a/b", "model://a/b", "$(find a)/b", "package:/a/b"]))

@@ -38,7 +38,7 @@ def onboard_text(tmp_path, text, **options):
     return done, RobotSpec.load(folder / "robot.toml")
 
 
-def test_a_cart_slides_on_the_world(tmp_path):
+def test_cart_on_rail(tmp_path):
     done, spec = onboard_text(tmp_path, CART)
     assert [joint.name for joint in done.robot.facts.joints] == ["slider", "hinge"]
     assert (spec.joint_order, spec.floating, spec.base) == (("slider",), False, "cart")
@@ -48,14 +48,14 @@ def test_a_cart_slides_on_the_world(tmp_path):
     )
 
 
-def test_two_arms_are_one_robot(tmp_path):
+def test_two_arms(tmp_path):
     done, spec = onboard_text(tmp_path, ARMS)
     assert spec.joint_order == ("left_joint", "right_joint")
     assert len(done.robot.facts.links) == 4
 
 
 @pytest.mark.parametrize("floating", [None, True])
-def test_a_walker_of_the_plane_keeps_its_joints_unless_it_is_set_free(tmp_path, floating):
+def test_planar_walker(tmp_path, floating):
     done, spec = onboard_text(tmp_path, WALKER, floating=floating)
     moving = [joint.name for joint in done.robot.facts.joints]
     assert moving == (["elbow"] if floating else ["z", "x", "turn", "elbow"])
@@ -65,7 +65,7 @@ def test_a_walker_of_the_plane_keeps_its_joints_unless_it_is_set_free(tmp_path, 
 
 
 @pytest.mark.parametrize("joint", ["<freejoint/>", ""])
-def test_a_robot_with_a_base_is_the_same(tmp_path, joint):
+def test_robot_with_base_is_unchanged(tmp_path, joint):
     text = ARMS.split("</worldbody>")[0].replace(
         '<body name="left" pos="-1 0 0">', f'<body name="left" pos="-1 0 0">{joint}'
     )

@@ -9,6 +9,7 @@ from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.xml.document import RobotFileError
 from terrainkit_robots.export.canonical import to_canonical
+from tests.robots import REAL_ROBOTS
 
 MASS = '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>'
 
@@ -33,28 +34,15 @@ def link_poses(robot, positions):
     }
 
 
-ROBOTS = [
-    "a1/urdf/a1.urdf",
-    "go2/urdf/go2.urdf",
-    "go2_mjcf/go2.xml",
-    "h1/urdf/h1.urdf",
-    "h1/h1.xml",
-    "g1/g1_29dof.urdf",
-    "g1/g1_29dof.xml",
-    "anymal_c/urdf/anymal_c.urdf",
-    "cassie/urdf/cassie.urdf",
-]
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-def test_the_normal_form_is_the_same_robot(name, robot_file):
+@pytest.mark.parametrize("name", REAL_ROBOTS)
+def test_canonical_robot_is_equivalent(name, robot_file):
     check_same(Facts(load_robot(robot_file(name))))
 
 
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
 @pytest.mark.parametrize("suffix", [".urdf", ".xml"])
-def test_the_normal_form_of_a_bundled_robot_is_the_same_robot(name, suffix):
-    check_same(Facts(load_robot(bundled.find(name).with_suffix(suffix))))
+def test_canonical_bundled_robot_is_equivalent(name, suffix):
+    check_same(Facts(load_robot(bundled.urdf_path(name).with_suffix(suffix))))
 
 
 def check_same(source):
@@ -75,7 +63,7 @@ def check_same(source):
     assert [j.name for j in again.model.joints] == [j.name for j in form.model.joints]
 
 
-def test_a_reference_goes_into_the_origin(tmp_path):
+def test_reference_moves_to_origin(tmp_path):
     robot = facts(
         tmp_path,
         mjcf(
@@ -94,14 +82,14 @@ def test_a_reference_goes_into_the_origin(tmp_path):
     np.testing.assert_allclose(at[:3, 3], [0, 0, -0.2], atol=1e-12)
 
 
-def test_a_joint_without_a_motor_is_fixed_and_told(tmp_path):
+def test_unsupported_joint_is_fixed(tmp_path):
     robot = facts(tmp_path, mjcf(f'<body name="ball">{MASS}<joint name="b" type="ball"/></body>'))
     form = to_canonical(robot)
     assert [joint.kind for joint in form.model.joints] == ["fixed"]
     assert any("b" in note and "ball" in note for note in form.notes)
 
 
-def test_the_effort_of_a_mjcf_is_that_of_its_motor(tmp_path):
+def test_mjcf_effort_is_that_of_actuator(tmp_path):
     robot = facts(
         tmp_path,
         mjcf(
@@ -115,7 +103,7 @@ def test_the_effort_of_a_mjcf_is_that_of_its_motor(tmp_path):
     assert [motor.joint for motor in form.model.actuators] == ["j"]
 
 
-def test_what_is_beside_the_robot_is_left_out_and_told(tmp_path):
+def test_other_trees_are_removed(tmp_path):
     text = mjcf(f'<body name="leg">{MASS}<joint name="j"/></body>').replace(
         "</worldbody>", f'<body name="crate">{MASS}<freejoint/></body></worldbody>'
     )
@@ -131,13 +119,13 @@ def test_what_is_beside_the_robot_is_left_out_and_told(tmp_path):
         ("", False),
     ],
 )
-def test_a_mjcf_says_itself_whether_it_floats(tmp_path, joint, floating):
+def test_mjcf_defines_floating_base(tmp_path, joint, floating):
     text = mjcf(f'<body name="arm">{MASS}<joint name="j" range="-1 1"/></body>')
     robot = facts(tmp_path, text.replace('<body name="base">', f'<body name="base">{joint}'))
     assert to_canonical(robot).model.floating is floating
 
 
-def test_an_arm_is_bolted_down_and_a_car_is_not(tmp_path):
+def test_arm_is_fixed_and_car_is_not(tmp_path):
     link = (
         '<link name="{}"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" '
         'ixy="0" ixz="0" iyz="0"/></inertial></link>'
@@ -168,7 +156,7 @@ CHAIN = """<robot name="r">{}<joint name="a" type="{}"><parent link="base"/><chi
         ("prismatic", (-1e16, 1e16), 1, False),
     ],
 )
-def test_a_wheel_is_on_the_base_or_on_what_steers_it(tmp_path, kind, ends, joints, floating):
+def test_wheel_on_base_or_steering_body(tmp_path, kind, ends, joints, floating):
     names = ["base", "one", "two", "three"][: joints + 1]
     links = "".join(
         f'<link name="{name}"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" '
@@ -184,7 +172,7 @@ def test_a_wheel_is_on_the_base_or_on_what_steers_it(tmp_path, kind, ends, joint
     assert to_canonical(robot).model.floating is floating
 
 
-def test_a_mass_from_a_mesh_is_what_mujoco_makes_of_it(tmp_path):
+def test_mass_from_mesh_matches_mujoco(tmp_path):
     import trimesh
 
     trimesh.creation.box((0.1, 0.2, 0.3)).export(tmp_path / "box.stl")
@@ -199,12 +187,12 @@ def test_a_mass_from_a_mesh_is_what_mujoco_makes_of_it(tmp_path):
     assert sorted(np.linalg.eigvalsh(link.inertial.inertia)) == pytest.approx(moments, rel=1e-4)
 
 
-def test_there_has_to_be_a_robot(tmp_path):
+def test_robot_without_links_is_rejected(tmp_path):
     with pytest.raises(RobotFileError, match="expected a robot"):
         to_canonical(facts(tmp_path, '<robot name="r"/>'))
 
 
-def test_two_joints_of_one_name_get_two(tmp_path):
+def test_duplicate_joint_names(tmp_path):
     text = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
       <joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>
       <joint name="j" type="fixed"><parent link="a"/><child link="c"/></joint></robot>"""
@@ -214,12 +202,12 @@ def test_two_joints_of_one_name_get_two(tmp_path):
 
 
 @pytest.mark.parametrize(("name", "wanted"), [("my robot/../x", "my_robot_.._x"), ("..", "robot")])
-def test_the_name_is_one_on_every_disk(tmp_path, name, wanted):
+def test_plain_name(tmp_path, name, wanted):
     form = to_canonical(facts(tmp_path, f'<robot name="{name}"><link name="a"/></robot>'))
     assert form.model.name == wanted
 
 
-def test_a_link_called_world_gets_another_name(tmp_path):
+def test_link_named_world_is_renamed(tmp_path):
     text = """<robot name="r"><link name="world"/><link name="world_link"/>
       <joint name="j" type="fixed"><parent link="world"/><child link="world_link"/></joint>
       </robot>"""
@@ -235,7 +223,7 @@ DYNAMICS = """<robot name="r"><link name="a"/><link name="b"/><joint name="j" ty
 
 
 @pytest.mark.parametrize(("written", "wanted"), [("0.3", 0.3), ("-0.3", 0.0), ("nan", 0.0)])
-def test_friction_and_damping_are_kept_where_they_slow(tmp_path, written, wanted):
+def test_friction_and_damping(tmp_path, written, wanted):
     (joint,) = to_canonical(facts(tmp_path, DYNAMICS.format(written))).model.joints
     assert (joint.friction, joint.damping) == (wanted, wanted)
 
@@ -248,7 +236,7 @@ def test_friction_and_damping_are_kept_where_they_slow(tmp_path, written, wanted
         (("nobody", "j"), ("j",)),
     ],
 )
-def test_a_joint_that_follows_itself_or_nobody_is_free_and_told(tmp_path, leads, notes):
+def test_invalid_mimic_is_removed(tmp_path, leads, notes):
     joint = """<joint name="{}" type="continuous"><parent link="a"/><child link="{}"/>
       <mimic joint="{}"/></joint>"""
     joints = joint.format("j", "b", leads[0]) + joint.format("k", "c", leads[1])
@@ -263,7 +251,7 @@ def test_a_joint_that_follows_itself_or_nobody_is_free_and_told(tmp_path, leads,
 MESH = '<mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/>'
 
 
-def test_a_texture_without_end_costs_nothing(tmp_path):
+def test_endless_texture_is_not_read(tmp_path):
     """It would take 2.4 GB, for a mass."""
     text = f"""<mujoco><asset>{MESH}
       <texture name="t" type="2d" builtin="flat" width="20000" height="20000"/>
@@ -274,14 +262,14 @@ def test_a_texture_without_end_costs_nothing(tmp_path):
     assert link.inertial.mass == pytest.approx(1000 / 6)
 
 
-def test_a_body_without_a_name_is_told(tmp_path):
+def test_unnamed_body_with_mesh_mass(tmp_path):
     text = f"""<mujoco><asset>{MESH}</asset><worldbody><body>
       <geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
     with pytest.raises(RobotFileError, match="a body with its mass from a mesh has no name"):
         to_canonical(facts(tmp_path, text))
 
 
-def test_a_mesh_that_mujoco_does_not_find_is_told(tmp_path):
+def test_missing_mesh_for_mass(tmp_path):
     text = """<mujoco><asset><mesh name="m" file="no.stl"/></asset><worldbody><body name="base">
       <geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
     with pytest.raises(RobotFileError, match="cannot compute masses from meshes: MuJoCo rejects"):

@@ -13,10 +13,10 @@ from terrainkit_robots.quiet_mujoco import quiet_mujoco
 
 @pytest.fixture
 def facts():
-    return Facts(to_canonical(Facts(load_robot(bundled.find("quadruped")))).model)
+    return Facts(to_canonical(Facts(load_robot(bundled.urdf_path("quadruped")))).model)
 
 
-def test_what_moves_as_one_is_one_body(facts):
+def test_fixed_links_are_merged(facts):
     single = merge_fixed_joints(facts.model, keep=["FL_foot"])
     names = [link.name for link in single.model.links]
     assert "FL_foot" in names
@@ -30,7 +30,7 @@ def test_what_moves_as_one_is_one_body(facts):
     assert [round(float(shape.origin[2, 3]), 3) for shape in calf.collisions] == [-0.1, -0.213]
 
 
-def test_it_moves_as_before(facts):
+def test_merged_robot_has_same_motion(facts):
     whole, single = (
         compiled(model) for model in (facts.model, merge_fixed_joints(facts.model).model)
     )
@@ -56,7 +56,7 @@ def mass_matrix(model, qpos):
     return rows
 
 
-def test_pairs_of_links_become_pairs_of_bodies(facts):
+def test_excluded_pairs_of_bodies(facts):
     from dataclasses import replace
 
     pairs = frozenset({frozenset(("FL_foot", "FR_foot")), frozenset(("FL_foot", "FL_calf"))})

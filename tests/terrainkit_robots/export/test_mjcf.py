@@ -23,11 +23,11 @@ def written(model, **extras):
 
 @pytest.fixture
 def quadruped():
-    facts = Facts(load_robot(bundled.find("quadruped")))
+    facts = Facts(load_robot(bundled.urdf_path("quadruped")))
     return Facts(to_canonical(facts).model)
 
 
-def test_masses_and_inertias_are_those_declared(quadruped):
+def test_masses_and_inertias(quadruped):
     model = written(quadruped.model)
     for link in quadruped.links:
         body = model.body(link.name)
@@ -45,7 +45,7 @@ def test_masses_and_inertias_are_those_declared(quadruped):
         )
 
 
-def test_several_joints_of_one_body_move_it_as_they_did(tmp_path):
+def test_several_joints_of_one_body(tmp_path):
     """Two hinges and a slide on one body, off its origin and with references."""
     text = f"""<mujoco><compiler angle="radian"/><worldbody><body name="base">{MASS}
       <body name="hip" pos="0.1 0.2 -0.3" quat="0.9 0.1 0.2 0.3">{MASS}
@@ -74,7 +74,7 @@ def pose_of(model, qpos, name):
     return np.r_[data.body(name).xpos, data.body(name).xmat]
 
 
-def test_the_motors_come_in_the_order_of_the_drives(quadruped):
+def test_actuator_order(quadruped):
     names = [joint.name for joint in quadruped.actuated][::-1]
     drives = {
         name: ActuatorConfig(stiffness=20 + k, damping=0.5, effort=5.0 + k, armature=0.01)
@@ -95,14 +95,14 @@ def test_the_motors_come_in_the_order_of_the_drives(quadruped):
     assert list(key.ctrl) == pytest.approx([quadruped.positions[name] for name in names])
 
 
-def test_a_drive_without_effort_is_not_limited(quadruped):
+def test_actuator_without_effort_is_unlimited(quadruped):
     model = written(
         quadruped.model, actuators={"FL_hip_joint": ActuatorConfig(stiffness=1, damping=0)}
     )
     assert not model.actuator(0).forcelimited
 
 
-def test_it_stands_on_its_feet_which_feel_it(quadruped):
+def test_touch_sensors_of_feet(quadruped):
     weight = quadruped.total_mass * 9.81
     drives = {
         joint.name: ActuatorConfig(stiffness=100, damping=2, effort=50.0, armature=0.01)
@@ -129,7 +129,7 @@ def test_it_stands_on_its_feet_which_feel_it(quadruped):
     assert data.sensor("orientation").data[0] == pytest.approx(1, abs=1e-3)
 
 
-def test_a_joint_that_mimics_another_follows_it(tmp_path):
+def test_mimic_joint(tmp_path):
     link = (
         '<link name="{}"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" '
         'ixy="0" ixz="0" iyz="0"/></inertial></link>'
@@ -150,7 +150,7 @@ def test_a_joint_that_mimics_another_follows_it(tmp_path):
     np.testing.assert_allclose(model.eq_data[0, :5], [0.1, -2, 0, 0, 0])
 
 
-def test_names_from_a_file_stay_names(quadruped):
+def test_special_characters_in_names(quadruped):
     hostile = '"/><body name="x">&amp; é'
     links = [
         dataclasses.replace(link, name=hostile) if link.name == "imu" else link
@@ -160,13 +160,13 @@ def test_names_from_a_file_stay_names(quadruped):
     assert written(base).nbody == written(quadruped.model).nbody
 
 
-def test_pairs_that_are_left_out_do_not_touch(quadruped):
+def test_excluded_pairs(quadruped):
     pair = frozenset(("base", "FL_calf"))
     assert written(quadruped.model).nexclude == 0
     assert written(quadruped.model, excluded=[pair]).nexclude == 1
 
 
-def test_an_arm_stands_still(tmp_path):
+def test_arm_keeps_its_pose(tmp_path):
     text = f"""<mujoco><worldbody><body name="base">{MASS}<body name="arm">{MASS}
       <joint name="j" range="-1 1"/></body></body></worldbody></mujoco>"""
     path = tmp_path / "robot.xml"
@@ -175,7 +175,7 @@ def test_an_arm_stands_still(tmp_path):
     assert (model.nq, model.nkey) == (1, 1)
 
 
-def test_the_scene_holds_the_robot_and_a_floor(quadruped, tmp_path):
+def test_scene(quadruped, tmp_path):
     (tmp_path / "robot.xml").write_text(mjcf_text(quadruped.model, Extras(height=0.3)))
     (tmp_path / "scene.xml").write_text(scene_text("quadruped", "robot.xml", height=0.3))
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "scene.xml"))
@@ -183,7 +183,7 @@ def test_the_scene_holds_the_robot_and_a_floor(quadruped, tmp_path):
     assert model.body("base").pos[2] == 0.3
 
 
-def test_contacts_of_a_foot_without_mass_are_as_stiff_as_of_one_with_next_to_none(quadruped):
+def test_contacts_of_massless_foot(quadruped):
     def weighs(mass):
         def foot(link):
             if link.name != "FL_foot":
@@ -200,7 +200,7 @@ def test_contacts_of_a_foot_without_mass_are_as_stiff_as_of_one_with_next_to_non
     np.testing.assert_allclose(none.invweight0, next_to_none.invweight0, rtol=1e-4)
 
 
-def test_dry_friction_of_joints_is_there(quadruped):
+def test_joint_friction(quadruped):
     joints = [
         dataclasses.replace(joint, friction=0.25) if joint.name == "FL_hip_joint" else joint
         for joint in quadruped.model.joints

@@ -9,10 +9,10 @@ from terrainkit_robots.export.sites import foot_sites, imu_notes, imu_site
 
 
 def facts_of(name):
-    return Facts(load_robot(bundled.find(name)))
+    return Facts(load_robot(bundled.urdf_path(name)))
 
 
-def test_a_ball_foot_is_within_its_site():
+def test_site_encloses_ball_foot():
     sites = foot_sites(facts_of("quadruped"))
     assert [site.body for site in sites] == ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]
     for site in sites:
@@ -20,14 +20,14 @@ def test_a_ball_foot_is_within_its_site():
         assert site.half_size == pytest.approx((0.024, 0.024, 0.024))
 
 
-def test_a_flat_foot_has_a_flat_site_below_the_ankle():
+def test_site_of_flat_foot():
     for site in foot_sites(facts_of("biped")):
         x, y, z = site.half_size
         assert x > y > z
         assert site.pose[2, 3] < 0
 
 
-def test_the_imu_is_where_its_link_is(tmp_path):
+def test_imu_at_link(tmp_path):
     path = tmp_path / "robot.urdf"
     path.write_text(
         """<robot name="r"><link name="trunk"/><link name="imu_link"/>
@@ -41,7 +41,7 @@ def test_the_imu_is_where_its_link_is(tmp_path):
     assert imu_notes(facts) == ()
 
 
-def test_a_robot_without_an_imu_has_it_at_its_base(tmp_path):
+def test_imu_default_is_base(tmp_path):
     path = tmp_path / "robot.urdf"
     path.write_text('<robot name="r"><link name="trunk"/></robot>')
     facts = Facts(load_robot(path))
@@ -62,7 +62,7 @@ IMU = """<mujoco><worldbody><body name="trunk"><freejoint/><geom size="0.1"/>
   <sensor><gyro site="sensed"/></sensor></mujoco>"""
 
 
-def test_the_imu_that_the_file_names_goes_before_a_link_of_that_name(tmp_path):
+def test_imu_of_file_has_precedence(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(IMU)
     facts = Facts(to_canonical(Facts(load_robot(path))).model)
@@ -72,7 +72,7 @@ def test_the_imu_that_the_file_names_goes_before_a_link_of_that_name(tmp_path):
     assert imu_notes(facts) == ()
 
 
-def test_an_imu_beside_the_robot_is_not_its_own(tmp_path):
+def test_imu_of_other_tree_is_ignored(tmp_path):
     path = tmp_path / "robot.xml"
     crate = '<body name="crate"><freejoint/><geom size="0.1"/><site name="sensed"/></body>'
     text = IMU.replace("</worldbody>", f"{crate}</worldbody>")
@@ -83,7 +83,7 @@ def test_an_imu_beside_the_robot_is_not_its_own(tmp_path):
     assert imu_notes(Facts(model))[0].startswith("placed the IMU at the origin of trunk")
 
 
-def test_the_imu_of_go2_is_where_its_site_is(robot_file):
+def test_imu_of_go2(robot_file):
     facts = Facts(to_canonical(Facts(load_robot(robot_file("go2_mjcf/go2.xml")))).model)
     site = imu_site(facts)
     assert site.body == "base_link"

@@ -9,7 +9,7 @@ MJCF = """<mujoco><worldbody><body name="a"><geom size="0.1"/>
 <tendon><fixed name="t"><joint joint="j" coef="1"/></fixed></tendon></mujoco>"""
 
 
-def test_what_is_left_out_of_a_mjcf_is_told(tmp_path):
+def test_unsupported_sections_and_stiffness(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(MJCF)
     assert unsupported_elements(load_robot(path)) == (
@@ -19,7 +19,7 @@ def test_what_is_left_out_of_a_mjcf_is_told(tmp_path):
     )
 
 
-def test_motors_of_tendons_are_told_and_followers_are_none(tmp_path):
+def test_actuators_of_tendons(tmp_path):
     path = tmp_path / "robot.xml"
     more = '<actuator><motor name="pull" tendon="t"/></actuator></mujoco>'
     text = MJCF.replace("</mujoco>", more).replace('stiffness="5"', "")
@@ -33,11 +33,11 @@ def test_motors_of_tendons_are_told_and_followers_are_none(tmp_path):
     )
 
 
-def test_nothing_is_left_out_of_a_urdf():
-    assert unsupported_elements(load_robot(bundled.find("quadruped"))) == ()
+def test_urdf_has_no_unsupported_elements():
+    assert unsupported_elements(load_robot(bundled.urdf_path("quadruped"))) == ()
 
 
-def test_how_shapes_feel_is_left_out_and_told(tmp_path):
+def test_contact_parameters(tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(
         """<mujoco><default><geom condim="6"/></default><worldbody><body name="a">

@@ -91,7 +91,7 @@ def mass_of(model):
     return float(model.body_mass.sum())
 
 
-def test_a_box_by_hand():
+def test_urdf_of_box():
     turn = np.eye(4)
     turn[:3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
     base = Link(
@@ -136,7 +136,7 @@ inertiafromgeom="false"/>
 
 
 class TestJoints:
-    def test_numbers_of_a_joint(self):
+    def test_joint_values(self):
         moving = joint(
             "hip",
             "revolute",
@@ -171,7 +171,7 @@ class TestJoints:
             "offset": "0.1",
         }
 
-    def test_what_is_not_known_is_made_up_and_told(self):
+    def test_unknown_limits_have_defaults_and_comment(self):
         bare = [
             joint("a", "continuous", "base", "one", limit=None),
             joint("b", "prismatic", "base", "two", limit=limits(None, None, None, None)),
@@ -190,14 +190,14 @@ class TestJoints:
         assert "<!-- Unknown velocity limit, set to 100: a, b. -->" in text
         assert compiled(text).njnt == 3
 
-    def test_names_do_not_end_a_comment(self):
+    def test_names_cannot_end_comment(self):
         model = robot(
             link("base"), link("leg"), joint("a--b-", "continuous", "base", "leg", limit=None)
         )
         assert parsed(model).find("joint").get("name") == "a--b-"
 
     @pytest.mark.parametrize("name", ["a---b", "-", "--", "a-----", "-- -- >", "->", "<!---->"])
-    def test_hyphens_do_not_end_the_comment(self, name):
+    def test_hyphens_cannot_end_comment(self, name):
         model = robot(link("base"), link("leg"), joint(name, "revolute", "base", "leg", limit=None))
         assert parsed(model).find("joint").get("name") == name
 
@@ -208,7 +208,7 @@ class TestJoints:
             max_size=4,
         )
     )
-    def test_any_names_go_into_the_comment(self, names):
+    def test_comment_with_any_names(self, names):
         links = [link(f"l{k}") for k in range(len(names) + 1)]
         joints = [
             joint(name, "revolute", "l0", f"l{k}", limit=None) for k, name in enumerate(names, 1)
@@ -219,7 +219,7 @@ class TestJoints:
         told = ", ".join(names)
         assert comment.replace(" ", "").endswith(f"{told}.".replace(" ", ""))
 
-    def test_feet_are_kept_by_isaac_gym(self):
+    def test_feet_have_dont_collapse(self):
         model = robot(
             link("base"),
             link("leg"),
@@ -236,14 +236,14 @@ class TestJoints:
         again = parsed(replace(model, joints=(*model.joints[:2], told)))
         assert [j.get("dont_collapse") for j in again.iter("joint")] == [None, None, "true"]
 
-    def test_what_no_normal_form_has_is_refused(self):
+    def test_noncanonical_joint_is_rejected(self):
         model = robot(link("base"), link("leg"), joint("hip", "ball", "base", "leg"))
         with pytest.raises(ValueError, match="joint hip: got type ball"):
             urdf_text(model)
 
 
 class TestMasses:
-    def test_only_what_is_declared(self):
+    def test_declared_masses(self):
         """Shapes weigh nothing, whether or not their links do."""
         heavy = (shape("box", 1, 1, 1),)
         model = robot(
@@ -257,7 +257,7 @@ class TestMasses:
         assert mass_of(made) == pytest.approx(4, abs=2e-6)
         assert [made.body(k).name for k in range(4)] == ["world", "base", "leg", "foot"]
 
-    def test_what_moves_without_mass_gets_a_tiny_one(self):
+    def test_massless_moving_link_gets_minimum_mass(self):
         model = robot(
             link("base", 3.0),
             link("between", None, virtual=True),
@@ -278,7 +278,7 @@ class TestMasses:
         }
         assert mass_of(compiled(text)) == pytest.approx(3, rel=1e-6)
 
-    def test_a_frame_that_carries_mass_needs_none(self):
+    def test_massless_frame_with_fixed_mass(self):
         model = robot(
             link("base", 3.0),
             link("frame", None),
@@ -290,7 +290,7 @@ class TestMasses:
         assert etree.fromstring(text).find("link[@name='frame']/inertial") is None
         assert mass_of(compiled(text)) == 5
 
-    def test_inertia_in_its_own_frame(self):
+    def test_inertia_frame(self):
         """Twelve numbers that tell every axis from every other."""
         origin = translated(0.1, -0.2, 0.3)
         quat = np.array([0.5, -0.1, 0.7, 0.2])
@@ -308,7 +308,7 @@ class TestMasses:
 
 
 class TestShapes:
-    def test_a_capsule_is_a_cylinder_and_two_balls(self):
+    def test_capsule_is_cylinder_and_two_spheres(self):
         turn = translated(0, 0, 1)
         turn[:3, :3] = [[0, 0, 1], [1, 0, 0], [0, 1, 0]]  # z of the shape is x of the link
         root = parsed(robot(link("base", collisions=(shape("capsule", 0.1, 0.3, origin=turn),))))
@@ -317,7 +317,7 @@ class TestShapes:
         assert [ball.find("origin").get("xyz") for ball in balls] == ["0.3 0 1", "-0.3 0 1"]
         assert [b.find("geometry/sphere").get("radius") for b in balls] == ["0.1", "0.1"]
 
-    def test_meshes_and_what_has_one_beside(self):
+    def test_meshes_and_ellipsoids(self):
         file = MeshFile(source=SOURCE, filename="meshes/a.stl", path=Path("a"), scale=(1, 2, 1))
         shapes = (
             shape("mesh", mesh=file),
@@ -332,17 +332,17 @@ class TestShapes:
         ]
 
     @pytest.mark.parametrize("kind", ["plane", "unknown", "ellipsoid"])
-    def test_what_urdf_has_not(self, kind):
+    def test_unsupported_shape_is_rejected(self, kind):
         size = (1, 2, 3) if kind == "ellipsoid" else ()
         with pytest.raises(ValueError, match=kind):
             urdf_text(robot(link("base", visuals=(shape(kind, *size),))))
 
-    def test_what_cannot_touch_anything_does_not_collide(self):
+    def test_geometry_without_contacts(self):
         ghost = shape("sphere", 0.1, contype=0, conaffinity=0)
         assert parsed(robot(link("base", collisions=(ghost,)))).find("link/collision") is None
 
 
-def test_an_axis_beside_the_origin_of_its_child():
+def test_axis_with_offset():
     """The child turns about the axis, and is where it was in between."""
     anchor = np.array([0.1, -0.2, 0.3])
     moved = joint(
@@ -375,8 +375,8 @@ def test_an_axis_beside_the_origin_of_its_child():
     assert mass_of(made) == pytest.approx(3, rel=1e-6)
 
 
-def test_the_same_text_each_time():
-    model = to_canonical(Facts(load_robot(bundled.find("biped")))).model
+def test_text_is_deterministic():
+    model = to_canonical(Facts(load_robot(bundled.urdf_path("biped")))).model
     assert urdf_text(model) == urdf_text(model)
 
 
@@ -406,7 +406,7 @@ def written(request, robot_file, tmp_path_factory):
 
 
 class TestRobots:
-    def test_mujoco_loads_it_as_it_stands(self, written):
+    def test_mujoco_loads_urdf(self, written):
         """Names, masses and kinematics are those of the source."""
         with quiet_mujoco():
             model = mujoco.MjModel.from_xml_path(str(written.path))
@@ -428,7 +428,7 @@ class TestRobots:
                 assert turn.T @ (there.xpos - place) == pytest.approx(pose[:3, 3], abs=1e-7)
                 assert turn.T @ there.xmat.reshape(3, 3) == pytest.approx(pose[:3, :3], abs=1e-7)
 
-    def test_so_does_yourdfpy(self, written):
+    def test_yourdfpy_loads_urdf(self, written):
         robot = yourdfpy.URDF.load(str(written.path), load_meshes=False)
         facts = written.source
         rng = np.random.default_rng(1)
@@ -438,7 +438,7 @@ class TestRobots:
             there = robot.get_transform(body.top.name, facts.bodies[0].top.name)
             np.testing.assert_allclose(there, pose, atol=1e-7)
 
-    def test_the_linter_reads_it_back(self, written):
+    def test_load_robot_reads_urdf(self, written):
         """No problem of reading, no mesh that is lost, no other joint order."""
         model = load_robot(written.path)
         facts = Facts(model, Meshes())

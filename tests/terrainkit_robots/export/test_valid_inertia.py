@@ -40,7 +40,7 @@ def compiled(form):
         ]
 
 
-def test_a_sensor_without_an_inertia_is_a_part_of_the_trunk(tmp_path):
+def test_sensor_mass_moves_to_trunk(tmp_path):
     robot = facts(tmp_path, {"trunk": TRUNK, "imu": NOTHING.format(0.5)}, fixed("trunk", "imu"))
     form = to_canonical(robot, floating=True)
     _, imu = form.model.links
@@ -56,7 +56,7 @@ def test_a_sensor_without_an_inertia_is_a_part_of_the_trunk(tmp_path):
     assert [model.body_mass.sum() for model in compiled(form)] == pytest.approx([60.5] * 2)
 
 
-def test_the_heaviest_link_takes_what_the_base_cannot_hold(tmp_path):
+def test_heaviest_link_gets_mass(tmp_path):
     robot = facts(tmp_path, {"base": NOTHING.format(1e-6), "trunk": TRUNK}, fixed("base", "trunk"))
     form = to_canonical(robot, floating=True)
     base, trunk = form.model.links
@@ -66,7 +66,7 @@ def test_the_heaviest_link_takes_what_the_base_cannot_hold(tmp_path):
     compiled(form)
 
 
-def test_a_plate_may_be_turned_and_rounded(tmp_path):
+def test_rotated_and_rounded_plate(tmp_path):
     plate = f'{TURNED}<mass value="2"/>' + (
         '<inertia ixx="0.010004" iyy="0.02" izz="0.03001" ixy="0" ixz="0" iyz="0"/>'
     )
@@ -78,7 +78,7 @@ def test_a_plate_may_be_turned_and_rounded(tmp_path):
     compiled(form)
 
 
-def test_what_no_body_can_have_is_left_as_it_is(tmp_path):
+def test_invalid_body_is_unchanged(tmp_path):
     wrong = '<mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="1" ixy="0" ixz="0" iyz="0"/>'
     robot = facts(tmp_path, {"a": wrong, "b": NOTHING.format(1)}, fixed("a", "b"))
     form = to_canonical(robot, floating=True)
@@ -90,7 +90,7 @@ def test_what_no_body_can_have_is_left_as_it_is(tmp_path):
 NONE = '<mass value="{}"/>'
 
 
-def test_an_inertia_that_is_not_written_is_one_of_zero(tmp_path):
+def test_missing_inertia_is_zero(tmp_path):
     forms = [
         to_canonical(facts(tmp_path, {"trunk": TRUNK, "imu": imu}, fixed("trunk", "imu")))
         for imu in (NONE.format(0.5), NOTHING.format(0.5))
@@ -105,7 +105,7 @@ def test_an_inertia_that_is_not_written_is_one_of_zero(tmp_path):
     compiled(forms[0])
 
 
-def test_a_mass_alone_has_no_inertia_in_either_file(tmp_path):
+def test_single_mass_without_inertia(tmp_path):
     joint = """<joint name="j" type="continuous"><parent link="base"/><child link="arm"/>
       <axis xyz="0 1 0"/></joint>"""
     robot = facts(tmp_path, {"base": NONE.format(5), "arm": TRUNK}, joint)

@@ -114,7 +114,7 @@ def test_leg_rules_need_legs():
     made = report(rule([violation()], needs=("legs",)))
     assert made.findings == ()
     assert made.skipped[0].reason == "no legs detected"
-    robot = Facts(load_robot(bundled.find("biped")))
+    robot = Facts(load_robot(bundled.urdf_path("biped")))
     assert len(report(rule([violation()], needs=("legs",)), robot=robot).findings) == 1
 
 
@@ -173,15 +173,15 @@ def test_all_rules_run_by_default():
 
 
 def test_lint_is_deterministic():
-    robot = bundled.find("quadruped")
+    robot = bundled.urdf_path("quadruped")
     first, second = (lint(Facts(load_robot(robot))) for _ in range(2))
     assert first.findings == second.findings
     assert first.skipped == second.skipped
 
 
-@pytest.mark.parametrize("name", bundled.names())
+@pytest.mark.parametrize("name", bundled.robot_names())
 @pytest.mark.parametrize("suffix", [".urdf", ".xml"])
 def test_bundled_robots_pass_all_rules(name, suffix):
-    made = lint(Facts(load_robot(bundled.find(name).with_suffix(suffix))))
+    made = lint(Facts(load_robot(bundled.urdf_path(name).with_suffix(suffix))))
     assert made.crashed == ()
     assert made.verdict == "pass"

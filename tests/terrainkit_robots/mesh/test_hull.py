@@ -12,7 +12,7 @@ def cloud(count, seed=0):
 
 @pytest.mark.parametrize("count", [4, 5, 50, 5000])
 @pytest.mark.parametrize("size", [1e-4, 1.0, 1e4])
-def test_the_hull_is_that_of_scipy(count, size):
+def test_hull_matches_scipy(count, size):
     points = cloud(count) * size + size
     hull = convex_hull(points)
     assert is_closed(hull)
@@ -20,7 +20,7 @@ def test_the_hull_is_that_of_scipy(count, size):
     assert {tuple(p) for p in hull.points} <= {tuple(p) for p in points}
 
 
-def test_a_thin_sheet_has_a_hull():
+def test_hull_of_thin_sheet():
     corners = trimesh.creation.box([1, 1, 5e-4]).vertices
     assert signed_volume(convex_hull(corners)) == pytest.approx(5e-4, rel=1e-3)
 
@@ -34,13 +34,13 @@ def test_a_thin_sheet_has_a_hull():
         pytest.param(cloud(100)[:, [0, 0, 0]], id="a line"),
     ],
 )
-def test_what_is_flat_has_none(points, capfd):
+def test_flat_points_are_rejected(points, capfd):
     with pytest.raises(MeshError, match="is flat and has no convex hull"):
         convex_hull(points)
     assert capfd.readouterr() == ("", "")
 
 
-def test_fewer_corners():
+def test_max_vertices():
     sphere = trimesh.creation.icosphere(subdivisions=4).vertices
     hull = convex_hull(sphere, 200)
     assert len(hull.points) <= 200
@@ -48,7 +48,7 @@ def test_fewer_corners():
     assert signed_volume(hull) == pytest.approx(4 / 3 * np.pi, rel=0.05)
 
 
-def test_of_very_many_points_it_is_almost_the_hull():
+def test_hull_of_many_points_is_approximate():
     points = cloud(60_000)
     points /= np.linalg.norm(points, axis=1, keepdims=True)
     points = np.concatenate([points, 2 * np.eye(3)])

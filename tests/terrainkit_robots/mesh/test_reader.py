@@ -64,16 +64,16 @@ SAMPLES = {
         pytest.param("msh", msh(BOX.vertices, BOX.faces, 3, 5), id="MSH"),
     ],
 )
-def test_a_box_in_every_format(kind, data):
+def test_box_in_every_format(kind, data):
     assert np.allclose(triangles(kind, data), BOX.triangles, atol=1e-6)
 
 
-def test_what_is_written_is_read():
+def test_round_trip():
     surface = read_mesh("stl", binary_stl(read_mesh("stl", exported("stl"))))
     assert np.allclose(surface.points[surface.faces], BOX.triangles, atol=1e-6)
 
 
-def test_a_mesh_of_nothing_but_points_is_their_hull():
+def test_points_without_faces_become_hull():
     surface = read_mesh("msh", msh(TETRAHEDRON))
     assert len(surface.faces) == 4
     with pytest.raises(MeshError, match="is flat"):
@@ -86,19 +86,19 @@ class TestObj:
     def faces(self, text):
         return read_mesh("obj", self.POINTS + text).faces.tolist()
 
-    def test_indices_of_textures_and_normals(self):
+    def test_texture_and_normal_indices(self):
         assert self.faces(b"f 1/9/9 2//9 3/9\n") == [[0, 1, 2]]
 
-    def test_indices_from_the_end(self):
+    def test_negative_indices(self):
         assert self.faces(b"f -4 -3 -2\n") == [[0, 1, 2]]
 
-    def test_polygons_become_triangles(self):
+    def test_polygons_are_triangulated(self):
         assert self.faces(b"f 1 2 3 4\nf 1 2\nf 4 3 2\n") == [[0, 1, 2], [0, 2, 3], [3, 2, 1]]
 
-    def test_lines_that_go_on_and_ends_of_windows(self):
+    def test_continued_lines_and_windows_line_endings(self):
         assert self.faces(b"f 1 2 \\\r\n 3\r\n") == [[0, 1, 2]]
 
-    def test_weights_and_colors_are_left(self):
+    def test_weights_and_colors_are_ignored(self):
         data = b"v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 2 0 1 0 0\nvn 1 2 3\nvt 1 1\nf 1 2 3\n"
         assert read_mesh("obj", data).points.tolist() == [[0, 0, 0], [1, 0, 0], [0, 2, 0]]
 
@@ -153,7 +153,7 @@ def test_broken_files(kind, data, problem):
     where=st.floats(0, 1),
     noise=st.binary(max_size=12) | st.sampled_from([b"", b"-1", b"1e999", b"nan", b"99999999999"]),
 )
-def test_no_damage_is_too_much(kind, where, noise):
+def test_damaged_files_raise_mesh_error(kind, where, noise):
     data = SAMPLES[kind]
     at = int(where * len(data))
     data = data[:at] + noise + data[at + len(noise) :]
@@ -164,7 +164,7 @@ def test_no_damage_is_too_much(kind, where, noise):
         assert np.isfinite(surface.points[surface.faces]).all()
 
 
-def test_other_files_are_not_followed(tmp_path, monkeypatch):
+def test_external_files_are_not_read(tmp_path, monkeypatch):
     # A GLB may name its data by another file.
     monkeypatch.chdir(tmp_path)
     (tmp_path / "data.bin").write_bytes(TETRAHEDRON.tobytes())
@@ -181,7 +181,7 @@ def test_other_files_are_not_followed(tmp_path, monkeypatch):
         read_mesh("glb", b"glTF" + struct.pack("<II", 2, 12 + len(chunk)) + chunk)
 
 
-def test_points_that_are_a_corner_of_nothing_are_dropped():
+def test_unused_points_are_removed():
     """Modelers leave them behind; a1's hip.dae reaches 2 cm farther with them."""
     points = [[9, 9, 9], *TETRAHEDRON[:2], [np.nan, 0, 0], *TETRAHEDRON[2:]]
     surface = read_mesh("msh", msh(points, [[1, 2, 4], [1, 4, 5], [1, 5, 2], [2, 5, 4]]))

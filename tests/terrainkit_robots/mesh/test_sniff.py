@@ -29,7 +29,7 @@ LFS = b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 1050284\
         pytest.param(".fbx", b"Kaydara", "other", None, id="something else"),
     ],
 )
-def test_sound_files(suffix, data, kind, faces):
+def test_valid_files(suffix, data, kind, faces):
     header = header_of(suffix, data)
     assert (header.format, header.faces, header.state) == (kind, faces, "fine")
     assert header.size == len(data)
@@ -64,19 +64,19 @@ def test_broken_files(suffix, data, problem):
     assert problem in header.problem
 
 
-def test_a_longer_stl_has_all_its_faces():
+def test_stl_with_trailing_data_has_faces():
     assert header_of(".stl", stl(2) + b"\0").faces == 2
     assert header_of(".stl", stl(2)[:-1]).faces is None
 
 
 @pytest.mark.parametrize("suffix", [".stl", ".dae", ".obj", ".fbx"])
-def test_a_pointer_of_git_lfs(suffix):
+def test_git_lfs_pointer(suffix):
     header = header_of(suffix, LFS)
     assert header.state == "lfs"
     assert "1,050,284 bytes" in header.problem
 
 
-def test_only_the_ends_are_read(tmp_path):
+def test_only_ends_are_read(tmp_path):
     path = tmp_path / "a.dae"
     with path.open("wb") as stream:  # a hole of 4 GB that no disk holds
         stream.write(DAE[:-11])
@@ -86,32 +86,32 @@ def test_only_the_ends_are_read(tmp_path):
     assert (header.state, header.size) == ("fine", 4 * 2**30 + 11)
 
 
-class TestOtherThanFiles:
-    def test_nothing(self, tmp_path):
+class TestSpecialFiles:
+    def test_missing(self, tmp_path):
         assert read_header(tmp_path / "a.stl").state == "missing"
 
     @pytest.mark.parametrize("name", ["a" * 300, "a\0b", "\ud800"])
-    def test_no_name_of_a_file(self, tmp_path, name):
+    def test_invalid_path(self, tmp_path, name):
         assert read_header(tmp_path / name).state == "missing"
 
-    def test_a_folder(self, tmp_path):
+    def test_folder(self, tmp_path):
         (tmp_path / "a.stl").mkdir()
         assert read_header(tmp_path / "a.stl").problem == "is a folder, not a file"
 
-    def test_a_pipe_that_nobody_writes_to(self, tmp_path):
+    def test_pipe(self, tmp_path):
         os.mkfifo(tmp_path / "a.stl")
         assert read_header(tmp_path / "a.stl").problem == "is a pipe, not a file"
 
-    def test_a_device(self, tmp_path):
+    def test_device(self, tmp_path):
         (tmp_path / "a.stl").symlink_to("/dev/zero")
         assert read_header(tmp_path / "a.stl").problem == "is a device, not a file"
 
-    def test_a_loop_of_links(self, tmp_path):
+    def test_symbolic_link_cycle(self, tmp_path):
         (tmp_path / "a.stl").symlink_to("a.stl")
         assert read_header(tmp_path / "a.stl").state == "missing"
 
     @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may read all")
-    def test_a_file_that_is_closed(self, tmp_path):
+    def test_no_permission(self, tmp_path):
         (tmp_path / "a.stl").write_bytes(stl(1))
         (tmp_path / "a.stl").chmod(0)
         assert read_header(tmp_path / "a.stl").state == "closed"

@@ -14,7 +14,7 @@ from terrainkit_robots.quiet_mujoco import quiet_mujoco
 
 @pytest.fixture
 def source():
-    return Facts(load_robot(bundled.find("quadruped")))
+    return Facts(load_robot(bundled.urdf_path("quadruped")))
 
 
 @pytest.fixture

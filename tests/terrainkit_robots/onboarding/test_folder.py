@@ -1,3 +1,6 @@
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -26,6 +29,17 @@ def test_new_folder_writes_nothing_after_error(tmp_path):
     with pytest.raises(ExportError, match="outside"), new_folder(tmp_path / "robot") as folder:
         write_files(folder, {"robot.toml": b"new", "../outside": b""})
     assert file_names(tmp_path) == []
+
+
+def test_new_folder_removes_folders_of_killed_processes(tmp_path):
+    killed = subprocess.Popen([sys.executable, "-c", ""])
+    killed.wait()
+    with new_folder(tmp_path / "a") as folder:
+        name = folder.parent.name
+    stale = tmp_path / name.replace(f"-{os.getpid()}-", f"-{killed.pid}-")
+    (stale / "a").mkdir(parents=True)
+    make(tmp_path / "b")
+    assert sorted(file_names(tmp_path)) == ["a", "b"]
 
 
 def test_new_folder_requires_overwrite(tmp_path):

@@ -34,14 +34,14 @@ def make_spec(order, **changes):
 
 @pytest.fixture(scope="module")
 def quadruped():
-    return Facts(load_robot(bundled.find("quadruped")))
+    return Facts(load_robot(bundled.urdf_path("quadruped")))
 
 
 def arm(kind, limits):
     text = f"""<robot name="arm"><link name="base"/><link name="tip"/>
     <joint name="j" type="{kind}"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/>
     {limits}</joint></robot>"""
-    path = bundled.find("quadruped")
+    path = bundled.urdf_path("quadruped")
     return Facts(load_robot(path, contents={path: text.encode()}))
 
 
@@ -84,7 +84,7 @@ def test_joint_table_of_joint_without_limits():
 
 
 def test_joint_table_lists_units_of_both_kinds():
-    path = bundled.find("quadruped")
+    path = bundled.urdf_path("quadruped")
     text = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
     <joint name="h" type="continuous"><parent link="a"/><child link="b"/></joint>
     <joint name="s" type="prismatic"><parent link="b"/><child link="c"/></joint></robot>"""

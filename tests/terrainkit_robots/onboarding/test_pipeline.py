@@ -47,7 +47,7 @@ def test_onboard_real_robot(name, robot_file, onboarded):
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
 @pytest.mark.parametrize("suffix", [".urdf", ".xml"])
 def test_onboard_bundled_robot(name, suffix, onboarded):
-    check_folder(bundled.find(name).with_suffix(suffix), onboarded)
+    check_folder(bundled.urdf_path(name).with_suffix(suffix), onboarded)
 
 
 def check_folder(file, onboarded):

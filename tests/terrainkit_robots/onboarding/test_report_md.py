@@ -55,7 +55,7 @@ def equivalence(file, *, mass=0.0, distance=1e-6, link="FL_foot"):
 
 
 def facts_of(text=None):
-    path = bundled.find("quadruped")
+    path = bundled.urdf_path("quadruped")
     return Facts(load_robot(path, contents={} if text is None else {path: text.encode()}))
 
 

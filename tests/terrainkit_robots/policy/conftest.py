@@ -19,9 +19,9 @@ from terrainkit_robots.rl.config import Control, Env, Normalization, Policy, Run
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import Run, create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import MapTerrain, Plane, Terrain
+from terrainkit_robots.spec.robot import Robot
 
 torch.set_num_threads(1)
 

@@ -20,9 +20,9 @@ from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import Control, DomainRand, Env, Noise, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import open_run
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.spec.robot import Robot
 
 DOCS = Path(__file__).parents[3] / "docs" / "exported_policy.md"
 FILES = ["policy.json", "policy.onnx", "policy.pt"]

@@ -7,8 +7,8 @@ from terrainkit_robots.rl.config import Env, Runner, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.spec.robot import Robot
 
 TASK = Task(
     env=Env(num_envs=16, num_threads=1), runner=Runner(num_steps_per_env=12, save_interval=100)

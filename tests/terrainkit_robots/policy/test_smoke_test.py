@@ -24,9 +24,9 @@ from terrainkit_robots.policy.smoke_test import (
 from terrainkit_robots.rl.config import Control, Env, Rewards, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.rewards import REWARDS
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.spec.robot import Robot
 
 TASK = Task(env=Env(num_envs=16, num_threads=1))
 
@@ -222,7 +222,7 @@ def quick(monkeypatch):
 @pytest.mark.usefixtures("quick")
 def test_smoke_test_onboards_a_file(tmp_path):
     urdf = tmp_path / "quadruped.urdf"
-    shutil.copy(bundled.find("quadruped"), urdf)
+    shutil.copy(bundled.urdf_path("quadruped"), urdf)
     before = urdf.read_bytes()
     result = smoke_test(str(urdf))
     assert result.passed, failed(result)
@@ -234,7 +234,7 @@ def test_smoke_test_onboards_a_file(tmp_path):
 @pytest.mark.usefixtures("quick")
 def test_smoke_test_rejects_a_file_with_errors(tmp_path):
     urdf = tmp_path / "bad.urdf"
-    text = bundled.find("quadruped").read_text()
+    text = bundled.urdf_path("quadruped").read_text()
     urdf.write_text(text.replace('<mass value="', '<mass value="-', 1))
     (check,) = smoke_test(str(urdf)).checks
     assert (check.name, check.passed) == ("can be onboarded", False)

@@ -24,9 +24,9 @@ from terrainkit_robots.rl.config import (
     Task,
 )
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import MapTerrain, Plane, Terrain
+from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
 # Test files are not in packages, so shared modules are found by path.

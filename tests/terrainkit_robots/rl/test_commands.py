@@ -15,8 +15,8 @@ from terrainkit_robots.rl.commands import VelocityCommand, sample_commands, uses
 from terrainkit_robots.rl.config import Commands, Control, DomainRand, Env, InitState, Rewards, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.rewards import REWARDS
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import quat_to_yaw
 
 torch.set_num_threads(1)
@@ -194,7 +194,7 @@ def make_env(num_envs: int = 4, **changes: Any) -> LeggedEnv:
         domain_rand=DomainRand(push_interval_s=0, joint_offset=0),
         control=Control(decimation=changes.pop("decimation", 4)),
     )
-    robot = Robot.load(Path(str(bundled.find("quadruped"))).parent)
+    robot = Robot.load(Path(str(bundled.urdf_path("quadruped"))).parent)
     ground = changes.pop("ground", Plane())
     return LeggedEnv(replace(task, **changes), robot, ground)
 

@@ -52,10 +52,11 @@ def test_every_reward_has_a_scale():
 
 
 @every_section
-def test_every_field_has_a_docstring(section):
+def test_every_option_has_a_docstring(section):
     told = field_docs(type(section))
     for each in dataclasses.fields(section):
-        assert told[each.name].endswith("."), each.name
+        if not isinstance(getattr(section, each.name), Config):  # it has a docstring of its own
+            assert told[each.name].endswith("."), each.name
 
 
 @every_section

@@ -14,8 +14,8 @@ from terrainkit_robots.rl.commands import VelocityCommand, sample_commands
 from terrainkit_robots.rl.config import Commands, DomainRand, Env, InitState, Task, Terrain
 from terrainkit_robots.rl.curriculum import TerrainCurriculum
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.spec.robot import Robot
 
 torch.set_num_threads(1)
 
@@ -348,7 +348,9 @@ class TestInEnvironment:
             init_state=InitState(lin_vel=0, ang_vel=0, yaw=0),
             domain_rand=DomainRand(push_interval_s=0),
         )
-        env = LeggedEnv(task, Robot.load(Path(str(bundled.find("quadruped"))).parent), Patches())
+        env = LeggedEnv(
+            task, Robot.load(Path(str(bundled.urdf_path("quadruped"))).parent), Patches()
+        )
         env.curriculum.levels[:] = 4
         env.reset()
         return env

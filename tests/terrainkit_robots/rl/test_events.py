@@ -20,9 +20,10 @@ from terrainkit_robots.rl.events import (
     sample_params,
     sample_reset_state,
 )
-from terrainkit_robots.rl.scene import Robot, build_scene
+from terrainkit_robots.rl.scene import build_scene
 from terrainkit_robots.rl.simulation import Simulation
 from terrainkit_robots.rl.terrain import MapTerrain, Plane
+from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import quat_to_yaw
 
 _NONE = DomainRand(
@@ -37,7 +38,7 @@ _NONE = DomainRand(
 
 
 def robot_named(name: str) -> Robot:
-    return Robot.load(Path(str(bundled.find(name))).parent)
+    return Robot.load(Path(str(bundled.urdf_path(name))).parent)
 
 
 def physics_of(kind: Literal["P", "V", "T"] = "P", n: int = 5) -> Simulation:

@@ -18,9 +18,9 @@ from terrainkit_robots.rl.observations import (
     policy_group,
     privileged_group,
 )
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.spec.robot import Robot
 
 torch.set_num_threads(1)
 
@@ -55,7 +55,7 @@ def state(n: int = 1, **arrays: Any) -> State:
 
 @pytest.fixture(scope="module")
 def robot() -> Robot:
-    return Robot.load(Path(str(bundled.find("quadruped"))).parent)
+    return Robot.load(Path(str(bundled.urdf_path("quadruped"))).parent)
 
 
 def group_of(robot: Robot, task: Task | None = None) -> tuple[ObservationTerm, ...]:
@@ -275,7 +275,7 @@ class TestNoise:
 
 class TestInEnvironment:
     def make(self, **changes: Any) -> LeggedEnv:
-        robot = Robot.load(Path(str(bundled.find("quadruped"))).parent)
+        robot = Robot.load(Path(str(bundled.urdf_path("quadruped"))).parent)
         task = replace(Task(env=Env(num_envs=3, num_threads=1)), **changes)
         return LeggedEnv(task, robot, Plane())
 

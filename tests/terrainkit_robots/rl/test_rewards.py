@@ -16,9 +16,9 @@ from terrainkit_robots.rl import rewards as module
 from terrainkit_robots.rl.config import Env, Rewards, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.rewards import REWARDS, active_rewards, reward
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.spec.robot import Robot
 
 torch.set_num_threads(1)
 
@@ -49,7 +49,7 @@ def random_state(n: int, seed: int) -> State:
 @pytest.fixture(scope="module")
 def robot() -> Robot:
     """Return a robot with two joints, the second without position limits."""
-    real = Robot.load(Path(str(bundled.find("quadruped"))).parent)
+    real = Robot.load(Path(str(bundled.urdf_path("quadruped"))).parent)
     return replace(
         real,
         spec=replace(real.spec, base_height_target=0.3),
@@ -330,7 +330,7 @@ def test_active_rewards_have_nonzero_scales() -> None:
 
 def make_env(settings: Rewards, num_envs: int = 4, **other: Any) -> LeggedEnv:
     task = Task(env=Env(num_envs=num_envs, num_threads=1, **other), rewards=settings)
-    return LeggedEnv(task, Robot.load(Path(str(bundled.find("quadruped"))).parent), Plane())
+    return LeggedEnv(task, Robot.load(Path(str(bundled.urdf_path("quadruped"))).parent), Plane())
 
 
 _NONE = dict.fromkeys(REWARDS, 0.0)

@@ -29,11 +29,11 @@ from terrainkit_robots.rl.run import (
     open_run,
     policy_state,
     read_checkpoint,
-    rewrite_task,
+    run_folder,
     save_checkpoint,
 )
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.terrain import load_terrain
+from terrainkit_robots.spec.robot import Robot
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ def test_open_run_returns_what_was_created(run, task, quadruped):
     opened = open_run(run)
     assert opened.task == task
     assert opened.robot.spec == quadruped.spec
-    assert opened.robot_name == "quadruped"
+    assert opened.info.robot == "quadruped"
     assert opened.robot.mjcf == quadruped.mjcf
     assert opened.terrain == "plane"
     assert opened.checkpoint is None
@@ -70,7 +70,7 @@ def test_open_run_uses_the_trained_spec(tmp_path, task, quadruped):
     spec.write_text(re.sub("spawn_height = [0-9.]+", "spawn_height = 7.5", spec.read_text()))
     assert Robot.load(mine).spec.spawn_height == 7.5
     opened = open_run(folder)
-    assert opened.robot_name == str(mine)
+    assert opened.info.robot == str(mine)
     assert opened.robot.spec == quadruped.spec
 
 
@@ -93,10 +93,8 @@ def test_changed_robot_files_names_the_files(tmp_path, task):
         (mine / name).write_bytes(before + b"\n")
         assert changed_robot_files(run) == (name,)
         (mine / name).write_bytes(before)
-    about = (run.folder / RUN_FILE).read_text().partition("[robot_sha256]")[0]
-    (run.folder / RUN_FILE).write_text(about)
     (mine / "robot.toml").write_bytes(before + b"\n")
-    assert changed_robot_files(run) == ()  # a run of an earlier version has no digests
+    assert changed_robot_files(replace(run, info=replace(run.info, robot_sha256=None))) == ()
 
 
 def test_missing_map_is_generated_again(tmp_path, task, mixed_map):
@@ -175,9 +173,10 @@ def test_default_folder_is_inside_logs(name):
     assert folder.parent.name not in ("", ".", "..")
 
 
-def test_rewrite_task_replaces_the_task(run, task):
+def test_run_folder_replaces_the_task(run, task):
+    (run / "model_1.pt").touch()
     other = replace(task, runner=replace(task.runner, max_iterations=77))
-    rewrite_task(open_run(run), other)
+    assert run_folder(None, "quadruped", "plane", other, open_run(run)) == run
     assert open_run(run).task == other
 
 
@@ -191,7 +190,7 @@ def test_open_run_finds_bundled_policy_by_name(tmp_path, task, monkeypatch):
     create_run(shipped, task, "rover_of_this_test", "plane")
     opened = open_run("rover_of_this_test")
     assert opened.folder == shipped == mine / "trained" / "rover_of_this_test"
-    assert opened.robot_name == "rover_of_this_test"
+    assert opened.info.robot == "rover_of_this_test"
 
 
 def test_local_run_precedes_bundled_policy(tmp_path, task, monkeypatch):
@@ -199,7 +198,7 @@ def test_local_run_precedes_bundled_policy(tmp_path, task, monkeypatch):
     Path("quadruped").mkdir()
     assert open_run("quadruped").folder == tasks.get_task("quadruped").trained_run
     create_run(Path("quadruped"), task, "biped", "plane")
-    assert open_run("quadruped").robot_name == "biped"
+    assert open_run("quadruped").info.robot == "biped"
 
 
 def test_open_run_rejects_other_folders(tmp_path):
@@ -216,10 +215,10 @@ def test_open_run_rejects_other_folders(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("format_version = 1", "format_version = 2", "format_version: got 2; expected 1"),
+        ("format_version = 1", "format_version = 2", "format_version: got 2; expected one of: 1"),
         ('robot = "quadruped"', "robot = 3", "robot: got 3; expected a string"),
         ('robot = "quadruped"', 'robot = "gone"', "folder 'gone'"),
-        ('terrain = "plane"', "", "terrain: got 'nothing'; expected a string"),
+        ('terrain = "plane"', "", "terrain: missing; expected a string"),
         ("seed", "seed =", "not a TOML file"),
     ],
 )

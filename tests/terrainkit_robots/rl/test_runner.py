@@ -15,8 +15,8 @@ from terrainkit_robots.rl.config import Algorithm, Env, Policy, Rewards, Runner,
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import open_run, policy_state, read_checkpoint, save_checkpoint
 from terrainkit_robots.rl.runner import LeggedRunner, resolve_device, runner_config
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.terrain import Plane, Terrain
+from terrainkit_robots.spec.robot import Robot
 
 Make = Callable[..., LeggedRunner]
 

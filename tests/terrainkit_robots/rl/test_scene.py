@@ -8,9 +8,10 @@ import torch
 from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.config import Asset, Control, Rewards, Sim
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.scene import Robot, build_scene
+from terrainkit_robots.rl.scene import build_scene
 from terrainkit_robots.rl.simulation import Simulation
 from terrainkit_robots.rl.terrain import MapTerrain, ModelTerrain, Plane
+from terrainkit_robots.spec.robot import Robot
 
 
 @pytest.fixture(scope="module")

@@ -33,16 +33,16 @@ def plugin(monkeypatch):
 
     def install(value):
         point = importlib.metadata.EntryPoint("rover", value, tasks.ENTRY_POINTS)
-        found = {tasks.ENTRY_POINTS: (point,)}
-        monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: found[group])
+        points = importlib.metadata.EntryPoints((point,))
+        monkeypatch.setattr(importlib.metadata, "entry_points", points.select)
 
     return install
 
 
-@pytest.mark.parametrize("name", bundled.names())
+@pytest.mark.parametrize("name", bundled.robot_names())
 def test_bundled_robots_have_a_task(name):
     found = get_task(name)
-    assert (found.name, found.folder) == (name, bundled.find(name).parent)
+    assert (found.name, found.folder) == (name, bundled.urdf_path(name).parent)
     assert name in task_names()
     read = scene.Robot.load(found.folder)
     assert read.mjcf.is_file()
@@ -164,8 +164,9 @@ def guide(tmp_path, monkeypatch):
     path.write_text(code[0])
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(rewards, "REWARDS", dict(rewards.REWARDS))
-    found = (importlib.metadata.EntryPoint(name, module, tasks.ENTRY_POINTS),)
-    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: found)  # noqa: ARG005
+    point = importlib.metadata.EntryPoint(name, module, tasks.ENTRY_POINTS)
+    points = importlib.metadata.EntryPoints((point,))
+    monkeypatch.setattr(importlib.metadata, "entry_points", points.select)
     yield get_task(name)
     for loaded in (module, module.partition(".")[0]):
         sys.modules.pop(loaded, None)

@@ -10,13 +10,13 @@ import torch
 from terrainkit_robots.description import bundled
 from terrainkit_robots.rl.config import DomainRand, Env, InitState, Task, Termination
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.scene import Robot
 from terrainkit_robots.rl.terminations import (
     bad_orientation,
     illegal_contact,
     terrain_out_of_bounds,
 )
 from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import projected_gravity
 
 torch.set_num_threads(1)
@@ -81,7 +81,7 @@ def make_env(ground: Plane | None = None, **changes: Any) -> LeggedEnv:
         domain_rand=DomainRand(push_interval_s=0),
         **changes,
     )
-    robot = Robot.load(Path(str(bundled.find("quadruped"))).parent)
+    robot = Robot.load(Path(str(bundled.urdf_path("quadruped"))).parent)
     return LeggedEnv(task, robot, ground or Plane())
 
 

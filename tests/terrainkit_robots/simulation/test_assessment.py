@@ -61,7 +61,7 @@ def test_assess_reports_every_failure_unless_diverged(stood):
 
 @pytest.fixture(scope="module")
 def quadruped():
-    return Facts(load_robot(bundled.find("quadruped")))
+    return Facts(load_robot(bundled.urdf_path("quadruped")))
 
 
 def stand(facts, sim):

@@ -37,9 +37,9 @@ def test_drop_test_of_pendulum(tmp_path):
     assert (drop.max_speed_joint, drop.diverged, drop.seconds) == ("j", False, pytest.approx(1.5))
 
 
-@pytest.mark.parametrize("name", bundled.names())
+@pytest.mark.parametrize("name", bundled.robot_names())
 def test_drop_test_of_bundled_robots_is_reproducible(name):
-    sim = make_sim_model(Facts(load_robot(bundled.find(name))))
+    sim = make_sim_model(Facts(load_robot(bundled.urdf_path(name))))
     before = sim.standing_qpos.copy(), sim.model.geom_contype.copy()
     drop = drop_test(sim)
     assert not drop.diverged

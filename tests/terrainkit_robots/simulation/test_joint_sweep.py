@@ -71,7 +71,7 @@ def test_joint_sweep_measures_gravity_load(crane):
 
 
 def test_joint_sweep_follows_actuator_order():
-    facts = Facts(load_robot(bundled.find("biped")))
+    facts = Facts(load_robot(bundled.urdf_path("biped")))
     sim = make_sim_model(facts)
     results = joint_sweep(sim)
     assert tuple(result.joint for result in results) == sim.actuated
@@ -84,7 +84,7 @@ def test_joint_sweep_follows_actuator_order():
 def test_joint_sweep_is_symmetric():
     results = {
         r.joint: r
-        for r in joint_sweep(make_sim_model(Facts(load_robot(bundled.find("quadruped")))))
+        for r in joint_sweep(make_sim_model(Facts(load_robot(bundled.urdf_path("quadruped")))))
     }
     left, right = results["FL_hip_joint"], results["FR_hip_joint"]
     assert left.reached[0] == pytest.approx(-right.reached[1], abs=1e-9)

@@ -176,10 +176,10 @@ def test_gains_never_reduce_armature(name, robot_file):
 
 
 def test_gains_add_armature_to_light_calf():
-    light = suggest_gains(read(bundled.find("quadruped")))
+    light = suggest_gains(read(bundled.urdf_path("quadruped")))
     assert light["FL_calf_joint"].armature == pytest.approx(0.01)
     assert "armature" in light["FL_calf_joint"].reason
-    declared = suggest_gains(read(bundled.find("quadruped").with_suffix(".xml")))
+    declared = suggest_gains(read(bundled.urdf_path("quadruped").with_suffix(".xml")))
     assert declared["FL_calf_joint"].armature == pytest.approx(0.01)
     assert "armature" not in declared["FL_calf_joint"].reason
 

@@ -15,7 +15,7 @@ INERTIAL = """<inertial><mass value="1"/>
 
 
 def quadruped():
-    return Facts(load_robot(bundled.find("quadruped")))
+    return Facts(load_robot(bundled.urdf_path("quadruped")))
 
 
 def chain(folder, count, shape=""):

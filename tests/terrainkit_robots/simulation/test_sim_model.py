@@ -9,7 +9,7 @@ from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.sim_model import TIME_STEP, SimModel, make_sim_model
 
-ROBOTS = [(name, suffix) for name in bundled.names() for suffix in (".urdf", ".xml")]
+ROBOTS = [(name, suffix) for name in bundled.robot_names() for suffix in (".urdf", ".xml")]
 BASES = {"quadruped": "base", "biped": "pelvis"}
 
 ARM = """
@@ -30,7 +30,7 @@ ARM = """
 @pytest.fixture(params=ROBOTS, ids=lambda robot: "".join(robot))
 def facts(request):
     name, suffix = request.param
-    return Facts(load_robot(bundled.find(name).with_suffix(suffix)))
+    return Facts(load_robot(bundled.urdf_path(name).with_suffix(suffix)))
 
 
 @pytest.fixture

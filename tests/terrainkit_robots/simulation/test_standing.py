@@ -68,13 +68,13 @@ def test_stand_test_of_bipeds_with_locked_joints(name, robot_file):
 
 
 def test_stand_test_of_biped_falls():
-    standing = stand(read(bundled.find("biped")))
+    standing = stand(read(bundled.urdf_path("biped")))
     assert standing.tilt > 0.5
     assert "pelvis" in standing.other_contacts
 
 
 def test_stand_test_is_reproducible():
-    facts = read(bundled.find("quadruped"))
+    facts = read(bundled.urdf_path("quadruped"))
     model = make_sim_model(facts).model
     before = model.actuator_gainprm.copy(), model.dof_armature.copy()
     first = stand(facts)
@@ -85,7 +85,7 @@ def test_stand_test_is_reproducible():
 
 
 def test_stand_test_with_stiffer_gains_sinks_less():
-    facts = read(bundled.find("quadruped"))
+    facts = read(bundled.urdf_path("quadruped"))
     stiff = {
         name: type(gain)(
             stiffness=3 * gain.stiffness, damping=2 * gain.damping, armature=0.02, reason=""
@@ -103,7 +103,7 @@ def test_stand_test_with_stiffer_gains_sinks_less():
 
 
 def test_stand_test_reports_knee_contacts():
-    facts = read(bundled.find("quadruped").with_suffix(".xml"))
+    facts = read(bundled.urdf_path("quadruped").with_suffix(".xml"))
     limp = {
         name: type(gain)(stiffness=1.0, damping=1.0, armature=gain.armature, reason="")
         for name, gain in suggest_gains(facts).items()
@@ -117,12 +117,12 @@ def test_stand_test_reports_knee_contacts():
 
 
 def test_stand_test_without_areas_reports_feet():
-    facts = read(bundled.find("quadruped"))
+    facts = read(bundled.urdf_path("quadruped"))
     assert "FL_foot" in stand(facts, areas=()).other_contacts
 
 
 def test_contact_areas_of_foot_and_shank():
-    facts = read(bundled.find("quadruped"))
+    facts = read(bundled.urdf_path("quadruped"))
     holds = {hold.body: hold for hold in contact_areas(facts)}
     assert math.isinf(holds["FL_foot"].radius)
     assert 0.05 < holds["FL_calf"].radius < 0.213

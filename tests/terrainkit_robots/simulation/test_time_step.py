@@ -43,7 +43,7 @@ def gain(stiffness, damping, armature=0.0):
 
 
 def quadruped():
-    facts = Facts(load_robot(bundled.find("quadruped")))
+    facts = Facts(load_robot(bundled.urdf_path("quadruped")))
     return make_sim_model(facts), suggest_gains(facts)
 
 

@@ -6,12 +6,12 @@ _FOLDER = Path(__file__).parent
 _NAMES = ("biped", "quadruped")
 
 
-def names() -> tuple[str, ...]:
+def robot_names() -> tuple[str, ...]:
     """Return the names of the bundled robots."""
     return _NAMES
 
 
-def find(name: str) -> Path | None:
+def urdf_path(name: str) -> Path | None:
     """Return the URDF of a bundled robot, or None if there is no such robot.
 
     The robot's MJCF is in the same folder.

@@ -70,7 +70,7 @@ def _capsule(r: float, half: float) -> tuple[float, Matrix]:
     volume = caps + middle
     if not volume > 0:
         return volume, np.zeros(3)
-    # a half ball has its centre 3/8 r from its flat side, which is `half` from the middle
+    # the center of a half ball is 3/8 r from its flat side, which is `half` from the center
     across_ends = 2 / 5 * r**2 + half**2 + 3 / 4 * r * half
     across = caps * across_ends + middle * (r**2 / 4 + half**2 / 3)
     along = caps * 2 / 5 * r**2 + middle * r**2 / 2

@@ -89,7 +89,7 @@ def parse_mjcf(tree: MjcfTree) -> tuple["mujoco.MjSpec | None", list[Node]]:
 
     for node in list(tree.nodes()):
         _check_numbers(tree, node)
-    began, message = time.monotonic(), ""
+    start, message = time.monotonic(), ""
     for _ in range(_MAX_ATTEMPTS):
         limit_size(tree)
         text, attached, lines = tree.write()
@@ -100,7 +100,7 @@ def parse_mjcf(tree: MjcfTree) -> tuple["mujoco.MjSpec | None", list[Node]]:
             tree.complete, message = False, _clean_message(str(error))
             if not _repair(tree, lines, str(error)):
                 return None, lines
-        if time.monotonic() - began > _MAX_SECONDS:
+        if time.monotonic() - start > _MAX_SECONDS:
             break
     reason = f"MuJoCo still rejects the file without the reported elements ({message}); "
     report(tree, tree.root, "XML011", reason + "the robot is not checked")
@@ -123,16 +123,16 @@ def _check_numbers(tree: MjcfTree, node: Node) -> None:
     MuJoCo reports only one at a time, and accepts NaN.
     """
     for name, text in list(node.attributes.items()):
-        if name not in _COUNTS or node.tag == "flag":  # which has message
+        if name not in _COUNTS or node.tag == "flag":  # its attributes are words
             continue
-        message = text.lower().replace("+", "").split()
-        if name in _INFINITE_ALLOWED and any(word in ("inf", "-inf") for word in message):
-            message = ["0" if word in ("inf", "-inf") else word for word in message]
+        words = text.lower().replace("+", "").split()
+        if name in _INFINITE_ALLOWED and any(word in ("inf", "-inf") for word in words):
+            words = ["0" if word in ("inf", "-inf") else word for word in words]
         counts = _COUNTS[name]
         count = (
-            counts[0] if name in _EXACT or (node.tag, name) == ("joint", "range") else len(message)
+            counts[0] if name in _EXACT or (node.tag, name) == ("joint", "range") else len(words)
         )
-        if not message or parse_numbers(" ".join(message), count) is not None:
+        if not words or parse_numbers(" ".join(words), count) is not None:
             continue
         repaired = next((r for n in counts if (r := replace_commas(text, n))), "")
         expected = "a number" if counts[0] == 1 else f"{counts[0]} numbers"
@@ -157,8 +157,8 @@ def _check_numbers(tree: MjcfTree, node: Node) -> None:
 def _repair(tree: MjcfTree, lines: list[Node], error: str) -> bool:
     """Report and remove what MuJoCo rejects; return False if its message does not name it."""
     message = _clean_message(error)
-    place = re.search(r"Element '[^']*', line (\d+)", error)
-    line = int(place[1]) if place else 0
+    location = re.search(r"Element '[^']*', line (\d+)", error)
+    line = int(location[1]) if location else 0
     if not 1 <= line <= len(lines):
         report(tree, tree.root, "XML011", f"MuJoCo rejects the file: {message}")
         return False
@@ -193,17 +193,17 @@ def _similar_nodes(
     tree: MjcfTree, node: Node, *, attribute: str = "", value: str = ""
 ) -> list[Node]:
     """Return all nodes with the same error: same tag, same parent tag, same attribute and value."""
-    place = node.parent.tag if node.parent else ""
-    duplicates = [
+    parent_tag = node.parent.tag if node.parent else ""
+    others = [
         other
         for other in tree.nodes()
         if other is not node
         and other.tag == node.tag
-        and (other.parent.tag if other.parent else "") == place
+        and (other.parent.tag if other.parent else "") == parent_tag
         and (not attribute or attribute in other.attributes)
         and (not value or other.attributes[attribute] == value)
     ]
-    return [node, *duplicates]
+    return [node, *others]
 
 
 def _count_suffix(nodes: list[Node]) -> str:
@@ -433,7 +433,7 @@ _REPAIRS: tuple[tuple[str, _Repair], ...] = (
 """Patterns of MuJoCo's messages and their repairs; the first repair that succeeds is used."""
 
 
-# What MuJoCo knows
+# MuJoCo schema
 
 
 @cache

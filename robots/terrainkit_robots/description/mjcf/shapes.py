@@ -165,7 +165,7 @@ def fromto_pose(ends: Matrix) -> tuple[Matrix, float]:
     x, y, z = along / length
     pose = np.eye(4)
     if x * x + y * y > 1e-28 or z < 0:
-        axis = np.array([-y, x, 0.0])  # of the smallest rotation from z to there
+        axis = np.array([-y, x, 0.0])  # of the smallest rotation from z
         norm = np.hypot(x, y)
         axis = axis / norm if norm > 1e-14 else np.array([1.0, 0, 0])
         half = np.arctan2(norm, z) / 2
@@ -246,7 +246,7 @@ def mesh_geometry(geometry: Geometry, mesh: Any, file: MeshFile, scale: Scale) -
     scales = np.array(file.scale)
     rotation = quat_to_matrix(np.asarray(mesh.refquat)).T
     if np.any(scales != scales[0]) and np.abs(rotation - np.eye(3)).max() > 1e-9:
-        return replace(geometry, shape="unknown", mesh=file)  # no scale_solid mesh in any pose
+        return replace(geometry, shape="unknown", mesh=file)  # not a scaled mesh in any pose
     mesh_pose = np.eye(4)
     mesh_pose[:3, :3] = rotation
     mesh_pose[:3, 3] = -scale.length * scales * (rotation @ np.asarray(mesh.refpos))

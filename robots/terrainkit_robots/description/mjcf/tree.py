@@ -226,7 +226,8 @@ class _Reader:
         written = {_prefixed_name(name, element): value for name, value in element.attrib.items()}
         node = Node(tag=tag, source=source, folder=folder, parent=parent, written=written)
         node.attributes = {
-            k: _base_name(v) if k.startswith("file") and tag != "model" else v
+            # without folders, because MuJoCo's parser checks whether files exist
+            k: re.split(r"[/\\]", v)[-1] or v if k.startswith("file") and tag != "model" else v
             for k, v in written.items()
             if k not in _excluded_attributes(tag)
         }
@@ -335,11 +336,6 @@ class _Reader:
             message = f"elements are nested more than {_MAX_DEPTH} deep; MuJoCo rejects the file"
             self.problems.append(Problem(code="XML011", message=message, source=source))
         self._deep, self.complete = True, False
-
-
-def _base_name(file: str) -> str:
-    """Return a file name without folders, because MuJoCo's parser checks whether files exist."""
-    return re.split(r"[/\\]", file)[-1] or file
 
 
 def _prefixed_name(name: str, element: "etree._Element") -> str:

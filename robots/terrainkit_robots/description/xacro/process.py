@@ -162,7 +162,7 @@ def _check_expression(text: str) -> None:
             )
 
 
-# PackageResolver
+# Packages
 
 
 def _install_find(
@@ -171,7 +171,7 @@ def _install_find(
     """Resolve `$(find ...)` without ROS."""
     searches = {str(file): PackageResolver(file, packages)}
 
-    def find(name: str) -> str:
+    def find_package(name: str) -> str:
         at = str((xacro.filestack or [None])[-1] or file)
         for start in dict.fromkeys(
             (str(file), at)
@@ -184,8 +184,8 @@ def _install_find(
             f"package {name}: not found; pass its folder with --package {name}=FOLDER"
         )
 
-    substitution_args._eval_find = find
-    substitution_args._eval_dict["find"] = find  # for $(eval ...)
+    substitution_args._eval_find = find_package
+    substitution_args._eval_dict["find"] = find_package  # for $(eval ...)
 
 
 # Locations of elements
@@ -287,13 +287,9 @@ def _error_message(error: BaseException, request: Mapping[str, Any]) -> str:
         if isinstance(cause, OSError):
             return f"xacro: cannot read {cause.filename}: {cause.strerror}"
     macro = next(iter(getattr(error, "macros", ())), None)
-    words = f"{error}{_in_macro(macro)}" or type(error).__name__
-    return f"xacro: {truncate(' '.join(words.split()), _MAX_MESSAGE)}"
-
-
-def _in_macro(macro: Any) -> str:
     name = macro.body.getAttribute("name") if macro is not None else ""
-    return f" of macro {name}" if name else ""
+    words = f"{error} of macro {name}" if name else str(error) or type(error).__name__
+    return f"xacro: {truncate(' '.join(words.split()), _MAX_MESSAGE)}"
 
 
 def _chain(error: BaseException | None) -> Iterator[BaseException]:

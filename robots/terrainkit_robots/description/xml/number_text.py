@@ -16,7 +16,7 @@ _NOTHING = 1e-12
 def number_text(values: float | Sequence[float] | Matrix) -> str:
     """Return numbers separated by spaces."""
     flat = np.atleast_1d(np.asarray(values, dtype=float)).ravel()
-    return " ".join(f"{value + 0.0:.{DIGITS}g}" for value in flat)  # minus zero becomes zero
+    return " ".join(f"{value + 0.0:.{DIGITS}g}" for value in flat)  # turns -0 into 0
 
 
 def place_text(values: Sequence[float] | Matrix) -> str:

@@ -19,7 +19,6 @@ from terrainkit_robots.export.mesh_export.file_names import FileNames
 from terrainkit_robots.export.mesh_export.mesh_bytes import MeshBytes, has_no_volume, mesh_bytes
 from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes
 from terrainkit_robots.mesh.surface import binary_stl
-from terrainkit_robots.transforms import Matrix
 
 _MIN_THICKNESS = 0.001
 """Thickness of the box that replaces a flat mesh [m]. Simulators with a time step of 5 ms detect
@@ -118,7 +117,8 @@ class _MeshExporter:
         try:
             content = self._content(mesh)
         except MeshError as error:
-            if is_collision and not self._is_flat(mesh):
+            is_flat = self._meshes.is_readable(mesh) and has_no_volume(self._meshes, mesh)
+            if is_collision and not is_flat:
                 raise RobotFileError(
                     f"{self._model.file}: collision mesh {mesh.filename} of {link.name} {error}"
                 ) from None
@@ -150,9 +150,6 @@ class _MeshExporter:
             raise MeshError(*result.args)
         return result
 
-    def _is_flat(self, mesh: MeshFile) -> bool:
-        return self._meshes.is_readable(mesh) and has_no_volume(self._meshes, mesh)
-
     def _box_of_flat_mesh(
         self, link: Link, shape: Geometry, mesh: MeshFile, file: str
     ) -> Geometry | None:
@@ -166,11 +163,12 @@ class _MeshExporter:
             f"{1000 * _MIN_THICKNESS:g} mm thickness"
         )
         size = np.maximum(half, _MIN_THICKNESS / 2)
-        return _box(shape, pose, size)
-
-
-def _box(shape: Geometry, pose: Matrix, size: Matrix) -> Geometry:
-    x, y, z = map(float, size)
-    return replace(
-        shape, shape="box", size=(x, y, z), mesh=None, fit_to_mesh=False, origin=shape.origin @ pose
-    )
+        x, y, z = map(float, size)
+        return replace(
+            shape,
+            shape="box",
+            size=(x, y, z),
+            mesh=None,
+            fit_to_mesh=False,
+            origin=shape.origin @ pose,
+        )

@@ -18,6 +18,7 @@ from terrainkit_robots.text import count
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.bodies.overlap import Overlap
+    from terrainkit_robots.transforms import Matrix
 
 _MAX_OVERLAP = 0.001
 """Overlap above which simulators push two bodies apart [m]."""
@@ -239,14 +240,14 @@ def overlap_in_range(robot: Facts) -> Iterator[Violation]:
     """
     if not robot.joints:
         raise CannotCheckError("there are no moving joints")
-    positions = {}
+    positions: dict[str, Matrix] = {}
     for index, joint in enumerate(robot.joints):
         lower, upper = joint_range(joint)
         if upper - lower > 4 * np.pi:
             lower, upper = -_DEFAULT_RANGE, _DEFAULT_RANGE
         # Multiples of the square roots of different primes are evenly distributed modulo 1.
         samples = np.arange(1, _NUM_SAMPLES + 1) * math.sqrt(_PRIMES[index % len(_PRIMES)]) % 1
-        positions[joint.name] = lower + (upper - lower) * samples
+        positions[joint.name] = np.asarray(lower + (upper - lower) * samples, dtype=np.float64)
     counts: Counter[tuple[str, str]] = Counter()
     for overlaps in robot.overlap_scene.sweep(positions, _NUM_SAMPLES):
         deepest = _group_by_pair(robot, overlaps)

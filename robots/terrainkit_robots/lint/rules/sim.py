@@ -248,7 +248,8 @@ def _explaining_rule(robot: Facts, error: str) -> str:
 
 
 def _load_failure(robot: Facts, loader: str, refusal: "LoadError", code: str) -> Violation:
-    sources = {each.name: each.source for each in (*robot.model.joints, *robot.model.links)}
+    sources = {link.name: link.source for link in robot.model.links}
+    sources = {joint.name: joint.source for joint in robot.model.joints} | sources
     source = sources.get(refusal.element) if refusal.element else None
     element = f" ({names([refusal.element])})" if refusal.element else ""
     return Violation(

@@ -266,11 +266,11 @@ def compiled(path):
         "go2/urdf/go2.urdf",
         "h1/urdf/h1.urdf",
         "g1/g1_29dof.urdf",
-        *bundled.names(),
+        *bundled.robot_names(),
     ],
 )
 def test_merge_bodies_matches_mujoco(name, robot_file):
-    path = bundled.find(name) if name in bundled.names() else robot_file(name)
+    path = bundled.urdf_path(name) if name in bundled.robot_names() else robot_file(name)
     model = compiled(path)
     merged = Facts(load_robot(path)).bodies
     assert len(merged) == model.nbody - 1

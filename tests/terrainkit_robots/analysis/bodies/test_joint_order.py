@@ -29,7 +29,7 @@ def test_permutation_of_different_names_is_none():
 
 
 def test_joints_are_depth_first():
-    path = bundled.find("quadruped")
+    path = bundled.urdf_path("quadruped")
     robot = Facts(load_robot(path))
     legs = ("FL", "FR", "RL", "RR")
     expected = tuple(f"{leg}_{part}_joint" for leg in legs for part in ("hip", "thigh", "calf"))

@@ -137,8 +137,8 @@ def test_stance_torques_match_mujoco(name, robot_file):
 
 def test_stance_torque_of_waist_matches_mujoco(tmp_path):
     # The legs of the bundled biped below an inclined waist with a torso above it.
-    text = bundled.find("biped").read_text()
-    model = load_robot(bundled.find("biped"))
+    text = bundled.urdf_path("biped").read_text()
+    model = load_robot(bundled.urdf_path("biped"))
     trunk = Facts(model).bodies[0].top.name
     inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
     text = text.replace(

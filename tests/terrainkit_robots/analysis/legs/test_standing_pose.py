@@ -262,7 +262,7 @@ def test_standing_pose_of_random_legs(thigh, ratio, lower, upper):
 
 
 def test_standing_pose_keeps_keyframe():
-    path = bundled.find("quadruped").with_suffix(".xml")
+    path = bundled.urdf_path("quadruped").with_suffix(".xml")
     robot = Facts(load_robot(path))
     assert robot.model.home
     assert solve_standing_pose(robot.leg_model) == {

@@ -37,7 +37,7 @@ def test_inertias_exclude_joints_with_armature(mjcf):
 
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
 def test_inertias_match_mass_matrix_of_mujoco(name):
-    path = bundled.find(name)
+    path = bundled.urdf_path(name)
     # With a fixed base, the diagonal of the mass matrix is the inertia about each axis.
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)

@@ -51,7 +51,7 @@ def test_merge_joints_keeps_mjcf_bodies(mjcf):
 
 @pytest.mark.parametrize("name", ["quadruped.urdf", "quadruped.xml"])
 def test_merged_feet_of_bundled_quadruped(name):
-    merges = merged_feet(Facts(load_robot(bundled.find("quadruped").with_name(name))))
+    merges = merged_feet(Facts(load_robot(bundled.urdf_path("quadruped").with_name(name))))
     if name.endswith("xml"):
         assert merges == ()
         return
@@ -61,14 +61,14 @@ def test_merged_feet_of_bundled_quadruped(name):
 
 
 def test_merged_feet_without_attribute(tmp_path):
-    text = bundled.find("quadruped").read_text().replace('dont_collapse="true"', "")
+    text = bundled.urdf_path("quadruped").read_text().replace('dont_collapse="true"', "")
     (tmp_path / "robot.urdf").write_text(text)
     merges = merged_feet(Facts(load_robot(tmp_path / "robot.urdf")))
     assert {simulator for each in merges for simulator in each.merged_body} == set(SIMULATORS)
 
 
 def test_merged_feet_of_separate_bodies_is_empty():
-    assert merged_feet(Facts(load_robot(bundled.find("biped")))) == ()
+    assert merged_feet(Facts(load_robot(bundled.urdf_path("biped")))) == ()
 
 
 def test_keep_link_options_cover_every_simulator():

@@ -222,7 +222,7 @@ def test_mujoco_order_of_published_robot(robot_file, name):
 
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
 def test_mujoco_order_of_bundled_robot(name):
-    path = bundled.find(name)
+    path = bundled.urdf_path(name)
     check(path, compile_urdf(path.read_text()))
     model = path.with_suffix(".xml")
     with quiet_mujoco():

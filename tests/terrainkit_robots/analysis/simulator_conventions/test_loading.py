@@ -33,13 +33,13 @@ def facts_of(folder, text, name="robot.xml"):
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
 def test_load_errors_of_bundled_robots_are_none(name):
     for suffix in (".urdf", ".xml"):
-        facts = Facts(load_robot(bundled.find(name).with_suffix(suffix)))
+        facts = Facts(load_robot(bundled.urdf_path(name).with_suffix(suffix)))
         assert mujoco_load_error(facts.model) is None
-    assert load_in_yourdfpy(Facts(load_robot(bundled.find(name)))) is None
+    assert load_in_yourdfpy(Facts(load_robot(bundled.urdf_path(name)))) is None
 
 
 def test_mujoco_load_error_names_element(tmp_path):
-    text = bundled.find("quadruped").read_text().replace('ixx="', 'ixx="9', 1)
+    text = bundled.urdf_path("quadruped").read_text().replace('ixx="', 'ixx="9', 1)
     refusal = mujoco_load_error(facts_of(tmp_path, text, "robot.urdf").model)
     assert refusal.message == "inertia must satisfy A + B >= C; use 'balanceinertia' to fix"
     assert refusal.element == "base"

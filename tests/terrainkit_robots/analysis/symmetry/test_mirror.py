@@ -275,7 +275,7 @@ def test_mirror_of_robot_along_y_is_x():
 
 def test_mirror_offset_of_lateral_trunk_frame():
     # The frame of the trunk is that of a sensor at its side.
-    path = bundled.find("quadruped")
+    path = bundled.urdf_path("quadruped")
     plain = Facts(load_robot(path))
     trunk = plain.bodies[0].top.name
     text = path.read_text().replace(

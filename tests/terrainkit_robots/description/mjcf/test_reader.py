@@ -163,9 +163,7 @@ def compiled_without_meshes(file: Path) -> mujoco.MjModel:
 
 
 @pytest.mark.parametrize("name", ["h1/h1.xml", "g1/g1_29dof.xml", "go2_mjcf/go2.xml"])
-def test_published_robots_are_read_as_mujoco_compiles_them(
-    name: str, robot_file: Callable[[str], Path]
-) -> None:
+def test_published_robots_match_mujoco(name: str, robot_file: Callable[[str], Path]) -> None:
     file = robot_file(name)
     robot, model = read_file(file), compiled_without_meshes(file)
     assert robot.problems == ()
@@ -196,7 +194,7 @@ def test_published_robots_are_read_as_mujoco_compiles_them(
     ]
 
 
-def test_go2_has_its_home_and_its_limits_of_torque(robot_file: Callable[[str], Path]) -> None:
+def test_go2_home_and_torque_limits(robot_file: Callable[[str], Path]) -> None:
     robot = read_file(robot_file("go2_mjcf/go2.xml"))
     assert robot.home["RR_calf_joint"] == -1.8
     assert robot.imu is not None
@@ -267,14 +265,14 @@ EVERYTHING = """
 """
 
 
-def test_what_the_xml_means_is_what_mujoco_compiles() -> None:
+def test_model_matches_mujoco() -> None:
     robot = read(EVERYTHING)
     assert robot.problems == ()
     assert robot.name == "everything"
     assert_compiled(robot, compiled(EVERYTHING))
 
 
-def test_every_link_is_where_mujoco_puts_it() -> None:
+def test_link_poses_match_mujoco() -> None:
     robot, model = read(EVERYTHING), compiled(EVERYTHING)
     data = mujoco.MjData(model)
     bodies = merge_bodies(build_tree(robot))
@@ -295,7 +293,7 @@ def test_every_link_is_where_mujoco_puts_it() -> None:
                     same_pose(at @ local, pose(theirs.xpos, theirs.xquat))
 
 
-def test_several_joints_of_a_body_have_links_between_them() -> None:
+def test_joints_of_one_body_have_virtual_links() -> None:
     robot = read(EVERYTHING)
     between = [each.name for each in robot.links if each.virtual]
     assert between == ["leg:swing", "leg:lift"]
@@ -305,7 +303,7 @@ def test_several_joints_of_a_body_have_links_between_them() -> None:
     assert slide.kind == "prismatic"
 
 
-def test_roots_hang_from_the_world() -> None:
+def test_root_bodies_have_parent_world() -> None:
     robot = read(EVERYTHING)
     assert joint(robot, "root").kind == "floating"
     assert {each.child for each in robot.joints if each.parent == "world"} == {"trunk", "post"}
@@ -314,7 +312,7 @@ def test_roots_hang_from_the_world() -> None:
     assert joint(robot, "wrist").kind == "ball"
 
 
-def test_home_is_the_first_keyframe_with_positions() -> None:
+def test_home_is_first_keyframe_with_positions() -> None:
     robot = read(
         in_world(
             '<body name="a"><freejoint name="root"/><body name="b"><joint name="hip"/>'
@@ -328,18 +326,18 @@ def test_home_is_the_first_keyframe_with_positions() -> None:
     assert robot.home == {"hip": 0.4, "slide": 0.5, "knee": 0.6}
 
 
-def test_excluded_pairs_are_kept() -> None:
+def test_excluded_pairs() -> None:
     assert read(EVERYTHING).excluded == frozenset({frozenset({"trunk", "leg"})})
 
 
-def test_each_replica_knows_its_element() -> None:
+def test_replicas_have_source_of_element() -> None:
     robot = read(EVERYTHING)
     lines = {link(robot, f"fin{k}").source.line for k in range(3)}
     assert len(lines) == 1
     assert '<body name="fin">' in EVERYTHING.splitlines()[lines.pop() - 1]
 
 
-def test_sources_are_where_the_elements_start() -> None:
+def test_sources_are_start_lines() -> None:
     text = in_world('\n<body\n name="a">\n<joint\n name="j" range="0 1"/><geom\n size="1"/></body>')
     robot = read(text)
     assert link(robot, "a").source.line == 2
@@ -370,7 +368,7 @@ SCALED = """
 
 
 @pytest.mark.parametrize("extra", ["", 'scaling="geometry"', 'massscale="3"'])
-def test_frames_that_scale_are_read_as_mujoco_compiles_them(extra: str) -> None:
+def test_scaled_frames_match_mujoco(extra: str) -> None:
     if not hasattr(mujoco.MjSpec().worldbody.add_frame(), "scale"):
         pytest.skip(f"frames of MuJoCo {mujoco.__version__} have no scale")
     text = SCALED.format(extra=extra)
@@ -388,7 +386,7 @@ def test_frames_that_scale_are_read_as_mujoco_compiles_them(extra: str) -> None:
         'boundmass="1.5" boundinertia="2"',
     ],
 )
-def test_masses_follow_the_compiler_settings(compiler: str) -> None:
+def test_masses_follow_compiler_settings(compiler: str) -> None:
     inside = """<body name="a"><freejoint/><inertial pos="1 0 0" mass="2" diaginertia="1 1 1"/>
       <geom size="1" mass="3"/><geom size="1" group="2" mass="4"/>
       <body name="b"><joint/><geom size="1" mass="5"/><geom size="2" group="3" mass="6"/></body>
@@ -397,7 +395,7 @@ def test_masses_follow_the_compiler_settings(compiler: str) -> None:
     assert_compiled(read(text), compiled(text))
 
 
-def test_inertia_of_each_shape_is_mujocos() -> None:
+def test_geom_inertia_matches_mujoco() -> None:
     for shape in (
         'type="sphere" size="0.3"',
         'type="box" size="0.1 0.2 0.3"',
@@ -412,7 +410,7 @@ def test_inertia_of_each_shape_is_mujocos() -> None:
         assert_compiled(read(text), compiled(text))
 
 
-def test_a_mass_that_hangs_on_a_mesh_file_is_not_a_number() -> None:
+def test_mass_from_mesh_is_nan() -> None:
     robot = read(
         in_world(
             '<body name="a"><joint/><geom type="mesh" mesh="m"/></body>'
@@ -432,7 +430,7 @@ def test_a_mass_that_hangs_on_a_mesh_file_is_not_a_number() -> None:
     assert np.isnan(known.inertia).all()
 
 
-def test_a_body_without_mass_or_shapes_has_no_inertial() -> None:
+def test_empty_body_has_no_inertial() -> None:
     assert link(read(in_world('<body name="a"/>')), "a").inertial is None
 
 
@@ -460,7 +458,7 @@ def box_stl(file: Path) -> Matrix:
         'refpos="0.1 0.2 0.3" scale="1 2 3"',
     ],
 )
-def test_a_mesh_lies_where_mujoco_puts_it(asset: str, tmp_path: Path) -> None:
+def test_mesh_pose_matches_mujoco(asset: str, tmp_path: Path) -> None:
     file = tmp_path / "robot.xml"
     corners = box_stl(tmp_path / "parts" / "box.stl")
     file.write_text(
@@ -495,7 +493,7 @@ def order(points: Matrix) -> Matrix:
         ('strippath="true" meshdir="m"', "somewhere/else/box.stl", "m/box.stl"),
     ],
 )
-def test_mesh_files_are_where_the_compiler_settings_say(
+def test_mesh_paths_follow_compiler_settings(
     compiler: str, name: str, path: str, tmp_path: Path
 ) -> None:
     file = tmp_path / "robot.xml"
@@ -512,7 +510,7 @@ def test_mesh_files_are_where_the_compiler_settings_say(
     mujoco.MjModel.from_xml_path(str(file))  # MuJoCo finds it there
 
 
-def test_an_absolute_mesh_path_stays_as_it_is() -> None:
+def test_absolute_mesh_path_is_unchanged() -> None:
     robot = read(
         in_world(
             '<body name="a"><geom type="mesh" mesh="b"/></body>',
@@ -524,7 +522,7 @@ def test_an_absolute_mesh_path_stays_as_it_is() -> None:
     assert shape.mesh.path == Path("/robots/b.stl")
 
 
-def test_a_mesh_that_is_in_the_model_itself_has_no_file() -> None:
+def test_inline_mesh_has_no_file() -> None:
     robot = read(
         in_world(
             '<body name="a"><geom type="mesh" mesh="m"/><geom type="box" mesh="f"/></body>',
@@ -538,7 +536,7 @@ def test_a_mesh_that_is_in_the_model_itself_has_no_file() -> None:
     assert fitted.mesh is not None
 
 
-def test_what_is_only_drawn_is_a_visual() -> None:
+def test_geom_without_contacts_is_visual() -> None:
     robot = read(
         in_world(
             '<body name="a"><geom size="1" name="drawn" contype="0" conaffinity="0"/>'
@@ -555,7 +553,7 @@ def test_what_is_only_drawn_is_a_visual() -> None:
     assert all(shape.contacts for shape in a.collisions)
 
 
-def test_contacts_that_are_switched_off_for_all() -> None:
+def test_contacts_disabled_by_option() -> None:
     flag = '<option><flag contact="disable"/></option>'
     robot = read(in_world('<body name="a"><geom size="1"/></body>', flag))
     assert [shape.contacts for shape in link(robot, "a").collisions] == [False]
@@ -578,9 +576,7 @@ def test_contacts_that_are_switched_off_for_all() -> None:
         ('rgba="-1 0 0 1"', None),
     ],
 )
-def test_a_shape_has_its_own_color_or_that_of_its_material(
-    attributes: str, color: tuple[float, ...] | None
-) -> None:
+def test_geom_color_or_material_color(attributes: str, color: tuple[float, ...] | None) -> None:
     rest = (
         '<default><default class="painted"><geom material="blue"/></default>'
         '<default class="red"><geom rgba="1 0 0 1"/></default></default>'
@@ -606,7 +602,9 @@ def test_a_shape_has_its_own_color_or_that_of_its_material(
         ('type="slide"', "prismatic", None),
     ],
 )
-def test_kind_and_limits(attributes: str, kind: str, bounds: tuple[float, float] | None) -> None:
+def test_joint_kind_and_limits(
+    attributes: str, kind: str, bounds: tuple[float, float] | None
+) -> None:
     text = in_world(
         f'<body name="a"><joint name="j" {attributes}/></body>', '<compiler angle="radian"/>'
     )
@@ -619,7 +617,7 @@ def test_kind_and_limits(attributes: str, kind: str, bounds: tuple[float, float]
         assert (it.limit.lower, it.limit.upper) == bounds
 
 
-def test_a_range_that_autolimits_would_be_needed_for_is_told() -> None:
+def test_range_without_limited_is_reported() -> None:
     robot = read(
         in_world('<body><joint name="j" range="0 1"/></body>', '<compiler autolimits="false"/>')
     )
@@ -647,7 +645,7 @@ def test_a_range_that_autolimits_would_be_needed_for_is_told() -> None:
         ("", '<motor joint="j" ctrlrange="-inf inf" forcerange="-4 4"/>', 4),
     ],
 )
-def test_effort(joint_has: str, drives: str, effort: float | None) -> None:
+def test_actuator_effort(joint_has: str, drives: str, effort: float | None) -> None:
     robot = read(
         in_world(
             f'<body name="a"><joint name="j" {joint_has}/></body>',
@@ -659,7 +657,7 @@ def test_effort(joint_has: str, drives: str, effort: float | None) -> None:
     assert robot.problems == ()
 
 
-def test_actuators_know_their_joint() -> None:
+def test_actuators_have_joint() -> None:
     robot = read(
         in_world(
             '<body name="a"><joint name="j"/><site name="s"/></body>',
@@ -671,7 +669,7 @@ def test_actuators_know_their_joint() -> None:
     assert [each.effort for each in robot.actuators] == [1, None, None]
 
 
-def test_the_armature_of_a_motor_counts_for_its_joint() -> None:
+def test_actuator_armature_adds_to_joint() -> None:
     text = in_world(
         '<body name="a"><joint name="j" armature="0.5"/><geom size="1"/></body>',
         '<actuator><motor joint="j" armature="0.1" gear="3"/></actuator>',
@@ -682,7 +680,7 @@ def test_the_armature_of_a_motor_counts_for_its_joint() -> None:
     assert joint(robot, "j").armature == pytest.approx(0.5 + 0.1 * 9)
 
 
-def test_a_joint_that_an_equality_ties_to_another_mimics_it() -> None:
+def test_joint_equality_becomes_mimic() -> None:
     robot = read(
         in_world(
             '<body name="a"><joint name="j" ref="0.2"/><body name="b"><joint name="k" ref="0.1"/>'
@@ -699,7 +697,7 @@ def test_a_joint_that_an_equality_ties_to_another_mimics_it() -> None:
     assert joint(robot, "l").mimic is None  # not in proportion
 
 
-def test_names_are_made_up_for_what_has_none() -> None:
+def test_unnamed_elements_get_names() -> None:
     robot = read(in_world("<body><freejoint/><body><joint/><joint/></body><body/></body>"))
     names = [each.name for each in robot.links if not each.virtual]
     assert len(set(names)) == 3
@@ -718,7 +716,7 @@ def write_all(folder: Path, files: Mapping[str, str]) -> Path:
     return folder / "robot.xml"
 
 
-def test_included_elements_know_their_file_and_line(tmp_path: Path) -> None:
+def test_included_elements_have_file_and_line(tmp_path: Path) -> None:
     file = write_all(
         tmp_path,
         {
@@ -748,7 +746,7 @@ def test_included_elements_know_their_file_and_line(tmp_path: Path) -> None:
     mujoco.MjSpec.from_file(str(file))  # so does MuJoCo
 
 
-def test_an_include_beside_the_including_file_is_found_as_by_mujoco(tmp_path: Path) -> None:
+def test_include_relative_to_including_file(tmp_path: Path) -> None:
     file = write_all(
         tmp_path,
         {
@@ -776,9 +774,7 @@ def test_an_include_beside_the_including_file_is_found_as_by_mujoco(tmp_path: Pa
         ('<include file="part.xml"><body/></include>', "children"),
     ],
 )
-def test_broken_includes_are_told_and_the_rest_is_read(
-    include: str, says: str, tmp_path: Path
-) -> None:
+def test_broken_includes_are_reported(include: str, says: str, tmp_path: Path) -> None:
     file = write_all(
         tmp_path,
         {
@@ -796,7 +792,7 @@ def test_broken_includes_are_told_and_the_rest_is_read(
     assert link(robot, "a")
 
 
-def test_a_broken_included_file_is_told_by_its_own_name(tmp_path: Path) -> None:
+def test_errors_in_included_file_name_the_file(tmp_path: Path) -> None:
     file = write_all(
         tmp_path,
         {
@@ -809,7 +805,7 @@ def test_a_broken_included_file_is_told_by_its_own_name(tmp_path: Path) -> None:
     assert (problem.source.file.name, problem.source.line) == ("part.xml", 2)
 
 
-def test_contents_stand_for_files(tmp_path: Path) -> None:
+def test_contents_replace_files(tmp_path: Path) -> None:
     file = tmp_path / "robot.xml"
     data = b'<mujoco><include file="part.xml"/></mujoco>'
     part = b'<x><worldbody><body name="b"/></worldbody></x>'
@@ -817,7 +813,7 @@ def test_contents_stand_for_files(tmp_path: Path) -> None:
     assert [each.name for each in robot.links] == ["b"]
 
 
-def test_an_attached_model_is_read_with_its_own_settings(tmp_path: Path) -> None:
+def test_attached_model_keeps_its_settings(tmp_path: Path) -> None:
     file = write_all(
         tmp_path,
         {
@@ -846,7 +842,7 @@ def test_an_attached_model_is_read_with_its_own_settings(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("model", ["gone.xml", "robot.xml", "robot.urdf"])
-def test_models_that_cannot_be_attached_are_told(model: str, tmp_path: Path) -> None:
+def test_invalid_attachments_are_reported(model: str, tmp_path: Path) -> None:
     file = write_all(
         tmp_path,
         {
@@ -864,7 +860,7 @@ def test_models_that_cannot_be_attached_are_told(model: str, tmp_path: Path) -> 
 # What MuJoCo refuses
 
 
-def test_a_defect_does_not_hide_the_next() -> None:
+def test_all_defects_are_reported() -> None:
     text = in_world(
         '\n<body name="a" poss="1 2 3"><inertial pos="0 0 0" mass="1,5" diaginertia="1 1 1"/>'
         '\n<joint name="j" range="0 1 2"/><joint name="j"/><geom size="0.1" type="ball"/></body>'
@@ -957,7 +953,7 @@ def test_a_defect_does_not_hide_the_next() -> None:
         ("<mujocoinclude/>", "XML002", "mujocoinclude"),
     ],
 )
-def test_each_defect_has_its_code(text: str, code: str, says: str) -> None:
+def test_defects_have_codes(text: str, code: str, says: str) -> None:
     problem = only(read(text))
     assert problem.code == code
     assert says in problem.message
@@ -965,7 +961,7 @@ def test_each_defect_has_its_code(text: str, code: str, says: str) -> None:
     assert problem.source.line == 1
 
 
-def test_what_mujoco_refuses_to_parse_or_compile_is_told() -> None:
+def test_everything_mujoco_rejects_is_reported() -> None:
     """Every text of the test above that MuJoCo takes is one that its compiler refuses."""
     for text in (
         in_world('<body name="a"><geom sise="1"/></body>'),
@@ -977,7 +973,7 @@ def test_what_mujoco_refuses_to_parse_or_compile_is_told() -> None:
             mujoco.MjModel.from_xml_string(text)
 
 
-def test_a_part_of_a_scene_may_name_what_is_elsewhere_in_it() -> None:
+def test_part_of_scene_may_refer_elsewhere() -> None:
     foot = '<body name="a"><geom name="foot" size="1"/></body>'
     pair = '<contact><pair geom1="foot" geom2="floor"/></contact>'
     assert read(in_world(foot, pair)).problems == ()
@@ -986,7 +982,7 @@ def test_a_part_of_a_scene_may_name_what_is_elsewhere_in_it() -> None:
     assert "'floor'" in only(read(in_world(foot + ground, pair))).message
 
 
-def test_an_inertial_without_mass_is_left_to_the_rule_for_that() -> None:
+def test_missing_mass_is_left_to_lint_rule() -> None:
     robot = read(in_world('<body name="a"><inertial pos="0 0 0" diaginertia="1 1 1"/></body>'))
     inertial = link(robot, "a").inertial
     assert robot.problems == ()
@@ -995,7 +991,7 @@ def test_an_inertial_without_mass_is_left_to_the_rule_for_that() -> None:
     assert inertial.inertia is not None
 
 
-def test_an_inertial_without_moments_has_none() -> None:
+def test_inertial_without_inertia() -> None:
     robot = read(in_world('<body name="a"><inertial pos="0 0 0" mass="-1"/></body>'))
     inertial = link(robot, "a").inertial
     assert inertial is not None
@@ -1003,7 +999,7 @@ def test_an_inertial_without_moments_has_none() -> None:
     assert inertial.inertia is None
 
 
-def test_one_mistake_in_many_places_is_told_once() -> None:
+def test_repeated_error_is_reported_once() -> None:
     robot = read(in_world("".join(f'\n<body name="b{k}" poss="1 2 3"/>' for k in range(300))))
     problem = only(robot)
     assert "300 times, next on line 3" in problem.message
@@ -1011,13 +1007,13 @@ def test_one_mistake_in_many_places_is_told_once() -> None:
     assert joint(robot, "b7_fixed").origin[:3, 3].tolist() == [1, 2, 3]
 
 
-def test_decimal_commas_throughout_are_all_told() -> None:
+def test_decimal_commas_are_all_reported() -> None:
     robot = read(in_world("".join(f'\n<body name="b{k}" pos="0,1 2 3"/>' for k in range(100))))
     assert codes(robot) == ["XML006"] * 100
     assert joint(robot, "b7_fixed").origin[:3, 3].tolist() == [0.1, 2, 3]
 
 
-def test_a_default_that_renames_all_is_read_as_the_default_of_all() -> None:
+def test_renamed_top_level_default() -> None:
     robot = read(
         in_world(
             '<body name="a" childclass="old"><joint name="j"/></body>',
@@ -1054,18 +1050,18 @@ def test_a_default_that_renames_all_is_read_as_the_default_of_all() -> None:
         in_world('<body name="a"/><flexcomp name="f" type="grid" count="1000 1000 1000"/>'),
     ],
 )
-def test_what_would_fill_the_memory_is_not_made(text: str) -> None:
+def test_memory_is_bounded(text: str) -> None:
     robot = read(text)
     assert "a" in [each.name.rstrip("0") for each in robot.links]
 
 
-def test_more_elements_than_mujoco_reads_in_time_are_told() -> None:
+def test_too_many_elements_are_reported() -> None:
     robot = read(in_world("<body/>" * (MAX_ELEMENTS + 1)))
     assert only(robot).code == "XML011"
     assert robot.links == ()
 
 
-def test_models_that_attach_models_do_not_multiply(tmp_path: Path) -> None:
+def test_nested_attachments_are_bounded(tmp_path: Path) -> None:
     files = {}
     for k in range(30):
         twice = "".join(f'<attach model="m" body="b" prefix="p{k}_"/>' for k in range(2))
@@ -1079,7 +1075,7 @@ def test_models_that_attach_models_do_not_multiply(tmp_path: Path) -> None:
     assert codes(robot) == ["XML011"]
 
 
-def test_a_deep_chain_is_read_as_far_as_it_goes() -> None:
+def test_deep_chain_is_read_to_limit() -> None:
     robot = read(in_world("<body>" * 10_000 + "</body>" * 10_000))
     assert "XML001" in codes(robot)
     robot = read(in_world("<body>" * 200 + "</body>" * 200))
@@ -1087,7 +1083,7 @@ def test_a_deep_chain_is_read_as_far_as_it_goes() -> None:
     assert len(robot.links) == 200
 
 
-def test_includes_in_includes_are_not_too_deep_for_anyone(tmp_path: Path) -> None:
+def test_deeply_nested_includes(tmp_path: Path) -> None:
     inner = '<x>{}<include file="p{}.xml"/>{}</x>'
     files = {"robot.xml": in_world('<include file="p0.xml"/>')}
     for k in range(100):
@@ -1098,7 +1094,7 @@ def test_includes_in_includes_are_not_too_deep_for_anyone(tmp_path: Path) -> Non
     assert len(robot.links) > 200
 
 
-def test_nothing_is_written_and_no_warning_printed(
+def test_no_log_file_and_no_warnings(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -1114,7 +1110,7 @@ def test_nothing_is_written_and_no_warning_printed(
     assert mujoco.get_mju_user_warning() is None
 
 
-def test_broken_input_of_any_kind_is_no_error() -> None:
+def test_broken_input_raises_nothing() -> None:
     """Bytes are dropped, doubled and swapped at random; the reader always returns."""
     rng = random.Random(0)
     whole = EVERYTHING.encode()
@@ -1146,7 +1142,7 @@ def test_broken_input_of_any_kind_is_no_error() -> None:
         assert isinstance(read(bytes(data)), RobotModel)
 
 
-def test_attributes_with_any_value_are_no_error() -> None:
+def test_any_attribute_value_raises_nothing() -> None:
     """Values are swapped between attributes at random."""
     rng = random.Random(1)
     values = re.findall(r'="([^"]*)"', EVERYTHING)
@@ -1162,13 +1158,13 @@ def test_attributes_with_any_value_are_no_error() -> None:
             assert each.origin.shape == (4, 4)
 
 
-def test_a_document_without_root_has_its_problems() -> None:
+def test_document_without_root_keeps_problems() -> None:
     robot = read("")
     assert robot.kind == "mjcf"
     assert codes(robot) == ["XML001"]
 
 
-def test_geometry_of_an_included_shape_is_typed() -> None:
+def test_geometry_is_typed() -> None:
     robot = read(
         in_world(
             '<body name="a"><geom type="hfield" hfield="h"/></body>',
@@ -1191,7 +1187,7 @@ def imu_robot(sensors: str, *, base: str = "", arm: str = "", world: str = "") -
     )
 
 
-def test_the_imu_is_the_site_that_a_gyro_names_wherever_another_is_called_imu() -> None:
+def test_imu_is_site_of_gyro() -> None:
     robot = imu_robot(
         '<gyro site="here"/>',
         base='<site name="imu"/>',
@@ -1205,7 +1201,7 @@ def test_the_imu_is_the_site_that_a_gyro_names_wherever_another_is_called_imu() 
 
 
 @pytest.mark.parametrize("sensor", ["gyro", "accelerometer"])
-def test_of_several_imus_it_is_the_one_closest_to_the_base(sensor: str) -> None:
+def test_imu_closest_to_base_is_used(sensor: str) -> None:
     robot = imu_robot(
         f'<{sensor} site="far"/><{sensor} site="near"/>',
         arm='<site name="far"/>',
@@ -1215,13 +1211,13 @@ def test_of_several_imus_it_is_the_one_closest_to_the_base(sensor: str) -> None:
     assert robot.imu[0] == "base"
 
 
-def test_without_a_sensor_the_imu_is_a_site_of_that_name() -> None:
+def test_imu_site_by_name() -> None:
     robot = imu_robot('<framequat objtype="site" objname="other"/>', arm='<site name="IMU"/>')
     assert robot.imu is not None
     assert robot.imu[0] == "arm"
 
 
-def test_sites_in_frames_and_between_two_points_are_where_mujoco_has_them() -> None:
+def test_site_poses_match_mujoco() -> None:
     inside = '<frame pos="1 0 0" euler="0 90 0"><site name="imu" {}/></frame>'
     for written in ('pos="0 0 1" euler="30 0 0"', 'type="capsule" size="1" fromto="0 0 1 1 0 2"'):
         text = in_world(f'<body name="base"><geom size="1"/>{inside.format(written)}</body>')
@@ -1238,10 +1234,10 @@ def test_sites_in_frames_and_between_two_points_are_where_mujoco_has_them() -> N
         imu_robot('<gyro site="nowhere"/>'),
     ],
 )
-def test_an_imu_that_is_nowhere_is_none(robot: RobotModel) -> None:
+def test_no_imu(robot: RobotModel) -> None:
     assert robot.imu is None
 
 
-def test_a_site_without_an_orientation_is_told() -> None:
+def test_invalid_site_orientation_is_reported() -> None:
     robot = imu_robot("", base='<site name="imu" axisangle="0 0 0 1"/>')
     assert [problem.code for problem in robot.problems] == ["XML011"]

@@ -27,17 +27,17 @@ def color(rgba):
     return f'<material name="m"><color rgba="{rgba}"/></material>'
 
 
-def test_a_color_of_its_own():
+def test_color_of_visual():
     assert visuals(link(color("1 0.5 0 0.25"))) == [(1, 0.5, 0, 0.25)]
 
 
-def test_the_color_of_a_named_material_wherever_that_is():
+def test_color_of_named_material():
     named = '<material name="m"/>'
     assert visuals(link(named) + color("0 0 1 1")) == [(0, 0, 1, 1)]
     assert visuals(link(named) + link(color("0 1 0 1"))) == [(0, 1, 0, 1)] * 2
 
 
-def test_a_material_of_the_robot_comes_before_one_of_a_link_and_the_first_before_others():
+def test_precedence_of_materials():
     text = link('<material name="m"/>') + link(color("0 1 0 1")) + color("0 0 1 1")
     assert visuals(text + color("1 0 0 1")) == [(0, 0, 1, 1), (0, 1, 0, 1)]
 
@@ -46,7 +46,7 @@ def test_a_material_of_the_robot_comes_before_one_of_a_link_and_the_first_before
     "rgba",
     ["1 1 1", "1 1 1 1 1", "a b c d", "nan 0 0 1", "inf 0 0 1", "-0.1 0 0 1", "255 0 0 1", ""],
 )
-def test_numbers_that_are_no_color(rgba):
+def test_invalid_color(rgba):
     assert visuals(link(color(rgba))) == [None]
 
 
@@ -65,7 +65,7 @@ def test_no_color(material):
     assert visuals(link(material) + '<material><color rgba="1 0 0 1"/></material>') == [None]
 
 
-def test_collision_shapes_have_none():
+def test_collisions_have_no_color():
     text = f'<robot name="r"><link name="l"><collision>{BOX}{color("1 0 0 1")}</collision></link>'
     model = load_robot(FILE, contents={FILE: f"{text}</robot>".encode()})
     assert model.links[0].collisions[0].color is None

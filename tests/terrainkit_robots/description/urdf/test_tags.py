@@ -62,7 +62,7 @@ def in_link(inner):
         ),
     ],
 )
-def test_a_word_close_to_a_known_one(text, wanted):
+def test_similar_name(text, wanted):
     assert found(text) == [wanted]
 
 
@@ -87,25 +87,25 @@ def test_a_word_close_to_a_known_one(text, wanted):
         in_link('<visual><geometry><capsule radius="1" length="1"/></geometry></visual>'),
     ],
 )
-def test_words_of_urdf_and_of_its_extensions_are_fine(text):
+def test_known_and_extension_names(text):
     assert found(text) == []
 
 
-def test_an_attribute_that_is_there_as_well_is_not_meant():
+def test_present_attribute_is_not_suggested():
     assert found(in_joint('<limit lower="0" lowe="0" upper="1"/>')) == []
 
 
-def test_several_are_told():
+def test_several_misspellings():
     text = in_joint('<limt lower="1"/><axis xzy="1 0 0"/>')
     assert sorted(found(text)) == [("axis", "xzy", "xyz"), ("limt", "", "limit")]
 
 
-def test_what_stands_in_an_extension_is_its_own():
+def test_contents_of_extensions_are_ignored():
     text = '<robot name="r"><gazebo><lnik nmae="a"/><limt/></gazebo></robot>'
     assert found(text) == []
 
 
-def test_a_chain_of_many_elements_is_walked_without_recursion():
+def test_deep_document_needs_no_recursion():
     text = '<robot name="r">' + '<link nam="l"/>' * 5000 + "</robot>"
     assert len(found(text)) == 5000
 
@@ -114,12 +114,12 @@ def test_a_chain_of_many_elements_is_walked_without_recursion():
 
 
 @pytest.mark.parametrize("text", ["${a}", "1 ${b} 2", "$(arg x)", "$(arg x)/mesh.stl"])
-def test_a_value_left_for_xacro(text):
+def test_has_variable(text):
     assert has_variable(text)
 
 
 @pytest.mark.parametrize("text", ["", "1 2 3", "$5", "{a}", "(arg x)", "package://a/b"])
-def test_a_value_of_its_own(text):
+def test_has_no_variable(text):
     assert not has_variable(text)
 
 
@@ -132,22 +132,22 @@ def test_a_value_of_its_own(text):
         ('<robot name="$(arg name)"/>', "'$(arg name)'"),
     ],
 )
-def test_xacro_that_nobody_expanded(text, what):
+def test_unexpanded_xacro(text, what):
     assert [word for _, word in unexpanded_xacro(etree.fromstring(text))] == [what]
 
 
-def test_a_prefix_without_namespace_is_xacro_too():
+def test_prefix_without_namespace():
     parser = etree.XMLParser(recover=True)
     root = etree.fromstring('<robot name="r"><xacro:include filename="a"/></robot>', parser)
     assert [word for _, word in unexpanded_xacro(root)] == ["<xacro:include>"]
 
 
-def test_of_a_whole_file_of_xacro_the_first_is_told():
+def test_first_xacro_element_is_reported():
     text = '<robot name="r"><link name="${a}"/><link name="${b}"/></robot>'
     (told,) = unexpanded_xacro(etree.fromstring(text))
     assert told[0].get("name") == "${a}"
 
 
-def test_a_robot_without_xacro():
+def test_robot_without_xacro():
     text = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r"><link name="l"/></robot>'
     assert list(unexpanded_xacro(etree.fromstring(text))) == []

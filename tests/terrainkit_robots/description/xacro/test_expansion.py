@@ -45,7 +45,7 @@ def told_at(error: XacroError) -> tuple[str, int] | None:
     return error.location and (error.location[0].name, error.location[1])
 
 
-def test_everything_that_robots_use_is_expanded(tmp_path: Path) -> None:
+def test_expand_supports_xacro_features(tmp_path: Path) -> None:
     file = write(
         tmp_path,
         """<xacro:arg name="prefix" default="left"/>
@@ -95,7 +95,7 @@ def test_everything_that_robots_use_is_expanded(tmp_path: Path) -> None:
     assert {path.name for path in robot.sources} == {"robot.xacro", "leg.xacro", "values.yaml"}
 
 
-def test_packages_are_found_where_they_are_given(tmp_path: Path) -> None:
+def test_given_package(tmp_path: Path) -> None:
     file = write(tmp_path / "a", '<xacro:include filename="$(find other)/part.xacro"/>')
     part = tmp_path / "elsewhere" / "part.xacro"
     part.parent.mkdir()
@@ -105,7 +105,7 @@ def test_packages_are_found_where_they_are_given(tmp_path: Path) -> None:
     assert robot.links[0].source.file == part
 
 
-def test_packages_are_found_by_their_package_xml(tmp_path: Path) -> None:
+def test_package_xml(tmp_path: Path) -> None:
     file = write(tmp_path, '<xacro:include filename="$(find my_robot)/urdf/part.xacro"/>')
     (tmp_path / "pack" / "package.xml").write_text("<package><name>my_robot</name></package>")
     (file.parent / "part.xacro").write_text(wrapped('<link name="found"/>'))
@@ -143,7 +143,7 @@ def test_packages_are_found_by_their_package_xml(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_what_fails_is_told_with_its_place(
+def test_errors_have_location(
     inside: str, says: str, place: tuple[str, int], tmp_path: Path
 ) -> None:
     file = write(
@@ -165,7 +165,7 @@ def only(robot: RobotModel) -> Problem:
     return robot.problems[0]
 
 
-def test_a_robot_that_cannot_be_expanded_has_one_problem(tmp_path: Path) -> None:
+def test_failed_expansion_is_one_problem(tmp_path: Path) -> None:
     robot = load_robot(write(tmp_path, '\n<link name="$(arg side)"/>'))
     assert robot.kind == "xacro"
     assert robot.links == ()
@@ -175,13 +175,13 @@ def test_a_robot_that_cannot_be_expanded_has_one_problem(tmp_path: Path) -> None
     assert problem.source.line == 3
 
 
-def test_an_expansion_ends_in_time(tmp_path: Path) -> None:
+def test_time_limit(tmp_path: Path) -> None:
     file = write(tmp_path, '<link name="${len(list(map(float, range(10**9))))}${10**10**10}"/>')
     error = failure(file, timeout=0.6)
     assert "longer than 0.6 s" in str(error) or "memory" in str(error)
 
 
-def test_an_expansion_that_needs_too_much_memory_is_stopped(tmp_path: Path) -> None:
+def test_memory_limit(tmp_path: Path) -> None:
     pytest.importorskip("resource")
     error = failure(write(tmp_path, "<link name=\"${len('a' * 10**9)}\"/>"), max_memory=2**28)
     assert "more than 0.25 GiB of memory" in str(error)
@@ -200,7 +200,7 @@ def test_an_expansion_that_needs_too_much_memory_is_stopped(tmp_path: Path) -> N
         "(lambda: 0).__globals__",
     ],
 )
-def test_expressions_that_lead_to_the_interpreter_are_refused(expression: str) -> None:
+def test_unsafe_expressions_are_rejected(expression: str) -> None:
     with pytest.raises(_RejectedError, match="not allowed"):
         _check_expression(expression)
 
@@ -209,7 +209,7 @@ def test_expressions_that_lead_to_the_interpreter_are_refused(expression: str) -
     "expression",
     ["2 * length + pi", "'{}_{}'.format(a, b)", "values['x'].y", "sin(radians(30))", "not a or b"],
 )
-def test_expressions_of_robots_are_allowed(expression: str) -> None:
+def test_safe_expressions_are_allowed(expression: str) -> None:
     _check_expression(f" {expression} ")
 
 
@@ -224,7 +224,7 @@ def test_expressions_of_robots_are_allowed(expression: str) -> None:
         "$(eval arg.gi_frame)",
     ],
 )
-def test_a_file_gets_nothing_done(value: str, tmp_path: Path) -> None:
+def test_side_effects_are_blocked(value: str, tmp_path: Path) -> None:
     file = write(tmp_path, f'<link name="{value}"/>')
     before = sorted(tmp_path.rglob("*"))
     error = failure(file)
@@ -233,7 +233,7 @@ def test_a_file_gets_nothing_done(value: str, tmp_path: Path) -> None:
     assert sorted(tmp_path.rglob("*")) == before
 
 
-def test_code_beside_the_robot_is_not_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_code_in_robot_folder_is_not_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = write(tmp_path, '<link name="a"/>')
     for name in ("json", "yaml", "xacro", "xml", "sitecustomize"):
         (file.parent / f"{name}.py").write_text("raise SystemExit('run')")
@@ -241,16 +241,14 @@ def test_code_beside_the_robot_is_not_run(tmp_path: Path, monkeypatch: pytest.Mo
     assert b'name="a"' in expand_xacro(Path(file.name), {}, {}).data
 
 
-def test_secrets_of_the_environment_are_not_for_files(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_secret_variables_are_hidden(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROBOT_MODEL", "big")
     monkeypatch.setenv("CI_TOKEN", "hidden")
     file = write(tmp_path, '<link name="$(env ROBOT_MODEL)$(optenv CI_TOKEN none)"/>')
     assert [each.name for each in load_robot(file).links] == ["bignone"]
 
 
-def test_a_fifo_does_not_hold_it_up(tmp_path: Path) -> None:
+def test_fifo_does_not_block(tmp_path: Path) -> None:
     if not hasattr(os, "mkfifo"):
         pytest.skip("this system has no FIFOs")
     file = write(tmp_path, '<xacro:include filename="pipe.xacro"/>')
@@ -258,9 +256,7 @@ def test_a_fifo_does_not_hold_it_up(tmp_path: Path) -> None:
     assert "not a regular file" in str(failure(file))
 
 
-def test_a_relative_path_stays_as_it_was_given(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_relative_path_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = write(tmp_path, '<link name="a"/>')
     monkeypatch.chdir(file.parent)
     robot = load_robot(Path(file.name))

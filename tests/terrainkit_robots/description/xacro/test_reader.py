@@ -29,7 +29,7 @@ LEG = (
 )
 
 
-def test_macros_keep_the_lines_they_came_from(write):
+def test_macro_elements_have_source_lines(write):
     write("parts/leg.xacro", *LEG)
     path = write(
         "r.xacro",
@@ -51,7 +51,7 @@ def test_macros_keep_the_lines_they_came_from(write):
     assert set(model.sources) == {path, path.parent / "parts/leg.xacro"}
 
 
-def test_an_argument_is_given_or_named(write):
+def test_missing_argument_is_named(write):
     path = write("r.xacro", '<link name="a"/>', '<link name="$(arg side)_b"/>')
     (problem,) = load_robot(path).problems
     assert problem.code == "XML005"
@@ -61,7 +61,7 @@ def test_an_argument_is_given_or_named(write):
     assert [link.name for link in model.links] == ["a", "left_b"]
 
 
-def test_a_package_is_given_found_or_named(write):
+def test_missing_package_is_named(write):
     leg = write("legs_description/urdf/leg.xacro", '<link name="leg"/>')
     text = '<xacro:include filename="$(find legs_description)/urdf/leg.xacro"/>'
     path = write("somewhere/else/entirely/r.xacro", text)
@@ -87,14 +87,14 @@ def test_a_package_is_given_found_or_named(write):
         "$(eval open('/etc/hostname').read())",
     ],
 )
-def test_an_expression_that_must_not_run_is_a_problem(write, expression):
+def test_unsafe_expression_is_a_problem(write, expression):
     (problem,) = load_robot(write("r.xacro", f'<link name="{expression}"/>')).problems
     assert problem.code == "XML005"
     assert "Traceback" not in problem.message
     assert "\n" not in problem.message
 
 
-def test_time_and_memory_are_limited(write):
+def test_limits(write):
     endless = write("endless.xacro", '<link name="${10**10**10}"/>')
     with pytest.raises(XacroError, match="longer than 1 s"):
         expand_xacro(endless, {}, {}, timeout=1.0)
@@ -106,7 +106,7 @@ def test_time_and_memory_are_limited(write):
         expand_xacro(loop, {}, {})
 
 
-def test_a_broken_file_is_told_once(write, tmp_path):
+def test_broken_file_is_reported_once(write, tmp_path):
     path = tmp_path / "r.xacro"
     path.write_text(HEAD + '<link name="a">')
     assert {problem.code for problem in load_robot(path).problems} == {"XML001"}

@@ -35,18 +35,18 @@ def codes(document):
 # Lines
 
 
-def test_an_element_is_on_the_line_of_its_bracket(file):
+def test_line_of_start_tag(file):
     document = parse(file, '<robot name="r">\n  <link name="a"/>\n\n  <link name="b"/>\n</robot>\n')
     assert lines(document) == [1, 2, 4]
     assert document.problems == ()
 
 
-def test_attributes_over_several_lines_do_not_move_it(file):
+def test_line_with_multiline_attributes(file):
     text = '<robot\n  name="r"\n  >\n  <link\n     name="a"\n  ><inertial\n/></link>\n</robot>'
     assert lines(parse(file, text)) == [1, 4, 6]
 
 
-def test_comments_and_instructions_count_as_lines_only(file):
+def test_line_after_comments(file):
     text = (
         '<?xml version="1.0"?>\n<!-- <robot> <link/>\n -->\n<?pi <a>?>\n'
         "<robot>\n<!--\n<link/>\n--><link/>\n<![CDATA[ <link> ]]>\n<joint/></robot>\n<!-- end -->"
@@ -55,24 +55,24 @@ def test_comments_and_instructions_count_as_lines_only(file):
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
-def test_lines_end_in_any_way(file, end):
+def test_line_endings(file, end):
     text = end.join(["<robot>", "<!-- a", "comment -->", "<link", 'name="a"/>', "<link/>"])
     assert lines(parse(file, text + "</robot>")) == [1, 4, 6]
 
 
-def test_elements_are_numbered_as_they_start(file):
+def test_element_index(file):
     document = parse(file, "<robot><link><visual/></link><!-- a --><joint/></robot>")
     order = [(e.tag, document.source(e).element) for e in document.root.iter(etree.Element)]
     assert order == [("robot", 0), ("link", 1), ("visual", 2), ("joint", 3)]
 
 
-def test_sources_name_the_file(file):
+def test_source_file(file):
     document = parse(file, "<robot><link/></robot>")
     assert {source.file for source in document.sources.values()} == {file}
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "iso-8859-1"])
-def test_an_encoding_is_read_as_declared(file, encoding):
+def test_declared_encoding(file, encoding):
     text = f'<?xml version="1.0" encoding="{encoding}"?>\n<robot name="Käfer">\n<link/>\n</robot>'
     document = parse(file, text.encode(encoding))
     assert document.root.get("name") == "Käfer"
@@ -108,7 +108,7 @@ def documents(draw):
 
 @settings(max_examples=100, deadline=None)
 @given(documents())
-def test_every_element_is_on_its_line(tmp_path_factory, document):
+def test_lines_of_real_files(tmp_path_factory, document):
     text, wanted = document
     assert lines(parse(tmp_path_factory.getbasetemp() / "r.urdf", text)) == wanted
 
@@ -119,7 +119,7 @@ def test_every_element_is_on_its_line(tmp_path_factory, document):
 @pytest.mark.parametrize(
     "ahead", [b"\xef\xbb\xbf", b"\n \xef\xbb\xbf", b"\xef\xbb\xbf\xef\xbb\xbf\n"]
 )
-def test_a_byte_order_mark_is_told_and_read_past(file, ahead):
+def test_byte_order_mark_is_reported(file, ahead):
     text = b'<?xml version="1.0"?>\n<robot>\n<link/></robot>'
     document = parse(file, ahead + text)
     assert codes(document) == ["XML009"]
@@ -128,18 +128,18 @@ def test_a_byte_order_mark_is_told_and_read_past(file, ahead):
     assert lines(document) == [2 + above, 3 + above]
 
 
-def test_space_before_the_declaration_is_told(file):
+def test_space_before_declaration_is_reported(file):
     assert codes(parse(file, "\n<?xml version='1.0'?><robot/>")) == ["XML009"]
 
 
-def test_space_before_a_document_without_declaration_is_fine(file):
+def test_space_without_declaration_is_allowed(file):
     document = parse(file, "\n\n  <robot/>")
     assert codes(document) == []
     assert lines(document) == [3]
 
 
 @pytest.mark.parametrize("ahead", [b"\xef\xbb\xbf", b" \n", b"\n\xef\xbb\xbf \xef\xbb\xbf"])
-def test_what_stands_before_can_be_taken_away(file, ahead):
+def test_leading_bytes_fix(file, ahead):
     text = b'<?xml version="1.0"?>\n<robot/>'
     problem = parse(file, ahead + text).problems[0]
     (edit,) = leading_bytes_fix(problem).edits
@@ -150,7 +150,7 @@ def test_what_stands_before_can_be_taken_away(file, ahead):
 # Broken documents
 
 
-def test_of_a_broken_document_the_rest_is_read(file):
+def test_broken_document_is_recovered(file):
     document = parse(file, '<robot>\n<link name="a">\n</robot>\n')
     assert codes(document)[0] == "XML001"
     assert document.problems[0].source.line == 3
@@ -158,41 +158,41 @@ def test_of_a_broken_document_the_rest_is_read(file):
     assert [link.get("name") for link in document.root.iter("link")] == ["a"]
 
 
-def test_elements_of_a_broken_document_have_lines_but_cannot_be_edited(file):
+def test_broken_document_cannot_be_edited(file):
     document = parse(file, "<robot>\n<link>\n<visual/>\n</robot>")
     assert lines(document) == [1, 2, 3]
     assert {source.element for source in document.sources.values()} == {None}
 
 
-def test_lines_of_a_broken_document_count_from_the_top_of_the_file(file):
+def test_lines_of_broken_document(file):
     assert lines(parse(file, b"\n\n\xef\xbb\xbf<robot>\n<link>\n</robot>")) == [3, 4]
 
 
-def test_each_line_with_a_mistake_is_told_once(file):
+def test_syntax_error_per_line(file):
     document = parse(file, '<robot>\n<link name=a b=c/>\n<link x="1" x="2"/>\n</robot>')
     assert [p.source.line for p in document.problems] == [2, 3]
     assert set(codes(document)) == {"XML001"}
 
 
-def test_not_every_mistake_of_a_hopeless_file_is_told(file):
+def test_number_of_syntax_errors_is_limited(file):
     document = parse(file, "<robot>" + "\n<link name=a/>" * 500 + "</robot>")
     assert 1 < len(document.problems) <= 20
 
 
-def test_an_ampersand_is_a_mistake_that_is_read_past(file):
+def test_ampersand_is_reported(file):
     document = parse(file, '<robot name="a & b">\n<link name="c"/></robot>')
     assert codes(document) == ["XML001"]
     assert len(document.root) == 1
 
 
-def test_a_prefix_without_namespace_is_no_mistake_of_syntax(file):
+def test_undeclared_prefix_is_allowed(file):
     document = parse(file, "<robot>\n<xacro:macro/>\n<link/></robot>")
     assert codes(document) == []
     assert lines(document) == [1, 2, 3]
 
 
 @pytest.mark.parametrize("data", [b"", b" \n\t", b"\xef\xbb\xbf", b"\xef\xbb\xbf \n"])
-def test_nothing_is_told_as_empty(file, data):
+def test_empty_file(file, data):
     document = parse(file, data)
     assert document.root is None
     assert codes(document) == ["XML001"]
@@ -203,7 +203,7 @@ def test_nothing_is_told_as_empty(file, data):
     "data",
     [b"just text", b"\x00" * 100, b"\x7fELF\x02\x01\x01", bytes(range(256)), b"{}", b"<", b"<<<"],
 )
-def test_what_is_no_xml_is_told(file, data):
+def test_not_xml(file, data):
     document = parse(file, data)
     assert document.root is None
     assert set(codes(document)) == {"XML001"}
@@ -211,14 +211,14 @@ def test_what_is_no_xml_is_told(file, data):
 
 @settings(max_examples=200, deadline=None)
 @given(st.binary(max_size=60))
-def test_any_bytes_are_read_without_an_exception(tmp_path_factory, data):
+def test_any_bytes_raise_nothing(tmp_path_factory, data):
     document = parse(tmp_path_factory.getbasetemp() / "r.urdf", data)
     assert (document.root is None) <= bool(document.problems)
 
 
 @settings(max_examples=200, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 90), st.integers(0, 8), st.binary(max_size=4))))
-def test_damage_is_told_or_harmless(tmp_path_factory, cuts):
+def test_damage_is_reported_or_harmless(tmp_path_factory, cuts):
     data = b'<?xml version="1.0"?>\n<robot name="r">\n<link name="a">\n</link><!-- b --></robot>\n'
     for at, length, other in cuts:
         data = data[:at] + other + data[at + length :]
@@ -236,7 +236,7 @@ def test_damage_is_told_or_harmless(tmp_path_factory, cuts):
 # Size
 
 
-def test_a_large_file_is_not_looked_at(file, monkeypatch):
+def test_large_file_is_not_parsed(file, monkeypatch):
     monkeypatch.setattr(xml_document, "MAX_BYTES", 2**20)
     document = parse(file, b"<robot>" + b" " * 2**20 + b"</robot>")
     assert document.root is None
@@ -244,7 +244,7 @@ def test_a_large_file_is_not_looked_at(file, monkeypatch):
     assert "1 MiB" in document.problems[0].message
 
 
-def test_a_document_of_very_many_elements_is_not_looked_at(file, monkeypatch):
+def test_too_many_elements_are_rejected(file, monkeypatch):
     monkeypatch.setattr(xml_document, "MAX_ELEMENTS", 1000)
     document = parse(file, "<robot>" + "<link/>" * 1000 + "</robot>")
     assert document.root is None
@@ -252,12 +252,12 @@ def test_a_document_of_very_many_elements_is_not_looked_at(file, monkeypatch):
     assert parse(file, "<robot>" + "<link/>" * 999 + "</robot>").root is not None
 
 
-def test_a_deep_document_is_told_and_is_no_trouble(file):
+def test_deep_document(file):
     document = parse(file, "<a>" * 100_000 + "</a>" * 100_000)
     assert "XML001" in codes(document)
 
 
-def test_a_million_links_are_no_trouble(file):
+def test_million_links(file):
     assert parse(file, b"<robot>" + b"<link/>\n" * 1_000_000 + b"</robot>").root is None
 
 
@@ -278,26 +278,26 @@ BOMB = """<?xml version="1.0"?>
 
 
 @pytest.mark.parametrize("body", ["<robot>&h;<link/></robot>", '<robot name="&h;"/>'])
-def test_an_entity_bomb_does_not_go_off(file, body):
+def test_entity_bomb(file, body):
     document = parse(file, BOMB + body)
     assert "XML010" in codes(document)
     assert len(etree.tostring(document.root)) < 10_000 if document.root is not None else True
 
 
-def test_entities_are_told_on_their_line(file):
+def test_entities_are_reported(file):
     document = parse(file, BOMB + "<robot/>")
     problem = next(p for p in document.problems if p.code == "XML010")
     assert problem.source.line == 2
 
 
-def test_elements_in_an_entity_are_not_there(file):
+def test_entities_are_not_expanded(file):
     text = '<!DOCTYPE robot [<!ENTITY a "<link/><link/>">]>\n<robot>&a;\n<joint/></robot>'
     document = parse(file, text)
     assert [e.tag for e in document.root.iter(etree.Element)] == ["robot", "joint"]
     assert lines(document)[1] == 3
 
 
-def test_other_files_are_not_read(file, tmp_path):
+def test_external_files_are_not_read(file, tmp_path):
     (tmp_path / "secret").write_text("a secret")
     (tmp_path / "secret.dtd").write_text('<!ENTITY b "a secret">')
     text = (
@@ -312,40 +312,40 @@ def test_other_files_are_not_read(file, tmp_path):
 # Files
 
 
-def test_bytes_are_read_as_they_are(file):
+def test_read_bytes(file):
     file.write_bytes(b"\xef\xbb\xbf\r\n<robot/>")
     assert read_bytes(file) == b"\xef\xbb\xbf\r\n<robot/>"
 
 
-def test_no_more_is_read_than_is_needed(file, monkeypatch):
+def test_read_bytes_is_limited(file, monkeypatch):
     monkeypatch.setattr(xml_document, "MAX_BYTES", 1000)
     file.write_bytes(b" " * 5000)
     assert len(read_bytes(file)) == 1001
 
 
-def test_a_file_that_is_not_there(file):
+def test_missing_file(file):
     with pytest.raises(RobotFileError, match=r"there is no file .*robot\.urdf"):
         read_bytes(file)
 
 
-def test_a_folder_is_no_robot(tmp_path):
+def test_folder_is_rejected(tmp_path):
     with pytest.raises(RobotFileError, match="it is a folder"):
         read_bytes(tmp_path)
 
 
-def test_a_pipe_is_not_waited_for(file):
+def test_pipe_is_rejected(file):
     os.mkfifo(file)
     with pytest.raises(RobotFileError, match="not a file"):
         read_bytes(file)
 
 
-def test_a_device_is_no_robot(file):
+def test_device_is_rejected(file):
     file.symlink_to("/dev/zero")
     with pytest.raises(RobotFileError, match="not a file"):
         read_bytes(file)
 
 
-def test_a_circle_of_links_is_told(file, tmp_path):
+def test_symbolic_link_cycle(file, tmp_path):
     file.symlink_to(tmp_path / "other")
     (tmp_path / "other").symlink_to(file)
     with pytest.raises(RobotFileError, match="cannot read"):
@@ -353,13 +353,13 @@ def test_a_circle_of_links_is_told(file, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["a\0b", "a" * 5000])
-def test_an_impossible_name_is_told(tmp_path, name):
+def test_invalid_path(tmp_path, name):
     with pytest.raises(RobotFileError, match="cannot read"):
         read_bytes(tmp_path / name)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
-def test_a_file_without_permission_is_told(file):
+def test_no_permission(file):
     file.write_text("<robot/>")
     file.chmod(0)
     with pytest.raises(RobotFileError, match=r"cannot read .*ermission"):

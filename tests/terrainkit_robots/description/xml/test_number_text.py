@@ -16,9 +16,9 @@ from terrainkit_robots.description.xml.number_text import number_text, place_tex
         ([1, -2.5, 1e-15], "1 -2.5 1e-15"),
     ],
 )
-def test_numbers(value, text):
+def test_number_text(value, text):
     assert number_text(value) == text
 
 
-def test_places_are_without_noise():
+def test_place_text_removes_rounding_errors():
     assert place_text([1e-13, -1e-13, 1e-11]) == "0 0 1e-11"

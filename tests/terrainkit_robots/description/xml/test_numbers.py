@@ -27,7 +27,7 @@ from terrainkit_robots.description.xml.numbers import parse_numbers, replace_com
         ("9e29", 9e29),
     ],
 )
-def test_a_number(text, wanted):
+def test_parse_number(text, wanted):
     assert parse_numbers(text, 1).tolist() == [wanted]
 
 
@@ -69,33 +69,33 @@ def test_a_number(text, wanted):
         "1" * 400,
     ],
 )
-def test_no_number(text):
+def test_invalid_number(text):
     assert parse_numbers(text, 1) is None
 
 
 @pytest.mark.parametrize("text", ["1 2 3", "  1\n\t2   3 ", "1 2e0 3.0"])
-def test_numbers_stand_apart_by_any_space(text):
+def test_any_white_space_separates(text):
     assert parse_numbers(text, 3).tolist() == [1, 2, 3]
 
 
 @pytest.mark.parametrize("text", ["", "1", "1 2", "1 2 3 4", "1 2 x", "1 2 nan"])
-def test_as_many_numbers_as_wanted_or_none(text):
+def test_count_must_match(text):
     assert parse_numbers(text, 3) is None
 
 
-def test_of_no_numbers_wanted_there_are_none():
+def test_count_of_zero():
     assert parse_numbers("", 0).tolist() == []
 
 
 @given(st.lists(st.floats(-1e29, 1e29), min_size=1, max_size=6))
-def test_what_python_writes_is_read_back(values):
+def test_round_trip(values):
     read = parse_numbers(" ".join(map(repr, values)), len(values))
     assert read.tolist() == values
 
 
 @example("0\x1f")  # white space to Python's split, and to nobody else
 @given(st.text(max_size=12))
-def test_what_is_read_is_finite_and_what_python_reads(text):
+def test_parsed_numbers_match_python(text):
     read = parse_numbers(text, 1)
     if read is not None:
         assert math.isfinite(read[0])
@@ -103,13 +103,13 @@ def test_what_is_read_is_finite_and_what_python_reads(text):
 
 
 @given(st.text(alphabet="0123456789.-+eE \tnaif,_", max_size=20))
-def test_text_that_looks_like_numbers_never_raises(text):
+def test_number_like_text_raises_nothing(text):
     for count in (1, 2, 3):
         read = parse_numbers(text, count)
         assert read is None or (read.shape == (count,) and np.isfinite(read).all())
 
 
-def test_a_very_long_text_is_no_number():
+def test_very_long_text():
     assert parse_numbers("1" * 5_000 + "x", 1) is None
     assert parse_numbers("1 " * 300_000, 3) is None
 
@@ -128,7 +128,7 @@ def test_a_very_long_text_is_no_number():
         ("1,2", 2, "1 2"),
     ],
 )
-def test_what_was_meant_by_commas(text, count, meant):
+def test_replace_commas(text, count, meant):
     assert replace_commas(text, count) == meant
     assert parse_numbers(meant, count) is not None
 
@@ -147,18 +147,18 @@ def test_what_was_meant_by_commas(text, count, meant):
         ("nan,nan", 2),
     ],
 )
-def test_commas_that_mean_nothing(text, count):
+def test_replace_commas_fails(text, count):
     assert replace_commas(text, count) == ""
 
 
-def test_one_number_with_a_comma_is_a_decimal():
+def test_single_number_with_comma():
     # Of two numbers it could be either, and the count decides.
     assert replace_commas("1,5", 1) == "1.5"
     assert replace_commas("1,5", 2) == "1 5"
 
 
 @given(st.text(alphabet="0123456789.-, ", max_size=20), st.integers(1, 4))
-def test_what_was_meant_has_no_commas_and_is_numbers(text, count):
+def test_replace_commas_yields_numbers(text, count):
     meant = replace_commas(text, count)
     assert meant == "" or parse_numbers(meant, count) is not None
     assert replace_commas(meant, count) == ""

@@ -36,7 +36,7 @@ def calls(monkeypatch):
     return made
 
 
-def test_an_angle_is_two_boxes(capfd):
+def test_angle_is_two_boxes(capfd):
     parts = convex_parts(ANGLE, None)
     volumes = sorted(signed_volume(part) for part in parts)
     assert sum(volumes) == pytest.approx(5, rel=0.02)
@@ -48,7 +48,7 @@ def test_an_angle_is_two_boxes(capfd):
     assert capfd.readouterr() == ("", "")
 
 
-def test_kept_by_content(tmp_path, calls):
+def test_parts_are_cached_by_content(tmp_path, calls):
     first = convex_parts(ANGLE, tmp_path)
     again = convex_parts(Surface(points=ANGLE.points.copy(), faces=ANGLE.faces.copy()), tmp_path)
     assert len(calls) == 1
@@ -60,24 +60,24 @@ def test_kept_by_content(tmp_path, calls):
     assert sum(map(signed_volume, other)) == pytest.approx(8 * sum(map(signed_volume, first)))
 
 
-def test_the_same_parts_each_time():
+def test_parts_are_deterministic():
     first, second = convex_parts(ANGLE, None), convex_parts(ANGLE, None)
     assert [part.points.tobytes() for part in first] == [part.points.tobytes() for part in second]
 
 
-def test_another_version_makes_other_keys(monkeypatch):
+def test_key_depends_on_version(monkeypatch):
     before = module._key(ANGLE)
     monkeypatch.setattr(metadata, "version", lambda _: "0.0.1")
     assert module._key(ANGLE) != before
 
 
-def test_a_key_follows_from_parameters(monkeypatch):
+def test_key_depends_on_parameters(monkeypatch):
     before = module._key(ANGLE)
     monkeypatch.setattr(module, "PARAMETERS", {**module.PARAMETERS, "threshold": 0.06})
     assert module._key(ANGLE) != before
 
 
-def test_a_damaged_file_is_made_anew(tmp_path, calls):
+def test_damaged_cache_file_is_replaced(tmp_path, calls):
     convex_parts(ANGLE, tmp_path)
     (file,) = tmp_path.iterdir()
     file.write_bytes(file.read_bytes()[:200])
@@ -86,13 +86,13 @@ def test_a_damaged_file_is_made_anew(tmp_path, calls):
 
 
 class TestFailures:
-    def test_too_long(self, monkeypatch, tmp_path):
+    def test_time_limit(self, monkeypatch, tmp_path):
         monkeypatch.setattr(module, "_MAX_SECONDS", 0.01)
         with pytest.raises(MeshError, match=r"exceeds the CoACD time limit of 0\.01 s"):
             convex_parts(ANGLE, tmp_path)
         assert not list(tmp_path.iterdir())
 
-    def test_an_end_of_the_process(self, monkeypatch):
+    def test_process_failure(self, monkeypatch):
         monkeypatch.setattr(module, "PARAMETERS", {"no_such_parameter": 1})
         with pytest.raises(MeshError, match=r"makes CoACD fail: .*no_such_parameter"):
             convex_parts(ANGLE, None)

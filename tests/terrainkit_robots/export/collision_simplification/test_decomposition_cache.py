@@ -26,7 +26,7 @@ def assert_same(found, wanted):
         np.testing.assert_array_equal(a.faces, b.faces)
 
 
-def test_what_is_put_is_got_again_by_its_key(tmp_path):
+def test_put_and_get(tmp_path):
     cache = DecompositionCache(tmp_path / "deep" / "cache")
     assert cache.get("a") is None
     cache.put("a", [PART, PART])
@@ -45,7 +45,7 @@ DAMAGES = {
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_file_counts_as_none_and_is_written_anew(tmp_path, damage):
+def test_damaged_file_is_replaced(tmp_path, damage):
     cache = DecompositionCache(tmp_path)
     cache.put("a", [PART])
     file = tmp_path / "a.npz"
@@ -65,13 +65,13 @@ def test_a_damaged_file_counts_as_none_and_is_written_anew(tmp_path, damage):
         Surface(points=PART.points[:3], faces=PART.faces[:1] * 0),
     ],
 )
-def test_parts_that_are_none_count_as_damaged(part):
+def test_invalid_parts_are_ignored(part):
     assert from_npz(to_npz([PART])) is not None
     assert from_npz(to_npz([PART, part])) is None
     assert from_npz(to_npz([])) is None
 
 
-def test_nothing_is_unpickled(tmp_path):
+def test_pickles_are_not_loaded(tmp_path):
     class Evil:
         def __reduce__(self):
             return Path.touch, (tmp_path / "executed",)
@@ -81,20 +81,20 @@ def test_nothing_is_unpickled(tmp_path):
     assert not (tmp_path / "executed").exists()
 
 
-def test_a_long_file_is_not_read(tmp_path, monkeypatch):
+def test_large_file_is_not_read(tmp_path, monkeypatch):
     cache = DecompositionCache(tmp_path)
     cache.put("a", [PART])
     monkeypatch.setattr(module, "_MAX_BYTES", 10)
     assert cache.get("a") is None
 
 
-def test_no_folder_keeps_nothing():
+def test_no_folder_disables_cache():
     cache = DecompositionCache(None)
     cache.put("a", [PART])
     assert cache.get("a") is None
 
 
-def test_where_nothing_can_be_written_nothing_is_kept(tmp_path):
+def test_unwritable_folder_is_ignored(tmp_path):
     (tmp_path / "file").write_text("in the way")
     cache = DecompositionCache(tmp_path / "file" / "cache")
     cache.put("a", [PART])

@@ -61,7 +61,7 @@ def volumes(done):
     return [volume(shape, done.meshes) for shape in shapes(done)]
 
 
-def test_kept():
+def test_keep():
     model, meshes = robot(mesh("thin.stl")), Meshes(FILES)
     done = simplify_collisions(model, meshes)
     assert done.model is model
@@ -71,7 +71,7 @@ def test_kept():
 
 
 class TestHull:
-    def test_in_place_of_the_mesh(self):
+    def test_hull_replaces_mesh(self):
         pose = np.eye(4)
         pose[:3, 3] = [1, 2, 3]
         done = treated("hull", mesh("angle.stl", origin=pose, contype=2, name="shin"))
@@ -82,7 +82,7 @@ class TestHull:
         assert not shape.mesh.path.exists()
         assert volumes(done) == pytest.approx([ANGLE.convex_hull.volume])
 
-    def test_how_much_larger_it_is(self):
+    def test_volume_error(self):
         done = treated("hull", mesh("angle.stl", (1, 2, 1)))
         (error,) = done.errors
         assert error.original == pytest.approx(8)
@@ -92,14 +92,14 @@ class TestHull:
             f"replaced collision mesh angle.stl by its convex hull (volume {error.percent:+.1f} %)",
         )
 
-    def test_of_a_mesh_that_is_not_closed(self):
+    def test_open_mesh(self):
         done = treated("hull", mesh("open.stl"))
         assert done.errors[0].original is None
         assert done.errors[0].percent is None
         assert "(volume unknown)" in done.notes[0]
         assert volumes(done) == pytest.approx([0.006])
 
-    def test_scales_are_in_the_corners(self):
+    def test_scale_is_applied_to_vertices(self):
         done = treated("hull", mesh("angle.stl", (1, -2, 1)), mesh("angle.stl", (2, 2, 2)))
         mirrored, large = shapes(done)
         assert mirrored.mesh.scale == large.mesh.scale == (1, 1, 1)
@@ -107,7 +107,7 @@ class TestHull:
         assert corners.min(axis=0) == pytest.approx([0, -4, 0])
         assert corners.max(axis=0) == pytest.approx([3, 0, 1])
 
-    def test_of_few_corners(self):
+    def test_number_of_vertices(self):
         ball = trimesh.creation.icosphere(subdivisions=4, radius=0.1)
         done = simplify_collisions(
             robot(mesh("a.stl")), Meshes({Path("a.stl"): stl_of(ball)}), "hull"
@@ -117,14 +117,14 @@ class TestHull:
         assert 300 < len(hull.points) <= 500
         assert volumes(done) == pytest.approx([ball.volume], rel=0.02)
 
-    def test_corners_of_no_triangle_do_not_count(self):
+    def test_unused_vertices_are_ignored(self):
         data = BOX.export(file_type="obj").encode() + b"\nv 9 9 9\n"
         done = simplify_collisions(robot(mesh("a.obj")), Meshes({Path("a.obj"): data}), "hull")
         assert volumes(done) == pytest.approx([0.006])
 
 
 class TestCoacd:
-    def test_parts_where_it_is_far_from_convex(self, tmp_path):
+    def test_nonconvex_mesh_is_decomposed(self, tmp_path):
         done = treated("coacd", mesh("thin.stl", name="shin"), mesh("angle.stl"), cache=tmp_path)
         thin, angle = done.errors
         assert thin.replacement == "2 convex parts"
@@ -134,7 +134,7 @@ class TestCoacd:
         assert sum(volumes(done)[:2]) == pytest.approx(THIN.volume, rel=0.02)
         assert len(list(tmp_path.iterdir())) == 1
 
-    def test_mirrored_parts_are_those_of_the_other_side(self, tmp_path):
+    def test_mirrored_parts(self, tmp_path):
         left = treated("coacd", mesh("thin.stl"), cache=tmp_path)
         right = treated("coacd", mesh("thin.stl", (1, -1, 1)), cache=tmp_path)
         assert len(list(tmp_path.iterdir())) == 1
@@ -144,7 +144,7 @@ class TestCoacd:
             np.testing.assert_allclose(*both, atol=1e-6)
         assert sum(volumes(right)) == pytest.approx(THIN.volume, rel=0.02)
 
-    def test_the_hull_where_it_fails_and_that_is_told(self, monkeypatch):
+    def test_hull_if_coacd_fails(self, monkeypatch):
         def fail(*_):
             raise MeshError("makes CoACD fail: no reason")
 
@@ -156,7 +156,7 @@ class TestCoacd:
 
 
 class TestPrimitives:
-    def test_a_box_where_the_file_has_it(self):
+    def test_box_at_pose_of_mesh(self):
         pose = np.eye(4)
         pose[:3, 3] = [1, 2, 3]
         done = treated("primitives", mesh("box.stl", (1, -2, 1), origin=pose))
@@ -176,15 +176,15 @@ class TestPrimitives:
         )
         assert done.errors[0].percent == pytest.approx(0, abs=0.01)
 
-    def test_one_that_mujoco_would_fit(self):
+    def test_fit_to_mesh_is_cleared(self):
         assert (
             shapes(treated("primitives", mesh("box.stl", fit_to_mesh=True)))[0].fit_to_mesh is False
         )
 
 
-class TestWhatStays:
+class TestUnchanged:
     @pytest.mark.parametrize("how", ["hull", "coacd", "primitives"])
-    def test_primitives_and_meshes_without_a_hull(self, how):
+    def test_primitives_and_flat_meshes(self, how):
         given = (
             Geometry(source=SOURCE, shape="sphere", size=(0.1,)),
             mesh("nowhere.stl"),
@@ -194,7 +194,7 @@ class TestWhatStays:
         assert shapes(done) == given
         assert not done.errors
 
-    def test_what_is_only_seen(self):
+    def test_visual_meshes(self):
         visual = mesh("thin.stl")
         done = simplify_collisions(
             robot(mesh("thin.stl"), visuals=(visual,)), Meshes(FILES), "hull"
@@ -203,7 +203,7 @@ class TestWhatStays:
         assert done.meshes.is_readable(visual.mesh)
 
 
-def test_progress_passes_on_each_mesh_once():
+def test_progress():
     seen = []
 
     def progress(items, total):
@@ -218,14 +218,14 @@ def test_progress_passes_on_each_mesh_once():
 
 
 @pytest.mark.parametrize("how", ["hull", "coacd", "primitives"])
-def test_the_same_each_time(how):
+def test_result_is_deterministic(how):
     first, second = (treated(how, mesh("thin.stl"), mesh("angle.stl")) for _ in range(2))
     assert dict(first.contents) == dict(second.contents)
     assert first.errors == second.errors
     assert [shape.size for shape in shapes(first)] == [shape.size for shape in shapes(second)]
 
 
-def test_a_robot_of_meshes(robot_file):
+def test_robot_with_meshes(robot_file):
     model = load_robot(robot_file("h1/urdf/h1.urdf"))
     done = simplify_collisions(model, Meshes(), "hull")
     assert len(done.errors) == 18

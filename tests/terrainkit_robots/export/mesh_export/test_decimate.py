@@ -13,18 +13,18 @@ def surface_of(mesh):
 BALL = surface_of(trimesh.creation.icosphere(subdivisions=5, radius=0.1))
 
 
-def test_what_has_few_faces_stays():
+def test_small_mesh_is_unchanged():
     assert decimate(BALL, len(BALL.faces)) is BALL
 
 
 @pytest.mark.parametrize("most", [10_000, 2_000, 300])
-def test_as_many_faces_as_are_wanted_and_the_same_shape(most):
+def test_face_limit_and_shape(most):
     coarse = decimate(BALL, most)
     assert 0.2 * most < len(coarse.faces) <= most
     assert signed_volume(coarse) == pytest.approx(signed_volume(BALL), rel=0.1)
 
 
-def test_nothing_is_left_of_dust():
+def test_no_triangles_left():
     points = np.random.default_rng(0).uniform(0, 1, (3000, 3))
     corners = np.repeat(points, 3, axis=0) + 1e-6 * np.tile(np.eye(3), (3000, 1))
     dust = Surface(points=corners, faces=np.arange(9000).reshape(-1, 3))

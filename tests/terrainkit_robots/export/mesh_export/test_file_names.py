@@ -3,14 +3,14 @@ import pytest
 from terrainkit_robots.export.mesh_export.file_names import FileNames
 
 
-def test_one_content_is_one_file():
+def test_equal_content_shares_file():
     names = FileNames("meshes")
     assert names.add("hip", ".stl", b"1") == "meshes/hip.stl"
     assert names.add("thigh", ".stl", b"1") == "meshes/hip.stl"
     assert names.files == {"meshes/hip.stl": b"1"}
 
 
-def test_distinct_contents_have_distinct_names_also_without_suffix_and_capitals():
+def test_names_are_unique_without_suffix_and_case():
     names = FileNames("meshes")
     added = [
         names.add(stem, suffix, bytes([k]))
@@ -37,5 +37,5 @@ def test_distinct_contents_have_distinct_names_also_without_suffix_and_capitals(
         ("x" * 500, f"m/{'x' * 80}.stl"),
     ],
 )
-def test_names_are_safe(wanted, name):
+def test_names_are_valid(wanted, name):
     assert FileNames("m").add(wanted, ".stl", b"") == name

@@ -41,19 +41,19 @@ def msh():
 
 
 class TestFormats:
-    def test_a_sound_binary_stl_stays_as_it_is(self):
+    def test_valid_binary_stl_is_unchanged(self):
         data = b"x" * 80 + STL[80:]
         packed = content(data, "a.STL", scale=(0.001, 0.002, 0.003))
         assert packed.data == data
         assert packed.scale == (0.001, 0.002, 0.003)
         assert not packed.note
 
-    def test_one_that_looks_like_text_gets_another_header(self):
+    def test_stl_that_looks_like_text(self):
         packed = content(b"solid".ljust(80) + STL[80:], "a.stl")
         assert packed.data == STL
 
     @pytest.mark.parametrize("suffix", ["obj", "ply", "glb", "stl_ascii"])
-    def test_others_keep_shape_and_size(self, suffix):
+    def test_formats_keep_shape_and_size(self, suffix):
         data = WEDGE.export(file_type=suffix)
         name = f"a.{suffix.removesuffix('_ascii')}"
         self.assert_same(content(data if isinstance(data, bytes) else data.encode(), name))
@@ -88,14 +88,14 @@ class TestFormats:
         assert surface.points.max(axis=0) == pytest.approx(WEDGE.bounds[1])
         assert signed_volume(surface) == pytest.approx(WEDGE.volume, rel=1e-6)
 
-    def test_the_same_bytes_each_time(self):
+    def test_bytes_are_deterministic(self):
         data = WEDGE.export(file_type="obj").encode()
         assert content(data, "a.obj").data == content(data, "a.obj").data
 
 
 class TestMirroredScale:
     @pytest.mark.parametrize("scale", [(1, -1, 1), (-0.5, 2, 1), (-1, -1, -2), (-1, -1, 1)])
-    def test_is_in_the_corners_and_the_outside_stays_out(self, scale):
+    def test_mirrored_mesh_faces_outward(self, scale):
         packed = content(STL, "a.stl", scale)
         assert packed.scale == (1, 1, 1)
         surface = read(packed)
@@ -106,14 +106,14 @@ class TestMirroredScale:
         volume = WEDGE.volume * abs(np.prod(scale))
         assert signed_volume(surface) == pytest.approx(volume, rel=1e-6)
 
-    def test_of_a_surface(self):
+    def test_scaled_surface(self):
         mirrored = scaled(SURFACE, (1, -1, 1))
         assert signed_volume(mirrored) == pytest.approx(WEDGE.volume)
         assert scaled(SURFACE, (1, 2, 1)).faces is SURFACE.faces
 
 
 class TestTooManyFaces:
-    def test_are_made_fewer_and_told(self, monkeypatch):
+    def test_mesh_is_decimated_with_note(self, monkeypatch):
         monkeypatch.setattr(module, "MAX_FACES", 1000)
         ball = trimesh.creation.icosphere(subdivisions=4, radius=0.1)
         data = binary_stl(Surface(points=ball.vertices, faces=ball.faces))
@@ -129,14 +129,14 @@ class TestWithoutVolume:
         ("scale", "flat"),
         [((1, 1, 1), False), ((1, 1, 0), True), ((1, 1e-6, 1), True), ((1e-6, 1e-6, 1e-6), True)],
     )
-    def test_by_scale(self, scale, flat):
+    def test_scale_makes_mesh_flat(self, scale, flat):
         meshes = Meshes({Path("a.stl"): STL})
         assert has_no_volume(meshes, use_of("a.stl", scale)) is flat
 
-    def test_is_an_error(self):
+    def test_flat_mesh_is_an_error(self):
         with pytest.raises(MeshError, match="is flat"):
             content(STL, "a.stl", (1, 1, 0))
 
-    def test_so_is_what_is_not_there(self):
+    def test_missing_mesh_is_an_error(self):
         with pytest.raises(MeshError, match="does not exist"):
             mesh_bytes(Meshes(), use_of("nowhere.stl"))

@@ -44,7 +44,7 @@ def packed(*, visuals=(), collisions=(), **contents):
 
 
 class TestNames:
-    def test_are_relative_and_the_paths_are_keys(self):
+    def test_names_are_relative(self):
         done = packed(visuals=[mesh("a.stl", (2, 2, 2))], a__stl=BOX)
         (visual,) = done.model.links[0].visuals
         assert done.files == {"meshes/a.stl": BOX}
@@ -53,31 +53,31 @@ class TestNames:
         assert visual.mesh.scale == (2, 2, 2)
         assert not done.notes
 
-    def test_one_content_is_stored_once(self):
+    def test_equal_content_is_stored_once(self):
         shapes = [mesh("a.stl"), mesh("b/c.stl"), mesh("a.stl", (1, 1, 2))]
         held = {Path("a.stl"): BOX, Path("b/c.stl"): BOX}
         done = export_meshes(robot(visuals=shapes, collisions=shapes), Meshes(held), folder="m")
         assert list(done.files) == ["m/a.stl"]
         assert {each.mesh.filename for each in done.model.links[0].visuals} == {"m/a.stl"}
 
-    def test_distinct_files_of_one_name(self):
+    def test_different_files_with_same_name(self):
         held = {Path("a/hip.stl"): BOX, Path("b/hip.stl"): BALL}
         done = export_meshes(robot(visuals=[mesh("a/hip.stl"), mesh("b/hip.stl")]), Meshes(held))
         assert done.files == {"meshes/hip.stl": BOX, "meshes/hip_2.stl": BALL}
 
-    def test_a_mirrored_use_is_a_file_of_its_own(self):
+    def test_mirrored_mesh_is_separate_file(self):
         done = packed(visuals=[mesh("a.stl"), mesh("a.stl", (1, -1, 1))], a__stl=BALL)
         assert list(done.files) == ["meshes/a.stl", "meshes/a_2.stl"]
         assert [v.mesh.scale for v in done.model.links[0].visuals] == [(1, 1, 1), (1, 1, 1)]
 
 
-class TestLeftOut:
-    def test_a_visual_mesh_that_is_not_there(self):
+class TestRemoved:
+    def test_missing_visual_mesh(self):
         done = packed(visuals=[mesh("a.stl"), shape("sphere", 0.1)])
         assert done.notes == ("removed the visual mesh a.stl of leg: it does not exist",)
         assert [each.shape for each in done.model.links[0].visuals] == ["sphere"]
 
-    def test_a_flat_visual_mesh(self):
+    def test_flat_visual_mesh(self):
         done = packed(visuals=[mesh("a.stl", (1, 0, 1))] * 2, a__stl=BOX)
         assert done.notes == ("removed the visual mesh a.stl of leg: it is flat",)
         assert not done.model.links[0].visuals
@@ -102,7 +102,7 @@ class TestLeftOut:
             ),
         ],
     )
-    def test_shapes_without_extent(self, given, note):
+    def test_geometry_without_size(self, given, note):
         done = packed(collisions=[given, shape("sphere", 0.1)])
         assert done.notes == (note,)
         assert [each.shape for each in done.model.links[0].collisions] == ["sphere"]
@@ -113,14 +113,14 @@ class TestCollisionMeshes:
         ("data", "reason"),
         [(None, "does not exist"), (b"", "is empty"), (BOX[:-1], "header declares")],
     )
-    def test_that_cannot_be_read_are_an_error_of_one_line(self, data, reason):
+    def test_unreadable_mesh_is_one_line_error(self, data, reason):
         contents = {} if data is None else {"a__stl": data}
         with pytest.raises(RobotFileError, match=reason) as error:
             packed(collisions=[mesh("a.stl")], **contents)
         assert "package://r/a.stl of leg" in str(error.value)
         assert "\n" not in str(error.value)
 
-    def test_that_are_flat_become_thin_boxes(self):
+    def test_flat_mesh_becomes_box(self):
         origin = np.eye(4)
         origin[:3, 3] = [1, 2, 3]
         done = packed(collisions=[mesh("a.stl", (1, 1, 0), origin=origin)], a__stl=BOX)
@@ -131,30 +131,30 @@ class TestCollisionMeshes:
         assert box.mesh is None
         assert "by a box of 1 mm thickness" in done.notes[0]
 
-    def test_of_which_nothing_is_left_are_left_out(self):
+    def test_mesh_without_surface_is_removed(self):
         done = packed(collisions=[mesh("a.stl", (1, 0, 0))], a__stl=BOX)
         assert not done.model.links[0].collisions
         assert "it has no surface" in done.notes[0]
 
-    def test_to_which_mujoco_fits_a_primitive_collide_as_they_are(self):
+    def test_fitted_mesh_is_exported(self):
         done = packed(collisions=[mesh("a.stl", fit_to_mesh=True)], a__stl=BOX)
         assert not done.model.links[0].collisions[0].fit_to_mesh
         assert "instead of MuJoCo's fitted primitive" in done.notes[0]
 
 
 class TestPrimitives:
-    def test_stay_as_they_are(self):
+    def test_primitives_are_unchanged(self):
         shapes = [shape("box", 1, 2, 3), shape("cylinder", 1, 2), shape("capsule", 1, 2)]
         done = packed(visuals=shapes)
         assert [(s.shape, s.size) for s in done.model.links[0].visuals] == [
             (s.shape, s.size) for s in shapes
         ]
 
-    def test_a_capsule_of_no_length_is_a_sphere(self):
+    def test_capsule_without_length_is_sphere(self):
         (done,) = packed(visuals=[shape("capsule", 0.1, 0)]).model.links[0].visuals
         assert (done.shape, done.size) == ("sphere", (0.1,))
 
-    def test_an_ellipsoid_has_a_mesh_beside(self):
+    def test_ellipsoid_has_mesh(self):
         done = packed(collisions=[shape("ellipsoid", 0.1, 0.2, 0.3)])
         (ellipsoid,) = done.model.links[0].collisions
         assert (ellipsoid.shape, ellipsoid.size) == ("ellipsoid", (0.1, 0.2, 0.3))
@@ -182,7 +182,7 @@ def corners(meshes, mesh):
 
 
 class TestRobots:
-    def test_mujoco_takes_every_file(self, done):
+    def test_mujoco_loads_every_file(self, done):
         spec = mujoco.MjSpec()
         for k, file in enumerate(done.files):
             spec.add_mesh(name=f"m{k}", file=file)
@@ -192,7 +192,7 @@ class TestRobots:
             model = spec.compile()
         assert model.nmesh == len(done.files) > 0
 
-    def test_boxes_around_the_meshes_stay(self, source, done):
+    def test_bounding_boxes_are_unchanged(self, source, done):
         before = Meshes()
         after = Meshes({Path(file): data for file, data in done.files.items()})
         pairs = {
@@ -206,13 +206,13 @@ class TestRobots:
             assert b.min(axis=0) == pytest.approx(a.min(axis=0), abs=1e-6)
             assert b.max(axis=0) == pytest.approx(a.max(axis=0), abs=1e-6)
 
-    def test_the_same_bytes_each_time_and_none_twice(self, source, done):
+    def test_files_are_deterministic_and_unique(self, source, done):
         again = export_meshes(source, Meshes())
         assert dict(again.files) == dict(done.files)
         assert list(again.files) == list(done.files)
         assert len(set(done.files.values())) == len(done.files)
 
 
-def test_links_without_shapes_stay():
+def test_links_without_geometry():
     (link,) = export_meshes(robot(), Meshes()).model.links
     assert link.name == "leg"

@@ -13,18 +13,8 @@ from terrainkit_robots.lint.compare.link_poses import compare_link_poses, sample
 from terrainkit_robots.lint.compare.mjcf_poses import mjcf_poses
 from terrainkit_robots.lint.compare.robot_pairs import pair_robots
 from terrainkit_robots.lint.compare.urdf_poses import urdf_poses
+from tests.robots import REAL_ROBOTS
 
-REAL = [
-    "a1/urdf/a1.urdf",
-    "go2/urdf/go2.urdf",
-    "go2_mjcf/go2.xml",
-    "h1/urdf/h1.urdf",
-    "h1/h1.xml",
-    "g1/g1_29dof.urdf",
-    "g1/g1_29dof.xml",
-    "anymal_c/urdf/anymal_c.urdf",
-    "cassie/urdf/cassie.urdf",
-]
 BUNDLED = ["quadruped.urdf", "quadruped.xml", "biped.urdf", "biped.xml"]
 
 ARM = """
@@ -69,7 +59,7 @@ def test_quaternion_origins_agree(tmp_path):
     assert worst(Facts(load_robot(path))) < 1e-9
 
 
-@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("name", REAL_ROBOTS)
 def test_body_poses_agree_on_real_robots(robot_file, name):
     assert worst(Facts(load_robot(robot_file(name)))) < 1e-9
 

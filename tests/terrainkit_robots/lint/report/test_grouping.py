@@ -16,7 +16,7 @@ JOINTS = ["FL_hip_joint", "FR_hip_joint", "RL_hip_joint"]
 @pytest.fixture
 def groups(finding):
     """Return a function that groups findings, given as keyword arguments, on a quadruped."""
-    model = Facts(load_robot(bundled.find("quadruped"))).model
+    model = Facts(load_robot(bundled.urdf_path("quadruped"))).model
 
     def make(*changes):
         return group_findings(model, [finding(**each) for each in changes])

@@ -12,7 +12,7 @@ def summary(path):
 
 
 def test_summary_of_a_quadruped():
-    lines = summary(bundled.find("quadruped"))
+    lines = summary(bundled.urdf_path("quadruped"))
     assert lines["robot"] == "quadruped (URDF)"
     assert lines["size"] == "15.02 kg, 17 links in 13 rigid bodies, 12 joints"
     assert lines["legs"] == "4, 0.448 m long; feet: FL_foot, FR_foot, RL_foot, RR_foot"
@@ -22,7 +22,7 @@ def test_summary_of_a_quadruped():
 
 
 def test_repeated_roles_are_numbered():
-    assert "  roll 2" in summary(bundled.find("biped"))
+    assert "  roll 2" in summary(bundled.urdf_path("biped"))
 
 
 def test_summary_without_legs_and_name(tmp_path):
@@ -37,7 +37,7 @@ def test_summary_without_legs_and_name(tmp_path):
 @pytest.mark.parametrize("value", ["1e300", "1e-300", "1e11", "nan", "-1e308"])
 @pytest.mark.parametrize("words", ['effort="{}"', 'upper="{}"', 'mass value="{}"', 'xyz="0 0 {}"'])
 def test_extreme_numbers_stay_short(tmp_path, words, value):
-    text = bundled.find("quadruped").read_text()
+    text = bundled.urdf_path("quadruped").read_text()
     start = words.partition("{")[0]
     head, _, rest = text.partition(start)
     (tmp_path / "robot.urdf").write_text(f"{head}{start}{value}{rest[rest.index(chr(34)) :]}")
@@ -46,9 +46,9 @@ def test_extreme_numbers_stay_short(tmp_path, words, value):
 
 
 def test_gains_are_shown_if_simulated():
-    report = lint(Facts(load_robot(bundled.find("quadruped"))), [])
+    report = lint(Facts(load_robot(bundled.urdf_path("quadruped"))), [])
     assert report.simulated
     told = dict(robot_summary(report))
     assert "kp 60, kd 2: FL_hip_joint" in told["  roll"]
-    static = lint(Facts(load_robot(bundled.find("quadruped"))), [], simulate=False)
+    static = lint(Facts(load_robot(bundled.urdf_path("quadruped"))), [], simulate=False)
     assert "kp" not in dict(robot_summary(static))["  roll"]

@@ -73,13 +73,13 @@ def test_unstable_drop_units_of_sliding_joint(robot):
 def test_does_not_stand_severity(monkeypatch, stood, tilt, lifted, severity):
     standing_with = replace(stood, tilt=math.radians(tilt), lifted_feet=lifted)
     monkeypatch.setattr(dyn, "stand_test", lambda *_, **__: standing_with)
-    violations = check("DYN002", bundled.find("quadruped"))
+    violations = check("DYN002", bundled.urdf_path("quadruped"))
     assert [violation.severity for violation in violations] == ([severity] if severity else [])
     assert all("tilts by" in violation.message for violation in violations)
 
 
 def test_unreachable_limits_counts_blocked_joints():
-    (violation,) = check("DYN003", bundled.find("quadruped"))
+    (violation,) = check("DYN003", bundled.urdf_path("quadruped"))
     assert violation.message.startswith(
         "6 of 12 joints blocked by a collision before a limit, moved one at a time from the "
         "default pose; worst "
@@ -102,7 +102,7 @@ def test_low_joint_inertia_units_of_sliding_joint(sliding_shanks):
 
 
 def test_low_joint_inertia_counts_other_joints():
-    (violation,) = check("DYN004", bundled.find("quadruped"))
+    (violation,) = check("DYN004", bundled.urdf_path("quadruped"))
     others = violation.measured["joints"] - 1
     assert others > 1
     assert violation.message.endswith(f" kg m2; the same applies to {others} other joints")

@@ -5,18 +5,7 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.rule import rules
-
-ROBOTS = [
-    "a1/urdf/a1.urdf",
-    "go2/urdf/go2.urdf",
-    "go2_mjcf/go2.xml",
-    "h1/urdf/h1.urdf",
-    "h1/h1.xml",
-    "g1/g1_29dof.urdf",
-    "g1/g1_29dof.xml",
-    "anymal_c/urdf/anymal_c.urdf",
-    "cassie/urdf/cassie.urdf",
-]
+from tests.robots import REAL_ROBOTS
 
 
 def check(path, text=None):
@@ -40,7 +29,7 @@ def replace(text, tag, name, pattern, replacement):
     return text[:start] + block + text[end:]
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", REAL_ROBOTS)
 def test_sym_accepts_published_robots(robot_file, name):
     assert check(robot_file(name)) == []
 

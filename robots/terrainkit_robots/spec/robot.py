@@ -1,0 +1,73 @@
+"""A robot to train: its spec as arrays in the order of its actions."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.errors import ConfigError
+from terrainkit_robots.spec.per_joint import match_joints
+from terrainkit_robots.spec.robot_spec import RobotSpec
+
+FloatArray = NDArray[np.float32]
+
+SPEC_FILE = "robot.toml"
+"""File name of the spec in a robot's folder."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Robot:
+    """A robot as arrays, with j joints in the order of its actions."""
+
+    spec: RobotSpec
+    """Its spec."""
+    mjcf: Path
+    """Its MuJoCo model."""
+    default_pose: FloatArray
+    """Default joint positions [rad], shape (j,)."""
+    wheels: NDArray[np.bool_]
+    """Joints with damping but no stiffness, shape (j,)."""
+    effort: FloatArray
+    """Torque limits [N m], shape (j,)."""
+    velocity: FloatArray
+    """Velocity limits [rad/s], shape (j,)."""
+    lower: FloatArray
+    """Lower soft limits [rad], -inf without one, shape (j,)."""
+    upper: FloatArray
+    """Upper soft limits [rad], shape (j,)."""
+
+    @classmethod
+    def from_spec(cls, spec: RobotSpec, folder: Path) -> "Robot":
+        """Return the robot that a spec in `folder` describes; raise ConfigError if incomplete."""
+        if not spec.floating:
+            raise ConfigError(f"base of {spec.name}: got a fixed base; expected a floating base")
+        if not spec.feet:
+            raise ConfigError(f"feet of {spec.name}: got none; expected one for each leg")
+        if spec.spawn_height is None or spec.base_height_target is None:
+            raise ConfigError(
+                f"the spec of {spec.name} lacks spawn_height or base_height_target; "
+                "terrainkit onboard measures both"
+            )
+
+        def array(table: str) -> FloatArray:
+            return np.array(list(spec.per_joint(table).values()), np.float32)
+
+        soft = match_joints(spec.soft_limits, spec.joint_order).values
+        limits = [soft.get(name, (-np.inf, np.inf)) for name in spec.joint_order]
+        lower, upper = np.array(limits, np.float32).T
+        return cls(
+            spec=spec,
+            mjcf=folder / spec.mjcf,
+            default_pose=array("default_pose"),
+            wheels=(array("stiffness") == 0) & (array("damping") > 0),
+            effort=array("effort"),
+            velocity=array("velocity"),
+            lower=lower,
+            upper=upper,
+        )
+
+    @classmethod
+    def load(cls, folder: Path) -> "Robot":
+        """Load the robot in an onboarded folder; raise ConfigError if there is none."""
+        return cls.from_spec(RobotSpec.load(folder / SPEC_FILE), folder)
