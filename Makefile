@@ -3,18 +3,18 @@
 test:          ## all tests
 	python -m pytest
 
-check:         ## what CI checks beside the tests
+check:         ## the checks of CI other than the tests
 	.ci/check
 
-format:        ## put the code in shape
+format:        ## format the code and apply ruff's fixes
 	ruff check --fix .
 	ruff format .
 
-bench:         ## ratios of speed and memory
+bench:         ## print the ratios of speed and memory
 	python benchmarks/run.py
 
-docs:          ## the generated pages of docs/ and the pictures
+docs:          ## rewrite the generated docs and pictures
 	python docs/build.py
 
-wheel:         ## what pip installs
+wheel:         ## the wheel that pip installs
 	python -m pip wheel --no-deps --wheel-dir dist .

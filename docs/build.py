@@ -48,7 +48,7 @@ def terrains_page() -> str:
         "# Terrains\n",
         NOTE,
         "Each terrain with its parameters. A parameter with two values is a range from difficulty",
-        "0 to difficulty 1. Replace it by one value or another range in a",
+        "0 to difficulty 1. Replace it with one value or another range in a",
         "[configuration file](conventions.md#configuration-files) or with `--set`. The pictures",
         "show difficulty 0.1, 0.5 and 1 on patches of 8 m x 8 m, with holes truncated.\n",
         terrain_table("#"),
@@ -105,8 +105,8 @@ def rules_page() -> str:
         "# The rules of check-robot\n",
         NOTE,
         "The rules that `terrainkit check-robot` runs. An error breaks training or a simulator. A",
-        "warning is a likely mistake that should be corrected. A note is information. `--fix`",
-        "applies fixes that do not change the robot for any reader that accepts the file.",
+        "warning is a likely mistake that should be corrected. A note needs no correction. `--fix`",
+        "applies fixes that do not change the robot for any parser that accepts the file.",
         "`--unsafe-fixes` also applies fixes that change numbers, shapes or other files.\n",
     ]
     for family, about in FAMILIES.items():
@@ -115,9 +115,8 @@ def rules_page() -> str:
         for rule in rules():
             if rule.family == family:
                 link = f"[{rule.code} {rule.name}](#{rule.code.lower()}-{rule.name})"
-                parts.append(
-                    f"| {link} | {markup(rule.title)} | {rule.severity} | {FIXED[rule.fixes]} |"
-                )
+                severity, fix = SEVERITY[rule.severity], FIXED[rule.fixes]
+                parts.append(f"| {link} | {markup(rule.title)} | {severity} | {fix} |")
         parts += ["", *(rule_section(rule) for rule in rules() if rule.family == family)]
     return "\n".join(parts)
 
@@ -132,14 +131,14 @@ CONFIGS = {
 """Config class of each TOML file."""
 
 FIXED = {"safe": "`--fix`", "unsafe": "`--unsafe-fixes`", "no": ""}
-SEVERITY = {"error": "An error", "warning": "A warning", "info": "A note"}
+SEVERITY = {"error": "error", "warning": "warning", "info": "note"}
 
 
 def rule_section(rule: Rule) -> str:
-    fixed = f", fixed by {FIXED[rule.fixes]}" if FIXED[rule.fixes] else ""
+    fixed = f"; fixed by {FIXED[rule.fixes]}" if FIXED[rule.fixes] else ""
     return (
         f"### {rule.code} {rule.name}\n\n"
-        f"**{markup(rule.title)}** {SEVERITY[rule.severity]}{fixed}.\n\n"
+        f"**{markup(rule.title)}** Severity: {SEVERITY[rule.severity]}{fixed}.\n\n"
         f"{markup(rule.why)}\n\n"
         f"*How to fix:* {markup(rule.how_to_fix)}\n\n"
         f"*Source:* {markup(rule.reference)}\n"

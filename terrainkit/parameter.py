@@ -1,7 +1,7 @@
 """Declare the parameters of a terrain: their range, and how they snap to the cells.
 
-The fields of a terrain are declared with the functions below. Each takes the value at difficulty 0
-and the value at difficulty 1; a single value is used at every difficulty.
+The fields of a terrain are declared with the functions below. Most take the value at difficulty 0
+and the value at difficulty 1; a single value applies at every difficulty.
 """
 
 import dataclasses
@@ -23,7 +23,7 @@ Realized = float | int | bool | tuple[float, float]
 
 
 MAX_VALUE = 1_000_000
-"""Largest number that a parameter accepts: far beyond any terrain, and far from overflow."""
+"""Largest number that a parameter accepts: beyond any terrain, and far below overflow."""
 
 MAX_COUNT = 10_000
 """Largest integer that a parameter accepts, so that building a patch takes bounded time."""
@@ -40,20 +40,20 @@ class Parameter:
     """Default at difficulty 1."""
 
     snap: Snap = "none"
-    """How the value snaps to the cells: not at all, to whole cells, or to a centered block."""
+    """How the value is rounded to cells: not at all, to whole cells, or to a centered square."""
 
-    zero: bool = True
+    allows_zero: bool = True
     """Whether 0 is allowed. Negative values never are."""
 
     is_grade: bool = False
-    """Whether it is a rise over run, which must stay below the map's slope_threshold."""
+    """Whether it is a rise over run, which must not exceed the map's slope_threshold."""
 
     allows_range: bool = True
     """Whether the value may be a range (easy, hard)."""
 
     tolerance: float = 0.0
-    """Deviation that is not reported, in the unit of the parameter: values that are a multiple of
-    a step may differ by one default step."""
+    """Deviation that is not reported, in the unit of the parameter, such as the default step of a
+    value that is rounded to whole steps."""
 
     def at(self, difficulty: float) -> Value:
         """Return the default at `difficulty`, 0 to 1."""
@@ -62,7 +62,7 @@ class Parameter:
     def realized(self, value: Value, grid: Grid) -> Realized:
         """Return `value` snapped to the cells of `grid`; a pair (x, y) where the axes differ."""
         if self.snap == "cells":
-            return grid.length(grid.cells(value, minimum=0 if self.zero else 1))
+            return grid.length(grid.cells(value, minimum=0 if self.allows_zero else 1))
         if self.snap == "centered":
             x, y = (grid.length(count) for count in grid.centered(value))
             return x if x == y else (x, y)
@@ -71,8 +71,8 @@ class Parameter:
     def deviates(self, requested: Value, realized: Realized, cell: float) -> bool:
         """Return whether `realized` differs from `requested` by more than snapping requires.
 
-        A length may differ by half a cell, the side of a centered block by one cell. Other values
-        may differ by 5 %, or by `tolerance` unless they became 0.
+        A length may differ by half a cell, and the side of a centered square by one cell. Other
+        values may differ by 5 %, or by `tolerance` unless they became 0.
         """
         values = realized if isinstance(realized, tuple) else (realized,)
         snapping = {"cells": cell / 2, "centered": cell, "none": 0.05 * requested}[self.snap]
@@ -97,19 +97,19 @@ def height(easy: float, hard: float | None = None, *, tolerance: float = 0.0) ->
     return _field(easy, hard, tolerance=tolerance)
 
 
-def length(easy: float, hard: float | None = None, *, zero: bool = False) -> Any:
-    """Declare a horizontal length [m], which snaps to whole cells: at least one unless `zero`."""
-    return _field(easy, hard, snap="cells", zero=zero)
+def length(easy: float, hard: float | None = None, *, allows_zero: bool = False) -> Any:
+    """Declare a horizontal length [m], which snaps to whole cells, at least one by default."""
+    return _field(easy, hard, snap="cells", allows_zero=allows_zero)
 
 
 def platform(side: float) -> Any:
     """Declare the side of a square at the center of the patch [m], which stays centered."""
-    return _field(side, snap="centered", zero=False)
+    return _field(side, snap="centered", allows_zero=False)
 
 
-def scalar(easy: float, hard: float | None = None, *, zero: bool = True) -> Any:
+def scalar(easy: float, hard: float | None = None, *, allows_zero: bool = True) -> Any:
     """Declare a number that does not snap to cells."""
-    return _field(easy, hard, zero=zero)
+    return _field(easy, hard, allows_zero=allows_zero)
 
 
 def grade(easy: float, hard: float) -> Any:
@@ -119,7 +119,7 @@ def grade(easy: float, hard: float) -> Any:
 
 def count(number: int) -> Any:
     """Declare a positive integer that does not depend on the difficulty."""
-    return _field(number, zero=False, allows_range=False)
+    return _field(number, allows_zero=False, allows_range=False)
 
 
 def switch(*, default: bool = False) -> Any:
@@ -161,6 +161,6 @@ def convert_parameter(terrain: str, name: str, value: object, parameter: Paramet
     if kind is bool:
         return bool(convert(f"{terrain}.{name}", value, bool))
     limit = MAX_VALUE if kind is float else MAX_COUNT
-    least = Meta(ge=0, le=limit) if parameter.zero else Meta(gt=0, le=limit)
+    least = Meta(ge=0, le=limit) if parameter.allows_zero else Meta(gt=0, le=limit)
     number: Value = convert(f"{terrain}.{name}", value, Annotated[kind, least])
     return number

@@ -93,7 +93,7 @@ def build_patch(
     )
     if origin is None:
         raise ConfigError(
-            f"{sub_terrain.name}: no disc of radius {config.spawn_radius:g} m is level within "
+            f"{sub_terrain.name}: no disc of radius {config.spawn_radius:g} m is flat within "
             f"{config.spawn_tolerance:g} m in a patch of {grid.size[0]:g} m x {grid.size[1]:g} m; "
             "increase the platform or reduce spawn_radius"
         )

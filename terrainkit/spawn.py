@@ -1,4 +1,4 @@
-"""Find spawn origins on level ground."""
+"""Find spawn origins on flat ground."""
 
 import math
 
@@ -21,18 +21,18 @@ def find_spawn(
     """Return the spawn origin nearest to `preferred`.
 
     All samples that influence the surface within `radius` of the origin differ by at most
-    `tolerance`. The disc is therefore level, and no wall or step reaches into it.
+    `tolerance`. The disc is therefore flat, and no wall or step reaches into it.
 
     Args:
         heights: Heights on `grid` [m], shape `grid.shape`.
         grid: Grid of the patch; the disc stays inside it.
-        preferred: Spawn position that the terrain prefers, x and y [m].
+        preferred: Preferred spawn position, x and y [m].
         radius: Radius of the disc [m].
         tolerance: Largest difference in height within the disc [m].
         threshold: Difference between neighboring samples above which there is a wall [m].
 
     Returns:
-        Origin (x, y, z) [m]; None if no disc in the patch is level.
+        Origin (x, y, z) [m]; None if no disc in the patch is flat.
     """
     radius_cells = radius / grid.cell
     index = tuple((p - low) / grid.cell - 0.5 for p, low in zip(preferred, grid.lower, strict=True))
@@ -41,7 +41,7 @@ def find_spawn(
         if low == high:
             return *preferred, high
         if high - low <= tolerance:
-            # Level within the tolerance is not level to the millimeter, so evaluate the surface.
+            # The disc is flat within the tolerance only, so evaluate the surface at its center.
             ground = surface_at(heights, np.array([index]), threshold=threshold)
             return *preferred, float(ground.height[0])
     candidates = _level_cells(heights, radius_cells, tolerance)
@@ -87,7 +87,7 @@ def _touches_disc(
 def _level_cells(
     heights: NDArray[np.float32], radius_cells: float, tolerance: float
 ) -> NDArray[np.int64]:
-    """Return the cells whose whole disc is level and in the patch, shape (n, 2)."""
+    """Return the cells whose whole disc is flat and inside the patch, shape (n, 2)."""
     import cv2
 
     margin = math.ceil(radius_cells + 1)

@@ -115,7 +115,7 @@ class Terrain(ABC):
         return heights
 
     def check_fit(self, grid: Grid) -> None:
-        """Raise ConfigError if a centered block of this terrain does not fit on `grid`."""
+        """Raise ConfigError if a centered square of this terrain does not fit on `grid`."""
         for name, parameter in parameters_of(type(self)).items():
             if parameter.snap == "centered":
                 self._check_centered(name, getattr(self, name), grid)
@@ -147,6 +147,6 @@ class Terrain(ABC):
         """Return the heights on `grid` [m], shape `grid.shape`.
 
         Take random numbers only from `rng`. Sample first and scale afterward, so that the pattern
-        stays the same at every difficulty. Leave a level disc where a robot can be spawned; see
+        stays the same at every difficulty. Leave a flat disc where a robot can be spawned; see
         :mod:`terrainkit.spawn`.
         """

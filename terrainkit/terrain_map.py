@@ -59,7 +59,7 @@ class TerrainMap:
         """Return the height of the ground [m] at `xy`.
 
         Args:
-            xy: Points [m], shape (..., 2). Beyond the map the ground continues level.
+            xy: Points [m], shape (..., 2). Beyond the map, the edge height applies.
 
         Returns:
             Heights [m], shape (...). On a wall, the height of one of its sides.

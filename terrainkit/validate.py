@@ -162,7 +162,7 @@ def _check_spawn(terrain_map: TerrainMap) -> Iterator[str]:
         spread = float(ground.max() - ground.min())
         if spread > config.spawn_tolerance + 1e-6:
             yield (
-                f"{subject} is not on level ground: heights within {config.spawn_radius:g} m "
+                f"{subject} is not on flat ground: heights within {config.spawn_radius:g} m "
                 f"differ by {spread:.3f} m; expected at most {config.spawn_tolerance:g} m"
             )
 

@@ -11,7 +11,7 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class Flat(Terrain):
-    """Level ground at height 0, the same at every difficulty."""
+    """Flat ground at height 0, the same at every difficulty."""
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return zeros."""

@@ -13,16 +13,16 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class Gap(Terrain):
-    """A gap of constant width around a central platform, with level ground beyond it."""
+    """A gap of constant width around a central platform, with flat ground beyond it."""
 
-    width: float = parameter.length(0.0, 1.0, zero=True)
+    width: float = parameter.length(0.0, 1.0, allows_zero=True)
     """Width of the gap [m]; it ends at the edge of the patch."""
 
     depth: float = parameter.height(5.0)
     """Depth of the gap, which has a floor [m]."""
 
     platform: float = parameter.platform(3.0)
-    """Side of the level square at the center [m]."""
+    """Side of the flat square at the center [m]."""
 
     def realized(self, grid: Grid) -> dict[str, Realized]:
         """Return the realized parameters: the gap ends at the edge of the patch."""

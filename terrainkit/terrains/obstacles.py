@@ -13,9 +13,9 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class Obstacles(Terrain):
-    """Rectangular blocks and trenches at random positions around a free platform.
+    """Rectangular blocks and trenches at random positions around a flat platform.
 
-    The height of each is `height` or half of it, up or down. Later ones overwrite earlier ones.
+    Each height or depth is `height` or half of it. Later obstacles overwrite earlier ones.
     """
 
     height: float = parameter.height(0.05, 0.25)
@@ -31,7 +31,7 @@ class Obstacles(Terrain):
     """Maximum side of an obstacle [m]."""
 
     platform: float = parameter.platform(3.0)
-    """Side of the level square at the center [m]."""
+    """Side of the flat square at the center [m]."""
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the obstacles, each within the patch, with the platform cleared."""

@@ -1,4 +1,4 @@
-"""A pyramid with a level top."""
+"""A pyramid with a flat top."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ class PyramidSlope(Terrain):
     """Rise over run of the sides."""
 
     platform: float = parameter.platform(3.0)
-    """Side of the level square at the center [m]."""
+    """Side of the flat square at the center [m]."""
 
     inverted: bool = parameter.switch()
     """Invert the heights: the platform is the lowest part, and the robot climbs to leave it."""

@@ -26,7 +26,7 @@ class PyramidStairs(Terrain):
     """Run of a step [m]."""
 
     platform: float = parameter.platform(3.0)
-    """Side of the level square at the center [m]."""
+    """Side of the flat square at the center [m]."""
 
     inverted: bool = parameter.switch()
     """Invert the heights: the platform is the lowest part, and the robot climbs to leave it."""

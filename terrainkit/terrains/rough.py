@@ -14,7 +14,7 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class Rough(Terrain):
-    """Uniform noise around height 0, with a level platform at the center."""
+    """Uniform noise around height 0, with a flat platform at the center."""
 
     amplitude: float = parameter.height(0.02, 0.1, tolerance=STEP)
     """Largest height above or below 0 [m], rounded down to whole steps."""
@@ -22,11 +22,11 @@ class Rough(Terrain):
     step: float = parameter.height(STEP)
     """Step of the random heights [m]."""
 
-    spacing: float = parameter.scalar(0.2, zero=False)
+    spacing: float = parameter.scalar(0.2, allows_zero=False)
     """Distance between two random heights [m]; heights in between are interpolated."""
 
     platform: float = parameter.platform(2.0)
-    """Side of the level square at the center [m]."""
+    """Side of the flat square at the center [m]."""
 
     def realized(self, grid: Grid) -> dict[str, Realized]:
         """Return the realized parameters: whole steps, and whole intervals across the patch."""

@@ -15,7 +15,7 @@ from terrainkit.terrains.pyramid_slope import PyramidSlope
 
 @dataclass(frozen=True, kw_only=True)
 class RoughSlope(Terrain):
-    """A pyramid slope with uniform noise on its sides; the platform is level."""
+    """A pyramid slope with uniform noise on its sides; the platform is flat."""
 
     grade: float = parameter.grade(0.0, 0.4)
     """Rise over run of the sides without the noise."""
@@ -26,11 +26,11 @@ class RoughSlope(Terrain):
     step: float = parameter.height(STEP)
     """Step of the random heights [m]."""
 
-    spacing: float = parameter.scalar(0.2, zero=False)
+    spacing: float = parameter.scalar(0.2, allows_zero=False)
     """Distance between two random heights [m]; heights in between are interpolated."""
 
     platform: float = parameter.platform(3.0)
-    """Side of the level square at the center [m]."""
+    """Side of the flat square at the center [m]."""
 
     inverted: bool = parameter.switch()
     """Invert the heights: the platform is the lowest part, and the robot climbs to leave it."""

@@ -13,7 +13,7 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class Slope(Terrain):
-    """A slope along x, from a level start to a level landing of the same length.
+    """A slope along x, from a flat start to a flat landing of the same length.
 
     The robot is spawned at low x. The slope spans the whole width of the patch.
     """
@@ -22,13 +22,13 @@ class Slope(Terrain):
     """Rise over run of the slope."""
 
     landing: float = parameter.length(2.0)
-    """Length along x of the level strips at both ends [m]."""
+    """Length along x of the flat strips at both ends [m]."""
 
     inverted: bool = parameter.switch()
     """Descend along x instead of climbing."""
 
     def spawn(self, grid: Grid) -> tuple[float, float]:
-        """Return the center of the level start."""
+        """Return the center of the flat start."""
         return grid.lower[0] + grid.length(grid.cells(self.landing)) / 2, grid.center[1]
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:

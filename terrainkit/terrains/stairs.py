@@ -13,7 +13,7 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class Stairs(Terrain):
-    """One flight of stairs along x, from a level start to a level landing at least as long.
+    """One flight of stairs along x, from a flat start to a flat landing at least as long.
 
     The robot is spawned at low x. The steps span the whole width of the patch.
     """
@@ -25,13 +25,13 @@ class Stairs(Terrain):
     """Run of a step [m]."""
 
     landing: float = parameter.length(2.0)
-    """Length along x of the level start, and minimum length of the landing [m]."""
+    """Length along x of the flat start, and minimum length of the landing [m]."""
 
     inverted: bool = parameter.switch()
     """Descend along x instead of climbing."""
 
     def spawn(self, grid: Grid) -> tuple[float, float]:
-        """Return the center of the level start."""
+        """Return the center of the flat start."""
         return grid.lower[0] + grid.length(grid.cells(self.landing)) / 2, grid.center[1]
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:

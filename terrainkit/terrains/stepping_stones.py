@@ -12,16 +12,16 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class SteppingStones(Terrain):
-    """Square stones in rows along y, each row with a random offset, around a platform.
+    """Square stones in rows along y with random offsets, around a flat platform.
 
-    Stones are clipped at the edge of the patch.
+    Stones are truncated at the edge of the patch.
     """
 
     stone: float = parameter.length(1.575, 0.075)
     """Side of a stone [m]."""
 
     distance: float = parameter.length(0.05, 0.1)
-    """Gap between two stones [m]."""
+    """Gap between neighboring stones [m]."""
 
     variation: float = parameter.height(0.0)
     """Maximum height of a stone above or below 0 [m]."""
@@ -30,10 +30,10 @@ class SteppingStones(Terrain):
     """Depth of the holes [m]."""
 
     platform: float = parameter.platform(4.0)
-    """Side of the level square at the center [m]."""
+    """Side of the flat square at the center [m]."""
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return the stones; a row is `stone` wide along x, and `distance` from the next."""
+        """Return the stones; rows are `stone` wide along x, with gaps of `distance`."""
         stone, distance = grid.cells(self.stone), grid.cells(self.distance)
         pitch = stone + distance
         shifts = (rng.random(grid.shape[0]) * pitch).astype(np.int64)

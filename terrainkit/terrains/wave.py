@@ -14,7 +14,7 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class Wave(Terrain):
-    """The product of sine waves along x and y, with a level platform at the center.
+    """The product of sine waves along x and y, with a flat platform at the center.
 
     The patch is a whole number of waves, so its rim is at height 0.
     """
@@ -26,7 +26,7 @@ class Wave(Terrain):
     """Waves along each side of the patch."""
 
     platform: float = parameter.platform(1.5)
-    """Side of the level square at the center [m]."""
+    """Side of the flat square at the center [m]."""
 
     def realized(self, grid: Grid) -> dict[str, Realized]:
         """Return the realized parameters; the highest sample is slightly off the crest."""

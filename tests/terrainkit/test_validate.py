@@ -74,7 +74,7 @@ def test_validate_finds_origin_on_uneven_ground(sound):
     ((check, message),) = found(changed(sound, "env_origins", (2, 5), origin))
     assert check == "spawn"
     assert message.startswith(
-        "patch (2, 5): the spawn origin is not on level ground: heights within 0.5 m differ by 0."
+        "patch (2, 5): the spawn origin is not on flat ground: heights within 0.5 m differ by 0."
     )
 
 

@@ -1,4 +1,4 @@
-"""The vectorized environment: n legged robots that follow velocity commands on one terrain."""
+"""The vectorized environment: legged robots that track velocity commands on a terrain."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -35,7 +35,7 @@ BoolArray = NDArray[np.bool_]
 
 
 class LeggedEnv(VecEnv):
-    """Legged robots as rsl-rl's `VecEnv`; returned tensors are never modified later."""
+    """An rsl-rl `VecEnv` of legged robots. Later steps do not modify returned tensors."""
 
     def __init__(self, task: Task, robot: Robot, terrain: Terrain, device: str = "cpu") -> None:
         """Build the simulations and reset every environment."""
@@ -95,7 +95,7 @@ class LeggedEnv(VecEnv):
         self.episode_length[:] = lengths.cpu().numpy()
 
     def get_observations(self) -> TensorDict:
-        """Return the current observations; later steps do not change these tensors."""
+        """Return the current observations; later steps do not modify these tensors."""
         return self._observations
 
     def step(
@@ -140,7 +140,7 @@ class LeggedEnv(VecEnv):
         self._compute_observations()
 
     def set_commands(self, commands: FloatArray | None) -> None:
-        """Fix the commands, shape (n, 3); None returns to random commands."""
+        """Set fixed commands, shape (n, 3); None restores random commands."""
         if commands is None and self.velocity_command.fixed is None:
             return
         self.velocity_command.fixed = commands
@@ -151,7 +151,7 @@ class LeggedEnv(VecEnv):
         self._compute_observations()
 
     def to_ctrl(self, actions: FloatArray) -> FloatArray:
-        """Return the motors' setpoints for actions of shape (n, j)."""
+        """Return the actuator controls for actions of shape (n, j)."""
         target = self.action_offset + self.action_scale * actions
         return target - self.joint_offset * self.is_position_controlled
 
@@ -171,7 +171,7 @@ class LeggedEnv(VecEnv):
     def _compute_state(
         self, env_ids: Ids, unstable: BoolArray | None = None, *, after_reset: bool = False
     ) -> State:
-        """Return the state of some environments; after a reset there are no contacts yet."""
+        """Return the state of the given environments; after a reset, there are no contacts."""
         rows: Any = slice(None) if len(env_ids) == self.num_envs else env_ids
         measured = self.sensors.read(rows, after_reset=after_reset)
         if unstable is not None:
@@ -192,7 +192,7 @@ class LeggedEnv(VecEnv):
     def _compute_rewards(self, state: State, unstable: BoolArray) -> FloatArray:
         """Return the rewards of a step, shape (n,), and add them to the episode sums.
 
-        An unstable simulation was reset by MuJoCo, so its state only counts as a termination.
+        MuJoCo reset the unstable simulations, so only their termination reward counts.
         """
         settings, dt = self.cfg.rewards, np.float32(self.cfg.dt)
         total = np.zeros(self.num_envs, np.float32)
@@ -220,7 +220,7 @@ class LeggedEnv(VecEnv):
         return quat_to_yaw(self.sim.qpos[:, 3:7].astype(np.float32))
 
     def _end_episodes(self, env_ids: Ids, state: State, unstable: BoolArray) -> dict[str, float]:
-        """Update the curricula after some episodes, and return the values to log."""
+        """Update the curricula at the end of episodes, and return the values to log."""
         seconds, fallen = self.steps_since_reset[env_ids] * self.cfg.dt, state.fallen[env_ids]
         log = {
             f"Episode/rew_{name}": float((total[env_ids] / seconds).mean())
@@ -275,7 +275,7 @@ class LeggedEnv(VecEnv):
         self.velocity_command.resample(self.rng, env_ids)
 
     def state_dict(self) -> dict[str, Any]:
-        """Return everything that changes from step to step, for an exact resume."""
+        """Return all mutable state, for an exact resume."""
         return {
             "arrays": {name: torch.tensor(array) for name, array in self._arrays().items()},
             "rng": self.rng.bit_generator.state,
@@ -286,7 +286,7 @@ class LeggedEnv(VecEnv):
         }
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Continue from a state; with another number of environments, keep only the curricula."""
+        """Restore a state; if the number of environments differs, restore only the curricula."""
         self.curriculum.load_state_dict(state["curriculum"])
         self.velocity_command.lin_vel_x = tuple(state["lin_vel_x"])
         arrays, saved = self._arrays(), state["arrays"]

@@ -1,4 +1,4 @@
-"""Training: from a robot, a terrain and a task to a run with a policy."""
+"""Train a policy for a robot on a terrain."""
 
 import os
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class TrainResult:
     """The result of training."""
 
     folder: Path | None
-    """Folder of the run; None except in the main process."""
+    """Folder of the run; None in all processes except the main one."""
     iteration: int
     """Completed iterations."""
     signal: int
@@ -48,13 +48,14 @@ def train(
     """Train a policy, and write checkpoints at intervals, at the end, and when interrupted.
 
     Args:
-        robot: A registered robot, or the folder of an onboarded one.
-        terrain: `plane`, a map, the config of a map, or a MuJoCo model.
-        task: The task; by default the one the robot is registered with.
-        folder: Folder of the run; by default `logs/<robot>/<date-time>`.
+        robot: Name of a registered task, or folder of an onboarded robot.
+        terrain: `plane`, a map (.npz), a map config (.toml), or a MuJoCo model (.xml).
+        task: The task; by default, the registered task of the robot.
+        folder: Folder of the run; by default, `logs/<robot>/<date-time>`.
         resume: A run to continue. With the same robot, terrain and task (`env.num_envs` and
-            `runner` may differ) it continues exactly. Otherwise a new run starts with its networks,
-            its optimizer if the learning rate is the same, and its terrain levels if the map is.
+            `runner` may differ), it continues exactly. Otherwise, a new run starts with its
+            networks, its optimizer state if the learning rate and its schedule are the same, and
+            its terrain levels if the map is the same.
         device: Device of the networks: `cpu`, `cuda`, `cuda:1`. The physics runs on the CPU.
         progress_callback: Called after each iteration.
 
@@ -116,7 +117,7 @@ def train(
 
 
 def _with_last_checkpoint(error: Exception, folder: Path | None) -> TerrainkitError:
-    """Return the error with a hint at the last checkpoint."""
+    """Return the error with the path of the last checkpoint."""
     saved = checkpoints(folder) if folder else {}
     hint = f"the last checkpoint is {saved[max(saved)]}" if saved else "there is no checkpoint"
     if isinstance(error, TerrainkitError):

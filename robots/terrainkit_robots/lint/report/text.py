@@ -135,7 +135,7 @@ def _note_help(findings: Sequence[Finding]) -> Iterator[Line]:
     """Yield how to get help on notes, which are listed without help."""
     codes = sorted(finding.code for finding in findings if finding.severity == "info")
     if codes:
-        yield Span("about a note: ", "dim"), Span(f"terrainkit rule CODE, such as {codes[0]}")
+        yield Span("details of a note: ", "dim"), Span(f"terrainkit rule CODE, such as {codes[0]}")
 
 
 def _skipped(report: Report, width: int) -> Iterator[Line]:

@@ -119,8 +119,8 @@ def does_not_stand(robot: Facts) -> Iterator[Violation]:
     An episode starts with zero actions, that is, PD control with the suggested gains at the
     standing pose. A robot that falls within two seconds is reset before it learns anything. A robot
     that leans, stands on its shanks, lifts a foot or saturates a motor learns to do so. A tilt of 3
-    to 9 degrees is only reported as information. Robots with one or two legs need not balance:
-    their joints are locked, so that only the feet and the pose count.
+    to 9 degrees is only a note. Robots with one or two legs need not balance: their joints are
+    locked, so that only the feet and the pose count.
 
     Fix:
         The message names the cause. Otherwise check the pose, the feet and the effort limits.
@@ -191,9 +191,9 @@ def unreachable_limits(robot: Facts) -> Iterator[Violation]:
     """A joint does not reach its limits while the others stay at the standing pose.
 
     Either a collision with another body stops the joint, or its motor cannot lift the limb.
-    Collisions between legs before a limit are common and reported once as information. It is a
-    warning if the own limb of a joint blocks it within 10 % of its range, or if a motor of a legged
-    robot cannot hold its limb at the standing pose; arms may have springs for that.
+    Collisions between legs are common; they are reported in one note. It is a warning if a limb
+    blocks its own joint within 10 % of the range, or if a motor of a legged robot cannot hold its
+    limb at the standing pose; arms may have springs for that.
 
     Fix:
         Compare the limits, the collision shapes and the effort limits with the real robot.
@@ -223,15 +223,15 @@ def unreachable_limits(robot: Facts) -> Iterator[Violation]:
     if blocked:
         worst = min(blocked, key=lambda result: result.share)
         parts.append(
-            f"{len(blocked)} of {count(len(results), 'joint')} blocked by a collision before a "
-            "limit, moved one at a time from the default pose; worst "
+            f"{len(blocked)} of {count(len(results), 'joint')} collide before reaching a limit "
+            "when moved alone from the default pose; worst: "
             f"{worst.joint}, which reaches {_describe(worst)}"
         )
     if weak:
         worst = max(weak, key=lambda result: result.max_load / result.effort)
         parts.append(
             f"{len(weak)} of {count(len(results), 'joint')} too weak to lift the limb over the "
-            f"whole range; worst {worst.joint}, which needs {worst.max_load:.3g} "
+            f"whole range; worst: {worst.joint}, which needs {worst.max_load:.3g} "
             f"{worst.units.effort} with an effort limit of {worst.effort:.3g} {worst.units.effort}"
         )
     if parts:

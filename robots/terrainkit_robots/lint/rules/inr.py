@@ -33,14 +33,15 @@ from terrainkit_robots.text import names
 from terrainkit_robots.transforms import Matrix
 
 _MIN_TRIANGLE_RATIO = 0.99
-"""Ratio (I1 + I2) / I3 of the principal moments below which rounding is no explanation."""
+"""Ratio (I1 + I2) / I3 of the principal moments below which rounding cannot explain the
+violation."""
 
 _MIN_ROUNDED_RATIO = 0.999
-"""The same ratio for a flat part whose moments are rounded to four digits: each number is off by
-at most 1/2000."""
+"""The same ratio for a flat part whose moments are rounded to four digits, each with an error of at
+most 1/2000."""
 
 _MIN_EXACT_RATIO = 1 - 1e-12
-"""The same ratio below which the deviation is not a floating-point error of this program."""
+"""The same ratio below which floating-point errors cannot explain the violation."""
 
 _MAX_GYRATION, _MAX_GYRATION_ERROR = 1.05, 3.0
 """Radius of gyration divided by half the diagonal of the body: limits of the warning and the error.
@@ -51,8 +52,8 @@ _MIN_GYRATION = 0.05
 in a light shell five times as long has 0.1."""
 
 _COM_SHARE, _COM_MARGIN, _COM_ERROR = 0.10, 0.005, 3.0
-"""Allowed distance of a center of mass from the bounding box of its body: a share of the diagonal
-plus a margin [m]; and the multiple of that distance that is an error."""
+"""Allowed distance of a center of mass from the bounding box of its body: a fraction of the
+diagonal plus a margin [m]. The last value is the multiple of that distance that is an error."""
 
 _MAX_MASS_RATIO = 1000.0
 """Mass ratio of neighboring bodies above which solvers become stiff at common time steps, such as
@@ -83,12 +84,12 @@ def massless_body(robot: Facts) -> Iterator[Violation]:
 
     The acceleration of a body without mass is undefined. MuJoCo rejects the file, PhysX assigns a
     default mass, and other simulators divide by zero. A massless link that is fixed to a body with
-    mass is part of that body and is only reported as information. A fixed base never moves and
-    needs no mass.
+    mass is part of that body: this is a note if the link is only a frame, and a warning if it has
+    shapes or an inertia. A fixed base never moves and needs no mass.
 
     Fix:
-        Give the body a mass and an inertia, make the joint above it fixed, or remove a link that
-        only separates two joints. An <inertial> needs both <mass> and <inertia>.
+        Give the body a mass and an inertia, make the joint above it fixed, or remove the link if
+        it only separates two joints. An <inertial> needs both <mass> and <inertia>.
 
     Source:
         MuJoCo 4.0: "mass and inertia of moving bodies must be larger than mjMINVAL", and
@@ -165,7 +166,7 @@ def _max_inertia(link: Link) -> float:
 
 
 def _has_valid_mass(body: Body) -> bool:
-    """Return whether every mass of the body is given, not negative, and below the upper limit."""
+    """Return whether all masses of the body are declared, nonnegative and below the limit."""
     masses = [link.inertial.mass for link in body.links if link.inertial is not None]
     return all(mass is not None and 0 <= mass < MAX_INERTIA for mass in masses)
 
@@ -198,10 +199,10 @@ def negative_mass(robot: Facts) -> Iterator[Violation]:
 def not_positive_definite(robot: Facts) -> Iterator[Violation]:
     """An inertia is missing, zero, or not positive definite.
 
-    All principal moments of a rigid body are positive. If one of them is not, the rotation of the
-    body is unstable and the simulation ends in NaN; MuJoCo rejects the file. Products ixy, ixz, iyz
-    that are large compared with ixx, iyy, izz have the same effect. A zero inertia is allowed on a
-    small link that is fixed to a body with an inertia.
+    All principal moments of a rigid body are positive. If one of them is not, MuJoCo rejects the
+    file; in other simulators, the rotation of the body is unstable and its state becomes NaN. The
+    usual cause is that the products ixy, ixz, iyz are too large compared with ixx, iyy, izz. A zero
+    inertia is allowed on a small link that is fixed to a body with an inertia.
 
     Fix:
         Take the six numbers from CAD, about the center of mass, in kg m2. The unsafe fix writes the
@@ -255,8 +256,8 @@ def _missing_inertia(robot: Facts, link: Link) -> Violation:
 def _needs_inertia(robot: Facts, link: Link, main: Container[int]) -> bool:
     """Return whether a link is the main link of a moving body.
 
-    In URDF, small parts fixed to the link do not replace an inertia that was forgotten. In MJCF a
-    body is part of another one on purpose.
+    In URDF, the inertias of small parts fixed to the link do not replace its own. In MJCF, a link
+    without an inertia is assumed to be part of its parent on purpose.
     """
     body = robot.body_of.get(link.name) if id(link) in main else None
     if body is None or body.virtual or body.mass <= MIN_INERTIA:
@@ -271,16 +272,17 @@ def triangle_inequality(robot: Facts) -> Iterator[Violation]:
 
     The sum of the two smaller principal moments equals the largest one for a flat plate and exceeds
     it for every other body. A smaller sum means that a number was mistyped, or that the inertia was
-    taken about the wrong point or in the wrong frame. MuJoCo rejects the file; other simulators
-    integrate it and gain energy.
+    taken about the wrong point or in the wrong frame. MuJoCo rejects the file; in other simulators,
+    the simulated body gains energy.
 
     Fix:
         Take the inertia from CAD about the center of mass. The unsafe fix writes the nearest
         physically valid inertia; MuJoCo's balanceinertia uses that of a sphere instead.
 
     Source:
-        MuJoCo 4.0: "inertia must satisfy A + B >= C", without a tolerance. Numbers with four digits
-        can round a flat part to a ratio of 0.999, which is only reported as information.
+        MuJoCo 4.0: "inertia must satisfy A + B >= C", without a tolerance. Rounding to four digits
+        can reduce the ratio (A + B) / C of a flat part to 0.999. A ratio from 0.99 to 0.999 is
+        therefore a warning, and a larger ratio is a note.
     """
     for link in robot.model.links:
         inertia = link.inertial.inertia if link.inertial else None
@@ -296,8 +298,8 @@ def triangle_inequality(robot: Facts) -> Iterator[Violation]:
             subject=link.name,
             source=inertia_source(link),
             severity="error" if ratio < _MIN_TRIANGLE_RATIO else severity,
-            message=f"principal moments of link {link.name}: got {_format(moments)} kg m2, where "
-            f"the two smaller ones sum to {text} times the largest; expected 1 or more",
+            message=f"principal moments of link {link.name}: got {_format(moments)} kg m2 with "
+            f"(I1 + I2) / I3 = {text}; expected at least 1",
             measured={"ratio": ratio, **_measured(moments)},
             fix=robot.inertia_repair.fix(link),
         )
@@ -305,11 +307,11 @@ def triangle_inequality(robot: Facts) -> Iterator[Violation]:
 
 @rule("INR005", "placeholder-inertia", "warning")
 def placeholder_inertia(robot: Facts) -> Iterator[Violation]:
-    """An inertia is the identity matrix, or the same for half of the links.
+    """An inertia is the identity matrix, or the same for at least half of the links.
 
-    A mass of 1 kg with an inertia of 1 kg m2 has a radius of gyration of 1 m. A motor that moves
-    such a link drives a flywheel, and gains tuned on it fail on the real robot. Identical parts,
-    such as four wheels, may share an inertia; a thigh and a shank do not.
+    A mass of 1 kg with an inertia of 1 kg m2 has a radius of gyration of 1 m. Such a link resists
+    rotation like a flywheel, and gains tuned on it fail on the real robot. Identical parts, such as
+    four wheels, may have the same inertia; a thigh and a shank do not.
 
     Fix:
         Take the inertia from CAD, or compute it from the mesh at a uniform density.
@@ -343,14 +345,16 @@ def inertia_too_large(robot: Facts) -> Iterator[Violation]:
 
     Mass inside a body is at most half the body's diagonal away from its center, which limits the
     radius of gyration sqrt(I / m). A larger value is usually a wrong unit (g mm2) or a wrong
-    reference point (the origin of the robot); the joint then moves a flywheel.
+    reference point (the origin of the robot). The joint then moves an inertia that the real robot
+    does not have.
 
     Fix:
         Give the inertia in kg m2 about the center of mass, and the mass in kg.
 
     Source:
-        I <= m r^2 for mass within r of the center of mass. The ratio is above 3 for the wrists of a
-        published UR5 and the fingers of a Baxter, which have the numbers of other parts or units.
+        I <= m r^2 if all mass is within r of the center of mass. A ratio above 3 is an error; it
+        occurs in a published UR5 (wrists) and Baxter (fingers), whose values are those of other
+        parts or in other units.
     """
     for link in robot.model.links:
         inertia = _max_inertia(link)
@@ -386,8 +390,8 @@ def inertia_too_small(robot: Facts) -> Iterator[Violation]:
 
     The radius of gyration is below 5 % of half the body's diagonal, as if the body were a point
     mass. Small torques then cause large accelerations: the simulation becomes stiff or unstable,
-    and learned torques do not move the real robot. The usual causes are wrong units and
-    placeholders.
+    and the torques that a policy learns are too small for the real robot. The usual
+    causes are wrong units and placeholders.
 
     Fix:
         Give the inertia in kg m2 about the center of mass, and the mass in kg.
@@ -460,15 +464,15 @@ def com_outside_body(robot: Facts) -> Iterator[Violation]:
     """A center of mass lies outside of its body.
 
     The origin of an <inertial> is given in the frame of its link. If it was given in the frame of
-    the robot or the CAD file, in millimeters, or without the sign of a mirrored part, the robot
-    tips over or needs torques that the real one does not need.
+    the robot or the CAD file, in millimeters, or with the sign of the part on the other side, the
+    simulated robot tips over or needs torques that the real one does not need.
 
     Fix:
         Give the center of mass in the frame of the link, in meters.
 
     Source:
         The center of mass of a convex body lies inside it. The margin of 10 % of the diagonal is
-        for shapes that omit parts of the body.
+        for shapes that omit parts of the body; three times the margin is an error.
     """
     body_bounds = robot.body_bounds
     for body in robot.bodies:
@@ -507,7 +511,7 @@ def mass_ratio(robot: Facts) -> Iterator[Violation]:
     """The masses of neighboring bodies differ by more than a factor of 1000.
 
     The joint between them is numerically stiff: it needs a much smaller time step, or the light
-    body becomes unstable. In PhysX the two sides of such a joint drift apart.
+    body becomes unstable. In PhysX, the two bodies drift apart.
 
     Fix:
         Merge the light body into its neighbor, or give it its real mass and an armature.
@@ -542,7 +546,7 @@ def mass_ratio(robot: Facts) -> Iterator[Violation]:
 
 @rule("INR010", "implausible-density", "warning")
 def implausible_density(robot: Facts) -> Iterator[Violation]:
-    """A mass does not fit the size of the body.
+    """A mass is implausible for the size of its body.
 
     No part of a robot is lighter than packing foam or denser than gold. Common causes are a mass in
     grams or pounds, a shifted decimal point, or a mesh in millimeters.
@@ -596,11 +600,11 @@ def inferred_mass(robot: Facts) -> Iterator[Violation]:
 
     MuJoCo infers the mass of a link with collision shapes but without <inertial> from the volume of
     the shapes and the density of water; overlapping shapes count twice. Other simulators do the
-    same or treat the link as massless, so that the robot has a different weight in each of them.
+    same or treat the link as massless, so the mass of the robot depends on the simulator.
 
     Fix:
-        Give each of these links an <inertial> with its mass, or move its collision shapes to the
-        link that it is fixed to.
+        Give each of these links an <inertial> with its mass, or move its collision shapes to
+        the link that it is fixed to.
 
     Source:
         Tested with MuJoCo 4.0: a fixed link with a box of 1 m3 adds 1000 kg.

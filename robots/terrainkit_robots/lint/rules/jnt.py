@@ -285,7 +285,7 @@ def inverted_limits(robot: Facts) -> Iterator[Violation]:
     joint oscillates between two limits that exclude each other.
 
     Fix:
-        Swap the two numbers, or restore a lost sign. A missing number counts as 0.
+        Swap the two limits, or restore a missing sign. A missing limit counts as 0.
 
     Source:
         Tested with MuJoCo 4.0: jnt_limited is false.
@@ -450,8 +450,7 @@ def zero_outside_limits(robot: Facts) -> Iterator[Violation]:
     """Position zero is outside the limits of a joint.
 
     A simulator that starts all joints at zero starts in an invalid pose, and the limit constraints
-    push the joint out of it. If the robot has a standing pose or a keyframe to start from, this is
-    only information.
+    push the joint out of it. If the robot has a standing pose or a keyframe, this is only a note.
 
     Fix:
         Start from a pose within the limits: set the default joint positions in the simulator.
@@ -469,8 +468,7 @@ def zero_outside_limits(robot: Facts) -> Iterator[Violation]:
             subject=first.name,
             source=first.limit.source,
             message=f"limits of {names(joint.name for joint in with_pose)}: got a range without 0 "
-            f"({first.name}: {lower:.5g} to {upper:.5g} {first.unit}); the robot has a pose to "
-            "start from",
+            f"({first.name}: {lower:.5g} to {upper:.5g} {first.unit}); start from the default pose",
             measured={"joints": len(with_pose), "lower": lower, "upper": upper},
         )
     for joint in outside:
@@ -482,7 +480,7 @@ def zero_outside_limits(robot: Facts) -> Iterator[Violation]:
                 source=joint.limit.source,
                 severity="warning",
                 message=f"limits of joint {joint.name}: got {lower:.5g} to {upper:.5g} "
-                f"{joint.unit}; expected a range with {joint.reference:g}, or a pose to start from",
+                f"{joint.unit}; expected a range with {joint.reference:g}, or a keyframe",
                 measured={"lower": lower, "upper": upper},
             )
 
@@ -629,7 +627,7 @@ def missing_actuator(robot: Facts) -> Iterator[Violation]:
     The joint is passive, and an environment made from the file has one action less. Joints that
     mimic others, joints that carry the trunk of a planar model, and files with tendons or other
     transmissions are not checked. A robot without legs may be passive by design, and mjlab and
-    Genesis add actuators to a file without any: both are only checked as information.
+    Genesis add actuators to a file without any: both are only notes.
 
     Fix:
         Add a <motor> or <position> actuator for the joint.
@@ -669,8 +667,8 @@ def unlimited_joint(robot: Facts) -> Iterator[Violation]:
 
     The joint turns without end, so that a leg can rotate through the trunk. MuJoCo needs a range,
     and either limited="true" or autolimits, which is the default. Wheels and propellers are not
-    checked. On a robot without legs this is only information, since joints of arms may turn
-    without end.
+    checked. On a robot without legs, this is only a note, since joints of arms may turn without
+    end.
 
     Fix:
         Give the joint a range, in the unit of <compiler angle>, which is degrees by default.

@@ -45,16 +45,18 @@ def test_notes_have_no_help(report, finding):
     text = format_reports([both])
     assert "Look at the legs." not in text
     assert text.count("help: ") == 1
-    assert "\nabout a note: terrainkit rule CODE, such as LEG001\n" in text
-    assert format_reports([both, both]).count("about a note: ") == 2
+    assert "\ndetails of a note: terrainkit rule CODE, such as LEG001\n" in text
+    assert format_reports([both, both]).count("details of a note: ") == 2
 
 
 def test_no_notes_no_note_help(report, finding):
-    assert "about a note" not in format_reports(
+    assert "details of a note" not in format_reports(
         [dataclasses.replace(report, findings=(finding(),))]
     )
     unhelpful = finding("LEG001", "legs", "info", hint="")
-    assert "about a note" in format_reports([dataclasses.replace(report, findings=(unhelpful,))])
+    assert "details of a note" in format_reports(
+        [dataclasses.replace(report, findings=(unhelpful,))]
+    )
 
 
 def test_entries_of_a_rule_are_limited(report, finding):

@@ -81,8 +81,8 @@ def test_does_not_stand_severity(monkeypatch, stood, tilt, lifted, severity):
 def test_unreachable_limits_counts_blocked_joints():
     (violation,) = check("DYN003", bundled.urdf_path("quadruped"))
     assert violation.message.startswith(
-        "6 of 12 joints blocked by a collision before a limit, moved one at a time from the "
-        "default pose; worst "
+        "6 of 12 joints collide before reaching a limit when moved alone from the default pose; "
+        "worst: "
     )
     assert " rad, where " in violation.message
 
@@ -90,7 +90,7 @@ def test_unreachable_limits_counts_blocked_joints():
 def test_unreachable_limits_units_of_sliding_joint(robot):
     (violation,) = check("DYN003", robot(LIFT))
     assert violation.message == (
-        "1 of 1 joint too weak to lift the limb over the whole range; worst lift, which needs "
+        "1 of 1 joint too weak to lift the limb over the whole range; worst: lift, which needs "
         "9.81 N with an effort limit of 5 N"
     )
 
