@@ -71,9 +71,9 @@ def measure_surface(path: Path, cell: float, half_size: float) -> HeightfieldSur
     if np.isnan(heights[n // 2, n // 2]):
         raise ConfigError(f"{path}: no ground at the origin, where robots spawn")
     # Where there is no ground, robots fall: any height far below will do.
-    heights = np.where(np.isnan(heights), np.nanmin(heights) - 10, heights).astype(np.float32)
+    filled = np.where(np.isnan(heights), np.nanmin(heights) - 10, heights).astype(np.float32)
     corner = (float(axis[0]), float(axis[0]))
-    return HeightfieldSurface(heights=heights, first_sample=corner, cell=cell)
+    return HeightfieldSurface(heights=filled, first_sample=corner, cell=cell)
 
 
 def _measure_heights(model: Any, axis: NDArray[np.float32]) -> NDArray[np.float64]:
