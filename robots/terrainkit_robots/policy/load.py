@@ -6,8 +6,8 @@ from rsl_rl.models import MLPModel
 
 from terrainkit.errors import ConfigError, TerrainkitWarning
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.run import Run, changed_robot_files, read_checkpoint
-from terrainkit_robots.rl.runner import OBS_GROUPS, check_checkpoint, network_errors, runner_config
+from terrainkit_robots.rl.run import Run, changed_robot_files
+from terrainkit_robots.rl.runner import OBS_GROUPS, open_checkpoint, runner_config
 from terrainkit_robots.spec.robot import SPEC_FILE
 
 
@@ -26,9 +26,7 @@ def load_policy(run: Run, env: LeggedEnv) -> MLPModel:
     if files := [name for name in changed_robot_files(run) if name != SPEC_FILE]:
         message = f"{run.info.robot}: {' and '.join(files)} changed after {run.folder} was trained"
         warnings.warn(message, TerrainkitWarning, stacklevel=2)
-    state = read_checkpoint(run.checkpoint)
-    check_checkpoint(run.checkpoint, state, env, OBS_GROUPS["actor"])
-    with network_errors(run.checkpoint):
+    with open_checkpoint(run.checkpoint, env, OBS_GROUPS["actor"]) as state:
         config = runner_config(run.task)["actor"]
         config.pop("class_name")
         actor = MLPModel(env.get_observations(), OBS_GROUPS, "actor", env.num_actions, **config)

@@ -91,8 +91,6 @@ def view(run: Run, config: EvaluationConfig | None = None) -> None:
     model, data = env.scene.model, mujoco.MjData(env.scene.model)
     schedule = command_schedule(commands, max(1, round(config.seconds / env.cfg.dt)))
     steps = rollout(env, load_policy(run, env), cycle(schedule))
-    light = model.vis.headlight  # the only light of the scene
-    light.ambient[:], light.diffuse[:], light.specular[:] = 0.35, 0.65, 0.1
     try:
         viewer = mujoco.viewer.launch_passive(model, data)
     except RuntimeError as error:  # macOS needs mjpython
@@ -164,14 +162,14 @@ class PoseRecorder:
             spacing = 2.4 * max(0.5, float(env.robot.spec.base_height_target or 0.5))
             poses[:, :, :2] += spacing * np.stack([-row, col - (side - 1) / 2], axis=1)
             captions = tuple(_caption(commands[n // 2]) for commands in self.commands)
-            shots.append(Shot(robot=n // 2, start=0, stop=frames, captions=captions))
+            shots.append(Shot(robot=n // 2, captions=captions))
         tracked, rows = select_tracked_robots(env, robots), len(terrain.env_origins)
         for robot in tracked if not terrain.is_flat else ():
             level, column = env.curriculum.levels[robot], env.curriculum.columns[robot]
             caption = str(terrain.terrain_names[level, column])
             caption += f", level {level} of {rows - 1}" if rows > 1 else ""
             stop = int(np.clip(self.first_fall[robot], 1, max(1, frames // len(tracked))))
-            shots.append(Shot(robot=robot, start=0, stop=stop, captions=(caption,) * stop))
+            shots.append(Shot(robot=robot, captions=(caption,) * stop))
         fps = 1 / (env.cfg.dt * self.stride)
         return VideoSpec(model=env.scene.model, poses=poses, shots=tuple(shots), fps=fps, size=size)
 

@@ -1,12 +1,13 @@
 """Render frames in a child process, since a broken OpenGL library may crash or block a process."""
 
+import faulthandler
 import os
 import pickle
 import subprocess
 import sys
 import tempfile
-import threading
 from collections.abc import Callable, Generator, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,11 +19,8 @@ from terrainkit_robots import gl_backend
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.text import one_line
 
-Frame = NDArray[np.uint8]
-"""An RGB image, shape (height, width, 3)."""
-
-FRAME_TIMEOUT = 120.0
-"""Maximum time for a single frame [s]."""
+Frame = NDArray[np.uint8]  # an RGB image, shape (height, width, 3)
+FRAME_TIMEOUT = 120.0  # maximum time for a single frame [s]
 
 
 class RenderError(TerrainkitError):
@@ -30,12 +28,9 @@ class RenderError(TerrainkitError):
 
 
 def stream_frames(render: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
-    """Yield the frames that a function renders in a child process.
+    """Yield the frames that a picklable function renders in a child process.
 
     The backends of `gl_backend.backends()` are tried in order until one renders a frame.
-
-    Args:
-        render: A picklable function without arguments that returns an iterator of frames.
 
     Raises:
         RenderError: if no backend works, a frame takes too long, or `render` raises this error.
@@ -52,27 +47,21 @@ def stream_frames(render: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
 
 def _run_child(render: Callable[[], Iterator[Frame]], backend: str) -> Generator[Frame, None, str]:
     """Yield frames, and return why the backend failed, or an empty string."""
-    command = [sys.executable, "-P", "-m", "terrainkit_robots.rendering"]
+    command = [sys.executable, "-P", "-c", f"from {__name__} import main; main({FRAME_TIMEOUT})"]
     environment, count = gl_backend.child_environment(backend), 0
     # MuJoCo may write a log into its working directory, which is therefore a temporary one.
-    with (
-        tempfile.TemporaryDirectory(prefix="terrainkit-", ignore_cleanup_errors=True) as folder,
-        tempfile.TemporaryFile() as request,
-    ):
-        pickle.dump(render, request)
-        request.seek(0)
+    with tempfile.TemporaryDirectory(prefix="terrainkit-", ignore_cleanup_errors=True) as folder:
+        Path(folder, "request").write_bytes(pickle.dumps(render))
         process = subprocess.Popen(
-            command,
-            env=environment,
-            cwd=folder,
-            stdin=request,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
+            command, env=environment, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
         )
+        assert process.stdout is not None
         try:
-            while isinstance(message := _receive(process), np.ndarray):
+            while isinstance(message := pickle.load(process.stdout), np.ndarray):
                 yield message
                 count += 1
+        except (EOFError, pickle.UnpicklingError):
+            message = f"no frame within {FRAME_TIMEOUT:g} s or crash, exit code {process.wait()}"
         finally:
             process.kill()
             process.communicate()
@@ -83,34 +72,20 @@ def _run_child(render: Callable[[], Iterator[Frame]], backend: str) -> Generator
     return str(message)
 
 
-def _receive(process: subprocess.Popen[bytes]) -> Any:
-    """Return the next message: a frame, a RenderError, or a reason that is empty at the end."""
-    assert process.stdout is not None
-    timer = threading.Timer(FRAME_TIMEOUT, process.kill)
-    timer.daemon = True
-    timer.start()
-    try:
-        return pickle.load(process.stdout)
-    except (EOFError, pickle.UnpicklingError):
-        timer.join(0.1)
-        if timer.finished.is_set():
-            return RenderError(f"MuJoCo rendered no frame within {FRAME_TIMEOUT:g} s")
-        return f"the process crashed (exit code {process.wait()})"
-    finally:
-        timer.cancel()
-
-
-def main() -> None:
-    """Read a pickled function from stdin, and write its frames to stdout as pickles."""
+def main(timeout: float) -> None:
+    """Call the pickled function, and write its frames and then an error or "" to stdout."""
     message: Any = ""
     with os.fdopen(os.dup(1), "wb") as output:
         os.dup2(2, 1)  # OpenGL libraries print to stdout
+        faulthandler.dump_traceback_later(timeout, exit=True)
         try:
-            render = pickle.load(sys.stdin.buffer)
+            render = pickle.loads(Path("request").read_bytes())
             with quiet_mujoco():
                 for frame in render():
+                    faulthandler.cancel_dump_traceback_later()  # the reader may take its time
                     pickle.dump(frame, output)
                     output.flush()
+                    faulthandler.dump_traceback_later(timeout, exit=True)
         except RenderError as error:
             message = error
         except Exception as error:  # OpenGL bindings raise errors of any type

@@ -83,11 +83,9 @@ class VelocityCommand:
     ) -> None:
         """Expand the range of the forward speed once commands are tracked well.
 
-        Args:
-            reward: Sum of the `tracking_lin_vel` rewards of the episodes that ended.
-            seconds: Total duration of these episodes [s].
-            scale: Reward per second of perfect tracking.
-            min_seconds: Duration over which tracking is averaged [s].
+        `reward` is the sum of the `tracking_lin_vel` rewards of the episodes that ended, of a total
+        duration of `seconds`; it is averaged over `min_seconds`. Perfect tracking has the reward
+        `scale` per second.
         """
         self.tracking += reward, seconds
         reward, seconds = self.tracking

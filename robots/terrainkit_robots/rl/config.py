@@ -21,9 +21,6 @@ from terrainkit.type_hint import (
     PositiveInt,
 )
 
-MAX_SCAN_POINTS = 10_000
-"""Largest number of points of the height scan."""
-
 HiddenDims = Annotated[tuple[Annotated[int, Meta(ge=1, le=65536)], ...], Meta(min_length=1)]
 ScanPoints = Annotated[tuple[float, ...], Meta(min_length=1)]
 Activation = Literal[
@@ -60,16 +57,6 @@ class Terrain(Config):
     """Points of the height scan along the heading of the robot [m]."""
     measured_points_y: ScanPoints = tuple(round(-0.5 + 0.1 * k, 1) for k in range(11))
     """Points of the height scan to the left of the robot [m]."""
-
-    def __post_init__(self) -> None:
-        """Validate the values, and the size of the height scan."""
-        super().__post_init__()
-        points = len(self.measured_points_x) * len(self.measured_points_y)
-        if points > MAX_SCAN_POINTS:
-            raise ConfigError(
-                f"measured_points_x, measured_points_y: got {points} points; "
-                f"expected at most {MAX_SCAN_POINTS}"
-            )
 
 
 @dataclass(frozen=True, kw_only=True)

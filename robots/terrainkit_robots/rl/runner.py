@@ -224,10 +224,8 @@ class LeggedRunner(OnPolicyRunner):
         networks and the curricula do. A checkpoint of a policy alone has only networks.
         `load_cfg` selects parts: `actor`, `critic`, `optimizer`, `curriculum` (terrain levels).
         """
-        state = read_checkpoint(Path(path))
-        check_checkpoint(Path(path), state, self.env, list(self.env.obs_groups))
         parts = load_cfg or {"actor": True, "critic": True, "optimizer": True}
-        with network_errors(Path(path)):
+        with open_checkpoint(Path(path), self.env, list(self.env.obs_groups)) as state:
             if "processes" not in state:
                 self.alg.load(state, {**parts, "optimizer": False}, strict)
                 return {}
@@ -317,12 +315,12 @@ class LeggedRunner(OnPolicyRunner):
             super()._configure_multi_gpu()
             return
         torch.distributed.init_process_group("gloo")
-        self.is_distributed = True
-        self.gpu_world_size = torch.distributed.get_world_size()
-        self.gpu_global_rank = torch.distributed.get_rank()
-        self.gpu_local_rank = int(os.environ.get("LOCAL_RANK", "0"))
-        ranks = {"global_rank": self.gpu_global_rank, "local_rank": self.gpu_local_rank}
-        self.cfg["multi_gpu"] = {**ranks, "world_size": self.gpu_world_size}
+        names = ("RANK", "LOCAL_RANK", "WORLD_SIZE")
+        rank, local_rank, world_size = (int(os.environ[name]) for name in names)
+        self.is_distributed, self.gpu_world_size = True, world_size
+        self.gpu_global_rank, self.gpu_local_rank = rank, local_rank
+        ranks = {"global_rank": rank, "local_rank": local_rank}
+        self.cfg["multi_gpu"] = {**ranks, "world_size": world_size}
 
 
 def runner_config(task: Task) -> dict[str, Any]:
@@ -365,11 +363,15 @@ def runner_config(task: Task) -> dict[str, Any]:
     }
 
 
-def check_checkpoint(
-    path: Path, state: Mapping[str, Any], env: LeggedEnv, groups: Sequence[str]
-) -> None:
-    """Raise ConfigError unless a checkpoint has the joints and observations of an environment."""
-    joints = list(env.robot.spec.joint_order)
+@contextmanager
+def open_checkpoint(
+    path: Path, env: LeggedEnv, groups: Sequence[str]
+) -> Iterator[Mapping[str, Any]]:
+    """Yield the content of a checkpoint with the joints and observations of an environment.
+
+    Errors in the block, such as torch's about weights that do not fit, become ConfigErrors.
+    """
+    state, joints = read_checkpoint(path), list(env.robot.spec.joint_order)
     if state["joints"] != joints:
         raise ConfigError(
             f"{path} belongs to another robot, {state['robot']}: got the joints "
@@ -382,13 +384,8 @@ def check_checkpoint(
                 f"{path} belongs to another task: got {got} {name} observations; expected "
                 f"{width}. To continue on a map after a plane, set terrain.measure_heights on both"
             )
-
-
-@contextmanager
-def network_errors(path: Path) -> Iterator[None]:
-    """Turn torch's errors about weights that do not fit into one ConfigError."""
     try:
-        yield
+        yield state
     except ConfigError:
         raise
     except (RuntimeError, ValueError, LookupError, TypeError, AttributeError) as error:

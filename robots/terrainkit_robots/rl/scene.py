@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.rendering.appearance import set_appearance
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.terrain import Terrain
 from terrainkit_robots.simulation.geoms import collides, lowest_point
@@ -59,6 +60,7 @@ def build_scene(robot: Robot, terrain: Terrain, task: Task) -> Scene:
         _set_joints_and_collisions(robot, base, task)
         _add_actuators(robot, scene, task)
         sensors = _add_sensors(robot, scene)
+        set_appearance(scene)  # for videos and the viewer
         try:
             model = scene.compile()
         except ValueError as error:
@@ -98,8 +100,8 @@ def _attach(robot: Robot, terrain: Terrain, task: Task) -> Any:
         each.option.ls_iterations = task.sim.ls_iterations
         for element in (*each.actuators, *each.sensors, *each.keys):
             each.delete(element)
-    for element in (*spec.cameras, *spec.lights):
-        spec.delete(element)
+    for camera in spec.cameras:
+        spec.delete(camera)
     for geom in ground.geoms:
         if geom.conaffinity:
             geom.contype |= 1  # robots without self-collision touch only geoms with a contype

@@ -71,12 +71,12 @@ class Simulation:
 
 
 def check_env_memory(task: Task, robot: Robot, *, scan: bool, ngeom: int) -> None:
-    """Raise MemoryLimitError with a number of environments that fits, unless the task's do."""
+    """Raise MemoryLimitError, with a number of environments that fits, unless the task's do."""
+    per_env = bytes_per_env(task, robot, scan=scan, ngeom=ngeom)
     num_envs, message = task.env.num_envs, ""
     while num_envs:
         try:
-            needed = num_envs * bytes_per_env(task, robot, scan=scan, ngeom=ngeom)
-            check_memory(needed, f"training with {num_envs} environments")
+            check_memory(num_envs * per_env, f"training with {num_envs} environments")
             break
         except MemoryLimitError as error:
             message, num_envs = message or str(error), num_envs // 2

@@ -7,16 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from terrainkit.errors import ConfigError, ExportError, TerrainkitError
+from terrainkit_robots.rl import run as runs
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.rl.run import (
-    Run,
-    can_continue,
-    checkpoints,
-    last_checkpoint,
-    parts_to_load,
-    run_folder,
-)
 from terrainkit_robots.spec.robot import Robot
 
 if TYPE_CHECKING:
@@ -41,7 +34,7 @@ def train(
     task: Task | None = None,
     *,
     folder: Path | None = None,
-    resume: Run | None = None,
+    resume: runs.Run | None = None,
     device: str = "cpu",
     progress_callback: "ProgressCallback | None" = None,
 ) -> TrainResult:
@@ -67,33 +60,28 @@ def train(
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # before torch is imported
     import torch
 
+    from terrainkit_robots.rl import runner as runners
     from terrainkit_robots.rl.env import LeggedEnv
-    from terrainkit_robots.rl.runner import (
-        LeggedRunner,
-        process_share,
-        resolve_device,
-        stop_on_signal,
-    )
     from terrainkit_robots.rl.terrain import load_terrain
 
     task = tasks.get_task(robot).task if task is None else task
     if task.runner.logger == "wandb" and find_spec("wandb") is None:
         raise ConfigError("runner.logger: wandb is not installed: pip install wandb")
-    continued = resume if resume and can_continue(resume, robot, terrain, task) else None
-    share = process_share(task)
-    device = resolve_device(device)
+    continued = resume if resume and runs.can_continue(resume, robot, terrain, task) else None
+    share = runners.process_share(task)
+    device = runners.resolve_device(device)
     model = continued.robot if continued else Robot.load(tasks.get_task(robot).folder)
     torch.set_num_threads(share.env.num_threads)
     torch.manual_seed(share.runner.seed)
     env = LeggedEnv(share, model, load_terrain(terrain, task.terrain.collision), device)
-    with stop_on_signal() as stop_signal:
-        runner = LeggedRunner(
+    with runners.stop_on_signal() as stop_signal:
+        runner = runners.LeggedRunner(
             env, device=device, progress_callback=progress_callback, should_stop=stop_signal
         )
         try:
             if resume is not None:
-                parts = None if continued else parts_to_load(resume, terrain, task)
-                runner.load(last_checkpoint(resume), parts)
+                parts = None if continued else runs.parts_to_load(resume, terrain, task)
+                runner.load(runs.last_checkpoint(resume), parts)
             completed, total = runner.current_learning_iteration, task.runner.max_iterations
             if completed >= total:
                 raise ConfigError(
@@ -101,7 +89,7 @@ def train(
                     "iterations that are completed"
                 )
             if runner.is_main_process:
-                runner.folder = run_folder(folder, robot, terrain, task, continued)
+                runner.folder = runs.run_folder(folder, robot, terrain, task, continued)
             try:
                 # Resets of a new run would otherwise all time out in the same step.
                 is_new = not env.steps_since_reset.any()
@@ -118,7 +106,7 @@ def train(
 
 def _with_last_checkpoint(error: Exception, folder: Path | None) -> TerrainkitError:
     """Return the error with the path of the last checkpoint."""
-    saved = checkpoints(folder) if folder else {}
+    saved = runs.checkpoints(folder) if folder else {}
     hint = f"the last checkpoint is {saved[max(saved)]}" if saved else "there is no checkpoint"
     if isinstance(error, TerrainkitError):
         return type(error)(f"{error}; {hint}")

@@ -1,5 +1,4 @@
 import os
-import sys
 import time
 from functools import partial
 
@@ -46,7 +45,7 @@ def test_stream_frames_reports_invalid_backend(monkeypatch):
 
 
 def test_stream_frames_reports_crash():
-    with pytest.raises(RenderError, match=r"egl: the process crashed \(exit code 3\)"):
+    with pytest.raises(RenderError, match=r"egl: no frame within 120 s or crash, exit code 3"):
         list(stream_frames(partial(os._exit, 3)))
 
 
@@ -57,9 +56,9 @@ def test_stream_frames_limits_length_of_reasons():
 
 
 def test_stream_frames_stops_slow_child(monkeypatch):
-    monkeypatch.setattr(child_process, "FRAME_TIMEOUT", 0.5)
+    monkeypatch.setattr(child_process, "FRAME_TIMEOUT", 1.5)
     start = time.monotonic()
-    with pytest.raises(RenderError, match=r"no frame within 0\.5 s"):
+    with pytest.raises(RenderError, match=r"egl: no frame within 1\.5 s.*; osmesa: "):
         list(stream_frames(partial(time.sleep, 60)))
     assert time.monotonic() - start < 30
 
@@ -76,18 +75,3 @@ def test_stream_frames_closed_early_ends_child(monkeypatch):
     next(frames)
     frames.close()
     assert processes[0].returncode is not None
-
-
-def test_main_rejects_invalid_request(tmp_path):
-    command = [sys.executable, "-P", "-m", "terrainkit_robots.rendering"]
-    done = child_process.subprocess.run(
-        command,
-        input=b"{",
-        capture_output=True,
-        cwd=tmp_path,
-        env=gl_backend.child_environment(""),
-        timeout=60,
-        check=False,
-    )
-    assert b"UnpicklingError" in done.stdout
-    assert list(tmp_path.iterdir()) == []

@@ -132,12 +132,6 @@ def test_none_is_accepted_where_declared():
         DomainRand(com_shift=None)
 
 
-def test_height_scan_size_is_limited():
-    points = tuple(0.01 * k for k in range(101))
-    with pytest.raises(ConfigError, match="got 10201 points; expected at most 10000"):
-        Terrain(measured_points_x=points, measured_points_y=points)
-
-
 def test_episode_has_at_least_one_step():
     short = Env(episode_length_s=0.001)
     with pytest.raises(ConfigError, match=r"env.episode_length_s: got 0.001; expected .* 0.02 s"):
