@@ -1,4 +1,4 @@
-"""Decompose the level parts of the ground into few axis-aligned boxes with vertical walls."""
+"""Decompose the flat parts of the ground into few axis-aligned boxes with vertical walls."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ _Span = tuple[int, int, int, int]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BoxDecomposition:
-    """Boxes under the level parts of the ground.
+    """Boxes under the flat parts of the ground.
 
     Boxes may overlap below the surface: pyramid stairs are a stack of one box per step.
     """
@@ -38,7 +38,7 @@ class BoxDecomposition:
     """Half of the size along x, y and z [m], shape (n, 3)."""
 
     covered: NDArray[np.bool_]
-    """Whether the whole cell is the top of a box, shape (nx, ny). The other cells are not level and
+    """Whether the whole cell is the top of a box, shape (nx, ny). The other cells are not flat and
     need a heightfield."""
 
     @property
@@ -53,9 +53,9 @@ def decompose_boxes(
     threshold: float,
     patch_edges: tuple[NDArray[np.int64], NDArray[np.int64]],
 ) -> BoxDecomposition:
-    """Return the level parts of the ground as boxes.
+    """Return the flat parts of the ground as boxes.
 
-    A cell is level if its whole square is level. Within a patch, the boxes of each height are found
+    A cell is flat if its whole square is flat. Within a patch, the boxes of each height are found
     by :func:`~terrainkit.rectangle_cover.rectangle_cover`, and may extend under higher ground.
     Boxes of different patches that share a whole side are merged.
 
@@ -65,8 +65,8 @@ def decompose_boxes(
         threshold: Difference between neighboring samples above which there is a wall [m].
         patch_edges: Cells along x and along y where patches meet. Boxes are searched per patch.
     """
-    level = level_cells(heights, grid, threshold)
-    low = _lower_bound(heights, level)
+    flat = flat_cells(heights, grid, threshold)
+    low = _lower_bound(heights, flat)
     edges = [
         np.unique(np.concatenate([[0], lines, [n]]))
         for lines, n in zip(patch_edges, heights.shape, strict=True)
@@ -75,17 +75,17 @@ def decompose_boxes(
     for i0, i1 in zip(edges[0], edges[0][1:], strict=False):
         for j0, j1 in zip(edges[1], edges[1][1:], strict=False):
             block = (slice(i0, i1), slice(j0, j1))
-            for height, (a, b, c, d) in _cover_block(heights[block], level[block], low[block]):
+            for height, (a, b, c, d) in _cover_block(heights[block], flat[block], low[block]):
                 span = (int(i0 + a), int(i0 + b), int(j0 + c), int(j0 + d))
                 spans.setdefault(height, []).append(span)
     merged = [(span, height) for height in sorted(spans) for span in _merge_spans(spans[height])]
-    return _make_boxes(merged, grid, float(heights.min()) - THICKNESS, level)
+    return _make_boxes(merged, grid, float(heights.min()) - THICKNESS, flat)
 
 
-def level_cells(heights: NDArray[np.float32], grid: Grid, threshold: float) -> NDArray[np.bool_]:
-    """Return which cells are level, shape of `heights`.
+def flat_cells(heights: NDArray[np.float32], grid: Grid, threshold: float) -> NDArray[np.bool_]:
+    """Return which cells are flat, shape of `heights`.
 
-    A cell consists of a quarter of each of the four quads around its sample. It is level if, in
+    A cell consists of a quarter of each of the four quads around its sample. It is flat if, in
     each quad, its corner is connected without a wall only to corners of the same height.
     """
     node_grid = NodeGrid.from_heights(heights, grid, threshold)
@@ -94,18 +94,18 @@ def level_cells(heights: NDArray[np.float32], grid: Grid, threshold: float) -> N
     same = corners[:, :, None] == corners[:, None, :]
     at_cut = (same | ~connected_corners(node_grid.walls(i, j))).all(axis=2)
 
-    level = np.ones(node_grid.z.shape, dtype=bool)
+    flat = np.ones(node_grid.z.shape, dtype=bool)
     quads = (slice(None, -1), slice(1, None))
     for k, (a, b) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1))):
-        corner = node_grid.level_x & node_grid.level_y
+        corner = node_grid.flat_x & node_grid.flat_y
         corner[i, j] = at_cut[:, k]
-        level[quads[a], quads[b]] &= corner
-    return level[1:-1, 1:-1]
+        flat[quads[a], quads[b]] &= corner
+    return flat[1:-1, 1:-1]
 
 
-def _lower_bound(heights: NDArray[np.float32], level: NDArray[np.bool_]) -> NDArray[np.float32]:
+def _lower_bound(heights: NDArray[np.float32], flat: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Return a lower bound of the ground in each cell [m]."""
-    return np.where(level, heights, np.minimum.reduce(neighborhood(heights)))
+    return np.where(flat, heights, np.minimum.reduce(neighborhood(heights)))
 
 
 def neighborhood(values: NDArray[_Cell]) -> list[NDArray[_Cell]]:
@@ -116,12 +116,12 @@ def neighborhood(values: NDArray[_Cell]) -> list[NDArray[_Cell]]:
 
 
 def _cover_block(
-    heights: NDArray[np.float32], level: NDArray[np.bool_], low: NDArray[np.float32]
+    heights: NDArray[np.float32], flat: NDArray[np.bool_], low: NDArray[np.float32]
 ) -> Iterator[tuple[float, _Span]]:
     """Yield the boxes of a block of cells, in the order of their heights."""
-    if not level.any():
+    if not flat.any():
         return
-    i, j = np.nonzero(level)
+    i, j = np.nonzero(flat)
     order = np.argsort(heights[i, j], kind="stable")
     i, j = i[order], j[order]
     values, first = np.unique(heights[i, j], return_index=True)
@@ -130,7 +130,7 @@ def _cover_block(
         part = (slice(0, heights.shape[0]), slice(0, heights.shape[1]))
         if len(values) > MAX_HEIGHTS_PER_BLOCK:
             part = (slice(rows.min(), rows.max() + 1), slice(cols.min(), cols.max() + 1))
-        required = level[part] & (heights[part] == height)
+        required = flat[part] & (heights[part] == height)
         for a, b, c, d in rectangle_cover(required, low[part] >= height):
             i0, j0 = part[0].start, part[1].start
             yield float(height), (int(i0 + a), int(i0 + b), int(j0 + c), int(j0 + d))
@@ -165,12 +165,12 @@ def _swap_axes(span: _Span) -> _Span:
 
 
 def _make_boxes(
-    boxes: list[tuple[_Span, float]], grid: Grid, bottom: float, level: NDArray[np.bool_]
+    boxes: list[tuple[_Span, float]], grid: Grid, bottom: float, flat: NDArray[np.bool_]
 ) -> BoxDecomposition:
     spans = np.array([span for span, _ in boxes], dtype=np.float64).reshape(-1, 4)
     tops = np.array([height for _, height in boxes], dtype=np.float64)
     lower = np.column_stack([spans[:, [0, 2]] * grid.cell + grid.lower, np.full(len(tops), bottom)])
     upper = np.column_stack([spans[:, [1, 3]] * grid.cell + grid.lower, tops])
     return BoxDecomposition(
-        centers=(lower + upper) / 2, half_sizes=(upper - lower) / 2, covered=level
+        centers=(lower + upper) / 2, half_sizes=(upper - lower) / 2, covered=flat
     )

@@ -11,7 +11,7 @@ MAX_STEP_HEIGHT = 0.5
 
 
 def measured_difficulty(heights: NDArray[np.float32], cell: float, start: float) -> float:
-    r"""Return the difficulty of a patch [m]: 0 for level ground.
+    r"""Return the difficulty of a patch [m]: 0 for flat ground.
 
     .. math:: H = \operatorname{mean}_{p, \delta} \min(|h(p + \delta) - h(p)|, L)
                 + \operatorname{mean}_p \min(|h(p) - h_0|, L)

@@ -44,7 +44,7 @@ def find_spawn(
             # The disc is flat within the tolerance only, so evaluate the surface at its center.
             ground = surface_at(heights, np.array([index]), threshold=threshold)
             return *preferred, float(ground.height[0])
-    candidates = _level_cells(heights, radius_cells, tolerance)
+    candidates = _flat_cells(heights, radius_cells, tolerance)
     if not len(candidates):
         return None
     i, j = candidates[np.argmin(((candidates - index) ** 2).sum(axis=1))]
@@ -84,7 +84,7 @@ def _touches_disc(
     return np.asarray(beyond_x**2 + beyond_y**2 <= radius_cells**2)
 
 
-def _level_cells(
+def _flat_cells(
     heights: NDArray[np.float32], radius_cells: float, tolerance: float
 ) -> NDArray[np.int64]:
     """Return the cells whose whole disc is flat and inside the patch, shape (n, 2)."""

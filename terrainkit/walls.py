@@ -12,7 +12,7 @@ from the one with the smallest x and y. Edge k runs from corner k to corner k + 
     |   0 --0-- 1
     +-----------> x
 
-An edge whose ends differ by more than a threshold is a wall: the ground is level from either end to
+An edge whose ends differ by more than a threshold is a wall: the ground is flat from either end to
 the midpoint of the edge, and vertical there. A quad with a wall is split along its midlines. The
 edges that are not walls determine which corners share a height at its center.
 """

@@ -13,7 +13,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.box_decomposition import BoxDecomposition, level_cells, neighborhood
+from terrainkit.box_decomposition import BoxDecomposition, flat_cells, neighborhood
 from terrainkit.memory import check_memory
 from terrainkit.mesh.closed import THICKNESS
 from terrainkit.surface import HeightfieldSurface
@@ -48,7 +48,7 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
         terrain_map: The map.
         path: Target.
         collision: hfield: one heightfield, whose walls are slopes over one cell. boxes: boxes with
-            vertical walls for the level ground, and a heightfield for the rest, if any, whose
+            vertical walls for the flat ground, and a heightfield for the rest, if any, whose
             walls are slopes over one cell. auto: boxes if they cover all of the ground and are
             few, else hfield.
 
@@ -83,7 +83,7 @@ def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecom
         return None
     if collision == "auto":
         threshold = terrain_map.config.wall_threshold
-        if not level_cells(terrain_map.heights, terrain_map.grid, threshold).all():
+        if not flat_cells(terrain_map.heights, terrain_map.grid, threshold).all():
             return None
         cover = terrain_map.boxes()
         return cover if len(cover.centers) <= MAX_BOXES else None

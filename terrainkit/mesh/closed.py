@@ -10,7 +10,7 @@ THICKNESS = 1.0
 
 
 def closed_mesh(surface: TriMesh) -> TriMesh:
-    """Return `surface` with vertical sides and a level bottom, `THICKNESS` below its lowest point.
+    """Return `surface` with vertical sides and a flat bottom, `THICKNESS` below its lowest point.
 
     Args:
         surface: A mesh of this package of a rectangular map.

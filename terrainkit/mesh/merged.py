@@ -1,7 +1,7 @@
 """The merged mesh: coplanar faces merged to large ones.
 
-Level quads are merged to rectangles, quads that are level along one axis to rows, and straight
-walls of constant height to panels with a level strip on both sides. Each polygon keeps the boundary
+Flat quads are merged to rectangles, quads that are flat along one axis to rows, and straight
+walls of constant height to panels with a flat strip on both sides. Each polygon keeps the boundary
 vertices that its neighbors use, so large and small faces share all vertices. The surface is exactly
 that of the full mesh.
 """
@@ -31,17 +31,17 @@ def merged_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> T
         MemoryLimitError: if the mesh would not fit in memory; nothing was allocated.
     """
     node_grid = NodeGrid.from_heights(heights, grid, threshold)
-    level_x, level_y = node_grid.level_x, node_grid.level_y
-    level = level_x & level_y
-    # Where the ground is level along y, walls on both edges along x are one straight wall.
-    walls_x = level_y & node_grid.walls_x[:, :-1] & node_grid.walls_x[:, 1:]
-    walls_y = level_x & node_grid.walls_y[:-1] & node_grid.walls_y[1:]
-    rows_y = level_y & ~(level | node_grid.has_wall)
-    rows_x = level_x & ~(level | node_grid.has_wall)
+    flat_x, flat_y = node_grid.flat_x, node_grid.flat_y
+    flat = flat_x & flat_y
+    # Where the ground is flat along y, walls on both edges along x are one straight wall.
+    walls_x = flat_y & node_grid.walls_x[:, :-1] & node_grid.walls_x[:, 1:]
+    walls_y = flat_x & node_grid.walls_y[:-1] & node_grid.walls_y[1:]
+    rows_y = flat_y & ~(flat | node_grid.has_wall)
+    rows_x = flat_x & ~(flat | node_grid.has_wall)
 
-    rectangles = [Rectangles.level(level), Rectangles.along_y(rows_y), Rectangles.along_x(rows_x)]
+    rectangles = [Rectangles.flat(flat), Rectangles.along_y(rows_y), Rectangles.along_x(rows_x)]
     runs = [WallRuns.normal_x(node_grid, walls_x), WallRuns.normal_y(node_grid, walls_y)]
-    single = ~(level | rows_x | rows_y | walls_x | walls_y)
+    single = ~(flat | rows_x | rows_y | walls_x | walls_y)
     kept = _corners(single)
     for rectangle in rectangles:
         rectangle.keep_corners(kept)

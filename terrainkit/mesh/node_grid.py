@@ -56,18 +56,18 @@ class NodeGrid:
         return either
 
     @cached_property
-    def level_x(self) -> NDArray[np.bool_]:
-        """Whether both edges of each quad along x are level."""
+    def flat_x(self) -> NDArray[np.bool_]:
+        """Whether both edges of each quad along x are flat."""
         same = self.z[:-1] == self.z[1:]
-        level: NDArray[np.bool_] = same[:, :-1] & same[:, 1:]
-        return level
+        flat: NDArray[np.bool_] = same[:, :-1] & same[:, 1:]
+        return flat
 
     @cached_property
-    def level_y(self) -> NDArray[np.bool_]:
-        """Whether both edges of each quad along y are level."""
+    def flat_y(self) -> NDArray[np.bool_]:
+        """Whether both edges of each quad along y are flat."""
         same = self.z[:, :-1] == self.z[:, 1:]
-        level: NDArray[np.bool_] = same[:-1] & same[1:]
-        return level
+        flat: NDArray[np.bool_] = same[:-1] & same[1:]
+        return flat
 
     def corners(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the numbers of the four corners of each quad (i, j), counterclockwise, (n, 4)."""

@@ -19,9 +19,9 @@ class Rectangles:
     j1: Ids
 
     @classmethod
-    def level(cls, level: Mask) -> Self:
-        """Return rectangles of level quads; the mask is cleared where there is none."""
-        row, start, stop = runs(level)
+    def flat(cls, flat: Mask) -> Self:
+        """Return rectangles of flat quads; the mask is cleared where there is none."""
+        row, start, stop = runs(flat)
         # Runs over the same columns in consecutive rows are one rectangle.
         order = np.lexsort((row, stop, start))
         row, start, stop = row[order], start[order], stop[order]
@@ -30,7 +30,7 @@ class Rectangles:
         last = np.roll(first, -1)
         i0, i1, j0, j1 = row[first], row[last] + 1, start[first], stop[first]
         small = (i1 - i0) * (j1 - j0) < 3
-        level[i0[small], j0[small]] = level[i1[small] - 1, j1[small] - 1] = False
+        flat[i0[small], j0[small]] = flat[i1[small] - 1, j1[small] - 1] = False
         return cls(i0=i0[~small], i1=i1[~small], j0=j0[~small], j1=j1[~small])
 
     @classmethod

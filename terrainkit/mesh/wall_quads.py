@@ -1,4 +1,4 @@
-"""The faces of quads with walls: level or sloping parts, and the walls between them."""
+"""The faces of quads with walls: flat or sloping parts, and the walls between them."""
 
 from dataclasses import dataclass
 

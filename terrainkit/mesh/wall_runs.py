@@ -1,4 +1,4 @@
-"""Straight walls of constant height, with the level ground along them."""
+"""Straight walls of constant height, with the flat ground along them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -82,7 +82,7 @@ class WallRuns:
             nodes[self.i, j] = nodes[self.i + 1, j] = True
 
     def strips(self, kept: Mask) -> list[Polygons]:
-        """Return the level strips, half a cell wide, on both sides of each wall."""
+        """Return the flat strips, half a cell wide, on both sides of each wall."""
         return [self._strip(side, kept.T if self.view.swapped else kept) for side in (0, 1)]
 
     def _strip(self, side: int, kept: Mask) -> Polygons:

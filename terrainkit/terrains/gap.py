@@ -19,7 +19,7 @@ class Gap(Terrain):
     """Width of the gap [m]; it ends at the edge of the patch."""
 
     depth: float = parameter.height(5.0)
-    """Depth of the gap, which has a floor [m]."""
+    """Depth of the floor of the gap [m]."""
 
     platform: float = parameter.platform(3.0)
     """Side of the flat square at the center [m]."""

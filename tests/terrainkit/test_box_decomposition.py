@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 from terrainkit import MapConfig, SubTerrain, generate
-from terrainkit.box_decomposition import decompose_boxes, level_cells
+from terrainkit.box_decomposition import decompose_boxes, flat_cells
 from terrainkit.grid import Grid
 from terrainkit.surface import surface_at
 
@@ -34,7 +34,7 @@ def cover_of(heights, threshold):
 
 
 def level_of(heights, threshold):
-    return level_cells(heights, Grid(shape=heights.shape, cell=1.0), threshold)
+    return flat_cells(heights, Grid(shape=heights.shape, cell=1.0), threshold)
 
 
 def patch(terrain, *, size=(6.0, 4.0), **parameters):
@@ -58,7 +58,7 @@ def test_boxes_match_covered_cells(heights, threshold):
 
 @given(heights=HEIGHTFIELDS, threshold=st.sampled_from([0.5, 1.5, 2.5]))
 @settings(deadline=None, derandomize=True, max_examples=100)
-def test_level_cells_are_level_everywhere(heights, threshold):
+def test_flat_cells_are_flat_everywhere(heights, threshold):
     offsets = np.linspace(0.02, 0.98, 7) - 0.5
     steps = np.stack(np.meshgrid(offsets, offsets), axis=-1).reshape(-1, 2)
     place = (np.argwhere(np.ones(heights.shape))[:, None] + steps).reshape(-1, 2)

@@ -8,9 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 SKY_COLOR = (0.94, 0.955, 0.97)
 DOWN, SUN_DIRECTION = np.array([0.0, 0.0, -1.0]), np.array([-0.318, 0.424, -0.848])
 FIELD_OF_VIEW = 30.0  # vertical [deg]
-FOG_START, FOG_END = 2.0, 5.5
-"""Distances from the camera at which the fog starts and is opaque, in extents of the model."""
-
+FOG_START, FOG_END = 2.0, 5.5  # distances from the camera, in extents of the model
 VISIBLE_GROUPS = (0, 1, 2)  # geom groups that MuJoCo shows by default
 
 
@@ -30,9 +28,7 @@ def set_appearance(spec: Any) -> None:
     for direction, ambient, diffuse, specular, has_shadow in lights:
         light = spec.worldbody.add_light(pos=-10 * direction, dir=direction, castshadow=has_shadow)
         light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
-        light.ambient, light.diffuse, light.specular = np.outer(
-            (ambient, diffuse, specular), [1] * 3
-        )
+        light.ambient[:], light.diffuse[:], light.specular[:] = ambient, diffuse, specular
     visual.global_.fovy = FIELD_OF_VIEW
     visual.quality.shadowsize, visual.quality.offsamples, visual.quality.numslices = 2048, 4, 64
     visual.map.znear, visual.map.zfar, visual.map.shadowclip = 0.02, 400.0, 1.0
@@ -40,10 +36,7 @@ def set_appearance(spec: Any) -> None:
 
 
 def make_renderer(model: Any, size: tuple[int, int], extent: float) -> Any:
-    """Return a `mujoco.Renderer` for frames of a size, and change the model's visual options.
-
-    The extent [m] is the radius in which shadows are cast, and the unit of distances in the fog.
-    """
+    """Return a `mujoco.Renderer`; the model's extent [m] scales the fog and the shadows."""
     import mujoco
 
     model.stat.extent = extent

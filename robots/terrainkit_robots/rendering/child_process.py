@@ -28,12 +28,9 @@ class RenderError(TerrainkitError):
 
 
 def stream_frames(render: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
-    """Yield the frames that a function renders in a child process.
+    """Yield the frames that a picklable function renders in a child process.
 
     The backends of `gl_backend.backends()` are tried in order until one renders a frame.
-
-    Args:
-        render: A picklable function without arguments that returns an iterator of frames.
 
     Raises:
         RenderError: if no backend works, a frame takes too long, or `render` raises this error.

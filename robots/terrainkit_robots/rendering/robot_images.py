@@ -14,23 +14,19 @@ from terrainkit_robots.rendering.child_process import Frame, RenderError, stream
 from terrainkit_robots.simulation.geoms import lowest_point
 from terrainkit_robots.text import one_line
 
-DEFAULT_SIZE = (480, 420)
-"""Width and height of a picture [pixels]."""
-
+DEFAULT_SIZE = (480, 420)  # [pixels]
 VIEWS = {"front": (180.0, -10.0), "side": (90.0, -10.0), "corner": (142.0, -24.0)}
 """Azimuth and elevation of the camera in each view [deg]."""
 
 FILL_RATIO = 0.95  # maximum share of the width and the height that the robot spans
 FLOOR = "terrainkit_floor"
-MUJOCO_RGBA = np.float32((0.5, 0.5, 0.5, 1))  # default color
+MUJOCO_RGBA = np.array((0.5, 0.5, 0.5, 1))  # default color
 
 
 def render_robot(file: Path, size: tuple[int, int] = DEFAULT_SIZE) -> dict[str, bytes]:
     """Return a PNG of each view of a robot, by the name of the view: front, side and corner.
 
-    Args:
-        file: The MJCF file; the robot is shown in its first keyframe, or in qpos0.
-        size: Width and height of a picture [pixels].
+    The robot of the MJCF file is shown in its first keyframe, or in qpos0.
 
     Raises:
         RenderError: if MuJoCo cannot render on this machine, or cannot render this robot.
@@ -45,11 +41,7 @@ def render_robot(file: Path, size: tuple[int, int] = DEFAULT_SIZE) -> dict[str, 
 
 
 def robot_frames(file: Path, size: tuple[int, int]) -> Iterator[Frame]:
-    """Yield a frame of each view of a robot.
-
-    Raises:
-        RenderError: if the file cannot be loaded, or the robot is empty or too large.
-    """
+    """Yield a frame of each view of a robot; raise a RenderError if it is invalid or too large."""
     import mujoco
 
     try:
@@ -106,8 +98,7 @@ def show_robot_geoms(model: Any) -> NDArray[np.int64]:
     """
     import mujoco
 
-    rgba, ground = model.geom_rgba, (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
-    solid = ~np.isin(model.geom_type, [int(kind) for kind in ground])
+    rgba, solid = model.geom_rgba, model.geom_type > int(mujoco.mjtGeom.mjGEOM_HFIELD)
     is_uncolored = (rgba == MUJOCO_RGBA).all(axis=1)  # the material shows, if there is one
     has_material = is_uncolored & (model.geom_matid >= 0)
     rgba[has_material] = model.mat_rgba[model.geom_matid[has_material]]

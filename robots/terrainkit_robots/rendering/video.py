@@ -18,9 +18,7 @@ from terrainkit_robots.text import one_line
 
 FloatArray = NDArray[np.floating[Any]]
 
-DEFAULT_SIZE, MIN_SIZE, MAX_SIZE = (640, 360), 64, 4096
-"""Width and height of a video [pixels]; without a GPU a frame of the default size takes 0.2 s."""
-
+DEFAULT_SIZE, MIN_SIZE, MAX_SIZE = (640, 360), 64, 4096  # [pixels]
 AZIMUTH, AZIMUTH_SWING, ELEVATION = 128.0, 10.0, -16.0  # angles of the camera [deg]
 MAX_OTHER_ROBOTS, MAX_OTHER_DISTANCE = 24, 14.0  # limits of the robots that are rendered, [m]
 
@@ -29,26 +27,19 @@ MAX_OTHER_ROBOTS, MAX_OTHER_DISTANCE = 24, 14.0  # limits of the robots that are
 class Shot:
     """A part of a video in which the camera follows one robot, from its first recorded frame."""
 
-    robot: int
-    """Index of the robot."""
-    captions: tuple[str, ...]
-    """Text at the bottom of each frame."""
+    robot: int  # index of the robot
+    captions: tuple[str, ...]  # text at the bottom of each frame
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class VideoSpec:
     """The content and the format of a video."""
 
-    model: Any
-    """The `mujoco.MjModel` of the scene, with one robot."""
-    poses: NDArray[np.float32]
-    """qpos of each robot in each recorded frame, shape (frames, robots, nq)."""
+    model: Any  # the `mujoco.MjModel` of the scene, with one robot
+    poses: NDArray[np.float32]  # qpos of robots in recorded frames, shape (frames, robots, nq)
     shots: tuple[Shot, ...]
-    """Shots in the order of the video."""
-    fps: float
-    """Frames per second."""
-    size: tuple[int, int] = DEFAULT_SIZE
-    """Width and height [pixels]."""
+    fps: float  # frames per second
+    size: tuple[int, int] = DEFAULT_SIZE  # width and height [pixels]
 
     def __post_init__(self) -> None:
         check_video_size(self.size)
@@ -141,6 +132,7 @@ def _shot_frames(spec: VideoSpec, shot: Shot, distance: float) -> Iterator[Frame
     view = targets[:, None, :2] + np.concatenate([-1.2 * rays, appearance.FOG_END * rays])
     model = cut_heightfields(spec.model, view.min(axis=(0, 1)), view.max(axis=(0, 1)))
     data, other_data, unchanged = mujoco.MjData(model), mujoco.MjData(model), mujoco.MjvPerturb()
+    moving = mujoco.mjtCatBit.mjCAT_DYNAMIC
     with appearance.make_renderer(model, spec.size, distance) as renderer:
         for k, caption in enumerate(shot.captions):
             data.qpos[:] = poses[k, shot.robot]
@@ -154,7 +146,6 @@ def _shot_frames(spec: VideoSpec, shot: Shot, distance: float) -> Iterator[Frame
             for robot in others[away[others] < MAX_OTHER_DISTANCE]:
                 other_data.qpos[:] = poses[k, robot]
                 mujoco.mj_kinematics(model, other_data)
-                moving = mujoco.mjtCatBit.mjCAT_DYNAMIC
                 mujoco.mjv_addGeoms(model, other_data, options, unchanged, moving, renderer.scene)
             frame = renderer.render()
             appearance.add_caption(frame, caption, height / 750)
@@ -171,10 +162,9 @@ def smooth_path(path: FloatArray, sigma: float) -> FloatArray:
 
 
 def cut_heightfields(model: Any, lower: FloatArray, upper: FloatArray) -> Any:
-    """Return a copy of a model whose heightfields cover only a rectangle.
+    """Return a copy of a model whose heightfields cover a rectangle, given by its corners [m].
 
-    Without a GPU, most of the time would be spent on the triangles of a large heightfield. The
-    corners of the rectangle are x and y in the world frame [m].
+    Without a GPU, most of the time would be spent on the triangles of a large heightfield.
     """
     import mujoco
 

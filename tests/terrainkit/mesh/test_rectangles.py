@@ -22,7 +22,7 @@ def count(found, shape):
     return quads
 
 
-@pytest.mark.parametrize("find", [Rectangles.level, Rectangles.along_y, Rectangles.along_x])
+@pytest.mark.parametrize("find", [Rectangles.flat, Rectangles.along_y, Rectangles.along_x])
 @given(mask=MASKS)
 @settings(deadline=None, derandomize=True, max_examples=60)
 def test_rectangles_cover_each_remaining_quad_once(find, mask):
@@ -36,7 +36,7 @@ def test_rectangles_cover_each_remaining_quad_once(find, mask):
 def test_rectangles_merge_level_quads_of_equal_columns():
     mask = np.zeros((5, 6), dtype=bool)
     mask[1:4, 2:5] = True
-    assert spans(Rectangles.level(mask)) == [(1, 4, 2, 5)]
+    assert spans(Rectangles.flat(mask)) == [(1, 4, 2, 5)]
 
 
 def test_rectangles_of_sloping_quads_are_one_deep():
@@ -55,7 +55,7 @@ def node_grid():
 
 
 def test_rectangles_boundary_is_counterclockwise(node_grid):
-    rectangle = Rectangles.level(np.ones((3, 4), dtype=bool))
+    rectangle = Rectangles.flat(np.ones((3, 4), dtype=bool))
     kept = np.zeros((4, 5), dtype=bool)
     rectangle.keep_corners(kept)
     assert np.argwhere(kept).tolist() == [[0, 0], [0, 4], [3, 0], [3, 4]]
