@@ -33,11 +33,8 @@ class Simulation:
         self._stage = mujoco.mjtStage.mjSTAGE_VEL
         self.scene = scene
         self.batch = Batch(scene.model, num_envs, num_threads)
-        self.qpos: NDArray[np.float64] = self.batch.bind("qpos")
-        self.qvel: NDArray[np.float64] = self.batch.bind("qvel")
-        self.ctrl: NDArray[np.float64] = self.batch.bind("ctrl")
-        self.torque: NDArray[np.float64] = self.batch.bind("actuator_force")
-        self._sensordata: NDArray[np.float64] = self.batch.bind("sensordata")
+        names = ("qpos", "qvel", "ctrl", "actuator_force", "sensordata")
+        self.qpos, self.qvel, self.ctrl, self.torque, self._sensordata = map(self.batch.bind, names)
 
     def step(self, count: int) -> NDArray[np.bool_]:
         """Step every simulation `count` times.
