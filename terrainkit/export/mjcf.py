@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from terrainkit.box_decomposition import BoxDecomposition, flat_cells, neighborhood
 from terrainkit.memory import check_memory
 from terrainkit.mesh.closed import THICKNESS
+from terrainkit.surface import HeightfieldSurface
 from terrainkit.type_hint import convert
 
 if TYPE_CHECKING:
@@ -161,6 +162,17 @@ def _border_boxes(
         lower, upper = np.array([a, c, bottom]), np.array([b, d, 0.0])
         boxes.append(((lower + upper) / 2, (upper - lower) / 2))
     return boxes
+
+
+def collision_surface(terrain_map: "TerrainMap", collision: Collision) -> HeightfieldSurface:
+    """Return the surface that MuJoCo collides with."""
+    heights, tops = np.ascontiguousarray(terrain_map.heights), None
+    cover = collision_boxes(terrain_map, collision)
+    if cover is not None:
+        tops = np.where(cover.covered, heights, np.float32(-np.inf))
+        heights = without_boxes(heights, cover)
+    first, cell = terrain_map.first_sample, terrain_map.grid.cell
+    return HeightfieldSurface(heights=heights, first_sample=first, cell=cell, box_tops=tops)
 
 
 def without_boxes(heights: NDArray[np.float32], cover: BoxDecomposition) -> NDArray[np.float32]:

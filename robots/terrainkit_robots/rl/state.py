@@ -155,8 +155,6 @@ class Sensors:
     def _height_scan(self, pos: FloatArray, quat: FloatArray) -> FloatArray:
         """Return the height of the base above the scan points, which turn with the yaw."""
         x, y = self._scan_points
-        if not len(x):
-            return np.zeros((len(pos), 0), np.float32)
         yaw = quat_to_yaw(quat)
         c, s = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
         height = self._terrain.height(pos[:, :1] + c * x - s * y, pos[:, 1:2] + s * x + c * y)

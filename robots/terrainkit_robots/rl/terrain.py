@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError
 from terrainkit.surface import HeightfieldSurface
 from terrainkit.text import closest
-from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.simulation.geoms import measure_heights
+from terrainkit_robots.simulation.geoms import measure_surface
 
 if TYPE_CHECKING:
     from terrainkit.terrain_map import TerrainMap
@@ -74,24 +73,14 @@ class MapTerrain(Terrain):
     """A terrainkit map."""
 
     def __init__(self, terrain_map: "TerrainMap", collision: Any = "auto") -> None:
-        from terrainkit.export.mjcf import collision_boxes, without_boxes
+        from terrainkit.export.mjcf import collision_surface
 
         self.env_origins = terrain_map.env_origins
         self.terrain_names = np.array(terrain_map.terrain_names)[terrain_map.terrain_types]
         self.patch_length = terrain_map.config.patch_size[0]
         self.lower, self.upper = terrain_map.grid.lower, terrain_map.grid.upper
         self._map, self._collision = terrain_map, collision
-        heights, tops = np.ascontiguousarray(terrain_map.heights), None
-        cover = collision_boxes(terrain_map, collision)
-        if cover is not None:
-            tops = np.where(cover.covered, heights, np.float32(-np.inf))
-            heights = without_boxes(heights, cover)
-        self._surface = HeightfieldSurface(
-            heights=heights,
-            first_sample=terrain_map.first_sample,
-            cell=terrain_map.grid.cell,
-            box_tops=tops,
-        )
+        self._surface = collision_surface(terrain_map, collision)
 
     def spec(self) -> Any:
         """Return the map as terrainkit exports it for MuJoCo."""
@@ -117,27 +106,9 @@ class ModelTerrain(Terrain):
         if not path.is_file():
             raise ConfigError(f"there is no file {path}")
         self._path = path
-        try:
-            with quiet_mujoco():
-                model = mujoco.MjModel.from_xml_path(str(path))
-        except ValueError as error:
-            reason = " ".join(str(error).split())
-            raise ConfigError(f"MuJoCo cannot read {path}: {reason}") from None
-        if model.nv:
-            raise ConfigError(f"{path}: got {model.nv} degrees of freedom; expected a static model")
-        n = 2 * round(half_size / cell) + 1
-        axis = ((np.arange(n) - n // 2) * cell).astype(np.float32)
-        heights = measure_heights(model, axis)
-        center = heights[n // 2, n // 2]
-        if np.isnan(center):
-            raise ConfigError(f"{path}: no ground at the origin, where robots spawn")
-        # Where there is no ground, robots fall: any height far below will do.
-        heights = np.where(np.isnan(heights), np.nanmin(heights) - 10, heights)
-        corner = (float(axis[0]), float(axis[0]))
-        self._surface = HeightfieldSurface(
-            heights=heights.astype(np.float32), first_sample=corner, cell=cell
-        )
-        self.env_origins = np.array([[[0, 0, center]]], np.float32)
+        self._surface = measure_surface(path, cell, half_size)
+        k = len(self._surface.heights) // 2
+        self.env_origins = np.array([[[0, 0, self._surface.heights[k, k]]]], np.float32)
         self.lower, self.upper = (-half_size, -half_size), (half_size, half_size)
 
     def spec(self) -> Any:

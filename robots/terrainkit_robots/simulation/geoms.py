@@ -1,9 +1,14 @@
 """Geoms of a MuJoCo model: which collide, and how high they are."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from terrainkit.errors import ConfigError
+from terrainkit.surface import HeightfieldSurface
+from terrainkit_robots.quiet_mujoco import quiet_mujoco
 
 MIN_NORMAL_Z = 0.1
 """Smallest vertical component of a plane's normal that makes it ground, and not a wall."""
@@ -39,7 +44,39 @@ def lowest_point(model: Any, data: Any, geom: int) -> float:
     return float(data.geom_xpos[geom][2] - extent)
 
 
-def measure_heights(model: Any, axis: NDArray[np.float32]) -> NDArray[np.float64]:
+def measure_surface(path: Path, cell: float, half_size: float) -> HeightfieldSurface:
+    """Measure the surface of a static MuJoCo model by rays from above.
+
+    Args:
+        path: The model's file.
+        cell: Distance between samples [m].
+        half_size: Half the side of the square around the origin that is measured [m].
+
+    Raises:
+        ConfigError: If MuJoCo cannot read the model, or there is no ground at the origin.
+    """
+    import mujoco
+
+    try:
+        with quiet_mujoco():
+            model = mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        reason = " ".join(str(error).split())
+        raise ConfigError(f"MuJoCo cannot read {path}: {reason}") from None
+    if model.nv:
+        raise ConfigError(f"{path}: got {model.nv} degrees of freedom; expected a static model")
+    n = 2 * round(half_size / cell) + 1
+    axis = ((np.arange(n) - n // 2) * cell).astype(np.float32)
+    heights = _measure_heights(model, axis)
+    if np.isnan(heights[n // 2, n // 2]):
+        raise ConfigError(f"{path}: no ground at the origin, where robots spawn")
+    # Where there is no ground, robots fall: any height far below will do.
+    filled = np.where(np.isnan(heights), np.nanmin(heights) - 10, heights).astype(np.float32)
+    corner = (float(axis[0]), float(axis[0]))
+    return HeightfieldSurface(heights=filled, first_sample=corner, cell=cell)
+
+
+def _measure_heights(model: Any, axis: NDArray[np.float32]) -> NDArray[np.float64]:
     """Measure the height of a static model by rays from above, shape (n, n); NaN without ground.
 
     `axis` has the coordinates of the grid along x and along y [m], shape (n,).
