@@ -185,7 +185,9 @@ def test_generate_warns_of_step_above_amplitude():
 def test_generate_warns_of_moved_spawn(terrain, given):
     choice = SubTerrain(terrain=terrain, parameters=given)
     config = MapConfig(rows=3, cols=1, border=0.0, difficulty_range=(0.5, 1.0), terrains=(choice,))
-    with pytest.warns(TerrainkitWarning, match=f"at the preferred spawn: {terrain} on 3 patch"):
+    with pytest.warns(
+        TerrainkitWarning, match=f"at the preferred spawn position: {terrain} on 3 patch"
+    ):
         generate(config)
 
 
