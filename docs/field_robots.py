@@ -187,11 +187,11 @@ def main() -> int:
         sys.stdout.write(json.dumps(asdict(onboard_robot(options.folders[0], options.into))))
         return 0
     folders = options.folders
-    wanted = robots()
-    versions = {robot.package: version(robot.package, folders) for robot in wanted}
+    listed = robots()
+    versions = {robot.package: version(robot.package, folders) for robot in listed}
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        outcomes = pool.map(partial(onboard_in_subprocess, folders=folders), wanted)
-        found = list(zip(wanted, outcomes, strict=True))
+        outcomes = pool.map(partial(onboard_in_subprocess, folders=folders), listed)
+        found = list(zip(listed, outcomes, strict=True))
     (DOCS / "field_robots.md").write_text("\n".join(page(found, versions)))
     return int(any("**" in outcome.result for _, outcome in found))
 

@@ -100,7 +100,7 @@ class MapConfig(Config):
         if self.terrains:
             object.__setattr__(self, "preset", "")
         self._check_grid()
-        self._check_mix()
+        self._check_sub_terrains()
 
     @classmethod
     def from_table(
@@ -124,7 +124,7 @@ class MapConfig(Config):
         return {key: value for key, value in super().to_table().items() if key != unused}
 
     @cached_property
-    def mix(self) -> tuple[SubTerrain, ...]:
+    def sub_terrains(self) -> tuple[SubTerrain, ...]:
         """The sub-terrains of the map: the custom ones, or those of the preset."""
         return self.terrains or presets.get_preset(self.preset)
 
@@ -191,8 +191,8 @@ class MapConfig(Config):
                     f"cells of the map along {axis}: got {cells:.7g}; expected at most {MAX_CELLS}"
                 )
 
-    def _check_mix(self) -> None:
-        names = [terrain.name for terrain in self.mix]
+    def _check_sub_terrains(self) -> None:
+        names = [terrain.name for terrain in self.sub_terrains]
         (name, count), *_ = Counter(names).most_common(1)
         if count > 1:
             raise ConfigError(f"terrains: got {count} of name {name!r}; expected unique names")
@@ -201,7 +201,7 @@ class MapConfig(Config):
                 f"mode selected: got {len(names)} terrains ({listing(names)}); expected one "
                 "(--terrain)"
             )
-        if not sum(terrain.proportion for terrain in self.mix) > 0:
+        if not sum(terrain.proportion for terrain in self.sub_terrains) > 0:
             raise ConfigError(
                 f"proportions of {listing(names)}: got a sum of 0; expected a sum above 0"
             )

@@ -1,33 +1,33 @@
-"""Every error that terrainkit raises on purpose.
+"""Errors and warnings of terrainkit.
 
-A message is one line: what was given, what was wanted, what exists.
+Each message is one line: what was received, what was expected, what exists.
 """
 
 from collections.abc import Iterable
 
 
 class TerrainkitError(Exception):
-    """The one class to catch; the command line turns it into a line on stderr and exit code 2."""
+    """Parent class of all errors. The command line prints it on stderr and exits with 2."""
 
 
 class ConfigError(TerrainkitError, ValueError):
-    """A number, name or combination that no map can be made from."""
+    """A value, name or combination of values is invalid."""
 
 
 class MapFileError(TerrainkitError):
-    """A file that is not a map, or not a whole one."""
+    """A file is not a map, or is truncated."""
 
 
 class ExportError(TerrainkitError):
-    """A map that the wanted format cannot hold, or a target that cannot be written."""
+    """A format cannot represent the map, or the target cannot be written."""
 
 
 class MemoryLimitError(TerrainkitError, MemoryError):
-    """Work that would not fit in this machine's memory; raised before anything is allocated."""
+    """Work would not fit in memory. It is raised before anything is allocated."""
 
 
 class TerrainkitWarning(UserWarning):
-    """Something was left out or changed, and the result is still sound."""
+    """Something was omitted or changed; the result is still valid."""
 
 
 MAX_LISTED = 40

@@ -58,7 +58,7 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
     indices: Iterator[tuple[int, int]] = iter(np.ndindex(size))
     for row, col in progress(indices, config.rows * config.cols) if progress else indices:
         terrain_type, level = assign_patch(config, columns, row, col)
-        sub_terrain = config.mix[terrain_type]
+        sub_terrain = config.sub_terrains[terrain_type]
         patch = build_patch(config, sub_terrain, level, row, col)
         i, j = config.patch_start(row, col)
         heights[i : i + patch.grid.shape[0], j : j + patch.grid.shape[1]] = patch.heights
@@ -75,7 +75,7 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
         heights=heights,
         env_origins=origins,
         terrain_types=terrain_types,
-        terrain_names=tuple(sub_terrain.name for sub_terrain in config.mix),
+        terrain_names=tuple(sub_terrain.name for sub_terrain in config.sub_terrains),
         difficulty=difficulty,
         parameters=parameters,
     )

@@ -32,7 +32,7 @@ def allocate_columns(proportions: list[float], num_columns: int) -> list[int]:
 
 
 def terrain_columns(config: MapConfig) -> list[int]:
-    """Return the terrain type of each column as an index into `config.mix`.
+    """Return the terrain type of each column as an index into `config.sub_terrains`.
 
     Warns:
         TerrainkitWarning: if a sub-terrain of a preset gets no column.
@@ -40,13 +40,14 @@ def terrain_columns(config: MapConfig) -> list[int]:
     Raises:
         ConfigError: if a custom sub-terrain gets no column.
     """
-    mix = config.mix
-    counts = allocate_columns([sub_terrain.proportion for sub_terrain in mix], config.cols)
-    missing = [s.name for s, n in zip(mix, counts, strict=True) if n == 0 and s.proportion > 0]
+    sub_terrains = config.sub_terrains
+    counts = allocate_columns([each.proportion for each in sub_terrains], config.cols)
+    pairs = zip(sub_terrains, counts, strict=True)
+    missing = [each.name for each, n in pairs if n == 0 and each.proportion > 0]
     if missing and config.mode != "randomized":
         message = (
-            f"{config.cols} columns are too few for {len(mix)} sub-terrains at these proportions: "
-            f"no column for {listing(missing)}"
+            f"{config.cols} columns are too few for {len(sub_terrains)} sub-terrains at these "
+            f"proportions: no column for {listing(missing)}"
         )
         if config.terrains:
             raise ConfigError(message)
@@ -64,14 +65,14 @@ def assign_patch(config: MapConfig, columns: list[int], row: int, col: int) -> t
         col: Index along y.
 
     Returns:
-        Terrain type as an index into `config.mix`, and difficulty, 0 to 1.
+        Terrain type as an index into `config.sub_terrains`, and difficulty, 0 to 1.
     """
     if config.mode == "selected":
         return columns[col], config.selected_difficulty
     if config.mode == "curriculum":
         return columns[col], _row_difficulty(config, row, col)
     rng = _layout_rng(config, row, col)
-    weights = np.array([sub_terrain.proportion for sub_terrain in config.mix])
+    weights = np.array([sub_terrain.proportion for sub_terrain in config.sub_terrains])
     terrain_type = rng.choice(len(weights), p=weights / weights.sum())
     return int(terrain_type), float(rng.choice(config.random_difficulties))
 

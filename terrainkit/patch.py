@@ -61,7 +61,7 @@ def make_patch(config: MapConfig, row: int, col: int) -> Patch:
     """
     config.check_patch(row, col)
     terrain_type, difficulty = assign_patch(config, terrain_columns(config), row, col)
-    return build_patch(config, config.mix[terrain_type], difficulty, row, col)
+    return build_patch(config, config.sub_terrains[terrain_type], difficulty, row, col)
 
 
 def build_patch(

@@ -95,7 +95,7 @@ def _check_patches(terrain_map: TerrainMap) -> Iterator[str]:
         border[i : i + nx, j : j + ny] = False
         terrain_type, difficulty = assign_patch(config, columns, row, col)
         try:
-            expected = build_patch(config, config.mix[terrain_type], difficulty, row, col)
+            expected = build_patch(config, config.sub_terrains[terrain_type], difficulty, row, col)
         except TerrainkitError as error:
             yield f"patch ({row}, {col}) cannot be generated from its config: {error}"
             continue
@@ -124,11 +124,11 @@ def _compare(patch: Patch, expected: Patch, location: str) -> Iterator[str]:
 
 def _check_realized(terrain_map: TerrainMap) -> Iterator[str]:
     """Compare the requested parameters with the realized ones."""
-    cell, mix = terrain_map.config.cell, terrain_map.config.mix
+    cell, sub_terrains = terrain_map.config.cell, terrain_map.config.sub_terrains
     for row, col in np.ndindex(terrain_map.difficulty.shape):
         patch = terrain_map.patch(row, col)
         parameters = parameters_of(
-            registry.get_terrain(mix[terrain_map.terrain_types[row, col]].terrain)
+            registry.get_terrain(sub_terrains[terrain_map.terrain_types[row, col]].terrain)
         )
         for name, requested in patch.parameters.requested.items():
             realized = patch.parameters.realized[name]

@@ -32,7 +32,7 @@ class Generate(ConfigCommand):
     """Generate a map of terrain patches and write it to a file.
 
     Rows of patches are difficulty levels, columns are terrains. --config, --terrain and --preset
-    select the terrains; the options from --rows on are the values of the map config.
+    select the terrains; --rows and the options after it override the map config.
     """
 
     output: Output
@@ -221,8 +221,12 @@ def _print_patch(terrain_map: TerrainMap, row: int, col: int) -> None:
     for name, requested in patch.parameters.requested.items():
         realized = patch.parameters.realized[name]
         values = realized if isinstance(realized, tuple) else (realized,)
-        rows.append((name, f"{requested:g}", " x ".join(f"{value:g}" for value in values)))
+        rows.append((name, _number(requested), " x ".join(map(_number, values))))
     render.table(rows)
+
+
+def _number(value: float) -> str:
+    return str(value).lower() if isinstance(value, bool) else f"{value:g}"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -82,7 +82,9 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
             ("lower", grid.lower),
         ):
             archive.check_value(key, expected)
-        names = archive.array("terrain_names", "U", (len(config.mix),), limit=MAX_TEXT_BYTES)
+        names = archive.array(
+            "terrain_names", "U", (len(config.sub_terrains),), limit=MAX_TEXT_BYTES
+        )
         terrain_types = archive.array("terrain_types", "i4", size)
         if terrain_types.min() < 0 or terrain_types.max() >= len(names):
             raise MapFileError(
@@ -148,7 +150,8 @@ def _all_parameters(
 ) -> NDArray[np.object_]:
     table = np.empty(terrain_types.shape, dtype=object)
     names = [
-        set(parameters_of(registry.get_terrain(sub_terrain.terrain))) for sub_terrain in config.mix
+        set(parameters_of(registry.get_terrain(sub_terrain.terrain)))
+        for sub_terrain in config.sub_terrains
     ]
     try:
         rows = json.loads(

@@ -12,7 +12,7 @@ FLAT, GAP = SubTerrain(terrain="flat"), SubTerrain(terrain="gap")
 
 def test_default_map_is_that_of_legged_gym():
     config = MapConfig()
-    assert config.mix == presets.get_preset("legged_gym")
+    assert config.sub_terrains == presets.get_preset("legged_gym")
     # 10 x 8 m of patches and 2 x 25 m of border are 130 m, at 0.1 m.
     assert config.grid.shape == (1300, 1300)
 
@@ -47,7 +47,7 @@ def test_centered_map_has_origin_at_center():
 
 def test_custom_terrains_replace_the_preset():
     config = MapConfig(preset="rough", terrains=(GAP, FLAT))
-    assert config.mix == (GAP, FLAT)
+    assert config.sub_terrains == (GAP, FLAT)
     assert config.preset == ""
 
 
@@ -145,4 +145,4 @@ def test_map_config_rejects_invalid_values(given, message):
 
 def test_one_terrain_may_have_two_names():
     wide = SubTerrain(terrain="gap", name="wide_gap", parameters={"width": 1.0})
-    assert MapConfig(terrains=(GAP, wide)).mix == (GAP, wide)
+    assert MapConfig(terrains=(GAP, wide)).sub_terrains == (GAP, wide)

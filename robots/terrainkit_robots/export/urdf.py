@@ -1,6 +1,6 @@
 """Write a canonical robot as URDF.
 
-The base has no joint: URDF has no free joint, and simulators add one when they are told to. What
+The base has no joint: URDF has no free joint, and simulators add one on request. What
 URDF cannot represent in one element is written as several: a capsule as a cylinder and two spheres,
 and a joint whose axis does not pass through the origin of its child as a joint to an empty link, to
 which the child is fixed.
