@@ -155,7 +155,8 @@ def _foot_map(env: "LeggedEnv", joints: SignedPermutation) -> SignedPermutation:
         above.append(dofs.index(dof) if dof >= 0 else -1)
     index = []
     for foot, joint in zip(spec.feet, above, strict=True):
-        found = np.flatnonzero(np.array(above) == joints.index[joint])
+        image = joints.index[joint] if joint >= 0 else -1
+        found = np.flatnonzero(np.array(above) == image)
         if len(found) != 1:
             raise ConfigError(
                 f"symmetry: the foot {foot} of {spec.name} has {len(found)} mirror images; "
