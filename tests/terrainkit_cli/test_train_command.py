@@ -167,7 +167,7 @@ def without_origins(folder: Path) -> None:
         (("quadruped", "--terrain", "gone.npz"), "no file gone.npz"),
         (("quadruped", "--num-envs", "many"), "--env.num-envs: got 'many'; expected an integer"),
         (("quadruped", "--num-envs", "0"), "--env.num-envs: got 0; expected an integer >= 1"),
-        (("quadruped", "--num-envs", "100000000"), "would fit"),
+        (("quadruped", "--num-envs", "100000000"), "env.num_envs 100000000"),
         (("quadruped", "--device", "tpu"), "device: got 'tpu'; expected one of: cpu"),
         (("quadruped", "--resume", "nowhere"), "run: got nowhere"),
         (("quadruped", "--rewards.torque", "1"), "did you mean --rewards.torques?"),

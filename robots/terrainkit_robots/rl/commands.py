@@ -1,14 +1,11 @@
 """Velocity commands: sampling, resampling, heading control, and the command curriculum."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from terrainkit_robots.rl.config import Commands, Task
+from terrainkit_robots.rl.simulation import Ids
 from terrainkit_robots.rl.terrain import Terrain
-from terrainkit_robots.transforms import wrap_to_pi
-
-FloatArray = NDArray[np.float32]
-Ids = NDArray[np.int64]
+from terrainkit_robots.transforms import FloatArray, wrap_to_pi
 
 MIN_TRACKING = 0.8
 """Share of the largest tracking reward above which the range expands, as in legged_gym."""

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from terrainkit.curriculum import assign_levels
 from terrainkit.curriculum import update_levels as next_levels
 from terrainkit.errors import ConfigError
+from terrainkit_robots.rl.simulation import Ids
 from terrainkit_robots.rl.terrain import Terrain
-
-Ids = NDArray[np.int64]
 
 SUCCESS_DECAY = 0.95
 """Weight of the previous success rate when an episode ends."""

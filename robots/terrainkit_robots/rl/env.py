@@ -1,6 +1,7 @@
 """The vectorized environment: legged robots that track velocity commands on a terrain."""
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,15 +23,14 @@ from terrainkit_robots.rl.observations import (
 )
 from terrainkit_robots.rl.rewards import active_rewards
 from terrainkit_robots.rl.scene import build_scene
-from terrainkit_robots.rl.simulation import Simulation, check_env_memory
+from terrainkit_robots.rl.simulation import Ids, Simulation, check_env_memory
 from terrainkit_robots.rl.state import Sensors, State
+from terrainkit_robots.rl.symmetry import MirrorMaps, mirror_maps
 from terrainkit_robots.rl.terminations import terrain_out_of_bounds
 from terrainkit_robots.rl.terrain import Terrain
 from terrainkit_robots.spec.robot import Robot
-from terrainkit_robots.transforms import quat_to_yaw
+from terrainkit_robots.transforms import FloatArray, quat_to_yaw
 
-FloatArray = NDArray[np.float32]
-Ids = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 
@@ -93,6 +93,11 @@ class LeggedEnv(VecEnv):
     @episode_length_buf.setter
     def episode_length_buf(self, lengths: torch.Tensor) -> None:
         self.episode_length[:] = lengths.cpu().numpy()
+
+    @cached_property
+    def mirror_maps(self) -> MirrorMaps:
+        """Left-right symmetry of observations and actions."""
+        return mirror_maps(self)
 
     def get_observations(self) -> TensorDict:
         """Return the current observations; later steps do not modify these tensors."""

@@ -9,12 +9,10 @@ from terrainkit.errors import ConfigError
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import DomainRand, InitState
 from terrainkit_robots.rl.scene import Scene
-from terrainkit_robots.rl.simulation import Simulation
+from terrainkit_robots.rl.simulation import Ids, Simulation
 from terrainkit_robots.rl.terrain import Terrain
 from terrainkit_robots.spec.robot import Robot
-
-FloatArray = NDArray[np.float32]
-Ids = NDArray[np.int64]
+from terrainkit_robots.transforms import FloatArray
 
 MAX_RESET_RELIEF = 0.06
 """Height range of the ground under a robot that is not reset exactly at its origin [m]."""

@@ -10,14 +10,11 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.spec.robot import Robot
-from terrainkit_robots.transforms import quat_rotate_inverse
-
-FloatArray = NDArray[np.float32]
+from terrainkit_robots.transforms import FloatArray, quat_rotate_inverse
 
 HEIGHT_SCAN_OFFSET = 0.5
 """Base height above the ground that is observed as 0 [m], as in legged_gym."""

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from terrainkit_robots.rl.config import Rewards
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.spec.robot import Robot
-
-FloatArray = NDArray[np.float32]
+from terrainkit_robots.transforms import FloatArray
 
 MIN_YAW_RATE = 0.1
 """Yaw rate from which a command counts as moving [rad/s]: heading control never reaches 0."""

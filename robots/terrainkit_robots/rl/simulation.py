@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.errors import ConfigError, MemoryLimitError
+from terrainkit.errors import ConfigError
 from terrainkit.memory import check_memory
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import Task
@@ -68,26 +68,14 @@ class Simulation:
 
 
 def check_env_memory(task: Task, robot: Robot, *, scan: bool, ngeom: int) -> None:
-    """Raise MemoryLimitError, with a number of environments that fits, unless the task's do."""
-    per_env = bytes_per_env(task, robot, scan=scan, ngeom=ngeom)
-    num_envs, message = task.env.num_envs, ""
-    while num_envs:
-        try:
-            check_memory(num_envs * per_env, f"training with {num_envs} environments")
-            break
-        except MemoryLimitError as error:
-            message, num_envs = message or str(error), num_envs // 2
-    if message:
-        raise MemoryLimitError(f"{message}; env.num_envs {num_envs} would fit")
-
-
-def bytes_per_env(task: Task, robot: Robot, *, scan: bool, ngeom: int) -> int:
-    """Estimate the memory that training takes for each environment, within a factor of two."""
+    """Raise MemoryLimitError if training needs more memory than is free, within a factor of two."""
     joints, steps, policy = len(robot.default_pose), task.runner.num_steps_per_env, task.policy
     points = len(task.terrain.measured_points_x) * len(task.terrain.measured_points_y)
     observations = 45 + 7 * joints + 2 * scan * points
-    hidden = sum(policy.actor_hidden_dims) + sum(policy.critic_hidden_dims)
+    hidden = sum(policy.actor_hidden_dims + policy.critic_hidden_dims)
     samples = steps / task.algorithm.num_mini_batches * (1 + (task.algorithm.symmetry != "none"))
     learning = max(3 * steps * observations, samples * (5 * hidden + 2 * observations))
     floats = (12 + steps) * observations + 3 * steps * joints + learning
-    return round(4 * floats + 8 * (100 + 60 * joints + 3 * ngeom))
+    per_env, num_envs = 4 * floats + 8 * (100 + 60 * joints + 3 * ngeom), task.env.num_envs
+    what = f"training with env.num_envs {num_envs}, {per_env / 1e6:.2g} MB each,"
+    check_memory(round(num_envs * per_env), what)

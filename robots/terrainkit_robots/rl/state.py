@@ -14,10 +14,12 @@ from terrainkit_robots.rl.terminations import (
     terrain_out_of_bounds,
 )
 from terrainkit_robots.rl.terrain import Terrain
-from terrainkit_robots.transforms import projected_gravity, quat_rotate_inverse, quat_to_yaw
-
-FloatArray = NDArray[np.float32]
-BoolArray = NDArray[np.bool_]
+from terrainkit_robots.transforms import (
+    FloatArray,
+    projected_gravity,
+    quat_rotate_inverse,
+    quat_to_yaw,
+)
 
 CONTACT_FORCE = 1.0
 """Vertical force from which a foot is in contact [N], as in legged_gym."""
@@ -56,7 +58,7 @@ class State:
     """Velocity of the feet, world frame [m/s], shape (n, f, 3)."""
     foot_force: FloatArray
     """Contact force on the feet, world frame [N], shape (n, f, 3)."""
-    first_contact: BoolArray
+    first_contact: NDArray[np.bool_]
     """Feet that touched down in this step, shape (n, f)."""
     air_time: FloatArray
     """Time since each foot left the ground, up to this step [s], shape (n, f)."""
@@ -64,7 +66,7 @@ class State:
     """Magnitude of the force on each penalized body [N], shape (n, p)."""
     height_scan: FloatArray
     """Height of the base above each scan point [m], shape (n, k); k = 0 without a scan."""
-    fallen: BoolArray
+    fallen: NDArray[np.bool_]
     """Robots whose episode ends with a fall, shape (n,)."""
     actions: FloatArray
     """Actions of this step, shape (n, j)."""

@@ -9,7 +9,6 @@ Symmetric Robot Policies, 2024.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import torch
@@ -18,11 +17,10 @@ from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.spec.robot_spec import MirrorJoint, RobotSpec
+from terrainkit_robots.transforms import FloatArray
 
 if TYPE_CHECKING:
     from terrainkit_robots.rl.env import LeggedEnv
-
-FloatArray = NDArray[np.float32]
 
 TOLERANCE = 1e-3
 """Allowed difference between left and right: default pose [rad], scan points [m], and action
@@ -56,35 +54,31 @@ def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
     """
     joints, cfg = _joint_map(env.robot.spec), env.cfg.terrain
     _check_control(env, joints)
-    signs = {"vector": [1, -1, 1], "axial": [-1, 1, -1], "command": [1, -1, -1]}
+    maps = {
+        "vector": _map(range(3), [1, -1, 1]),
+        "axial": _map(range(3), [-1, 1, -1]),
+        "command": _map(range(3), [1, -1, -1]),
+        "joints": joints,
+        "feet": _foot_map(env, joints),
+    }
     groups = {}
     for name, group in env.obs_groups.items():
-        index, sign, start = [], [], 0
+        parts, start = [], 0
         for term in group:
             width = term.function(env.state).shape[1]
-            if term.symmetry == "scalar":
-                part = _map(range(width), np.ones(width))
-            elif term.symmetry == "scan":
-                part = _scan_map(cfg.measured_points_x, cfg.measured_points_y)
-            elif term.symmetry == "feet":
-                part = _foot_map(env)
-            elif term.symmetry == "joints":
-                part = joints
-            else:
-                part = _map(range(3), signs[term.symmetry])
+            maps["scalar"] = _map(range(width), np.ones(width))
+            if term.symmetry == "scan":
+                maps["scan"] = _scan_map(cfg.measured_points_x, cfg.measured_points_y)
+            part = maps[term.symmetry]
             if len(part.index) != width:
                 raise ConfigError(
                     f"observation {term.name}: got {width} numbers; the symmetry "
                     f"{term.symmetry!r} expects {len(part.index)}"
                 )
-            index.append(part.index + start)
-            sign.append(part.sign)
+            parts.append((part.index + start, part.sign))
             start += width
-        groups[name] = _map(np.concatenate(index), np.concatenate(sign))
+        groups[name] = _map(*map(np.concatenate, zip(*parts, strict=True)))
     return MirrorMaps(groups, joints)
-
-
-_cache: "WeakKeyDictionary[LeggedEnv, MirrorMaps]" = WeakKeyDictionary()
 
 
 def augment(
@@ -94,9 +88,7 @@ def augment(
 
     This is rsl-rl's `data_augmentation_func`; either argument may be None.
     """
-    if env not in _cache:
-        _cache[env] = mirror_maps(env)
-    maps = _cache[env]
+    maps = env.mirror_maps
 
     def doubled(values: torch.Tensor, image: SignedPermutation) -> torch.Tensor:
         index, sign = (torch.from_numpy(each).to(values.device) for each in vars(image).values())
@@ -121,17 +113,13 @@ def _map(index: Sequence[int] | NDArray[np.int64], sign: ArrayLike) -> SignedPer
 def _joint_map(spec: RobotSpec) -> SignedPermutation:
     """Return the map of one number per joint."""
     names, mirror = list(spec.joint_order), spec.mirror
-    if missing := [name for name in names if name not in mirror]:
-        raise ConfigError(
-            f"mirror of {spec.name}: symmetry needs a pair for each joint; it has none for: "
-            f"{listing(missing)}"
-        )
     for name in names:
-        pair = mirror[name]
-        if pair.joint not in names or mirror[pair.joint] != MirrorJoint(joint=name, sign=pair.sign):
+        pair = mirror.get(name, MirrorJoint(joint="nothing", sign=1))
+        image = MirrorJoint(joint=name, sign=pair.sign)
+        if pair.joint not in names or mirror.get(pair.joint) != image:
             raise ConfigError(
-                f"mirror of {spec.name}: {name} is paired with {pair.joint!r}, which is not a "
-                f"joint that is paired with {name} with the sign {pair.sign}"
+                f"mirror of {spec.name}: {name} is paired with {pair.joint}; symmetry expects "
+                f"a joint that is paired with {name} with the same sign"
             )
     return _map([names.index(mirror[n].joint) for n in names], [mirror[n].sign for n in names])
 
@@ -145,7 +133,7 @@ def _check_control(env: "LeggedEnv", joints: SignedPermutation) -> None:
         "damping": -model.actuator_biasprm[:, 2],
         "effort": model.actuator_forcerange[:, 1],
     }
-    checks = [("default_pose", pose, joints(pose[None])[0], np.full(len(pose), TOLERANCE))]
+    checks = [("default_pose", pose, joints(pose[None])[0], TOLERANCE)]
     checks += [(t, own, own[joints.index], TOLERANCE * np.abs(own)) for t, own in tables.items()]
     for table, own, mirrored, tolerance in checks:
         for k in np.flatnonzero(np.abs(own - mirrored) > tolerance):
@@ -155,27 +143,27 @@ def _check_control(env: "LeggedEnv", joints: SignedPermutation) -> None:
             )
 
 
-def _foot_map(env: "LeggedEnv") -> SignedPermutation:
+def _foot_map(env: "LeggedEnv", joints: SignedPermutation) -> SignedPermutation:
     """Return the map of one vector per foot: feet are paired as the joints above them are."""
-    spec, model = env.robot.spec, env.scene.model
-    chains = []
+    spec, model, above = env.robot.spec, env.scene.model, []
+    dofs = env.scene.joint_qvel.tolist()
     for foot in spec.feet:
-        chain, body = set(), model.body(foot)
-        while body.id not in (0, env.scene.base):
-            chain |= {model.joint(body.jntadr[0] + k).name for k in range(body.jntnum[0])}
-            body = model.body(body.parentid[0])
-        chains.append(chain & set(spec.joint_order))
+        body = model.body_weldid[model.body(foot).id]
+        dof = model.body_dofadr[body] + model.body_dofnum[body] - 1
+        while dof >= 0 and dof not in dofs:
+            dof = model.dof_parentid[dof]
+        above.append(dofs.index(dof) if dof >= 0 else -1)
     index = []
-    for foot, chain in zip(spec.feet, chains, strict=True):
-        image = {spec.mirror[name].joint for name in chain}
-        found = [k for k, other in enumerate(chains) if other == image]
+    for foot, joint in zip(spec.feet, above, strict=True):
+        image = joints.index[joint] if joint >= 0 else -1
+        found = np.flatnonzero(np.array(above) == image)
         if len(found) != 1:
             raise ConfigError(
                 f"symmetry: the foot {foot} of {spec.name} has {len(found)} mirror images; "
                 f"expected 1 of: {listing(spec.feet)}"
             )
         index += [3 * found[0] + axis for axis in range(3)]
-    return _map(index, [1, -1, 1] * len(chains))
+    return _map(index, [1, -1, 1] * len(above))
 
 
 def _scan_map(x: Sequence[float], y: Sequence[float]) -> SignedPermutation:

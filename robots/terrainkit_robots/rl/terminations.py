@@ -5,8 +5,7 @@ from numpy.typing import NDArray
 
 from terrainkit_robots.rl.config import Termination
 from terrainkit_robots.rl.terrain import Terrain
-
-FloatArray = NDArray[np.float32]
+from terrainkit_robots.transforms import FloatArray
 
 
 def illegal_contact(force: FloatArray, cfg: Termination) -> NDArray[np.bool_]:

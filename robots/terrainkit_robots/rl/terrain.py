@@ -13,11 +13,11 @@ from terrainkit.errors import ConfigError
 from terrainkit.surface import HeightfieldSurface
 from terrainkit.text import closest
 from terrainkit_robots.simulation.geoms import measure_surface
+from terrainkit_robots.transforms import FloatArray
 
 if TYPE_CHECKING:
     from terrainkit.terrain_map import TerrainMap
 
-FloatArray = NDArray[np.float32]
 Collision = Literal["auto", "hfield", "boxes", "plane"]
 
 

@@ -12,7 +12,7 @@ from terrainkit_robots.rl.config import DomainRand, Env, Runner, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.events import RandomizedParams
 from terrainkit_robots.rl.scene import build_scene
-from terrainkit_robots.rl.simulation import Simulation, bytes_per_env, check_env_memory
+from terrainkit_robots.rl.simulation import Simulation, check_env_memory
 from terrainkit_robots.rl.terrain import MapTerrain, Plane
 
 
@@ -281,7 +281,7 @@ print((peaks[1] - peaks[0]) / (many - few))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads the peak memory from /proc")
-def test_memory_estimate_matches_measurement(quadruped):
+def test_memory_estimate_matches_measurement(quadruped, monkeypatch):
     run = subprocess.run(
         [sys.executable, "-c", MEASURED],
         env={"PYTHONPATH": ":".join(filter(None, sys.path)), "OMP_NUM_THREADS": "1"},
@@ -290,15 +290,19 @@ def test_memory_estimate_matches_measurement(quadruped):
         timeout=120,
         check=True,
     )
-    measured, task = float(run.stdout), Task(runner=Runner(num_steps_per_env=12))
-    assert 0.7 < bytes_per_env(task, quadruped, scan=True, ngeom=50) / measured < 2.0
+    needed = []
+    monkeypatch.setattr(
+        "terrainkit_robots.rl.simulation.check_memory", lambda each, _: needed.append(each)
+    )
+    task = Task(env=Env(num_envs=1000), runner=Runner(num_steps_per_env=12))
+    check_env_memory(task, quadruped, scan=True, ngeom=50)
+    assert 0.7 < needed[0] / 1000 / float(run.stdout) < 2.0
 
 
-def test_check_memory_names_what_fits(quadruped, monkeypatch):
+def test_check_env_memory_names_the_setting(quadruped, monkeypatch):
     monkeypatch.setattr("terrainkit.memory._free_memory", lambda: 1 << 30)
     task = Task(env=Env(num_envs=40_000))
-    with pytest.raises(
-        MemoryLimitError, match=r"with 40000 environments needs .*; env\.num_envs 5000 would fit"
-    ):
+    message = r"training with env\.num_envs 40000, 0\.\d+ MB each, needs .* GB of memory"
+    with pytest.raises(MemoryLimitError, match=message):
         check_env_memory(task, quadruped, scan=False, ngeom=50)
     check_env_memory(Task(env=Env(num_envs=5000)), quadruped, scan=False, ngeom=50)

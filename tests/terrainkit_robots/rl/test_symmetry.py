@@ -273,7 +273,7 @@ class TestErrors:
         robot = robot_named("quadruped")
         mirror = {k: v for k, v in robot.spec.mirror.items() if k != "FL_hip_joint"}
         env = make_env("", robot=replace(robot, spec=replace(robot.spec, mirror=mirror)))
-        with pytest.raises(ConfigError, match=r"needs a pair for each joint.*FL_hip_joint"):
+        with pytest.raises(ConfigError, match="FL_hip_joint is paired with nothing"):
             mirror_maps(env)
 
     def test_inconsistent_pair_is_rejected(self) -> None:
@@ -282,7 +282,7 @@ class TestErrors:
             "FL_hip_joint": MirrorJoint(joint="RR_hip_joint", sign=-1)
         }
         env = make_env("", robot=replace(robot, spec=replace(robot.spec, mirror=mirror)))
-        with pytest.raises(ConfigError, match="FL_hip_joint is paired with 'RR_hip_joint'"):
+        with pytest.raises(ConfigError, match="FL_hip_joint is paired with RR_hip_joint"):
             mirror_maps(env)
 
     def test_asymmetric_default_pose_is_rejected(self) -> None:
