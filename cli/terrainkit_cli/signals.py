@@ -4,6 +4,7 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 REPEAT_TIME = 1.0
 """Signals within this time of the first count as one [s]: torchrun and schedulers repeat them."""
@@ -45,7 +46,7 @@ def stop_on_signals() -> Iterator[Callable[[], int]]:
     SIGTERM or SIGHUP then only sets the returned value. A second one raises KeyboardInterrupt.
     """
     received: list[tuple[int, float]] = []
-    previous = {}
+    previous: dict[int, Any] = {}
 
     def handle(number: int, _: object) -> None:
         if received and time.monotonic() - received[0][1] >= REPEAT_TIME:

@@ -28,5 +28,5 @@ def bundle_policy(run: runs.Run, folder: Path) -> runs.Run:
     state = runs.policy_state(runs.read_checkpoint(run.checkpoint))
     files = {name: (run.folder / name).read_bytes() for name in names}
     runs.write_run_folder(folder, files | {runs.RUN_FILE: info.to_toml().encode()})
-    runs.save_checkpoint(folder / runs.checkpoint_name(state["iteration"]), state)
+    runs.save_checkpoint(folder / f"model_{state['iteration']}.pt", state)
     return runs.open_run(folder)

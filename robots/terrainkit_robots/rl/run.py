@@ -86,11 +86,6 @@ class Run:
     """The selected checkpoint, by default the last; None if there is none."""
 
 
-def checkpoint_name(iteration: int) -> str:
-    """Return the file name of a checkpoint."""
-    return f"model_{iteration}.pt"
-
-
 def checkpoints(folder: Path) -> dict[int, Path]:
     """Return the checkpoints in a folder by iteration, in order."""
     paths = folder.glob("model_*.pt")
@@ -106,17 +101,6 @@ def default_folder(robot: str) -> Path:
     return parent / free_name(datetime.now().strftime("%Y-%m-%d_%H-%M-%S"), existing)
 
 
-def resolve_terrain(terrain: str | Path) -> str:
-    """Return the terrain as a run records it: `plane`, or an absolute path."""
-    return "plane" if str(terrain) == "plane" else str(Path(terrain).resolve())
-
-
-def resolve_robot(robot: str | Path) -> str:
-    """Return the robot as a run records it: a registered name, or its folder's absolute path."""
-    found = tasks.get_task(robot)
-    return str(robot) if str(robot) in tasks.task_names() else str(found.folder.resolve())
-
-
 def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | Path) -> Run:
     """Create the folder of a new run; `robot_name` is a task's name or an onboarded folder.
 
@@ -124,12 +108,13 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
         ConfigError: If there is no such robot, or the terrain's file cannot be read.
         ExportError: If the folder is not empty, or cannot be written.
     """
-    robot_folder, source = tasks.get_task(robot_name).folder, resolve_terrain(terrain)
+    robot, source = _sources(robot_name, terrain)
+    robot_folder, content = tasks.get_task(robot_name).folder, _terrain_content(source)
     packages = ("terrainkit", "mujoco", "rsl-rl-lib", "torch")
     info = RunInfo(
-        robot=resolve_robot(robot_name),
+        robot=robot,
         terrain=source,
-        terrain_sha256=_sha256(Path(source)) if source.endswith(".xml") else None,
+        terrain_sha256=content if isinstance(content, str) else None,
         seed=task.runner.seed,
         started=datetime.now().astimezone().isoformat(timespec="seconds"),
         versions={name: version(name) for name in packages},
@@ -140,8 +125,8 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
         TASK_FILE: task.to_toml(),
         SPEC_FILE: read_text(robot_folder / SPEC_FILE),
     }
-    if (config := _map_config(source)) is not None:
-        files[MAP_FILE] = config.to_toml()
+    if content is not None and not isinstance(content, str):
+        files[MAP_FILE] = content.to_toml()
     write_run_folder(folder, {name: text.encode() for name, text in files.items()})
     return open_run(folder)
 
@@ -179,7 +164,8 @@ def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
     if terrain != "plane":
         # A map whose file is missing is generated again from its config.
         file, config = folder / terrain, folder / MAP_FILE
-        terrain = resolve_terrain(config if config.is_file() and not file.is_file() else file)
+        used = config if config.is_file() and not file.is_file() else file
+        terrain = str(used.resolve())
     saved = checkpoints(folder)
     if checkpoint is not None:
         if checkpoint not in saved:
@@ -243,11 +229,11 @@ def changed_robot_files(run: Run) -> tuple[str, ...]:
 
 def is_same_terrain(run: Run, terrain: str | Path) -> bool:
     """Return whether a terrain is the run's; maps with the same config are the same."""
-    source, config = resolve_terrain(terrain), run.folder / MAP_FILE
+    _, source = _sources(run.info.robot, terrain)
+    content, config = _terrain_content(source), run.folder / MAP_FILE
     if config.is_file():
-        return _map_config(source) == _map_config(str(config))
-    recorded = run.info.terrain_sha256
-    return source == run.terrain and recorded in (None, recorded and _sha256(Path(source)))
+        return content == _terrain_content(str(config))
+    return source == run.terrain and run.info.terrain_sha256 in (None, content)
 
 
 def can_continue(run: Run, robot: str | Path, terrain: str | Path, task: Task) -> bool:
@@ -258,10 +244,9 @@ def can_continue(run: Run, robot: str | Path, terrain: str | Path, task: Task) -
     """
     num_envs, num_threads = run.task.env.num_envs, run.task.env.num_threads
     env = replace(task.env, num_envs=num_envs, num_threads=num_threads)
-    if (
-        replace(task, env=env, runner=run.task.runner) != run.task
-        or resolve_terrain(terrain) != run.terrain
-        or resolve_robot(robot) != run.info.robot
+    if replace(task, env=env, runner=run.task.runner) != run.task or _sources(robot, terrain) != (
+        run.info.robot,
+        run.terrain,
     ):
         return False
     if not is_same_terrain(run, terrain):
@@ -386,8 +371,17 @@ def _sha256(path: Path) -> str:
         raise ConfigError(f"cannot read {path}: {error.strerror or error}") from error
 
 
-def _map_config(terrain: str) -> "MapConfig | None":
-    """Return the config of a map; None for another terrain."""
+def _sources(robot: str | Path, terrain: str | Path) -> tuple[str, str]:
+    """Return the robot and the terrain as a run records them: names, or absolute paths."""
+    folder = tasks.get_task(robot).folder
+    return (
+        str(robot) if str(robot) in tasks.task_names() else str(folder.resolve()),
+        "plane" if str(terrain) == "plane" else str(Path(terrain).resolve()),
+    )
+
+
+def _terrain_content(terrain: str) -> "MapConfig | str | None":
+    """Return what two equal terrains share: a map's config, or the digest of a model."""
     if terrain.endswith(".toml"):
         from terrainkit.config import MapConfig
 
@@ -396,4 +390,4 @@ def _map_config(terrain: str) -> "MapConfig | None":
         from terrainkit.terrain_map import TerrainMap
 
         return TerrainMap.load(terrain).config
-    return None
+    return _sha256(Path(terrain)) if terrain.endswith(".xml") else None

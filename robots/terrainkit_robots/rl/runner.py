@@ -21,7 +21,7 @@ from rsl_rl.utils.logger import Logger
 from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.run import checkpoint_name, read_checkpoint, save_checkpoint
+from terrainkit_robots.rl.run import read_checkpoint, save_checkpoint
 
 OBS_GROUPS = {"actor": ["policy"], "critic": ["privileged"]}
 """Observation groups of each network."""
@@ -188,7 +188,7 @@ class LeggedRunner(OnPolicyRunner):
         """Write a checkpoint, by default to the folder; every process must call this."""
         state = self.state_dict() | (infos or {})
         if path is None and self.folder is not None:
-            path = self.folder / checkpoint_name(self.current_learning_iteration)
+            path = self.folder / f"model_{self.current_learning_iteration}.pt"
         if path is not None and self.is_main_process:
             save_checkpoint(Path(path), state)
             self.logger.save_model(str(path), self.current_learning_iteration)
@@ -225,10 +225,10 @@ class LeggedRunner(OnPolicyRunner):
             if len(processes) != self.gpu_world_size:  # those that share a state sample differently
                 seed = [self.env.cfg.runner.seed, state["iteration"]]
                 self.env.rng = np.random.default_rng(seed)
-                return {}
-            torch.set_rng_state(process["random"]["cpu"])
-            if self.device != "cpu" and "cuda" in process["random"]:
-                torch.cuda.set_rng_state(process["random"]["cuda"], self.device)
+            else:
+                torch.set_rng_state(process["random"]["cpu"])
+                if self.device != "cpu" and "cuda" in process["random"]:
+                    torch.cuda.set_rng_state(process["random"]["cuda"], self.device)
         return {}
 
     def state_dict(self) -> dict[str, Any]:
@@ -272,10 +272,10 @@ class LeggedRunner(OnPolicyRunner):
         pace = (time.perf_counter() - self._start_time) / (self._completed - self._first)
         lengths = [self.env.cfg.dt * steps for steps in logger.lenbuffer]
 
-        def means(prefix: str) -> dict[str, float]:
-            found = {k: mean for k, mean in logger.means.items() if k.startswith(prefix)}
-            return {key.removeprefix(prefix): mean for key, mean in found.items()}
-
+        rewards, levels, success = (
+            {k.removeprefix(p): mean for k, mean in logger.means.items() if k.startswith(p)}
+            for p in ("Episode/rew_", "Curriculum/level_", "Curriculum/success_")
+        )
         return TrainingProgress(
             folder=self.folder,
             iteration=self._completed,
@@ -286,40 +286,35 @@ class LeggedRunner(OnPolicyRunner):
             reward=statistics.mean(logger.rewbuffer) if lengths else None,
             episode_length=statistics.mean(lengths) if lengths else None,
             noise_std=self.alg.get_policy().output_std.detach().mean().item(),
-            rewards=means("Episode/rew_"),
-            levels=means("Curriculum/level_"),
-            success=means("Curriculum/success_"),
+            rewards=rewards,
+            levels=levels,
+            success=success,
         )
 
     def _configure_multi_gpu(self) -> None:
         """Join torchrun's other processes; on CPUs with gloo, which rsl-rl does not support."""
-        if int(os.environ.get("WORLD_SIZE", "1")) == 1 or self.device != "cpu":
+        if self.device != "cpu" or os.environ.get("WORLD_SIZE", "1") == "1":
             super()._configure_multi_gpu()
             return
         torch.distributed.init_process_group("gloo")
-        names = ("RANK", "LOCAL_RANK", "WORLD_SIZE")
-        rank, local_rank, world_size = (int(os.environ[name]) for name in names)
-        self.is_distributed, self.gpu_world_size = True, world_size
-        self.gpu_global_rank, self.gpu_local_rank = rank, local_rank
-        ranks = {"global_rank": rank, "local_rank": local_rank}
-        self.cfg["multi_gpu"] = {**ranks, "world_size": world_size}
+        self.is_distributed, self.gpu_world_size = True, torch.distributed.get_world_size()
+        self.gpu_global_rank = torch.distributed.get_rank()
+        self.gpu_local_rank = int(os.environ["LOCAL_RANK"])
+        ranks = {"global_rank": self.gpu_global_rank, "local_rank": self.gpu_local_rank}
+        self.cfg["multi_gpu"] = {**ranks, "world_size": self.gpu_world_size}
 
 
 def runner_config(task: Task) -> dict[str, Any]:
     """Return the configuration of rsl-rl's runner."""
     policy, runner, algorithm = task.policy, task.runner, dict(vars(task.algorithm))
-    symmetry, coefficient = algorithm.pop("symmetry"), algorithm.pop("mirror_loss_coeff")
+    symmetry = algorithm.pop("symmetry")
     symmetry_cfg = {
         "data_augmentation_func": "terrainkit_robots.rl.symmetry:augment",
         "use_data_augmentation": symmetry == "augmentation",
         "use_mirror_loss": symmetry == "loss",
-        "mirror_loss_coeff": coefficient,
+        "mirror_loss_coeff": algorithm.pop("mirror_loss_coeff"),
     }
-    distribution = {
-        "class_name": "GaussianDistribution",
-        "init_std": policy.init_noise_std,
-        "std_type": "scalar",
-    }
+    distribution = {"class_name": "GaussianDistribution", "init_std": policy.init_noise_std}
     network = {
         "class_name": "MLPModel",
         "activation": policy.activation,

@@ -21,7 +21,6 @@ from terrainkit_robots.rl.run import (
     RUN_FILE,
     TASK_FILE,
     changed_robot_files,
-    checkpoint_name,
     checkpoints,
     create_run,
     default_folder,
@@ -135,7 +134,7 @@ def test_checkpoints_are_ordered_by_iteration(run):
         (run / name).touch()
     assert list(checkpoints(run)) == [9, 10, 100]
     assert open_run(run).checkpoint == run / "model_100.pt"
-    assert open_run(run, 9).checkpoint == run / checkpoint_name(9)
+    assert open_run(run, 9).checkpoint == run / "model_9.pt"
     assert open_run(run / "model_10.pt").checkpoint == run / "model_10.pt"
     with pytest.raises(ConfigError, match="got checkpoint 11; expected one of: 9, 10, 100"):
         open_run(run, 11)
