@@ -74,15 +74,11 @@ class LeggedEnv(VecEnv):
 
         # A motor receives offset + scale * action.
         kind, scale = task.control.control_type, task.control.action_scale
-        stiff = np.array(list(robot.spec.per_joint("stiffness").values())) > 0
-        if task.control.stiffness is not None:
-            stiff &= task.control.stiffness > 0
-        self.is_position_controlled = positional = stiff & (kind == "P")
-        spec_scale = np.array(list(robot.spec.per_joint("action_scale").values()))
-        default = {"P": spec_scale, "V": robot.velocity, "T": robot.effort}[kind]
-        scales = default if scale is None else np.full(joints, scale)
-        self.action_scale = scales.astype(np.float32)
-        self.action_offset = np.where(positional, robot.default_pose, np.float32(0))
+        positions = list(robot.spec.per_joint("action_scale").values())
+        default = {"P": positions, "V": robot.velocity, "T": robot.effort}[kind]
+        self.action_scale = np.full(joints, default if scale is None else scale, np.float32)
+        self.is_position_controlled = self.scene.model.actuator_biasprm[:, 1] != 0
+        self.action_offset = np.where(self.is_position_controlled, robot.default_pose, 0)
         self.reset()
 
     @property
@@ -299,9 +295,7 @@ class LeggedEnv(VecEnv):
             self.reset()
             return
         wrong = [name for name in vars(self.state) if name not in state["state"]]
-        for name, array in arrays.items():
-            if name not in saved or tuple(saved[name].shape) != array.shape:
-                wrong.append(name)
+        wrong += [k for k, a in arrays.items() if k not in saved or saved[k].shape != a.shape]
         if wrong:
             raise ConfigError(
                 f"the checkpoint's {wrong[0]} belongs to another robot, task or version of "
