@@ -45,6 +45,33 @@ def atomic_write(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
         raise ExportError(f"cannot write {path}: {error.strerror or error}") from error
 
 
+@contextmanager
+def atomic_folder(path: Path) -> Iterator[Path]:
+    """Yield an empty folder, and move it to `path` when the block ends, replacing a folder there.
+
+    If the block raises, nothing changes.
+
+    Raises:
+        ExportError: if the folder cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with temporary_folder(path.parent) as work:
+            folder, old = work / path.name, work / f"{path.name}.old"
+            folder.mkdir()
+            yield folder
+            if path.is_dir():
+                path.replace(old)
+            try:
+                folder.replace(path)
+            except OSError:
+                if old.is_dir():
+                    old.replace(path)
+                raise
+    except OSError as error:
+        raise ExportError(f"cannot write {path}: {error.strerror or error}") from error
+
+
 def check_target(path: Path, *, overwrite: bool) -> None:
     """Raise ExportError if `path` cannot be written, or exists and may not be replaced."""
     try:

@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-from terrainkit_cli import parse, render
+from terrainkit_cli import parse, render, signals
 
 COMMAND_GROUPS = {
     "Terrain": {
@@ -49,7 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if "MUJOCO_GL" in os.environ:
         os.environ["TERRAINKIT_MUJOCO_GL"] = os.environ.pop("MUJOCO_GL")
     warnings.showwarning = render.show_warning
-    _handle_signals()
+    signals.raise_on_signals()
     from terrainkit.errors import TerrainkitError
 
     try:
@@ -72,7 +72,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         render.error("interrupted")
         return 128 + signal.SIGINT
-    except Terminated as end:
+    except signals.Terminated as end:
         render.error(f"ended by {end.signal.name}")
         return 128 + end.signal
 
@@ -82,29 +82,6 @@ def _open_closed_streams() -> None:
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, Path(os.devnull).open(mode))  # noqa: SIM115
-
-
-class Terminated(BaseException):
-    """A scheduler or a closed terminal ends the process; temporary files are removed."""
-
-    def __init__(self, number: int) -> None:
-        super().__init__(number)
-        self.signal = signal.Signals(number)
-
-
-def _handle_signals() -> None:
-    """Raise Terminated on SIGTERM and SIGHUP."""
-    numbers = [signal.SIGTERM]
-    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
-        numbers.append(signal.SIGHUP)
-
-    def terminate(number: int, _: object) -> None:
-        for each in numbers:  # a second signal would interrupt the cleanup
-            signal.signal(each, lambda *_: None)
-        raise Terminated(number)
-
-    for number in numbers:
-        signal.signal(number, terminate)
 
 
 def _run(arguments: list[str]) -> int:

@@ -11,6 +11,7 @@ from terrainkit.errors import ConfigError
 from terrainkit_cli import render
 from terrainkit_cli.config_options import TaskCommand
 from terrainkit_cli.robot_options import text_option
+from terrainkit_cli.signals import stop_on_signals
 from terrainkit_cli.training_extra import require_training
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ class Train(TaskCommand):
 
         run = self._resume_run
         robot, terrain, task = self._robot(run), self._terrain(run), self.changed_config()
-        with render.training() as show_progress:
+        with stop_on_signals() as stop_signal, render.training() as show_progress:
             result = train(
                 robot,
                 terrain,
@@ -78,9 +79,11 @@ class Train(TaskCommand):
                 resume=run,
                 device=self.device,
                 progress_callback=show_progress,
+                should_stop=stop_signal,
             )
+            number = stop_signal() if result.iteration < task.runner.max_iterations else 0
         _print_result(result, task)
-        return 128 + result.signal if result.signal else 0
+        return 128 + number if number else 0
 
     @cached_property  # read once: training may write a checkpoint in between
     def _resume_run(self) -> "Run | None":

@@ -7,7 +7,7 @@ import resource
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError
-from terrainkit_cli import render
+from terrainkit_cli import render, signals
 from terrainkit_cli.main import main
 from terrainkit_cli.training_extra import require_training
 from terrainkit_robots.rl.run import checkpoints, open_run
@@ -84,20 +84,50 @@ def test_train_resumes_a_run(train, tmp_path, capsys):
     assert capsys.readouterr().err.endswith("than the 2 iterations that are completed\n")
 
 
+@pytest.fixture
+def interrupt(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Return a function that makes training raise signals in an iteration."""
+
+    def interrupt_in(iteration: int, *numbers: signal.Signals) -> None:
+        def show(progress: TrainingProgress) -> None:
+            for number in numbers if progress.iteration == iteration else ():
+                signal.raise_signal(number)
+
+        monkeypatch.setattr(render, "training", lambda: nullcontext(show))
+
+    return interrupt_in
+
+
 @pytest.mark.parametrize(
     ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
 )
-def test_train_interrupt_saves_checkpoint(train, tmp_path, capsys, monkeypatch, number, code):
-    @contextmanager
-    def interrupting():
-        yield lambda progress: signal.raise_signal(number) if progress.iteration == 2 else None
-
-    monkeypatch.setattr(render, "training", interrupting)
+def test_train_interrupt_saves_checkpoint(train, tmp_path, capsys, interrupt, number, code):
+    interrupt(2, number)
+    before = signal.getsignal(signal.SIGINT)
     assert train("quadruped", "--num-envs", 4, "--max-iterations", 9, "--log-dir", "my run") == code
+    assert signal.getsignal(signal.SIGINT) == before
     assert list(checkpoints(tmp_path / "my run")) == [2]
     assert capsys.readouterr().out == (
         "stopped after 2 of 9 iterations: 'my run'\ncontinue: terrainkit train --resume 'my run'\n"
     )
+
+
+def test_train_ignores_signal_in_last_iteration(train, interrupt):
+    interrupt(2, signal.SIGTERM)
+    assert train("quadruped", "--num-envs", 4, "--max-iterations", 2) == 0
+
+
+def test_train_counts_repeated_signal_once(train, tmp_path, interrupt):
+    interrupt(2, signal.SIGINT, signal.SIGTERM)
+    assert train("quadruped", "--num-envs", 4, "--max-iterations", 9, "--log-dir", "run") == 130
+    assert list(checkpoints(tmp_path / "run")) == [2]
+
+
+def test_train_second_signal_ends_at_once(train, tmp_path, interrupt, monkeypatch):
+    monkeypatch.setattr(signals, "REPEAT_TIME", 0.0)
+    interrupt(1, signal.SIGINT, signal.SIGINT)
+    assert train("quadruped", "--num-envs", 4, "--max-iterations", 9, "--log-dir", "run") == 130
+    assert checkpoints(tmp_path / "run") == {}
 
 
 def test_train_full_disk_is_one_line(train, tmp_path, capsys):
@@ -214,9 +244,7 @@ PROGRESS = TrainingProgress(
 def test_training_progress_lines_are_sparse(capsys):
     with render.training() as watch:
         for iteration in range(1, 24):
-            watch(
-                TrainingProgress(**{**vars(PROGRESS), "iteration": iteration, "max_iterations": 23})
-            )
+            watch(PROGRESS._replace(iteration=iteration, max_iterations=23))
     out, err = capsys.readouterr()
     assert out == ""
     assert [line.split(":")[0] for line in err.splitlines()] == [
@@ -234,7 +262,7 @@ def test_training_progress_lines_are_sparse(capsys):
 def test_training_reward_lines_are_sparse(capsys):
     with render.training() as watch:
         for iteration in range(1, 101):
-            watch(TrainingProgress(**{**vars(PROGRESS), "iteration": iteration}))
+            watch(PROGRESS._replace(iteration=iteration))
     terms = [line for line in capsys.readouterr().err.splitlines() if "env steps/s" not in line]
     rewards = "success stairs 75%, tracking_lin_vel +0.500 /s, torques -0.062 /s"
     assert terms == [f"iteration 50/400: {rewards}", f"iteration 100/400: {rewards}"]

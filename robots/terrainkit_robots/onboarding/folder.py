@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from terrainkit.atomic_write import temporary_folder
+from terrainkit.atomic_write import atomic_folder
 from terrainkit.errors import ExportError
 from terrainkit_robots.text import free_name, names
 
@@ -103,28 +103,9 @@ def new_folder(target: Path, *, overwrite: bool = False) -> Iterator[Path]:
         ExportError: as `check_folder`, and if the folder cannot be written.
     """
     check_folder(target, overwrite=overwrite)
-    try:
-        # In the same parent folder, so that the final move is a rename on the same disk.
-        with temporary_folder(target.parent) as work:
-            folder = work / target.name
-            folder.mkdir()
-            yield folder
-            check_folder(target, overwrite=overwrite)
-            _replace_folder(target, folder, work / "before")
-    except OSError as error:
-        raise ExportError(f"cannot write {target}: {error.strerror or error}") from error
-
-
-def _replace_folder(target: Path, folder: Path, old: Path) -> None:
-    """Move `target` to `old` if it exists, and `folder` to `target`; both or neither."""
-    if target.is_dir():
-        target.replace(old)
-    try:
-        folder.replace(target)
-    except OSError:
-        if old.is_dir():
-            old.replace(target)
-        raise
+    with atomic_folder(target) as folder:
+        yield folder
+        check_folder(target, overwrite=overwrite)
 
 
 def write_files(folder: Path, files: Mapping[str, bytes]) -> None:

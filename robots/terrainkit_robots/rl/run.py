@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from terrainkit.atomic_write import atomic_write, temporary_folder
+from terrainkit.atomic_write import atomic_folder, atomic_write
 from terrainkit.errors import ConfigError, ExportError, listing
 from terrainkit.schema import Config
 from terrainkit.text import expected_names
@@ -148,22 +148,13 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
 
 def write_run_folder(folder: Path, files: Mapping[str, bytes]) -> None:
     """Write a new folder with some files, completely or not at all."""
-    try:
+    with atomic_folder(folder) as new:
         if folder.is_dir() and any(folder.iterdir()):
             raise ExportError(
                 f"{folder} exists; choose another folder, or continue with --resume {folder}"
             )
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with temporary_folder(folder.parent) as work:
-            made = work / folder.name
-            made.mkdir()
-            for name, data in files.items():
-                (made / name).write_bytes(data)
-            if folder.is_dir():
-                folder.rmdir()
-            made.rename(folder)
-    except OSError as error:
-        raise ExportError(f"cannot write {folder}: {error.strerror or error}") from error
+        for name, data in files.items():
+            (new / name).write_bytes(data)
 
 
 def open_run(name: str | Path, checkpoint: int | None = None) -> Run:

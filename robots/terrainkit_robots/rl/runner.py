@@ -1,17 +1,15 @@
 """The runner: rsl-rl's `OnPolicyRunner` with exact resume, graceful stopping and progress."""
 
 import os
-import signal
 import statistics
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from types import FrameType
-from typing import Any
+from typing import Any, NamedTuple
 
 os.environ.setdefault("GIT_PYTHON_REFRESH", "quiet")  # rsl-rl imports git, which may be missing
 
@@ -32,38 +30,22 @@ LOGGER_STATE = ("tot_timesteps", "tot_time", "rewbuffer", "lenbuffer")
 LOGGER_BUFFERS = ("cur_reward_sum", "cur_episode_length")
 """Attributes of rsl-rl's logger in a checkpoint; the latter have a value per environment."""
 
-SIGNAL_INTERVAL = 1.0
-"""Signals within this time of the first count as one [s]: torchrun and schedulers repeat them."""
 
-
-@dataclass(frozen=True, kw_only=True)
-class TrainingProgress:
+class TrainingProgress(NamedTuple):
     """The progress of training; means are those of the last 100 episodes."""
 
     folder: Path | None
-    """Folder of the run."""
     iteration: int
-    """Completed iterations."""
     max_iterations: int
-    """Iterations after which training ends."""
-    steps_per_second: float
-    """Environment steps per second, learning included [1/s]."""
-    learning_fraction: float
-    """Fraction of the time spent on learning, 0 to 1."""
-    eta: float
-    """Estimated time until training ends [s]."""
-    reward: float | None
-    """Mean sum of rewards of an episode; None before the first has ended."""
-    episode_length: float | None
-    """Mean episode length [s]; None before the first has ended."""
+    steps_per_second: float  # environment steps, learning included
+    learning_fraction: float  # of the time, 0 to 1
+    eta: float  # [s]
+    reward: float | None  # sum of an episode; None before the first has ended
+    episode_length: float | None  # [s]
     noise_std: float
-    """Mean standard deviation of the actions."""
-    rewards: Mapping[str, float]
-    """Mean reward per second of each term."""
-    levels: Mapping[str, float]
-    """Mean level on each terrain; empty on a plane."""
-    success: Mapping[str, float]
-    """Success rate on each terrain, 0 to 1."""
+    rewards: Mapping[str, float]  # of each term [1/s]
+    levels: Mapping[str, float]  # on each terrain; empty on a plane
+    success: Mapping[str, float]  # on each terrain, 0 to 1
 
 
 ProgressCallback = Callable[[TrainingProgress], object]
@@ -391,44 +373,6 @@ def open_checkpoint(
     except (RuntimeError, ValueError, LookupError, TypeError, AttributeError) as error:
         reason = " ".join(str(error).split())[:200]
         raise ConfigError(f"{path} does not fit the networks of its task: {reason}") from error
-
-
-@contextmanager
-def stop_on_signal() -> Iterator[Callable[[], int]]:
-    """Yield a function that returns the signal that requested to stop, or 0.
-
-    The first SIGINT, SIGTERM or SIGHUP lets the iteration finish, so that a checkpoint can be
-    written. A second one raises KeyboardInterrupt.
-    """
-    received: list[tuple[int, float]] = []
-
-    def handle(number: int, _frame: FrameType | None) -> None:
-        if received and time.monotonic() - received[0][1] >= SIGNAL_INTERVAL:
-            raise KeyboardInterrupt
-        received.append((number, time.monotonic()))
-
-    numbers = [signal.SIGINT, signal.SIGTERM]
-    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
-        numbers.append(signal.SIGHUP)
-    if threading.current_thread() is not threading.main_thread():
-        numbers = []  # only the main thread may handle signals
-    previous = {number: signal.signal(number, handle) for number in numbers}
-    try:
-        yield lambda: received[0][0] if received else 0
-    finally:
-        for number, handler in previous.items():
-            signal.signal(number, handler)
-
-
-@contextmanager
-def single_torch_thread() -> Iterator[None]:
-    """Limit torch to one thread, which is fastest for networks as small as these."""
-    previous = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(previous)
 
 
 def resolve_device(name: str) -> str:

@@ -1,6 +1,7 @@
 """Train a policy for a robot on a terrain."""
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -24,8 +25,6 @@ class TrainResult:
     """Folder of the run; None in all processes except the main one."""
     iteration: int
     """Completed iterations."""
-    signal: int
-    """The signal that stopped training early, such as SIGINT; 0 for none."""
 
 
 def train(
@@ -37,8 +36,9 @@ def train(
     resume: runs.Run | None = None,
     device: str = "cpu",
     progress_callback: "ProgressCallback | None" = None,
+    should_stop: Callable[[], object] = lambda: False,
 ) -> TrainResult:
-    """Train a policy, and write checkpoints at intervals, at the end, and when interrupted.
+    """Train a policy, and write checkpoints at intervals, at the end, and when stopped.
 
     Args:
         robot: Name of a registered task, or folder of an onboarded robot.
@@ -51,6 +51,7 @@ def train(
             its terrain levels if the map is the same.
         device: Device of the networks: `cpu`, `cuda`, `cuda:1`. The physics runs on the CPU.
         progress_callback: Called after each iteration.
+        should_stop: Called before each iteration; True stops training with a checkpoint.
 
     Raises:
         ConfigError: If the arguments do not fit together, or training diverges.
@@ -74,41 +75,33 @@ def train(
     torch.set_num_threads(share.env.num_threads)
     torch.manual_seed(share.runner.seed)
     env = LeggedEnv(share, model, load_terrain(terrain, task.terrain.collision), device)
-    with runners.stop_on_signal() as stop_signal:
-        runner = runners.LeggedRunner(
-            env, device=device, progress_callback=progress_callback, should_stop=stop_signal
-        )
-        try:
-            if resume is not None:
-                parts = None if continued else runs.parts_to_load(resume, terrain, task)
-                runner.load(runs.last_checkpoint(resume), parts)
-            completed, total = runner.current_learning_iteration, task.runner.max_iterations
-            if completed >= total:
-                raise ConfigError(
-                    f"runner.max_iterations: got {total}; expected more than the {completed} "
-                    "iterations that are completed"
-                )
-            if runner.is_main_process:
-                runner.folder = runs.run_folder(folder, robot, terrain, task, continued)
-            try:
-                # Resets of a new run would otherwise all time out in the same step.
-                is_new = not env.steps_since_reset.any()
-                runner.learn(total - completed, init_at_random_ep_len=is_new)
-            except (TerrainkitError, OSError) as error:
-                raise _with_last_checkpoint(error, runner.folder) from error
-        finally:
-            if torch.distributed.is_available() and torch.distributed.is_initialized():
-                torch.distributed.destroy_process_group()
-    iteration = runner.current_learning_iteration
-    number = stop_signal() if iteration < total else 0
-    return TrainResult(folder=runner.folder, iteration=iteration, signal=number)
-
-
-def _with_last_checkpoint(error: Exception, folder: Path | None) -> TerrainkitError:
-    """Return the error with the path of the last checkpoint."""
-    saved = runs.checkpoints(folder) if folder else {}
-    hint = f"the last checkpoint is {saved[max(saved)]}" if saved else "there is no checkpoint"
-    if isinstance(error, TerrainkitError):
-        return type(error)(f"{error}; {hint}")
-    reason = error.strerror if isinstance(error, OSError) else None
-    return ExportError(f"cannot write in {folder}: {reason or error}; {hint}")
+    runner = runners.LeggedRunner(
+        env, device=device, progress_callback=progress_callback, should_stop=should_stop
+    )
+    try:
+        if resume is not None:
+            parts = None if continued else runs.parts_to_load(resume, terrain, task)
+            runner.load(runs.last_checkpoint(resume), parts)
+        completed, total = runner.current_learning_iteration, task.runner.max_iterations
+        if completed >= total:
+            raise ConfigError(
+                f"runner.max_iterations: got {total}; expected more than the {completed} "
+                "iterations that are completed"
+            )
+        if runner.is_main_process:
+            runner.folder = runs.run_folder(folder, robot, terrain, task, continued)
+        # Resets of a new run would otherwise all time out in the same step.
+        runner.learn(total - completed, init_at_random_ep_len=not env.steps_since_reset.any())
+    except (TerrainkitError, OSError) as error:
+        if runner.folder is None:
+            raise
+        saved = runs.checkpoints(runner.folder)
+        hint = f"the last checkpoint is {saved[max(saved)]}" if saved else "there is no checkpoint"
+        if isinstance(error, TerrainkitError):
+            raise type(error)(f"{error}; {hint}") from error
+        reason = error.strerror or error
+        raise ExportError(f"cannot write in {runner.folder}: {reason}; {hint}") from error
+    finally:
+        if torch.distributed.is_available() and torch.distributed.is_initialized():
+            torch.distributed.destroy_process_group()
+    return TrainResult(folder=runner.folder, iteration=runner.current_learning_iteration)

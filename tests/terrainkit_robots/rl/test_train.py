@@ -1,7 +1,6 @@
 import os
 import resource
 import shutil
-import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,7 +13,7 @@ import torch
 
 import terrainkit
 from terrainkit.errors import ConfigError, ExportError, MemoryLimitError
-from terrainkit_robots.rl import runner, tasks
+from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Algorithm, Env, Policy, Runner, Task, Terrain
 from terrainkit_robots.rl.run import (
     checkpoints,
@@ -87,7 +86,7 @@ def full_disk(size: int) -> Iterator[None]:
 
 def test_train_writes_a_run(task, tmp_path):
     trained = train("quadruped", "plane", task, folder=tmp_path / "run")
-    assert (trained.folder, trained.iteration, trained.signal) == (tmp_path / "run", 4, 0)
+    assert (trained.folder, trained.iteration) == (tmp_path / "run", 4)
     run = open_run(tmp_path / "run")
     assert run.task == task
     assert run.checkpoint == tmp_path / "run" / "model_4.pt"
@@ -110,55 +109,16 @@ def test_resume_continues_exactly_in_its_folder(task, tmp_path, run_after):
     assert open_run(tmp_path / "run").task == task
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_interrupted_run_resumes_exactly(task, tmp_path, run_after, number):
-    def interrupt(progress: TrainingProgress) -> None:
-        if progress.iteration == 2:
-            signal.raise_signal(number)
-
-    before = [signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)]
+def test_stopped_run_resumes_exactly(task, tmp_path, run_after):
     run_after(4, name="whole")
+    calls = iter([False, False, True])
     stopped = train(
-        "quadruped", "plane", task, folder=tmp_path / "run", progress_callback=interrupt
+        "quadruped", "plane", task, folder=tmp_path / "run", should_stop=lambda: next(calls)
     )
-    assert (stopped.iteration, stopped.signal) == (2, number)
-    assert [signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)] == before
+    assert stopped.iteration == 2
+    assert list(checkpoints(tmp_path / "run")) == [2]
     train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
     assert same_weights(tmp_path / "whole" / "model_4.pt", tmp_path / "run" / "model_4.pt")
-
-
-def test_signal_in_last_iteration_is_ignored(task, tmp_path):
-    def interrupt(progress: TrainingProgress) -> None:
-        if progress.iteration == 4:
-            signal.raise_signal(signal.SIGTERM)
-
-    done = train("quadruped", "plane", task, folder=tmp_path / "run", progress_callback=interrupt)
-    assert (done.iteration, done.signal) == (4, 0)
-
-
-def test_second_signal_raises_keyboard_interrupt(task, tmp_path, monkeypatch):
-    monkeypatch.setattr(runner, "SIGNAL_INTERVAL", 0.0)
-
-    def interrupt(_progress: TrainingProgress) -> None:
-        signal.raise_signal(signal.SIGINT)
-        signal.raise_signal(signal.SIGINT)
-
-    with pytest.raises(KeyboardInterrupt):
-        train("quadruped", "plane", task, folder=tmp_path / "run", progress_callback=interrupt)
-    assert checkpoints(tmp_path / "run") == {}
-
-
-def test_repeated_signal_counts_once(task, tmp_path):
-    def interrupt(progress: TrainingProgress) -> None:
-        if progress.iteration == 2:
-            signal.raise_signal(signal.SIGINT)
-            signal.raise_signal(signal.SIGTERM)
-
-    stopped = train(
-        "quadruped", "plane", task, folder=tmp_path / "run", progress_callback=interrupt
-    )
-    assert (stopped.iteration, stopped.signal) == (2, signal.SIGINT)
-    assert list(checkpoints(tmp_path / "run")) == [2]
 
 
 def test_train_runs_in_a_thread(task, tmp_path):

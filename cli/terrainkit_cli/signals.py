@@ -1,0 +1,65 @@
+"""Signals that end a command, or stop training after the current iteration."""
+
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+REPEAT_TIME = 1.0
+"""Signals within this time of the first count as one [s]: torchrun and schedulers repeat them."""
+
+
+class Terminated(BaseException):
+    """A scheduler or a closed terminal ends the process; temporary files are removed."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.signal = signal.Signals(number)
+
+
+def _termination_signals() -> list[signal.Signals]:
+    numbers = [signal.SIGTERM]
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
+        numbers.append(signal.SIGHUP)
+    return numbers
+
+
+def raise_on_signals() -> None:
+    """Raise Terminated on SIGTERM and SIGHUP."""
+    numbers = _termination_signals()
+
+    def terminate(number: int, _: object) -> None:
+        for each in numbers:  # a second signal would interrupt the cleanup
+            signal.signal(each, lambda *_: None)
+        raise Terminated(number)
+
+    for number in numbers:
+        signal.signal(number, terminate)
+
+
+@contextmanager
+def stop_on_signals() -> Iterator[Callable[[], int]]:
+    """Yield a function that returns the signal that requested to stop, or 0.
+
+    Its first call installs the handlers; before that, a signal ends the command. The first SIGINT,
+    SIGTERM or SIGHUP then only sets the returned value. A second one raises KeyboardInterrupt.
+    """
+    received: list[tuple[int, float]] = []
+    previous = {}
+
+    def handle(number: int, _: object) -> None:
+        if received and time.monotonic() - received[0][1] >= REPEAT_TIME:
+            raise KeyboardInterrupt
+        received.append((number, time.monotonic()))
+
+    def requested() -> int:
+        if not previous:
+            for number in (signal.SIGINT, *_termination_signals()):
+                previous[number] = signal.signal(number, handle)
+        return received[0][0] if received else 0
+
+    try:
+        yield requested
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)
