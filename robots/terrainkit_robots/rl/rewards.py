@@ -177,7 +177,8 @@ def foot_clearance(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
 def stumble(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
     """Penalize a foot whose horizontal force exceeds five times its vertical force."""
     horizontal = np.hypot(state.foot_force[..., 0], state.foot_force[..., 1])
-    return (horizontal > 5 * np.abs(state.foot_force[..., 2])).any(axis=1).astype(np.float32)
+    hit = horizontal > 5 * np.abs(state.foot_force[..., 2])
+    return np.asarray(hit.any(axis=1), np.float32)
 
 
 @reward
@@ -190,5 +191,5 @@ def stand_still(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
 @reward
 def feet_contact_forces(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
     """Penalize contact forces of feet above the limit [N]."""
-    force = np.linalg.norm(state.foot_force, axis=2)
+    force = np.sqrt(np.square(state.foot_force).sum(axis=2))
     return np.maximum(force - np.float32(cfg.max_contact_force), 0).sum(axis=1)
