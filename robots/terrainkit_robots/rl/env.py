@@ -11,7 +11,7 @@ from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots.rl.commands import VelocityCommand, uses_heading
+from terrainkit_robots.rl.commands import VelocityCommand
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.curriculum import TerrainCurriculum
 from terrainkit_robots.rl.events import Pushes, apply_params, sample_params, sample_reset_state
@@ -48,8 +48,10 @@ class LeggedEnv(VecEnv):
         self.sim = Simulation(self.scene, self.num_envs, task.env.num_threads)
         self.rng = np.random.default_rng(task.runner.seed)
         self.sensors = Sensors(self.sim, terrain, task, scan=scan)
+        heading = task.commands.heading_command
+        heading = not terrain.is_flat if heading is None else heading
         self.velocity_command = VelocityCommand(
-            task.commands, self.num_envs, task.dt, heading_command=uses_heading(task, terrain)
+            task.commands, self.num_envs, task.dt, heading_command=heading
         )
         self.pushes = Pushes(task.domain_rand, self.num_envs, task.dt)
         weight = float(self.scene.model.body_subtreemass[self.scene.base] * 9.81)
