@@ -64,12 +64,11 @@ class TerrainCurriculum:
         commanded = np.linalg.norm(self.commanded[env_ids], axis=1)
         crossed = distance > self._terrain.patch_length / 2
         success = crossed | (~fallen & (distance >= commanded / 2))
-        for level, column, succeeded in zip(
-            self.levels[env_ids], self.columns[env_ids], success, strict=True
-        ):
-            rate = self.success[level, column]
+        patches = zip(self.levels[env_ids], self.columns[env_ids], strict=True)
+        for patch, succeeded in zip(patches, success, strict=True):
+            rate = self.success[patch]
             decay = 0.0 if np.isnan(rate) else SUCCESS_DECAY
-            self.success[level, column] = decay * np.nan_to_num(rate) + (1 - decay) * succeeded
+            self.success[patch] = decay * np.nan_to_num(rate) + (1 - decay) * succeeded
         rows = len(self._terrain.env_origins)
         if update_levels and rows > 1:
             self._updates += 1

@@ -309,8 +309,7 @@ class LeggedEnv(VecEnv):
         self.rng.bit_generator.state = state["rng"]
         # Computing the state again would advance the air time and draw noise.
         self.state = State(**{name: each.numpy().copy() for name, each in state["state"].items()})
-        groups = state["observations"]
-        self._observations = TensorDict(groups, batch_size=[self.num_envs]).to(self.device)
+        self._observations = TensorDict(state["observations"], [self.num_envs]).to(self.device)
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         """Return views of the arrays to save, by name."""
