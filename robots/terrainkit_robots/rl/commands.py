@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from terrainkit_robots.rl.config import Commands, Task
+from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.simulation import Ids
-from terrainkit_robots.rl.terrain import Terrain
 from terrainkit_robots.transforms import FloatArray, wrap_to_pi
 
 MIN_TRACKING = 0.8
@@ -12,12 +11,6 @@ MIN_TRACKING = 0.8
 
 RANGE_STEP = 0.1
 """Amount by which the range of the forward speed expands at a time [m/s]."""
-
-
-def uses_heading(task: Task, terrain: Terrain) -> bool:
-    """Return whether commands have a heading; the default is True except on flat ground."""
-    setting = task.commands.heading_command
-    return not terrain.is_flat if setting is None else setting
 
 
 def sample_commands(

@@ -139,10 +139,8 @@ class Commands(Config):
         super().__post_init__()
         low, high = self.lin_vel_x
         if self.curriculum and self.max_curriculum <= min(-low, high):
-            raise ConfigError(
-                f"max_curriculum: got {self.max_curriculum:g}; expected more than lin_vel_x, "
-                f"{low:g} to {high:g}, or no curriculum"
-            )
+            got = f"max_curriculum: got {self.max_curriculum:g}"
+            raise ConfigError(f"{got}; expected more than lin_vel_x, {low:g} to {high:g}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -391,21 +389,16 @@ class Task(Config):
         """Validate the sections, and values that depend on each other."""
         super().__post_init__()
         if self.max_episode_length < 1:
-            raise ConfigError(
-                f"env.episode_length_s: got {self.env.episode_length_s:g}; expected at least one "
-                f"policy step, {self.dt:g} s"
-            )
+            got = f"env.episode_length_s: got {self.env.episode_length_s:g}"
+            raise ConfigError(f"{got}; expected at least one policy step, {self.dt:g} s")
         if self.asset.collisions != "all" and self.rewards.collision:
-            raise ConfigError(
-                f"rewards.collision: got {self.rewards.collision:g}; expected 0 with "
-                f"asset.collisions {self.asset.collisions}, where penalized bodies do not collide"
-            )
+            got = f"rewards.collision: got {self.rewards.collision:g}"
+            raise ConfigError(f"{got}; expected 0 with asset.collisions {self.asset.collisions}")
         samples = self.env.num_envs * self.runner.num_steps_per_env
         if samples < self.algorithm.num_mini_batches:
-            raise ConfigError(
-                f"algorithm.num_mini_batches: got {self.algorithm.num_mini_batches}; expected at "
-                f"most the number of samples, env.num_envs * runner.num_steps_per_env = {samples}"
-            )
+            got = f"algorithm.num_mini_batches: got {self.algorithm.num_mini_batches}"
+            most = f"env.num_envs * runner.num_steps_per_env = {samples}"
+            raise ConfigError(f"{got}; expected at most {most}")
 
     @property
     def dt(self) -> float:

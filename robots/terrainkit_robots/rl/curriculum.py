@@ -64,12 +64,11 @@ class TerrainCurriculum:
         commanded = np.linalg.norm(self.commanded[env_ids], axis=1)
         crossed = distance > self._terrain.patch_length / 2
         success = crossed | (~fallen & (distance >= commanded / 2))
-        for level, column, succeeded in zip(
-            self.levels[env_ids], self.columns[env_ids], success, strict=True
-        ):
-            rate = self.success[level, column]
+        patches = zip(self.levels[env_ids], self.columns[env_ids], strict=True)
+        for patch, succeeded in zip(patches, success, strict=True):
+            rate = self.success[patch]
             decay = 0.0 if np.isnan(rate) else SUCCESS_DECAY
-            self.success[level, column] = decay * np.nan_to_num(rate) + (1 - decay) * succeeded
+            self.success[patch] = decay * np.nan_to_num(rate) + (1 - decay) * succeeded
         rows = len(self._terrain.env_origins)
         if update_levels and rows > 1:
             self._updates += 1
@@ -101,22 +100,15 @@ class TerrainCurriculum:
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything that changes, for a checkpoint."""
-        return {
-            "levels": self.levels.copy(),
-            "columns": self.columns.copy(),
-            "commanded": self.commanded.copy(),
-            "success": self.success.copy(),
-            "updates": self._updates,
-        }
+        names = ("levels", "columns", "commanded", "success")
+        return {name: getattr(self, name).copy() for name in names} | {"updates": self._updates}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Continue from a checkpoint; with another number of robots, keep only their levels."""
         rows, cols = self.success.shape
         if state["success"].shape != self.success.shape:
             got = " x ".join(map(str, state["success"].shape))
-            raise ConfigError(
-                f"the checkpoint's map has {got} patches; this one has {rows} x {cols}"
-            )
+            raise ConfigError(f"checkpoint's map has {got} patches; this one has {rows} x {cols}")
         levels, columns = np.asarray(state["levels"]), np.asarray(state["columns"])
         if ((levels < 0) | (levels >= rows) | (columns < 0) | (columns >= cols)).any():
             raise ConfigError(f"the checkpoint's robots are not on {rows} x {cols} patches")
@@ -126,8 +118,6 @@ class TerrainCurriculum:
             self.levels[:], self.columns[:] = levels, columns
             self.commanded[:] = state["commanded"]
             return
-        for column in np.unique(self.columns):
-            saved = levels[columns == column]
-            if len(saved):
-                mine = self.columns == column
-                self.levels[mine] = np.resize(saved, int(mine.sum()))
+        for column in np.intersect1d(self.columns, columns):
+            own = self.columns == column
+            self.levels[own] = np.resize(levels[columns == column], int(own.sum()))

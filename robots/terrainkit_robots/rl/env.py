@@ -11,7 +11,7 @@ from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots.rl.commands import VelocityCommand, uses_heading
+from terrainkit_robots.rl.commands import VelocityCommand
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.curriculum import TerrainCurriculum
 from terrainkit_robots.rl.events import Pushes, apply_params, sample_params, sample_reset_state
@@ -48,8 +48,10 @@ class LeggedEnv(VecEnv):
         self.sim = Simulation(self.scene, self.num_envs, task.env.num_threads)
         self.rng = np.random.default_rng(task.runner.seed)
         self.sensors = Sensors(self.sim, terrain, task, scan=scan)
+        heading = task.commands.heading_command
+        heading = not terrain.is_flat if heading is None else heading
         self.velocity_command = VelocityCommand(
-            task.commands, self.num_envs, task.dt, heading_command=uses_heading(task, terrain)
+            task.commands, self.num_envs, task.dt, heading_command=heading
         )
         self.pushes = Pushes(task.domain_rand, self.num_envs, task.dt)
         weight = float(self.scene.model.body_subtreemass[self.scene.base] * 9.81)
@@ -74,15 +76,11 @@ class LeggedEnv(VecEnv):
 
         # A motor receives offset + scale * action.
         kind, scale = task.control.control_type, task.control.action_scale
-        stiff = np.array(list(robot.spec.per_joint("stiffness").values())) > 0
-        if task.control.stiffness is not None:
-            stiff &= task.control.stiffness > 0
-        self.is_position_controlled = positional = stiff & (kind == "P")
-        spec_scale = np.array(list(robot.spec.per_joint("action_scale").values()))
-        default = {"P": spec_scale, "V": robot.velocity, "T": robot.effort}[kind]
-        scales = default if scale is None else np.full(joints, scale)
-        self.action_scale = scales.astype(np.float32)
-        self.action_offset = np.where(positional, robot.default_pose, np.float32(0))
+        positions = list(robot.spec.per_joint("action_scale").values())
+        default = {"P": positions, "V": robot.velocity, "T": robot.effort}[kind]
+        self.action_scale = np.full(joints, default if scale is None else scale, np.float32)
+        self.is_position_controlled = self.scene.model.actuator_biasprm[:, 1] != 0
+        self.action_offset = np.where(self.is_position_controlled, robot.default_pose, 0)
         self.reset()
 
     @property
@@ -299,9 +297,7 @@ class LeggedEnv(VecEnv):
             self.reset()
             return
         wrong = [name for name in vars(self.state) if name not in state["state"]]
-        for name, array in arrays.items():
-            if name not in saved or tuple(saved[name].shape) != array.shape:
-                wrong.append(name)
+        wrong += [k for k, a in arrays.items() if k not in saved or saved[k].shape != a.shape]
         if wrong:
             raise ConfigError(
                 f"the checkpoint's {wrong[0]} belongs to another robot, task or version of "
@@ -313,8 +309,7 @@ class LeggedEnv(VecEnv):
         self.rng.bit_generator.state = state["rng"]
         # Computing the state again would advance the air time and draw noise.
         self.state = State(**{name: each.numpy().copy() for name, each in state["state"].items()})
-        groups = state["observations"]
-        self._observations = TensorDict(groups, batch_size=[self.num_envs]).to(self.device)
+        self._observations = TensorDict(state["observations"], [self.num_envs]).to(self.device)
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         """Return views of the arrays to save, by name."""

@@ -65,18 +65,14 @@ def sample_params(
 def apply_params(sim: Simulation, params: RandomizedParams) -> None:
     """Write the parameters of each robot to its simulation."""
     batch, scene, model, base = sim.batch, sim.scene, sim.scene.model, sim.scene.base
-    min_mass = float(model.body_mass[base] + params.added_mass.min())
-    if min_mass <= 0:
-        raise ConfigError(
-            f"domain_rand.added_mass: a base of {model.body_mass[base]:.3g} kg would weigh "
-            f"{min_mass:.3g} kg; expected more than 0 kg"
-        )
-    mass = batch.expand("body_mass")
-    mass[:, base] = model.body_mass[base] + params.added_mass[:, 0]
+    nominal = model.body_mass[base]
+    mass = nominal + params.added_mass
+    if mass.min() <= 0:
+        got = f"a base of {nominal:.3g} kg would weigh {mass.min():.3g} kg"
+        raise ConfigError(f"domain_rand.added_mass: {got}; expected more than 0 kg")
+    batch.expand("body_mass")[:, base] = mass[:, 0]
     # The added mass has the shape of the base, so the inertia grows in proportion.
-    batch.expand("body_inertia")[:, base] = (
-        model.body_inertia[base] * (mass[:, base] / model.body_mass[base])[:, None]
-    )
+    batch.expand("body_inertia")[:, base] = model.body_inertia[base] * (mass / nominal)
     batch.expand("body_ipos")[:, base] = model.body_ipos[base] + params.com_shift
     batch.expand("geom_friction")[:, scene.geoms, 0] = params.geom_friction
     # MuJoCo's affine actuators: force = gain * ctrl + bias . (1, q, dq).
@@ -136,11 +132,10 @@ def sample_reset_state(
     qpos = np.tile(scene.home, (count, 1))
     offset = rng.uniform(-limit, limit, (count, 2)).astype(np.float32)
     # Points that cover the area of the feet at any heading.
-    radius = 0.5 * max(float(robot.spec.leg_length or 0.4), float(robot.spec.stance_width or 0.2))
-    angle = np.arange(8) * (np.pi / 4)
-    circle = np.stack([np.cos(angle), np.sin(angle)])
-    rings = np.concatenate([np.zeros((2, 1)), radius / 2 * circle, radius * circle], axis=1)
-    ring_x, ring_y = rings.astype(np.float32)
+    radius = 0.5 * max(robot.spec.leg_length or 0.4, robot.spec.stance_width or 0.2)
+    circle = np.exp(0.25j * np.pi * np.arange(8))
+    rings = radius * np.concatenate([[0], circle / 2, circle])
+    ring_x, ring_y = rings.real.astype(np.float32), rings.imag.astype(np.float32)
     for factor in (0.5, 0.0, 1.0):  # the last pass checks the origin itself
         x, y = (env_origins[:, :2] + offset).T
         height = terrain.height(x[:, None] + ring_x, y[:, None] + ring_y)
@@ -150,7 +145,7 @@ def sample_reset_state(
             break
         offset[uneven] *= factor
     qpos[:, :2] = env_origins[:, :2] + offset
-    qpos[:, 2] = highest + float(robot.spec.spawn_height or 0.0)
+    qpos[:, 2] = highest + (robot.spec.spawn_height or 0.0)
     yaw = rng.uniform(-cfg.yaw, cfg.yaw, count)
     qpos[:, 3], qpos[:, 6] = np.cos(yaw / 2), np.sin(yaw / 2)
     low, high = cfg.reset_range or robot.spec.reset_range

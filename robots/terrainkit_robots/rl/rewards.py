@@ -85,10 +85,9 @@ def orientation(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
 @reward
 def base_height(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
     """Penalize a base above or below its target height, squared [m2]."""
-    target = cfg.base_height_target
-    if target is None:
-        target = robot.spec.base_height_target
-    return np.square(_height_error(state.base_height, target or 0.0))
+    default = robot.spec.base_height_target or 0.0
+    target = default if cfg.base_height_target is None else cfg.base_height_target
+    return np.square(_height_error(state.base_height, target))
 
 
 @reward
@@ -142,9 +141,7 @@ def termination(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
 @reward
 def dof_pos_limits(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
     """Penalize joint positions beyond their soft limits [rad]."""
-    below = np.maximum(robot.lower - state.dof_pos, 0)
-    above = np.maximum(state.dof_pos - robot.upper, 0)
-    return (below + above).sum(axis=1)
+    return np.abs(state.dof_pos - np.clip(state.dof_pos, robot.lower, robot.upper)).sum(axis=1)
 
 
 @reward
@@ -194,5 +191,5 @@ def stand_still(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
 @reward
 def feet_contact_forces(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
     """Penalize contact forces of feet above the limit [N]."""
-    force = np.sqrt(np.einsum("nfi,nfi->nf", state.foot_force, state.foot_force))
+    force = np.sqrt(np.square(state.foot_force).sum(axis=2))
     return np.maximum(force - np.float32(cfg.max_contact_force), 0).sum(axis=1)

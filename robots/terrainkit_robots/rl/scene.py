@@ -121,18 +121,12 @@ def _base(robot: Robot, scene: Any) -> Any:
     if scene.joints[0].parent.name != spec.base:
         raise ConfigError(f"{file}: a joint precedes {spec.base}; expected the base first")
     joints = [joint.name for joint in scene.joints if joint.type != free]
-    if unknown := [name for name in spec.joint_order if name not in joints]:
-        raise ConfigError(
-            f"the spec of {spec.name} has the joint {unknown[0]!r}; "
-            f"{file.name} has: {listing(joints)}"
-        )
     bodies = [body.name for body in base.find_all("body")] + [base.name]
-    for field in ("feet", "termination_contacts", "penalized_contacts"):
-        if unknown := [name for name in getattr(spec, field) if name not in bodies]:
-            raise ConfigError(
-                f"{field} of {spec.name}: got {unknown[0]!r}; the bodies of {file.name} are: "
-                f"{listing(bodies)}"
-            )
+    fields = dict.fromkeys(("feet", "termination_contacts", "penalized_contacts"), bodies)
+    for field, known in {"joint_order": joints, **fields}.items():
+        if unknown := [name for name in getattr(spec, field) if name not in known]:
+            got = f"{field} of {spec.name}: got {unknown[0]!r}"
+            raise ConfigError(f"{got}; {file.name} has: {listing(known)}")
     return base
 
 

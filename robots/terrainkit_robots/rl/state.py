@@ -130,6 +130,10 @@ class Sensors:
         self.air_time[rows] = np.where(contact, 0, air_time)
         dof_acc = (dof_vel - self.last_dof_vel[rows]) / self._dt
         self.last_dof_vel[rows] = dof_vel
+        # The scan points turn with the yaw.
+        (x, y), yaw = self._scan_points, quat_to_yaw(quat)[:, None]
+        c, s = np.cos(yaw), np.sin(yaw)
+        scan = self._terrain.height(pos[:, :1] + c * x - s * y, pos[:, 1:2] + s * x + c * y)
         ground_height = self._terrain.height(foot_pos[..., 0], foot_pos[..., 1])
         return {
             "base_pos": pos,
@@ -148,16 +152,8 @@ class Sensors:
             "first_contact": first_contact,
             "air_time": air_time,
             "penalized_force": np.sqrt(np.einsum("npi,npi->np", penalized, penalized)),
-            "height_scan": self._height_scan(pos, quat),
+            "height_scan": pos[:, 2:3] - scan,
             "fallen": illegal_contact(terminating, self._cfg)
             | bad_orientation(gravity, self._cfg)
             | terrain_out_of_bounds(pos, self._terrain),
         }
-
-    def _height_scan(self, pos: FloatArray, quat: FloatArray) -> FloatArray:
-        """Return the height of the base above the scan points, which turn with the yaw."""
-        x, y = self._scan_points
-        yaw = quat_to_yaw(quat)
-        c, s = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
-        height = self._terrain.height(pos[:, :1] + c * x - s * y, pos[:, 1:2] + s * x + c * y)
-        return pos[:, 2:3] - height

@@ -11,6 +11,7 @@ bundled robots are TOML files beside them. The folder of an onboarded robot need
 
 from dataclasses import dataclass
 from importlib import metadata
+from os.path import isdir
 from pathlib import Path
 
 from terrainkit.errors import ConfigError
@@ -57,12 +58,11 @@ def register_task(name: str, folder: str | Path, task: Task | None = None) -> Ta
     Raises:
         ConfigError: if the name is not a file name, or is registered with another folder.
     """
-    task = Task() if task is None else task
     if not isinstance(name, str) or name in ("", "..") or Path(name).name != name:
         raise ConfigError(f"task name: got {name!r}; expected a name without slashes")
-    if not isinstance(task, Task):
+    if not isinstance(task, Task | None):
         raise ConfigError(f"task {name}: got {task!r}; expected an instance of Task")
-    spec = TaskSpec(name=name, folder=Path(folder).absolute(), task=task)
+    spec = TaskSpec(name=name, folder=Path(folder).absolute(), task=task or Task())
     if (other := _registered.get(name, spec)).folder != spec.folder:
         raise ConfigError(f"task {name}: registered with {other.folder}; expected a new name")
     _registered[name] = spec
@@ -88,34 +88,25 @@ def get_task(name_or_folder: str | Path) -> TaskSpec:
             _load_plugin(plugin)
     if name in _registered:
         return _registered[name]
-    try:
-        if not folder.is_dir():
-            expected = expected_names(name, task_names(), "tasks are")
-            raise ConfigError(f"no task or robot folder {truncate(repr(name))}; {expected}")
-        if not (folder / SPEC_FILE).exists():
-            raise ConfigError(
-                f"{folder} has no {SPEC_FILE}; expected a folder of terrainkit onboard"
-            )
-    except OSError as error:
-        raise ConfigError(f"cannot read {truncate(name)}: {error.strerror or error}") from error
+    if not isdir(name):  # noqa: PTH112 - Path.is_dir raises OSError for long names
+        expected = expected_names(name, task_names(), "tasks are")
+        raise ConfigError(f"no task or robot folder {truncate(repr(name))}; {expected}")
+    if not (folder / SPEC_FILE).exists():
+        raise ConfigError(f"{folder} has no {SPEC_FILE}; expected a folder of terrainkit onboard")
     spec = RobotSpec.load(folder / SPEC_FILE)
     return TaskSpec(name=spec.name, folder=folder.absolute(), task=Task())
 
 
 def _load_plugin(plugin: metadata.EntryPoint) -> None:
     """Import the module that registers the task of an entry point."""
+    what = f"task {plugin.name} ({plugin.value})"
     try:
         plugin.load()
     except Exception as error:  # a module of another package may raise anything
-        message = " ".join(f"{type(error).__name__}: {error}".split()).removesuffix(":")
-        raise ConfigError(
-            f"task {plugin.name} ({plugin.value}) cannot be loaded: {message}"
-        ) from error
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise ConfigError(f"{what} cannot be loaded: {reason}") from error
     if plugin.name not in _registered:
-        raise ConfigError(
-            f"task {plugin.name}: {plugin.value} does not register it; "
-            f"expected a call of register_task({plugin.name!r}, ...)"
-        )
+        raise ConfigError(f"{what}: expected a call of register_task({plugin.name!r}, ...)")
 
 
 for _path in Path(bundled.__file__).parent.glob("*/tasks/*.toml"):

@@ -145,9 +145,8 @@ def load_terrain(source: str | Path, collision: Collision = "auto") -> Terrain:
         from terrainkit import MapConfig, TerrainMap, generate
 
         is_map = path.suffix == ".npz"
-        return MapTerrain(
-            TerrainMap.load(path) if is_map else generate(MapConfig.load(path)), collision
-        )
+        terrain_map = TerrainMap.load(path) if is_map else generate(MapConfig.load(path))
+        return MapTerrain(terrain_map, collision)
     if path.suffix == ".xml":
         return ModelTerrain(path)
     suggestion = " did you mean 'plane'?" if closest(str(source), ["plane"]) else ""

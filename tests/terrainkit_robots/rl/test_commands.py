@@ -11,7 +11,7 @@ import torch
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.description import bundled
-from terrainkit_robots.rl.commands import VelocityCommand, sample_commands, uses_heading
+from terrainkit_robots.rl.commands import VelocityCommand, sample_commands
 from terrainkit_robots.rl.config import Commands, Control, DomainRand, Env, InitState, Rewards, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.rewards import REWARDS
@@ -125,7 +125,7 @@ class TestHeading:
         np.testing.assert_allclose(off, 0, atol=1e-3)
 
 
-class TestUsesHeading:
+class TestHeadingCommand:
     @pytest.mark.parametrize(
         ("given", "level", "expected"),
         [(None, True, False), (None, False, True), (True, True, True), (False, False, False)],
@@ -136,7 +136,6 @@ class TestUsesHeading:
         ground = Plane()
         ground.is_flat = level
         settings = Commands(heading_command=given, standing=0.0)
-        assert uses_heading(Task(commands=settings), ground) == expected
         env = make_env(ground=ground, commands=settings)
         assert env.velocity_command.heading_command == expected
         before = env.commands[:, 2].copy()

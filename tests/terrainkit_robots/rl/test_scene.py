@@ -219,7 +219,7 @@ class TestBuildSceneErrors:
         [
             ({"base": "torso"}, "has no body 'torso', the base of its spec"),
             ({"base": "front"}, "front has no freejoint of its own"),
-            ({"feet": ("hoof",)}, "feet of cart: got 'hoof'; the bodies of cart.xml are: "),
+            ({"feet": ("hoof",)}, "feet of cart: got 'hoof'; cart.xml has: "),
             ({"termination_contacts": ("x",)}, "termination_contacts of cart: got 'x'"),
             ({"penalized_contacts": ("x",)}, "penalized_contacts of cart: got 'x'"),
             ({"mjcf": "gone.xml"}, "MuJoCo cannot read .*gone.xml"),
@@ -241,7 +241,7 @@ class TestBuildSceneErrors:
         }  # fmt: skip
         tables["soft_limits"] = {".*": (-1.0, 1.0)}
         spec = replace(cart.spec, joint_order=("wheel_axle", "fore_hinge"), **tables)
-        with pytest.raises(ConfigError, match=r"joint 'fore_hinge'; cart\.xml has: "):
+        with pytest.raises(ConfigError, match=r"joint_order of .*'fore_hinge'; cart\.xml has: "):
             build_scene(Robot.from_spec(spec, cart.mjcf.parent), Plane(), nominal_task())
 
     def test_build_scene_rejects_other_moving_bodies(self, cart, nominal_task, tmp_path):

@@ -129,7 +129,7 @@ def test_entry_point_is_imported_on_use(tmp_path, monkeypatch, plugin):
     [
         ("no_such_package", r"task rover \(no_such_package\) cannot be loaded: ModuleNotFoundErr"),
         ("math:no_such_name", r"rover \(math:no_such_name\) cannot be loaded: AttributeError"),
-        ("math", r"task rover: math does not register it; expected a call of register"),
+        ("math", r"task rover \(math\): expected a call of register_task"),
     ],
 )
 def test_invalid_entry_point_fails_on_use(plugin, value, told):
