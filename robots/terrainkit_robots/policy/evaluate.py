@@ -16,12 +16,11 @@ from terrainkit.errors import ConfigError
 from terrainkit.schema import Config
 from terrainkit.type_hint import PositiveInt
 from terrainkit_robots.policy.load import load_policy
-from terrainkit_robots.policy.torch_threads import single_torch_thread
 from terrainkit_robots.rl.config import Commands, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import uses_height_scan
 from terrainkit_robots.rl.run import Run, is_same_terrain
-from terrainkit_robots.rl.runner import resolve_device
+from terrainkit_robots.rl.runner import resolve_device, single_torch_thread
 from terrainkit_robots.rl.terrain import load_terrain
 
 FloatArray = NDArray[np.float32]

@@ -396,3 +396,14 @@ def process_share(task: Task) -> Task:
         env=replace(task.env, num_envs=num_envs, num_threads=threads),
         runner=replace(task.runner, seed=task.runner.seed + rank),
     )
+
+
+@contextmanager
+def single_torch_thread() -> Iterator[None]:
+    """Limit torch to one thread, which is fastest for networks as small as these."""
+    previous = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(previous)
