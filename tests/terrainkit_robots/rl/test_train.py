@@ -384,7 +384,7 @@ def test_train_rejects_a_mismatched_spec(task, tmp_path):
             (mine / path.name).write_bytes(path.read_bytes())
     model = mine / "quadruped.xml"
     model.write_text(model.read_text().replace("FL_hip_joint", "FL_shoulder_joint"))
-    with pytest.raises(ConfigError, match="has the joint 'FL_hip_joint'"):
+    with pytest.raises(ConfigError, match="joint_order of quadruped: got 'FL_hip_joint'"):
         train(mine, "plane", task, folder=tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
