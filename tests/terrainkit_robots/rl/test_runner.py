@@ -205,9 +205,7 @@ def test_load_rejects_another_task(make, task, tmp_path, map_ground):
 def test_load_rejects_another_map(make, task, tmp_path, map_ground):
     blind = replace(task, terrain=replace(task.terrain, measure_heights=False))
     make(blind).save()
-    with pytest.raises(
-        ConfigError, match=r"^checkpoint's map has 1 x 1 patches; this one has 3"
-    ):
+    with pytest.raises(ConfigError, match=r"^checkpoint's map has 1 x 1 patches; this one has 3"):
         make(blind, map_ground).load(tmp_path / "model_0.pt")
 
 
