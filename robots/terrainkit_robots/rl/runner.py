@@ -26,10 +26,6 @@ from terrainkit_robots.rl.run import read_checkpoint, save_checkpoint
 OBS_GROUPS = {"actor": ["policy"], "critic": ["privileged"]}
 """Observation groups of each network."""
 
-LOGGER_STATE = ("tot_timesteps", "tot_time", "rewbuffer", "lenbuffer")
-LOGGER_BUFFERS = ("cur_reward_sum", "cur_episode_length")
-"""Attributes of rsl-rl's logger in a checkpoint; the latter have a value per environment."""
-
 
 class TrainingProgress(NamedTuple):
     """The progress of training; means are those of the last 100 episodes."""
@@ -105,16 +101,18 @@ class MetricsLogger(Logger):
 
     def state_dict(self) -> dict[str, Any]:
         """Return the buffers, for a checkpoint."""
-        return {name: getattr(self, name) for name in (*LOGGER_STATE, *LOGGER_BUFFERS)}
+        names = ("tot_timesteps", "tot_time", "cur_reward_sum", "cur_episode_length")
+        means = {"rewbuffer": list(self.rewbuffer), "lenbuffer": list(self.lenbuffer)}
+        return {name: getattr(self, name) for name in names} | means
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore the buffers; those per environment only if their number is the same."""
         self.rewbuffer.extend(state["rewbuffer"])
         self.lenbuffer.extend(state["lenbuffer"])
         self.tot_timesteps, self.tot_time = state["tot_timesteps"], state["tot_time"]
-        for name in LOGGER_BUFFERS:
-            if len(state[name]) == self.num_envs:
-                getattr(self, name).copy_(state[name])
+        if len(state["cur_reward_sum"]) == self.num_envs:
+            self.cur_reward_sum.copy_(state["cur_reward_sum"])
+            self.cur_episode_length.copy_(state["cur_episode_length"])
 
     def _store_code_state(self) -> list[str]:
         return []  # a run.toml records the versions; the user's git repository is not touched
@@ -396,14 +394,3 @@ def process_share(task: Task) -> Task:
         env=replace(task.env, num_envs=num_envs, num_threads=threads),
         runner=replace(task.runner, seed=task.runner.seed + rank),
     )
-
-
-@contextmanager
-def single_torch_thread() -> Iterator[None]:
-    """Limit torch to one thread, which is fastest for networks as small as these."""
-    previous = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(previous)
