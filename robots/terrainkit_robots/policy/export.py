@@ -16,11 +16,12 @@ from tensordict import TensorDict
 
 from terrainkit.atomic_write import atomic_write, check_target
 from terrainkit.errors import ExportError
+from terrainkit_robots.checkpoint import read_checkpoint
 from terrainkit_robots.policy.evaluate import FloatArray, evaluation_task
 from terrainkit_robots.policy.load import load_policy, single_torch_thread
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import HEIGHT_SCAN_OFFSET
-from terrainkit_robots.rl.run import Run, last_checkpoint, read_checkpoint
+from terrainkit_robots.rl.run import Run, last_checkpoint
 from terrainkit_robots.rl.terrain import load_terrain
 
 ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE = "policy.onnx", "policy.pt", "policy.json"

@@ -104,7 +104,7 @@ def compute_observations(
     values = [term.function(state) for term in group]
     widths = [value.shape[1] for value in values]
     observations = np.concatenate(values, axis=1, dtype=np.float32)
-    noise = np.repeat(np.float32([term.noise for term in group]), widths)
+    noise = np.repeat([term.noise for term in group], widths).astype(np.float32)
     if rng is not None and noise.any():
         noisy = np.flatnonzero(noise)
         start, stop = noisy[0], noisy[-1] + 1  # one block is faster than single columns

@@ -1,29 +1,25 @@
-"""Run folders and checkpoints: what training writes, and what it needs to continue.
+"""Run folders: what training writes, and what it needs to continue.
 
 A run has `task.toml`, `robot.toml` (the spec as it was trained), `run.toml` (robot, terrain and
 versions), `map.toml` (the config of its map, if any), and `model_<iteration>.pt` checkpoints.
 """
 
 import hashlib
-import io
 import re
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
 from importlib.metadata import version
 from os.path import isdir, isfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypedDict
-
-import msgspec
+from typing import TYPE_CHECKING, Literal
 
 from terrainkit.atomic_write import atomic_folder, atomic_write
 from terrainkit.errors import ConfigError, ExportError, listing
 from terrainkit.schema import Config
 from terrainkit.text import expected_names
 from terrainkit.toml_text import read_text
-from terrainkit_robots.files import open_regular
+from terrainkit_robots.checkpoint import read_checkpoint
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.spec.robot import SPEC_FILE, Robot
@@ -34,19 +30,6 @@ if TYPE_CHECKING:
     from terrainkit.config import MapConfig
 
 RUN_FILE, TASK_FILE, MAP_FILE = "run.toml", "task.toml", "map.toml"
-
-
-class Checkpoint(TypedDict):
-    """The part of a checkpoint that describes a policy; one of training also has its state."""
-
-    format: Literal["terrainkit checkpoint"]
-    version: Literal[1]
-    iteration: int
-    robot: str
-    joints: list[str]
-    observed: dict[str, int]  # width of each observation group
-    actor_state_dict: dict[str, Any]
-    critic_state_dict: dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -206,11 +189,6 @@ def _resolve_run(name: str | Path) -> tuple[Path, Path | None]:
     return shipped, None
 
 
-def is_shipped(run: Run) -> bool:
-    """Return whether a run is part of a package, so that its folder must not be written."""
-    return run.folder.resolve() == tasks.get_task(run.info.robot).trained_run.resolve()
-
-
 def changed_robot_files(run: Run) -> tuple[str, ...]:
     """Return the names of the robot's files that differ from those it was trained with."""
     recorded = run.info.robot_sha256
@@ -280,48 +258,6 @@ def run_folder(
             return continued.folder
     folder = folder or default_folder(tasks.get_task(robot).name)
     return create_run(folder, task, robot, terrain).folder
-
-
-def save_checkpoint(path: Path, state: Mapping[str, Any]) -> None:
-    """Write a checkpoint completely, or not at all; see `LeggedRunner.state_dict`."""
-    import torch
-
-    data = io.BytesIO()  # torch itself aborts the process on a full disk
-    torch.save({"format": "terrainkit checkpoint", "version": 1, **state}, data)
-    with atomic_write(path, overwrite=True) as target:
-        target.write_bytes(data.getbuffer())
-
-
-def read_checkpoint(path: Path) -> dict[str, Any]:
-    """Read a checkpoint, without executing code from it.
-
-    Raises:
-        ConfigError: If it is missing, damaged, or not written by terrainkit.
-    """
-    import torch
-
-    try:
-        with open_regular(path) as file:
-            parts = zipfile.ZipFile(file).infolist()
-            if any(part.compress_type != zipfile.ZIP_STORED for part in parts):
-                raise ConfigError(f"{path}: got a compressed file, which could expand to any size")
-            file.seek(0)
-            state: dict[str, Any] = torch.load(file, map_location="cpu", weights_only=True)
-        policy_state(state)
-    except msgspec.ValidationError as error:
-        raise ConfigError(f"{path} is not a checkpoint of terrainkit: {error}") from error
-    except OSError as error:
-        raise ConfigError(f"cannot read {path}: {error.strerror or error}") from error
-    except ConfigError:
-        raise
-    except Exception as error:  # torch's errors for damaged files have no common class
-        raise ConfigError(f"{path} is not a checkpoint of terrainkit, or is damaged") from error
-    return state
-
-
-def policy_state(state: Mapping[str, Any]) -> Checkpoint:
-    """Return the part of a checkpoint without which there is no policy or critic."""
-    return msgspec.convert(state, Checkpoint)
 
 
 def _robot_digests(folder: Path) -> dict[str, str]:

@@ -19,9 +19,9 @@ from rsl_rl.runners import OnPolicyRunner
 from rsl_rl.utils.logger import Logger
 
 from terrainkit.errors import ConfigError, listing
+from terrainkit_robots.checkpoint import read_checkpoint, save_checkpoint
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.run import read_checkpoint, save_checkpoint
 
 OBS_GROUPS = {"actor": ["policy"], "critic": ["privileged"]}
 """Observation groups of each network."""
@@ -61,19 +61,16 @@ class MetricsLogger(Logger):
 
     def init_logging_writer(self) -> None:
         """Open the log files."""
+        if self._runner.env.cfg.runner.logger == "tensorboard":
+            # TensorBoard drops what an interrupted run logged after its last checkpoint.
+            self.cfg["logger"]["purge_step"] = self._runner.current_learning_iteration
+            super().init_logging_writer()
+            return
         try:
             with redirect_stdout(None):
                 super().init_logging_writer()
         except Exception as error:
-            if self.cfg["logger"] == "tensorboard":
-                raise
             raise ConfigError(f"wandb does not start: {' '.join(str(error).split())}") from error
-        if self.writer is not None and self.cfg["logger"] == "tensorboard":
-            from tensorboard.compat.proto.event_pb2 import Event, SessionLog
-
-            # TensorBoard drops what an interrupted run logged after its last checkpoint.
-            start = Event(session_log=SessionLog(status=SessionLog.START))
-            self.writer.file_writer.add_event(start, self._runner.current_learning_iteration)
 
     def stop_logging_writer(self) -> None:
         """Close the log files, if they are open."""
@@ -319,12 +316,15 @@ def runner_config(task: Task) -> dict[str, Any]:
         "obs_normalization": policy.obs_normalization,
     }
     actor = {"hidden_dims": list(policy.actor_hidden_dims), "distribution_cfg": distribution}
-    wandb = {"class_name": "WandbLogWriter", "project_name": "terrainkit"}
+    loggers = {
+        "tensorboard": {"class_name": "torch.utils.tensorboard:SummaryWriter", "flush_secs": 10},
+        "wandb": {"class_name": "WandbLogWriter", "project_name": "terrainkit"},
+    }
     return {
         "num_steps_per_env": runner.num_steps_per_env,
         "save_interval": sys.maxsize,  # `LeggedRunner.finish_iteration` saves, in all processes
         "seed": runner.seed,
-        "logger": wandb if runner.logger == "wandb" else "tensorboard",
+        "logger": loggers[runner.logger],
         "check_for_nan": False,  # `MetricsLogger` names the rewards that are not finite
         "obs_groups": OBS_GROUPS,
         "actor": network | actor,

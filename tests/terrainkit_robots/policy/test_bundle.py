@@ -4,10 +4,11 @@ import pytest
 import torch
 
 from terrainkit.errors import ConfigError, ExportError
+from terrainkit_robots.checkpoint import read_checkpoint
 from terrainkit_robots.policy.bundle import bundle_policy
 from terrainkit_robots.policy.load import load_policy
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.run import create_run, open_run, read_checkpoint
+from terrainkit_robots.rl.run import create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.tasks import get_task, task_names
 from terrainkit_robots.rl.terrain import Plane, load_terrain

@@ -4,6 +4,7 @@ import torch
 from vec_env_contract import VecEnvContract
 
 from terrainkit.errors import ConfigError
+from terrainkit_robots.checkpoint import save_checkpoint
 from terrainkit_robots.rl.config import (
     Commands,
     Control,
@@ -15,7 +16,6 @@ from terrainkit_robots.rl.config import (
     Terrain,
 )
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.run import save_checkpoint
 from terrainkit_robots.rl.terrain import MapTerrain, Plane
 
 SHORT = Env(num_envs=5, num_threads=1, episode_length_s=0.4)

@@ -13,15 +13,10 @@ import torch
 
 import terrainkit
 from terrainkit.errors import ConfigError, ExportError, MemoryLimitError
+from terrainkit_robots.checkpoint import policy_state, read_checkpoint, save_checkpoint
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Algorithm, Env, Policy, Runner, Task, Terrain
-from terrainkit_robots.rl.run import (
-    checkpoints,
-    open_run,
-    policy_state,
-    read_checkpoint,
-    save_checkpoint,
-)
+from terrainkit_robots.rl.run import checkpoints, open_run
 from terrainkit_robots.rl.runner import TrainingProgress
 from terrainkit_robots.rl.train import train
 
