@@ -102,6 +102,11 @@ def length(easy: float, hard: float | None = None, *, allows_zero: bool = False)
     return _field(easy, hard, snap="cells", allows_zero=allows_zero)
 
 
+def size(easy: float, hard: float | None = None) -> Any:
+    """Declare a length of a solid [m], above 0, which does not snap to cells."""
+    return _field(easy, hard, allows_zero=False)
+
+
 def platform(side: float) -> Any:
     """Declare the side of a square at the center of the patch [m], which stays centered."""
     return _field(side, snap="centered", allows_zero=False)
@@ -140,7 +145,7 @@ def parameters_of(terrain: type) -> Mapping[str, Parameter]:
         if "parameter" not in field.metadata:
             raise ConfigError(
                 f"{terrain.__name__}: {field.name} is a plain field; expected one declared with "
-                "parameter.height, length, platform, grade, scalar, count or switch"
+                "parameter.height, length, size, platform, grade, scalar, count or switch"
             )
     return {f.name: f.metadata["parameter"] for f in dataclasses.fields(terrain)}
 
