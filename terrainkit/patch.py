@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
-from terrainkit.layout import assign_patch, terrain_columns
+from terrainkit.layout import assign_patch, patch_rng, terrain_columns
 from terrainkit.parameter import Realized, Value, parameters_of
 from terrainkit.sub_terrain import SubTerrain
 from terrainkit.terrain import Terrain
@@ -80,8 +80,7 @@ def build_patch(
     terrain = sub_terrain.at(difficulty)
     _check_slopes(terrain, config)
     grid = config.patch_grid(row, col)
-    rng = np.random.default_rng(np.random.SeedSequence([config.seed, row, col]))
-    heights = terrain.build(grid, rng)
+    heights = terrain.build(grid, patch_rng(config, terrain, row, col))
     preferred = terrain.spawn(grid)
     origin = find_spawn(
         heights,

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,13 @@ class Terrain(ABC):
     and returns a terrain with plain numbers. Fields are declared with the functions of
     :mod:`terrainkit.parameter`; the docstring of a field is its help text. A terrain that is
     constructed directly takes the hard end of each range by default.
+    """
+
+    has_column_layout: ClassVar[bool] = False
+    """Whether the rows of a column have the same random numbers in mode curriculum.
+
+    Set it where single random objects decide how hard a patch is. Otherwise a row could be easier
+    than the one before.
     """
 
     def __post_init__(self) -> None:
