@@ -66,7 +66,8 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
         terrain_types[row, col] = terrain_type
         difficulty[row, col] = level
         parameters[row, col] = patch.parameters
-        deviations.update(_deviations(patch, sub_terrain.terrain, config.cell))
+        for name in _deviations(patch, sub_terrain.terrain, config.cell):
+            deviations[name] += 1
         moved_spawns[sub_terrain.name] += patch.spawn_offset > config.cell
     _warn(config, deviations, +moved_spawns)
     return TerrainMap(

@@ -103,7 +103,7 @@ def build_patch(
         grid=grid,
         heights=heights,
         origin=np.array(origin, dtype=np.float32),
-        spawn_offset=float(np.abs(np.subtract(origin[:2], preferred)).max()),
+        spawn_offset=max(abs(origin[0] - preferred[0]), abs(origin[1] - preferred[1])),
     )
 
 

@@ -35,7 +35,8 @@ def find_spawn(
         Origin (x, y, z) [m]; None if no disc in the patch is flat.
     """
     radius_cells = radius / grid.cell
-    index = tuple((p - low) / grid.cell - 0.5 for p, low in zip(preferred, grid.lower, strict=True))
+    (x, y), (x0, y0) = preferred, grid.lower
+    index = (x - x0) / grid.cell - 0.5, (y - y0) / grid.cell - 0.5
     if _is_inside(preferred, grid, radius):
         low, high = _height_range(heights, index, radius_cells)
         if low == high:
@@ -53,8 +54,8 @@ def find_spawn(
 
 def _is_inside(point: tuple[float, float], grid: Grid, radius: float) -> bool:
     margin = radius + grid.cell / 2  # the last half cell slopes toward the next patch
-    sides = zip(point, grid.lower, grid.upper, strict=True)
-    return all(low + margin <= p <= high - margin for p, low, high in sides)
+    (x, y), (x0, y0), (x1, y1) = point, grid.lower, grid.upper
+    return x0 + margin <= x <= x1 - margin and y0 + margin <= y <= y1 - margin
 
 
 def _height_range(
@@ -66,9 +67,11 @@ def _height_range(
         for p, n in zip(index, heights.shape, strict=True)
     ]
     square = heights[slice(*spans[0]), slice(*spans[1])]
-    if square.min() != square.max():
-        x, y = (np.arange(*span) - p for span, p in zip(spans, index, strict=True))
-        square = square[_touches_disc(x[:, None], y[None, :], radius_cells)]
+    low, high = float(square.min()), float(square.max())
+    if low == high:
+        return low, high
+    x, y = (np.arange(*span) - p for span, p in zip(spans, index, strict=True))
+    square = square[_touches_disc(x[:, None], y[None, :], radius_cells)]
     return float(square.min()), float(square.max())
 
 
