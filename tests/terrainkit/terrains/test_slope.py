@@ -53,7 +53,7 @@ def test_slope_spawn_is_on_the_lower_landing():
 
 
 @pytest.mark.parametrize(("asked", "cells"), [(2.0, 20), (1.54, 15), (1.55, 16)])
-def test_slope_records_the_flat_length_at_both_ends(asked, cells, rng):
+def test_slope_records_the_flat_length_at_both_ends(asked, cells):
     slope = Slope(grade=0.4, landing=asked)
     config = MapConfig(
         rows=1,
