@@ -72,7 +72,8 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
         parameters[row, col] = patch.parameters
         solids.append(patch.solids)
         goals[row, col] = patch.goals
-        deviations.update(_deviations(patch, sub_terrain.terrain, config.cell))
+        for name in _deviations(patch, sub_terrain.terrain, config.cell):
+            deviations[name] += 1
         moved_spawns[sub_terrain.name] += patch.spawn_offset > config.cell
     _warn(config, deviations, +moved_spawns)
     return TerrainMap(

@@ -10,14 +10,11 @@ from numpy.typing import NDArray
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
-from terrainkit.layout import assign_patch, terrain_columns
+from terrainkit.layout import assign_patch, patch_rng, terrain_columns
 from terrainkit.parameter import Realized, Value, parameters_of
 from terrainkit.solids import Solids
 from terrainkit.sub_terrain import SubTerrain
 from terrainkit.terrain import Terrain
-
-_SOLIDS_STREAM = (2,)
-"""Spawn key that separates the random numbers of solids and goals from those of the heights."""
 
 EDGE_TOLERANCE = 1e-3
 """Distance by which a solid may extend beyond its patch [m]."""
@@ -94,8 +91,7 @@ def build_patch(
     terrain = sub_terrain.at(difficulty)
     _check_slopes(terrain, config)
     grid = config.patch_grid(row, col)
-    seed = [config.seed, row, col]
-    heights = terrain.build(grid, np.random.default_rng(np.random.SeedSequence(seed)))
+    heights = terrain.build(grid, patch_rng(config, terrain, row, col))
     solids, goals = _solids_and_goals(terrain, grid, heights, config, (row, col))
     preferred = terrain.spawn(grid)
     disc = Disc(
@@ -122,7 +118,7 @@ def build_patch(
         solids=solids,
         goals=goals,
         origin=np.array(origin, dtype=np.float32),
-        spawn_offset=float(np.abs(np.subtract(origin[:2], preferred)).max()),
+        spawn_offset=max(abs(origin[0] - preferred[0]), abs(origin[1] - preferred[1])),
     )
 
 
@@ -141,8 +137,8 @@ def _solids_and_goals(
     from terrainkit.surface import surface_at
 
     def rng() -> np.random.Generator:
-        seed = np.random.SeedSequence([config.seed, *patch], spawn_key=_SOLIDS_STREAM)
-        return np.random.default_rng(seed)
+        """Return the child of the generator of the heights, in its initial state."""
+        return patch_rng(config, terrain, *patch).spawn(1)[0]
 
     solids = Solids.empty()
     if type(terrain).solids is not Terrain.solids:

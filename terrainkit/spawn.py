@@ -53,20 +53,20 @@ def find_spawn(
     Returns:
         Origin (x, y, z) [m]; None if there is no such disc in the patch.
     """
-    index = tuple((p - low) / grid.cell - 0.5 for p, low in zip(preferred, grid.lower, strict=True))
+    (x, y), (x0, y0) = preferred, grid.lower
+    index = (x - x0) / grid.cell - 0.5, (y - y0) / grid.cell - 0.5
     obstacles = SolidIndex(solids, radius=disc.radius)
     if _is_inside(preferred, grid, disc.radius):
-        low, high = _height_range(heights, index, disc.radius / grid.cell)
-        if high - low <= disc.tolerance:
-            # The disc may be flat within the tolerance only, so evaluate the surface at its center.
-            ground = surface_at(heights, np.array([index]), threshold=threshold)
-            origin = np.array([[*preferred, high if low == high else float(ground.height[0])]])
-            if _is_free(origin, obstacles, disc.headroom)[0]:
-                x, y, z = origin[0].tolist()
+        low, z = _height_range(heights, index, disc.radius / grid.cell)
+        if z - low <= disc.tolerance:
+            if low != z:
+                # The disc is flat within the tolerance only: evaluate the surface at its center.
+                z = float(surface_at(heights, np.array([index]), threshold=threshold).height[0])
+            if not len(solids) or _is_free(np.array([[x, y, z]]), obstacles, disc.headroom)[0]:
                 return x, y, z
     cells = _flat_cells(heights, disc.radius / grid.cell, disc.tolerance)
-    x, y = (grid.axis(k)[cells[:, k]] for k in (0, 1))
-    origins = np.column_stack([x, y, heights[cells[:, 0], cells[:, 1]]])
+    i, j = cells.T
+    origins = np.column_stack([grid.axis(0)[i], grid.axis(1)[j], heights[i, j]])
     is_free = _is_free(origins, obstacles, disc.headroom)
     cells, origins = cells[is_free], origins[is_free]
     if not len(cells):
@@ -87,8 +87,8 @@ def _is_free(
 
 def _is_inside(point: tuple[float, float], grid: Grid, radius: float) -> bool:
     margin = radius + grid.cell / 2  # the last half cell slopes toward the next patch
-    sides = zip(point, grid.lower, grid.upper, strict=True)
-    return all(low + margin <= p <= high - margin for p, low, high in sides)
+    (x, y), (x0, y0), (x1, y1) = point, grid.lower, grid.upper
+    return x0 + margin <= x <= x1 - margin and y0 + margin <= y <= y1 - margin
 
 
 def _height_range(
@@ -100,9 +100,11 @@ def _height_range(
         for p, n in zip(index, heights.shape, strict=True)
     ]
     square = heights[slice(*spans[0]), slice(*spans[1])]
-    if square.min() != square.max():
-        x, y = (np.arange(*span) - p for span, p in zip(spans, index, strict=True))
-        square = square[_touches_disc(x[:, None], y[None, :], radius_cells)]
+    low, high = float(square.min()), float(square.max())
+    if low == high:
+        return low, high
+    x, y = (np.arange(*span) - p for span, p in zip(spans, index, strict=True))
+    square = square[_touches_disc(x[:, None], y[None, :], radius_cells)]
     return float(square.min()), float(square.max())
 
 

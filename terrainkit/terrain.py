@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,10 +39,19 @@ class Terrain(ABC):
     constructed directly takes the hard end of each range by default.
     """
 
+    has_column_layout: ClassVar[bool] = False
+    """Whether the rows of a column have the same random numbers in mode curriculum.
+
+    Set it where single random objects decide how hard a patch is. Otherwise a row could be easier
+    than the one before.
+    """
+
     def __post_init__(self) -> None:
         for name, parameter in parameters_of(type(self)).items():
-            value = convert_parameter(self.kind(), name, getattr(self, name), parameter)
-            object.__setattr__(self, name, value)
+            given = getattr(self, name)
+            value = convert_parameter(self.kind(), name, given, parameter)
+            if value is not given:
+                object.__setattr__(self, name, value)
 
     @classmethod
     def kind(cls) -> str:
@@ -123,14 +132,12 @@ class Terrain(ABC):
                 self._check_centered(name, getattr(self, name), grid)
 
     def _check_centered(self, name: str, value: float, grid: Grid) -> None:
-        counts = grid.centered(value)
-        if value > min(grid.size) + grid.cell / 2:
-            x, y = grid.size
+        counts, (x, y) = grid.centered(value), grid.size
+        if value > min(x, y) + grid.cell / 2:
             raise ConfigError(
                 f"{self.kind()}: {name} {value:g} m does not fit in a patch of {x:g} m x {y:g} m"
             )
-        if all(count >= n for count, n in zip(counts, grid.shape, strict=True)):
-            x, y = grid.size
+        if counts[0] >= grid.shape[0] and counts[1] >= grid.shape[1]:
             raise ConfigError(
                 f"{self.kind()}: {name} {value:g} m fills the whole patch of {x:g} m x {y:g} m"
             )
