@@ -1,0 +1,16 @@
+"""Docstrings of the fields of a dataclass."""
+
+from functools import cache
+from typing import Any
+
+
+@cache
+def field_docs(cls: type[Any]) -> dict[str, str]:
+    """Return the docstring of each field of a dataclass on one line, by name."""
+    import docstring_parser
+
+    return {
+        param.arg_name: " ".join((param.description or "").split())
+        for owner in reversed(cls.__mro__[:-1])  # a subclass inherits the docs of its parents
+        for param in docstring_parser.parse_from_object(owner).params
+    }
