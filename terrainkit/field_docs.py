@@ -11,6 +11,7 @@ def field_docs(cls: type[Any]) -> dict[str, str]:
 
     return {
         param.arg_name: " ".join((param.description or "").split())
-        for owner in reversed(cls.__mro__[:-1])  # a subclass inherits the docs of its parents
+        for owner in reversed(cls.__mro__)  # a subclass inherits the docs of its parents
+        if "__dataclass_fields__" in vars(owner)
         for param in docstring_parser.parse_from_object(owner).params
     }
