@@ -61,7 +61,7 @@ class Grid:
         """
         return max(minimum, math.floor(length / self.cell + 0.5 + _CELL_TOLERANCE))
 
-    def length(self, count: int) -> float:
+    def length(self, count: float) -> float:
         """Return the length of `count` cells [m], rounded to a nanometer."""
         return round(count * self.cell, 9)
 
@@ -77,13 +77,17 @@ class Grid:
         odd = self.shape[k] % 2
         return max(0, 2 * math.floor((size / self.cell - odd) / 2 + 0.5 + _CELL_TOLERANCE) + odd)
 
-    def rings(self, inner: tuple[int, int]) -> NDArray[np.int64]:
+    def rings(self, inner: tuple[int, int]) -> NDArray[np.int32]:
         """Return the ring around the centered block `inner` of each cell, shape `shape`.
 
         Ring 0 is the block itself, ring 1 the cells that touch its sides or corners, and so on.
         """
-        x, y = (_distance_to_block(n, block) for n, block in zip(self.shape, inner, strict=True))
-        return np.maximum(x[:, None], y[None, :])
+        x, y = map(_distance_to_block, self.shape, inner)
+        return np.maximum.outer(x, y)
+
+    def margins(self, inner: tuple[int, int]) -> tuple[int, int]:
+        """Return the cells along x and y between the centered block `inner` and the edge."""
+        return (self.shape[0] - inner[0]) // 2, (self.shape[1] - inner[1]) // 2
 
     def centered_slices(self, block: tuple[int, int]) -> tuple[slice, slice]:
         """Return the index of the centered block of `block` cells along x and y."""
@@ -92,14 +96,15 @@ class Grid:
 
     def fade(self, inner: tuple[int, int], distance: float) -> NDArray[np.float64]:
         """Return weights that rise from 0 on the centered block `inner` to 1 at `distance` [m]."""
-        return np.clip(self.rings(inner) * (self.cell / max(distance, self.cell)), None, 1.0)
+        rise = self.rings(inner) * (self.cell / max(distance, self.cell))
+        return np.asarray(np.minimum(rise, 1.0), dtype=np.float64)
 
 
-def _distance_to_block(n: int, block: int) -> NDArray[np.int64]:
+def _distance_to_block(n: int, block: int) -> NDArray[np.int32]:
     first = (n - block) // 2
-    index = np.arange(n)
+    index = np.arange(n, dtype=np.int32)
     outside = np.maximum(first - index, index - (first + block - 1))
-    return np.clip(outside, 0, None)
+    return np.maximum(outside, 0)
 
 
 def whole_cells(name: str, length: float, cell: float, *, minimum: int = 1) -> int:

@@ -40,9 +40,9 @@ class ValueNoise:
             nodes = (2 * nodes - 1) * self.amplitude
         else:
             nodes = (np.floor(nodes * (2 * self._levels + 1)) - self._levels) * self.step
-        for k in (0, 1):
-            nodes = _interpolate(nodes, grid.shape[k], axis=k)
-        return nodes
+        along_x = _interpolate(nodes, grid.shape[0])
+        along_y = _interpolate(np.ascontiguousarray(along_x.T), grid.shape[1])
+        return np.ascontiguousarray(along_y.T)
 
     def realized(self, grid: Grid) -> dict[str, Realized]:
         """Return amplitude and spacing as realized on `grid`."""
@@ -64,12 +64,12 @@ class ValueNoise:
         return x, y
 
 
-def _interpolate(nodes: NDArray[np.float64], n: int, axis: int) -> NDArray[np.float64]:
+def _interpolate(nodes: NDArray[np.float64], n: int) -> NDArray[np.float64]:
+    """Return the values at n cells along the first axis, between equidistant nodes."""
     # Elementwise sums, not a matrix product: BLAS may round differently on another machine.
-    position = (np.arange(n) + 0.5) * ((nodes.shape[axis] - 1) / n)
+    position = (np.arange(n) + 0.5) * ((len(nodes) - 1) / n)
     below = position.astype(np.int64)
-    weight = position - below
-    weight = weight[:, None] if axis == 0 else weight
-    low, high = np.take(nodes, below, axis), np.take(nodes, below + 1, axis)
-    between: NDArray[np.float64] = low + weight * (high - low)
+    between = np.diff(nodes, axis=0)[below]
+    between *= (position - below)[:, None]
+    between += nodes[below]
     return between

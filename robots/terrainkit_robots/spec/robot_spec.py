@@ -200,6 +200,22 @@ class RobotSpec(Config):
             raise ConfigError(f"no table by joint {name!r}; there are: {listing(JOINT_TABLES)}")
         return by_joint(getattr(self, name), self.joint_order, name)
 
+    def mirror_joints(self) -> list[MirrorJoint]:
+        """Return the mirror image of each joint, in the order of `joint_order`.
+
+        Raises:
+            ConfigError: if a joint has none, or is not the mirror image of its own.
+        """
+        for name in self.joint_order:
+            pair = self.mirror.get(name, MirrorJoint(joint="nothing", sign=1))
+            image = MirrorJoint(joint=name, sign=pair.sign)
+            if pair.joint not in self.joint_order or self.mirror.get(pair.joint) != image:
+                raise ConfigError(
+                    f"mirror of {self.name}: {name} is paired with {pair.joint}; symmetry expects "
+                    f"a joint that is paired with {name} with the same sign"
+                )
+        return [self.mirror[name] for name in self.joint_order]
+
     @classmethod
     def from_table(
         cls, table: Mapping[str, Any], default: Self | None = None, path: str = ""
