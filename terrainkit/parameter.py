@@ -118,6 +118,11 @@ def length(
     return _field(easy, hard, snap="cells", allows_zero=allows_zero, slopes_away=slopes_away)
 
 
+def size(easy: float, hard: float | None = None) -> Any:
+    """Declare a length of a solid [m], above 0, which does not snap to cells."""
+    return _field(easy, hard, allows_zero=False)
+
+
 def platform(side: float, *, slopes_away: bool = False) -> Any:
     """Declare the side of a square at the center of the patch [m], which stays centered."""
     return _field(side, snap="centered", allows_zero=False, slopes_away=slopes_away)
@@ -156,7 +161,7 @@ def parameters_of(terrain: type) -> Mapping[str, Parameter]:
         if "parameter" not in field.metadata:
             raise ConfigError(
                 f"{terrain.__name__}: {field.name} is a plain field; expected one declared with "
-                "parameter.height, length, platform, grade, scalar, count or switch"
+                "parameter.height, length, size, platform, grade, scalar, count or switch"
             )
     return {f.name: f.metadata["parameter"] for f in dataclasses.fields(terrain)}
 
