@@ -21,9 +21,10 @@ from isometric import isometric, side_by_side
 import terrainkit
 from terrainkit import presets, registry
 from terrainkit.config import MapConfig
+from terrainkit.field_docs import field_docs
 from terrainkit.grid import Grid
 from terrainkit.preview import write_preview
-from terrainkit.schema import Config, field_docs, field_keys, field_types, is_required
+from terrainkit.schema import Config, field_keys, field_types, is_required
 from terrainkit.sub_terrain import SubTerrain
 from terrainkit.terrain_docs import TerrainDoc, terrain_doc
 from terrainkit.toml_text import value_text

@@ -86,6 +86,9 @@ class MapConfig(Config):
     spawn_tolerance: NonNegative = 0.01
     """Largest height difference within that disc [m]."""
 
+    spawn_headroom: NonNegative = 1.0
+    """Height above that disc that is free of solids [m]."""
+
     static_friction: NonNegative = 1.0
     """Static friction coefficient of the ground."""
 

@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from terrainkit import registry
 from terrainkit.config import MapConfig
@@ -13,6 +14,7 @@ from terrainkit.layout import assign_patch, terrain_columns
 from terrainkit.memory import check_memory
 from terrainkit.parameter import parameters_of
 from terrainkit.patch import Patch, build_patch
+from terrainkit.solids import Solids
 from terrainkit.terrain_map import TerrainMap
 
 Progress = Callable[[Iterator[tuple[int, int]], int], Iterator[tuple[int, int]]]
@@ -53,6 +55,8 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
     terrain_types = np.empty(size, dtype=np.int32)
     difficulty = np.empty(size, dtype=np.float32)
     parameters = np.empty(size, dtype=object)
+    solids: list[Solids] = []
+    goals = np.empty(size, dtype=object)
     deviations: Counter[str] = Counter()
     moved_spawns: Counter[str] = Counter()
     indices: Iterator[tuple[int, int]] = iter(np.ndindex(size))
@@ -66,6 +70,8 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
         terrain_types[row, col] = terrain_type
         difficulty[row, col] = level
         parameters[row, col] = patch.parameters
+        solids.append(patch.solids)
+        goals[row, col] = patch.goals
         for name in _deviations(patch, sub_terrain.terrain, config.cell):
             deviations[name] += 1
         moved_spawns[sub_terrain.name] += patch.spawn_offset > config.cell
@@ -79,7 +85,18 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
         terrain_names=tuple(sub_terrain.name for sub_terrain in config.sub_terrains),
         difficulty=difficulty,
         parameters=parameters,
+        solids=Solids.concatenate(solids),
+        goals=_pad_goals(goals),
     )
+
+
+def _pad_goals(goals: NDArray[np.object_]) -> NDArray[np.float32]:
+    """Return the goals of all patches, shape (rows, cols, k, 4), padded with NaN."""
+    number = max(len(each) for each in goals.ravel().tolist())
+    padded = np.full((*goals.shape, number, 4), np.nan, dtype=np.float32)
+    for row, col in np.ndindex(goals.shape):
+        padded[row, col, : len(goals[row, col])] = goals[row, col]
+    return padded
 
 
 def _deviations(patch: Patch, terrain: str, cell: float) -> list[str]:

@@ -61,7 +61,7 @@ class Grid:
         """
         return max(minimum, math.floor(length / self.cell + 0.5 + _CELL_TOLERANCE))
 
-    def length(self, count: int) -> float:
+    def length(self, count: float) -> float:
         """Return the length of `count` cells [m], rounded to a nanometer."""
         return round(count * self.cell, 9)
 
@@ -84,6 +84,10 @@ class Grid:
         """
         x, y = map(_distance_to_block, self.shape, inner)
         return np.maximum.outer(x, y)
+
+    def margins(self, inner: tuple[int, int]) -> tuple[int, int]:
+        """Return the cells along x and y between the centered block `inner` and the edge."""
+        return (self.shape[0] - inner[0]) // 2, (self.shape[1] - inner[1]) // 2
 
     def centered_slices(self, block: tuple[int, int]) -> tuple[slice, slice]:
         """Return the index of the centered block of `block` cells along x and y."""

@@ -6,9 +6,14 @@ import numpy as np
 
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError, TerrainkitWarning, listing
+from terrainkit.terrain import Terrain
 
 _LAYOUT_STREAM = (1,)
 """Spawn key that separates the layout's random numbers from those of the terrain on the patch."""
+
+_COLUMN_STREAM = (2,)
+"""Spawn key of the random numbers of a column. Without it, [seed, col] would equal [seed, col, 0].
+"""
 
 
 def allocate_columns(proportions: list[float], num_columns: int) -> list[int]:
@@ -75,6 +80,19 @@ def assign_patch(config: MapConfig, columns: list[int], row: int, col: int) -> t
     weights = np.array([sub_terrain.proportion for sub_terrain in config.sub_terrains])
     terrain_type = rng.choice(len(weights), p=weights / weights.sum())
     return int(terrain_type), float(rng.choice(config.random_difficulties))
+
+
+def patch_rng(config: MapConfig, terrain: Terrain, row: int, col: int) -> "np.random.Generator":
+    """Return the random number generator of the terrain on patch (row, col).
+
+    It depends on the seed and the patch only. In mode curriculum, all rows of a column share it for
+    terrains with :attr:`~terrainkit.terrain.Terrain.has_column_layout`.
+    """
+    if config.mode == "curriculum" and terrain.has_column_layout:
+        seed = np.random.SeedSequence([config.seed, col], spawn_key=_COLUMN_STREAM)
+    else:
+        seed = np.random.SeedSequence([config.seed, row, col])
+    return np.random.default_rng(seed)
 
 
 def _row_difficulty(config: MapConfig, row: int, col: int) -> float:

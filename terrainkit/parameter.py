@@ -48,6 +48,10 @@ class Parameter:
     is_grade: bool = False
     """Whether it is a rise over run, which must not exceed the map's slope_threshold."""
 
+    slopes_away: bool = False
+    """Whether the ground beyond a flat part may slope. The slope starts at the center of the
+    outermost cell, so the flat part is half a cell shorter on each sloping side."""
+
     allows_range: bool = True
     """Whether the value may be a range (easy, hard)."""
 
@@ -62,22 +66,26 @@ class Parameter:
     def realized(self, value: Value, grid: Grid) -> Realized:
         """Return `value` snapped to the cells of `grid`; a pair (x, y) where the axes differ."""
         if self.snap == "cells":
-            return grid.length(grid.cells(value, minimum=0 if self.allows_zero else 1))
+            count = grid.cells(value, minimum=0 if self.allows_zero else 1)
+            return grid.length(count - self.slopes_away / 2)
         if self.snap == "centered":
-            x, y = map(grid.length, grid.centered(value))
+            x, y = (grid.length(count - self.slopes_away) for count in grid.centered(value))
             return x if x == y else (x, y)
         return value
 
     def deviates(self, requested: Value, realized: Realized, cell: float) -> bool:
         """Return whether `realized` differs from `requested` by more than snapping requires.
 
-        A length may differ by half a cell, and the side of a centered square by one cell. Other
-        values may differ by 5 %, or by `tolerance` unless they became 0.
+        A length may differ by half a cell, and the side of a centered square by one cell; by twice
+        as much where the ground slopes away. Other values may differ by 5 %, or by `tolerance`
+        unless they became 0.
         """
         if realized == requested:
             return False
         values = realized if isinstance(realized, tuple) else (realized,)
         snapping = {"cells": cell / 2, "centered": cell, "none": 0.05 * requested}[self.snap]
+        if self.slopes_away:
+            snapping *= 2
         allowed = max(snapping, self.tolerance if all(values) else 0.0)
         return any(abs(value - requested) > allowed + 1e-6 for value in values)
 
@@ -99,14 +107,25 @@ def height(easy: float, hard: float | None = None, *, tolerance: float = 0.0) ->
     return _field(easy, hard, tolerance=tolerance)
 
 
-def length(easy: float, hard: float | None = None, *, allows_zero: bool = False) -> Any:
+def length(
+    easy: float,
+    hard: float | None = None,
+    *,
+    allows_zero: bool = False,
+    slopes_away: bool = False,
+) -> Any:
     """Declare a horizontal length [m], which snaps to whole cells, at least one by default."""
-    return _field(easy, hard, snap="cells", allows_zero=allows_zero)
+    return _field(easy, hard, snap="cells", allows_zero=allows_zero, slopes_away=slopes_away)
 
 
-def platform(side: float) -> Any:
+def size(easy: float, hard: float | None = None) -> Any:
+    """Declare a length of a solid [m], above 0, which does not snap to cells."""
+    return _field(easy, hard, allows_zero=False)
+
+
+def platform(side: float, *, slopes_away: bool = False) -> Any:
     """Declare the side of a square at the center of the patch [m], which stays centered."""
-    return _field(side, snap="centered", allows_zero=False)
+    return _field(side, snap="centered", allows_zero=False, slopes_away=slopes_away)
 
 
 def scalar(easy: float, hard: float | None = None, *, allows_zero: bool = True) -> Any:
@@ -142,7 +161,7 @@ def parameters_of(terrain: type) -> Mapping[str, Parameter]:
         if "parameter" not in field.metadata:
             raise ConfigError(
                 f"{terrain.__name__}: {field.name} is a plain field; expected one declared with "
-                "parameter.height, length, platform, grade, scalar, count or switch"
+                "parameter.height, length, size, platform, grade, scalar, count or switch"
             )
     return {f.name: f.metadata["parameter"] for f in dataclasses.fields(terrain)}
 

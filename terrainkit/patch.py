@@ -1,5 +1,6 @@
 """Patch: one terrain, built on the grid of its place in a map."""
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -9,10 +10,14 @@ from numpy.typing import NDArray
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
-from terrainkit.layout import assign_patch, terrain_columns
+from terrainkit.layout import assign_patch, patch_rng, terrain_columns
 from terrainkit.parameter import Realized, Value, parameters_of
+from terrainkit.solids import Solids
 from terrainkit.sub_terrain import SubTerrain
 from terrainkit.terrain import Terrain
+
+EDGE_TOLERANCE = 1e-3
+"""Distance by which a solid may extend beyond its patch [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +50,12 @@ class Patch:
     heights: NDArray[np.float32]
     """Heights [m], shape `grid.shape`."""
 
+    solids: Solids
+    """Solids of the patch, in the frame of the map."""
+
+    goals: NDArray[np.float32]
+    """Goals in their order: x, y, z [m] and heading [rad], shape (k, 4)."""
+
     origin: NDArray[np.float32]
     """Spawn origin (x, y, z) [m], shape (3,)."""
 
@@ -75,27 +86,28 @@ def build_patch(
     Raises:
         ConfigError: if the terrain does not fit in the patch, or has no place to spawn.
     """
-    from terrainkit.spawn import find_spawn
+    from terrainkit.spawn import Disc, find_spawn
 
     terrain = sub_terrain.at(difficulty)
     _check_slopes(terrain, config)
     grid = config.patch_grid(row, col)
-    rng = np.random.default_rng(np.random.SeedSequence([config.seed, row, col]))
-    heights = terrain.build(grid, rng)
+    heights = terrain.build(grid, patch_rng(config, terrain, row, col))
+    solids, goals = _solids_and_goals(terrain, grid, heights, config, (row, col))
     preferred = terrain.spawn(grid)
-    origin = find_spawn(
-        heights,
-        grid,
-        preferred,
+    disc = Disc(
         radius=config.spawn_radius,
         tolerance=config.spawn_tolerance,
-        threshold=config.wall_threshold,
+        headroom=config.spawn_headroom,
+    )
+    origin = find_spawn(
+        heights, grid, preferred, disc, solids=solids, threshold=config.wall_threshold
     )
     if origin is None:
         raise ConfigError(
             f"{sub_terrain.name}: no disc of radius {config.spawn_radius:g} m is flat within "
-            f"{config.spawn_tolerance:g} m in a patch of {grid.size[0]:g} m x {grid.size[1]:g} m; "
-            "increase the platform or reduce spawn_radius"
+            f"{config.spawn_tolerance:g} m and free of solids up to {config.spawn_headroom:g} m in "
+            f"a patch of {grid.size[0]:g} m x {grid.size[1]:g} m; increase the platform or reduce "
+            "spawn_radius or spawn_headroom"
         )
     return Patch(
         terrain=sub_terrain.name,
@@ -103,9 +115,52 @@ def build_patch(
         parameters=Parameters(requested=terrain.requested(), realized=terrain.realized(grid)),
         grid=grid,
         heights=heights,
+        solids=solids,
+        goals=goals,
         origin=np.array(origin, dtype=np.float32),
         spawn_offset=max(abs(origin[0] - preferred[0]), abs(origin[1] - preferred[1])),
     )
+
+
+def _solids_and_goals(
+    terrain: Terrain,
+    grid: Grid,
+    heights: NDArray[np.float32],
+    config: MapConfig,
+    patch: tuple[int, int],
+) -> tuple[Solids, NDArray[np.float32]]:
+    """Return the solids and the goals of a terrain on a patch.
+
+    Raises:
+        ConfigError: if a solid extends beyond the patch, or a goal is not on it.
+    """
+    from terrainkit.surface import surface_at
+
+    def rng() -> np.random.Generator:
+        """Return the child of the generator of the heights, in its initial state."""
+        return patch_rng(config, terrain, *patch).spawn(1)[0]
+
+    solids = Solids.empty()
+    if type(terrain).solids is not Terrain.solids:
+        solids = terrain.solids(grid, heights, rng())
+        lower, upper = (corner[:, :2] for corner in solids.bounds())
+        outside = np.maximum(grid.lower - lower, upper - grid.upper).max(initial=0.0)
+        if outside > EDGE_TOLERANCE:
+            raise ConfigError(
+                f"{terrain.kind()}: solids(): got a solid {outside:.3f} m beyond its patch; "
+                "expected solids within it"
+            )
+        numbers = np.tile(np.array(patch, np.int32), (len(solids), 1))
+        solids = dataclasses.replace(solids, patch=numbers)
+    goals = np.empty((0, 4))
+    if type(terrain).goals is not Terrain.goals:
+        goals = np.array(terrain.goals(grid, heights, rng()), dtype=float).reshape(-1, 4)
+        index = (goals[:, :2] - grid.lower) / grid.cell - 0.5
+        if not ((index >= -0.5) & (index <= np.array(grid.shape) - 0.5)).all():
+            raise ConfigError(f"{terrain.kind()}: goals(): got a goal outside of the patch")
+        ground = surface_at(heights, index, threshold=config.wall_threshold).height
+        goals[:, 2] = np.where(np.isnan(goals[:, 2]), ground, goals[:, 2])
+    return solids, goals.astype(np.float32)
 
 
 def _check_slopes(terrain: Terrain, config: MapConfig) -> None:

@@ -1,55 +1,88 @@
 """Find spawn origins on flat ground."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.free_space import CONTACT
 from terrainkit.grid import Grid
+from terrainkit.solid_index import SolidIndex
+from terrainkit.solids import Solids
 from terrainkit.surface import surface_at
+
+
+@dataclass(frozen=True, kw_only=True)
+class Disc:
+    """The free place that a robot needs to be spawned."""
+
+    radius: float
+    """Radius [m]."""
+
+    tolerance: float
+    """Largest difference in height within the disc [m]."""
+
+    headroom: float
+    """Height above the disc that is free of solids [m]."""
 
 
 def find_spawn(
     heights: NDArray[np.float32],
     grid: Grid,
     preferred: tuple[float, float],
+    disc: Disc,
     *,
-    radius: float,
-    tolerance: float,
+    solids: Solids,
     threshold: float,
 ) -> tuple[float, float, float] | None:
     """Return the spawn origin nearest to `preferred`.
 
-    All samples that influence the surface within `radius` of the origin differ by at most
-    `tolerance`. The disc is therefore flat, and no wall or step reaches into it.
+    All samples that influence the surface within the disc around the origin differ by at most its
+    tolerance, and no solid is above the disc within its headroom. The disc is therefore flat, and
+    no wall, step or obstacle reaches into it.
 
     Args:
         heights: Heights on `grid` [m], shape `grid.shape`.
         grid: Grid of the patch; the disc stays inside it.
         preferred: Preferred spawn position, x and y [m].
-        radius: Radius of the disc [m].
-        tolerance: Largest difference in height within the disc [m].
+        disc: The disc.
+        solids: Solids of the patch.
         threshold: Difference between neighboring samples above which there is a wall [m].
 
     Returns:
-        Origin (x, y, z) [m]; None if no disc in the patch is flat.
+        Origin (x, y, z) [m]; None if there is no such disc in the patch.
     """
-    radius_cells = radius / grid.cell
     (x, y), (x0, y0) = preferred, grid.lower
     index = (x - x0) / grid.cell - 0.5, (y - y0) / grid.cell - 0.5
-    if _is_inside(preferred, grid, radius):
-        low, high = _height_range(heights, index, radius_cells)
-        if low == high:
-            return *preferred, high
-        if high - low <= tolerance:
-            # The disc is flat within the tolerance only, so evaluate the surface at its center.
-            ground = surface_at(heights, np.array([index]), threshold=threshold)
-            return *preferred, float(ground.height[0])
-    candidates = _flat_cells(heights, radius_cells, tolerance)
-    if not len(candidates):
+    obstacles = SolidIndex(solids, radius=disc.radius)
+    if _is_inside(preferred, grid, disc.radius):
+        low, z = _height_range(heights, index, disc.radius / grid.cell)
+        if z - low <= disc.tolerance:
+            if low != z:
+                # The disc is flat within the tolerance only: evaluate the surface at its center.
+                z = float(surface_at(heights, np.array([index]), threshold=threshold).height[0])
+            if not len(solids) or _is_free(np.array([[x, y, z]]), obstacles, disc.headroom)[0]:
+                return x, y, z
+    cells = _flat_cells(heights, disc.radius / grid.cell, disc.tolerance)
+    i, j = cells.T
+    origins = np.column_stack([grid.axis(0)[i], grid.axis(1)[j], heights[i, j]])
+    is_free = _is_free(origins, obstacles, disc.headroom)
+    cells, origins = cells[is_free], origins[is_free]
+    if not len(cells):
         return None
-    i, j = candidates[np.argmin(((candidates - index) ** 2).sum(axis=1))]
-    return float(grid.axis(0)[i]), float(grid.axis(1)[j]), float(heights[i, j])
+    x, y, z = origins[np.argmin(((cells - index) ** 2).sum(axis=1))].tolist()
+    return x, y, z
+
+
+def _is_free(
+    origins: NDArray[np.float64], obstacles: SolidIndex, headroom: float
+) -> NDArray[np.bool_]:
+    """Return whether no solid is above each disc within the headroom, shape (n,)."""
+    bottom, top = np.moveaxis(obstacles.spans(origins[:, :2]), -1, 0)
+    z = origins[:, 2:]
+    is_blocked: NDArray[np.bool_] = ((top > z + CONTACT) & (bottom < z + headroom)).any(axis=1)
+    return ~is_blocked
 
 
 def _is_inside(point: tuple[float, float], grid: Grid, radius: float) -> bool:

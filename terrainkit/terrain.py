@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from terrainkit.parameter import (
     convert_parameter,
     parameters_of,
 )
+from terrainkit.solids import Solids
 from terrainkit.text import expected_names
 from terrainkit.type_hint import show
 
@@ -27,14 +28,22 @@ from terrainkit.type_hint import show
 class Terrain(ABC):
     r"""A type of ground with fixed parameters.
 
-    A terrain is a frozen dataclass with one method, :meth:`heights`. It does not depend on a
-    difficulty: :meth:`at` interpolates every range,
+    A terrain is a frozen dataclass with the method :meth:`heights`, and :meth:`solids` and
+    :meth:`goals` where it has any. It does not depend on a difficulty: :meth:`at` interpolates
+    every range,
 
     .. math:: p(d) = (1 - d)\, p_\text{easy} + d\, p_\text{hard},
 
     and returns a terrain with plain numbers. Fields are declared with the functions of
     :mod:`terrainkit.parameter`; the docstring of a field is its help text. A terrain that is
     constructed directly takes the hard end of each range by default.
+    """
+
+    has_column_layout: ClassVar[bool] = False
+    """Whether the rows of a column have the same random numbers in mode curriculum.
+
+    Set it where single random objects decide how hard a patch is. Otherwise a row could be easier
+    than the one before.
     """
 
     def __post_init__(self) -> None:
@@ -150,3 +159,26 @@ class Terrain(ABC):
         stays the same at every difficulty. Leave a flat disc where a robot can be spawned; see
         :mod:`terrainkit.spawn`.
         """
+
+    def solids(
+        self, grid: Grid, heights: NDArray[np.float32], rng: "np.random.Generator"
+    ) -> Solids:
+        """Return the solids on `grid`, in its frame; by default none.
+
+        Args:
+            grid: Grid of the patch; solids must not extend beyond it.
+            heights: Heights of the ground [m], shape `grid.shape`.
+            rng: Generator in the same state as the one of :meth:`goals`, so that both can start
+                by sampling the same layout.
+        """
+        return Solids.empty()
+
+    def goals(
+        self, grid: Grid, heights: NDArray[np.float32], rng: "np.random.Generator"
+    ) -> NDArray[np.floating]:
+        """Return the goals in their order, x, y, z [m] and heading [rad], shape (k, 4).
+
+        A z of NaN stands for the height of the ground. By default there are none. The arguments
+        are those of :meth:`solids`.
+        """
+        return np.empty((0, 4))

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -10,9 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from terrainkit.config import MapConfig
 from terrainkit.curriculum import Assignment, assign_levels, update_levels
 from terrainkit.errors import ConfigError, ExportError
+from terrainkit.free_space import Direction, clearance, first_surface, free_intervals
 from terrainkit.grid import Grid
 from terrainkit.parameter import MAX_VALUE
 from terrainkit.patch import Patch
+from terrainkit.solid_index import SolidIndex
+from terrainkit.solids import Solids
+from terrainkit.type_hint import convert
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -50,6 +55,13 @@ class TerrainMap:
     parameters: NDArray[np.object_]
     """:class:`~terrainkit.patch.Parameters` of each patch, shape (rows, cols)."""
 
+    solids: Solids
+    """Solids of all patches."""
+
+    goals: NDArray[np.float32]
+    """Goals of each patch in their order: x, y, z [m] and heading [rad], shape (rows, cols, k, 4),
+    NaN where a patch has fewer than k."""
+
     def __repr__(self) -> str:
         rows, cols = self.difficulty.shape
         names = ", ".join(self.terrain_names)
@@ -64,7 +76,7 @@ class TerrainMap:
         Returns:
             Heights [m], shape (...). On a wall, the height of one of its sides.
         """
-        points, shape = _points(xy)
+        points, shape = _points("xy", xy, 2)
         return self._surface_at(points).height.reshape(shape)
 
     def normal(self, xy: ArrayLike) -> NDArray[np.float64]:
@@ -76,24 +88,80 @@ class TerrainMap:
         Returns:
             Unit vectors, shape (..., 3). On a wall, the normal of the ground on one of its sides.
         """
-        points, shape = _points(xy)
+        points, shape = _points("xy", xy, 2)
         downhill = 0.0 - self._surface_at(points).gradient / self.grid.cell
         normal = np.column_stack([downhill, np.ones(len(downhill))])
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         return normal.reshape(*shape, 3)
 
-    def mesh(self, *, merged: bool = True, closed: bool = False) -> "TriMesh":
-        """Return the surface as a triangle mesh; see :mod:`terrainkit.mesh`.
+    def scan(self, points: ArrayLike, direction: Direction = "down") -> NDArray[np.float64]:
+        """Return the z of the first surface above or below `points` [m]; NaN where there is none.
+
+        Rays hit the ground and the solids that are visible. A ray that starts inside a solid hits
+        the solid's far side, as MuJoCo's `mj_ray` does.
 
         Args:
-            merged: Merge coplanar faces; otherwise two triangles per cell.
-            closed: Add sides and a bottom to make a watertight solid.
+            points: Starts of the rays [m], shape (..., 3).
+            direction: "down" or "up".
+
+        Raises:
+            ConfigError: if `points` or `direction` is invalid.
+        """
+        direction = convert("direction", direction, Direction)
+        starts, shape = _points("points", points, 3)
+        ground = self._surface_at(starts[:, :2]).height
+        spans = self._visible.spans(starts[:, :2])
+        return first_surface(ground, spans, starts[:, 2], direction).reshape(shape)
+
+    def clearance(self, xy: ArrayLike) -> NDArray[np.float64]:
+        """Return the free height above the ground at `xy` [m], below the solids that collide.
+
+        Args:
+            xy: Points [m], shape (..., 2).
+
+        Returns:
+            Clearance [m], shape (...): inf under the open sky, 0 where a solid covers the ground.
+        """
+        points, shape = _points("xy", xy, 2)
+        ground = self._surface_at(points).height
+        return clearance(ground, self._colliding.spans(points)).reshape(shape)
+
+    def intervals(self, xy: ArrayLike) -> NDArray[np.float64]:
+        """Return the free intervals above the ground at `xy`, between the solids that collide.
+
+        Args:
+            xy: Points [m], shape (..., 2).
+
+        Returns:
+            Floor and ceiling of each interval [m], shape (..., k, 2), upward, padded with NaN. The
+            ceiling of the last interval is inf.
+        """
+        points, shape = _points("xy", xy, 2)
+        ground = self._surface_at(points).height
+        intervals = free_intervals(ground, self._colliding.spans(points))
+        return intervals.reshape(*shape, *intervals.shape[1:])
+
+    def mesh(self, *, merged: bool = True, closed: bool = False) -> "TriMesh":
+        """Return the ground and the solids that collide as a triangle mesh.
+
+        The ground comes first; see :mod:`terrainkit.mesh`.
+
+        Args:
+            merged: Merge coplanar faces of the ground; otherwise two triangles per cell.
+            closed: Return one watertight solid: the ground with sides and a bottom, united with
+                the solids.
         """
         from terrainkit.mesh import closed_mesh, full_mesh, merged_mesh
+        from terrainkit.mesh.solid_mesh import concatenate_meshes, solid_meshes, united
 
         threshold = self.config.wall_threshold
-        mesh = (merged_mesh if merged else full_mesh)(self.heights, self.grid, threshold)
-        return closed_mesh(mesh) if closed else mesh
+        ground = (merged_mesh if merged else full_mesh)(self.heights, self.grid, threshold)
+        if closed:
+            ground = closed_mesh(ground)
+        if not self.solids.collides.any():
+            return ground
+        meshes = [ground, *solid_meshes(self.solids.select(self.solids.collides))]
+        return united(meshes) if closed else concatenate_meshes(meshes)
 
     def boxes(self) -> "BoxDecomposition":
         """Return the level ground as boxes; see :mod:`terrainkit.box_decomposition`."""
@@ -116,8 +184,9 @@ class TerrainMap:
 
         Raises:
             ConfigError: if `vertical_scale` is not above 0.
-            ExportError: if a height does not fit in 16 bits at this scale.
+            ExportError: if the map has solids, or a height does not fit in 16 bits at this scale.
         """
+        self.require_no_solids("a heightfield")
         if not 0 < vertical_scale < np.inf:
             raise ConfigError(f"vertical_scale: got {vertical_scale:g}; expected a number > 0")
         units = np.rint(self.heights.T / vertical_scale)
@@ -148,6 +217,14 @@ class TerrainMap:
                     "run terrainkit check-map for details"
                 )
 
+    def require_no_solids(self, what: str) -> None:
+        """Raise ExportError if the map has solids, which `what` cannot represent."""
+        if len(self.solids):
+            raise ExportError(
+                f"{what} has no solids: got a map with {len(self.solids)}; "
+                "use a mesh (.stl, .ply, .obj, .glb) or MuJoCo (.xml)"
+            )
+
     def patch(self, row: int, col: int) -> Patch:
         """Return patch (row, col); :func:`terrainkit.make_patch` builds one without a map.
 
@@ -157,12 +234,15 @@ class TerrainMap:
         self.config.check_patch(row, col)
         grid = self.config.patch_grid(row, col)
         i, j = self.config.patch_start(row, col)
+        goals = self.goals[row, col]
         return Patch(
             terrain=self.terrain_names[self.terrain_types[row, col]],
             difficulty=float(self.difficulty[row, col]),
             parameters=self.parameters[row, col],
             grid=grid,
             heights=self.heights[i : i + grid.shape[0], j : j + grid.shape[1]],
+            solids=self.solids.select((self.solids.patch == (row, col)).all(axis=1)),
+            goals=goals[~np.isnan(goals[:, 0])],
             origin=self.env_origins[row, col],
         )
 
@@ -214,6 +294,14 @@ class TerrainMap:
 
         return read_map(cls, path)
 
+    @cached_property
+    def _visible(self) -> SolidIndex:
+        return SolidIndex(self.solids.select(self.solids.visible))
+
+    @cached_property
+    def _colliding(self) -> SolidIndex:
+        return SolidIndex(self.solids.select(self.solids.collides))
+
     def _patch_edges(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return the first cell of each patch along x and y, and the end of the last patch."""
         (rows, cols), border = self.difficulty.shape, self.config.border_cells
@@ -227,8 +315,10 @@ class TerrainMap:
         return surface_at(self.heights, index, threshold=self.config.wall_threshold)
 
 
-def _points(xy: ArrayLike) -> tuple[NDArray[np.float64], tuple[int, ...]]:
-    points = np.asarray(xy, dtype=np.float64)
-    if points.shape[-1:] != (2,) or not np.isfinite(points).all():
-        raise ConfigError(f"xy: got shape {points.shape}; expected finite values of shape (..., 2)")
-    return points.reshape(-1, 2), points.shape[:-1]
+def _points(name: str, values: ArrayLike, size: int) -> tuple[NDArray[np.float64], tuple[int, ...]]:
+    points = np.asarray(values, dtype=np.float64)
+    if points.shape[-1:] != (size,) or not np.isfinite(points).all():
+        raise ConfigError(
+            f"{name}: got shape {points.shape}; expected finite values of shape (..., {size})"
+        )
+    return points.reshape(-1, size), points.shape[:-1]

@@ -4,6 +4,7 @@ Everything is recomputed from the map alone. Spawn discs are sampled on the surf
 checked edge by edge and face by face, and each patch is compared with a second build of it.
 """
 
+import dataclasses
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,9 +15,11 @@ from numpy.typing import NDArray
 from terrainkit import registry
 from terrainkit.errors import TerrainkitError, TerrainkitWarning
 from terrainkit.layout import assign_patch, terrain_columns
+from terrainkit.mesh.solid_mesh import concatenate_meshes, solid_meshes
 from terrainkit.mesh.tri_mesh import TriMesh
 from terrainkit.parameter import parameters_of
 from terrainkit.patch import Patch, build_patch
+from terrainkit.solids import Solids
 from terrainkit.terrain_map import TerrainMap
 
 TOLERANCE = 1e-3
@@ -114,12 +117,28 @@ def _compare(patch: Patch, expected: Patch, location: str) -> Iterator[str]:
         )
     if patch.parameters != expected.parameters:
         yield f"{location}: the recorded parameters differ from those of its config"
+    if not _same_solids(patch.solids, expected.solids):
+        yield f"{location}: the solids differ from those of its config"
+    if patch.goals.shape != expected.goals.shape or not np.allclose(
+        patch.goals, expected.goals, atol=TOLERANCE
+    ):
+        yield f"{location}: the goals differ from those of its config"
     error = float(np.abs(patch.heights - expected.heights).max())
     if error > TOLERANCE:
         yield (
             f"{location}: heights differ by up to {error:.3f} m from the {expected.terrain} of its "
             "config: edited, moved, or with axes swapped"
         )
+
+
+def _same_solids(solids: Solids, expected: Solids) -> bool:
+    return all(
+        values.shape == wanted.shape and np.allclose(values, wanted, atol=TOLERANCE, equal_nan=True)
+        for values, wanted in (
+            (getattr(solids, field.name), getattr(expected, field.name))
+            for field in dataclasses.fields(Solids)
+        )
+    )
 
 
 def _check_realized(terrain_map: TerrainMap) -> Iterator[str]:
@@ -156,6 +175,9 @@ def _check_spawn(terrain_map: TerrainMap) -> Iterator[str]:
         if (origin[:2] < grid.lower).any() or (origin[:2] > grid.upper).any():
             yield f"{subject} is outside the patch"
         ground = terrain_map.height(origin[:2] + disc)
+        free = terrain_map.clearance(origin[:2] + disc).min()
+        if free < config.spawn_headroom - TOLERANCE:
+            yield (f"{subject} has {free:.3f} m of headroom; expected {config.spawn_headroom:g} m")
         above = float(origin[2] - terrain_map.height(origin[:2]))
         if abs(above) > TOLERANCE:
             yield f"{subject} is {abs(above):.3f} m {'above' if above > 0 else 'below'} the ground"
@@ -169,6 +191,15 @@ def _check_spawn(terrain_map: TerrainMap) -> Iterator[str]:
 
 def _check_mesh(terrain_map: TerrainMap, mesh: TriMesh) -> Iterator[str]:
     grid = terrain_map.grid
+    solids = terrain_map.solids.select(terrain_map.solids.collides)
+    if len(solids):
+        expected_mesh = concatenate_meshes(solid_meshes(solids))
+        mesh, solid_part = _split(mesh, len(expected_mesh.vertices), len(expected_mesh.triangles))
+        if solid_part.triangles.tolist() != expected_mesh.triangles.tolist() or not np.allclose(
+            solid_part.vertices, expected_mesh.vertices, atol=TOLERANCE
+        ):
+            yield "the last faces of the mesh differ from the solids of the map"
+            return
     a, b, c = (mesh.vertices[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
     normal = np.cross(b - a, c - a)
     area = np.linalg.norm(normal, axis=1) / 2
@@ -193,6 +224,16 @@ def _check_mesh(terrain_map: TerrainMap, mesh: TriMesh) -> Iterator[str]:
             f"the mesh differs from the heights by up to {error.max():.3f} m, "
             f"most at ({x:.2f}, {y:.2f})"
         )
+
+
+def _split(mesh: TriMesh, num_vertices: int, num_triangles: int) -> tuple[TriMesh, TriMesh]:
+    """Return the first part of a mesh, and its last vertices and triangles as a mesh."""
+    nv, nf = len(mesh.vertices) - num_vertices, len(mesh.triangles) - num_triangles
+    first, last = mesh.triangles[: max(nf, 0)], mesh.triangles[max(nf, 0) :]
+    return (
+        TriMesh(vertices=mesh.vertices[: max(nv, 0)], triangles=first),
+        TriMesh(vertices=mesh.vertices[max(nv, 0) :], triangles=last - np.int32(max(nv, 0))),
+    )
 
 
 def _check_edges(terrain_map: TerrainMap, mesh: TriMesh) -> Iterator[str]:

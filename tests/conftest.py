@@ -39,7 +39,7 @@ def level_map():
             cols=3,
             patch_size=(6.0, 4.0),
             border=0.5,
-            seed=3,
+            seed=32,
             terrains=(
                 SubTerrain(terrain="stairs", parameters={"step_height": (0.1, 0.2)}),
                 SubTerrain(terrain="obstacles", parameters={"height": (0.2, 0.4), "platform": 1.5}),

@@ -42,8 +42,7 @@ class PolicyCommand(Command):
     policy."""
 
     terrain: Annotated[str, text_option("TERRAIN")] = ""
-    """plane, a map (.npz), a map config (.toml), or a MuJoCo model (.xml); by default, the terrain
-    of the training."""
+    """plane, a map (.npz), or a map config (.toml); by default, the terrain of the training."""
 
     command: Annotated[
         tuple[float, float, float],

@@ -107,11 +107,13 @@ class Export(Command):
 
         require_training("onnx", "onnxruntime")
         from terrainkit_robots.policy.export import export_policy
-        from terrainkit_robots.rl.run import is_shipped, open_run
+        from terrainkit_robots.rl.run import open_run
+        from terrainkit_robots.rl.tasks import get_task
 
         run = open_run(self.source, optional_number(self.checkpoint))
         default = run.folder / "exported"
-        if is_shipped(run):
+        if run.folder.resolve() == get_task(run.info.robot).trained_run.resolve():
+            # The folder of a bundled policy is part of an installed package.
             default = Path(f"{run.folder.name}_policy")
         folder = Path(self.output) if self.output else default
         result = export_policy(run, folder, overwrite=self.overwrite)

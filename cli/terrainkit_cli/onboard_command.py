@@ -131,7 +131,7 @@ class Onboard(Command):
             force=self.force,
             overwrite=self.overwrite,
             render_images=self.pictures,
-            cache_dir=cache_folder(),
+            cache_dir=cache_folder() if self.collision == "coacd" else None,
             progress=partial(steps.bar, of="collision meshes"),
             on_step=steps.update,
         )

@@ -17,7 +17,7 @@ from terrainkit_cli.training_extra import require_training
 if TYPE_CHECKING:
     from terrainkit_robots.rl.config import Task
     from terrainkit_robots.rl.run import Run
-    from terrainkit_robots.rl.train import TrainResult
+    from terrainkit_robots.rl.runner import LeggedRunner
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +40,7 @@ class Train(TaskCommand):
     }
 
     terrain: Annotated[str, text_option("TERRAIN")] = ""
-    """plane (the default), a map (.npz), a map config (.toml), or a MuJoCo model (.xml)."""
+    """plane (the default), a map (.npz), or a map config (.toml)."""
 
     log_dir: Annotated[str, text_option("FOLDER")] = ""
     """Folder of the run, new or empty; by default logs/ROBOT/DATE-TIME."""
@@ -71,7 +71,7 @@ class Train(TaskCommand):
         run = self._resume_run
         robot, terrain, task = self._robot(run), self._terrain(run), self.changed_config()
         with stop_on_signals() as stop_signal, render.training() as show_progress:
-            result = train(
+            runner = train(
                 robot,
                 terrain,
                 task,
@@ -81,8 +81,9 @@ class Train(TaskCommand):
                 progress_callback=show_progress,
                 should_stop=stop_signal,
             )
-            number = stop_signal() if result.iteration < task.runner.max_iterations else 0
-        _print_result(result, task)
+            completed = runner.current_learning_iteration
+            number = stop_signal() if completed < task.runner.max_iterations else 0
+        _print_result(runner, task)
         return 128 + number if number else 0
 
     @cached_property  # read once: training may write a checkpoint in between
@@ -106,16 +107,16 @@ class Train(TaskCommand):
         return self.terrain or ("plane" if run is None else run.terrain)
 
 
-def _print_result(result: "TrainResult", task: "Task") -> None:
+def _print_result(runner: "LeggedRunner", task: "Task") -> None:
     """Print the result and the next commands."""
-    if result.folder is None:  # only the first of several processes prints
+    if runner.folder is None:  # only the first of several processes prints
         return
     from terrainkit_robots.text import count
 
-    run = quote(str(result.folder))
+    run, completed = quote(str(runner.folder)), runner.current_learning_iteration
     whole = task.runner.max_iterations
-    if result.iteration < whole:
-        render.result(f"stopped after {result.iteration} of {whole} iterations: {run}")
+    if completed < whole:
+        render.result(f"stopped after {completed} of {whole} iterations: {run}")
         render.result(f"continue: terrainkit train --resume {run}")
         return
     render.result(f"trained {count(whole, 'iteration')}: {run}")

@@ -5,8 +5,8 @@ import os
 
 from terrainkit.errors import ConfigError
 
-_PACKAGES = ("torch", "rsl_rl", "tensordict", "tensorboard")
-"""Packages that training imports."""
+_PACKAGES = ("torch", "rsl_rl", "tensordict", "tensorboard", "mujoco.batch")
+"""Packages that training imports; MuJoCo has `batch` since version 3.17."""
 
 
 def require_training(*packages: str) -> None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from terrainkit.box_decomposition import BoxDecomposition, flat_cells, neighborhood
 from terrainkit.memory import check_memory
 from terrainkit.mesh.closed import THICKNESS
+from terrainkit.solids import Solids
 from terrainkit.surface import HeightfieldSurface
 from terrainkit.type_hint import convert
 
@@ -73,6 +74,7 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
             _add_hfield(asset, body, terrain_map, without_boxes(terrain_map.heights, cover))
         for box in zip(cover.centers, cover.half_sizes, strict=True):
             _add_box(body, *box)
+    _add_solids(asset, body, terrain_map.solids)
     ET.indent(root)
     ET.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
 
@@ -184,6 +186,36 @@ def without_boxes(heights: NDArray[np.float32], cover: BoxDecomposition) -> NDAr
 def _add_box(body: ET.Element, center: NDArray[np.float64], half_size: NDArray[np.float64]) -> None:
     position, size = _numbers(*center), _numbers(*half_size)
     ET.SubElement(body, "geom", {"class": "terrain"}, type="box", pos=position, size=size)
+
+
+def _add_solids(asset: ET.Element, body: ET.Element, solids: Solids) -> None:
+    """Add one geom for each solid. Rays of group 3 are off by default, as for hidden geoms."""
+    hulls = solids.hulls()
+    for k, vertices in enumerate(hulls):
+        text = _numbers(*vertices.ravel())
+        ET.SubElement(asset, "mesh", name=f"solid_{k}", vertex=text, inertia="convex")
+    shapes = [("box", [3, 4, 5], row) for row in solids.boxes]
+    shapes += [("cylinder", [3, 5], row) for row in solids.cylinders]
+    attributes = [
+        {
+            "type": kind,
+            "pos": _numbers(*row[:3]),
+            "size": _numbers(*row[size]),
+            "quat": _numbers(*row[6:]),
+        }
+        for kind, size, row in shapes
+    ]
+    attributes += [{"type": "mesh", "mesh": f"solid_{k}"} for k in range(len(hulls))]
+    flags = zip(solids.friction, solids.collides, solids.visible, strict=True)
+    for given, (friction, collides, visible) in zip(attributes, flags, strict=True):
+        geom = ET.SubElement(body, "geom", {"class": "terrain", **given})
+        if not np.isnan(friction):
+            geom.set("friction", _numbers(friction, 0.005, 0.0001))
+        if not collides:
+            geom.set("contype", "0")
+            geom.set("conaffinity", "0")
+        if not visible:
+            geom.set("group", "3")
 
 
 def _numbers(*values: float) -> str:

@@ -18,6 +18,7 @@ from terrainkit.mesh.node_grid import BYTES_PER_NODE
 from terrainkit.mesh.tri_mesh import TriMesh
 from terrainkit.parameter import MAX_VALUE, Realized, Value, parameters_of
 from terrainkit.patch import Parameters
+from terrainkit.solids import Solids
 
 if TYPE_CHECKING:
     from terrainkit.terrain_map import TerrainMap
@@ -28,6 +29,24 @@ FORMAT_VERSION = 1
 
 MAX_FACES_PER_SAMPLE = 20
 """Upper bound of the triangles and vertices of a mesh per sample of its map."""
+
+MAX_SOLID_BYTES = 1 << 30
+"""Upper bound of an array of solids [bytes]."""
+
+MAX_GOALS = 1000
+"""Largest number of goals of a patch."""
+
+_SOLIDS = {
+    "boxes": "boxes",
+    "cylinders": "cylinders",
+    "hull_vertices": "hull_vertices",
+    "hull_counts": "hull_counts",
+    "solid_friction": "friction",
+    "solid_collides": "collides",
+    "solid_visible": "visible",
+    "solid_patch": "patch",
+}
+"""Field of :class:`Solids` by key of the file."""
 
 MAX_PATCH_RECORD_BYTES = 8192
 """Upper bound of the parameters of a patch as JSON [bytes]."""
@@ -56,7 +75,8 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
         "difficulty": terrain_map.difficulty,
         "vertices": mesh.vertices,
         "triangles": mesh.triangles,
-        "boxes": np.empty((0, 10), dtype=np.float32),
+        **{key: getattr(terrain_map.solids, name) for key, name in _SOLIDS.items()},
+        "goals": terrain_map.goals,
         "config": np.array(config.to_toml()),
         "parameters": np.array(_parameters_text(terrain_map)),
         "friction": np.array([config.static_friction, config.dynamic_friction]),
@@ -90,11 +110,6 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
             raise MapFileError(
                 f"{path}: terrain_types: got an index out of range; expected 0 to {len(names) - 1}"
             )
-        solids = len(archive.array("boxes", "f4", (None, 10), limit=MAX_TEXT_BYTES))
-        if solids:
-            raise MapFileError(
-                f"{path}: got {solids} solids; this version of terrainkit reads none"
-            )
         return cls(
             config=config,
             grid=grid,
@@ -104,6 +119,8 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
             terrain_names=tuple(str(name) for name in names),
             difficulty=archive.array("difficulty", "f4", size),
             parameters=_all_parameters(archive, config, terrain_types),
+            solids=_read_solids(archive, size),
+            goals=_read_goals(archive, size),
         )
 
 
@@ -138,6 +155,55 @@ def _config(archive: Archive) -> MapConfig:
         return MapConfig.from_toml(archive.text("config"))
     except ConfigError as error:
         raise MapFileError(f"{archive.path}: config: {error}") from error
+
+
+def _read_solids(archive: Archive, size: tuple[int, int]) -> Solids:
+    """Return the solids of a map of `size` patches; maps of terrainkit 0.1 have none."""
+    if "solid_patch" not in archive.names():
+        return Solids.empty()
+
+    def read(key: str, kind: str, *shape: int | None) -> NDArray[Any]:
+        return archive.array(key, kind, shape, limit=MAX_SOLID_BYTES)
+
+    boxes, cylinders = (read(key, "f4", None, 10) for key in ("boxes", "cylinders"))
+    vertices, counts = read("hull_vertices", "f4", None, 3), read("hull_counts", "i4", None)
+    number = len(boxes) + len(cylinders) + len(counts)
+    solids = Solids(
+        boxes=boxes,
+        cylinders=cylinders,
+        hull_vertices=vertices,
+        hull_counts=counts,
+        friction=read("solid_friction", "f4", number),
+        collides=read("solid_collides", "b1", number),
+        visible=read("solid_visible", "b1", number),
+        patch=read("solid_patch", "i4", number, 2),
+    )
+    shapes = np.concatenate([boxes, cylinders])
+    is_valid = {
+        "boxes and cylinders": (np.abs(shapes) <= MAX_VALUE).all()
+        and (shapes[:, 3:6] > 0).all()
+        and (np.abs(np.linalg.norm(shapes[:, 6:], axis=1) - 1) < 1e-3).all(),
+        "hulls": (np.abs(vertices) <= MAX_VALUE).all()
+        and (counts >= 4).all()
+        and counts.sum(dtype=np.int64) == len(vertices),
+        "solid_friction": not (solids.friction < 0).any() and not np.isinf(solids.friction).any(),
+        "solid_patch": ((solids.patch >= 0) & (solids.patch < size)).all(),
+    }
+    for key, valid in is_valid.items():
+        if not valid:
+            raise MapFileError(f"{archive.path}: {key}: got invalid values or sizes")
+    return solids
+
+
+def _read_goals(archive: Archive, size: tuple[int, int]) -> NDArray[np.float32]:
+    """Return the goals of a map of `size` patches; maps of terrainkit 0.1 have none."""
+    if "goals" not in archive.names():
+        return np.empty((*size, 0, 4), dtype=np.float32)
+    limit = math.prod(size) * MAX_GOALS * 16
+    goals = archive.array("goals", "f4", (*size, None, 4), limit=limit)
+    if not (np.isnan(goals).all(axis=-1) | (np.abs(goals) <= MAX_VALUE).all(axis=-1)).all():
+        raise MapFileError(f"{archive.path}: goals: got values that are not finite")
+    return goals
 
 
 def _parameters_text(terrain_map: "TerrainMap") -> str:

@@ -26,10 +26,12 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
         path: Target; the sidecar has the same name with the suffix .json.
 
     Raises:
-        ExportError: if the height range is too large for millimeter accuracy in 16 bits.
+        ExportError: if the map has solids, or the height range is too large for millimeter
+            accuracy in 16 bits.
     """
     import cv2
 
+    terrain_map.require_no_solids("an image of heights")
     heights, config = terrain_map.heights, terrain_map.config
     low = float(heights.min())
     scale = (float(heights.max()) - low) / np.iinfo(np.uint16).max

@@ -27,8 +27,7 @@ class Gap(Terrain):
     def realized(self, grid: Grid) -> dict[str, Realized]:
         """Return the realized parameters: the gap ends at the edge of the patch."""
         width, block = grid.cells(self.width, minimum=0), grid.centered(self.platform)
-        available = ((n - b) // 2 for n, b in zip(grid.shape, block, strict=True))
-        x, y = (grid.length(min(width, cells)) for cells in available)
+        x, y = (grid.length(min(width, margin)) for margin in grid.margins(block))
         return super().realized(grid) | {"width": x if x == y else (x, y)}
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:

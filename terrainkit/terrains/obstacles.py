@@ -1,6 +1,7 @@
 """Random rectangular obstacles."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +16,11 @@ from terrainkit.terrain import Terrain
 class Obstacles(Terrain):
     """Rectangular blocks and trenches at random positions around a flat platform.
 
-    Each height or depth is `height` or half of it. Later obstacles overwrite earlier ones.
+    Each height or depth is `height` or half of it. Later obstacles overwrite earlier ones. In mode
+    curriculum, the rows of a column differ only in `height`.
     """
+
+    has_column_layout: ClassVar[bool] = True
 
     height: float = parameter.height(0.05, 0.25)
     """Height of the highest block and depth of the deepest trench [m]."""

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
+from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.terrain import Terrain
 
@@ -14,13 +15,14 @@ from terrainkit.terrain import Terrain
 class PyramidSlope(Terrain):
     """Four slopes of constant grade around a central platform.
 
-    The lowest part of the rim is at height 0; if inverted, the highest.
+    The slopes end at height 0. On a patch that is not square, they are as long on every side as
+    the shorter side permits, and the ground beyond them is flat.
     """
 
     grade: float = parameter.grade(0.0, 0.4)
     """Rise over run of the sides."""
 
-    platform: float = parameter.platform(3.0)
+    platform: float = parameter.platform(3.0, slopes_away=True)
     """Side of the flat square at the center [m]."""
 
     inverted: bool = parameter.switch()
@@ -28,6 +30,14 @@ class PyramidSlope(Terrain):
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the slopes, which fall by `grade * cell` from ring to ring."""
-        rings = grid.rings(grid.centered(self.platform))
-        rise: NDArray[np.floating] = self.grade * grid.cell * (rings.max() - rings)
+        platform = grid.centered(self.platform)
+        run = min(grid.margins(platform))
+        if run == 0:
+            raise ConfigError(
+                f"pyramid_slope: a platform of {self.platform:g} m leaves no slope in a patch of "
+                f"{grid.size[0]:g} m x {grid.size[1]:g} m"
+            )
+        rise: NDArray[np.floating] = (
+            self.grade * grid.cell * np.maximum(run - grid.rings(platform), 0)
+        )
         return -rise if self.inverted else rise

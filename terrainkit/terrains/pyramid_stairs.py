@@ -16,7 +16,7 @@ class PyramidStairs(Terrain):
     """Square steps of constant height and width around a central platform.
 
     The outermost tread is at height 0. It is at least as wide as the others, since it takes the
-    remaining cells.
+    remaining cells. On a patch that is not square, the shorter side determines the number of steps.
     """
 
     step_height: float = parameter.height(0.05, 0.23)
@@ -34,8 +34,8 @@ class PyramidStairs(Terrain):
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the treads, counted outward from the platform."""
         width = grid.cells(self.step_width)
-        rings = grid.rings(grid.centered(self.platform))
-        risers = rings.max() // width
+        platform = grid.centered(self.platform)
+        rings, risers = grid.rings(platform), min(grid.margins(platform)) // width
         if risers == 0:
             raise ConfigError(
                 f"pyramid_stairs: no step of {self.step_width:g} m fits between the platform of "

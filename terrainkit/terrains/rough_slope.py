@@ -15,7 +15,10 @@ from terrainkit.terrains.pyramid_slope import PyramidSlope
 
 @dataclass(frozen=True, kw_only=True)
 class RoughSlope(Terrain):
-    """A pyramid slope with uniform noise on its sides; the platform is flat."""
+    """A pyramid slope with uniform noise on its sides; the platform is flat.
+
+    The rim of the patch is at height 0, plus the noise.
+    """
 
     grade: float = parameter.grade(0.0, 0.4)
     """Rise over run of the sides without the noise."""
@@ -29,7 +32,7 @@ class RoughSlope(Terrain):
     spacing: float = parameter.scalar(0.2, allows_zero=False)
     """Distance between two random heights [m]; heights in between are interpolated."""
 
-    platform: float = parameter.platform(3.0)
+    platform: float = parameter.platform(3.0, slopes_away=True)
     """Side of the flat square at the center [m]."""
 
     inverted: bool = parameter.switch()

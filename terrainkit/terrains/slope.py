@@ -1,4 +1,4 @@
-"""A straight slope."""
+"""A slope up and down along x."""
 
 from dataclasses import dataclass
 
@@ -13,26 +13,27 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class Slope(Terrain):
-    """A slope along x, from a flat start to a flat landing of the same length.
+    """A slope up and down along x, between flat strips of the same length at both ends.
 
-    The robot is spawned at low x. The slope spans the whole width of the patch.
+    The robot is spawned at low x. The ridge is in the middle and spans the width of the patch. Both
+    ends are at height 0; the sides along x end at a cliff unless the next column is the same.
     """
 
     grade: float = parameter.grade(0.0, 0.4)
     """Rise over run of the slope."""
 
-    landing: float = parameter.length(2.0)
-    """Length along x of the flat strips at both ends [m]."""
+    landing: float = parameter.length(2.0, slopes_away=True)
+    """Length along x of the flat strip at each end [m]."""
 
     inverted: bool = parameter.switch()
-    """Descend along x instead of climbing."""
+    """Invert the heights: a valley instead of a ridge."""
 
     def spawn(self, grid: Grid) -> tuple[float, float]:
         """Return the center of the flat start."""
         return grid.lower[0] + grid.length(grid.cells(self.landing)) / 2, grid.center[1]
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return a clipped ramp, which is constant along y."""
+        """Return the slopes, which are constant along y and change by `grade * cell` per cell."""
         landing = grid.cells(self.landing)
         run = grid.shape[0] - 2 * landing
         if run < 1:
@@ -40,6 +41,6 @@ class Slope(Terrain):
                 f"slope: two landings of {self.landing:g} m leave no slope in a patch "
                 f"{grid.size[0]:g} m long"
             )
-        steps = np.clip(np.arange(grid.shape[0]) - landing + 1, 0, run)
-        rise = self.grade * grid.cell * steps
+        from_end = np.minimum(np.arange(grid.shape[0]), np.arange(grid.shape[0])[::-1])
+        rise = self.grade * grid.cell * np.maximum(from_end - landing + 1, 0)
         return np.broadcast_to((-rise if self.inverted else rise)[:, None], grid.shape)

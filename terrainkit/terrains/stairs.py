@@ -1,4 +1,4 @@
-"""A straight flight of stairs."""
+"""Stairs up and down along x."""
 
 from dataclasses import dataclass
 
@@ -13,9 +13,11 @@ from terrainkit.terrain import Terrain
 
 @dataclass(frozen=True, kw_only=True)
 class Stairs(Terrain):
-    """One flight of stairs along x, from a flat start to a flat landing at least as long.
+    """A flight of stairs up and one down along x, between flat strips at both ends.
 
-    The robot is spawned at low x. The steps span the whole width of the patch.
+    The robot is spawned at low x. The steps span the width of the patch, and the top step takes the
+    remaining cells. Both ends are at height 0; the sides along x end at a cliff unless the next
+    column is the same.
     """
 
     step_height: float = parameter.height(0.05, 0.23)
@@ -25,25 +27,25 @@ class Stairs(Terrain):
     """Run of a step [m]."""
 
     landing: float = parameter.length(2.0)
-    """Length along x of the flat start, and minimum length of the landing [m]."""
+    """Length along x of the flat strip at each end [m]."""
 
     inverted: bool = parameter.switch()
-    """Descend along x instead of climbing."""
+    """Invert the heights: descend first, then climb."""
 
     def spawn(self, grid: Grid) -> tuple[float, float]:
         """Return the center of the flat start."""
         return grid.lower[0] + grid.length(grid.cells(self.landing)) / 2, grid.center[1]
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return the treads: a riser at the end of the start, and one every `step_width`."""
+        """Return the treads, counted from the flat strips at both ends."""
         landing, width = grid.cells(self.landing), grid.cells(self.step_width)
-        run = grid.shape[0] - 2 * landing
-        if run < 0:
+        top = grid.shape[0] - 2 * landing
+        if top < width:
             raise ConfigError(
-                f"stairs: two landings of {self.landing:g} m do not fit in a patch "
-                f"{grid.size[0]:g} m long"
+                f"stairs: two landings of {self.landing:g} m leave no step of "
+                f"{self.step_width:g} m in a patch {grid.size[0]:g} m long"
             )
-        risers = run // width + 1
-        treads = np.clip((np.arange(grid.shape[0]) - landing) // width + 1, 0, risers)
-        rise = self.step_height * treads
+        risers = (top - width) // (2 * width) + 1
+        from_end = np.minimum(np.arange(grid.shape[0]), np.arange(grid.shape[0])[::-1])
+        rise = self.step_height * np.clip((from_end - landing) // width + 1, 0, risers)
         return np.broadcast_to((-rise if self.inverted else rise)[:, None], grid.shape)

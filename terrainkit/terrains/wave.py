@@ -16,7 +16,7 @@ from terrainkit.terrain import Terrain
 class Wave(Terrain):
     """The product of sine waves along x and y, with a flat platform at the center.
 
-    The patch is a whole number of waves, so its rim is at height 0.
+    A whole number of waves fits between the outermost samples, which are at height 0.
     """
 
     amplitude: float = parameter.height(0.0, 0.2)
@@ -25,7 +25,7 @@ class Wave(Terrain):
     number: int = parameter.count(4)
     """Waves along each side of the patch."""
 
-    platform: float = parameter.platform(1.5)
+    platform: float = parameter.platform(1.5, slopes_away=True)
     """Side of the flat square at the center [m]."""
 
     def realized(self, grid: Grid) -> dict[str, Realized]:
@@ -35,7 +35,7 @@ class Wave(Terrain):
 
     def _waves(self, grid: Grid) -> list[NDArray[np.float64]]:
         # Rounded, since the last digits of a sine depend on the C library.
-        phases = [2 * np.pi * self.number * (np.arange(n) + 0.5) / n for n in grid.shape]
+        phases = [2 * np.pi * self.number * np.arange(n) / max(n - 1, 1) for n in grid.shape]
         return [np.asarray(np.sin(phase).round(9), dtype=np.float64) for phase in phases]
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:

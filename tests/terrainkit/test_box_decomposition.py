@@ -129,16 +129,19 @@ def test_boxes_of_inverted_pyramid_are_four_per_step():
 
 
 @pytest.mark.parametrize("inverted", [False, True])
-def test_boxes_of_stairs_are_one_per_tread(inverted):
+def test_boxes_of_stairs_are_one_per_height(inverted):
     stairs = patch("stairs", step_height=0.2, step_width=0.4, landing=1.0, inverted=inverted)
-    assert len(stairs.boxes().centers) == len(np.unique(stairs.heights))
+    treads = 2 * len(np.unique(stairs.heights)) - 1
+    # Each height is one box under all higher ones, or one tread of a valley.
+    assert len(stairs.boxes().centers) == (treads if inverted else len(np.unique(stairs.heights)))
 
 
-def test_boxes_of_a_slope_are_its_level_ends():
+def test_boxes_of_a_slope_cover_its_flat_ends():
     cover = patch("slope", grade=0.3, landing=1.5).boxes()
-    assert len(cover.centers) == 2
-    # From the last of 15 cells that leans upwards to the first that is as high as the landing.
-    assert np.flatnonzero(~cover.covered.all(axis=1)).tolist() == list(range(14, 45))
+    # Both ends are at height 0, so one box reaches under the slope from one to the other.
+    assert len(cover.centers) == 1
+    # From the last of 15 flat cells, where the slope starts, to the first at the other end.
+    assert np.flatnonzero(~cover.covered.all(axis=1)).tolist() == list(range(14, 46))
 
 
 def test_boxes_of_many_heights_match():

@@ -12,6 +12,7 @@ import pytest
 from terrainkit import MapConfig, SubTerrain, TerrainkitWarning, generate, make_patch
 from terrainkit.config import Mode
 from terrainkit.errors import ConfigError, MemoryLimitError, TerrainkitError
+from terrainkit.measured_difficulty import measured_difficulty
 
 OBSTACLES, ROUGH, STAIRS = (SubTerrain(terrain=name) for name in ("obstacles", "rough", "stairs"))
 NUMBERS = [field.name for field in fields(MapConfig) if field.type in (float, float | None)]
@@ -28,7 +29,7 @@ def test_generate_default_map_has_golden_bytes():
     terrain_map = generate(MapConfig())
     assert terrain_map.heights.shape == (1300, 1300)
     assert sha256(terrain_map) == (
-        "abe5b051a3f58204bab0afe4da0f02592148a74d3075fe73252fbf173b0f6ff8"
+        "b15d85142bd7b58ba65b0fbfdb4ba15a967acbfe69d06f7b6c90547b190d9d6d"
     )
 
 
@@ -92,6 +93,26 @@ def test_generate_more_rows_keep_the_first_ones():
     few = MapConfig(rows=2, cols=2, border=0.0, terrains=(OBSTACLES,))
     many = MapConfig(rows=5, cols=3, border=0.0, terrains=(OBSTACLES,))
     assert make_patch(few, 0, 1).heights.tobytes() == make_patch(many, 0, 1).heights.tobytes()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_generate_obstacles_differ_only_in_height_along_column(seed):
+    terrain_map = generate(MapConfig(rows=4, cols=3, border=0.0, terrains=(OBSTACLES,), seed=seed))
+    easy, *_, hard = (terrain_map.patch(row, 1).heights for row in range(4))
+    assert easy.any()
+    assert hard == pytest.approx(5 * easy, abs=1e-6)  # 0.05 and 0.25 m
+    assert (terrain_map.patch(0, 0).heights != easy).any()
+    for col in range(3):
+        patches = [terrain_map.patch(row, col) for row in range(4)]
+        hard = [measured_difficulty(p.heights, 0.1, float(p.origin[2])) for p in patches]
+        assert np.diff(hard).min() > 0
+
+
+@pytest.mark.parametrize("mode", ["selected", "randomized"])
+def test_generate_obstacles_differ_by_row_without_curriculum(mode):
+    config = MapConfig(rows=2, cols=1, border=0.0, terrains=(OBSTACLES,), mode=mode)
+    first, second = (generate(config).patch(row, 0).heights != 0 for row in (0, 1))
+    assert (first != second).any()
 
 
 def test_generate_centered_only_moves_the_map():
@@ -198,5 +219,5 @@ def test_generate_warns_once_of_missing_columns():
 
 
 def test_generate_rejects_terrain_that_does_not_fit():
-    with pytest.raises(ConfigError, match=r"stairs: two landings of 2 m do not fit in a patch 3 m"):
+    with pytest.raises(ConfigError, match=r"stairs: two landings of 2 m leave no step"):
         generate(MapConfig(patch_size=(3.0, 3.0), terrains=(STAIRS,)))

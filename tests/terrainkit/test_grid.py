@@ -168,3 +168,7 @@ def test_whole_cells_lists_nearest_lengths():
 def test_whole_cells_rejects_uncountable_lengths(length):
     with pytest.raises(ConfigError, match=r"border .* is too many cells of 0\.1 m"):
         whole_cells("border", length, 0.1)
+
+
+def test_grid_margins_are_cells_beyond_the_block():
+    assert Grid(shape=(80, 41), cell=0.1).margins((30, 31)) == (25, 5)

@@ -129,3 +129,13 @@ def test_convert_parameter_rejects_invalid_values(name, value, message):
 )
 def test_convert_parameter_accepts_limits_and_numpy_scalars(name, value):
     parameter.convert_parameter("hurdle", name, value, HURDLE[name])
+
+
+def test_realized_length_is_shorter_where_ground_slopes_away():
+    grid = Grid(shape=(80, 51), cell=0.1)
+    length = parameter.Parameter(easy=1.0, hard=1.0, snap="cells", slopes_away=True)
+    square = parameter.Parameter(easy=1.0, hard=1.0, snap="centered", slopes_away=True)
+    assert length.realized(2.0, grid) == 1.95
+    assert square.realized(2.0, grid) == (1.9, 2.0)
+    assert not square.deviates(2.0, (1.9, 1.8), 0.1)
+    assert square.deviates(2.0, (1.9, 1.7), 0.1)

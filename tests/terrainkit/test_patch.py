@@ -6,6 +6,7 @@ import pytest
 from terrainkit import MapConfig, SubTerrain, make_patch
 from terrainkit.errors import ConfigError, TerrainkitWarning
 from terrainkit.terrains.obstacles import Obstacles
+from terrainkit.terrains.rough import Rough
 
 PIT = SubTerrain(terrain="pit")
 OBSTACLES = SubTerrain(terrain="obstacles")
@@ -42,9 +43,16 @@ def test_make_patch_records_requested_and_realized():
 
 
 def test_make_patch_is_seeded_by_row_and_column():
-    patch = make_patch(MapConfig(seed=7, terrains=(OBSTACLES,)), 3, 5)
+    patch = make_patch(MapConfig(seed=7, terrains=(SubTerrain(terrain="rough"),)), 3, 5)
     rng = np.random.default_rng(np.random.SeedSequence([7, 3, 5]))
     # Row 3 of 0 to 9 has difficulty 1/3.
+    alone = Rough.at(3 / 9).build(patch.grid, rng)
+    assert patch.heights.tobytes() == alone.tobytes()
+
+
+def test_make_patch_with_column_layout_is_seeded_by_column():
+    patch = make_patch(MapConfig(seed=7, terrains=(OBSTACLES,)), 3, 5)
+    rng = np.random.default_rng(np.random.SeedSequence([7, 5], spawn_key=(2,)))
     alone = Obstacles.at(3 / 9).build(patch.grid, rng)
     assert patch.heights.tobytes() == alone.tobytes()
 
@@ -67,7 +75,7 @@ def test_make_patch_without_spawn_is_rejected():
     choice = SubTerrain(terrain="rough", name="rubble", parameters={"platform": 0.4})
     with pytest.raises(
         ConfigError,
-        match=r"rubble: no disc of radius 0\.5 m is flat within 0\.01 m in a patch of 8 m x 8 m",
+        match=r"rubble: no disc of radius 0\.5 m is flat within 0\.01 m and free of",
     ):
         make_patch(MapConfig(terrains=(choice,)), 9, 0)
 

@@ -53,7 +53,7 @@ def test_get_terrain_ignores_imported_terrains():
 
 
 def test_get_terrain_unknown_name_lists_terrains():
-    with pytest.raises(ConfigError, match=r"did you mean 'stairs'\? There are: flat, .*, wave$"):
+    with pytest.raises(ConfigError, match=r"did you mean 'stairs'\? There are: .*flat, .*wave$"):
         registry.get_terrain("stair")
 
 
@@ -64,7 +64,9 @@ def test_get_terrain_suggests_inverted_option():
 
 @pytest.mark.parametrize("name", ["flat_inverted", "stair_inverted", "_inverted"])
 def test_get_terrain_without_inverted_is_unknown(name):
-    with pytest.raises(ConfigError, match=rf"no terrain '{name}'; there are: flat, gap, .*, wave$"):
+    with pytest.raises(
+        ConfigError, match=rf"no terrain '{name}'; there are: .*flat, .*gap, .*wave$"
+    ):
         registry.get_terrain(name)
 
 
@@ -133,7 +135,7 @@ def test_get_terrain_rejects_other_entry_point(plugin):
 
 def test_get_terrain_error_lists_plugins(plugin):
     plugin("terrainkit.terrains.wave:Wave")
-    with pytest.raises(ConfigError, match=r"there are: flat, .*, wave, dunes"):
+    with pytest.raises(ConfigError, match=r"there are: .*flat, .*wave, dunes"):
         registry.get_terrain("moon")
 
 

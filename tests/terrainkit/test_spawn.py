@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from terrainkit.grid import Grid
-from terrainkit.spawn import find_spawn
+from terrainkit.solids import Solids, make_boxes
+from terrainkit.spawn import Disc, find_spawn
 from terrainkit.surface import surface_at
 
 PLOT = Grid(shape=(40, 40), cell=0.1)
@@ -17,10 +18,19 @@ def level(height=0.0, grid=PLOT):
     return np.full(grid.shape, height, dtype=np.float32)
 
 
-def spawn(heights, wanted=(2.0, 2.0), *, radius=0.5, tolerance=0.01, threshold=WALL, grid=PLOT):
-    return find_spawn(
-        heights, grid, wanted, radius=radius, tolerance=tolerance, threshold=threshold
-    )
+def spawn(
+    heights,
+    wanted=(2.0, 2.0),
+    *,
+    radius=0.5,
+    tolerance=0.01,
+    threshold=WALL,
+    grid=PLOT,
+    solids=None,
+):
+    solids = solids or Solids.empty()
+    needed = Disc(radius=radius, tolerance=tolerance, headroom=1.0)
+    return find_spawn(heights, grid, wanted, needed, solids=solids, threshold=threshold)
 
 
 def disc(heights, origin, *, radius=0.5, threshold=WALL, grid=PLOT):
@@ -149,3 +159,19 @@ def test_find_spawn_does_not_fit_smaller_platform():
     x, y, z = spawn(heights)
     assert z == -5.0
     assert disc(heights, (x, y)).tolist() == [-5.0] * (26 * 121)
+
+
+@pytest.mark.parametrize(("bottom", "expected"), [(0.9, False), (1.1, True)])
+def test_find_spawn_avoids_solids_within_the_headroom(bottom, expected):
+    bar = make_boxes((2.0, 2.0, bottom + 0.05), (0.1, 0.1, 0.1))
+    x, y, _ = spawn(level(), solids=bar)
+    assert ((x, y) == (2.0, 2.0)) == expected
+    if not expected:
+        # The disc clears the bar, and moves no farther than a cell beyond.
+        distance = math.hypot(max(0, abs(x - 2.0) - 0.05), max(0, abs(y - 2.0) - 0.05))
+        assert 0.5 <= distance <= 0.65
+
+
+def test_find_spawn_returns_none_under_a_low_roof():
+    roof = make_boxes((2.0, 2.0, 0.6), (4.0, 4.0, 0.1))
+    assert spawn(level(), solids=roof) is None

@@ -11,7 +11,7 @@ from terrainkit.errors import ConfigError, ExportError
 
 @pytest.fixture(scope="module")
 def slope_map():
-    # Level to x = 1, up at grade 0.5, and level again from x = 5 on.
+    # Flat to x = 1, up at grade 0.5 to x = 3, down to x = 5, and flat again.
     slope = SubTerrain(terrain="slope", parameters={"grade": 0.5, "landing": 1.0})
     return generate(
         MapConfig(
@@ -81,8 +81,9 @@ def test_height_rejects_invalid_points(terrain_map, view, xy, shape):
 
 @pytest.mark.parametrize("far", [1e3, 1e300])
 def test_height_beyond_the_map_is_that_of_the_edge(slope_map, far):
-    assert slope_map.height((far, 1.0)) == slope_map.heights.max() > 1.9
-    assert slope_map.height((-far, 1.0)) == 0.0
+    top = dataclasses.replace(slope_map, heights=slope_map.heights[:30])
+    assert top.height((far, 1.0)) == slope_map.heights.max() > 0.9
+    assert top.height((-far, 1.0)) == 0.0
 
 
 def test_normal_of_level_ground_is_up(slope_map):
@@ -92,7 +93,7 @@ def test_normal_of_level_ground_is_up(slope_map):
 def test_normal_of_a_slope_is_downhill(slope_map):
     # Grade 0.5 along x: (-0.5, 0, 1) / sqrt(1.25)
     np.testing.assert_allclose(
-        slope_map.normal((3.0, 1.0)), np.array([-0.5, 0, 1]) / np.sqrt(1.25), atol=1e-5
+        slope_map.normal((2.0, 1.0)), np.array([-0.5, 0, 1]) / np.sqrt(1.25), atol=1e-5
     )
 
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from terrainkit.errors import ConfigError, listing
+from terrainkit_robots.checkpoint import policy_state, read_checkpoint, save_checkpoint
 from terrainkit_robots.rl import run as runs
 from terrainkit_robots.rl.tasks import task_names
 from terrainkit_robots.spec.robot import SPEC_FILE
@@ -13,20 +14,16 @@ def bundle_policy(run: runs.Run, folder: Path) -> runs.Run:
     """Write a run without its training state and without paths of this machine.
 
     Raises:
-        ConfigError: If the run has no checkpoint, or its robot or terrain cannot be shipped.
+        ConfigError: If the run has no checkpoint, or its robot cannot be shipped.
         ExportError: If the folder is not empty, or cannot be written.
     """
-    if run.checkpoint is None:
-        raise ConfigError(f"run {run.folder}: got no checkpoint; expected a trained run")
     if run.info.robot not in task_names():
         raise ConfigError(f"robot: got {run.info.robot}; expected one of {listing(task_names())}")
     is_plane = run.terrain == "plane"
     names = [runs.TASK_FILE, SPEC_FILE] + [runs.MAP_FILE] * (not is_plane)
-    if not (run.folder / names[-1]).is_file():
-        raise ConfigError(f"terrain: got {run.terrain}; expected plane or a map with a config")
     info = replace(run.info, terrain="plane" if is_plane else runs.MAP_FILE)
-    state = runs.policy_state(runs.read_checkpoint(run.checkpoint))
+    state = policy_state(read_checkpoint(runs.last_checkpoint(run)))
     files = {name: (run.folder / name).read_bytes() for name in names}
     runs.write_run_folder(folder, files | {runs.RUN_FILE: info.to_toml().encode()})
-    runs.save_checkpoint(folder / f"model_{state['iteration']}.pt", state)
+    save_checkpoint(folder / f"model_{state['iteration']}.pt", state)
     return runs.open_run(folder)

@@ -15,12 +15,12 @@ from tensordict import TensorDict
 from terrainkit.errors import ConfigError
 from terrainkit.schema import Config
 from terrainkit.type_hint import PositiveInt
-from terrainkit_robots.policy.load import load_policy
+from terrainkit_robots.policy.load import load_policy, single_torch_thread
 from terrainkit_robots.rl.config import Commands, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import uses_height_scan
 from terrainkit_robots.rl.run import Run, is_same_terrain
-from terrainkit_robots.rl.runner import resolve_device, single_torch_thread
+from terrainkit_robots.rl.runner import resolve_device
 from terrainkit_robots.rl.terrain import load_terrain
 
 FloatArray = NDArray[np.float32]
@@ -176,9 +176,7 @@ def make_evaluation_env(
 
 def is_flat(run: Run, terrain: str | None = None) -> bool:
     """Return whether a terrain, or else that of the training, is a plane."""
-    if terrain is not None:
-        return terrain == "plane"
-    return run.terrain == "plane" or run.task.terrain.collision == "plane"
+    return "plane" in ([terrain] if terrain else [run.terrain, run.task.terrain.collision])
 
 
 def _assign(count: int, num_envs: int, seed: int) -> NDArray[np.int64]:

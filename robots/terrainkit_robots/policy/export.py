@@ -16,12 +16,12 @@ from tensordict import TensorDict
 
 from terrainkit.atomic_write import atomic_write, check_target
 from terrainkit.errors import ExportError
+from terrainkit_robots.checkpoint import read_checkpoint
 from terrainkit_robots.policy.evaluate import FloatArray, evaluation_task
-from terrainkit_robots.policy.load import load_policy
+from terrainkit_robots.policy.load import load_policy, single_torch_thread
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import HEIGHT_SCAN_OFFSET
-from terrainkit_robots.rl.run import Run, read_checkpoint
-from terrainkit_robots.rl.runner import single_torch_thread
+from terrainkit_robots.rl.run import Run, last_checkpoint
 from terrainkit_robots.rl.terrain import load_terrain
 
 ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE = "policy.onnx", "policy.pt", "policy.json"
@@ -68,7 +68,7 @@ def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> ExportR
     task = evaluation_task(run.task, num_envs=8)
     env = LeggedEnv(task, run.robot, load_terrain(run.terrain, task.terrain.collision))
     actor = load_policy(run, env)
-    iteration = read_checkpoint(run.checkpoint)["iteration"] if run.checkpoint else 0
+    iteration = read_checkpoint(last_checkpoint(run))["iteration"]
     text = json.dumps(describe_policy(env) | {"iteration": iteration}, indent=2) + "\n"
     limits = task.normalization.clip_observations, task.normalization.clip_actions
     clip_obs, clip_actions = (torch.nn.Hardtanh(-limit, limit) for limit in limits)

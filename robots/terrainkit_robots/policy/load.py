@@ -1,12 +1,15 @@
 """Load the policy of a run."""
 
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 
+import torch
 from rsl_rl.models import MLPModel
 
-from terrainkit.errors import ConfigError, TerrainkitWarning
+from terrainkit.errors import TerrainkitWarning
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.run import Run, changed_robot_files
+from terrainkit_robots.rl.run import Run, changed_robot_files, last_checkpoint
 from terrainkit_robots.rl.runner import OBS_GROUPS, open_checkpoint, runner_config
 from terrainkit_robots.spec.robot import SPEC_FILE
 
@@ -20,15 +23,25 @@ def load_policy(run: Run, env: LeggedEnv) -> MLPModel:
     Raises:
         ConfigError: If the run has no checkpoint, or one of another robot or task.
     """
-    if run.checkpoint is None:
-        raise ConfigError(f"run {run.folder}: got no checkpoint; expected a trained run")
+    path = last_checkpoint(run)
     # The run has its own copy of the spec, so only a change of the model matters.
     if files := [name for name in changed_robot_files(run) if name != SPEC_FILE]:
         message = f"{run.info.robot}: {' and '.join(files)} changed after {run.folder} was trained"
         warnings.warn(message, TerrainkitWarning, stacklevel=2)
-    with open_checkpoint(run.checkpoint, env, OBS_GROUPS["actor"]) as state:
+    with open_checkpoint(path, env, OBS_GROUPS["actor"]) as state:
         config = runner_config(run.task)["actor"]
         config.pop("class_name")
         actor = MLPModel(env.get_observations(), OBS_GROUPS, "actor", env.num_actions, **config)
         actor.load_state_dict(state["actor_state_dict"])
     return actor.to(env.device).eval()
+
+
+@contextmanager
+def single_torch_thread() -> Iterator[None]:
+    """Limit torch to one thread, which is fastest for networks as small as these."""
+    previous = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(previous)

@@ -21,12 +21,11 @@ from terrainkit_robots.policy.evaluate import (
     rollout,
     summarize,
 )
-from terrainkit_robots.policy.load import load_policy
+from terrainkit_robots.policy.load import load_policy, single_torch_thread
 from terrainkit_robots.rendering.video import DEFAULT_SIZE, Shot, VideoSpec
 from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import Run
-from terrainkit_robots.rl.runner import single_torch_thread
 
 DEFAULT_SECONDS, DEFAULT_ROBOTS, FORMATION_ENVS, MAX_FPS = 12.0, 4, 9, 25.0
 """Defaults: duration [s], robots that the video of a map follows, robots on a plane, frame rate."""

@@ -15,10 +15,11 @@ import torch
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots.onboarding.pipeline import OnboardOptions, is_blocking, onboard
 from terrainkit_robots.policy.evaluate import evaluation_task
+from terrainkit_robots.policy.load import single_torch_thread
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.runner import LeggedRunner, single_torch_thread
+from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane

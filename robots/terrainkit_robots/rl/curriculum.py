@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from terrainkit.curriculum import assign_levels
@@ -101,7 +102,8 @@ class TerrainCurriculum:
     def state_dict(self) -> dict[str, Any]:
         """Return everything that changes, for a checkpoint."""
         names = ("levels", "columns", "commanded", "success")
-        return {name: getattr(self, name).copy() for name in names} | {"updates": self._updates}
+        arrays = {name: torch.tensor(getattr(self, name)) for name in names}
+        return arrays | {"updates": self._updates}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Continue from a checkpoint; with another number of robots, keep only their levels."""

@@ -65,8 +65,8 @@ class LeggedEnv(VecEnv):
             terrain, self.num_envs, task.terrain.max_init_level, task.runner.seed
         )
         n, joints = self.num_envs, self.num_actions
-        self.episode_length = np.zeros(n, np.int64)  # rsl-rl may set it to random lengths
-        self.steps_since_reset = np.zeros_like(self.episode_length)
+        self.episode_length_buf = torch.zeros(n, dtype=torch.int64)  # rsl-rl may replace it
+        self.steps_since_reset = np.zeros(n, np.int64)
         self.start_pos = np.zeros((n, 2))  # base position at the last reset
         self.actions = np.zeros((3, n, joints), np.float32)  # of the last three steps
         self.joint_offset = np.zeros((n, joints), np.float32)
@@ -82,15 +82,6 @@ class LeggedEnv(VecEnv):
         self.is_position_controlled = self.scene.model.actuator_biasprm[:, 1] != 0
         self.action_offset = np.where(self.is_position_controlled, robot.default_pose, 0)
         self.reset()
-
-    @property
-    def episode_length_buf(self) -> torch.Tensor:
-        """View of the length of each episode so far [steps], shape (n,)."""
-        return torch.from_numpy(self.episode_length)
-
-    @episode_length_buf.setter
-    def episode_length_buf(self, lengths: torch.Tensor) -> None:
-        self.episode_length[:] = lengths.cpu().numpy()
 
     @cached_property
     def mirror_maps(self) -> MirrorMaps:
@@ -112,12 +103,13 @@ class LeggedEnv(VecEnv):
         self._apply_actions(actions)
         self.pushes.apply(self.rng, self.sim.qvel)
         unstable = self.sim.step(self.cfg.control.decimation)
-        self.episode_length += 1
+        self.episode_length_buf += 1
         self.steps_since_reset += 1
         self.sensors.last_dof_vel[unstable] = 0  # MuJoCo reset the state: no acceleration
         self.state = state = self._compute_state(np.arange(self.num_envs), unstable)
         rewards = self._compute_rewards(state, unstable)
-        time_out = (self.episode_length >= self.max_episode_length) & ~state.fallen
+        is_last = self.episode_length_buf.numpy() >= self.max_episode_length
+        time_out = is_last & ~state.fallen
         done = state.fallen | time_out
         self.curriculum.accumulate_command(self.commands, quat_to_yaw(state.base_quat), self.cfg.dt)
         extras: dict[str, Any] = {"time_outs": torch.from_numpy(time_out).to(self.device)}
@@ -240,7 +232,7 @@ class LeggedEnv(VecEnv):
         if self.cfg.commands.curriculum:
             log["Curriculum/lin_vel_x"] = self.velocity_command.lin_vel_x[1]
         # rsl-rl cuts the first episodes to random lengths; those say nothing about the terrain.
-        complete = self.episode_length[env_ids] == self.steps_since_reset[env_ids]
+        complete = (self.episode_length_buf.numpy() == self.steps_since_reset)[env_ids]
         base_pos = state.base_pos[env_ids]
         distance = np.linalg.norm(base_pos[:, :2] - self.start_pos[env_ids], axis=1)
         # A robot that left the map crossed its patch, even if the patch is wider than long.
@@ -267,7 +259,7 @@ class LeggedEnv(VecEnv):
             self.sim.forward(env_ids)
         self.start_pos[env_ids] = qpos[:, :2]
         self.curriculum.reset(env_ids)
-        self.episode_length[env_ids] = self.steps_since_reset[env_ids] = 0
+        self.episode_length_buf[env_ids] = self.steps_since_reset[env_ids] = 0
         self.actions[:, env_ids] = 0
         self.pushes.reset(self.rng, env_ids)
         self.sensors.reset(env_ids)
@@ -284,7 +276,6 @@ class LeggedEnv(VecEnv):
             "rng": self.rng.bit_generator.state,
             "lin_vel_x": self.velocity_command.lin_vel_x,
             "curriculum": self.curriculum.state_dict(),
-            "state": {name: torch.tensor(array) for name, array in vars(self.state).items()},
             "observations": dict(self._observations.clone().items()),
         }
 
@@ -296,8 +287,7 @@ class LeggedEnv(VecEnv):
         if len(saved["episode_length"]) != self.num_envs:
             self.reset()
             return
-        wrong = [name for name in vars(self.state) if name not in state["state"]]
-        wrong += [k for k, a in arrays.items() if k not in saved or saved[k].shape != a.shape]
+        wrong = [k for k, a in arrays.items() if k not in saved or saved[k].shape != a.shape]
         if wrong:
             raise ConfigError(
                 f"the checkpoint's {wrong[0]} belongs to another robot, task or version of "
@@ -307,15 +297,13 @@ class LeggedEnv(VecEnv):
             array[...] = saved[name].numpy()
         apply_params(self.sim, self.params)
         self.rng.bit_generator.state = state["rng"]
-        # Computing the state again would advance the air time and draw noise.
-        self.state = State(**{name: each.numpy().copy() for name, each in state["state"].items()})
         self._observations = TensorDict(state["observations"], [self.num_envs]).to(self.device)
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         """Return views of the arrays to save, by name."""
         arrays = {
             "physics": self.sim.batch.state,
-            "episode_length": self.episode_length,
+            "episode_length": self.episode_length_buf.numpy(),
             "commands": self.commands,
             "heading": self.velocity_command.heading,
             "actions": self.actions,
@@ -329,4 +317,6 @@ class LeggedEnv(VecEnv):
             "tracking": self.velocity_command.tracking,
         }
         sums = {f"rew_{name}": total for name, total in self.episode_sums.items()}
-        return arrays | sums | vars(self.params)
+        # Computing the state again would advance the air time and draw noise.
+        state = {f"state_{name}": array for name, array in vars(self.state).items()}
+        return arrays | sums | state | vars(self.params)

@@ -6,7 +6,6 @@ terms without noise, and terms that only a simulation knows. Exported policies u
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -103,24 +102,14 @@ def compute_observations(
 ) -> FloatArray:
     """Return the observations of a group, shape (n, width), with noise from `rng` if given."""
     values = [term.function(state) for term in group]
-    widths = tuple(value.shape[1] for value in values)
+    widths = [value.shape[1] for value in values]
     observations = np.concatenate(values, axis=1, dtype=np.float32)
-    noise = _per_number(tuple(term.noise for term in group), widths)
+    noise = np.repeat([term.noise for term in group], widths).astype(np.float32)
     if rng is not None and noise.any():
         noisy = np.flatnonzero(noise)
         start, stop = noisy[0], noisy[-1] + 1  # one block is faster than single columns
         sample = rng.random((len(observations), stop - start), dtype=np.float32)
         observations[:, start:stop] += (2 * sample - 1) * noise[start:stop]
-    observations *= _per_number(tuple(term.scale for term in group), widths)
+    scales = [np.broadcast_to(term.scale, width) for term, width in zip(group, widths, strict=True)]
+    observations *= np.concatenate(scales, dtype=np.float32)
     return np.clip(observations, -clip, clip, out=observations)
-
-
-@lru_cache(maxsize=64)
-def _per_number(
-    values: tuple[tuple[float, ...] | float, ...], widths: tuple[int, ...]
-) -> FloatArray:
-    """Repeat the value of each term over its width; read-only, because it is cached."""
-    parts = [np.broadcast_to(value, width) for value, width in zip(values, widths, strict=True)]
-    array = np.concatenate(parts).astype(np.float32)
-    array.flags.writeable = False
-    return array

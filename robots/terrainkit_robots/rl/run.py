@@ -1,29 +1,25 @@
-"""Run folders and checkpoints: what training writes, and what it needs to continue.
+"""Run folders: what training writes, and what it needs to continue.
 
 A run has `task.toml`, `robot.toml` (the spec as it was trained), `run.toml` (robot, terrain and
 versions), `map.toml` (the config of its map, if any), and `model_<iteration>.pt` checkpoints.
 """
 
 import hashlib
-import io
 import re
-import zipfile
-from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
 from importlib.metadata import version
+from os.path import isdir, isfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
-
-import numpy as np
+from typing import TYPE_CHECKING, Literal
 
 from terrainkit.atomic_write import atomic_folder, atomic_write
 from terrainkit.errors import ConfigError, ExportError, listing
 from terrainkit.schema import Config
 from terrainkit.text import expected_names
 from terrainkit.toml_text import read_text
-from terrainkit_robots.files import open_regular
+from terrainkit_robots.checkpoint import read_checkpoint
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.spec.robot import SPEC_FILE, Robot
@@ -34,16 +30,6 @@ if TYPE_CHECKING:
     from terrainkit.config import MapConfig
 
 RUN_FILE, TASK_FILE, MAP_FILE = "run.toml", "task.toml", "map.toml"
-CHECKPOINT_HEADER = {"format": "terrainkit checkpoint", "version": 1}
-CHECKPOINT_KEYS = {
-    "iteration": int,
-    "robot": str,
-    "joints": list,
-    "observed": dict,
-    "actor_state_dict": dict,
-    "critic_state_dict": dict,
-}
-"""Keys of every checkpoint, and their types; a checkpoint of training has more."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,9 +41,7 @@ class RunInfo(Config):
     robot: str
     """Name of a registered task, or the absolute path of the robot's folder."""
     terrain: str
-    """`plane`, or the path of a map, its config, or a MuJoCo model."""
-    terrain_sha256: str | None = None
-    """Digest of a MuJoCo model."""
+    """`plane`, or the path of a map or its config."""
     seed: int
     """Seed of all random numbers."""
     started: str
@@ -109,12 +93,11 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
         ExportError: If the folder is not empty, or cannot be written.
     """
     robot, source = _sources(robot_name, terrain)
-    robot_folder, content = tasks.get_task(robot_name).folder, _terrain_content(source)
+    robot_folder, map_config = tasks.get_task(robot_name).folder, _map_config(source)
     packages = ("terrainkit", "mujoco", "rsl-rl-lib", "torch")
     info = RunInfo(
         robot=robot,
         terrain=source,
-        terrain_sha256=content if isinstance(content, str) else None,
         seed=task.runner.seed,
         started=datetime.now().astimezone().isoformat(timespec="seconds"),
         versions={name: version(name) for name in packages},
@@ -125,8 +108,8 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
         TASK_FILE: task.to_toml(),
         SPEC_FILE: read_text(robot_folder / SPEC_FILE),
     }
-    if content is not None and not isinstance(content, str):
-        files[MAP_FILE] = content.to_toml()
+    if map_config is not None:
+        files[MAP_FILE] = map_config.to_toml()
     write_run_folder(folder, {name: text.encode() for name, text in files.items()})
     return open_run(folder)
 
@@ -189,32 +172,21 @@ def _resolve_run(name: str | Path) -> tuple[Path, Path | None]:
 
     A run in the working directory takes precedence over a shipped policy of the same name.
     """
-    path, is_robot = Path(name), str(name) in tasks.task_names()
-    try:
-        if (path / RUN_FILE).is_file() or (path.is_dir() and not is_robot):
-            return path, None
-        if path.is_file():
-            return path.parent, path
-    except (OSError, ValueError) as error:
-        raise ConfigError(f"cannot read {name}: {error}") from error
-    if not is_robot:
-        expected = expected_names(
-            str(name),
-            tasks.task_names(),
-            "expected a folder that terrainkit train wrote, a checkpoint in one, or a robot",
-        )
-        raise ConfigError(f"run: got {name}; {expected}")
-    shipped = tasks.get_task(str(name)).trained_run
+    path, name, robots = Path(name), str(name), tasks.task_names()
+    # Path.is_file raises OSError for long names.
+    if isfile(path / RUN_FILE) or (isdir(path) and name not in robots):  # noqa: PTH112, PTH113
+        return path, None
+    if isfile(path):  # noqa: PTH113
+        return path.parent, path
+    if name not in robots:
+        runs = "expected a folder that terrainkit train wrote, a checkpoint in one, or a robot"
+        raise ConfigError(f"run: got {name}; {expected_names(name, robots, runs)}")
+    shipped = tasks.get_task(name).trained_run
     if not shipped.is_dir():
         raise ConfigError(
             f"no policy is shipped with {name}; terrainkit train {name} writes a run with one"
         )
     return shipped, None
-
-
-def is_shipped(run: Run) -> bool:
-    """Return whether a run is part of a package, so that its folder must not be written."""
-    return run.folder.resolve() == tasks.get_task(run.info.robot).trained_run.resolve()
 
 
 def changed_robot_files(run: Run) -> tuple[str, ...]:
@@ -229,11 +201,8 @@ def changed_robot_files(run: Run) -> tuple[str, ...]:
 
 def is_same_terrain(run: Run, terrain: str | Path) -> bool:
     """Return whether a terrain is the run's; maps with the same config are the same."""
-    _, source = _sources(run.info.robot, terrain)
-    content, config = _terrain_content(source), run.folder / MAP_FILE
-    if config.is_file():
-        return content == _terrain_content(str(config))
-    return source == run.terrain and run.info.terrain_sha256 in (None, content)
+    trained_on = run.folder / MAP_FILE if (run.folder / MAP_FILE).is_file() else "plane"
+    return _map_config(terrain) == _map_config(trained_on)
 
 
 def can_continue(run: Run, robot: str | Path, terrain: str | Path, task: Task) -> bool:
@@ -244,20 +213,15 @@ def can_continue(run: Run, robot: str | Path, terrain: str | Path, task: Task) -
     """
     num_envs, num_threads = run.task.env.num_envs, run.task.env.num_threads
     env = replace(task.env, num_envs=num_envs, num_threads=num_threads)
-    if replace(task, env=env, runner=run.task.runner) != run.task or _sources(robot, terrain) != (
-        run.info.robot,
-        run.terrain,
-    ):
+    is_same_task = replace(task, env=env, runner=run.task.runner) == run.task
+    if not is_same_task or _sources(robot, terrain) != (run.info.robot, run.terrain):
         return False
-    if not is_same_terrain(run, terrain):
+    changed = [f"{name} of {run.info.robot}" for name in changed_robot_files(run)]
+    changed += [] if is_same_terrain(run, terrain) else [run.terrain]
+    if changed:
         raise ConfigError(
-            f"{run.terrain} has changed since {run.folder} was trained on it; with another "
-            "--terrain, a new run starts with its networks"
-        )
-    if files := changed_robot_files(run):
-        raise ConfigError(
-            f"{' and '.join(files)} of {run.info.robot} changed since {run.folder} was trained; "
-            "with a copy of the robot in another folder, a new run starts with its networks"
+            f"{' and '.join(changed)} changed since {run.folder} was trained; with a copy of the "
+            "robot or another --terrain, a new run starts with its networks"
         )
     return "processes" in read_checkpoint(last_checkpoint(run))
 
@@ -277,7 +241,7 @@ def parts_to_load(run: Run, terrain: str | Path, task: Task) -> dict[str, bool]:
 def last_checkpoint(run: Run) -> Path:
     """Return the selected checkpoint of a run; raise ConfigError if there is none."""
     if run.checkpoint is None:
-        raise ConfigError(f"{run.folder} has no checkpoint yet; train it first")
+        raise ConfigError(f"run {run.folder}: got no checkpoint; expected a trained run")
     return run.checkpoint
 
 
@@ -296,79 +260,10 @@ def run_folder(
     return create_run(folder, task, robot, terrain).folder
 
 
-def save_checkpoint(path: Path, state: Mapping[str, Any]) -> None:
-    """Write a checkpoint completely, or not at all; see `LeggedRunner.state_dict`."""
-    import torch
-
-    data = io.BytesIO()  # torch itself aborts the process on a full disk
-    torch.save(_to_plain({**CHECKPOINT_HEADER, **state}), data)
-    with atomic_write(path, overwrite=True) as target:
-        target.write_bytes(data.getbuffer())
-
-
-def read_checkpoint(path: Path) -> dict[str, Any]:
-    """Read a checkpoint, without executing code from it; arrays become tensors.
-
-    Raises:
-        ConfigError: If it is missing, damaged, or not written by terrainkit.
-    """
-    import torch
-
-    try:
-        if path.exists() and not path.is_file():
-            raise ConfigError(f"{path} is not a file; expected a checkpoint")
-        with zipfile.ZipFile(path) as file:  # compressed parts could expand to any size
-            if any(part.compress_type != zipfile.ZIP_STORED for part in file.infolist()):
-                raise ConfigError(f"{path} is not a checkpoint of terrainkit: it is compressed")
-        state = torch.load(path, map_location="cpu", weights_only=True)
-    except OSError as error:
-        raise ConfigError(f"cannot read {path}: {error.strerror or error}") from error
-    except ConfigError:
-        raise
-    except Exception as error:  # torch's errors for damaged files have no common class
-        raise ConfigError(f"{path} is not a checkpoint of terrainkit, or is damaged") from error
-    if not isinstance(state, dict) or state.get("format") != CHECKPOINT_HEADER["format"]:
-        raise ConfigError(f"{path} is not a checkpoint of terrainkit")
-    if (got := state.get("version")) != CHECKPOINT_HEADER["version"]:
-        raise ConfigError(f"{path}: version: got {got!r}; expected 1")
-    for key, kind in CHECKPOINT_KEYS.items():
-        if not isinstance(state.get(key), kind):
-            raise ConfigError(f"{path}: {key} is missing or not a {kind.__name__}")
-    return state
-
-
-def policy_state(state: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the part of a checkpoint without which there is no policy or critic."""
-    return {key: state[key] for key in CHECKPOINT_KEYS}
-
-
-def _to_plain(value: Any) -> Any:
-    """Convert to dicts, lists, numbers and tensors, which can be read without executing code."""
-    import torch
-
-    if isinstance(value, Mapping):
-        return {key: _to_plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple | deque):
-        return [_to_plain(item) for item in value]
-    if isinstance(value, np.ndarray | torch.Tensor):
-        return torch.as_tensor(value).detach().to("cpu").clone()  # without a view's storage
-    if value is None or isinstance(value, bool | int | float | str):
-        return value
-    raise TypeError(f"a checkpoint cannot hold a {type(value).__name__}")
-
-
 def _robot_digests(folder: Path) -> dict[str, str]:
     """Return the SHA-256 of a robot's spec and model by file name."""
     files = (SPEC_FILE, RobotSpec.load(folder / SPEC_FILE).mjcf)
-    return {name: _sha256(folder / name) for name in files}
-
-
-def _sha256(path: Path) -> str:
-    try:
-        with open_regular(path) as file:
-            return hashlib.sha256(file.read()).hexdigest()
-    except OSError as error:
-        raise ConfigError(f"cannot read {path}: {error.strerror or error}") from error
+    return {name: hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in files}
 
 
 def _sources(robot: str | Path, terrain: str | Path) -> tuple[str, str]:
@@ -380,14 +275,11 @@ def _sources(robot: str | Path, terrain: str | Path) -> tuple[str, str]:
     )
 
 
-def _terrain_content(terrain: str) -> "MapConfig | str | None":
-    """Return what two equal terrains share: a map's config, or the digest of a model."""
-    if terrain.endswith(".toml"):
-        from terrainkit.config import MapConfig
+def _map_config(terrain: str | Path) -> "MapConfig | None":
+    """Return the config of a map, or None for a plane."""
+    from terrainkit import MapConfig, TerrainMap
 
-        return MapConfig.load(terrain)
-    if terrain.endswith(".npz"):
-        from terrainkit.terrain_map import TerrainMap
-
-        return TerrainMap.load(terrain).config
-    return _sha256(Path(terrain)) if terrain.endswith(".xml") else None
+    if str(terrain) == "plane":
+        return None
+    is_config = Path(terrain).suffix == ".toml"
+    return MapConfig.load(terrain) if is_config else TerrainMap.load(terrain).config

@@ -19,16 +19,12 @@ from rsl_rl.runners import OnPolicyRunner
 from rsl_rl.utils.logger import Logger
 
 from terrainkit.errors import ConfigError, listing
+from terrainkit_robots.checkpoint import read_checkpoint, save_checkpoint
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.run import read_checkpoint, save_checkpoint
 
 OBS_GROUPS = {"actor": ["policy"], "critic": ["privileged"]}
 """Observation groups of each network."""
-
-LOGGER_STATE = ("tot_timesteps", "tot_time", "rewbuffer", "lenbuffer")
-LOGGER_BUFFERS = ("cur_reward_sum", "cur_episode_length")
-"""Attributes of rsl-rl's logger in a checkpoint; the latter have a value per environment."""
 
 
 class TrainingProgress(NamedTuple):
@@ -65,19 +61,16 @@ class MetricsLogger(Logger):
 
     def init_logging_writer(self) -> None:
         """Open the log files."""
+        if self._runner.env.cfg.runner.logger == "tensorboard":
+            # TensorBoard drops what an interrupted run logged after its last checkpoint.
+            self.cfg["logger"]["purge_step"] = self._runner.current_learning_iteration
+            super().init_logging_writer()
+            return
         try:
             with redirect_stdout(None):
                 super().init_logging_writer()
         except Exception as error:
-            if self.cfg["logger"] == "tensorboard":
-                raise
             raise ConfigError(f"wandb does not start: {' '.join(str(error).split())}") from error
-        if self.writer is not None and self.cfg["logger"] == "tensorboard":
-            from tensorboard.compat.proto.event_pb2 import Event, SessionLog
-
-            # TensorBoard drops what an interrupted run logged after its last checkpoint.
-            start = Event(session_log=SessionLog(status=SessionLog.START))
-            self.writer.file_writer.add_event(start, self._runner.current_learning_iteration)
 
     def stop_logging_writer(self) -> None:
         """Close the log files, if they are open."""
@@ -105,16 +98,18 @@ class MetricsLogger(Logger):
 
     def state_dict(self) -> dict[str, Any]:
         """Return the buffers, for a checkpoint."""
-        return {name: getattr(self, name) for name in (*LOGGER_STATE, *LOGGER_BUFFERS)}
+        names = ("tot_timesteps", "tot_time", "cur_reward_sum", "cur_episode_length")
+        means = {"rewbuffer": list(self.rewbuffer), "lenbuffer": list(self.lenbuffer)}
+        return {name: getattr(self, name) for name in names} | means
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore the buffers; those per environment only if their number is the same."""
         self.rewbuffer.extend(state["rewbuffer"])
         self.lenbuffer.extend(state["lenbuffer"])
         self.tot_timesteps, self.tot_time = state["tot_timesteps"], state["tot_time"]
-        for name in LOGGER_BUFFERS:
-            if len(state[name]) == self.num_envs:
-                getattr(self, name).copy_(state[name])
+        if len(state["cur_reward_sum"]) == self.num_envs:
+            self.cur_reward_sum.copy_(state["cur_reward_sum"])
+            self.cur_episode_length.copy_(state["cur_episode_length"])
 
     def _store_code_state(self) -> list[str]:
         return []  # a run.toml records the versions; the user's git repository is not touched
@@ -321,12 +316,15 @@ def runner_config(task: Task) -> dict[str, Any]:
         "obs_normalization": policy.obs_normalization,
     }
     actor = {"hidden_dims": list(policy.actor_hidden_dims), "distribution_cfg": distribution}
-    wandb = {"class_name": "WandbLogWriter", "project_name": "terrainkit"}
+    loggers = {
+        "tensorboard": {"class_name": "torch.utils.tensorboard:SummaryWriter", "flush_secs": 10},
+        "wandb": {"class_name": "WandbLogWriter", "project_name": "terrainkit"},
+    }
     return {
         "num_steps_per_env": runner.num_steps_per_env,
         "save_interval": sys.maxsize,  # `LeggedRunner.finish_iteration` saves, in all processes
         "seed": runner.seed,
-        "logger": wandb if runner.logger == "wandb" else "tensorboard",
+        "logger": loggers[runner.logger],
         "check_for_nan": False,  # `MetricsLogger` names the rewards that are not finite
         "obs_groups": OBS_GROUPS,
         "actor": network | actor,
@@ -396,14 +394,3 @@ def process_share(task: Task) -> Task:
         env=replace(task.env, num_envs=num_envs, num_threads=threads),
         runner=replace(task.runner, seed=task.runner.seed + rank),
     )
-
-
-@contextmanager
-def single_torch_thread() -> Iterator[None]:
-    """Limit torch to one thread, which is fastest for networks as small as these."""
-    previous = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(previous)

@@ -91,6 +91,8 @@ def _attach(robot: Robot, terrain: Terrain, task: Task) -> Any:
         reason = " ".join(str(error).split())
         raise ConfigError(f"MuJoCo cannot read {robot.mjcf}: {reason}") from None
     ground = terrain.spec()
+    for element in (*spec.actuators, *spec.sensors, *spec.keys, *spec.cameras):
+        spec.delete(element)
     for each in (spec, ground):  # options of both, or MuJoCo warns about differences
         each.option = mujoco.MjSpec().option  # gravity, wind: the same for every robot
         each.option.timestep = task.sim.dt
@@ -98,13 +100,6 @@ def _attach(robot: Robot, terrain: Terrain, task: Task) -> Any:
         each.option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
         each.option.iterations = task.sim.iterations
         each.option.ls_iterations = task.sim.ls_iterations
-        for element in (*each.actuators, *each.sensors, *each.keys):
-            each.delete(element)
-    for camera in spec.cameras:
-        spec.delete(camera)
-    for geom in ground.geoms:
-        if geom.conaffinity:
-            geom.contype |= 1  # robots without self-collision touch only geoms with a contype
     # The terrain is attached to the robot, so the robot's names keep their form.
     spec.attach(ground, frame=spec.worldbody.add_frame(), prefix="ground/")
     return spec

@@ -4,9 +4,9 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from mujoco.batch import Batch
 from numpy.typing import NDArray
 
-from terrainkit.errors import ConfigError
 from terrainkit.memory import check_memory
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import Task
@@ -21,13 +21,6 @@ class Simulation:
 
     def __init__(self, scene: Scene, num_envs: int, num_threads: int = 0) -> None:
         """Allocate the simulations in the model's default state."""
-        try:
-            from mujoco.batch import Batch
-        except ImportError:
-            raise ConfigError(
-                f"MuJoCo: got version {mujoco.__version__}; expected 3.17 or newer, which steps "
-                "many simulations at once: pip install 'terrainkit[train]'"
-            ) from None
         warnings = (f"mjWARN_BAD{name}" for name in ("QPOS", "QVEL", "QACC", "CTRL"))
         self._unstable = [int(getattr(mujoco.mjtWarning, name)) for name in warnings]
         self._stage = mujoco.mjtStage.mjSTAGE_VEL

@@ -10,13 +10,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
+import mujoco
 import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
 from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit_robots.spec.robot_spec import MirrorJoint, RobotSpec
+from terrainkit_robots.rl.scene import SOLE
 from terrainkit_robots.transforms import FloatArray
 
 if TYPE_CHECKING:
@@ -52,14 +53,15 @@ def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
     Raises:
         ConfigError: If left and right of the robot or its height scan differ.
     """
-    joints, cfg = _joint_map(env.robot.spec), env.cfg.terrain
+    names, images = env.robot.spec.joint_order, env.robot.spec.mirror_joints()
+    joints = _map([names.index(each.joint) for each in images], [each.sign for each in images])
     _check_control(env, joints)
     maps = {
         "vector": _map(range(3), [1, -1, 1]),
         "axial": _map(range(3), [-1, 1, -1]),
         "command": _map(range(3), [1, -1, -1]),
         "joints": joints,
-        "feet": _foot_map(env, joints),
+        "feet": _foot_map(env),
     }
     groups = {}
     for name, group in env.obs_groups.items():
@@ -68,7 +70,8 @@ def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
             width = term.function(env.state).shape[1]
             maps["scalar"] = _map(range(width), np.ones(width))
             if term.symmetry == "scan":
-                maps["scan"] = _scan_map(cfg.measured_points_x, cfg.measured_points_y)
+                terrain = env.cfg.terrain
+                maps["scan"] = _scan_map(terrain.measured_points_x, terrain.measured_points_y)
             part = maps[term.symmetry]
             if len(part.index) != width:
                 raise ConfigError(
@@ -110,20 +113,6 @@ def _map(index: Sequence[int] | NDArray[np.int64], sign: ArrayLike) -> SignedPer
     return SignedPermutation(np.array(index, np.int64), np.array(sign, np.float32))
 
 
-def _joint_map(spec: RobotSpec) -> SignedPermutation:
-    """Return the map of one number per joint."""
-    names, mirror = list(spec.joint_order), spec.mirror
-    for name in names:
-        pair = mirror.get(name, MirrorJoint(joint="nothing", sign=1))
-        image = MirrorJoint(joint=name, sign=pair.sign)
-        if pair.joint not in names or mirror.get(pair.joint) != image:
-            raise ConfigError(
-                f"mirror of {spec.name}: {name} is paired with {pair.joint}; symmetry expects "
-                f"a joint that is paired with {name} with the same sign"
-            )
-    return _map([names.index(mirror[n].joint) for n in names], [mirror[n].sign for n in names])
-
-
 def _check_control(env: "LeggedEnv", joints: SignedPermutation) -> None:
     """Check that an action has the same effect on the left as on the right."""
     names, pose, model = env.robot.spec.joint_order, env.robot.default_pose, env.scene.model
@@ -143,27 +132,19 @@ def _check_control(env: "LeggedEnv", joints: SignedPermutation) -> None:
             )
 
 
-def _foot_map(env: "LeggedEnv", joints: SignedPermutation) -> SignedPermutation:
-    """Return the map of one vector per foot: feet are paired as the joints above them are."""
-    spec, model, above = env.robot.spec, env.scene.model, []
-    dofs = env.scene.joint_qvel.tolist()
-    for foot in spec.feet:
-        body = model.body_weldid[model.body(foot).id]
-        dof = model.body_dofadr[body] + model.body_dofnum[body] - 1
-        while dof >= 0 and dof not in dofs:
-            dof = model.dof_parentid[dof]
-        above.append(dofs.index(dof) if dof >= 0 else -1)
-    index = []
-    for foot, joint in zip(spec.feet, above, strict=True):
-        image = joints.index[joint] if joint >= 0 else -1
-        found = np.flatnonzero(np.array(above) == image)
-        if len(found) != 1:
-            raise ConfigError(
-                f"symmetry: the foot {foot} of {spec.name} has {len(found)} mirror images; "
-                f"expected 1 of: {listing(spec.feet)}"
-            )
-        index += [3 * found[0] + axis for axis in range(3)]
-    return _map(index, [1, -1, 1] * len(above))
+def _foot_map(env: "LeggedEnv") -> SignedPermutation:
+    """Return the map of one vector per foot: feet are paired by position in the default pose."""
+    scene, feet = env.scene, env.robot.spec.feet
+    data = mujoco.MjData(scene.model)
+    data.qpos[:] = scene.home
+    mujoco.mj_kinematics(scene.model, data)
+    position = np.array([data.site(SOLE + foot).xpos for foot in feet])
+    distance = np.linalg.norm(position[:, None] - position * [1, -1, 1], axis=2)
+    index = distance.argmin(axis=1)
+    for k in np.flatnonzero(index[index] != np.arange(len(feet))):
+        got = f"the foot {feet[k]} is nearest to the mirror image of {feet[index[k]]}"
+        raise ConfigError(f"symmetry: {got}, which is nearest to another; expected pairs of feet")
+    return _map((3 * index[:, None] + range(3)).ravel(), [1, -1, 1] * len(feet))
 
 
 def _scan_map(x: Sequence[float], y: Sequence[float]) -> SignedPermutation:

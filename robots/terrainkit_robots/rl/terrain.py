@@ -3,22 +3,18 @@
 import tempfile
 from abc import ABC, abstractmethod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit.surface import HeightfieldSurface
 from terrainkit.text import closest
-from terrainkit_robots.simulation.geoms import measure_surface
 from terrainkit_robots.transforms import FloatArray
 
 if TYPE_CHECKING:
     from terrainkit.terrain_map import TerrainMap
-
-Collision = Literal["auto", "hfield", "boxes", "plane"]
 
 
 class Terrain(ABC):
@@ -34,18 +30,16 @@ class Terrain(ABC):
     """Lower corner, x and y [m]."""
     upper: tuple[float, float]
     """Upper corner, x and y [m]."""
-    is_flat: bool = False
+    is_flat: bool
     """Whether the ground is level everywhere, so that a height scan carries no information."""
-
-    _surface: HeightfieldSurface
 
     @abstractmethod
     def spec(self) -> Any:
         """Return the terrain as an `mujoco.MjSpec`."""
 
+    @abstractmethod
     def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Return the height at points [m], broadcast over `x` and `y`."""
-        return self._surface.height(x, y)
 
 
 class Plane(Terrain):
@@ -72,6 +66,8 @@ class Plane(Terrain):
 class MapTerrain(Terrain):
     """A terrainkit map."""
 
+    is_flat = False
+
     def __init__(self, terrain_map: "TerrainMap", collision: Any = "auto") -> None:
         from terrainkit.export.mjcf import collision_surface
 
@@ -81,6 +77,10 @@ class MapTerrain(Terrain):
         self.lower, self.upper = terrain_map.grid.lower, terrain_map.grid.upper
         self._map, self._collision = terrain_map, collision
         self._surface = collision_surface(terrain_map, collision)
+
+    def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return the height of the collision geometry."""
+        return self._surface.height(x, y)
 
     def spec(self) -> Any:
         """Return the map as terrainkit exports it for MuJoCo."""
@@ -93,29 +93,6 @@ class MapTerrain(Terrain):
         return spec
 
 
-class ModelTerrain(Terrain):
-    """A static MuJoCo model whose heights are measured by rays; robots spawn at its origin."""
-
-    terrain_names = np.array([["custom"]])
-
-    def __init__(self, path: Path, *, cell: float = 0.05, half_size: float = 20.0) -> None:
-        """Measure the square of `half_size` [m] around the origin with samples every `cell` [m].
-
-        Heights are accurate to the size of a cell at edges.
-        """
-        if not path.is_file():
-            raise ConfigError(f"there is no file {path}")
-        self._path = path
-        self._surface = measure_surface(path, cell, half_size)
-        k = len(self._surface.heights) // 2
-        self.env_origins = np.array([[[0, 0, self._surface.heights[k, k]]]], np.float32)
-        self.lower, self.upper = (-half_size, -half_size), (half_size, half_size)
-
-    def spec(self) -> Any:
-        """Return the model."""
-        return mujoco.MjSpec.from_file(str(self._path))
-
-
 def _add_material(spec: Any) -> None:
     """Add a checkered material, on which motion is visible."""
     texture = spec.add_texture(name="ground", type=mujoco.mjtTexture.mjTEXTURE_2D)
@@ -126,12 +103,11 @@ def _add_material(spec: Any) -> None:
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "ground"
 
 
-def load_terrain(source: str | Path, collision: Collision = "auto") -> Terrain:
+def load_terrain(source: str | Path, collision: str = "auto") -> Terrain:
     """Load the terrain that `source` names.
 
     Args:
-        source: `plane`, a map (.npz), the config of a map (.toml), which is generated, or a
-            static MuJoCo model (.xml).
+        source: `plane`, a map (.npz), or the config of a map (.toml), which is generated.
         collision: Collision geometry of a map; `plane` replaces any source by a plane.
 
     Raises:
@@ -147,10 +123,6 @@ def load_terrain(source: str | Path, collision: Collision = "auto") -> Terrain:
         is_map = path.suffix == ".npz"
         terrain_map = TerrainMap.load(path) if is_map else generate(MapConfig.load(path))
         return MapTerrain(terrain_map, collision)
-    if path.suffix == ".xml":
-        return ModelTerrain(path)
     suggestion = " did you mean 'plane'?" if closest(str(source), ["plane"]) else ""
-    raise ConfigError(
-        f"terrain: got {str(source)!r};{suggestion} expected plane, a map (.npz), "
-        "the config of a map (.toml), or a MuJoCo model (.xml)"
-    )
+    expected = "expected plane, a map (.npz), or the config of a map (.toml)"
+    raise ConfigError(f"terrain: got {str(source)!r};{suggestion} {expected}")

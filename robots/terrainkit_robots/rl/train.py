@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,17 +13,7 @@ from terrainkit_robots.rl.config import Task
 from terrainkit_robots.spec.robot import Robot
 
 if TYPE_CHECKING:
-    from terrainkit_robots.rl.runner import ProgressCallback
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class TrainResult:
-    """The result of training."""
-
-    folder: Path | None
-    """Folder of the run; None in all processes except the main one."""
-    iteration: int
-    """Completed iterations."""
+    from terrainkit_robots.rl.runner import LeggedRunner, ProgressCallback
 
 
 def train(
@@ -37,12 +26,12 @@ def train(
     device: str = "cpu",
     progress_callback: "ProgressCallback | None" = None,
     should_stop: Callable[[], object] = lambda: False,
-) -> TrainResult:
+) -> "LeggedRunner":
     """Train a policy, and write checkpoints at intervals, at the end, and when stopped.
 
     Args:
         robot: Name of a registered task, or folder of an onboarded robot.
-        terrain: `plane`, a map (.npz), a map config (.toml), or a MuJoCo model (.xml).
+        terrain: `plane`, a map (.npz), or a map config (.toml).
         task: The task; by default, the registered task of the robot.
         folder: Folder of the run; by default, `logs/<robot>/<date-time>`.
         resume: A run to continue. With the same robot, terrain and task (`env.num_envs` and
@@ -52,6 +41,10 @@ def train(
         device: Device of the networks: `cpu`, `cuda`, `cuda:1`. The physics runs on the CPU.
         progress_callback: Called after each iteration.
         should_stop: Called before each iteration; True stops training with a checkpoint.
+
+    Returns:
+        The runner, with the folder of the run (None in all processes except the main one), the
+        number of completed iterations, and the policy.
 
     Raises:
         ConfigError: If the arguments do not fit together, or training diverges.
@@ -104,4 +97,4 @@ def train(
     finally:
         if torch.distributed.is_available() and torch.distributed.is_initialized():
             torch.distributed.destroy_process_group()
-    return TrainResult(folder=runner.folder, iteration=runner.current_learning_iteration)
+    return runner

@@ -14,7 +14,8 @@ from typing import Annotated, Any, Literal, Self, get_args, get_origin
 from msgspec import Meta
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit.schema import Config, field_docs, field_types
+from terrainkit.field_docs import field_docs
+from terrainkit.schema import Config, field_types
 from terrainkit.toml_text import LINE_LENGTH, comment_text, line_text
 from terrainkit.type_hint import SORTED, UNIQUE, parse_hint
 from terrainkit_robots.spec.per_joint import by_joint
@@ -198,6 +199,22 @@ class RobotSpec(Config):
         if name not in JOINT_TABLES:
             raise ConfigError(f"no table by joint {name!r}; there are: {listing(JOINT_TABLES)}")
         return by_joint(getattr(self, name), self.joint_order, name)
+
+    def mirror_joints(self) -> list[MirrorJoint]:
+        """Return the mirror image of each joint, in the order of `joint_order`.
+
+        Raises:
+            ConfigError: if a joint has none, or is not the mirror image of its own.
+        """
+        for name in self.joint_order:
+            pair = self.mirror.get(name, MirrorJoint(joint="nothing", sign=1))
+            image = MirrorJoint(joint=name, sign=pair.sign)
+            if pair.joint not in self.joint_order or self.mirror.get(pair.joint) != image:
+                raise ConfigError(
+                    f"mirror of {self.name}: {name} is paired with {pair.joint}; symmetry expects "
+                    f"a joint that is paired with {name} with the same sign"
+                )
+        return [self.mirror[name] for name in self.joint_order]
 
     @classmethod
     def from_table(

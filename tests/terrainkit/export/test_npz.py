@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
 from terrainkit.errors import MapFileError, MemoryLimitError
 from terrainkit.export.npz import read_mesh
+from terrainkit.solids import Solids
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +120,11 @@ def test_npz_round_trip(path, terrain_map):
     read = TerrainMap.load(path)
     for field in dataclasses.fields(TerrainMap):
         found, wanted = (getattr(each, field.name) for each in (read, terrain_map))
-        if isinstance(wanted, np.ndarray) and wanted.dtype != object:
+        if isinstance(wanted, Solids):
+            for part in dataclasses.fields(Solids):
+                values, expected = getattr(found, part.name), getattr(wanted, part.name)
+                assert (values.dtype, values.tobytes()) == (expected.dtype, expected.tobytes())
+        elif isinstance(wanted, np.ndarray) and wanted.dtype != object:
             assert (found.dtype, found.shape) == (wanted.dtype, wanted.shape)
             assert found.tobytes() == wanted.tobytes()
         else:
@@ -387,9 +392,29 @@ def test_npz_triangle_out_of_range_is_rejected(good, bad, corner):
     assert "triangles" in refusal(bad, read_mesh)
 
 
-def test_npz_solids_are_rejected(good, bad):
-    repack(good, bad, {"boxes": npy(np.zeros((2, 10), dtype=np.float32))})
-    assert "got 2 solids" in refusal(bad)
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("boxes", np.zeros((2, 10), np.float32)),
+        ("solid_friction", np.zeros(3, np.float32)),
+        ("hull_counts", np.array([8], np.int32)),
+        ("solid_patch", np.zeros((0, 3), np.int32)),
+    ],
+)
+def test_npz_inconsistent_solids_are_rejected(good, bad, key, value):
+    repack(good, bad, {key: npy(value)})
+    assert "expected" in refusal(bad)
+
+
+def test_npz_without_solids_is_readable(good, tmp_path):
+    """Maps of version 0.1 have an empty array of boxes, and no other key of solids."""
+    old = tmp_path / "old.npz"
+    with np.load(good) as archive:
+        keys = [k for k in archive if not k.startswith(("solid_", "hull_", "cylinders", "goals"))]
+        np.savez(old, **{key: archive[key] for key in keys})
+    read = TerrainMap.load(old)
+    assert len(read.solids) == 0
+    assert read.goals.shape == (*read.difficulty.shape, 0, 4)
 
 
 @pytest.mark.parametrize("text", ["{{{", "hello", "rows = ", "a\0b", '"a\nb" = 1'])

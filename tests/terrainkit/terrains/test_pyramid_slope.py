@@ -18,14 +18,16 @@ def test_pyramid_slope_peak_height(grid, rng):
     assert heights.min() == 0.0
 
 
-@pytest.mark.parametrize("shape", [(80, 80), (80, 40), (73, 51)])
-def test_pyramid_slope_has_constant_grade(shape, rng):
-    corners = quads(PyramidSlope(grade=0.4).build(Grid(shape=shape, cell=0.1), rng))
-    off = corners.min(axis=0) < corners.max()
-    assert off.mean() > 0.5
+@pytest.mark.parametrize(("shape", "run"), [((80, 80), 25), ((80, 40), 5), ((73, 51), 10)])
+def test_pyramid_slope_has_constant_grade(shape, run, rng):
+    grid = Grid(shape=shape, cell=0.1)
+    corners = quads(PyramidSlope(grade=0.4).build(grid, rng))
     grades = np.ptp(corners, axis=0) / 0.1
-    assert grades[off] == pytest.approx(np.full(off.sum(), 0.4), abs=1e-5)
-    assert not grades[~off].any()
+    # Quads between the platform and ring `run` slope; the others are flat.
+    rings = quads(grid.rings(grid.centered(3.0)))
+    slope = (rings.max(axis=0) > 0) & (rings.min(axis=0) < run)
+    assert grades[slope] == pytest.approx(np.full(slope.sum(), 0.4), abs=1e-5)
+    assert not grades[~slope].any()
 
 
 @pytest.mark.parametrize(
@@ -45,15 +47,32 @@ def test_pyramid_slope_platform_is_level_and_centered(shape, asked, sides, rng):
     assert (top.any(axis=1).sum(), top.any(axis=0).sum()) == sides
     assert top.sum() == sides[0] * sides[1]
     assert (top == top[::-1, ::-1]).all()
+    # The slope starts at the centers of the outermost cells of the platform.
     realized = slope.realized(grid)["platform"]
-    assert np.broadcast_to(realized, 2) == pytest.approx(np.array(sides) * 0.1)
+    assert np.broadcast_to(realized, 2) == pytest.approx(np.array(sides) * 0.1 - 0.1)
 
 
-def test_pyramid_slope_short_sides_end_higher(rng):
+@pytest.mark.parametrize("inverted", [False, True])
+@pytest.mark.parametrize("shape", [(80, 80), (80, 40), (40, 80), (73, 51)])
+def test_pyramid_slope_rim_is_at_height_zero(shape, inverted, rng):
+    heights = PyramidSlope(inverted=inverted).build(Grid(shape=shape, cell=0.1), rng)
+    assert not heights[[0, -1]].any()
+    assert not heights[:, [0, -1]].any()
+
+
+def test_pyramid_slope_height_follows_from_the_shorter_side(rng):
     heights = PyramidSlope(grade=0.4).build(Grid(shape=(80, 40), cell=0.1), rng)
-    # Along x the ground falls for 2.5 m, along y for 0.5 m.
-    assert heights[0, 20] == 0.0
-    assert heights[40, 0] == pytest.approx(1.0 - 0.2)
+    # Along y the slope has 0.5 m, so it has 0.5 m along x too.
+    assert heights.max() == pytest.approx(0.2)
+    assert not heights[:21].any()
+    assert heights[21, 20] == pytest.approx(0.04)
+
+
+def test_pyramid_slope_platform_as_wide_as_patch_is_rejected(rng):
+    with pytest.raises(
+        ConfigError, match="a platform of 4 m leaves no slope in a patch of 8 m x 4 m"
+    ):
+        PyramidSlope(platform=4.0).build(Grid(shape=(80, 40), cell=0.1), rng)
 
 
 def test_pyramid_slope_is_symmetric(grid, rng):

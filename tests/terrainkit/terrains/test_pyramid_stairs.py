@@ -56,13 +56,22 @@ def test_pyramid_stairs_platform_is_centered(shape, asked, sides, rng):
     assert np.broadcast_to(realized, 2) == pytest.approx(np.array(sides) * 0.1)
 
 
-def test_pyramid_stairs_are_cut_at_short_sides(rng):
-    stairs = PyramidStairs(step_height=0.1, step_width=0.3)
+def test_pyramid_stairs_follow_the_shorter_side(rng):
+    stairs = PyramidStairs(step_height=0.1, step_width=0.3, platform=2.0)
     heights = stairs.build(Grid(shape=(80, 40), cell=0.1), rng)
-    # Along y there are five cells: one step of three and two cells of the next.
-    assert edges(heights[40]) == [2, 5, 35, 38]
-    assert heights[40, 0] == pytest.approx(0.6)
-    assert heights[0, 20] == 0.0
+    # Along y there are ten cells: three steps, and an outermost tread of four cells.
+    assert edges(heights[40]) == [4, 7, 10, 30, 33, 36]
+    # Along x the outermost tread has 30 - 6 cells.
+    assert edges(heights[:, 20]) == [24, 27, 30, 50, 53, 56]
+    assert heights.max() == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("inverted", [False, True])
+@pytest.mark.parametrize("shape", [(80, 80), (80, 40), (40, 80), (73, 51)])
+def test_pyramid_stairs_rim_is_at_height_zero(shape, inverted, rng):
+    heights = PyramidStairs(inverted=inverted).build(Grid(shape=shape, cell=0.1), rng)
+    assert not heights[[0, -1]].any()
+    assert not heights[:, [0, -1]].any()
 
 
 def test_pyramid_stairs_are_symmetric(grid, rng):

@@ -30,7 +30,9 @@ def test_rough_platform_is_level_and_centered(shape, asked, sides):
     assert heights[x - 1].any()
     assert heights[:, y - 1].any()
     assert heights[x + sides[0]].any()
-    assert Rough(platform=asked).realized(grid)["platform"] == pytest.approx(sides[0] * 0.1)
+    # The noise starts at the centers of the outermost cells of the platform.
+    realized = Rough(platform=asked).realized(grid)["platform"]
+    assert realized == pytest.approx(sides[0] * 0.1 - 0.1)
 
 
 def test_rough_noise_fades_over_one_spacing(grid):
@@ -68,7 +70,8 @@ def test_rough_realized_parameters():
         "step": 0.005,
         # 8 m are 29.6 intervals of 0.27 m, so 30; 5.1 m are 18.9, so 19.
         "spacing": (0.266666667, 0.268421053),
-        "platform": (2.0, 2.1),
+        # 20 and 21 cells; the noise starts at the centers of the outermost ones.
+        "platform": (1.9, 2.0),
     }
 
 

@@ -63,7 +63,8 @@ def test_rough_slope_realized_parameters():
         "step": 0.02,
         # 8 m are 33.3 intervals of 0.24 m, so 33; 5.1 m are 21.25, so 21.
         "spacing": (0.242424242, 0.242857143),
-        "platform": (3.0, 2.9),
+        # 30 and 29 cells; the slope starts at the centers of the outermost ones.
+        "platform": (2.9, 2.8),
         "inverted": False,
     }
 

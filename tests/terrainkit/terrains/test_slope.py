@@ -1,17 +1,21 @@
 import numpy as np
 import pytest
 
+from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.terrains.slope import Slope
 
 
-def test_slope_rises_between_level_landings(grid, rng):
+def test_slope_rises_and_falls_between_flat_ends(grid, rng):
     profile = Slope(grade=0.4, landing=2.0).build(grid, rng)[:, 0]
     assert not profile[:20].any()
-    # 8 m less two landings of 2 m are a run of 4 m: 40 cells of 0.04 m, up to 1.6 m.
-    assert np.diff(profile)[19:59] == pytest.approx(np.full(40, 0.04), abs=1e-6)
-    assert profile[-20:] == pytest.approx(np.full(20, 1.6))
+    assert not profile[-20:].any()
+    # 8 m less two ends of 2 m are 40 cells: 20 up and 20 down by 0.04 m each.
+    up = np.full(20, 0.04)
+    assert np.diff(profile)[19:39] == pytest.approx(up, abs=1e-6)
+    assert np.diff(profile)[40:60] == pytest.approx(-up, abs=1e-6)
+    assert (profile == profile[::-1]).all()
 
 
 def test_slope_is_constant_across_its_width(rng):
@@ -22,17 +26,17 @@ def test_slope_is_constant_across_its_width(rng):
 @pytest.mark.parametrize(
     ("shape", "top"),
     [
-        ((80, 40), 1.6),  # 4.0 m of slope
-        ((73, 51), 1.32),  # 3.3 m
+        ((80, 40), 0.8),  # 4.0 m of slope, half of it upward
+        ((73, 51), 0.68),  # 33 cells, the middle one is the 17th
         ((41, 40), 0.04),  # one cell
     ],
 )
-def test_slope_top_is_grade_times_run(shape, top, rng):
+def test_slope_top_is_grade_times_half_the_run(shape, top, rng):
     heights = Slope(grade=0.4).build(Grid(shape=shape, cell=0.1), rng)
     assert heights.max() == pytest.approx(top)
 
 
-def test_slope_inverted_descends(grid, rng):
+def test_slope_inverted_is_negated(grid, rng):
     rising = Slope(grade=0.2).build(grid, rng)
     assert (Slope(grade=0.2, inverted=True).build(grid, rng) == -rising).all()
 
@@ -48,12 +52,24 @@ def test_slope_spawn_is_on_the_lower_landing():
     assert Slope(landing=2.0).spawn(grid) == pytest.approx((17.0, 12.75))
 
 
-@pytest.mark.parametrize(("asked", "built"), [(2.0, 2.0), (1.54, 1.5), (1.55, 1.6)])
-def test_slope_landing_snaps_to_cells(asked, built, grid, rng):
+@pytest.mark.parametrize(("asked", "cells"), [(2.0, 20), (1.54, 15), (1.55, 16)])
+def test_slope_records_the_flat_length_at_both_ends(asked, cells):
     slope = Slope(grade=0.4, landing=asked)
-    assert slope.realized(grid)["landing"] == built
-    level = np.flatnonzero(slope.build(grid, rng)[:, 0] == 0.0)
-    assert len(level) * 0.1 == pytest.approx(built)
+    config = MapConfig(
+        rows=1,
+        cols=1,
+        border=0.0,
+        difficulty_range=(1.0, 1.0),
+        terrains=(SubTerrain(terrain="slope", parameters={"landing": asked}),),
+    )
+    terrain_map = generate(config)
+    x = np.linspace(0.0, 8.0, 8001)
+    flat = terrain_map.height(np.column_stack([x, np.full(8001, 4.0)])) == 0.0
+    # The slope starts at the center of the last flat cell.
+    start, end = x[~flat][[0, -1]]
+    assert start == pytest.approx(cells * 0.1 - 0.05, abs=0.0011)
+    assert 8.0 - end == pytest.approx(start, abs=1e-9)
+    assert slope.realized(terrain_map.grid)["landing"] == pytest.approx(start, abs=0.0011)
 
 
 def test_slope_without_run_is_rejected(grid, rng):

@@ -11,26 +11,33 @@ def risers(heights):
     return (np.flatnonzero(np.diff(heights[:, 0])) + 1).tolist()
 
 
-def test_stairs_have_equal_steps(grid, rng):
+def test_stairs_go_up_and_down_in_equal_steps(grid, rng):
     heights = Stairs(step_height=0.1, step_width=0.4, landing=2.0).build(grid, rng)
-    # 4 m between the landings are ten treads of 0.4 m, so eleven risers.
-    assert risers(heights) == [20, 24, 28, 32, 36, 40, 44, 48, 52, 56, 60]
+    # 4 m between the ends: four treads of 0.4 m up, a top of 0.8 m, and four treads down.
+    assert risers(heights) == [20, 24, 28, 32, 36, 44, 48, 52, 56, 60]
     assert np.diff(heights[:, 0])[19] == pytest.approx(0.1)
-    assert np.unique(heights) == pytest.approx(0.1 * np.arange(12), abs=1e-6)
+    assert np.unique(heights) == pytest.approx(0.1 * np.arange(6), abs=1e-6)
+    assert (heights == heights[::-1]).all()
 
 
-def test_stairs_remaining_cells_extend_the_landing(grid, rng):
+def test_stairs_top_takes_the_remaining_cells(grid, rng):
     heights = Stairs(step_height=0.1, step_width=0.3, landing=2.0).build(grid, rng)
-    # 40 cells hold 13 treads of 3, so 14 risers, the last at 20 + 39.
-    assert risers(heights) == list(range(20, 60, 3))
-    assert heights[59:, 0] == pytest.approx(np.full(21, 1.4))
+    # 40 cells are six treads of 3 up, six down, and a top of 4.
+    assert risers(heights) == [*range(20, 39, 3), *range(42, 61, 3)]
+    assert heights[38:42, 0] == pytest.approx(np.full(4, 0.7))
+
+
+def test_stairs_end_at_height_zero(grid, rng):
+    heights = Stairs().build(grid, rng)
+    assert not heights[:20].any()
+    assert not heights[-20:].any()
 
 
 def test_stairs_width_0_31_is_built_as_0_3(grid, rng):
     stairs = Stairs(step_width=0.31)
     assert stairs.requested()["step_width"] == 0.31
     assert stairs.realized(grid)["step_width"] == 0.3
-    assert set(np.diff(risers(stairs.build(grid, rng)))) == {3}
+    assert set(np.diff(risers(stairs.build(grid, rng)))) == {3, 4}  # the top is wider
 
 
 def test_stairs_span_the_width(rng):
@@ -41,19 +48,19 @@ def test_stairs_span_the_width(rng):
 @pytest.mark.parametrize(
     ("shape", "cell", "count"),
     [
-        ((80, 40), 0.1, 14),  # 40 cells hold 13 treads of 3
-        ((73, 51), 0.1, 12),  # 33 cells hold 11
-        ((40, 40), 0.2, 11),  # 20 cells hold 10 of 2
-        ((40, 40), 0.1, 1),  # two landings and nothing between
+        ((80, 40), 0.1, 7),  # 40 cells hold 12 treads of 3 and a top of 4
+        ((73, 51), 0.1, 6),  # 33 cells hold 10 and a top of 3
+        ((40, 40), 0.2, 5),  # 20 cells hold 8 of 2 and a top of 4
+        ((43, 40), 0.1, 1),  # only a top of 3
     ],
 )
 def test_stairs_number_of_steps_fills_the_patch(shape, cell, count, rng):
     heights = Stairs(step_height=0.2).build(Grid(shape=shape, cell=cell), rng)
-    assert len(risers(heights)) == count
+    assert len(risers(heights)) == 2 * count
     assert heights.max() == pytest.approx(0.2 * count)
 
 
-def test_stairs_inverted_descend(grid, rng):
+def test_stairs_inverted_are_negated(grid, rng):
     rising = Stairs().build(grid, rng)
     assert (Stairs(inverted=True).build(grid, rng) == -rising).all()
 
@@ -71,13 +78,14 @@ def test_stairs_spawn_is_on_the_lower_landing():
 
 def test_stairs_landings_too_long_are_rejected(grid, rng):
     with pytest.raises(
-        ConfigError, match=r"stairs: two landings of 4\.1 m do not fit in a patch 8 m long"
+        ConfigError,
+        match=r"stairs: two landings of 3\.9 m leave no step of 0\.31 m in a patch 8 m long",
     ):
-        Stairs(landing=4.1).build(grid, rng)
+        Stairs(landing=3.9).build(grid, rng)
 
 
 def test_stairs_narrow_step_is_one_cell(grid, rng):
     stairs = Stairs(step_width=0.04)
     assert stairs.realized(grid)["step_width"] == 0.1
-    # 40 cells between the landings, and a riser before and after each.
-    assert risers(stairs.build(grid, rng)) == list(range(20, 61))
+    # 40 cells between the ends: 19 treads up, a top of two cells, 19 treads down.
+    assert risers(stairs.build(grid, rng)) == [*range(20, 40), *range(41, 61)]

@@ -7,38 +7,38 @@ from terrainkit.terrains.wave import Wave
 
 
 def test_wave_of_four_cells_by_hand(rng):
-    grid = Grid(shape=(16, 16), cell=0.1)
-    heights = Wave(amplitude=0.2, number=4, platform=0.2).build(grid, rng)
-    # Samples at 45, 135, 225 and 315 degrees: sines of 0.707 and -0.707, products of 0.5 and -0.5.
-    assert heights[0] == pytest.approx([0.1, 0.1, -0.1, -0.1] * 4)
-    assert heights[2] == pytest.approx([-0.1, -0.1, 0.1, 0.1] * 4)
-    assert heights[:, 0] == pytest.approx([0.1, 0.1, -0.1, -0.1] * 4)
+    grid = Grid(shape=(17, 17), cell=0.1)
+    heights = Wave(amplitude=0.2, number=4, platform=0.1).build(grid, rng)
+    # Samples at 0, 90, 180 and 270 degrees.
+    assert heights[1] == pytest.approx([*[0.0, 0.2, 0.0, -0.2] * 4, 0.0])
+    assert heights[3] == pytest.approx([*[0.0, -0.2, 0.0, 0.2] * 4, 0.0])
+    assert heights[:, 1] == pytest.approx([*[0.0, 0.2, 0.0, -0.2] * 4, 0.0])
 
 
 @pytest.mark.parametrize(("number", "shape"), [(1, (80, 80)), (4, (80, 40)), (5, (73, 51))])
 def test_wave_number_is_whole_per_side(number, shape, rng):
     heights = Wave(number=number, platform=0.2).build(Grid(shape=shape, cell=0.1), rng)
     # A wave crosses zero in its middle; between two waves it crosses zero too.
-    for line in (heights[0], heights[:, 0]):
+    for line in (heights[1], heights[:, 1]):
         signs = np.sign(line[line != 0])
         assert np.count_nonzero(np.diff(signs)) == 2 * number - 1
 
 
-@pytest.mark.parametrize("shape", [(80, 80), (80, 40), (73, 51)])
-def test_wave_rim_is_zero(shape, rng):
-    heights = Wave(amplitude=0.2).build(Grid(shape=shape, cell=0.1), rng)
-    # Half a cell outside lies the rim: the sample beyond it mirrors the one inside.
-    assert heights[0] == pytest.approx(-heights[-1], abs=1e-6)
-    assert heights[:, 0] == pytest.approx(-heights[:, -1], abs=1e-6)
-    longest = np.pi * 4 / min(shape)  # half a cell, as a share of a wave
-    assert np.abs(heights[0]).max() <= 0.2 * np.sin(longest) + 1e-6
+@pytest.mark.parametrize(("shape", "cell"), [((80, 40), 0.1), ((73, 51), 0.1), ((32, 32), 0.25)])
+def test_wave_rim_is_zero(shape, cell, rng):
+    heights = Wave(amplitude=0.2).build(Grid(shape=shape, cell=cell), rng)
+    assert not heights[[0, -1]].any()
+    assert not heights[:, [0, -1]].any()
+    assert heights[1].any()
 
 
 def test_wave_reaches_the_amplitude(grid, rng):
     heights = Wave(amplitude=0.2).build(grid, rng)
-    # The highest of 20 samples a wave is 9 degrees off the crest: 0.2 * cos(9 deg)^2 = 0.195.
-    assert heights.max() == pytest.approx(0.195, abs=0.002)
-    assert heights.min() == pytest.approx(-0.195, abs=0.002)
+    # A wave is 79 / 4 cells of 18.2 degrees. The sample nearest to a crest is 1.1 degrees off it:
+    # 0.2 * cos(1.1 deg)^2 = 0.19992.
+    assert heights.max() == pytest.approx(0.19992, abs=1e-5)
+    assert heights.min() == pytest.approx(-0.19992, abs=1e-5)
+    assert Wave(amplitude=0.2).realized(grid)["amplitude"] == pytest.approx(0.19992, abs=1e-5)
 
 
 @pytest.mark.parametrize(("shape", "side"), [((80, 80), 16), ((80, 40), 16), ((73, 51), 15)])
@@ -50,7 +50,8 @@ def test_wave_platform_is_level_and_centered(shape, side, rng):
     assert not heights[x : x + side, y : y + side].any()
     assert heights[x - 1, y : y + side].any()
     assert heights[x : x + side, y - 1].any()
-    assert Wave().realized(grid)["platform"] == pytest.approx(side * 0.1)
+    # The waves start at the centers of the outermost cells of the platform.
+    assert Wave().realized(grid)["platform"] == pytest.approx(side * 0.1 - 0.1)
 
 
 def test_wave_fades_over_a_quarter_wave(grid, rng):
@@ -62,7 +63,7 @@ def test_wave_fades_over_a_quarter_wave(grid, rng):
 @pytest.mark.parametrize(("difficulty", "amplitude"), [(0.0, 0.0), (0.5, 0.1), (1.0, 0.2)])
 def test_wave_amplitude_grows_with_difficulty(difficulty, amplitude, grid, rng):
     heights = Wave.at(difficulty).build(grid, rng)
-    assert heights.max() == pytest.approx(0.9755 * amplitude, abs=1e-4)
+    assert heights.max() == pytest.approx(0.9996 * amplitude, abs=1e-4)
 
 
 def test_wave_needs_four_cells_per_wave(rng):

@@ -1,18 +1,13 @@
-import pickle
 import re
-import resource
 import shutil
 import tomllib
-import zipfile
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-import torch
 
-from terrainkit import TerrainMap
+from terrainkit import TerrainMap, generate
 from terrainkit.errors import ConfigError, ExportError, MapFileError
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Rewards, Task
@@ -20,16 +15,14 @@ from terrainkit_robots.rl.run import (
     MAP_FILE,
     RUN_FILE,
     TASK_FILE,
+    can_continue,
     changed_robot_files,
     checkpoints,
     create_run,
     default_folder,
     is_same_terrain,
     open_run,
-    policy_state,
-    read_checkpoint,
     run_folder,
-    save_checkpoint,
 )
 from terrainkit_robots.rl.terrain import load_terrain
 from terrainkit_robots.spec.robot import Robot
@@ -107,14 +100,18 @@ def test_missing_map_is_generated_again(tmp_path, task, mixed_map):
     np.testing.assert_array_equal(again.env_origins, mixed_map.env_origins)
 
 
-def test_modified_model_is_another_terrain(tmp_path, task):
-    path = tmp_path / "ground.xml"
-    path.write_text("<mujoco><worldbody><geom type='plane' size='9 9 1'/></worldbody></mujoco>")
+def test_modified_map_is_another_terrain(tmp_path, task, mixed_map):
+    path = mixed_map.save(tmp_path / "map.npz")
     run = create_run(tmp_path / "run", task, "quadruped", path)
     assert is_same_terrain(run, path)
+    assert is_same_terrain(run, mixed_map.save(tmp_path / "copy.npz"))
     assert not is_same_terrain(run, "plane")
-    path.write_text(path.read_text().replace("9 9 1", "8 8 1"))
+    assert not is_same_terrain(create_run(tmp_path / "plane", task, "quadruped", "plane"), path)
+    other = replace(mixed_map.config, seed=mixed_map.config.seed + 1)
+    generate(other).save(path, overwrite=True)
     assert not is_same_terrain(run, path)
+    with pytest.raises(ConfigError, match=r"map\.npz changed since .*run was trained; with a copy"):
+        can_continue(run, "quadruped", path, task)
 
 
 def test_create_run_rejects_map_of_other_version(tmp_path, task, mixed_map):
@@ -233,138 +230,3 @@ def test_open_run_names_the_wrong_key(run):
     path.write_text(path.read_text().replace("tracking_lin_vel", "tracking_lin_vle"))
     with pytest.raises(ConfigError, match="tracking_lin_vle"):
         open_run(run)
-
-
-@pytest.fixture
-def state() -> dict[str, Any]:
-    return {
-        "iteration": 7,
-        "robot": "rover",
-        "joints": ["front", "rear"],
-        "observed": {"policy": 3},
-        "actor_state_dict": {"weight": torch.arange(6.0).reshape(2, 3)},
-        "critic_state_dict": {"weight": torch.ones(1)},
-        "processes": [{"rng": {"state": 2**127 + 1}, "levels": np.arange(4), "pair": (1.5, 2.5)}],
-    }
-
-
-def test_checkpoint_round_trip(tmp_path, state):
-    save_checkpoint(tmp_path / "model.pt", state)
-    read = read_checkpoint(tmp_path / "model.pt")
-    assert read["iteration"] == 7
-    assert read["joints"] == ["front", "rear"]
-    torch.testing.assert_close(read["actor_state_dict"], state["actor_state_dict"], rtol=0, atol=0)
-    (mine,) = read["processes"]
-    assert mine["rng"]["state"] == 2**127 + 1
-    assert mine["levels"].tolist() == [0, 1, 2, 3]
-    assert mine["pair"] == [1.5, 2.5]
-
-
-def test_checkpoint_saves_only_the_view(tmp_path, state):
-    large = torch.zeros(1_000_000)
-    save_checkpoint(tmp_path / "model.pt", state | {"view": large[:3]})
-    assert (tmp_path / "model.pt").stat().st_size < 10_000
-
-
-def test_save_checkpoint_rejects_other_types(tmp_path, state):
-    with pytest.raises(TypeError, match=r"a checkpoint cannot hold a \w*Path"):
-        save_checkpoint(tmp_path / "model.pt", state | {"path": tmp_path})
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_policy_state_is_a_checkpoint(tmp_path, state):
-    save_checkpoint(tmp_path / "model.pt", policy_state(state))
-    assert "processes" not in read_checkpoint(tmp_path / "model.pt")
-
-
-def test_full_disk_keeps_the_previous_checkpoint(tmp_path, state):
-    path = tmp_path / "model.pt"
-    save_checkpoint(path, state)
-    before, limits = path.read_bytes(), resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (2000, limits[1]))
-    try:
-        with pytest.raises(ExportError, match=r"cannot write .*model\.pt: File too large"):
-            save_checkpoint(path, state | {"more": torch.ones(1000)})
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-    assert path.read_bytes() == before
-    assert [entry.name for entry in tmp_path.iterdir()] == ["model.pt"]
-
-
-def test_read_checkpoint_rejects_truncated_files(tmp_path, state):
-    save_checkpoint(tmp_path / "whole.pt", state)
-    data = (tmp_path / "whole.pt").read_bytes()
-    path = tmp_path / "model.pt"
-    for length in (0, 1, 100, len(data) // 2, len(data) - 1):
-        path.write_bytes(data[:length])
-        with pytest.raises(ConfigError, match="is not a checkpoint of terrainkit, or is damaged"):
-            read_checkpoint(path)
-
-
-def test_damaged_checkpoint_raises_one_line(tmp_path, state):
-    save_checkpoint(tmp_path / "whole.pt", state)
-    data = bytearray((tmp_path / "whole.pt").read_bytes())
-    path, draw = tmp_path / "model.pt", np.random.default_rng(0)
-    for _ in range(100):
-        damaged = bytearray(data)
-        for at in draw.integers(0, len(data), 5):
-            damaged[at] ^= int(draw.integers(1, 256))
-        path.write_bytes(damaged)
-        try:
-            read_checkpoint(path)
-        except ConfigError as error:
-            assert "\n" not in str(error)  # noqa: PT017 (damage may go unnoticed in a weight)
-
-
-class _Harm:
-    def __reduce__(self) -> Any:
-        return print, ("harm",)
-
-
-def test_read_checkpoint_executes_nothing(tmp_path, state, capsys):
-    path = tmp_path / "model.pt"
-    torch.save(state | {"format": "terrainkit checkpoint", "version": 1, "harm": _Harm()}, path)
-    with pytest.raises(ConfigError, match="is not a checkpoint of terrainkit"):
-        read_checkpoint(path)
-    path.write_bytes(pickle.dumps(_Harm()))
-    with pytest.raises(ConfigError, match="is not a checkpoint of terrainkit"):
-        read_checkpoint(path)
-    assert capsys.readouterr().out == ""
-
-
-def test_read_checkpoint_rejects_compressed_files(tmp_path, state):
-    save_checkpoint(tmp_path / "whole.pt", state)
-    path = tmp_path / "model.pt"
-    with (
-        zipfile.ZipFile(tmp_path / "whole.pt") as whole,
-        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed,
-    ):
-        for name in whole.namelist():
-            packed.writestr(name, whole.read(name))
-    with pytest.raises(ConfigError, match="it is compressed"):
-        read_checkpoint(path)
-
-
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({"format": "other"}, "is not a checkpoint of terrainkit"),
-        ({"version": 2}, "version: got 2; expected 1"),
-        ({"iteration": "seven"}, "iteration is missing or not a int"),
-        ({"actor_state_dict": None}, "actor_state_dict is missing or not a dict"),
-    ],
-)
-def test_read_checkpoint_rejects_foreign_files(tmp_path, state, change, said):
-    whole = {"format": "terrainkit checkpoint", "version": 1}
-    torch.save(policy_state(state) | whole | change, tmp_path / "model.pt")
-    with pytest.raises(ConfigError, match=said):
-        read_checkpoint(tmp_path / "model.pt")
-
-
-def test_read_checkpoint_rejects_nonfiles(tmp_path):
-    with pytest.raises(ConfigError, match=r"cannot read .*gone\.pt: No such file"):
-        read_checkpoint(tmp_path / "gone.pt")
-    with pytest.raises(ConfigError, match="is not a file; expected a checkpoint"):
-        read_checkpoint(tmp_path)
-    with pytest.raises(ConfigError, match="is not a file; expected a checkpoint"):
-        read_checkpoint(Path("/dev/zero"))

@@ -11,9 +11,10 @@ import pytest
 import torch
 
 from terrainkit.errors import ConfigError
+from terrainkit_robots.checkpoint import policy_state, read_checkpoint, save_checkpoint
 from terrainkit_robots.rl.config import Algorithm, Env, Policy, Rewards, Runner, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.run import open_run, policy_state, read_checkpoint, save_checkpoint
+from terrainkit_robots.rl.run import open_run
 from terrainkit_robots.rl.runner import LeggedRunner, resolve_device, runner_config
 from terrainkit_robots.rl.terrain import Plane, Terrain
 from terrainkit_robots.spec.robot import Robot

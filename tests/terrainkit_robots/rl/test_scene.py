@@ -10,7 +10,7 @@ from terrainkit_robots.rl.config import Asset, Control, Rewards, Sim
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.scene import build_scene
 from terrainkit_robots.rl.simulation import Simulation
-from terrainkit_robots.rl.terrain import MapTerrain, ModelTerrain, Plane
+from terrainkit_robots.rl.terrain import MapTerrain, Plane
 from terrainkit_robots.spec.robot import Robot
 
 
@@ -101,17 +101,6 @@ class TestIndices:
             last = block.stop
         assert last == scene.model.nsensordata
 
-    def test_sensors_of_terrain_do_not_shift_ranges(self, cart, nominal_task, tmp_path):
-        path = tmp_path / "ground.xml"
-        path.write_text(
-            '<mujoco><worldbody><geom type="plane" size="5 5 0.1"/></worldbody>'
-            "<sensor><clock/></sensor></mujoco>"
-        )
-        ground = ModelTerrain(path, cell=0.1, half_size=1.0)
-        scene = build_scene(cart, ground, nominal_task())
-        foot = scene.model.sensor("foot_position_sole of wheel")
-        assert foot.adr[0] == scene.sensors["foot_position"].start
-
     def test_options_are_the_tasks(self, cart, nominal_task):
         task = nominal_task(sim=Sim(dt=0.002, iterations=7, ls_iterations=9))
         option = build_scene(cart, Plane(), task).model.opt
@@ -162,18 +151,6 @@ class TestCollisions:
             bodies = scene.model.geom_bodyid[scene.geoms]
             touching.append({scene.model.body(k).name for k in bodies})
         assert touching == [{"trunk", "front", "rear", "wheel"}, {"trunk", "front", "wheel"}]
-
-    @pytest.mark.parametrize("affinity", [(1, 1), (0, 1), (1, 0), (2, 4), (8, 0)])
-    def test_contact_with_any_terrain_bits(self, cart, nominal_task, tmp_path, affinity):
-        path = tmp_path / "ground.xml"
-        path.write_text(
-            '<mujoco><worldbody><geom name="floor" type="plane" size="5 5 0.1" '
-            f'contype="{affinity[0]}" conaffinity="{affinity[1]}"/></worldbody></mujoco>'
-        )
-        scene = build_scene(cart, ModelTerrain(path, cell=0.1, half_size=1.0), nominal_task())
-        qpos = scene.home.copy()
-        qpos[2] = 0.15
-        assert any("ground/floor" in pair for pair in contacts(scene.model, qpos))
 
     def test_contact_friction_is_the_robots(self, scene):
         assert (scene.model.geom_priority[scene.geoms] == 1).all()

@@ -3,12 +3,12 @@ import numpy as np
 import pytest
 
 from terrainkit import MapConfig, SubTerrain, generate
-from terrainkit.errors import ConfigError, TerrainkitError
+from terrainkit.errors import TerrainkitError
 from terrainkit.surface import HeightfieldSurface
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import InitState
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.terrain import MapTerrain, ModelTerrain, Plane, load_terrain
+from terrainkit_robots.rl.terrain import MapTerrain, Plane, load_terrain
 
 EXACT = 1e-3
 
@@ -34,22 +34,6 @@ def compiled(ground):
 def anywhere(ground, count, seed=0):
     low, high = np.array(ground.lower), np.array(ground.upper)
     return (low + (high - low) * np.random.default_rng(seed).random((count, 2))).astype(np.float32)
-
-
-@pytest.fixture(scope="module")
-def scanned(tmp_path_factory):
-    """Return an asymmetric terrain: a level floor with a step and a slope."""
-    path = tmp_path_factory.mktemp("scanned") / "ground.xml"
-    path.write_text("""
-        <mujoco>
-          <worldbody>
-            <geom type="plane" size="9 9 0.1" pos="0 0 -0.2"/>
-            <geom type="box" size="0.5 0.25 0.15" pos="0.5 0.25 -0.15"/>
-            <geom type="box" size="0.6 0.4 0.05" pos="-0.7 -0.5 -0.1" euler="0 10 0"/>
-          </worldbody>
-        </mujoco>
-    """)
-    return ModelTerrain(path, cell=0.02, half_size=1.5)
 
 
 class TestHeightfieldSurface:
@@ -168,120 +152,9 @@ class TestMapTerrain:
         np.testing.assert_allclose(found, origins[:, 2], atol=EXACT)
 
 
-class TestModelTerrain:
-    def test_model_height_matches_rays(self, scanned):
-        xy = anywhere(scanned, 3000)
-        found = scanned.height(xy[:, 0], xy[:, 1])
-        near = np.stack(
-            [
-                scanned.height(xy[:, 0] + np.float32(dx), xy[:, 1] + np.float32(dy))
-                for dx, dy in np.random.default_rng(0).uniform(-0.03, 0.03, (12, 2))
-            ]
-        )
-        smooth = np.ptp(near, axis=0) < 0.02
-        off = np.abs(found - rays(compiled(scanned), xy))
-        assert smooth.mean() > 0.8
-        assert off[smooth].max() < EXACT
-
-    def test_model_is_one_custom_patch(self, scanned):
-        assert scanned.terrain_names.tolist() == [["custom"]]
-        assert Plane().terrain_names.tolist() == [["plane"]]
-
-    def test_model_bounds_are_half_size(self, scanned):
-        assert scanned.lower == (-1.5, -1.5)
-        assert scanned.upper == (1.5, 1.5)
-
-    def test_model_origin_is_on_the_ground(self, scanned):
-        np.testing.assert_allclose(scanned.env_origins, [[[0, 0, 0]]], atol=1e-6)
-
-    def test_missing_ground_is_far_below(self, tmp_path):
-        path = tmp_path / "slab.xml"
-        path.write_text(
-            '<mujoco><worldbody><geom type="box" size=".5 .5 .1"/></worldbody></mujoco>'
-        )
-        ground = ModelTerrain(path, cell=0.1, half_size=1.0)
-        found = ground.height(np.float32([0, 0.9]), np.float32([0, 0]))
-        np.testing.assert_allclose(found, [0.1, 0.1 - 10], atol=1e-6)
-
-    @pytest.mark.parametrize("turn", ["0 10 0", "0 -10 0", "10 0 0"])
-    @pytest.mark.parametrize("x", [0, 3])
-    def test_tilted_plane_is_measured_uphill(self, tmp_path, turn, x):
-        path = tmp_path / "tilted.xml"
-        path.write_text(
-            "<mujoco><worldbody>"
-            f'<geom type="plane" size="0 0 1" euler="{turn}" pos="{x} 0 0"/>'
-            "</worldbody></mujoco>"
-        )
-        ground = ModelTerrain(path, cell=1.0, half_size=12.0)
-        corners = np.float32([[-12, -12], [-12, 12], [12, -12], [12, 12]])
-        found = ground.height(corners[:, 0], corners[:, 1])
-        np.testing.assert_allclose(found, rays(compiled(ground), corners), atol=1e-4)
-
-    @pytest.mark.parametrize(
-        ("text", "message"),
-        [
-            ("<mujoco/>", "no ground at the origin"),
-            ("<mujoco", "MuJoCo cannot read"),
-            ("<robot name='x'/>", "MuJoCo cannot read|no ground at the origin"),
-            ("", "MuJoCo cannot read"),
-            (
-                '<mujoco><worldbody><geom type="plane" size="1 1 1"/><body pos="0 0 1"><freejoint/>'
-                '<geom size="0.1"/></body></worldbody></mujoco>',
-                "got 6 degrees of freedom; expected a static model",
-            ),
-            (
-                '<mujoco><worldbody><geom type="box" pos="3 0 0" size="1 1 1"/></worldbody>'
-                "</mujoco>",
-                "no ground at the origin",
-            ),
-        ],
-    )
-    def test_invalid_source_is_rejected(self, tmp_path, text, message):
-        path = tmp_path / "ground.xml"
-        path.write_text(text)
-        with pytest.raises(ConfigError, match=message) as caught:
-            ModelTerrain(path, cell=0.1, half_size=0.5)
-        assert "\n" not in str(caught.value)
-        assert not (tmp_path / "MUJOCO_LOG.TXT").exists()
-
-    def test_statistic_of_file_is_ignored(self, tmp_path):
-        # The statistic of a scene is for cameras and may be smaller than the model.
-        path = tmp_path / "tower.xml"
-        path.write_text(
-            '<mujoco><statistic extent="0.8" center="0 0 0.1"/><worldbody>'
-            '<geom type="plane" size="5 5 0.1" pos="0 0 -1"/>'
-            '<geom type="box" size="0.5 0.5 3"/></worldbody></mujoco>'
-        )
-        ground = ModelTerrain(path, cell=0.1, half_size=0.5)
-        np.testing.assert_allclose(ground.env_origins[0, 0], [0, 0, 3], atol=1e-6)
-
-    def test_visual_geoms_are_ignored(self, tmp_path):
-        path = tmp_path / "carpet.xml"
-        path.write_text(
-            '<mujoco><worldbody><geom type="plane" size="5 5 0.1"/>'
-            '<geom type="box" size="3 3 0.1" pos="0 0 0.5" contype="0" conaffinity="0"/>'
-            "</worldbody></mujoco>"
-        )
-        ground = ModelTerrain(path, cell=0.1, half_size=0.5)
-        np.testing.assert_allclose(ground.env_origins[0, 0], [0, 0, 0], atol=1e-6)
-
-    def test_transparent_geoms_are_measured(self, tmp_path):
-        # MuJoCo's rays ignore fully transparent geoms.
-        path = tmp_path / "glass.xml"
-        path.write_text(
-            '<mujoco><worldbody><geom type="plane" size="5 5 0.1" pos="0 0 -1"/>'
-            '<geom type="box" size="3 3 0.1" rgba="1 1 1 0"/></worldbody></mujoco>'
-        )
-        ground = ModelTerrain(path, cell=0.1, half_size=0.5)
-        np.testing.assert_allclose(ground.env_origins[0, 0], [0, 0, 0.1], atol=1e-6)
-
-
 class TestLoadTerrain:
     def test_load_every_kind(self, mixed_map, tmp_path):
         mixed_map.save(tmp_path / "map.npz")
-        (tmp_path / "slab.xml").write_text(
-            '<mujoco><worldbody><geom type="plane" size="1 1 1"/></worldbody></mujoco>'
-        )
         assert isinstance(load_terrain("plane"), Plane)
         assert isinstance(load_terrain(tmp_path / "map.npz"), MapTerrain)
         assert isinstance(load_terrain(str(tmp_path / "map.npz")), MapTerrain)
@@ -308,12 +181,10 @@ class TestLoadTerrain:
             ("map.obj", "expected plane, a map"),
             ("none.npz", "none.npz"),
             ("none.toml", "none.toml"),
-            ("none.xml", "there is no file"),
-            ("folder.xml", "there is no file"),
+            ("ground.xml", "expected plane, a map"),
         ],
     )
     def test_invalid_source_is_rejected(self, tmp_path, name, message):
-        (tmp_path / "folder.xml").mkdir()
         source = tmp_path / name if "." in name else name
         with pytest.raises(TerrainkitError, match=message) as caught:
             load_terrain(source)

@@ -13,15 +13,10 @@ import torch
 
 import terrainkit
 from terrainkit.errors import ConfigError, ExportError, MemoryLimitError
+from terrainkit_robots.checkpoint import policy_state, read_checkpoint, save_checkpoint
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Algorithm, Env, Policy, Runner, Task, Terrain
-from terrainkit_robots.rl.run import (
-    checkpoints,
-    open_run,
-    policy_state,
-    read_checkpoint,
-    save_checkpoint,
-)
+from terrainkit_robots.rl.run import checkpoints, open_run
 from terrainkit_robots.rl.runner import TrainingProgress
 from terrainkit_robots.rl.train import train
 
@@ -86,7 +81,7 @@ def full_disk(size: int) -> Iterator[None]:
 
 def test_train_writes_a_run(task, tmp_path):
     trained = train("quadruped", "plane", task, folder=tmp_path / "run")
-    assert (trained.folder, trained.iteration) == (tmp_path / "run", 4)
+    assert (trained.folder, trained.current_learning_iteration) == (tmp_path / "run", 4)
     run = open_run(tmp_path / "run")
     assert run.task == task
     assert run.checkpoint == tmp_path / "run" / "model_4.pt"
@@ -115,7 +110,7 @@ def test_stopped_run_resumes_exactly(task, tmp_path, run_after):
     stopped = train(
         "quadruped", "plane", task, folder=tmp_path / "run", should_stop=lambda: next(calls)
     )
-    assert stopped.iteration == 2
+    assert stopped.current_learning_iteration == 2
     assert list(checkpoints(tmp_path / "run")) == [2]
     train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
     assert same_weights(tmp_path / "whole" / "model_4.pt", tmp_path / "run" / "model_4.pt")
@@ -130,14 +125,14 @@ def test_train_runs_in_a_thread(task, tmp_path):
     )
     work.start()
     work.join()
-    assert trained[0].iteration == 1
+    assert trained[0].current_learning_iteration == 1
 
 
 def test_resume_accepts_other_num_envs(task, tmp_path, run_after):
     run_after(1)
     more = with_iterations(replace(task, env=replace(task.env, num_envs=6)), 2)
     done = train("quadruped", "plane", more, resume=open_run(tmp_path / "run"))
-    assert (done.folder, done.iteration) == (tmp_path / "run", 2)
+    assert (done.folder, done.current_learning_iteration) == (tmp_path / "run", 2)
     assert open_run(tmp_path / "run").task.env.num_envs == 6
 
 
@@ -256,7 +251,7 @@ def test_resume_switches_between_plane_and_map(task, tmp_path, mixed_map, before
     train("quadruped", path, first, folder=tmp_path / "run")
     run = open_run(tmp_path / "run")
     done = train("quadruped", path, second, resume=run, folder=tmp_path / "more")
-    assert done.iteration == 1
+    assert done.current_learning_iteration == 1
 
 
 def test_resume_from_renamed_checkpoint_starts_new_run(task, run_after, tmp_path, monkeypatch):
@@ -273,7 +268,7 @@ def test_resume_from_policy_starts_new_run(task, run_after, tmp_path):
     path = run / "model_1.pt"
     save_checkpoint(path, policy_state(read_checkpoint(path)))
     done = train("quadruped", "plane", task, resume=open_run(run), folder=tmp_path / "more")
-    assert (done.folder, done.iteration) == (tmp_path / "more", 4)
+    assert (done.folder, done.current_learning_iteration) == (tmp_path / "more", 4)
     assert list(checkpoints(run)) == [1]
 
 

@@ -1,0 +1,74 @@
+"""Queries of the space above the ground: scans, clearance and free intervals."""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Direction = Literal["down", "up"]
+
+CONTACT = 1e-4
+"""Gap below which a solid touches the ground or another solid [m]."""
+
+
+def first_surface(
+    ground: NDArray[np.float64],
+    spans: NDArray[np.float64],
+    z: NDArray[np.float64],
+    direction: Direction,
+) -> NDArray[np.float64]:
+    """Return the z of the first surface that a vertical ray meets [m], NaN where there is none.
+
+    A ray that starts inside a solid meets the solid's far side, as MuJoCo's `mj_ray` does.
+
+    Args:
+        ground: Height of the ground under each start [m], shape (n,).
+        spans: Bottom and top of the solids on each line [m], shape (n, k, 2), padded with NaN.
+        z: Height of each start [m], shape (n,).
+        direction: Direction of the rays.
+    """
+    surfaces = np.concatenate([ground[:, None], spans.reshape(len(spans), -1)], axis=1)
+    if direction == "down":
+        found = np.max(surfaces, axis=1, where=surfaces <= z[:, None], initial=-np.inf)
+    else:
+        found = np.min(surfaces, axis=1, where=surfaces >= z[:, None], initial=np.inf)
+    return np.where(np.isfinite(found), found, np.nan)
+
+
+def free_intervals(ground: NDArray[np.float64], spans: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the free intervals above the ground on each vertical line.
+
+    Args:
+        ground: Height of the ground on each line [m], shape (n,).
+        spans: Bottom and top of the solids on each line [m], shape (n, k, 2), in the order of the
+            bottoms, padded with NaN.
+
+    Returns:
+        Floor and ceiling of each interval [m], shape (n, m, 2), upward, padded with NaN. The
+        ceiling of the last one is inf. Gaps of less than `CONTACT` are closed.
+    """
+    bottom, top = spans[..., 0], spans[..., 1]
+    tops = np.column_stack([ground, np.where(np.isnan(top), -np.inf, top)])
+    floor = np.maximum.accumulate(tops, axis=1)
+    bottoms = np.where(np.isnan(bottom), np.inf, bottom)
+    ceiling = np.column_stack([bottoms, np.full(len(ground), np.inf)])
+    intervals = np.dstack([floor, ceiling])
+    # The padding repeats the last interval.
+    is_last = np.isinf(ceiling)
+    free = (ceiling > floor + CONTACT) & (np.cumsum(is_last, axis=1) <= 1)
+    most = int(free.sum(axis=1).max(initial=1))
+    order = np.argsort(~free, axis=1, kind="stable")[:, :most]
+    chosen = np.take_along_axis(intervals, order[..., None], axis=1)
+    return np.where(np.take_along_axis(free, order, axis=1)[..., None], chosen, np.nan)
+
+
+def clearance(ground: NDArray[np.float64], spans: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the free height above the ground on each vertical line [m], shape (n,).
+
+    It is inf under the open sky, and 0 where a solid covers the ground. The arguments are those of
+    :func:`free_intervals`.
+    """
+    bottom, top = spans[..., 0], spans[..., 1]
+    above = top > ground[:, None] + CONTACT  # solids within the ground do not count; NaN is False
+    gap = np.where(above, bottom - ground[:, None], np.inf).min(axis=1, initial=np.inf)
+    return np.where(gap < CONTACT, 0.0, gap)

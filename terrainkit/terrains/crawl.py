@@ -1,0 +1,77 @@
+"""Bars above the ground."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+from terrainkit.lane import lane_goals, lane_positions, lane_spawn
+from terrainkit.solids import Solids, make_boxes
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class Crawl(Terrain):
+    """Bars across a lane along x, under which the robot crawls.
+
+    The ground is flat, and the robot is spawned at low x. There is a goal behind each bar.
+    """
+
+    clearance: float = parameter.height(0.5, 0.2)
+    """Height of the lower side of the bars above the ground [m]."""
+
+    min_depth: float = parameter.size(0.1)
+    """Minimum length of a bar along x [m]."""
+
+    max_depth: float = parameter.size(0.6)
+    """Maximum length of a bar along x [m]."""
+
+    thickness: float = parameter.size(0.2)
+    """Height of a bar [m]."""
+
+    spacing: float = parameter.size(1.0)
+    """Distance between two bars [m]; more behind a bar shorter than `max_depth`."""
+
+    start: float = parameter.length(2.0)
+    """Length of the flat start along x [m]."""
+
+    def spawn(self, grid: Grid) -> tuple[float, float]:
+        """Return the center of the flat start."""
+        return lane_spawn(grid, self.start)
+
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return flat ground."""
+        return np.zeros(grid.shape)
+
+    def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
+        """Return the bars, which span the whole width of the patch."""
+        x, depth = self._layout(grid, rng)
+        center = np.column_stack(
+            [x + depth / 2, x * 0 + grid.center[1], x * 0 + self.clearance + self.thickness / 2]
+        )
+        size = np.column_stack([depth, depth * 0 + grid.size[1], depth * 0 + self.thickness])
+        return make_boxes(center, size)
+
+    def goals(
+        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
+    ) -> NDArray[np.floating]:
+        """Return a goal in the middle of each gap behind a bar."""
+        x, depth = self._layout(grid, rng)
+        behind = x + self.max_depth + self.spacing
+        return lane_goals(grid, (x + depth + behind) / 2)
+
+    def _layout(
+        self, grid: Grid, rng: np.random.Generator
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the first edge and the depth of each bar along x [m]."""
+        x = lane_positions(grid, self.start, self.max_depth, self.spacing)
+        if self.min_depth > self.max_depth or not len(x):
+            raise ConfigError(
+                f"crawl: got min_depth {self.min_depth:g} m, max_depth {self.max_depth:g} m and "
+                f"spacing {self.spacing:g} m; expected min_depth <= max_depth, and a bar that fits "
+                f"behind a start of {self.start:g} m in a patch {grid.size[0]:g} m long"
+            )
+        return x, self.min_depth + (self.max_depth - self.min_depth) * rng.random(len(x))
