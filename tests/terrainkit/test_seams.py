@@ -95,8 +95,8 @@ def test_presets_meet_at_the_same_height_along_x(preset):
     config = MapConfig(rows=3, cols=cols, preset=preset, border=1.0)
     cliffs = seams_of(generate(config)).cliffs()
     # Only the sides of straight slopes and stairs are cliffs.
-    between_rows = [s for s in cliffs if None not in s.patches and s.patches[0][1] == s.patches[1][1]]
-    assert between_rows == []
+    inner = [seam.patches for seam in cliffs if None not in seam.patches]
+    assert [(first, second) for first, second in inner if first[1] == second[1]] == []
 
 
 def test_equal_stairs_meet_at_the_same_height():
