@@ -328,11 +328,27 @@ def test_npz_pickled_object_is_not_unpickled(good, bad, tmp_path, key):
         "boxes",
         "config",
         "parameters",
+        "friction",
+        "restitution",
     ],
 )
 def test_npz_missing_array_is_named(good, bad, key):
     repack(good, bad, {key: None})
     assert f"has no {key}" in refusal(bad)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("friction", [1.0, 0.5], r"friction: got [1.0, 0.5]; expected (1.0, 1.0) by its config"),
+        ("friction", [np.nan, 1.0], r"friction: got [nan, 1.0]; expected (1.0, 1.0)"),
+        ("restitution", np.nan, r"restitution: got nan; expected 0.0 by its config"),
+        ("restitution", 0.5, r"restitution: got 0.5; expected 0.0 by its config"),
+    ],
+)
+def test_npz_contact_values_must_match_config(good, bad, key, value, message):
+    repack(good, bad, {key: npy(np.array(value))})
+    assert message in refusal(bad)
 
 
 @pytest.mark.parametrize("key", ["vertices", "triangles"])
