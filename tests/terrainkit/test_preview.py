@@ -4,7 +4,13 @@ import pytest
 
 import terrainkit as tk
 from terrainkit.errors import ExportError
-from terrainkit.preview import color_levels, height_colors, render_preview, shaded_relief, write_preview
+from terrainkit.preview import (
+    color_levels,
+    height_colors,
+    render_preview,
+    shaded_relief,
+    write_preview,
+)
 
 PAPER = (250, 249, 246)
 
@@ -57,7 +63,7 @@ def test_color_levels_are_ends_and_color_stops():
 @pytest.mark.parametrize("inverted", [False, True])
 def test_preview_height_scale_has_the_colors_of_heights(inverted):
     slope = tk.SubTerrain(terrain="pyramid_slope", parameters={"inverted": inverted})
-    config = tk.MapConfig(rows=1, cols=1, border=0.0, difficulty_range=(1.0, 1.0), terrains=(slope,))
+    config = tk.MapConfig(rows=1, cols=1, difficulty_range=(1.0, 1.0), terrains=(slope,))
     picture = render_preview(tk.generate(config), 400)
     bar = picture[70:-60, -130 + 20 : -130 + 42].astype(int)
     # Heights from 0 to 1 m or from -1 m to 0; row 0 is the highest.
