@@ -14,6 +14,7 @@ from terrainkit.layout import assign_patch, terrain_columns
 from terrainkit.memory import check_memory
 from terrainkit.parameter import parameters_of
 from terrainkit.patch import Patch, build_patch
+from terrainkit.seams import Seams, cliffs_text
 from terrainkit.solids import Solids
 from terrainkit.terrain_map import TerrainMap
 
@@ -36,8 +37,8 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
 
     Warns:
         TerrainkitWarning: if a sub-terrain of a preset gets no column, if the cells are too coarse
-            or the patches too small for the requested parameters, or if a spawn origin is not where
-            the terrain places it.
+            or the patches too small for the requested parameters, if a spawn origin is not where
+            the terrain places it, or if patches meet at a cliff.
 
     Raises:
         ConfigError: if a terrain does not fit in a patch, or has no place to spawn.
@@ -76,7 +77,7 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
             deviations[name] += 1
         moved_spawns[sub_terrain.name] += patch.spawn_offset > config.cell
     _warn(config, deviations, +moved_spawns)
-    return TerrainMap(
+    terrain_map = TerrainMap(
         config=config,
         grid=grid,
         heights=heights,
@@ -88,6 +89,8 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
         solids=Solids.concatenate(solids),
         goals=_pad_goals(goals),
     )
+    _warn_about_map(terrain_map)
+    return terrain_map
 
 
 def _pad_goals(goals: NDArray[np.object_]) -> NDArray[np.float32]:
@@ -126,3 +129,35 @@ def _warn(config: MapConfig, deviations: Counter[str], moved_spawns: Counter[str
             TerrainkitWarning,
             stacklevel=3,
         )
+
+
+def _warn_about_map(terrain_map: TerrainMap) -> None:
+    config = terrain_map.config
+    if collapsed := list(_collapsed_ranges(terrain_map)):
+        warnings.warn(
+            f"cells of {config.cell:g} m or height steps are too coarse for a range: "
+            f"{listing(collapsed)} on every patch",
+            TerrainkitWarning,
+            stacklevel=3,
+        )
+    if cliffs := Seams(config=config, heights=terrain_map.heights).cliffs():
+        text = cliffs_text(cliffs, terrain_map.patch_names)
+        warnings.warn(
+            f"cliffs between patches: {text}; a robot cannot climb them",
+            TerrainkitWarning,
+            stacklevel=3,
+        )
+
+
+def _collapsed_ranges(terrain_map: TerrainMap) -> Iterator[str]:
+    """Yield the parameters that have several requested values but only one realized value."""
+    for terrain_type, sub_terrain in enumerate(terrain_map.config.sub_terrains):
+        patches = terrain_map.parameters[terrain_map.terrain_types == terrain_type].tolist()
+        for name in patches[0].requested if patches else ():
+            requested = {patch.requested[name] for patch in patches}
+            realized = {patch.realized[name] for patch in patches}
+            if len(requested) > 1 and len(realized) == 1:
+                yield (
+                    f"{sub_terrain.name}.{name} from {min(requested):g} to {max(requested):g} is "
+                    f"{realized.pop()}"
+                )

@@ -202,6 +202,11 @@ class TerrainMap:
         return np.ascontiguousarray(units, dtype=np.int16)
 
     @property
+    def patch_names(self) -> NDArray[np.str_]:
+        """Name of the sub-terrain of each patch, shape (rows, cols)."""
+        return np.array(self.terrain_names)[self.terrain_types]
+
+    @property
     def first_sample(self) -> tuple[float, float]:
         """Position of `heights[0, 0]`, x and y [m]: half a cell inside the corner of the map."""
         return self.grid.lower[0] + self.grid.cell / 2, self.grid.lower[1] + self.grid.cell / 2

@@ -123,6 +123,14 @@ def _compare(patch: Patch, expected: Patch, location: str) -> Iterator[str]:
         patch.goals, expected.goals, atol=TOLERANCE
     ):
         yield f"{location}: the goals differ from those of its config"
+    moved = float(np.abs(patch.origin[:2] - expected.origin[:2]).max())
+    if moved > TOLERANCE:
+        yield f"{location}: the spawn origin is {moved:.3f} m from that of its config"
+    if expected.spawn_offset > expected.grid.cell:
+        yield (
+            f"{location}: no flat disc at the spawn position of {expected.terrain}: the origin is "
+            f"{expected.spawn_offset:.3f} m away, where a robot may be beyond the obstacle"
+        )
     error = float(np.abs(patch.heights - expected.heights).max())
     if error > TOLERANCE:
         yield (

@@ -100,6 +100,8 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
             ("border", config.border),
             ("patch_size", config.patch_size),
             ("lower", grid.lower),
+            ("friction", (config.static_friction, config.dynamic_friction)),
+            ("restitution", config.restitution),
         ):
             archive.check_value(key, expected)
         names = archive.array(

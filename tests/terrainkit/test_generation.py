@@ -196,6 +196,24 @@ def test_generate_warns_of_step_above_amplitude():
 
 
 @pytest.mark.parametrize(
+    ("terrain", "given", "collapsed"),
+    [
+        ("stepping_stones", {"distance": (0.05, 0.1)}, "distance from 0.05 to 0.1 is 0.1"),
+        ("stepping_stones", {"stone": (0.26, 0.34)}, "stone from 0.26 to 0.34 is 0.3"),
+        ("rough", {"amplitude": (0.02, 0.024)}, "amplitude from 0.02 to 0.024 is 0.02"),
+    ],
+)
+def test_generate_warns_of_a_collapsed_range(terrain, given, collapsed):
+    choice = SubTerrain(terrain=terrain, parameters=given)
+    config = MapConfig(rows=3, cols=1, border=0.0, terrains=(choice,))
+    with pytest.warns(TerrainkitWarning, match=f"{terrain}.{collapsed} on every patch"):
+        generate(config)
+    generate(replace(config, rows=1))
+    if terrain == "stepping_stones":
+        generate(replace(config, cell=0.02))
+
+
+@pytest.mark.parametrize(
     ("terrain", "given"),
     [
         ("gap", {"platform": 1.0}),

@@ -73,11 +73,33 @@ def test_validate_finds_origin_above_ground(sound):
 def test_validate_finds_origin_on_uneven_ground(sound):
     x, y = sound.config.patch_grid(2, 5).center
     origin = [x + 2.0, y, sound.height([x + 2.0, y])]
-    ((check, message),) = found(changed(sound, "env_origins", (2, 5), origin))
+    moved, (check, message) = found(changed(sound, "env_origins", (2, 5), origin))
+    assert moved == (
+        "patches",
+        "patch (2, 5): the spawn origin is 2.000 m from that of its config",
+    )
     assert check == "spawn"
     assert message.startswith(
         "patch (2, 5): the spawn origin is not on flat ground: heights within 0.5 m differ by 0."
     )
+
+
+def test_validate_finds_moved_origin(sound):
+    origin = sound.env_origins[0, 3] + np.float32([0.3, 0, 0])
+    assert found(changed(sound, "env_origins", (0, 3), origin)) == [
+        ("patches", "patch (0, 3): the spawn origin is 0.300 m from that of its config")
+    ]
+
+
+def test_validate_finds_origin_outside_pit():
+    # A disc of 1 m and the cells around it do not fit in a pit of 1 m.
+    pit = tk.SubTerrain(terrain="pit", parameters={"side": 1.0})
+    config = tk.MapConfig(rows=2, cols=1, border=1.0, terrains=(pit,))
+    with pytest.warns(tk.TerrainkitWarning, match="at the preferred spawn position: pit on 1 "):
+        terrain_map = tk.generate(config)
+    ((check, message),) = found(terrain_map)
+    assert check == "patches"
+    assert message.startswith("patch (1, 0): no flat disc at the spawn position of pit: the origin")
 
 
 def test_validate_finds_origin_outside_patch(sound):

@@ -131,6 +131,17 @@ def test_npz_round_trip(path, terrain_map):
             assert np.array_equal(found, wanted)
 
 
+def test_npz_solids_round_trip(solid_map, tmp_path):
+    read = TerrainMap.load(solid_map.save(tmp_path / "solids.npz"))
+    for part in dataclasses.fields(Solids):
+        values, expected = (getattr(each.solids, part.name) for each in (read, solid_map))
+        assert (values.dtype, values.tobytes()) == (expected.dtype, expected.tobytes())
+    assert read.goals.tobytes() == solid_map.goals.tobytes()
+    assert len(read.patch(0, 0).solids) == 0
+    assert len(read.patch(0, 1).solids) == 4
+    assert read.patch(0, 1).goals.tolist() == [[3, 6, 0, 0], [5.5, 6, 0, 1]]
+
+
 def test_npz_loaded_map_saves_the_same_bytes(path, tmp_path):
     again = TerrainMap.load(str(path)).save(tmp_path / "again.npz")
     assert again.read_bytes() == path.read_bytes()
@@ -317,11 +328,27 @@ def test_npz_pickled_object_is_not_unpickled(good, bad, tmp_path, key):
         "boxes",
         "config",
         "parameters",
+        "friction",
+        "restitution",
     ],
 )
 def test_npz_missing_array_is_named(good, bad, key):
     repack(good, bad, {key: None})
     assert f"has no {key}" in refusal(bad)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("friction", [1.0, 0.5], r"friction: got [1.0, 0.5]; expected (1.0, 1.0) by its config"),
+        ("friction", [np.nan, 1.0], r"friction: got [nan, 1.0]; expected (1.0, 1.0)"),
+        ("restitution", np.nan, r"restitution: got nan; expected 0.0 by its config"),
+        ("restitution", 0.5, r"restitution: got 0.5; expected 0.0 by its config"),
+    ],
+)
+def test_npz_contact_values_must_match_config(good, bad, key, value, message):
+    repack(good, bad, {key: npy(np.array(value))})
+    assert message in refusal(bad)
 
 
 @pytest.mark.parametrize("key", ["vertices", "triangles"])
