@@ -101,7 +101,7 @@ def at_difficulty(value: Value | Range, difficulty: float) -> Value:
     easy, hard = value
     # 0.31 (1 - d) + 0.31 d can round to 0.31000000000000005.
     between = easy if easy == hard else easy * (1.0 - difficulty) + hard * difficulty
-    return round(between) if isinstance(easy, int) else between
+    return round(between) if type(easy) is int else between
 
 
 def height(easy: float, hard: float | None = None, *, tolerance: float = 0.0) -> Any:

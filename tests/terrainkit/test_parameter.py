@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
-from terrainkit.terrain import Terrain
+from terrainkit.terrains.flat import Flat
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,11 +54,8 @@ def test_parameter_count_and_switch_are_constant():
 @pytest.mark.parametrize(("difficulty", "number"), [(0.0, 12), (0.5, 6), (0.6, 5), (1.0, 1)])
 def test_parameter_count_range_is_rounded(difficulty, number):
     @dataclass(frozen=True, kw_only=True)
-    class Star(Terrain):
+    class Star(Flat):
         number: int = parameter.count(12, 1)
-
-        def heights(self, grid, rng):
-            return np.zeros(grid.shape)
 
     built = Star.at(difficulty)
     assert built.number == number
