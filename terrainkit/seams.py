@@ -47,8 +47,9 @@ class Seams:
         steps within the two patches. The holes of stepping stones, which end at the edge of their
         patch, are therefore no cliffs; the side of a flight of stairs is one.
         """
-        candidates = self._above(MIN_CLIFF_HEIGHT)
-        cliffs = [s for s in candidates if s.height > sum(map(self._largest_step, s.patches))]
+        candidates = list(self._above(MIN_CLIFF_HEIGHT))
+        steps = {p: self._largest_step(p) for p in {p for seam in candidates for p in seam.patches}}
+        cliffs = [seam for seam in candidates if seam.height > sum(steps[p] for p in seam.patches)]
         return sorted(cliffs, key=lambda seam: -seam.height)
 
     def _above(self, limit: float) -> Iterator[Seam]:

@@ -56,7 +56,8 @@ class Onboard(Command):
     nonconvex meshes into convex parts with CoACD; or fit a box, cylinder, capsule or sphere."""
 
     config: Annotated[StringList, *repeated_option("FRAMEWORK")] = field(default_factory=list)
-    """Also write a configuration for: legged_gym, leggedgym_ex, isaaclab, mjlab, genesis."""
+    """Also write the configuration file of a training framework: legged_gym, leggedgym_ex,
+    isaaclab, mjlab, genesis."""
 
     base: Literal["auto", "floating", "fixed"] = "auto"
     """Type of the base: floating, or fixed to the world. With auto, it is floating if the file

@@ -267,10 +267,10 @@ class Rule(Command):
     code: Annotated[
         str, tyro.conf.Positional, tyro.conf.arg(metavar="[CODE]", help_behavior_hint="")
     ] = ""
-    """Code or name of the rule; without it, all rules are listed."""
+    """Code of the rule, such as INR001, or its name."""
 
     all: Flag = False
-    """List all rules."""
+    """List all rules. This is the default without CODE."""
 
     def run(self) -> int:
         """Print the documentation of a rule, or a list of rules."""

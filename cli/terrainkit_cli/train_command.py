@@ -48,8 +48,9 @@ class Train(TaskCommand):
     resume: Annotated[str, text_option("RUN")] = ""
     """Continue a run: its folder, or one of its checkpoints. Robot, terrain and task default to
     those of the run. Training continues in the same folder, as if it had not been interrupted.
-    With another terrain or task, a new run starts with the networks of this run and, unless
-    --algorithm.learning-rate or --algorithm.schedule differ, its last learning rate."""
+    With another terrain or task, a new run starts with the networks of this run. It also starts
+    with its optimizer state if --algorithm.learning-rate and --algorithm.schedule are the same, and
+    with its terrain levels if the map is the same."""
 
     device: Annotated[str, text_option("DEVICE")] = "cpu"
     """Device of the networks: cpu (the default), cuda, cuda:1. The physics runs on the CPU."""

@@ -255,3 +255,40 @@ def test_map_update_levels_equals_function(terrain_map):
 def test_repr_is_one_line(terrain_map):
     assert repr(terrain_map).startswith("<TerrainMap 2 x 3 patches, (")
     assert "\n" not in repr(terrain_map)
+
+
+def test_scan_sees_visible_solids_and_clearance_those_that_collide(solid_map):
+    over = [[1, 6, 2], [5, 6, 2], [2, 6, 2]]  # the box, one that does not collide, a hidden one
+    assert solid_map.scan(over) == pytest.approx([0.6, 0.6, 0.0])
+    xy = np.array(over)[:, :2]
+    assert solid_map.clearance(xy) == pytest.approx([0.4, np.inf, 0.0])
+    assert solid_map.intervals(xy)[0] == pytest.approx(np.array([[0, 0.4], [0.6, np.inf]]))
+
+
+@pytest.mark.parametrize("shape", [(3,), (2, 3), (2, 5, 3)])
+def test_scan_keeps_the_shape(solid_map, shape):
+    points = np.ones(shape)
+    assert solid_map.scan(points).shape == shape[:-1]
+    assert solid_map.clearance(points[..., :2]).shape == shape[:-1]
+    assert solid_map.intervals(points[..., :2]).shape == (*shape[:-1], 1, 2)
+
+
+@pytest.mark.parametrize(
+    ("points", "direction", "message"),
+    [
+        ([0.0, 0.0], "down", "points: got shape"),
+        ([0.0, 0.0, np.nan], "down", "points: got"),
+        ([0.0, 0.0, 0.0], "left", "direction: got 'left'; expected one of: down, up"),
+    ],
+)
+def test_scan_rejects_invalid_input(solid_map, points, direction, message):
+    with pytest.raises(ConfigError, match=message):
+        solid_map.scan(points, direction)
+
+
+def test_heightfield_formats_reject_solids(solid_map, tmp_path):
+    with pytest.raises(ExportError, match="a heightfield has no solids: got a map with 4"):
+        solid_map.height_field_raw()
+    with pytest.raises(ExportError, match="an image of heights has no solids"):
+        solid_map.save(tmp_path / "map.png")
+    assert list(tmp_path.iterdir()) == []

@@ -213,7 +213,7 @@ def test_train_works_without_video_packages(monkeypatch):
     )
     require_training()
     assert os.environ["OMP_WAIT_POLICY"] == "PASSIVE"
-    with pytest.raises(ConfigError, match="this needs imageio_ffmpeg, which is not installed"):
+    with pytest.raises(ConfigError, match="missing packages: imageio_ffmpeg"):
         require_training("imageio_ffmpeg")
 
 

@@ -136,6 +136,17 @@ def test_npz_round_trip(path, terrain_map):
             assert np.array_equal(found, wanted)
 
 
+def test_npz_solids_round_trip(solid_map, tmp_path):
+    read = TerrainMap.load(solid_map.save(tmp_path / "solids.npz"))
+    for part in dataclasses.fields(Solids):
+        values, expected = (getattr(each.solids, part.name) for each in (read, solid_map))
+        assert (values.dtype, values.tobytes()) == (expected.dtype, expected.tobytes())
+    assert read.goals.tobytes() == solid_map.goals.tobytes()
+    assert len(read.patch(0, 0).solids) == 0
+    assert len(read.patch(0, 1).solids) == 4
+    assert read.patch(0, 1).goals.tolist() == [[3, 6, 0, 0], [5.5, 6, 0, 1]]
+
+
 def test_npz_loaded_map_saves_the_same_bytes(path, tmp_path):
     again = TerrainMap.load(str(path)).save(tmp_path / "again.npz")
     assert again.read_bytes() == path.read_bytes()
