@@ -99,11 +99,11 @@ def sample_spawns(
     Returns:
         Positions (x, y, z) [m], shape (n, 3) with 1 <= n <= `number`.
     """
+    if number == 1:
+        return np.array([origin])
     from scipy.ndimage import label
 
     chosen = [np.array(origin)]
-    if number == 1:
-        return np.array(chosen)
     cells, places = _free_discs(heights, grid, disc, SolidIndex(solids, radius=disc.radius))
     is_free = np.zeros(grid.shape, dtype=bool)
     is_free[tuple(cells.T)] = True
