@@ -13,21 +13,21 @@ from terrainkit_cli import render
 from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import (
     Flag,
+    IgnoredRules,
     InputPath,
     Output,
     Packages,
     StringList,
     XacroArguments,
     find_robot,
-    parse_ignore,
-    parse_packages,
-    parse_xacro_arguments,
+    parse_settings,
     repeated_option,
     split_commas,
 )
 
 if TYPE_CHECKING:
-    from terrainkit_robots.onboarding.pipeline import OnboardOptions, OnboardResult
+    from terrainkit_robots.onboarding.pipeline import OnboardOptions
+    from terrainkit_robots.onboarding.result import OnboardResult
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +79,7 @@ class Onboard(Command):
     pictures: Flag = True
     """Render the pictures of report.md."""
 
-    ignore: Annotated[StringList, *repeated_option("CODES=REASON")] = field(default_factory=list)
+    ignore: IgnoredRules = field(default_factory=list)
     """Ignore these rules; the reason is written to the report."""
 
     package: Packages = field(default_factory=list)
@@ -115,15 +115,10 @@ class Onboard(Command):
         from terrainkit_robots.export.collision_simplification.decomposition_cache import (
             cache_folder,
         )
-        from terrainkit_robots.lint.settings import Settings
         from terrainkit_robots.onboarding.pipeline import OnboardOptions
 
         return OnboardOptions(
-            settings=Settings(
-                ignore=parse_ignore(self.ignore),
-                packages=parse_packages(self.package),
-                xacro_arguments=parse_xacro_arguments(self.xacro_arg),
-            ),
+            settings=parse_settings(self.ignore, self.package, self.xacro_arg),
             collision=self.collision,
             frameworks=tuple(word for words in self.config for word in split_commas(words)),
             floating={"auto": None, "floating": True, "fixed": False}[self.base],
