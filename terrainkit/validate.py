@@ -191,7 +191,8 @@ def _check_spawn(terrain_map: TerrainMap) -> Iterator[str]:
             ground = terrain_map.height(xy + disc)
             free = terrain_map.clearance(xy + disc).min()
             if free < config.spawn_headroom - TOLERANCE:
-                yield f"{subject} has {free:.3f} m of headroom; expected {config.spawn_headroom:g} m"
+                headroom = config.spawn_headroom
+                yield f"{subject} has {free:.3f} m of headroom; expected {headroom:g} m"
             above = float(z - terrain_map.height(xy))
             if abs(above) > TOLERANCE:
                 side = "above" if above > 0 else "below"
