@@ -1,5 +1,6 @@
 """Decompose the flat parts of the ground into few axis-aligned boxes with vertical walls."""
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeVar
@@ -11,7 +12,7 @@ from terrainkit.grid import Grid
 from terrainkit.mesh.closed import THICKNESS
 from terrainkit.mesh.node_grid import NodeGrid
 from terrainkit.rectangle_cover import rectangle_cover
-from terrainkit.walls import connected_corners
+from terrainkit.walls import flat_corners
 
 MAX_HEIGHTS_PER_BLOCK = 50
 """Number of heights in a block above which boxes are searched only around the cells of their
@@ -19,9 +20,6 @@ height, since the time would grow with its square. Below it, a box may extend un
 the edge of the block, where it can merge with one in the next block."""
 
 _Cell = TypeVar("_Cell", bound=np.generic)
-
-_Span = tuple[int, int, int, int]
-"""Cells i0 to i1 along x and j0 to j1 along y, ends excluded."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,20 +63,22 @@ def decompose_boxes(
         threshold: Difference between neighboring samples above which there is a wall [m].
         patch_edges: Cells along x and along y where patches meet. Boxes are searched per patch.
     """
+    import cv2
+
     flat = flat_cells(heights, grid, threshold)
-    low = _lower_bound(heights, flat)
+    # A lower bound of the ground in each cell.
+    low = np.where(flat, heights, cv2.erode(heights, np.ones((3, 3), dtype=np.uint8)))
     edges = [
-        np.unique(np.concatenate([[0], lines, [n]]))
+        np.unique(np.concatenate([[0], lines, [n]])).tolist()
         for lines, n in zip(patch_edges, heights.shape, strict=True)
     ]
-    spans: dict[float, list[_Span]] = {}
-    for i0, i1 in zip(edges[0], edges[0][1:], strict=False):
-        for j0, j1 in zip(edges[1], edges[1][1:], strict=False):
-            block = (slice(i0, i1), slice(j0, j1))
-            for height, (a, b, c, d) in _cover_block(heights[block], flat[block], low[block]):
-                span = (int(i0 + a), int(i0 + b), int(j0 + c), int(j0 + d))
-                spans.setdefault(height, []).append(span)
-    merged = [(span, height) for height in sorted(spans) for span in _merge_spans(spans[height])]
+    boxes = [
+        (height, i0 + a, i0 + b, j0 + c, j0 + d)
+        for i0, i1 in itertools.pairwise(edges[0])
+        for j0, j1 in itertools.pairwise(edges[1])
+        for height, (a, b, c, d) in _cover_block(flat[i0:i1, j0:j1], low[i0:i1, j0:j1])
+    ]
+    merged = _merge_boxes(np.array(boxes, dtype=np.float64).reshape(-1, 5))
     return _make_boxes(merged, grid, float(heights.min()) - THICKNESS, flat)
 
 
@@ -89,23 +89,18 @@ def flat_cells(heights: NDArray[np.float32], grid: Grid, threshold: float) -> ND
     each quad, its corner is connected without a wall only to corners of the same height.
     """
     node_grid = NodeGrid.from_heights(heights, grid, threshold)
-    i, j = np.nonzero(node_grid.has_wall)
+    numbers = np.flatnonzero(node_grid.has_wall)
+    i, j = np.divmod(numbers, node_grid.has_wall.shape[1])
     corners = node_grid.z.ravel()[node_grid.corners(i, j)]
-    same = corners[:, :, None] == corners[:, None, :]
-    at_cut = (same | ~connected_corners(node_grid.walls(i, j))).all(axis=2)
+    at_walls = flat_corners(corners, node_grid.walls(i, j))
+    corner = node_grid.flat_x & node_grid.flat_y
 
     flat = np.ones(node_grid.z.shape, dtype=bool)
     quads = (slice(None, -1), slice(1, None))
     for k, (a, b) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1))):
-        corner = node_grid.flat_x & node_grid.flat_y
-        corner[i, j] = at_cut[:, k]
+        corner[i, j] = at_walls[:, k]
         flat[quads[a], quads[b]] &= corner
     return flat[1:-1, 1:-1]
-
-
-def _lower_bound(heights: NDArray[np.float32], flat: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Return a lower bound of the ground in each cell [m]."""
-    return np.where(flat, heights, np.minimum.reduce(neighborhood(heights)))
 
 
 def neighborhood(values: NDArray[_Cell]) -> list[NDArray[_Cell]]:
@@ -116,61 +111,69 @@ def neighborhood(values: NDArray[_Cell]) -> list[NDArray[_Cell]]:
 
 
 def _cover_block(
-    heights: NDArray[np.float32], flat: NDArray[np.bool_], low: NDArray[np.float32]
-) -> Iterator[tuple[float, _Span]]:
-    """Yield the boxes of a block of cells, in the order of their heights."""
-    if not flat.any():
-        return
-    i, j = np.nonzero(flat)
-    order = np.argsort(heights[i, j], kind="stable")
-    i, j = i[order], j[order]
-    values, first = np.unique(heights[i, j], return_index=True)
-    groups = zip(values, np.split(i, first[1:]), np.split(j, first[1:]), strict=True)
-    for height, rows, cols in groups:
-        part = (slice(0, heights.shape[0]), slice(0, heights.shape[1]))
-        if len(values) > MAX_HEIGHTS_PER_BLOCK:
-            part = (slice(rows.min(), rows.max() + 1), slice(cols.min(), cols.max() + 1))
-        required = flat[part] & (heights[part] == height)
-        for a, b, c, d in rectangle_cover(required, low[part] >= height):
-            i0, j0 = part[0].start, part[1].start
-            yield float(height), (int(i0 + a), int(i0 + b), int(j0 + c), int(j0 + d))
+    flat: NDArray[np.bool_], low: NDArray[np.float32]
+) -> Iterator[tuple[float, tuple[int, int, int, int]]]:
+    """Yield the top and the span of each box of a block of cells, in the order of their tops."""
+    x, y = _changes(flat, low), _changes(flat.T, low.T)
+    flat, low = flat[x[:-1]][:, y[:-1]], low[x[:-1]][:, y[:-1]]
+    tops = np.unique(low[flat])
+    part = (slice(0, flat.shape[0]), slice(0, flat.shape[1]))
+    for top in tops:
+        required = flat & (low == top)
+        if len(tops) > MAX_HEIGHTS_PER_BLOCK:
+            part = _bounds(required.any(axis=1)), _bounds(required.any(axis=0))
+        i, j = x[part[0].start :].tolist(), y[part[1].start :].tolist()
+        for a, b, c, d in rectangle_cover(required[part], low[part] >= top):
+            yield float(top), (i[a], i[b], j[c], j[d])
 
 
-def _merge_spans(spans: list[_Span]) -> list[_Span]:
-    """Merge spans that share a whole side until none do."""
+def _changes(flat: NDArray[np.bool_], low: NDArray[np.float32]) -> NDArray[np.int64]:
+    """Return the rows that differ from the previous one, including both ends."""
+    differ = ((flat[1:] != flat[:-1]) | (low[1:] != low[:-1])).any(axis=1)
+    return np.concatenate([[0], np.flatnonzero(differ) + 1, [len(flat)]])
+
+
+def _bounds(mask: NDArray[np.bool_]) -> slice:
+    """Return the range from the first to the last True."""
+    index = np.flatnonzero(mask)
+    return slice(index[0], index[-1] + 1)
+
+
+def _merge_boxes(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Merge boxes of the same top that share a whole side until none do.
+
+    Args:
+        boxes: Top [m] and cells i0 to i1 and j0 to j1 of each box, shape (n, 5).
+    """
     before = -1
-    while len(spans) != before:
-        before = len(spans)
-        for swapped in (False, True):
-            spans = _merge_spans_along(spans, swapped=swapped)
-    return spans
+    while len(boxes) != before:
+        before = len(boxes)
+        for _ in "xy":
+            boxes = _merge_along_x(boxes)[:, [0, 3, 4, 1, 2]]
+    return boxes
 
 
-def _merge_spans_along(spans: list[_Span], *, swapped: bool) -> list[_Span]:
-    """Merge adjacent spans of the same j0 and j1, or of the same i0 and i1 if `swapped`."""
-    result: list[_Span] = []
-    for i0, i1, j0, j1 in sorted(
-        map(_swap_axes, spans) if swapped else spans, key=lambda s: (s[2:], s)
-    ):
-        if result and result[-1][2:] == (j0, j1) and i0 <= result[-1][1]:
-            result[-1] = (result[-1][0], max(result[-1][1], i1), j0, j1)
-        else:
-            result.append((i0, i1, j0, j1))
-    return [_swap_axes(span) for span in result] if swapped else result
-
-
-def _swap_axes(span: _Span) -> _Span:
-    i0, i1, j0, j1 = span
-    return j0, j1, i0, i1
+def _merge_along_x(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Merge boxes of the same top, j0 and j1 that touch, shape (n, 5)."""
+    top, i0, i1, j0, j1 = boxes[np.lexsort(boxes.T[[2, 1, 4, 3, 0]])].T
+    other = np.ones(len(top), dtype=bool)
+    other[1:] = (np.diff(top) != 0) | (np.diff(j0) != 0) | (np.diff(j1) != 0)
+    # The largest i1 so far, which starts again in every group of the same top, j0 and j1.
+    group = np.cumsum(other) * (i1.max(initial=0) + 1)
+    reach = np.maximum.accumulate(i1 + group) - group
+    first = other.copy()
+    first[1:] |= i0[1:] > reach[:-1]
+    last = np.roll(first, -1)
+    return np.column_stack([top[first], i0[first], reach[last], j0[first], j1[first]])
 
 
 def _make_boxes(
-    boxes: list[tuple[_Span, float]], grid: Grid, bottom: float, flat: NDArray[np.bool_]
+    boxes: NDArray[np.float64], grid: Grid, bottom: float, flat: NDArray[np.bool_]
 ) -> BoxDecomposition:
-    spans = np.array([span for span, _ in boxes], dtype=np.float64).reshape(-1, 4)
-    tops = np.array([height for _, height in boxes], dtype=np.float64)
-    lower = np.column_stack([spans[:, [0, 2]] * grid.cell + grid.lower, np.full(len(tops), bottom)])
-    upper = np.column_stack([spans[:, [1, 3]] * grid.cell + grid.lower, tops])
+    top, i0, i1, j0, j1 = boxes.T
+    x, y = grid.lower
+    lower = np.column_stack([i0 * grid.cell + x, j0 * grid.cell + y, np.full(len(top), bottom)])
+    upper = np.column_stack([i1 * grid.cell + x, j1 * grid.cell + y, top])
     return BoxDecomposition(
         centers=(lower + upper) / 2, half_sizes=(upper - lower) / 2, covered=flat
     )
