@@ -79,9 +79,7 @@ def check_target(path: Path, *, overwrite: bool) -> None:
         if path.exists() and not path.is_file():
             raise ExportError(f"cannot write {path}: it exists and is not a regular file")
         if path.exists() and not overwrite:
-            raise ExportError(
-                f"{path} exists; choose another name, or use --overwrite (overwrite=True)"
-            )
+            raise ExportError(f"{path} exists; use another name, or --overwrite")
         if not path.parent.is_dir():
             raise ExportError(f"cannot write {path}: the folder {path.parent} does not exist")
     except OSError as error:

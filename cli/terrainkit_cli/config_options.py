@@ -90,7 +90,7 @@ class TaskCommand(ConfigCommand):
     """Name of a bundled task, or a folder written by terrainkit onboard."""
 
     config: InputPath = ""
-    """Values of the task (.toml); options override them."""
+    """Task file (.toml) whose values override those of ROBOT; options override both."""
 
     ALIASES: ClassVar[Mapping[str, str]] = {}
     """Shorter options of values of the task."""

@@ -342,7 +342,7 @@ def test_rule_all_lists_rules(here):
     ("words", "message"),
     [
         (("INR002", "--all"), "got CODE and --all; expected one of them"),
-        (("INR999",), "no rule 'INR999'; there are: XML001"),
+        (("INR999",), "no rule 'INR999'; there are: INR001"),
     ],
 )
 def test_rule_rejects_unknown_code(here, words, message):
