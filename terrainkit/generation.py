@@ -52,7 +52,7 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
     )
     columns = terrain_columns(config)
     heights = np.zeros(grid.shape, dtype=np.float32)
-    origins = np.empty((*size, 3), dtype=np.float32)
+    spawns = np.empty(size, dtype=object)
     terrain_types = np.empty(size, dtype=np.int32)
     difficulty = np.empty(size, dtype=np.float32)
     parameters = np.empty(size, dtype=object)
@@ -67,7 +67,7 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
         patch = build_patch(config, sub_terrain, level, row, col)
         i, j = config.patch_start(row, col)
         heights[i : i + patch.grid.shape[0], j : j + patch.grid.shape[1]] = patch.heights
-        origins[row, col] = patch.origin
+        spawns[row, col] = patch.spawns
         terrain_types[row, col] = terrain_type
         difficulty[row, col] = level
         parameters[row, col] = patch.parameters
@@ -81,24 +81,24 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
         config=config,
         grid=grid,
         heights=heights,
-        env_origins=origins,
+        spawns=_pad(spawns),
         terrain_types=terrain_types,
         terrain_names=tuple(sub_terrain.name for sub_terrain in config.sub_terrains),
         difficulty=difficulty,
         parameters=parameters,
         solids=Solids.concatenate(solids),
-        goals=_pad_goals(goals),
+        goals=_pad(goals),
     )
     _warn_about_map(terrain_map)
     return terrain_map
 
 
-def _pad_goals(goals: NDArray[np.object_]) -> NDArray[np.float32]:
-    """Return the goals of all patches, shape (rows, cols, k, 4), padded with NaN."""
-    number = max(len(each) for each in goals.ravel().tolist())
-    padded = np.full((*goals.shape, number, 4), np.nan, dtype=np.float32)
-    for row, col in np.ndindex(goals.shape):
-        padded[row, col, : len(goals[row, col])] = goals[row, col]
+def _pad(poses: NDArray[np.object_]) -> NDArray[np.float32]:
+    """Return the poses (k, 4) of all patches, shape (rows, cols, k, 4), padded with NaN."""
+    number = max(len(each) for each in poses.ravel().tolist())
+    padded = np.full((*poses.shape, number, 4), np.nan, dtype=np.float32)
+    for row, col in np.ndindex(poses.shape):
+        padded[row, col, : len(poses[row, col])] = poses[row, col]
     return padded
 
 

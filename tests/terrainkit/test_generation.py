@@ -80,6 +80,24 @@ def test_make_patch_equals_slice_of_the_map(row, col):
     assert patch.parameters == terrain_map.parameters[row, col]
 
 
+def test_generate_spawns_begin_with_the_origin():
+    one, many = generate(SMALL), generate(replace(SMALL, spawns_per_patch=5, spawn_radius=0.3))
+    assert one.spawns.shape == (3, 4, 1, 4)
+    assert many.spawns.shape == (3, 4, 5, 4)
+    assert many.spawns[:, :, 0].tobytes() == one.spawns[:, :, 0].tobytes()
+    assert many.heights.tobytes() == one.heights.tobytes()
+    assert (many.spawns[0, 0] != many.spawns[1, 0]).any()
+
+
+def test_generate_pads_spawns_with_nan():
+    flat = SubTerrain(terrain="flat")
+    # The platform of 1.5 m has room for one disc with a radius of 0.5 m only.
+    small = SubTerrain(terrain="pyramid_stairs", parameters={"platform": 1.5})
+    config = replace(SMALL, cols=2, spawns_per_patch=6, terrains=(flat, small))
+    number = np.isfinite(generate(config).spawns).sum(axis=2)
+    assert number.tolist() == [[[6] * 4, [1] * 4]] * 3
+
+
 def test_generate_change_of_one_column_is_local():
     edited = SubTerrain(terrain="stairs", parameters={"step_height": 0.3, "inverted": True})
     before = generate(SMALL).heights

@@ -6,7 +6,7 @@ import pytest
 
 import terrainkit
 from terrainkit import MapConfig, SubTerrain, generate
-from terrainkit.errors import ConfigError, ExportError
+from terrainkit.errors import ConfigError, ExportError, TerrainkitWarning
 
 
 @pytest.fixture(scope="module")
@@ -208,6 +208,32 @@ def test_assign_uses_level_and_column(terrain_map):
 
 def test_assign_respects_max_init_level(terrain_map):
     assert terrain_map.assign(50, max_init_level=0).levels.tolist() == [0] * 50
+
+
+def flat_map(**values):
+    flat = SubTerrain(terrain="flat")
+    return generate(MapConfig(rows=1, cols=3, border=0.0, terrains=(flat,), **values))
+
+
+def test_assign_spreads_environments_over_spawns():
+    start = flat_map(spawns_per_patch=16).assign(48)
+    x, y, _ = start.env_origins.T
+    distance = np.hypot(x[:, None] - x, y[:, None] - y)[np.triu_indices(48, 1)]
+    assert distance.min() >= 1.0 - 1e-5
+    assert start.headings.tolist() == [0.0] * 48
+
+
+def test_assign_warns_of_shared_spawns():
+    # On a patch of 6 m x 2 m, one disc of 0.8 m fits on each side of the origin.
+    terrain_map = flat_map(patch_size=(6.0, 2.0), spawns_per_patch=100, spawn_radius=0.8)
+    message = "3 of 12 environments share a spawn position with another; increase spawns_per_patch"
+    with pytest.warns(TerrainkitWarning, match=message):
+        start = terrain_map.assign(12)
+    assert len(np.unique(start.env_origins, axis=0)) == 9
+
+
+def test_assign_shares_single_origins_without_warning():
+    assert len(np.unique(flat_map().assign(12).env_origins, axis=0)) == 3
 
 
 def test_env_origins_are_on_the_ground(terrain_map):
