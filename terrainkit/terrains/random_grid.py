@@ -33,7 +33,7 @@ class RandomGrid(Terrain):
         number = tuple((n - 2) // side for n in grid.shape)
         if min(number) < 1:
             raise ConfigError(
-                f"random_grid: no block of {self.block:g} m fits inside a rim of {grid.cell:g} m in "
+                f"random_grid: no block of {self.block:g} m fits in a rim of {grid.cell:g} m in "
                 f"a patch of {grid.size[0]:g} m x {grid.size[1]:g} m"
             )
         blocks = self.height * (2 * rng.random(number) - 1)

@@ -20,7 +20,7 @@ _MIN_SIDE = 0.02
 class StonesEverywhere(Terrain):
     """Square stones of exact size with random offsets and heights, in a pit around a platform.
 
-    Stones are truncated at the rim of the pit, and those at the platform are level with it.
+    Stones are truncated at the platform and at the edges of the pit.
     """
 
     stone: float = parameter.size(0.96, 0.2)
@@ -58,8 +58,12 @@ class StonesEverywhere(Terrain):
         side = np.array([grid.length(n) for n in grid.centered(self.platform)]) / 2
         start, end = grid.center - side, grid.center + side
         near = ((lower < end) & (upper > start)).all(axis=-1)
-        inside = ((lower >= start) & (upper <= end)).all(axis=-1)
-        top = np.where(near, 0.0, draws[..., 2] * self.variation)
-        keep = (upper - lower > _MIN_SIDE).all(axis=-1) & ~inside & (top > -self.depth)
+        outermost = np.concatenate([start - lower, upper - end], axis=-1).argmax(axis=-1)
+        for k in (0, 1):
+            is_low, is_high = near & (outermost == k), near & (outermost == k + 2)
+            upper[..., k] = np.where(is_low, np.minimum(upper[..., k], start[k]), upper[..., k])
+            lower[..., k] = np.where(is_high, np.maximum(lower[..., k], end[k]), lower[..., k])
+        top = draws[..., 2] * self.variation
+        keep = (upper - lower > _MIN_SIDE).all(axis=-1) & (top > -self.depth)
         floor = np.full(top.shape, -self.depth - SINK)
         return make_blocks(np.dstack([lower, floor])[keep], np.dstack([upper, top])[keep])

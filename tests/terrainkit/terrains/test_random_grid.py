@@ -33,5 +33,5 @@ def test_random_grid_pattern_is_the_same_at_every_difficulty(grid):
 
 
 def test_random_grid_rejects_tile_larger_than_patch(grid, rng):
-    with pytest.raises(ConfigError, match=r"no block of 7.9 m fits inside a rim"):
+    with pytest.raises(ConfigError, match=r"no block of 7.9 m fits in a rim"):
         RandomGrid(block=7.9).build(grid, rng)
