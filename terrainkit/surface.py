@@ -130,11 +130,13 @@ class HeightfieldSurface:
             z: Height of the robot [m], which passes under solids whose bottom is above `z`.
             scan: Return what a height scan sees, not what robots collide with.
         """
-        ground = self._ground(x, y)
+        height = self._height_without_solids(x, y)
         solids = self.visible if scan else self.colliding
-        return ground if solids is None else np.maximum(ground, solids.top(x, y, z))
+        return height if solids is None else np.maximum(height, solids.top(x, y, z))
 
-    def _ground(self, x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _height_without_solids(
+        self, x: NDArray[np.float32], y: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
         """Return the height without solids.
 
         A cell is two triangles with the diagonal of MuJoCo's heightfield, from (i, j) to
