@@ -11,12 +11,16 @@ from terrainkit.grid import Grid
 from terrainkit.mesh.closed import THICKNESS
 from terrainkit.mesh.node_grid import NodeGrid
 from terrainkit.rectangle_cover import rectangle_cover
-from terrainkit.walls import connected_corners
+from terrainkit.walls import connected_corners, wall_edges
 
 MAX_HEIGHTS_PER_BLOCK = 50
 """Number of heights in a block above which boxes are searched only around the cells of their
 height, since the time would grow with its square. Below it, a box may extend under higher ground to
 the edge of the block, where it can merge with one in the next block."""
+
+MAX_LENGTH = 24.0
+"""Length up to which boxes of different patches are merged [m]. A longer box lies on many nodes of
+MuJoCo's bounding volume hierarchy, which a robot anywhere near the box then has to test."""
 
 _Cell = TypeVar("_Cell", bound=np.generic)
 
@@ -57,7 +61,11 @@ def decompose_boxes(
 
     A cell is flat if its whole square is flat. Within a patch, the boxes of each height are found
     by :func:`~terrainkit.rectangle_cover.rectangle_cover`, and may extend under higher ground.
-    Boxes of different patches that share a whole side are merged.
+    Boxes of different patches that share a whole side are merged up to `MAX_LENGTH`, or without
+    a limit where that halves their number. The boxes are in the order of their centers, which
+    MuJoCo's bounding volume hierarchy keeps where centers are equal along an axis.
+
+    A patch that has slopes and no walls gets no boxes: a heightfield represents it exactly.
 
     Args:
         heights: Samples [m], shape `grid.shape`.
@@ -67,6 +75,8 @@ def decompose_boxes(
     """
     flat = flat_cells(heights, grid, threshold)
     low = _lower_bound(heights, flat)
+    has_wall = _cells_at_walls(heights, threshold)
+    lines_x, lines_y = patch_edges
     edges = [
         np.unique(np.concatenate([[0], lines, [n]]))
         for lines, n in zip(patch_edges, heights.shape, strict=True)
@@ -75,11 +85,21 @@ def decompose_boxes(
     for i0, i1 in zip(edges[0], edges[0][1:], strict=False):
         for j0, j1 in zip(edges[1], edges[1][1:], strict=False):
             block = (slice(i0, i1), slice(j0, j1))
+            is_patch = lines_x[0] <= i0 < lines_x[-1] and lines_y[0] <= j0 < lines_y[-1]
+            if is_patch and not (flat[block].all() or has_wall[block].any()):
+                flat[block] = False
+                continue
             for height, (a, b, c, d) in _cover_block(heights[block], flat[block], low[block]):
                 span = (int(i0 + a), int(i0 + b), int(j0 + c), int(j0 + d))
                 spans.setdefault(height, []).append(span)
-    merged = [(span, height) for height in sorted(spans) for span in _merge_spans(spans[height])]
-    return _make_boxes(merged, grid, float(heights.min()) - THICKNESS, flat)
+    limit = round(MAX_LENGTH / grid.cell)
+    short, long = (
+        [(span, height) for height in spans for span in merge_spans(spans[height], max_cells)]
+        for max_cells in (limit, np.inf)
+    )
+    boxes = long if 2 * len(long) <= len(short) else short
+    boxes.sort(key=lambda box: (box[0][0] + box[0][1], box[0][2] + box[0][3], box[1], box[0]))
+    return _make_boxes(boxes, grid, float(heights.min()) - THICKNESS, flat)
 
 
 def flat_cells(heights: NDArray[np.float32], grid: Grid, threshold: float) -> NDArray[np.bool_]:
@@ -101,6 +121,16 @@ def flat_cells(heights: NDArray[np.float32], grid: Grid, threshold: float) -> ND
         corner[i, j] = at_cut[:, k]
         flat[quads[a], quads[b]] &= corner
     return flat[1:-1, 1:-1]
+
+
+def _cells_at_walls(heights: NDArray[np.float32], threshold: float) -> NDArray[np.bool_]:
+    """Return which cells have a wall on one of their four sides, shape of `heights`."""
+    result = np.zeros(heights.shape, dtype=bool)
+    along_x, along_y = wall_edges(heights, threshold)
+    for side in (slice(None, -1), slice(1, None)):
+        result[side] |= along_x
+        result[:, side] |= along_y
+    return result
 
 
 def _lower_bound(heights: NDArray[np.float32], flat: NDArray[np.bool_]) -> NDArray[np.float32]:
@@ -136,26 +166,28 @@ def _cover_block(
             yield float(height), (int(i0 + a), int(i0 + b), int(j0 + c), int(j0 + d))
 
 
-def _merge_spans(spans: list[_Span]) -> list[_Span]:
-    """Merge spans that share a whole side until none do."""
+def merge_spans(spans: list[_Span], max_cells: float = np.inf) -> list[_Span]:
+    """Merge spans that share a whole side, up to a length of `max_cells`, until none do."""
     before = -1
     while len(spans) != before:
         before = len(spans)
         for swapped in (False, True):
-            spans = _merge_spans_along(spans, swapped=swapped)
+            spans = _merge_spans_along(spans, max_cells, swapped=swapped)
     return spans
 
 
-def _merge_spans_along(spans: list[_Span], *, swapped: bool) -> list[_Span]:
+def _merge_spans_along(spans: list[_Span], max_cells: float, *, swapped: bool) -> list[_Span]:
     """Merge adjacent spans of the same j0 and j1, or of the same i0 and i1 if `swapped`."""
     result: list[_Span] = []
     for i0, i1, j0, j1 in sorted(
         map(_swap_axes, spans) if swapped else spans, key=lambda s: (s[2:], s)
     ):
-        if result and result[-1][2:] == (j0, j1) and i0 <= result[-1][1]:
-            result[-1] = (result[-1][0], max(result[-1][1], i1), j0, j1)
-        else:
-            result.append((i0, i1, j0, j1))
+        if result and result[-1][2:] == (j0, j1):
+            first, last = result[-1][:2]
+            if i1 <= last or (i0 <= last and i1 - first <= max_cells):
+                result[-1] = (first, max(last, i1), j0, j1)
+                continue
+        result.append((i0, i1, j0, j1))
     return [_swap_axes(span) for span in result] if swapped else result
 
 
