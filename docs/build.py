@@ -1,7 +1,8 @@
 """Build the generated docs: terrains.md, rules.md, config.md, cli.md, the README's table, pictures.
 
-python docs/build.py            write them
-python docs/build.py --check    exit with 1 if a text is out of date or a picture is missing
+python docs/build.py              write them
+python docs/build.py TERRAIN...   write all texts, and the pictures of these terrains only
+python docs/build.py --check      exit with 1 if a text is out of date or a picture is missing
 """
 
 import dataclasses
@@ -16,14 +17,15 @@ from tempfile import TemporaryDirectory
 
 import cv2
 import numpy as np
-from isometric import isometric, side_by_side
+from gallery import render_patches
 
 import terrainkit
 from terrainkit import presets, registry
 from terrainkit.config import MapConfig
-from terrainkit.grid import Grid
+from terrainkit.errors import listing
+from terrainkit.field_docs import field_docs
 from terrainkit.preview import write_preview
-from terrainkit.schema import Config, field_docs, field_keys, field_types, is_required
+from terrainkit.schema import Config, field_keys, field_types, is_required
 from terrainkit.sub_terrain import SubTerrain
 from terrainkit.terrain_docs import TerrainDoc, terrain_doc
 from terrainkit.toml_text import value_text
@@ -200,18 +202,35 @@ def help_of(arguments: list[str]) -> str:
 
 def draw_pictures() -> None:
     PICTURES.mkdir(exist_ok=True)
-    grid = Grid(shape=(80, 80), cell=0.1)
     for name in registry.terrain_names():
-        patches = [
-            registry.get_terrain(name).at(difficulty).build(grid, np.random.default_rng(SEED))
-            for difficulty in (0.1, 0.5, 1.0)
-        ]
-        picture = side_by_side([isometric(heights, grid.cell, scale=24) for heights in patches])
-        cv2.imwrite(str(PICTURES / f"{name}.png"), cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
+        draw_terrain(name)
     terrain_map = terrainkit.generate(terrainkit.MapConfig())
     write_preview(terrain_map, PICTURES / "map.png", width=820, overwrite=True)
     draw_robot("quadruped")
     draw_walk("quadruped_map")
+
+
+def draw_terrain(name: str) -> None:
+    """Render patches of a terrain at difficulty 0.1, 0.5 and 1."""
+    terrain = terrainkit.SubTerrain(terrain=name)
+    patches = [
+        terrainkit.make_patch(
+            MapConfig(
+                rows=1,
+                cols=1,
+                border=0,
+                seed=SEED,
+                mode="selected",
+                selected_difficulty=difficulty,
+                terrains=(terrain,),
+            ),
+            0,
+            0,
+        )
+        for difficulty in (0.1, 0.5, 1.0)
+    ]
+    picture = cv2.cvtColor(render_patches(patches, width=800), cv2.COLOR_RGB2BGR)
+    cv2.imwrite(str(PICTURES / f"{name}.png"), picture, [cv2.IMWRITE_PNG_COMPRESSION, 9])
 
 
 def draw_robot(name: str) -> None:
@@ -251,8 +270,9 @@ def words(text: str) -> list[str]:
 
 
 def main() -> int:
-    if sys.argv[1:] not in ([], ["--check"]):
-        print(f"got {' '.join(sys.argv[1:])}; expected --check or nothing", file=sys.stderr)
+    names = [] if sys.argv[1:] == ["--check"] else sys.argv[1:]
+    if unknown := set(names) - set(registry.terrain_names()):
+        print(f"got {listing(sorted(unknown))}; expected --check or terrains", file=sys.stderr)
         return 2
     pages = {
         "terrains.md": terrains_page(),
@@ -274,7 +294,10 @@ def main() -> int:
     for name, text in pages.items():
         (DOCS / name).write_text(text)
     README.write_text(readme())
-    draw_pictures()
+    for name in names:
+        draw_terrain(name)
+    if not names:
+        draw_pictures()
     return 0
 
 

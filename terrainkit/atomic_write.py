@@ -60,14 +60,13 @@ def atomic_folder(path: Path) -> Iterator[Path]:
             folder, old = work / path.name, work / f"{path.name}.old"
             folder.mkdir()
             yield folder
-            if path.is_dir():
-                path.replace(old)
             try:
+                if path.is_dir():
+                    path.replace(old)
                 folder.replace(path)
-            except OSError:
-                if old.is_dir():
+            finally:  # an error or a signal may come between the two moves
+                if os.path.lexists(old) and not os.path.lexists(path):
                     old.replace(path)
-                raise
     except OSError as error:
         raise ExportError(f"cannot write {path}: {error.strerror or error}") from error
 
@@ -80,9 +79,7 @@ def check_target(path: Path, *, overwrite: bool) -> None:
         if path.exists() and not path.is_file():
             raise ExportError(f"cannot write {path}: it exists and is not a regular file")
         if path.exists() and not overwrite:
-            raise ExportError(
-                f"{path} exists; choose another name, or use --overwrite (overwrite=True)"
-            )
+            raise ExportError(f"{path} exists; use another name, or --overwrite")
         if not path.parent.is_dir():
             raise ExportError(f"cannot write {path}: the folder {path.parent} does not exist")
     except OSError as error:

@@ -1,5 +1,6 @@
 """Decompose the flat parts of the ground into few axis-aligned boxes with vertical walls."""
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeVar
@@ -11,7 +12,7 @@ from terrainkit.grid import Grid
 from terrainkit.mesh.closed import THICKNESS
 from terrainkit.mesh.node_grid import NodeGrid
 from terrainkit.rectangle_cover import rectangle_cover
-from terrainkit.walls import connected_corners, wall_edges
+from terrainkit.walls import flat_corners, wall_edges
 
 MAX_HEIGHTS_PER_BLOCK = 50
 """Number of heights in a block above which boxes are searched only around the cells of their
@@ -19,13 +20,10 @@ height, since the time would grow with its square. Below it, a box may extend un
 the edge of the block, where it can merge with one in the next block."""
 
 MAX_LENGTH = 24.0
-"""Length up to which boxes of different patches are merged [m]. A longer box lies on many nodes of
-MuJoCo's bounding volume hierarchy, which a robot anywhere near the box then has to test."""
+"""Distance at which a row of merged boxes is divided [m]. Long boxes enlarge many nodes of MuJoCo's
+bounding volume hierarchy, all of which are tested for a robot near such a box."""
 
 _Cell = TypeVar("_Cell", bound=np.generic)
-
-_Span = tuple[int, int, int, int]
-"""Cells i0 to i1 along x and j0 to j1 along y, ends excluded."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,9 +59,9 @@ def decompose_boxes(
 
     A cell is flat if its whole square is flat. Within a patch, the boxes of each height are found
     by :func:`~terrainkit.rectangle_cover.rectangle_cover`, and may extend under higher ground.
-    Boxes of different patches that share a whole side are merged up to `MAX_LENGTH`, or without
-    a limit where that halves their number. The boxes are in the order of their centers, which
-    MuJoCo's bounding volume hierarchy keeps where centers are equal along an axis.
+    Boxes of different patches that share a whole side are merged, and divided at `MAX_LENGTH`
+    unless that doubles their number. They are sorted by their centers, since MuJoCo's bounding
+    volume hierarchy divides boxes with equal centers along an axis in this order.
 
     A patch that has slopes and no walls gets no boxes: a heightfield represents it exactly.
 
@@ -73,33 +71,28 @@ def decompose_boxes(
         threshold: Difference between neighboring samples above which there is a wall [m].
         patch_edges: Cells along x and along y where patches meet. Boxes are searched per patch.
     """
+    import cv2
+
     flat = flat_cells(heights, grid, threshold)
-    low = _lower_bound(heights, flat)
-    has_wall = _cells_at_walls(heights, threshold)
-    lines_x, lines_y = patch_edges
+    # A lower bound of the ground in each cell.
+    low = np.where(flat, heights, cv2.erode(heights, np.ones((3, 3), dtype=np.uint8)))
+    _drop_patches_without_walls(flat, _cells_at_walls(heights, threshold), patch_edges)
     edges = [
-        np.unique(np.concatenate([[0], lines, [n]]))
+        np.unique(np.concatenate([[0], lines, [n]])).tolist()
         for lines, n in zip(patch_edges, heights.shape, strict=True)
     ]
-    spans: dict[float, list[_Span]] = {}
-    for i0, i1 in zip(edges[0], edges[0][1:], strict=False):
-        for j0, j1 in zip(edges[1], edges[1][1:], strict=False):
-            block = (slice(i0, i1), slice(j0, j1))
-            is_patch = lines_x[0] <= i0 < lines_x[-1] and lines_y[0] <= j0 < lines_y[-1]
-            if is_patch and not (flat[block].all() or has_wall[block].any()):
-                flat[block] = False
-                continue
-            for height, (a, b, c, d) in _cover_block(heights[block], flat[block], low[block]):
-                span = (int(i0 + a), int(i0 + b), int(j0 + c), int(j0 + d))
-                spans.setdefault(height, []).append(span)
-    limit = round(MAX_LENGTH / grid.cell)
-    short, long = (
-        [(span, height) for height in spans for span in merge_spans(spans[height], max_cells)]
-        for max_cells in (limit, np.inf)
-    )
-    boxes = long if 2 * len(long) <= len(short) else short
-    boxes.sort(key=lambda box: (box[0][0] + box[0][1], box[0][2] + box[0][3], box[1], box[0]))
-    return _make_boxes(boxes, grid, float(heights.min()) - THICKNESS, flat)
+    boxes = [
+        (height, i0 + a, i0 + b, j0 + c, j0 + d)
+        for i0, i1 in itertools.pairwise(edges[0])
+        for j0, j1 in itertools.pairwise(edges[1])
+        for height, (a, b, c, d) in _cover_block(flat[i0:i1, j0:j1], low[i0:i1, j0:j1])
+    ]
+    table = np.array(boxes, dtype=np.float64).reshape(-1, 5)
+    short, long = merge_boxes(table, MAX_LENGTH // grid.cell), merge_boxes(table)
+    merged = long if 2 * len(long) <= len(short) else short
+    top, i0, i1, j0, j1 = merged.T
+    merged = merged[np.lexsort([i0, top, j0 + j1, i0 + i1])]
+    return _make_boxes(merged, grid, float(heights.min()) - THICKNESS, flat)
 
 
 def flat_cells(heights: NDArray[np.float32], grid: Grid, threshold: float) -> NDArray[np.bool_]:
@@ -109,16 +102,16 @@ def flat_cells(heights: NDArray[np.float32], grid: Grid, threshold: float) -> ND
     each quad, its corner is connected without a wall only to corners of the same height.
     """
     node_grid = NodeGrid.from_heights(heights, grid, threshold)
-    i, j = np.nonzero(node_grid.has_wall)
+    numbers = np.flatnonzero(node_grid.has_wall)
+    i, j = np.divmod(numbers, node_grid.has_wall.shape[1])
     corners = node_grid.z.ravel()[node_grid.corners(i, j)]
-    same = corners[:, :, None] == corners[:, None, :]
-    at_cut = (same | ~connected_corners(node_grid.walls(i, j))).all(axis=2)
+    at_walls = flat_corners(corners, node_grid.walls(i, j))
+    corner = node_grid.flat_x & node_grid.flat_y
 
     flat = np.ones(node_grid.z.shape, dtype=bool)
     quads = (slice(None, -1), slice(1, None))
     for k, (a, b) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1))):
-        corner = node_grid.flat_x & node_grid.flat_y
-        corner[i, j] = at_cut[:, k]
+        corner[i, j] = at_walls[:, k]
         flat[quads[a], quads[b]] &= corner
     return flat[1:-1, 1:-1]
 
@@ -133,9 +126,18 @@ def _cells_at_walls(heights: NDArray[np.float32], threshold: float) -> NDArray[n
     return result
 
 
-def _lower_bound(heights: NDArray[np.float32], flat: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Return a lower bound of the ground in each cell [m]."""
-    return np.where(flat, heights, np.minimum.reduce(neighborhood(heights)))
+def _drop_patches_without_walls(
+    flat: NDArray[np.bool_],
+    has_wall: NDArray[np.bool_],
+    patch_edges: tuple[NDArray[np.int64], NDArray[np.int64]],
+) -> None:
+    """Set `flat` to False in each patch that has slopes and no walls."""
+    x, y = patch_edges
+    for i0, i1 in itertools.pairwise(x.tolist()):
+        for j0, j1 in itertools.pairwise(y.tolist()):
+            patch = (slice(i0, i1), slice(j0, j1))
+            if not (flat[patch].all() or has_wall[patch].any()):
+                flat[patch] = False
 
 
 def neighborhood(values: NDArray[_Cell]) -> list[NDArray[_Cell]]:
@@ -146,63 +148,72 @@ def neighborhood(values: NDArray[_Cell]) -> list[NDArray[_Cell]]:
 
 
 def _cover_block(
-    heights: NDArray[np.float32], flat: NDArray[np.bool_], low: NDArray[np.float32]
-) -> Iterator[tuple[float, _Span]]:
-    """Yield the boxes of a block of cells, in the order of their heights."""
-    if not flat.any():
-        return
-    i, j = np.nonzero(flat)
-    order = np.argsort(heights[i, j], kind="stable")
-    i, j = i[order], j[order]
-    values, first = np.unique(heights[i, j], return_index=True)
-    groups = zip(values, np.split(i, first[1:]), np.split(j, first[1:]), strict=True)
-    for height, rows, cols in groups:
-        part = (slice(0, heights.shape[0]), slice(0, heights.shape[1]))
-        if len(values) > MAX_HEIGHTS_PER_BLOCK:
-            part = (slice(rows.min(), rows.max() + 1), slice(cols.min(), cols.max() + 1))
-        required = flat[part] & (heights[part] == height)
-        for a, b, c, d in rectangle_cover(required, low[part] >= height):
-            i0, j0 = part[0].start, part[1].start
-            yield float(height), (int(i0 + a), int(i0 + b), int(j0 + c), int(j0 + d))
+    flat: NDArray[np.bool_], low: NDArray[np.float32]
+) -> Iterator[tuple[float, tuple[int, int, int, int]]]:
+    """Yield the top and the span of each box of a block of cells, in the order of their tops."""
+    x, y = _changes(flat, low), _changes(flat.T, low.T)
+    flat, low = flat[x[:-1]][:, y[:-1]], low[x[:-1]][:, y[:-1]]
+    tops = np.unique(low[flat])
+    part = (slice(0, flat.shape[0]), slice(0, flat.shape[1]))
+    for top in tops:
+        required = flat & (low == top)
+        if len(tops) > MAX_HEIGHTS_PER_BLOCK:
+            part = _bounds(required.any(axis=1)), _bounds(required.any(axis=0))
+        i, j = x[part[0].start :].tolist(), y[part[1].start :].tolist()
+        for a, b, c, d in rectangle_cover(required[part], low[part] >= top):
+            yield float(top), (i[a], i[b], j[c], j[d])
 
 
-def merge_spans(spans: list[_Span], max_cells: float = np.inf) -> list[_Span]:
-    """Merge spans that share a whole side, up to a length of `max_cells`, until none do."""
+def _changes(flat: NDArray[np.bool_], low: NDArray[np.float32]) -> NDArray[np.int64]:
+    """Return the rows that differ from the previous one, including both ends."""
+    differ = ((flat[1:] != flat[:-1]) | (low[1:] != low[:-1])).any(axis=1)
+    return np.concatenate([[0], np.flatnonzero(differ) + 1, [len(flat)]])
+
+
+def _bounds(mask: NDArray[np.bool_]) -> slice:
+    """Return the range from the first to the last True."""
+    index = np.flatnonzero(mask)
+    return slice(index[0], index[-1] + 1)
+
+
+def merge_boxes(boxes: NDArray[np.float64], max_cells: float = np.inf) -> NDArray[np.float64]:
+    """Merge boxes of the same top that share a whole side until none do.
+
+    Args:
+        boxes: Top [m] and cells i0 to i1 and j0 to j1 of each box, shape (n, 5).
+        max_cells: Cells after which a row of merged boxes is divided.
+    """
     before = -1
-    while len(spans) != before:
-        before = len(spans)
-        for swapped in (False, True):
-            spans = _merge_spans_along(spans, max_cells, swapped=swapped)
-    return spans
+    while len(boxes) != before:
+        before = len(boxes)
+        for _ in "xy":
+            boxes = _merge_along_x(boxes, max_cells)[:, [0, 3, 4, 1, 2]]
+    return boxes
 
 
-def _merge_spans_along(spans: list[_Span], max_cells: float, *, swapped: bool) -> list[_Span]:
-    """Merge adjacent spans of the same j0 and j1, or of the same i0 and i1 if `swapped`."""
-    result: list[_Span] = []
-    for i0, i1, j0, j1 in sorted(
-        map(_swap_axes, spans) if swapped else spans, key=lambda s: (s[2:], s)
-    ):
-        if result and result[-1][2:] == (j0, j1):
-            first, last = result[-1][:2]
-            if i1 <= last or (i0 <= last and i1 - first <= max_cells):
-                result[-1] = (first, max(last, i1), j0, j1)
-                continue
-        result.append((i0, i1, j0, j1))
-    return [_swap_axes(span) for span in result] if swapped else result
-
-
-def _swap_axes(span: _Span) -> _Span:
-    i0, i1, j0, j1 = span
-    return j0, j1, i0, i1
+def _merge_along_x(boxes: NDArray[np.float64], max_cells: float) -> NDArray[np.float64]:
+    """Merge boxes of the same top, j0 and j1 that touch, shape (n, 5)."""
+    top, i0, i1, j0, j1 = boxes[np.lexsort(boxes.T[[2, 1, 4, 3, 0]])].T
+    other = np.ones(len(top), dtype=bool)
+    other[1:] = (np.diff(top) != 0) | (np.diff(j0) != 0) | (np.diff(j1) != 0)
+    # The largest i1 so far, which starts again in every group of the same top, j0 and j1.
+    group = np.cumsum(other) * (i1.max(initial=0) + 1)
+    reach = np.maximum.accumulate(i1 + group) - group
+    first = other.copy()
+    first[1:] |= i0[1:] > reach[:-1]
+    start = i0[np.maximum.accumulate(np.where(first, np.arange(len(i0)), 0))]
+    first[1:] |= np.diff((i0 - start) // max_cells) > 0
+    last = np.roll(first, -1)
+    return np.column_stack([top[first], i0[first], reach[last], j0[first], j1[first]])
 
 
 def _make_boxes(
-    boxes: list[tuple[_Span, float]], grid: Grid, bottom: float, flat: NDArray[np.bool_]
+    boxes: NDArray[np.float64], grid: Grid, bottom: float, flat: NDArray[np.bool_]
 ) -> BoxDecomposition:
-    spans = np.array([span for span, _ in boxes], dtype=np.float64).reshape(-1, 4)
-    tops = np.array([height for _, height in boxes], dtype=np.float64)
-    lower = np.column_stack([spans[:, [0, 2]] * grid.cell + grid.lower, np.full(len(tops), bottom)])
-    upper = np.column_stack([spans[:, [1, 3]] * grid.cell + grid.lower, tops])
+    top, i0, i1, j0, j1 = boxes.T
+    x, y = grid.lower
+    lower = np.column_stack([i0 * grid.cell + x, j0 * grid.cell + y, np.full(len(top), bottom)])
+    upper = np.column_stack([i1 * grid.cell + x, j1 * grid.cell + y, top])
     return BoxDecomposition(
         centers=(lower + upper) / 2, half_sizes=(upper - lower) / 2, covered=flat
     )

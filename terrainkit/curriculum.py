@@ -23,7 +23,10 @@ class Assignment:
     """Terrain of each environment as an index into `terrain_names`, shape (n,)."""
 
     env_origins: NDArray[np.float32]
-    """Spawn origin of each environment [m], shape (n, 3)."""
+    """Spawn position of each environment [m], shape (n, 3)."""
+
+    headings: NDArray[np.float32]
+    """Heading of each environment at its spawn position [rad], shape (n,)."""
 
 
 def assign_levels(
@@ -56,6 +59,30 @@ def assign_levels(
     levels = np.random.default_rng(seed).integers(0, highest + 1, size=num_envs)
     columns = np.arange(num_envs) * cols // max(num_envs, 1)
     return levels, columns
+
+
+def assign_spawns(
+    spawns: NDArray[np.float32], levels: ArrayLike, columns: ArrayLike
+) -> tuple[NDArray[np.float32], int]:
+    """Distribute the environments of each patch over its spawn positions.
+
+    Args:
+        spawns: Spawn positions x, y, z [m] and headings [rad] of each patch, shape
+            (rows, cols, k, 4), padded with NaN.
+        levels: Row of each environment, shape (n,).
+        columns: Column of each environment, shape (n,).
+
+    Returns:
+        Spawn position and heading of each environment, shape (n, 4), and the number of
+        environments for which none was left, so that they share one.
+    """
+    rows, cols = np.asarray(levels, dtype=np.int64), np.asarray(columns, dtype=np.int64)
+    patch = rows * spawns.shape[1] + cols
+    order = np.argsort(patch, kind="stable")
+    rank = np.empty_like(patch)
+    rank[order] = np.arange(len(patch)) - np.searchsorted(patch[order], patch[order])
+    number = (~np.isnan(spawns).all(axis=-1)).sum(axis=-1)[rows, cols]
+    return spawns[rows, cols, rank % number], int((rank >= number).sum())
 
 
 def update_levels(

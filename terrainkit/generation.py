@@ -14,6 +14,7 @@ from terrainkit.layout import assign_patch, terrain_columns
 from terrainkit.memory import check_memory
 from terrainkit.parameter import parameters_of
 from terrainkit.patch import Patch, build_patch
+from terrainkit.seams import Seams, cliffs_text
 from terrainkit.solids import Solids
 from terrainkit.terrain_map import TerrainMap
 
@@ -36,8 +37,8 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
 
     Warns:
         TerrainkitWarning: if a sub-terrain of a preset gets no column, if the cells are too coarse
-            or the patches too small for the requested parameters, or if a spawn origin is not where
-            the terrain places it.
+            or the patches too small for the requested parameters, if a spawn origin is not where
+            the terrain places it, or if patches meet at a cliff.
 
     Raises:
         ConfigError: if a terrain does not fit in a patch, or has no place to spawn.
@@ -51,7 +52,7 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
     )
     columns = terrain_columns(config)
     heights = np.zeros(grid.shape, dtype=np.float32)
-    origins = np.empty((*size, 3), dtype=np.float32)
+    spawns = np.empty(size, dtype=object)
     terrain_types = np.empty(size, dtype=np.int32)
     difficulty = np.empty(size, dtype=np.float32)
     parameters = np.empty(size, dtype=object)
@@ -66,7 +67,7 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
         patch = build_patch(config, sub_terrain, level, row, col)
         i, j = config.patch_start(row, col)
         heights[i : i + patch.grid.shape[0], j : j + patch.grid.shape[1]] = patch.heights
-        origins[row, col] = patch.origin
+        spawns[row, col] = patch.spawns
         terrain_types[row, col] = terrain_type
         difficulty[row, col] = level
         parameters[row, col] = patch.parameters
@@ -76,26 +77,28 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
             deviations[name] += 1
         moved_spawns[sub_terrain.name] += patch.spawn_offset > config.cell
     _warn(config, deviations, +moved_spawns)
-    return TerrainMap(
+    terrain_map = TerrainMap(
         config=config,
         grid=grid,
         heights=heights,
-        env_origins=origins,
+        spawns=_pad(spawns),
         terrain_types=terrain_types,
         terrain_names=tuple(sub_terrain.name for sub_terrain in config.sub_terrains),
         difficulty=difficulty,
         parameters=parameters,
         solids=Solids.concatenate(solids),
-        goals=_pad_goals(goals),
+        goals=_pad(goals),
     )
+    _warn_about_map(terrain_map)
+    return terrain_map
 
 
-def _pad_goals(goals: NDArray[np.object_]) -> NDArray[np.float32]:
-    """Return the goals of all patches, shape (rows, cols, k, 4), padded with NaN."""
-    number = max(len(each) for each in goals.ravel().tolist())
-    padded = np.full((*goals.shape, number, 4), np.nan, dtype=np.float32)
-    for row, col in np.ndindex(goals.shape):
-        padded[row, col, : len(goals[row, col])] = goals[row, col]
+def _pad(poses: NDArray[np.object_]) -> NDArray[np.float32]:
+    """Return the poses (k, 4) of all patches, shape (rows, cols, k, 4), padded with NaN."""
+    number = max(len(each) for each in poses.ravel().tolist())
+    padded = np.full((*poses.shape, number, 4), np.nan, dtype=np.float32)
+    for row, col in np.ndindex(poses.shape):
+        padded[row, col, : len(poses[row, col])] = poses[row, col]
     return padded
 
 
@@ -126,3 +129,35 @@ def _warn(config: MapConfig, deviations: Counter[str], moved_spawns: Counter[str
             TerrainkitWarning,
             stacklevel=3,
         )
+
+
+def _warn_about_map(terrain_map: TerrainMap) -> None:
+    config = terrain_map.config
+    if collapsed := list(_collapsed_ranges(terrain_map)):
+        warnings.warn(
+            f"cells of {config.cell:g} m or height steps are too coarse for a range: "
+            f"{listing(collapsed)} on every patch",
+            TerrainkitWarning,
+            stacklevel=3,
+        )
+    if cliffs := Seams(config=config, heights=terrain_map.heights).cliffs():
+        text = cliffs_text(cliffs, terrain_map.patch_names)
+        warnings.warn(
+            f"cliffs between patches: {text}; a robot cannot climb them",
+            TerrainkitWarning,
+            stacklevel=3,
+        )
+
+
+def _collapsed_ranges(terrain_map: TerrainMap) -> Iterator[str]:
+    """Yield the parameters that have several requested values but only one realized value."""
+    for terrain_type, sub_terrain in enumerate(terrain_map.config.sub_terrains):
+        patches = terrain_map.parameters[terrain_map.terrain_types == terrain_type].tolist()
+        for name in patches[0].requested if patches else ():
+            requested = {patch.requested[name] for patch in patches}
+            realized = {patch.realized[name] for patch in patches}
+            if len(requested) > 1 and len(realized) == 1:
+                yield (
+                    f"{sub_terrain.name}.{name} from {min(requested):g} to {max(requested):g} is "
+                    f"{realized.pop()}"
+                )

@@ -13,12 +13,14 @@ MIN_CHECKED_BYTES = 1 << 28
 """Requests below this size always pass [bytes]."""
 
 
-def check_memory(needed: int, what: str) -> None:
+def check_memory(needed: int, what: str, parts: tuple[str, int] = ("", 0)) -> None:
     """Raise an error if more memory is needed than is free.
 
     Args:
         needed: Peak memory of the work [bytes].
         what: Name of the work in the error.
+        parts: Name and number of equal parts of the work, such as ("env.num_envs", 4096); the error
+            says how many would fit.
 
     Raises:
         MemoryLimitError: if `needed` exceeds the free memory.
@@ -27,8 +29,11 @@ def check_memory(needed: int, what: str) -> None:
         return
     free = _free_memory()
     if needed > free:
+        name, num_parts = parts
+        num_fitting = num_parts * free // needed
+        hint = f"; {name} {num_fitting} would fit" if num_fitting > 0 else ""
         raise MemoryLimitError(
-            f"{what} needs {needed / 1e9:.1f} GB of memory; {free / 1e9:.1f} GB free"
+            f"{what} needs {needed / 1e9:.1f} GB of memory; {free / 1e9:.1f} GB free{hint}"
         )
 
 

@@ -93,13 +93,15 @@ class Parameter:
 def at_difficulty(value: Value | Range, difficulty: float) -> Value:
     """Interpolate a range (easy, hard) at `difficulty`, 0 to 1; exact at both ends.
 
-    A single value is returned unchanged. All ranges of all terrains are interpolated here.
+    A range of integers gives the nearest integer. A single value is returned unchanged. All ranges
+    of all terrains are interpolated here.
     """
     if not isinstance(value, tuple):
         return value
     easy, hard = value
     # 0.31 (1 - d) + 0.31 d can round to 0.31000000000000005.
-    return easy if easy == hard else easy * (1.0 - difficulty) + hard * difficulty
+    between = easy if easy == hard else easy * (1.0 - difficulty) + hard * difficulty
+    return round(between) if type(easy) is int else between
 
 
 def height(easy: float, hard: float | None = None, *, tolerance: float = 0.0) -> Any:
@@ -138,9 +140,9 @@ def grade(easy: float, hard: float) -> Any:
     return _field(easy, hard, is_grade=True)
 
 
-def count(number: int) -> Any:
-    """Declare a positive integer that does not depend on the difficulty."""
-    return _field(number, allows_zero=False, allows_range=False)
+def count(easy: int, hard: int | None = None) -> Any:
+    """Declare a positive integer; only with two values may it depend on the difficulty."""
+    return _field(easy, hard, allows_zero=False, allows_range=hard is not None)
 
 
 def switch(*, default: bool = False) -> Any:

@@ -1,6 +1,7 @@
-"""Preview: a shaded relief of a map with labels and spawn origins."""
+"""Preview: a shaded relief of a map with labels, spawn origins, solids and goals."""
 
 import math
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,9 +29,14 @@ _COLORS = (
 
 _TEXT_COLOR = (40, 40, 46)
 _SPAWN_COLOR = (196, 40, 40)
+_GOAL_COLOR = (40, 90, 160)
+_SOLID_OPACITY = 0.75
 _BACKGROUND = (250, 249, 246)
-_MARGIN = (250, 60, 30, 70)
+_MARGIN = (250, 60, 130, 70)
 """Margin to the left, below, to the right and above the relief [px]."""
+
+_BAR_WIDTH, _MAX_BAR_HEIGHT = 22, 500
+"""Size of the color bar [px]; it is lower where the relief is."""
 
 MAX_PIXELS = 10_000
 """Largest side of the relief [px]."""
@@ -94,9 +100,10 @@ def render_preview(terrain_map: "TerrainMap", width: int = 1600) -> Picture:
     height, span = ground.shape[:2]
     image = np.full((height + above + below, span + left + right, 3), _BACKGROUND, dtype=np.uint8)
     image[above : above + height, left : left + span] = ground
-    _draw_labels(
-        image, terrain_map, scale, (left - crop[0] * scale, above + height + crop[1] * scale)
-    )
+    _draw_color_bar(image[above : above + height, left + span :], heights)
+    zero = (left - crop[0] * scale, above + height + crop[1] * scale)
+    _draw_solids(image, terrain_map, scale, zero)
+    _draw_labels(image, terrain_map, scale, zero)
     return image
 
 
@@ -148,6 +155,58 @@ def _downsample(heights: NDArray[np.float32], width: int) -> NDArray[np.float32]
     return np.asarray(shrunk.reshape(width, other), dtype=np.float32)
 
 
+def color_levels(low: float, high: float) -> NDArray[np.float64]:
+    """Return the heights of the ticks of a color bar [m], ascending.
+
+    They are both ends, and the levels in between at which the color scale changes its slope. The
+    intervals have the same length on the bar, so that a deep hole does not fill it.
+    """
+    inner = [level for level, _ in _COLORS if low < level < high]
+    return np.unique([low, *inner, high])
+
+
+def _draw_color_bar(image: Picture, heights: NDArray[np.float32]) -> None:
+    """Draw the color bar of `heights` and its ticks into the margin `image`."""
+    levels = color_levels(float(heights.min()), float(heights.max()))
+    height = min(len(image) - 1, _MAX_BAR_HEIGHT)
+    ticks = np.linspace(height, 0, len(levels))
+    rows = np.interp(np.arange(height + 1), ticks[::-1], levels[::-1])
+    bar = image[: height + 1, 20 : 20 + _BAR_WIDTH]
+    bar[:] = height_colors(rows)[:, None]
+    bar[[0, -1]] = bar[:, [0, -1]] = _TEXT_COLOR
+    every = max(1, math.ceil(_LABEL_HEIGHT * len(levels) / (height + 1)))
+    for row, level in list(zip(ticks.round().astype(int).tolist(), levels, strict=True))[::every]:
+        image[row, 20 + _BAR_WIDTH : 26 + _BAR_WIDTH] = _TEXT_COLOR
+        y = min(max(row + 5, 11), len(image) - 2)
+        _write(image, f"{level:.2f} m".replace("-0.00", "0.00"), (32 + _BAR_WIDTH, y))
+
+
+def _write(image: Picture, text: str, at: tuple[int, int], size: float = 0.5) -> None:
+    import cv2
+
+    cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, _TEXT_COLOR, 1, cv2.LINE_AA)
+
+
+def _draw_solids(
+    image: Picture, terrain_map: "TerrainMap", scale: float, zero: tuple[float, float]
+) -> None:
+    """Draw the outline of each solid, filled in the color of its top, the highest one last."""
+    import cv2
+
+    from terrainkit.mesh.solid_mesh import solid_meshes
+
+    for mesh in sorted(solid_meshes(terrain_map.solids), key=lambda m: m.vertices[:, 2].max()):
+        corners = np.array(zero) + mesh.vertices[:, :2] * (scale, -scale)
+        outline = cv2.convexHull(np.rint(corners).astype(np.int32))
+        x, y, width, height = cv2.boundingRect(outline)
+        window = image[y : y + height, x : x + width]
+        top = height_colors(mesh.vertices[:, 2].max())
+        layer = cv2.fillConvexPoly(window.copy(), outline - (x, y), top.tolist(), cv2.LINE_AA)
+        # The ground shows through, since a solid may hang above it.
+        window[:] = cv2.addWeighted(layer, _SOLID_OPACITY, window, 1 - _SOLID_OPACITY, 0)
+        cv2.polylines(image, [outline], True, (top * 0.6).tolist(), 1, cv2.LINE_AA)
+
+
 def _draw_labels(
     image: Picture, terrain_map: "TerrainMap", scale: float, zero: tuple[float, float]
 ) -> None:
@@ -155,12 +214,10 @@ def _draw_labels(
 
     config, (rows, cols) = terrain_map.config, terrain_map.difficulty.shape
     first = config.patch_grid(0, 0).lower
+    write = partial(_write, image)
 
     def pixel(x: float, y: float) -> tuple[int, int]:
         return round(zero[0] + x * scale), round(zero[1] - y * scale)
-
-    def write(text: str, at: tuple[int, int], size: float = 0.5) -> None:
-        cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, _TEXT_COLOR, 1, cv2.LINE_AA)
 
     size_x, size_y = config.patch_size
     by_column = config.mode != "randomized"
@@ -182,3 +239,7 @@ def _draw_labels(
         cv2.circle(image, pixel(*origin[:2]), radius, _BACKGROUND, 3, cv2.LINE_AA)
         cv2.circle(image, pixel(*origin[:2]), radius, _SPAWN_COLOR, 1, cv2.LINE_AA)
         cv2.circle(image, pixel(*origin[:2]), 2, _SPAWN_COLOR, -1, cv2.LINE_AA)
+    goals = terrain_map.goals[~np.isnan(terrain_map.goals[..., 0])].tolist()
+    for x, y, _, heading in goals:
+        tip = x + 0.4 * math.cos(heading), y + 0.4 * math.sin(heading)
+        cv2.arrowedLine(image, pixel(x, y), pixel(*tip), _GOAL_COLOR, 1, cv2.LINE_AA, tipLength=0.4)

@@ -1,6 +1,12 @@
-"""Cover a set of cells with few rectangles, which may overlap."""
+"""Cover a set of cells with few rectangles, which may overlap.
 
+Sets of cells are integers with one bit per cell. On the small grids here, Python's integers are
+several times as fast as arrays.
+"""
+
+import heapq
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +16,25 @@ Span = tuple[int, int, int, int]
 """Cells i0 to i1 and j0 to j1, ends excluded."""
 
 
+class _Rectangle(NamedTuple):
+    span: Span
+    shift: int
+    """Number of the first cell of its first row."""
+    cells: int
+    """The required cells within it."""
+
+    @property
+    def area(self) -> int:
+        i0, i1, j0, j1 = self.span
+        return (i1 - i0) * (j1 - j0)
+
+
 def rectangle_cover(required: Mask, allowed: Mask) -> list[Span]:
     """Return few rectangles that cover all of `required` and nothing outside of `allowed`.
 
     The minimum cover is NP-hard. This is the greedy cover, which is at most ln(n) + 1 times as
-    large: repeatedly take the maximal rectangle that covers most of the missing cells. Rectangles
-    that became redundant are dropped at the end.
+    large: repeatedly take the maximal rectangle that covers most of the missing cells, the largest
+    of them in case of a tie. Rectangles that became redundant are dropped at the end.
 
     Args:
         required: Cells to cover, shape (nx, ny).
@@ -26,80 +45,88 @@ def rectangle_cover(required: Mask, allowed: Mask) -> list[Span]:
     count, labels, stats, _ = cv2.connectedComponentsWithStats(
         allowed.astype(np.uint8), connectivity=4
     )
+    present = np.zeros(count, dtype=bool)
+    present[labels[required]] = True
     spans: list[Span] = []
-    present = np.bincount(labels[required], minlength=count) > 0
-    for k in np.flatnonzero(present):
+    for k in np.flatnonzero(present).tolist():
         # OpenCV's x is the second index.
-        j0, i0, width, height, area = (int(n) for n in stats[k])
-        i1, j1 = i0 + height, j0 + width
+        j, i, width, height, area = stats[k].tolist()
         if area == width * height:
-            spans.append((i0, i1, j0, j1))
+            spans.append((i, i + height, j, j + width))
             continue
-        inside = labels[i0:i1, j0:j1] == k
-        part = _cover_component(required[i0:i1, j0:j1] & inside, inside)
-        spans += [(i0 + a, i0 + b, j0 + c, j0 + d) for a, b, c, d in part]
+        part = slice(i, i + height), slice(j, j + width)
+        inside = labels[part] == k
+        found = _cover_component(required[part] & inside, inside)
+        spans += [(i + i0, i + i1, j + j0, j + j1) for i0, i1, j0, j1 in found]
     return spans
 
 
 def _cover_component(required: Mask, allowed: Mask) -> list[Span]:
-    # Merge rows and columns that equal the previous one.
-    x, y = _changes(required, allowed, axis=0), _changes(required, allowed, axis=1)
-    corner = np.ix_(x[:-1], y[:-1])
-    candidates = np.array(list(_maximal_rectangles(allowed[corner])))
-    area = np.outer(np.diff(x), np.diff(y))
-    missing = np.where(required[corner], area, 0)
-    chosen: list[NDArray[np.int64]] = []
-    while missing.any():
-        i0, i1, j0, j1 = best = candidates[np.argmax(_span_sums(missing, candidates))]
-        missing[i0:i1, j0:j1] = 0
-        chosen.append(best)
-    kept = _drop_redundant(np.array(chosen), required[corner])
-    return [(int(x[a]), int(x[b]), int(y[c]), int(y[d])) for a, b, c, d in kept]
+    required_rows, allowed_rows = _row_bits(required), _row_bits(allowed)
+    # Bit i * width + j is cell (i, j). A rectangle's cells are counted from its first row.
+    width = required.shape[1]
+    cells = sum(row << (i * width) for i, row in enumerate(required_rows))
+    first_column = ((1 << len(required) * width) - 1) // ((1 << width) - 1)
+    candidates = []
+    for i0, i1, run in _maximal_rectangles(required_rows, allowed_rows):
+        covered = run * (first_column & ((1 << (i1 - i0) * width) - 1))
+        span = i0, i1, (run & -run).bit_length() - 1, run.bit_length()
+        candidates.append(_Rectangle(span, i0 * width, covered & (cells >> (i0 * width))))
+    return [rectangle.span for rectangle in _drop_redundant(_choose(candidates, cells))]
 
 
-def _changes(required: Mask, allowed: Mask, axis: int) -> NDArray[np.int64]:
-    """Return where rows (or columns) differ from the previous one, including both ends."""
-    differ = (np.diff(required, axis=axis) | np.diff(allowed, axis=axis)).any(axis=1 - axis)
-    return np.concatenate([[0], np.flatnonzero(differ) + 1, [required.shape[axis]]])
+def _row_bits(mask: Mask) -> list[int]:
+    """Return each row as an integer whose bit j is cell j."""
+    packed = np.packbits(mask, axis=1, bitorder="little")
+    data, n = packed.tobytes(), packed.shape[1]
+    return [int.from_bytes(data[i : i + n], "little") for i in range(0, len(data), n)]
 
 
-def _maximal_rectangles(allowed: Mask) -> Iterator[Span]:
-    """Yield the maximal rectangles within `allowed`."""
-    rows = len(allowed)
-    empty = np.zeros(allowed.shape[1], dtype=bool)
-    for i0 in range(rows):
-        above = allowed[i0 - 1] if i0 > 0 else empty
-        common = np.ones_like(empty)
-        for i1 in range(i0 + 1, rows + 1):
-            common = common & allowed[i1 - 1]
-            if not common.any():
-                break
-            below = allowed[i1] if i1 < rows else empty
-            edge = np.flatnonzero(np.diff(common, prepend=False, append=False))
-            for j0, j1 in edge.reshape(-1, 2):
-                if not above[j0:j1].all() and not below[j0:j1].all():
-                    yield i0, i1, int(j0), int(j1)
+def _maximal_rectangles(required: list[int], allowed: list[int]) -> Iterator[tuple[int, int, int]]:
+    """Yield rows i0 to i1 and columns of the maximal rectangles that have a required cell."""
+    above = 0
+    for i0, common in enumerate(allowed):
+        wanted = 0
+        for i1, below in enumerate([*allowed[i0 + 1 :], 0] if common & ~above else [], i0 + 1):
+            wanted |= required[i1 - 1]
+            rest = common if common & ~below and common & wanted else 0
+            while rest:
+                run = rest & ~(rest + (rest & -rest))
+                rest ^= run
+                if run & ~above and run & ~below and run & wanted:
+                    yield i0, i1, run
+            common &= below
+            if not common & ~above:
+                break  # all further rectangles extend upward
+        above = allowed[i0]
 
 
-def _span_sums(values: NDArray[np.int64], spans: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the sum of `values` within each span, from a summed-area table."""
-    table = np.zeros((values.shape[0] + 1, values.shape[1] + 1), dtype=np.int64)
-    table[1:, 1:] = values.cumsum(axis=0).cumsum(axis=1)
-    i0, i1, j0, j1 = spans.T
-    sums: NDArray[np.int64] = table[i1, j1] - table[i0, j1] - table[i1, j0] + table[i0, j0]
-    return sums
-
-
-def _drop_redundant(spans: NDArray[np.int64], required: Mask) -> NDArray[np.int64]:
-    """Return the spans without those whose required cells others cover, last ones first."""
-    depth = np.zeros(required.shape, dtype=np.int64)
-    for i0, i1, j0, j1 in spans:
-        depth[i0:i1, j0:j1] += 1
-    kept = []
-    for span in spans[::-1]:
-        i0, i1, j0, j1 = span
-        if (depth[i0:i1, j0:j1][required[i0:i1, j0:j1]] > 1).all():
-            depth[i0:i1, j0:j1] -= 1
+def _choose(candidates: list[_Rectangle], missing: int) -> list[tuple[_Rectangle, int]]:
+    """Return rectangles in greedy order, each with the cells that it was the first to cover."""
+    queue = [(-each.cells.bit_count(), -each.area, k) for k, each in enumerate(candidates)]
+    heapq.heapify(queue)
+    chosen = []
+    while missing:
+        # The number of missing cells only falls, so an unchanged first entry is the largest.
+        number, area, k = queue[0]
+        rectangle = candidates[k]
+        first = rectangle.cells & (missing >> rectangle.shift)
+        current = -first.bit_count()
+        if current == number:
+            heapq.heappop(queue)
+            chosen.append((rectangle, first))
+            missing ^= first << rectangle.shift
         else:
-            kept.append(span)
-    return np.array(kept[::-1])
+            heapq.heapreplace(queue, (current, area, k))
+    return chosen
+
+
+def _drop_redundant(chosen: list[tuple[_Rectangle, int]]) -> list[_Rectangle]:
+    """Return the chosen rectangles without those whose cells others cover, last ones first."""
+    kept, covered = [], 0
+    for rectangle, first in reversed(chosen):
+        # Earlier rectangles do not cover the cells that this one was the first to cover.
+        if first & ~(covered >> rectangle.shift):
+            kept.append(rectangle)
+            covered |= rectangle.cells << rectangle.shift
+    return kept[::-1]

@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any, Self
 
 from terrainkit.errors import ConfigError
+from terrainkit.field_docs import field_docs
 from terrainkit.text import expected_names, truncate
 from terrainkit.toml_text import key_text, line_text, parse_toml, read_text
 from terrainkit.type_hint import NONE, convert, describe, is_table, parse_hint
@@ -121,18 +122,6 @@ def field_types(cls: type[Any]) -> dict[str, Any]:
 def field_keys(cls: type[Any]) -> dict[str, str]:
     """Return the name of each field by its TOML key: `key` in its metadata, or else the name."""
     return {field.metadata.get("key", field.name): field.name for field in dataclasses.fields(cls)}
-
-
-@cache
-def field_docs(cls: type[Any]) -> dict[str, str]:
-    """Return the docstring of each field of a dataclass on one line, by name."""
-    import docstring_parser
-
-    return {
-        param.arg_name: " ".join((param.description or "").split())
-        for owner in reversed(cls.__mro__[:-1])  # a subclass inherits the docs of its parents
-        for param in docstring_parser.parse_from_object(owner).params
-    }
 
 
 def is_required(field: "dataclasses.Field[Any]") -> bool:

@@ -4,8 +4,8 @@ import inspect
 from dataclasses import dataclass
 
 from terrainkit import registry
+from terrainkit.field_docs import field_docs
 from terrainkit.parameter import Value, parameters_of
-from terrainkit.schema import field_docs
 
 
 @dataclass(frozen=True, kw_only=True)

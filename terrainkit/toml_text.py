@@ -1,6 +1,8 @@
 """Reading TOML text from any source, and writing keys, values and comments as TOML text."""
 
+import json
 import os
+import re
 import stat
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -64,9 +66,7 @@ def read_text(path: "str | Path") -> str:
 
 def key_text(key: str) -> str:
     """Return a key as TOML, in quotes if it needs them."""
-    import tomlkit
-
-    return tomlkit.key(key).as_string()
+    return key if re.fullmatch("[A-Za-z0-9_-]+", key) else value_text(key)
 
 
 def value_text(value: Any, width: int = LINE_LENGTH) -> str:
@@ -76,8 +76,6 @@ def value_text(value: Any, width: int = LINE_LENGTH) -> str:
         value: The value.
         width: Characters left on the line; a longer list gets one line per item.
     """
-    import tomlkit
-
     if isinstance(value, Mapping):
         items = [f"{key_text(key)} = {value_text(item)}" for key, item in value.items()]
         return f"{{ {', '.join(items)} }}" if items else "{}"
@@ -87,8 +85,9 @@ def value_text(value: Any, width: int = LINE_LENGTH) -> str:
         return (
             line if len(line) <= width else "".join(["[\n", *(f"    {t},\n" for t in texts), "]"])
         )
-    text: str = tomlkit.item(value).as_string()
-    return text
+    if isinstance(value, str):  # TOML has the strings of JSON, but DEL must be escaped
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return str(value).lower()
 
 
 def line_text(key: str, value: Any, *comments: str) -> str:

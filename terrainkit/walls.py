@@ -48,14 +48,18 @@ def wall_edges(
     return x, y
 
 
-def connected_corners(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which corners of a quad are connected by edges without a wall, shape (n, 4, 4).
+def flat_corners(corners: NDArray[np.floating], walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return whether each corner of a quad is connected only to corners of its height, (n, 4).
+
+    Corners are connected by edges without a wall.
 
     Args:
+        corners: Heights of the corners [m], shape (n, 4).
         walls: Whether each edge is a wall, shape (n, 4).
     """
-    joined: NDArray[np.bool_] = _connected_cases()[walls @ _CASE]
-    return joined
+    slopes = (corners != np.roll(corners, -1, axis=1)) & ~walls
+    flat: NDArray[np.bool_] = _flat_cases()[walls @ _CASE, slopes @ _CASE]
+    return flat
 
 
 def center_heights(corners: NDArray[np.floating], walls: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -72,7 +76,7 @@ def center_heights(corners: NDArray[np.floating], walls: NDArray[np.bool_]) -> N
     return centers
 
 
-def _merge_spans(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _connected(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
     joined = np.eye(4, dtype=bool)
     for _ in range(3):
         for k in range(4):
@@ -98,7 +102,16 @@ _CASE = np.array([1, 2, 4, 8])
 
 @cache
 def _connected_cases() -> NDArray[np.bool_]:
-    return np.array([_merge_spans((case & _CASE) > 0) for case in range(16)])
+    return np.array([_connected((case & _CASE) > 0) for case in range(16)])
+
+
+@cache
+def _flat_cases() -> NDArray[np.bool_]:
+    """Return whether each corner is flat, by the walls and by the edges that slope, (16, 16, 4)."""
+    slopes = (np.arange(16)[:, None] & _CASE) > 0
+    # An edge that slopes tilts the corners that are connected to its first corner.
+    tilted = np.einsum("ak,wkc->wac", slopes, _connected_cases())
+    return np.asarray(~tilted, dtype=bool)
 
 
 @cache

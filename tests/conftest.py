@@ -1,8 +1,11 @@
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import settings
 
 from terrainkit import MapConfig, SubTerrain, generate
+from terrainkit.solids import Solids, make_boxes, make_cylinders, make_hulls
 
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
@@ -47,6 +50,28 @@ def level_map():
             ),
         )
     )
+
+
+@pytest.fixture(scope="session")
+def solid_map():
+    """Return level ground with solids of each kind on patch (0, 1), each with other flags."""
+    flat = SubTerrain(terrain="flat")
+    terrain_map = generate(
+        MapConfig(rows=1, cols=2, patch_size=(6.0, 4.0), border=0.5, terrains=(flat,))
+    )
+    solids = Solids.concatenate(
+        [
+            make_boxes((1, 6, 0.5), (0.5, 2, 0.2), rpy=(0, 0, 0.3), friction=0.3),
+            make_boxes((5, 6, 0.5), (0.5, 1, 0.2), collides=False),
+            make_cylinders((2, 6, 0.3), 0.2, 0.8, visible=False),
+            make_hulls([[[4, 6, 0], [4.5, 6, 0], [4, 6.5, 0], [4, 6, 0.4], [4.3, 6.3, 0.4]]]),
+        ]
+    )
+    patch = np.tile(np.array([0, 1], np.int32), (len(solids), 1))
+    goals = np.full((1, 2, 2, 4), np.nan, dtype=np.float32)
+    goals[0, 1] = [[3, 6, 0, 0], [5.5, 6, 0, 1]]
+    solids = dataclasses.replace(solids, patch=patch)
+    return dataclasses.replace(terrain_map, solids=solids, goals=goals)
 
 
 @pytest.fixture(scope="session")

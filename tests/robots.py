@@ -34,3 +34,18 @@ ARM = """<robot name="arm">
     <limit lower="-1.5" upper="1.5" effort="30" velocity="3"/></joint>
 </robot>"""
 """The URDF of an arm with a fixed base and one joint, without errors."""
+
+PENDULUM = """
+<robot name="pendulum">
+  <link name="pole"/>
+  <link name="bob">
+    <inertial><origin xyz="0.5 0 0"/><mass value="2"/>
+      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <joint name="j" type="revolute">
+    <parent link="pole"/><child link="bob"/><axis xyz="0 1 0"/>
+    <limit lower="-4" upper="4" effort="10" velocity="10"/>
+  </joint>
+</robot>
+"""
+"""The URDF of a bob of 2 kg, 0.5 m from a joint of a fixed link."""

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar, ge
 import tyro
 
 from terrainkit.errors import ConfigError
-from terrainkit.schema import Config, field_docs, field_types
+from terrainkit.field_docs import field_docs
+from terrainkit.schema import Config, field_types
 from terrainkit.type_hint import NONE, convert, parse_hint
 from terrainkit_cli.parse import Command, UsageError, check_options, option_names, parse, value_of
 from terrainkit_cli.robot_options import InputPath
@@ -89,7 +90,7 @@ class TaskCommand(ConfigCommand):
     """Name of a bundled task, or a folder written by terrainkit onboard."""
 
     config: InputPath = ""
-    """Values of the task (.toml); options override them."""
+    """Task file (.toml) whose values override those of ROBOT; options override both."""
 
     ALIASES: ClassVar[Mapping[str, str]] = {}
     """Shorter options of values of the task."""

@@ -44,10 +44,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     _open_closed_streams()
-    # With this variable, `import mujoco` fails where its graphics library is missing, although few
-    # commands render. gl_backend.py reads the other name.
-    if "MUJOCO_GL" in os.environ:
-        os.environ["TERRAINKIT_MUJOCO_GL"] = os.environ.pop("MUJOCO_GL")
+    # Child processes render. Here, `import mujoco` would load a graphics library, which takes time
+    # and fails where it is missing. gl_backend.py reads the other name.
+    if os.environ.get("MUJOCO_GL") != "disable":
+        os.environ["TERRAINKIT_MUJOCO_GL"] = os.environ.get("MUJOCO_GL", "")
+        os.environ["MUJOCO_GL"] = "disable"
+    if arguments[:1] != ["train"]:  # only training multiplies large matrices
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # idle threads of OpenBLAS spin
     warnings.showwarning = render.show_warning
     signals.raise_on_signals()
     from terrainkit.errors import TerrainkitError

@@ -13,21 +13,21 @@ from terrainkit_cli import render
 from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import (
     Flag,
+    IgnoredRules,
     InputPath,
     Output,
     Packages,
     StringList,
     XacroArguments,
     find_robot,
-    parse_ignore,
-    parse_packages,
-    parse_xacro_arguments,
+    parse_settings,
     repeated_option,
     split_commas,
 )
 
 if TYPE_CHECKING:
-    from terrainkit_robots.onboarding.pipeline import OnboardOptions, OnboardResult
+    from terrainkit_robots.onboarding.pipeline import OnboardOptions
+    from terrainkit_robots.onboarding.result import OnboardResult
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +56,8 @@ class Onboard(Command):
     nonconvex meshes into convex parts with CoACD; or fit a box, cylinder, capsule or sphere."""
 
     config: Annotated[StringList, *repeated_option("FRAMEWORK")] = field(default_factory=list)
-    """Also write a configuration for: legged_gym, leggedgym_ex, isaaclab, mjlab, genesis."""
+    """Also write the configuration file of a training framework: legged_gym, leggedgym_ex,
+    isaaclab, mjlab, genesis."""
 
     base: Literal["auto", "floating", "fixed"] = "auto"
     """Type of the base: floating, or fixed to the world. With auto, it is floating if the file
@@ -78,7 +79,7 @@ class Onboard(Command):
     pictures: Flag = True
     """Render the pictures of report.md."""
 
-    ignore: Annotated[StringList, *repeated_option("CODES=REASON")] = field(default_factory=list)
+    ignore: IgnoredRules = field(default_factory=list)
     """Ignore these rules; the reason is written to the report."""
 
     package: Packages = field(default_factory=list)
@@ -114,15 +115,10 @@ class Onboard(Command):
         from terrainkit_robots.export.collision_simplification.decomposition_cache import (
             cache_folder,
         )
-        from terrainkit_robots.lint.settings import Settings
         from terrainkit_robots.onboarding.pipeline import OnboardOptions
 
         return OnboardOptions(
-            settings=Settings(
-                ignore=parse_ignore(self.ignore),
-                packages=parse_packages(self.package),
-                xacro_arguments=parse_xacro_arguments(self.xacro_arg),
-            ),
+            settings=parse_settings(self.ignore, self.package, self.xacro_arg),
             collision=self.collision,
             frameworks=tuple(word for words in self.config for word in split_commas(words)),
             floating={"auto": None, "floating": True, "fixed": False}[self.base],
@@ -131,7 +127,7 @@ class Onboard(Command):
             force=self.force,
             overwrite=self.overwrite,
             render_images=self.pictures,
-            cache_dir=cache_folder(),
+            cache_dir=cache_folder() if self.collision == "coacd" else None,
             progress=partial(steps.bar, of="collision meshes"),
             on_step=steps.update,
         )

@@ -2,7 +2,7 @@
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -13,15 +13,14 @@ from terrainkit_cli import render
 from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import (
     Flag,
+    IgnoredRules,
     InputPath,
     Output,
     Packages,
     StringList,
     XacroArguments,
     find_robot,
-    parse_ignore,
-    parse_packages,
-    parse_xacro_arguments,
+    parse_settings,
     repeated_option,
     split_commas,
 )
@@ -67,7 +66,7 @@ class CheckRobot(Command):
     select: Annotated[StringList, *repeated_option("CODES")] = field(default_factory=list)
     """Run only these rules: comma-separated codes, prefixes of codes, or names."""
 
-    ignore: Annotated[StringList, *repeated_option("CODES=REASON")] = field(default_factory=list)
+    ignore: IgnoredRules = field(default_factory=list)
     """Do not run these rules; the reason is printed in the report."""
 
     package: Packages = field(default_factory=list)
@@ -120,13 +119,10 @@ class CheckRobot(Command):
 
     def _settings(self) -> "Settings":
         from terrainkit_robots.lint.selection import select_rules
-        from terrainkit_robots.lint.settings import Settings
 
-        settings = Settings(
+        settings = replace(
+            parse_settings(self.ignore, self.package, self.xacro_arg),
             select=tuple(word for words in self.select for word in split_commas(words)),
-            ignore=parse_ignore(self.ignore),
-            packages=parse_packages(self.package),
-            xacro_arguments=parse_xacro_arguments(self.xacro_arg),
             strict=self.flag("strict"),
             simulate=self.flag("simulation"),
         )
@@ -176,12 +172,7 @@ class CheckRobot(Command):
                 raise ConfigError(f"{name} is a bundled robot and cannot be changed; copy it first")
             if report.facts.model.kind == "xacro":
                 raise ConfigError(f"{name}: xacro files cannot be fixed; edit the reported lines")
-            first = report
-            result = fix_robot(
-                path,
-                lambda contents: check(contents) if contents else first,
-                unsafe=self.unsafe_fixes,
-            )
+            result = fix_robot(path, check, report=report, unsafe=self.unsafe_fixes)
             if self.diff:
                 diff = unified_diff(result)
             else:
@@ -267,10 +258,10 @@ class Rule(Command):
     code: Annotated[
         str, tyro.conf.Positional, tyro.conf.arg(metavar="[CODE]", help_behavior_hint="")
     ] = ""
-    """Code or name of the rule; without it, all rules are listed."""
+    """Code of the rule, such as INR001, or its name."""
 
     all: Flag = False
-    """List all rules."""
+    """List all rules. This is the default without CODE."""
 
     def run(self) -> int:
         """Print the documentation of a rule, or a list of rules."""

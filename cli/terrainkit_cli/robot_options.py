@@ -10,6 +10,8 @@ from terrainkit.errors import ConfigError
 from terrainkit.text import expected_names
 
 if TYPE_CHECKING:
+    from terrainkit_robots.lint.settings import Settings
+
     StringList = list[str]
 else:
     # For list[str], tyro imports typeguard, which takes a quarter of the time of check-robot.
@@ -27,6 +29,7 @@ def text_option(metavar: str, *aliases: str) -> object:
     return tyro.conf.arg(metavar=metavar, aliases=list(aliases), help_behavior_hint="")
 
 
+IgnoredRules = Annotated[StringList, *repeated_option("CODES=REASON")]
 Packages = Annotated[StringList, *repeated_option("NAME=DIR")]
 XacroArguments = Annotated[StringList, *repeated_option("NAME:=VALUE")]
 InputPath = Annotated[str, text_option("PATH")]
@@ -75,23 +78,23 @@ def split_commas(text: str) -> list[str]:
     return [word.strip() for word in text.split(",") if word.strip()]
 
 
-def parse_ignore(texts: Sequence[str]) -> dict[str, str]:
-    """Return the reason for each ignored rule, from texts such as `INR001,INR002=REASON`."""
-    parsed = parse_pairs("--ignore", texts, "=", "CODES=REASON")
-    return {code: reason for codes, reason in parsed.items() for code in split_commas(codes)}
+def parse_settings(
+    ignore: Sequence[str], package: Sequence[str], xacro_arg: Sequence[str]
+) -> "Settings":
+    """Return the settings of the options --ignore, --package and --xacro-arg.
 
+    Raises:
+        ConfigError: if a text has another format, or names no rule or folder.
+    """
+    from terrainkit_robots.lint.settings import Settings, package_folder
 
-def parse_packages(texts: Sequence[str]) -> dict[str, Path]:
-    """Return the folder of each package, from texts such as `NAME=DIR`."""
-    from terrainkit_robots.lint.settings import package_folder
-
-    parsed = parse_pairs("--package", texts, "=", "NAME=DIR")
-    return {name: package_folder(name, Path(folder)) for name, folder in parsed.items()}
-
-
-def parse_xacro_arguments(texts: Sequence[str]) -> dict[str, str]:
-    """Return the value of each xacro argument, from texts such as `NAME:=VALUE`."""
-    return parse_pairs("--xacro-arg", texts, ":=", "NAME:=VALUE")
+    ignored = parse_pairs("--ignore", ignore, "=", "CODES=REASON")
+    folders = parse_pairs("--package", package, "=", "NAME=DIR")
+    return Settings(
+        ignore={code: reason for codes, reason in ignored.items() for code in split_commas(codes)},
+        packages={name: package_folder(name, Path(folder)) for name, folder in folders.items()},
+        xacro_arguments=parse_pairs("--xacro-arg", xacro_arg, ":=", "NAME:=VALUE"),
+    )
 
 
 def parse_pairs(option: str, texts: Sequence[str], separator: str, expected: str) -> dict[str, str]:

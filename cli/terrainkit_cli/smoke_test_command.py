@@ -11,15 +11,13 @@ from terrainkit.errors import ConfigError, TerrainkitError, listing
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import (
+    IgnoredRules,
     InputPath,
     Output,
     Packages,
     StringList,
     XacroArguments,
-    parse_ignore,
-    parse_packages,
-    parse_xacro_arguments,
-    repeated_option,
+    parse_settings,
 )
 from terrainkit_cli.training_extra import require_training
 
@@ -54,7 +52,7 @@ class SmokeTest(Command):
     output: Output = ""
     """Write the report to this file; an existing file is replaced."""
 
-    ignore: Annotated[StringList, *repeated_option("CODES=REASON")] = field(default_factory=list)
+    ignore: IgnoredRules = field(default_factory=list)
     """For robot files: rules to ignore, with the reason."""
 
     package: Packages = field(default_factory=list)
@@ -109,15 +107,10 @@ class SmokeTest(Command):
             check_target(Path(self.output), overwrite=True)  # before the tests
 
     def _smoke_test(self, name: str) -> "SmokeTestResult":
-        from terrainkit_robots.lint.settings import Settings
         from terrainkit_robots.onboarding.pipeline import OnboardOptions
         from terrainkit_robots.policy.smoke_test import smoke_test
 
-        settings = Settings(
-            ignore=parse_ignore(self.ignore),
-            packages=parse_packages(self.package),
-            xacro_arguments=parse_xacro_arguments(self.xacro_arg),
-        )
+        settings = parse_settings(self.ignore, self.package, self.xacro_arg)
         spec = Path(self.spec) if self.spec else None
         return smoke_test(name, OnboardOptions(settings=settings, spec=spec))
 

@@ -259,6 +259,7 @@ class Preview(Command):
 class CheckMap(Command):
     """Validate a map: spawn origins, patches, sizes, difficulty, mesh.
 
+    It also prints the largest height difference between neighboring patches, which is no issue.
     Exit code 0: no issues. 1: the map has issues. 2: the file cannot be read.
     """
 
@@ -266,8 +267,9 @@ class CheckMap(Command):
     """The map, a file written by terrainkit generate."""
 
     def run(self) -> int:
-        """Print the issues, and return 1 if there are any."""
+        """Print the issues and the largest seam, and return 1 if there are issues."""
         from terrainkit.export.npz import read_mesh
+        from terrainkit.seams import Seams, cliffs_text, seam_text
         from terrainkit.validate import validate
         from terrainkit_robots.text import count
 
@@ -275,6 +277,11 @@ class CheckMap(Command):
         issues = validate(terrain_map, read_mesh(self.map))
         for issue in issues:
             render.result(f"{issue.check}: {issue.message}")
+        seams = Seams(config=terrain_map.config, heights=terrain_map.heights)
+        if largest := seams.largest():
+            render.result(f"largest seam: {seam_text(largest, terrain_map.patch_names)}")
+        if cliffs := seams.cliffs():
+            render.result(f"cliffs: {cliffs_text(cliffs, terrain_map.patch_names)}")
         if issues:
             render.result(f"\n{self.map}: {count(len(issues), 'issue')}")
             return 1

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.util import find_spec
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated, ClassVar
@@ -48,8 +49,9 @@ class Train(TaskCommand):
     resume: Annotated[str, text_option("RUN")] = ""
     """Continue a run: its folder, or one of its checkpoints. Robot, terrain and task default to
     those of the run. Training continues in the same folder, as if it had not been interrupted.
-    With another terrain or task, a new run starts with the networks of this run and, unless
-    --algorithm.learning-rate or --algorithm.schedule differ, its last learning rate."""
+    With another terrain or task, a new run starts with the networks of this run. It also starts
+    with its optimizer state if --algorithm.learning-rate and --algorithm.schedule are the same, and
+    with its terrain levels if the map is the same."""
 
     device: Annotated[str, text_option("DEVICE")] = "cpu"
     """Device of the networks: cpu (the default), cuda, cuda:1. The physics runs on the CPU."""
@@ -70,6 +72,8 @@ class Train(TaskCommand):
 
         run = self._resume_run
         robot, terrain, task = self._robot(run), self._terrain(run), self.changed_config()
+        if task.runner.logger == "wandb" and find_spec("wandb") is None:
+            raise ConfigError("runner.logger: wandb is not installed: pip install wandb")
         with stop_on_signals() as stop_signal, render.training() as show_progress:
             runner = train(
                 robot,

@@ -21,8 +21,7 @@ def require_training(*packages: str) -> None:
     missing = [name for name in (*_PACKAGES, *packages) if importlib.util.find_spec(name) is None]
     if missing:
         raise ConfigError(
-            f"this needs {', '.join(missing)}, which is not installed: "
-            "pip install 'terrainkit[train]'"
+            f"missing packages: {', '.join(missing)}; run: pip install 'terrainkit[train]'"
         )
     # Busy-waiting threads of torch slow the physics down. torch reads this when it is imported.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")

@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from terrainkit_robots.description.model import RobotModel
     from terrainkit_robots.lint.check import check_robot
     from terrainkit_robots.lint.runner import Finding, Report
-    from terrainkit_robots.onboarding.pipeline import OnboardOptions, OnboardResult, onboard
+    from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
+    from terrainkit_robots.onboarding.result import OnboardResult
     from terrainkit_robots.spec.robot_spec import RobotSpec
 
 __all__ = [
@@ -29,7 +30,7 @@ __all__ = [
 _MODULES = {
     "Finding": "lint.runner",
     "OnboardOptions": "onboarding.pipeline",
-    "OnboardResult": "onboarding.pipeline",
+    "OnboardResult": "onboarding.result",
     "Report": "lint.runner",
     "RobotModel": "description.model",
     "RobotSpec": "spec.robot_spec",

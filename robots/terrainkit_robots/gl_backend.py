@@ -47,5 +47,6 @@ def installation_advice() -> str:
 
 
 def _requested_backend() -> str:
-    # The command line renames MUJOCO_GL so that an invalid value does not break `import mujoco`.
-    return (os.environ.get("TERRAINKIT_MUJOCO_GL") or os.environ.get("MUJOCO_GL", "")).strip()
+    # The command line renames MUJOCO_GL, so that `import mujoco` loads no graphics library.
+    saved = os.environ.get("TERRAINKIT_MUJOCO_GL")
+    return (os.environ.get("MUJOCO_GL", "") if saved is None else saved).strip()

@@ -1,9 +1,9 @@
 """Write the map as an MJCF model that loads alone or is included in a scene.
 
 Everything is inline, since paths in an included file are resolved in the folders of the including
-model. All geoms belong to the world body, since MuJoCo computes the bounds of the geoms of any other
-body in every step. All geoms have one class that sets every attribute, since the robot's defaults
-would apply otherwise.
+model. All geoms belong to the world body, since in every step MuJoCo computes the bounds of the
+geoms of any other body. All geoms have one class that sets every attribute, since the robot's
+defaults would apply otherwise.
 """
 
 from pathlib import Path
@@ -13,7 +13,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.box_decomposition import BoxDecomposition, flat_cells, merge_spans, neighborhood
+from terrainkit.box_decomposition import BoxDecomposition, flat_cells, merge_boxes, neighborhood
 from terrainkit.memory import check_memory
 from terrainkit.mesh.closed import THICKNESS
 from terrainkit.solids import Solids
@@ -40,9 +40,10 @@ slopes toward the patch, so the heightfield has to extend beyond that cell."""
 _Part = tuple[slice, slice]
 """A rectangle of samples, counted on the map with `_RINGS` more samples on each side."""
 
-MAX_BOXES = 1800
-"""Number of boxes up to which they cost less than a heightfield with cells of 0.1 m. Relative to a
-plane, a step with n boxes was measured to cost 1.07 + 0.00035 n, with a heightfield 1.71."""
+MAX_BOXES = 100
+"""Number of boxes up to which they cost less than a heightfield with cells of 0.1 m, as measured by
+benchmarks/collision.py: a step of the bundled quadruped then takes 1.75 times as long as on a plane
+on either."""
 
 
 def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "auto") -> None:
@@ -52,9 +53,9 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
         terrain_map: The map.
         path: Target.
         collision: hfield: one heightfield, whose walls are slopes over one cell. boxes: boxes with
-            vertical walls for the flat ground, and a heightfield for the rest, if any, whose
-            walls are slopes over one cell. auto: boxes if they cover all of the ground and are
-            few, else hfield.
+            vertical walls for the flat ground of patches with walls, and heightfields for the rest,
+            if any, whose walls are slopes over one cell. auto: boxes if they cover all of the
+            ground and are so few that a step of a robot is faster than on a heightfield.
 
     Raises:
         ConfigError: if `collision` is invalid.
@@ -146,14 +147,15 @@ def _uncovered_parts(terrain_map: "TerrainMap", cover: BoxDecomposition) -> list
     uncovered = np.pad(~cover.covered, _RINGS, mode="edge")[: edges_x[-1], : edges_y[-1]]
     patches = np.logical_or.reduceat(uncovered, edges_x[:-1], axis=0)
     patches = np.logical_or.reduceat(patches, edges_y[:-1], axis=1)
-    spans = merge_spans([(r, r + 1, c, c + 1) for r, c in np.argwhere(patches).tolist()])
+    row, col = np.nonzero(patches)
+    merged = merge_boxes(np.column_stack([0.0 * row, row, row + 1, col, col + 1]))
     # The surface at the edge of a patch depends on the next sample, too.
     return [
         (
             slice(edges_x[r0] - (r0 > 0), edges_x[r1] + (r1 < len(edges_x) - 1)),
             slice(edges_y[c0] - (c0 > 0), edges_y[c1] + (c1 < len(edges_y) - 1)),
         )
-        for r0, r1, c0, c1 in spans
+        for _, r0, r1, c0, c1 in merged.astype(int).tolist()
     ]
 
 
@@ -226,7 +228,9 @@ def without_boxes(heights: NDArray[np.float32], cover: BoxDecomposition) -> NDAr
     return np.where(lowered, heights.min() - np.float32(THICKNESS / 2), heights)
 
 
-def _add_box(world: ET.Element, center: NDArray[np.float64], half_size: NDArray[np.float64]) -> None:
+def _add_box(
+    world: ET.Element, center: NDArray[np.float64], half_size: NDArray[np.float64]
+) -> None:
     position, size = _numbers(*center), _numbers(*half_size)
     ET.SubElement(world, "geom", {"class": "terrain"}, type="box", pos=position, size=size)
 

@@ -20,7 +20,7 @@ class SteppingStones(Terrain):
     stone: float = parameter.length(1.575, 0.075)
     """Side of a stone [m]."""
 
-    distance: float = parameter.length(0.05, 0.1)
+    distance: float = parameter.length(0.1)
     """Gap between neighboring stones [m]."""
 
     variation: float = parameter.height(0.0)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from terrainkit.atomic_write import atomic_write, temporary_folder
+from terrainkit.atomic_write import atomic_folder, atomic_write, temporary_folder
 from terrainkit.errors import ExportError
 
 
@@ -197,6 +197,68 @@ def test_atomic_write_respects_umask(target):
     write(target)
     os.umask(before)
     assert target.stat().st_mode & 0o777 == 0o644
+
+
+@pytest.fixture
+def old_folder(tmp_path):
+    folder = tmp_path / "robot"
+    folder.mkdir()
+    (folder / "old.txt").write_text("old")
+    return folder
+
+
+def write_folder(path, *, then=None):
+    with atomic_folder(path) as folder:
+        (folder / "new.txt").write_text("new")
+        if then:
+            then(folder)
+
+
+def test_atomic_folder_creates_folder_at_the_end(tmp_path):
+    target = tmp_path / "runs" / "robot"
+    with atomic_folder(target) as folder:
+        (folder / "meshes").mkdir()
+        assert not target.exists()
+    assert names(target) == ["meshes"]
+    assert names(target.parent) == ["robot"]
+
+
+def test_atomic_folder_replaces_folder(old_folder):
+    write_folder(old_folder)
+    assert names(old_folder) == ["new.txt"]
+    assert names(old_folder.parent) == ["robot"]
+
+
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt, OSError])
+def test_atomic_folder_error_keeps_old_folder(old_folder, error):
+    with pytest.raises((error, ExportError)):
+        write_folder(old_folder, then=fail_with(error))
+    assert names(old_folder) == ["old.txt"]
+    assert names(old_folder.parent) == ["robot"]
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, OSError])
+def test_atomic_folder_interrupted_move_restores_folder(monkeypatch, old_folder, error):
+    replace = Path.replace
+
+    def move(path, target):
+        if target == old_folder and path.name == "robot":  # the new folder; the old one is away
+            raise error
+        return replace(path, target)
+
+    monkeypatch.setattr(Path, "replace", move)
+    with pytest.raises((error, ExportError)):
+        write_folder(old_folder)
+    assert names(old_folder) == ["old.txt"]
+    assert names(old_folder.parent) == ["robot"]
+
+
+def test_atomic_folder_rejects_file(target):
+    target.write_text("old")
+    with pytest.raises(ExportError, match=r"cannot write .*map\.npz: "):
+        write_folder(target)
+    assert target.read_text() == "old"
+    assert names(target.parent) == ["map.npz"]
 
 
 def test_atomic_write_removes_folders_of_killed_processes(tmp_path):

@@ -165,10 +165,10 @@ def stripes(counts, patch_cells):
 
 
 def test_boxes_are_merged_to_a_limited_length():
-    # Four patches of 10 m: 2 boxes of two patches each at height 0, and 1 at each other height.
+    # Four patches of 10 m: at height 0, a new box begins in the patch at 30 m.
     cover = stripes([2, 1, 1], 10)
     sizes = sorted(map(tuple, (2 * cover.half_sizes[:, :2]).tolist()))
-    assert sizes == [(10.0, 10.0), (10.0, 10.0), (10.0, 20.0), (20.0, 20.0), (20.0, 20.0)]
+    assert sizes == [(10.0, 10.0), (10.0, 10.0), (10.0, 20.0), (20.0, 10.0), (20.0, 30.0)]
 
 
 def test_boxes_are_longer_where_that_halves_their_number():

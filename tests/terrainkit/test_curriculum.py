@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit.curriculum import assign_levels, update_levels
+from terrainkit.curriculum import assign_levels, assign_spawns, update_levels
 from terrainkit.errors import ConfigError
 
 
@@ -157,3 +157,32 @@ def test_update_levels_settle_at_walkable_level():
 
 def test_update_levels_standing_robots_end_at_zero():
     assert not careers(lambda levels, _: levels < 0).any()
+
+
+def spawn_sets():
+    """Return the spawns of 2 x 2 patches: patch (r, c) has 2 r + c + 1 of 4, at x = 1, 2, ..."""
+    spawns = np.full((2, 2, 4, 4), np.nan, np.float32)
+    for number, spawn_set in enumerate(spawns.reshape(4, 4, 4), start=1):
+        spawn_set[:number] = [[k + 1, 10 * number, 0.5, 0.25] for k in range(number)]
+    return spawns
+
+
+def test_assign_spawns_takes_positions_in_turn():
+    levels, columns = [1, 0, 1, 1, 0, 1], [0, 1, 0, 1, 1, 0]
+    spawns, num_shared = assign_spawns(spawn_sets(), levels, columns)
+    assert spawns[:, 0].tolist() == [1, 1, 2, 1, 2, 3]
+    assert spawns[:, 1].tolist() == [30, 20, 30, 40, 20, 30]
+    assert spawns[:, 2:].tolist() == [[0.5, 0.25]] * 6
+    assert num_shared == 0
+
+
+def test_assign_spawns_counts_shared_positions():
+    spawns, num_shared = assign_spawns(spawn_sets(), [0] * 5, [1] * 5)
+    assert spawns[:, 0].tolist() == [1, 2, 1, 2, 1]
+    assert num_shared == 3
+
+
+def test_assign_spawns_of_no_environments():
+    spawns, num_shared = assign_spawns(spawn_sets(), [], [])
+    assert spawns.shape == (0, 4)
+    assert num_shared == 0

@@ -8,7 +8,9 @@ from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.measured_difficulty import measured_difficulty
 from terrainkit.parameter import MAX_VALUE, parameters_of
+from terrainkit.seams import Seams
 from terrainkit.terrain import Terrain
+from terrainkit.validate import validate
 
 VARIANTS = [(name, {}) for name in registry.terrain_names()] + [
     (name, {"inverted": True})
@@ -20,18 +22,27 @@ every_terrain = pytest.mark.parametrize(
     VARIANTS,
     ids=[f"{name}_inverted" if inverted else name for name, inverted in VARIANTS],
 )
-every_plot = pytest.mark.parametrize(
+DEFAULT_GRIDS = [
+    pytest.param(Grid(shape=(80, 80), cell=0.1), id="8x8"),
+    pytest.param(Grid(shape=(80, 40), cell=0.1), id="8x4"),
+    pytest.param(Grid(shape=(160, 160), cell=0.05), id="8x8 fine"),
+    pytest.param(Grid(shape=(160, 80), cell=0.05), id="8x4 fine"),
+]
+every_grid = pytest.mark.parametrize(
     "grid",
     [
-        pytest.param(Grid(shape=(80, 80), cell=0.1), id="8x8"),
-        pytest.param(Grid(shape=(80, 40), cell=0.1), id="8x4"),
+        *DEFAULT_GRIDS,
         pytest.param(Grid(shape=(73, 51), cell=0.1), id="7.3x5.1"),
-        pytest.param(Grid(shape=(160, 160), cell=0.05), id="fine"),
         pytest.param(Grid(shape=(40, 40), cell=0.2), id="coarse"),
     ],
 )
-DIFFICULTIES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
-# That the cells of some plots are too coarse for what is asked is said, and not the point here.
+every_default_grid = pytest.mark.parametrize("grid", DEFAULT_GRIDS)
+OUTLINE = np.array([(x, y) for x in np.linspace(-1, 1, 21) for y in (-1, 1)])
+OUTLINE = np.concatenate([OUTLINE, OUTLINE[:, ::-1]])
+"""Points on the outline of a square with sides of 2."""
+
+DIFFICULTIES = (0.0, 0.25, 0.5, 0.75, 1.0)
+# Some grids are too coarse for some parameters; generate warns, which is not tested here.
 coarse = pytest.mark.filterwarnings("ignore:cells of:terrainkit.TerrainkitWarning")
 
 
@@ -69,7 +80,7 @@ def assert_spawns_are_inside(terrain_map, radius):
         assert grid.lower[1] + radius <= y <= grid.upper[1] - radius
 
 
-@every_plot
+@every_grid
 @every_terrain
 def test_every_terrain_heights_are_finite_float32(terrain, given_parameters, grid):
     for heights in at_every_difficulty(terrain, given_parameters, grid):
@@ -96,12 +107,46 @@ def test_every_terrain_rejects_block_as_wide_as_patch(terrain, block, size):
 
 
 @coarse
-@every_plot
+@every_grid
 @every_terrain
 def test_every_terrain_spawn_is_level(terrain, given_parameters, grid):
     terrain_map = map_of(terrain, given_parameters, grid)
     assert_spawns_are_level(terrain_map, 0.5)
     assert_spawns_are_inside(terrain_map, 0.5)
+
+
+@coarse
+@every_default_grid
+@every_terrain
+def test_every_terrain_map_is_valid(terrain, given_parameters, grid):
+    terrain_map = map_of(terrain, given_parameters, grid, cols=1)
+    assert terrain_map.difficulty.ravel().tolist() == [0.0, 0.5, 1.0]
+    # The mesh, the spawn origins, and a second build of each patch. Some parameters do not fit.
+    assert [issue for issue in validate(terrain_map) if issue.check != "realized"] == []
+    cliffs = Seams(config=terrain_map.config, heights=terrain_map.heights).cliffs()
+    assert [seam for seam in cliffs if None not in seam.patches] == []
+
+
+@coarse
+@every_default_grid
+@every_terrain
+def test_every_terrain_platform_is_flat_as_recorded(terrain, given_parameters, grid):
+    for name, declared in parameters_of(registry.get_terrain(terrain)).items():
+        if declared.snap != "centered":
+            continue
+        # By default, steps below 0.075 m are ramps, which start half a cell earlier.
+        threshold = 0.75 if declared.slopes_away else 0.05
+        terrain_map = map_of(terrain, given_parameters, grid, cols=1, slope_threshold=threshold)
+        for row in range(3):
+            patch = terrain_map.patch(row, 0)
+            side = np.broadcast_to(patch.parameters.realized[name], 2)
+            inside, outside = (
+                terrain_map.height(patch.grid.center + outline * (side / 2 + margin))
+                for margin, outline in ((-1e-3, OUTLINE), (1e-2, OUTLINE))
+            )
+            assert np.ptp(inside) < 1e-5
+            if row == 2 and declared.slopes_away:
+                assert np.ptp([*outside, inside[0]]) > 1e-4
 
 
 @pytest.mark.parametrize(
@@ -158,7 +203,7 @@ def test_every_terrain_ignores_global_random_state(terrain, given_parameters):
     assert np.array_equal(first, second)
 
 
-@every_plot
+@every_grid
 @every_terrain
 def test_every_terrain_measured_difficulty_does_not_decrease(terrain, given_parameters, grid):
     x, y = registry.get_terrain(terrain).at(0.0).spawn(grid)

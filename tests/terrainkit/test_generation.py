@@ -80,6 +80,24 @@ def test_make_patch_equals_slice_of_the_map(row, col):
     assert patch.parameters == terrain_map.parameters[row, col]
 
 
+def test_generate_spawns_begin_with_the_origin():
+    one, many = generate(SMALL), generate(replace(SMALL, spawns_per_patch=5, spawn_radius=0.3))
+    assert one.spawns.shape == (3, 4, 1, 4)
+    assert many.spawns.shape == (3, 4, 5, 4)
+    assert many.spawns[:, :, 0].tobytes() == one.spawns[:, :, 0].tobytes()
+    assert many.heights.tobytes() == one.heights.tobytes()
+    assert (many.spawns[0, 0] != many.spawns[1, 0]).any()
+
+
+def test_generate_pads_spawns_with_nan():
+    flat = SubTerrain(terrain="flat")
+    # The platform of 1.5 m has room for one disc with a radius of 0.5 m only.
+    small = SubTerrain(terrain="pyramid_stairs", parameters={"platform": 1.5})
+    config = replace(SMALL, cols=2, spawns_per_patch=6, terrains=(flat, small))
+    number = np.isfinite(generate(config).spawns).sum(axis=2)
+    assert number.tolist() == [[[6] * 4, [1] * 4]] * 3
+
+
 def test_generate_change_of_one_column_is_local():
     edited = SubTerrain(terrain="stairs", parameters={"step_height": 0.3, "inverted": True})
     before = generate(SMALL).heights
@@ -193,6 +211,24 @@ def test_generate_warns_of_step_above_amplitude():
     with pytest.warns(TerrainkitWarning, match=r"height steps .* rough\.amplitude on 1 patch"):
         made = generate(MapConfig(rows=1, cols=1, border=0.0, terrains=(choice,)))
     assert not made.heights.any()
+
+
+@pytest.mark.parametrize(
+    ("terrain", "given", "collapsed"),
+    [
+        ("stepping_stones", {"distance": (0.05, 0.1)}, "distance from 0.05 to 0.1 is 0.1"),
+        ("stepping_stones", {"stone": (0.26, 0.34)}, "stone from 0.26 to 0.34 is 0.3"),
+        ("rough", {"amplitude": (0.02, 0.024)}, "amplitude from 0.02 to 0.024 is 0.02"),
+    ],
+)
+def test_generate_warns_of_a_collapsed_range(terrain, given, collapsed):
+    choice = SubTerrain(terrain=terrain, parameters=given)
+    config = MapConfig(rows=3, cols=1, border=0.0, terrains=(choice,))
+    with pytest.warns(TerrainkitWarning, match=f"{terrain}.{collapsed} on every patch"):
+        generate(config)
+    generate(replace(config, rows=1))
+    if terrain == "stepping_stones":
+        generate(replace(config, cell=0.02))
 
 
 @pytest.mark.parametrize(

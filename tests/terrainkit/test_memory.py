@@ -19,6 +19,14 @@ def test_check_memory_rejects_large_work(needed):
         check_memory(needed, "a lot")
 
 
+def test_check_memory_names_parts_that_fit(monkeypatch):
+    monkeypatch.setattr("terrainkit.memory._free_memory", lambda: 10**9)
+    with pytest.raises(MemoryLimitError, match=r"; num_envs 25 would fit$"):
+        check_memory(4 * 10**9, "training", ("num_envs", 100))
+    with pytest.raises(MemoryLimitError, match=r"1\.0 GB free$"):
+        check_memory(4 * 10**9, "training", ("num_envs", 1))
+
+
 def test_check_memory_error_is_a_memory_error():
     with pytest.raises(MemoryError) as error:
         check_memory(1 << 62, "a lot")

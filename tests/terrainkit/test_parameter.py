@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
+from terrainkit.terrains.flat import Flat
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +49,18 @@ def test_parameter_count_and_switch_are_constant():
     assert HURDLE["number"].at(0.3) == 4
     assert isinstance(HURDLE["number"].at(0.3), int)
     assert HURDLE["inverted"].at(0.3) is False
+
+
+@pytest.mark.parametrize(("difficulty", "number"), [(0.0, 12), (0.5, 6), (0.6, 5), (1.0, 1)])
+def test_parameter_count_range_is_rounded(difficulty, number):
+    @dataclass(frozen=True, kw_only=True)
+    class Star(Flat):
+        number: int = parameter.count(12, 1)
+
+    built = Star.at(difficulty)
+    assert built.number == number
+    assert isinstance(built.number, int)
+    assert Star.at(difficulty, {"number": (12, 1)}) == built
 
 
 @settings(deadline=None, derandomize=True)

@@ -1,10 +1,19 @@
+import dataclasses
+
 import cv2
 import numpy as np
 import pytest
 
 import terrainkit as tk
 from terrainkit.errors import ExportError
-from terrainkit.preview import height_colors, render_preview, shaded_relief, write_preview
+from terrainkit.preview import (
+    color_levels,
+    height_colors,
+    render_preview,
+    shaded_relief,
+    write_preview,
+)
+from terrainkit.solids import Solids
 
 PAPER = (250, 249, 246)
 
@@ -18,7 +27,7 @@ def pits():
 
 def test_preview_x_is_to_the_right(pits):
     picture = render_preview(pits, 520)  # 26 m along x: 20 px for a metre
-    left, _, _, above = 250, 60, 30, 70
+    left, _, _, above = 250, 60, 130, 70
     first, last = (picture[above + 100, left + 20 + row * 160 + 30].astype(int) for row in (0, 2))
     assert np.abs(last - first).max() > 40
 
@@ -40,13 +49,41 @@ def test_preview_y_is_up():
 
 def test_preview_has_the_minimum_width(pits):
     for width in (100, 520, 1000):
-        ground = render_preview(pits, width).shape[1] - 250 - 30
+        ground = render_preview(pits, width).shape[1] - 250 - 130
         assert width <= ground < 2 * max(width, 260)
 
 
 def test_preview_labels_every_column(pits):
     picture = render_preview(pits, 520)
     assert (picture[:, :250] != PAPER).any()
+
+
+def test_color_levels_are_ends_and_color_stops():
+    assert color_levels(-10.2, 0.3) == pytest.approx([-10.2, -10.0, -1.5, -0.4, 0.0, 0.3])
+    assert color_levels(0.0, 0.0).tolist() == [0.0]
+
+
+@pytest.mark.parametrize("inverted", [False, True])
+def test_preview_height_scale_has_the_colors_of_heights(inverted):
+    slope = tk.SubTerrain(terrain="pyramid_slope", parameters={"inverted": inverted})
+    config = tk.MapConfig(rows=1, cols=1, difficulty_range=(1.0, 1.0), terrains=(slope,))
+    picture = render_preview(tk.generate(config), 400)
+    bar = picture[70:-60, -130 + 20 : -130 + 42].astype(int)
+    # Heights from 0 to 1 m or from -1 m to 0; row 0 is the highest.
+    top, bottom = height_colors(np.array([0.0, -1.0] if inverted else [1.0, 0.0]))
+    assert np.abs(bar[2, 10] - top).max() < 8
+    assert np.abs(bar[-3, 10] - bottom).max() < 8
+    middle = height_colors(np.array([-0.4 if inverted else 0.4]))[0]
+    assert np.abs(bar[len(bar) // 2, 10] - middle).max() < 8
+    assert (picture[70:-60, -80:] != PAPER).any()  # tick labels
+
+
+@pytest.mark.parametrize("width", [100, 130, 400])
+def test_preview_height_scale_of_a_flat_map(width):
+    flat = tk.SubTerrain(terrain="flat")
+    terrain_map = tk.generate(tk.MapConfig(rows=5, cols=1, border=0.0, terrains=(flat,)))
+    bar = render_preview(terrain_map, width)[70:-60, -130 + 20 : -130 + 42]
+    assert (bar[3:-3, 3:-3] == height_colors(np.array(0.0)).astype(np.uint8)).all()
 
 
 def test_shaded_relief_is_brighter_toward_the_light():
@@ -98,4 +135,22 @@ def test_preview_of_a_long_map_is_limited():
     )
     height, width, _ = render_preview(tk.generate(config), 1600).shape
     assert height <= 10_000 + 70 + 60
-    assert width < 300 + 10_000 / 300 + 30
+    assert width < 300 + 10_000 / 300 + 130
+
+
+def test_preview_draws_solids_and_goals(solid_map):
+    """The color at the center of the box is mixed from that of its top and of the ground."""
+    bare = dataclasses.replace(
+        solid_map, solids=Solids.empty(), goals=np.full_like(solid_map.goals, np.nan)
+    )
+    with_solids, without = (render_preview(each, 700).astype(int) for each in (solid_map, bare))
+    scale = 100  # 7 m on 700 pixels
+    bottom, left = without.shape[0] - 60, 250
+
+    def pixel(picture, x, y):
+        return picture[bottom - round((y + 0.5) * scale), left + round((x + 0.5) * scale)]
+
+    expected = 0.75 * height_colors(np.array(0.6)) + 0.25 * pixel(without, 1, 6)
+    assert pixel(with_solids, 1, 6) == pytest.approx(expected, abs=2)
+    assert (pixel(with_solids, 3, 1) == pixel(without, 3, 1)).all()
+    assert (pixel(with_solids, 3.1, 6) != pixel(without, 3.1, 6)).any()  # the arrow of a goal

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from terrainkit.errors import ConfigError
-from terrainkit.schema import Config, field_docs, flatten
+from terrainkit.schema import Config, flatten
 from terrainkit.type_hint import UNIQUE, Interval, PositiveFloat, PositiveInt
 
 
@@ -86,10 +86,6 @@ def test_from_toml_error_names_the_key(text, message):
 def test_from_toml_suggests_key_of_nested_config():
     with pytest.raises(ConfigError, match=r"no key 'effort'; did you mean 'motor\.effort'"):
         Robot.from_toml("effort = 1", Robot(legs=4))
-
-
-def test_field_docs_are_on_one_line():
-    assert field_docs(Robot)["mass"] == "Total mass [kg]."
 
 
 def test_flatten_yields_dotted_names():

@@ -6,7 +6,7 @@ import pytest
 
 import terrainkit
 from terrainkit import MapConfig, SubTerrain, generate
-from terrainkit.errors import ConfigError, ExportError
+from terrainkit.errors import ConfigError, ExportError, TerrainkitWarning
 
 
 @pytest.fixture(scope="module")
@@ -210,6 +210,32 @@ def test_assign_respects_max_init_level(terrain_map):
     assert terrain_map.assign(50, max_init_level=0).levels.tolist() == [0] * 50
 
 
+def flat_map(**values):
+    flat = SubTerrain(terrain="flat")
+    return generate(MapConfig(rows=1, cols=3, border=0.0, terrains=(flat,), **values))
+
+
+def test_assign_spreads_environments_over_spawns():
+    start = flat_map(spawns_per_patch=16).assign(48)
+    x, y, _ = start.env_origins.T
+    distance = np.hypot(x[:, None] - x, y[:, None] - y)[np.triu_indices(48, 1)]
+    assert distance.min() >= 1.0 - 1e-5
+    assert start.headings.tolist() == [0.0] * 48
+
+
+def test_assign_warns_of_shared_spawns():
+    # On a patch of 6 m x 2 m, one disc of 0.8 m fits on each side of the origin.
+    terrain_map = flat_map(patch_size=(6.0, 2.0), spawns_per_patch=100, spawn_radius=0.8)
+    message = "3 of 12 environments share a spawn position with another; increase spawns_per_patch"
+    with pytest.warns(TerrainkitWarning, match=message):
+        start = terrain_map.assign(12)
+    assert len(np.unique(start.env_origins, axis=0)) == 9
+
+
+def test_assign_shares_single_origins_without_warning():
+    assert len(np.unique(flat_map().assign(12).env_origins, axis=0)) == 3
+
+
 def test_env_origins_are_on_the_ground(terrain_map):
     x, y, z = np.moveaxis(terrain_map.env_origins.astype(float), -1, 0)
     np.testing.assert_allclose(terrain_map.height(np.stack([x, y], axis=-1)), z, atol=1e-3)
@@ -229,3 +255,40 @@ def test_map_update_levels_equals_function(terrain_map):
 def test_repr_is_one_line(terrain_map):
     assert repr(terrain_map).startswith("<TerrainMap 2 x 3 patches, (")
     assert "\n" not in repr(terrain_map)
+
+
+def test_scan_sees_visible_solids_and_clearance_those_that_collide(solid_map):
+    over = [[1, 6, 2], [5, 6, 2], [2, 6, 2]]  # the box, one that does not collide, a hidden one
+    assert solid_map.scan(over) == pytest.approx([0.6, 0.6, 0.0])
+    xy = np.array(over)[:, :2]
+    assert solid_map.clearance(xy) == pytest.approx([0.4, np.inf, 0.0])
+    assert solid_map.intervals(xy)[0] == pytest.approx(np.array([[0, 0.4], [0.6, np.inf]]))
+
+
+@pytest.mark.parametrize("shape", [(3,), (2, 3), (2, 5, 3)])
+def test_scan_keeps_the_shape(solid_map, shape):
+    points = np.ones(shape)
+    assert solid_map.scan(points).shape == shape[:-1]
+    assert solid_map.clearance(points[..., :2]).shape == shape[:-1]
+    assert solid_map.intervals(points[..., :2]).shape == (*shape[:-1], 1, 2)
+
+
+@pytest.mark.parametrize(
+    ("points", "direction", "message"),
+    [
+        ([0.0, 0.0], "down", "points: got shape"),
+        ([0.0, 0.0, np.nan], "down", "points: got"),
+        ([0.0, 0.0, 0.0], "left", "direction: got 'left'; expected one of: down, up"),
+    ],
+)
+def test_scan_rejects_invalid_input(solid_map, points, direction, message):
+    with pytest.raises(ConfigError, match=message):
+        solid_map.scan(points, direction)
+
+
+def test_heightfield_formats_reject_solids(solid_map, tmp_path):
+    with pytest.raises(ExportError, match="a heightfield has no solids: got a map with 4"):
+        solid_map.height_field_raw()
+    with pytest.raises(ExportError, match="an image of heights has no solids"):
+        solid_map.save(tmp_path / "map.png")
+    assert list(tmp_path.iterdir()) == []

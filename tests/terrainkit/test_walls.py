@@ -1,7 +1,9 @@
+import itertools
+
 import numpy as np
 import pytest
 
-from terrainkit.walls import center_heights, connected_corners, wall_edges
+from terrainkit.walls import center_heights, flat_corners, wall_edges
 
 
 def samples(*rows):
@@ -60,10 +62,14 @@ def walls_on(edges):
         ("four walls", ["0", "1", "2", "3"]),
     ],
 )
-def test_connected_corners_follow_edges_without_walls(case, groups):
-    joined = connected_corners(walls_on(WALLS[case]))[0]
-    found = {"".join(str(k) for k in np.flatnonzero(row)) for row in joined}
-    assert sorted(found) == groups
+def test_flat_corners_are_connected_to_equal_corners(case, groups):
+    corners = np.array(list(itertools.product([0.0, 1.0], repeat=4)))
+    walls = np.repeat(walls_on(WALLS[case]), len(corners), axis=0)
+    expected = np.empty(corners.shape, dtype=bool)
+    for group in groups:
+        members = list(map(int, group))
+        expected[:, members] = (np.ptp(corners[:, members], axis=1) == 0)[:, None]
+    assert flat_corners(corners, walls).tolist() == expected.tolist()
 
 
 @pytest.mark.parametrize(

@@ -62,4 +62,16 @@ def walking(tmp_path) -> Path:
     return folder
 
 
+@pytest.fixture
+def run_beside_walk(walking, monkeypatch, run_main) -> Callable[..., tuple[int, str, str]]:
+    """Run `terrainkit` in a folder with a run `walk`; return exit code, output and errors."""
+    monkeypatch.chdir(walking.parent)
+
+    def run(*words: object) -> tuple[int, str, str]:
+        done = run_main(*words)
+        return done.returncode, done.stdout, done.stderr
+
+    return run
+
+
 SMALL = ("--rows", 2, "--cols", 5, "--preset", "rough", "--border", 1, "--patch-size", 8, 6)

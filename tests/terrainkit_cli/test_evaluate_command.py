@@ -1,5 +1,6 @@
 import json
 import sys
+from functools import partial
 
 import pytest
 
@@ -14,15 +15,9 @@ QUICK = ("--seconds", "0.04", "--num-envs", "1")
 
 
 @pytest.fixture
-def here(walking, monkeypatch, run_main):
+def here(run_beside_walk):
     """Run `terrainkit evaluate` in a folder with a run `walk`."""
-    monkeypatch.chdir(walking.parent)
-
-    def run(*words):
-        done = run_main("evaluate", *words)
-        return done.returncode, done.stdout, done.stderr
-
-    return run
+    return partial(run_beside_walk, "evaluate")
 
 
 def one_line(err):

@@ -1,4 +1,5 @@
 import importlib.util
+from functools import partial
 
 import pytest
 
@@ -14,15 +15,9 @@ SMALL = ("--size", "96", "64")
 
 
 @pytest.fixture
-def here(walking, monkeypatch, run_main):
+def here(run_beside_walk):
     """Run `terrainkit play` in a folder with a run `walk`."""
-    monkeypatch.chdir(walking.parent)
-
-    def run(*words):
-        done = run_main("play", *words)
-        return done.returncode, done.stdout, done.stderr
-
-    return run
+    return partial(run_beside_walk, "play")
 
 
 def one_line(err):
@@ -63,7 +58,7 @@ def test_play_names_the_missing_extra(here, monkeypatch):
     )
     code, out, err = here("walk", *QUICK)
     assert (code, out) == (2, "")
-    assert "imageio_ffmpeg, which is not installed: pip install 'terrainkit[train]'" in err
+    assert "missing packages: imageio_ffmpeg; run: pip install 'terrainkit[train]'" in err
     assert here("walk", *QUICK, "--no-video")[0] == 0
 
 

@@ -269,6 +269,22 @@ def test_check_map_accepts_generated_map(terrainkit, small_map):
     assert "no issues" in run.stdout
 
 
+def test_check_map_prints_the_largest_seam(terrainkit):
+    options = ("--rows", 1, "--cols", 1, "--border", 1, "--difficulty-range", 1, 1)
+    terrainkit("generate", "-o", "a.npz", "--terrain", "stairs", *options)
+    run = terrainkit("check-map", "a.npz")
+    assert run.returncode == 0
+    assert "largest seam: 1.61 m between stairs (0, 0) and the border\n" in run.stdout
+    assert "cliffs: 2 seams, up to 1.61 m between stairs (0, 0) and the border\n" in run.stdout
+
+
+def test_generate_warns_about_cliffs(terrainkit):
+    run = terrainkit("generate", "-o", "a.npz", "--preset", "stairs", "--cols", 3, "--border", 1)
+    assert run.returncode == 0
+    assert "cliffs between patches: " in run.stderr
+    assert "1.61 m between stairs (9, 0) and pyramid_stairs (9, 1)" in run.stderr
+
+
 def test_check_map_reports_issues(terrainkit, tmp_path, small_map):
     arrays = dict(np.load(tmp_path / small_map))
     arrays["env_origins"][1, 2, 2] += 0.2

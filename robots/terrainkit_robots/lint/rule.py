@@ -201,6 +201,9 @@ def get_rule(code_or_name: str) -> Rule:
     for key, rule in known.items():
         if key.lower() == code_or_name.lower():
             return rule
-    codes = [rule.code for rule in rules()]
-    suggestion = expected_names(code_or_name, codes, closest_name=closest(code_or_name, known))
+    names = [rule.code for rule in rules() if code_or_name.upper().startswith(rule.family)]
+    prefix = "there are" if names else "expected a code or a name of the families"
+    suggestion = expected_names(
+        code_or_name, names or FAMILIES, prefix, closest(code_or_name, known)
+    )
     raise ConfigError(f"no rule {code_or_name!r}; {suggestion}")

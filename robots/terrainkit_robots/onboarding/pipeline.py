@@ -18,16 +18,12 @@ from terrainkit_robots.onboarding.folder import (
     write_files,
 )
 from terrainkit_robots.onboarding.frameworks.frameworks import config_file_name, robot_config_text
-from terrainkit_robots.onboarding.robot_files import (
-    MJCF,
-    RobotFiles,
-    SpecOverride,
-    make_robot_files,
-)
+from terrainkit_robots.onboarding.report_md import report_markdown
+from terrainkit_robots.onboarding.result import OnboardResult
+from terrainkit_robots.onboarding.robot_files import MJCF, SpecOverride, make_robot_files
 
 if TYPE_CHECKING:
     from terrainkit_robots.export.collision_simplification.simplify import CollisionMethod, Progress
-    from terrainkit_robots.onboarding.verify import Verification
 
 _BLOCKING_RULES = ("XML", "MSH", "TRE", "INR", "JNT001", "JNT004", "JNT007", "JNT013")
 """Codes, or starts of codes, of rules whose errors change the robot that would be written. For
@@ -84,38 +80,6 @@ class OnboardOptions:
     """Called with the name of each step when it starts."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class OnboardResult:
-    """The outcome of `onboard`."""
-
-    report: Report
-    """Findings that remain after the fixes."""
-
-    fixed: tuple[Finding, ...] = ()
-    """Findings of the source file that do not apply to the written files."""
-
-    folder: Path | None = None
-    """The folder that was written; None if blocking errors remain."""
-
-    robot: RobotFiles | None = None
-    """The robot in the folder; None if blocking errors remain."""
-
-    verification: "Verification | None" = None
-    """The comparison of the written files with the source, and the standing test."""
-
-    configs: tuple[str, ...] = ()
-    """Names of the framework configurations."""
-
-    images: tuple[str, ...] = ()
-    """Names of the picture files."""
-
-    images_error: str = ""
-    """The reason why there are no pictures."""
-
-    edits: tuple[str, ...] = ()
-    """Names of the files that keep user edits of the replaced folder."""
-
-
 def is_blocking(finding: Finding) -> bool:
     """Return whether a finding means that the written files would describe another robot."""
     return finding.severity == "error" and finding.code.startswith(_BLOCKING_RULES)
@@ -143,7 +107,6 @@ def onboard(
         TerrainkitError: if a file cannot be read or written, an option is invalid, or MuJoCo
             rejects the robot.
     """
-    from terrainkit_robots.onboarding.report_md import report_markdown
     from terrainkit_robots.onboarding.verify import verify
     from terrainkit_robots.spec.robot_spec import RobotSpec
 
@@ -211,12 +174,11 @@ def _fix_in_memory(path: Path, options: OnboardOptions) -> tuple[Report, tuple[F
     report = check_robot(path, settings)
     fixed: tuple[Finding, ...] = ()
     if report.facts.model.kind != "xacro" and any(f.fix is not None for f in report.findings):
-        first = report
 
         def check(contents: Mapping[Path, bytes]) -> Report:
-            return check_robot(path, settings, contents=contents) if contents else first
+            return check_robot(path, settings, contents=contents)
 
-        result = fix_robot(path, check, unsafe=options.unsafe_fixes)
+        result = fix_robot(path, check, report=report, unsafe=options.unsafe_fixes)
         report, fixed = result.report, result.fixed
     by_export = [f for f in report.findings if f.severity == "error" and f.code in _FIXED_BY_EXPORT]
     remaining = tuple(f for f in report.findings if f not in by_export)

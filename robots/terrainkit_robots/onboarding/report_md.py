@@ -10,7 +10,7 @@ from terrainkit_robots.analysis.bodies.joint_order import permutation
 from terrainkit_robots.analysis.simulator_conventions.order_table import order_table
 from terrainkit_robots.lint.report.escape import escape_control, escape_surrogates
 from terrainkit_robots.lint.report.grouping import group_findings
-from terrainkit_robots.lint.report.markdown import cell, finding_row, titled_list
+from terrainkit_robots.lint.report.markdown import cell, findings_table, titled_list
 from terrainkit_robots.lint.report.summary import (
     SEVERITY_LABELS,
     group_skipped,
@@ -21,7 +21,7 @@ from terrainkit_robots.text import count, display_path
 
 if TYPE_CHECKING:
     from terrainkit_robots.lint.runner import Finding
-    from terrainkit_robots.onboarding.pipeline import OnboardResult
+    from terrainkit_robots.onboarding.result import OnboardResult
     from terrainkit_robots.onboarding.robot_files import RobotFiles
     from terrainkit_robots.onboarding.verify import Verification
     from terrainkit_robots.simulation.standing import StandResult
@@ -228,12 +228,8 @@ def _findings(result: "OnboardResult") -> Iterator[str]:
     report, severities = result.report, list(SEVERITY_LABELS)
     yield "## Findings\n"
     yield f"**{summarize_findings([report])}** in the source file, after the fixes.\n"
-    if report.findings:
-        yield "| | rule | location | finding | how to fix |\n|---|---|---|---|---|"
-        findings = sorted(report.findings, key=lambda f: (severities.index(f.severity), f.code))
-        groups = group_findings(report.facts.model, findings)
-        yield from (finding_row(group) for group in groups)
-        yield ""
+    findings = sorted(report.findings, key=lambda f: (severities.index(f.severity), f.code))
+    yield from findings_table(group_findings(report.facts.model, findings))
     skipped = [(codes, reason) for _, codes, reason in group_skipped(report.skipped)]
     yield from titled_list("Not checked or ignored", skipped)
 

@@ -9,7 +9,7 @@ from terrainkit_robots.onboarding.equivalence import NUM_POSES
 from terrainkit_robots.text import count, names
 
 if TYPE_CHECKING:
-    from terrainkit_robots.onboarding.pipeline import OnboardResult
+    from terrainkit_robots.onboarding.result import OnboardResult
     from terrainkit_robots.onboarding.robot_files import RobotFiles
     from terrainkit_robots.onboarding.verify import Verification
 

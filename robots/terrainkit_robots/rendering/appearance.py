@@ -22,7 +22,7 @@ def set_appearance(spec: Any) -> None:
     texture = spec.add_texture(name="terrainkit_sky", type=sky, width=8, height=8)
     texture.builtin = mujoco.mjtBuiltin.mjBUILTIN_FLAT
     texture.rgb1 = texture.rgb2 = SKY_COLOR
-    visual.rgba.fog = visual.rgba.haze = [*SKY_COLOR, 1]
+    visual.rgba.fog = [*SKY_COLOR, 1]
     visual.headlight.active = 0
     lights = [(DOWN, 0.45, 0.15, 0.0, False), (SUN_DIRECTION, 0.0, 0.5, 0.08, True)]
     for direction, ambient, diffuse, specular, has_shadow in lights:
@@ -43,6 +43,7 @@ def make_renderer(model: Any, size: tuple[int, int], extent: float) -> Any:
     model.vis.global_.offwidth, model.vis.global_.offheight = size
     renderer = mujoco.Renderer(model, size[1], size[0], max_geom=30 * model.ngeom + 1000)
     renderer.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = 1
+    renderer.scene.flags[mujoco.mjtRndFlag.mjRND_HAZE] = 0  # invisible in the fog
     return renderer
 
 

@@ -31,13 +31,16 @@ def render_robot(file: Path, size: tuple[int, int] = DEFAULT_SIZE) -> dict[str, 
     Raises:
         RenderError: if MuJoCo cannot render on this machine, or cannot render this robot.
     """
+    images = stream_frames(partial(robot_images, file.absolute(), size))
+    return {name: image.tobytes() for name, image in zip(VIEWS, images, strict=True)}
+
+
+def robot_images(file: Path, size: tuple[int, int]) -> Iterator[NDArray[np.uint8]]:
+    """Yield the bytes of a PNG of each view of a robot."""
     import cv2
 
-    frames = stream_frames(partial(robot_frames, file.absolute(), size))
-    return {
-        name: cv2.imencode(".png", frame[:, :, ::-1])[1].tobytes()
-        for name, frame in zip(VIEWS, frames, strict=True)
-    }
+    for frame in robot_frames(file, size):
+        yield cv2.imencode(".png", frame[:, :, ::-1])[1]
 
 
 def robot_frames(file: Path, size: tuple[int, int]) -> Iterator[Frame]:

@@ -71,4 +71,4 @@ def check_env_memory(task: Task, robot: Robot, *, scan: bool, ngeom: int) -> Non
     floats = (12 + steps) * observations + 3 * steps * joints + learning
     per_env, num_envs = 4 * floats + 8 * (100 + 60 * joints + 3 * ngeom), task.env.num_envs
     what = f"training with env.num_envs {num_envs}, {per_env / 1e6:.2g} MB each,"
-    check_memory(round(num_envs * per_env), what)
+    check_memory(round(num_envs * per_env), what, ("env.num_envs", num_envs))

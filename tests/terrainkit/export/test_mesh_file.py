@@ -1,9 +1,12 @@
+import dataclasses
 import json
 import struct
 
 import numpy as np
 import pytest
 import trimesh
+
+from terrainkit.solids import Solids
 
 SUFFIXES = (".stl", ".ply", ".obj", ".glb")
 
@@ -67,3 +70,23 @@ def test_mesh_file_glb_has_friction_extras(terrain_map, tmp_path):
     (mesh,) = json.loads(data[20 : 20 + length])["meshes"]
     contact = {"static_friction": 0.8, "dynamic_friction": 0.6, "restitution": 0.1}
     assert contact.items() <= mesh["extras"].items()
+
+
+@every_suffix
+def test_mesh_file_has_the_solids_that_collide(solid_map, tmp_path, suffix):
+    mesh = saved(solid_map, tmp_path, suffix, closed=True)
+    assert mesh.is_watertight
+    assert mesh.is_winding_consistent
+    ground = dataclasses.replace(solid_map, solids=Solids.empty()).mesh(closed=True)
+    plain = trimesh.Trimesh(ground.vertices, ground.triangles, process=False)
+    # The box is free of the ground. The cylinder stands 0.1 m in it, the hull on it.
+    box, cylinder = 0.5 * 2 * 0.2, np.pi * 0.2**2 * 0.7
+    hull = trimesh.convex.convex_hull(solid_map.solids.hull_vertices).volume
+    assert mesh.volume - plain.volume == pytest.approx(box + cylinder + hull, rel=1e-2)
+
+
+@every_suffix
+def test_mesh_file_open_has_ground_and_solids(solid_map, tmp_path, suffix):
+    mesh = saved(solid_map, tmp_path, suffix)
+    assert len(mesh.faces) == len(solid_map.mesh().triangles)
+    assert mesh.bounds[1, 2] == pytest.approx(0.7, abs=1e-6)

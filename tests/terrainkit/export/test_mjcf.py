@@ -267,3 +267,34 @@ def test_mjcf_robot_rests_at_spawn_origin(terrain_map, tmp_path, collision):
         on_ground = (model.geom_bodyid[data.contact.geom] == 0).any(axis=1)
         assert on_ground.sum() >= 3
         assert data.contact.dist[on_ground].min() > -5e-3
+
+
+@pytest.mark.parametrize("collision", ["hfield", "boxes", "auto"])
+def test_mjcf_has_one_geom_per_solid(solid_map, tmp_path, collision):
+    model = loaded(solid_map, tmp_path, collision=collision)
+    kinds = [int(kind) for kind in model.geom_type[-4:]]
+    geom = mujoco.mjtGeom
+    assert kinds == [geom.mjGEOM_BOX, geom.mjGEOM_BOX, geom.mjGEOM_CYLINDER, geom.mjGEOM_MESH]
+    assert model.geom_friction[-4:, 0].tolist() == [0.3, 1.0, 1.0, 1.0]
+    assert model.geom_contype[-4:].tolist() == [1, 0, 1, 1]
+    assert model.geom_conaffinity[-4:].tolist() == [1, 0, 1, 1]
+    assert model.geom_group[-4:].tolist() == [0, 0, 3, 0]
+
+
+def test_mjcf_rays_hit_the_solids(solid_map, tmp_path):
+    model = loaded(solid_map, tmp_path)
+    xy = np.array([[1, 6], [5, 6], [2, 6], [4.1, 6.1], [3, 6]])
+    assert ray_cast(model, xy) == pytest.approx([0.6, 0.6, 0.7, 0.4, 0.0], abs=1e-6)
+
+
+def test_mjcf_ball_lands_on_the_first_solid_that_collides(solid_map, tmp_path):
+    path = solid_map.save(tmp_path / "ground.xml")
+    spec = mujoco.MjSpec.from_file(str(path))
+    for x in (1.0, 5.0):  # over the box, and over the box that does not collide
+        ball = spec.worldbody.add_body(pos=[x, 6.0, 1.5])
+        ball.add_freejoint()
+        ball.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.05, 0, 0], mass=1)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 1500)
+    assert data.xpos[-2:, 2] == pytest.approx([0.65, 0.05], abs=2e-3)

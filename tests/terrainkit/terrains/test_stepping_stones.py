@@ -75,9 +75,9 @@ def test_stepping_stones_platform_as_wide_as_patch():
 @pytest.mark.parametrize(
     ("difficulty", "asked", "built"),
     [
-        # Easy 1.575 and 0.05 m, hard 0.075 and 0.1 m.
-        (0.0, (1.575, 0.05), (1.6, 0.1)),
-        (0.5, (0.825, 0.075), (0.8, 0.1)),
+        # Stones of 1.575 to 0.075 m.
+        (0.0, (1.575, 0.1), (1.6, 0.1)),
+        (0.5, (0.825, 0.1), (0.8, 0.1)),
         (1.0, (0.075, 0.1), (0.1, 0.1)),
     ],
 )

@@ -125,7 +125,13 @@ def test_get_rule_by_name(each):
     assert get_rule(each.name.upper()) is each
 
 
-@pytest.mark.parametrize("word", ["", "INR", "INR999", "no-such-rule"])
-def test_get_rule_unknown_lists_rules(word):
-    with pytest.raises(ConfigError, match=r"no rule .*[Tt]here are: .*XML001"):
+@pytest.mark.parametrize("word", ["INR", "inr999"])
+def test_get_rule_unknown_code_lists_family(word):
+    with pytest.raises(ConfigError, match=r"no rule .*[Tt]here are: INR001, INR002, .*INR\d+$"):
+        get_rule(word)
+
+
+@pytest.mark.parametrize("word", ["", "no-such-rule"])
+def test_get_rule_unknown_name_lists_families(word):
+    with pytest.raises(ConfigError, match=r"xpected a code or a name of the families: XML, MSH, "):
         get_rule(word)

@@ -11,8 +11,8 @@ from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.runner import Finding, Report, Skipped
 from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
 from terrainkit_robots.onboarding.equivalence import Equivalence
-from terrainkit_robots.onboarding.pipeline import OnboardResult
 from terrainkit_robots.onboarding.report_md import report_markdown
+from terrainkit_robots.onboarding.result import OnboardResult
 from terrainkit_robots.onboarding.robot_files import RobotFiles
 from terrainkit_robots.onboarding.verify import Verification
 from terrainkit_robots.simulation.gain import Gain

@@ -7,7 +7,8 @@ import pytest
 from msgspec import Meta
 
 from terrainkit.errors import ConfigError
-from terrainkit.schema import Config, field_docs
+from terrainkit.field_docs import field_docs
+from terrainkit.schema import Config
 from terrainkit.type_hint import SORTED, PositiveFloat
 from terrainkit_robots.rl.config import (
     Algorithm,

@@ -1,3 +1,4 @@
+import re
 import subprocess
 import sys
 from dataclasses import fields
@@ -292,7 +293,7 @@ def test_memory_estimate_matches_measurement(quadruped, monkeypatch):
     )
     needed = []
     monkeypatch.setattr(
-        "terrainkit_robots.rl.simulation.check_memory", lambda each, _: needed.append(each)
+        "terrainkit_robots.rl.simulation.check_memory", lambda each, *_: needed.append(each)
     )
     task = Task(env=Env(num_envs=1000), runner=Runner(num_steps_per_env=12))
     check_env_memory(task, quadruped, scan=True, ngeom=50)
@@ -303,6 +304,8 @@ def test_check_env_memory_names_the_setting(quadruped, monkeypatch):
     monkeypatch.setattr("terrainkit.memory._free_memory", lambda: 1 << 30)
     task = Task(env=Env(num_envs=40_000))
     message = r"training with env\.num_envs 40000, 0\.\d+ MB each, needs .* GB of memory"
-    with pytest.raises(MemoryLimitError, match=message):
+    with pytest.raises(MemoryLimitError, match=message) as caught:
         check_env_memory(task, quadruped, scan=False, ngeom=50)
-    check_env_memory(Task(env=Env(num_envs=5000)), quadruped, scan=False, ngeom=50)
+    (hint,) = re.findall(r"env\.num_envs (\d+) would fit$", str(caught.value))
+    assert int(hint) > 5000
+    check_env_memory(Task(env=Env(num_envs=int(hint))), quadruped, scan=False, ngeom=50)

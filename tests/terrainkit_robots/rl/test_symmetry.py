@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.description import bundled
@@ -226,11 +225,6 @@ class TestAugment:
         assert batch.observations.batch_size == torch.Size([16])
         assert batch.actions.shape == (16, 12)
         assert batch.values[:, 0].tolist() == 2 * list(range(8))
-
-    def test_unknown_group_is_rejected(self) -> None:
-        env = make_env("quadruped")
-        with pytest.raises(ConfigError, match="group: got 'camera'; expected: policy, privileged"):
-            augment(env, TensorDict({"camera": torch.zeros(8, 3)}, batch_size=[8]), None)
 
 
 class TestNames:

@@ -128,7 +128,7 @@ class TestMapTerrain:
     def test_terrain_names_of_randomized_map(self):
         choices = tuple(SubTerrain(terrain=name) for name in ("flat", "stairs"))
         config = MapConfig(
-            mode="randomized", rows=4, cols=3, patch_size=(4, 4), border=0.5, terrains=choices
+            mode="randomized", rows=4, cols=3, patch_size=(5, 4), border=0.5, terrains=choices
         )
         terrain_map = generate(config)
         ground = MapTerrain(terrain_map)

@@ -8,20 +8,7 @@ from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.simulation.drop import drop_test
 from terrainkit_robots.simulation.sim_model import make_sim_model
-
-PENDULUM = """
-<robot name="pendulum">
-  <link name="pole"/>
-  <link name="bob">
-    <inertial><origin xyz="0.5 0 0"/><mass value="2"/>
-      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
-  </link>
-  <joint name="j" type="revolute">
-    <parent link="pole"/><child link="bob"/><axis xyz="0 1 0"/>
-    <limit lower="-4" upper="4" effort="10" velocity="10"/>
-  </joint>
-</robot>
-"""
+from tests.robots import PENDULUM
 
 
 def read(folder, text):

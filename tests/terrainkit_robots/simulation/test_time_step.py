@@ -14,20 +14,8 @@ from terrainkit_robots.simulation.time_step import (
     max_stable_time_step,
     min_stable_inertia,
 )
+from tests.robots import PENDULUM
 
-PENDULUM = """
-<robot name="pendulum">
-  <link name="pole"/>
-  <link name="bob">
-    <inertial><origin xyz="0.5 0 0"/><mass value="2"/>
-      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
-  </link>
-  <joint name="j" type="revolute">
-    <parent link="pole"/><child link="bob"/><axis xyz="0 1 0"/>
-    <limit lower="-1" upper="1" effort="10" velocity="10"/>
-  </joint>
-</robot>
-"""
 INERTIA = 0.01 + 2 * 0.5**2
 
 

@@ -68,15 +68,18 @@ class FixResult:
     """The report on the fixed robot."""
 
 
-def fix_robot(file: Path, check: CheckContents, *, unsafe: bool = False) -> FixResult:
+def fix_robot(
+    file: Path, check: CheckContents, *, report: Report | None = None, unsafe: bool = False
+) -> FixResult:
     """Apply the fixes of a robot in memory. Nothing is written.
 
     Args:
         file: The robot's file.
         check: Function that loads and checks the robot.
+        report: The report on the unchanged files, if there is one already.
         unsafe: Whether to apply fixes that change a number, a shape or another file.
     """
-    report = check({})
+    report = report or check({})
     files = _Files(file)
     applied: list[Finding] = []
     reasons: dict[_Key, str] = {}

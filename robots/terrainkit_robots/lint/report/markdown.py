@@ -8,6 +8,7 @@ from terrainkit_robots.lint.report.fixed_report import fixed_findings, unfixed_f
 from terrainkit_robots.lint.report.grouping import FindingGroup, group_findings
 from terrainkit_robots.lint.report.robot_summary import robot_summary
 from terrainkit_robots.lint.report.summary import (
+    LIKELY,
     SEVERITY_LABELS,
     format_location,
     group_skipped,
@@ -36,10 +37,7 @@ def _section(report: Report) -> Iterator[str]:
     yield from titled_list("Fixed", [(g.first.code, f"{g.first.name}: {_text(g)}") for g in fixed])
     unfixed = [(f.code, f"{f.subject or f.name}: {why}") for f, why in unfixed_findings(report)]
     yield from titled_list("Not fixed", unfixed)
-    if report.findings:
-        yield "| | rule | location | finding | how to fix |\n|---|---|---|---|---|"
-        yield from (finding_row(group) for group in group_findings(model, report.findings))
-        yield ""
+    yield from findings_table(group_findings(model, report.findings))
     skipped = [(codes, reason) for _, codes, reason in group_skipped(report.skipped)]
     yield from titled_list("Not checked or ignored", skipped)
 
@@ -52,8 +50,17 @@ def titled_list(title: str, items: Sequence[tuple[str, str]]) -> Iterator[str]:
         yield ""
 
 
-def finding_row(group: FindingGroup) -> str:
-    """Return a row of the table of findings."""
+def findings_table(groups: Sequence[FindingGroup]) -> Iterator[str]:
+    """Yield the lines of a table of findings, or nothing if there are none."""
+    if groups:
+        yield "| | rule | location | finding | how to fix |\n|---|---|---|---|---|"
+        yield from map(_finding_row, groups)
+        yield ""
+    if any(group.first.certainty == "likely" for group in groups):
+        yield f"{LIKELY}.\n".capitalize()
+
+
+def _finding_row(group: FindingGroup) -> str:
     finding = group.first
     cells = (
         SEVERITY_LABELS[finding.severity],

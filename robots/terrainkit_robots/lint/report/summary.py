@@ -12,6 +12,9 @@ from terrainkit_robots.text import count, display_path, names
 SEVERITY_LABELS: dict[Severity, str] = {"error": "error", "warning": "warning", "info": "note"}
 """Label of each severity, in the order of reports."""
 
+LIKELY = "likely: the finding depends on a heuristic, such as leg detection"
+"""Explanation of the mark `(likely)`."""
+
 
 def summarize_findings(reports: Sequence[Report]) -> str:
     """Return the number of findings, such as `2 errors, 1 warning` or `no problems found`.

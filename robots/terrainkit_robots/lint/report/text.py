@@ -10,6 +10,7 @@ from terrainkit_robots.lint.report.fixed_report import fixed_findings, unfixed_f
 from terrainkit_robots.lint.report.grouping import FindingGroup, group_findings
 from terrainkit_robots.lint.report.robot_summary import robot_summary
 from terrainkit_robots.lint.report.summary import (
+    LIKELY,
     SEVERITY_LABELS,
     format_location,
     group_skipped,
@@ -82,7 +83,7 @@ def _robot(report: Report, width: int) -> Iterator[Line]:
         yield Span(SEVERITY_LABELS[severity], _STYLES[severity]), Span(f" {code} {name}")
         yield from _rule(groups, width)
         yield ()
-    footer = [*_note_help(report.findings), *_skipped(report, width)]
+    footer = [*_help(report.findings), *_skipped(report, width)]
     yield from footer
     if footer:
         yield ()
@@ -131,8 +132,11 @@ def _fix_description(finding: Finding) -> str:
     return f"{finding.subject}: {description}" if finding.subject else description
 
 
-def _note_help(findings: Sequence[Finding]) -> Iterator[Line]:
-    """Yield how to get help on notes, which are listed without help."""
+def _help(findings: Sequence[Finding]) -> Iterator[Line]:
+    """Yield what `(likely)` means, and how to get help on notes, which are listed without help."""
+    if any(finding.certainty == "likely" for finding in findings):
+        label, text = LIKELY.split(" ", 1)
+        yield Span(f"{label} ", "dim"), Span(text)
     codes = sorted(finding.code for finding in findings if finding.severity == "info")
     if codes:
         yield Span("details of a note: ", "dim"), Span(f"terrainkit rule CODE, such as {codes[0]}")

@@ -26,6 +26,9 @@ def test_finding_without_line_shows_file_only(report):
 
 def test_likely_finding_is_marked(report):
     assert "robot.urdf:40: the mass is -1 kg; expected > 0 (likely)\n" in format_reports([report])
+    assert "\nlikely: the finding depends on a heuristic" in format_reports([report])
+    proven = dataclasses.replace(report, findings=report.findings[:1])
+    assert "likely" not in format_reports([proven])
 
 
 def test_shared_hint_is_printed_once(report, finding):

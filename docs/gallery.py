@@ -1,0 +1,107 @@
+"""Pictures of patches for the documentation, rendered by MuJoCo in the colors of the preview."""
+
+from collections.abc import Iterator
+from functools import partial
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.mesh import closed_mesh, full_mesh
+from terrainkit.mesh.solid_mesh import concatenate_meshes, solid_meshes
+from terrainkit.mesh.tri_mesh import TriMesh
+from terrainkit.patch import Patch
+from terrainkit.preview import height_colors
+from terrainkit_robots.rendering import appearance
+from terrainkit_robots.rendering.child_process import stream_frames
+
+MIN_HEIGHT = -1.0
+"""Deeper holes are cut off at this height [m]."""
+
+COLOR_RANGE = (-1.5, 3.0)
+"""Heights of the first and the last color of the texture [m]."""
+
+GAP = 0.5
+"""Distance between the corners of two patches [m]."""
+
+MARGIN = 12
+"""Margin above and below the patches [pixels]."""
+
+
+def render_patches(patches: list[Patch], width: int) -> NDArray[np.uint8]:
+    """Return an RGB picture of `patches` side by side, shape (height, width, 3).
+
+    The patches are seen from low x and low y; each is a block with its solids.
+
+    Args:
+        patches: Patches of the same size.
+        width: Width of the picture [pixels].
+    """
+    meshes = [_block(patch, k) for k, patch in enumerate(patches)]
+    (frame,) = stream_frames(partial(_frames, meshes, (width, width)))
+    used = np.flatnonzero((frame != frame[0, 0]).any(axis=(1, 2)))
+    return frame[max(0, used[0] - MARGIN) : used[-1] + MARGIN]
+
+
+def _block(patch: Patch, index: int) -> TriMesh:
+    """Return the ground of a patch as a block, with the solids, at place `index` of the row."""
+    threshold = 0.75 * patch.grid.cell
+    ground = full_mesh(np.maximum(patch.heights, MIN_HEIGHT), patch.grid, threshold)
+    mesh = concatenate_meshes([_with_thickness(closed_mesh(ground)), *solid_meshes(patch.solids)])
+    # The row runs to the right of a camera that looks along x and y.
+    step = sum(patch.grid.size) / 2 + GAP
+    offset = np.array([index * step, -index * step, 0.0]) - [*patch.grid.lower, 0.0]
+    return TriMesh(vertices=(mesh.vertices + offset).astype(np.float32), triangles=mesh.triangles)
+
+
+def _with_thickness(mesh: TriMesh) -> TriMesh:
+    """Return a closed mesh whose bottom is 0.3 m below the deepest hole that is shown."""
+    vertices = mesh.vertices.copy()
+    bottom = vertices[:, 2] == vertices[:, 2].min()
+    vertices[bottom, 2] = min(0.0, float(vertices[~bottom, 2].min())) - 0.3
+    return TriMesh(vertices=vertices, triangles=mesh.triangles)
+
+
+def _frames(meshes: list[TriMesh], size: tuple[int, int]) -> Iterator[NDArray[np.uint8]]:
+    spec = mujoco.MjSpec()
+    appearance.set_appearance(spec)
+    levels = np.linspace(*COLOR_RANGE, 512)
+    texture = spec.add_texture(
+        name="heights", type=mujoco.mjtTexture.mjTEXTURE_2D, width=512, height=2, nchannel=3
+    )
+    texture.data = np.tile(height_colors(levels), (2, 1)).astype(np.uint8).tobytes()
+    material = spec.add_material(name="heights", specular=0.1)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "heights"
+    low, high = COLOR_RANGE
+    for k, mesh in enumerate(meshes):
+        corners = mesh.vertices[mesh.triangles.ravel()]  # not shared, so that faces are flat
+        level = np.clip((corners[:, 2] - low) / (high - low), 0.001, 0.999)
+        spec.add_mesh(
+            name=f"patch{k}",
+            uservert=corners.ravel(),
+            userface=np.arange(len(corners)),
+            usertexcoord=np.column_stack([level, np.full(len(level), 0.5)]).ravel(),
+            userfacetexcoord=np.arange(len(corners)),
+            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+        )
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=f"patch{k}",
+            material="heights",
+            contype=0,
+            conaffinity=0,
+        )
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    vertices = np.concatenate([mesh.vertices for mesh in meshes])
+    lower, upper = vertices.min(axis=0), vertices.max(axis=0)
+    extent = float(np.linalg.norm(upper - lower))
+    renderer = appearance.make_renderer(model, size, extent)
+    renderer.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = 0
+    target = (lower + upper) / 2
+    # The row is nearly as wide as the field of view at this distance.
+    half_angle = np.radians(appearance.FIELD_OF_VIEW / 2)
+    distance = 0.53 * float(np.linalg.norm((upper - lower)[:2])) / np.tan(half_angle)
+    appearance.update_scene(renderer, data, target, distance, 45.0, -32.0)
+    yield renderer.render()

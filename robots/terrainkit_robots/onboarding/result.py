@@ -1,0 +1,43 @@
+"""The result of onboarding a robot."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from terrainkit_robots.lint.runner import Finding, Report
+
+if TYPE_CHECKING:
+    from terrainkit_robots.onboarding.robot_files import RobotFiles
+    from terrainkit_robots.onboarding.verify import Verification
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OnboardResult:
+    """The outcome of `onboard`."""
+
+    report: Report
+    """Findings that remain after the fixes."""
+
+    fixed: tuple[Finding, ...] = ()
+    """Findings of the source file that do not apply to the written files."""
+
+    folder: Path | None = None
+    """The folder that was written; None if blocking errors remain."""
+
+    robot: "RobotFiles | None" = None
+    """The robot in the folder; None if blocking errors remain."""
+
+    verification: "Verification | None" = None
+    """The comparison of the written files with the source, and the standing test."""
+
+    configs: tuple[str, ...] = ()
+    """Names of the framework configurations."""
+
+    images: tuple[str, ...] = ()
+    """Names of the picture files."""
+
+    images_error: str = ""
+    """The reason why there are no pictures."""
+
+    edits: tuple[str, ...] = ()
+    """Names of the files that keep user edits of the replaced folder."""
