@@ -10,7 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from terrainkit.config import MapConfig
-from terrainkit.curriculum import Assignment, assign_levels, assign_spawns, update_levels
+from terrainkit.curriculum import (
+    Assignment,
+    assign_levels,
+    assign_spawns,
+    resample_columns,
+    update_levels,
+)
 from terrainkit.errors import ConfigError, ExportError, TerrainkitWarning
 from terrainkit.free_space import Direction, clearance, first_surface, free_intervals
 from terrainkit.grid import Grid
@@ -284,6 +290,12 @@ class TerrainMap:
             env_origins=spawns[:, :3],
             headings=spawns[:, 3],
         )
+
+    def resample_columns(
+        self, levels: ArrayLike, columns: ArrayLike, *, seed: int | Sequence[int]
+    ) -> NDArray[np.int64]:
+        """Return other columns at a reset; see :func:`terrainkit.curriculum.resample_columns`."""
+        return resample_columns(levels, columns, self.terrain_types, seed=seed)
 
     def update_levels(
         self,

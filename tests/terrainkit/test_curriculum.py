@@ -1,7 +1,12 @@
 import numpy as np
 import pytest
 
-from terrainkit.curriculum import assign_levels, assign_spawns, update_levels
+from terrainkit.curriculum import (
+    assign_levels,
+    assign_spawns,
+    resample_columns,
+    update_levels,
+)
 from terrainkit.errors import ConfigError
 
 
@@ -186,3 +191,41 @@ def test_assign_spawns_of_no_environments():
     spawns, num_shared = assign_spawns(spawn_sets(), [], [])
     assert spawns.shape == (0, 4)
     assert num_shared == 0
+
+
+TYPES = np.array([[0, 0, 1, 0, 2], [1, 1, 1, 2, 2]], np.int32)
+"""Terrain types of 2 x 5 patches."""
+
+
+def test_resample_columns_keeps_the_terrain_type():
+    levels, columns = np.repeat([0, 1], 500), np.tile(np.arange(5), 200)
+    after = resample_columns(levels, columns, TYPES, seed=0)
+    assert (TYPES[levels, after] == TYPES[levels, columns]).all()
+
+
+def test_resample_columns_is_uniform_over_variants():
+    after = resample_columns(np.zeros(3000, int), np.ones(3000, int), TYPES, seed=0)
+    assert np.bincount(after, minlength=5)[[2, 4]].tolist() == [0, 0]
+    assert np.bincount(after)[[0, 1, 3]] == pytest.approx([1000] * 3, abs=100)
+
+
+def test_resample_columns_is_seeded():
+    levels, columns = np.zeros(100, int), np.zeros(100, int)
+    one, again, other = (
+        resample_columns(levels, columns, TYPES, seed=(0, reset)) for reset in (1, 1, 2)
+    )
+    assert one.tolist() == again.tolist() != other.tolist()
+
+
+def test_resample_columns_without_variants_changes_nothing():
+    assert resample_columns([0, 0], [2, 4], TYPES, seed=0).tolist() == [2, 4]
+    assert resample_columns([], [], TYPES, seed=0).shape == (0,)
+
+
+@pytest.mark.parametrize(
+    ("level", "column", "message"),
+    [(2, 0, "levels: got 2 to 2; expected 0 to 1"), (0, -1, "columns: got -1 to -1; expected 0 ")],
+)
+def test_resample_columns_rejects_unknown_patches(level, column, message):
+    with pytest.raises(ConfigError, match=message):
+        resample_columns([level], [column], TYPES, seed=0)

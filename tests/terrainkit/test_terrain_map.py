@@ -236,6 +236,33 @@ def test_assign_shares_single_origins_without_warning():
     assert len(np.unique(flat_map().assign(12).env_origins, axis=0)) == 3
 
 
+@pytest.fixture(scope="module")
+def bank():
+    """Four variants of each level of two terrains."""
+    terrains = tuple(SubTerrain(terrain=name) for name in ("rough", "obstacles"))
+    return generate(MapConfig(rows=3, cols=8, border=0.0, terrains=terrains))
+
+
+def test_bank_has_variants_of_each_type_and_level(bank):
+    for level in range(1, 3):
+        for columns in (range(4), range(4, 8)):
+            variants = [bank.patch(level, column) for column in columns]
+            assert len({(each.terrain, each.difficulty) for each in variants}) == 1
+            assert len({each.heights.tobytes() for each in variants}) == 4
+
+
+def test_resample_columns_changes_terrain_at_each_reset(bank):
+    start = bank.assign(200, max_init_level=2)
+    columns, visited = start.columns, [start.columns]
+    for reset in range(60):
+        columns = bank.resample_columns(start.levels, columns, seed=(0, reset))
+        assert (bank.terrain_types[start.levels, columns] == start.terrain_types).all()
+        visited.append(columns)
+    assert all(len(set(each)) == 4 for each in np.transpose(visited).tolist())
+    again = bank.resample_columns(start.levels, visited[-2], seed=(0, 59))
+    assert again.tolist() == visited[-1].tolist()
+
+
 def test_env_origins_are_on_the_ground(terrain_map):
     x, y, z = np.moveaxis(terrain_map.env_origins.astype(float), -1, 0)
     np.testing.assert_allclose(terrain_map.height(np.stack([x, y], axis=-1)), z, atol=1e-3)

@@ -295,6 +295,14 @@ class TestErrors:
         with pytest.raises(ConfigError, match=f"{table} differs between left and right: RL_hip"):
             mirror_maps(make_env("", robot=robot))
 
+    def test_feet_without_pairs_are_rejected(self) -> None:
+        env = make_env("quadruped")
+        position = env.scene.foot_pos.copy()
+        position[0] = position[2]  # two feet have the same mirror image
+        env.scene = replace(env.scene, foot_pos=position)
+        with pytest.raises(ConfigError, match=f"symmetry: the foot {env.robot.spec.feet[2]} is"):
+            mirror_maps(env)
+
     def test_asymmetric_scan_is_rejected(self) -> None:
         env = make_env("quadruped", Valley())
         terrain = sections.Terrain(measured_points_y=(-0.5, 0.0, 0.4))
