@@ -135,7 +135,10 @@ def test_handwritten_file_is_read():
     [
         ("row = 3", "config has no key 'row'; did you mean 'rows'. It has: rows, cols, patch_"),
         ("[map]\nrows = 3", "config has no key 'map'; it has: rows, "),
-        ('[[terrains]]\nterrain = "lava"', "no terrain 'lava'; there are: .*flat, .*gap, "),
+        (
+            '[[terrains]]\nterrain = "lava"',
+            "no terrain 'lava' is built in, .*flat, .*gap, ",
+        ),
         (
             '[[terrains]]\nterrain = "gap"\nwidht = 1.0',
             "gap has no parameter 'widht'; did you mean 'width'. It has: width, depth, platform",
