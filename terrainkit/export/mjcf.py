@@ -42,9 +42,9 @@ _Part = tuple[slice, slice]
 """A rectangle of samples, counted on the map with `_RINGS` more samples on each side."""
 
 MAX_BOXES = 100
-"""Number of boxes up to which they cost less than a heightfield with cells of 0.1 m, as measured by
-benchmarks/collision.py: a step of the bundled quadruped then takes 1.75 times as long as on a plane
-on either."""
+"""Number of boxes up to which they cost no more than a heightfield with cells of 0.1 m, on which a
+step of the bundled quadruped takes about 1.75 times that on a plane. Four runs of
+benchmarks/collision.py gave 50 to 130."""
 
 
 def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "auto") -> None:

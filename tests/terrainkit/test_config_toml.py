@@ -33,6 +33,7 @@ NOT_THE_DEFAULT = {
     "slope_threshold": None,
     "spawn_radius": 0.3,
     "spawn_tolerance": 1e-7,
+    "spawns_per_patch": 3,
     "spawn_headroom": 2.5,
     "static_friction": 0.8,
     "dynamic_friction": 0.6,

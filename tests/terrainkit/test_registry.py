@@ -187,9 +187,7 @@ def test_register_terrain_rejects_name_of_another_class():
     with pytest.raises(ConfigError, match=r"'ramp_up' of a\.RampUp is that of __main__\.RampUp; "):
         registry.register_terrain(make_ramp("a"))
     stairs = type("Stairs", (registry.get_terrain("stairs"),), {"__module__": "a"})
-    with pytest.raises(
-        ConfigError, match=r"'stairs' of a\.Stairs is that of terrainkit\.t"
-    ):
+    with pytest.raises(ConfigError, match=r"'stairs' of a\.Stairs is that of terrainkit\.t"):
         registry.register_terrain(dataclass(frozen=True, kw_only=True)(stairs))
 
 
@@ -225,9 +223,7 @@ def test_map_of_registered_terrain_needs_registration(tmp_path):
     assert TerrainMap.load(path).terrain_names == ("ramp_up",)
     registry._registered.clear()
     registry.get_terrain.cache_clear()
-    with pytest.raises(
-        MapFileError, match="no terrain 'ramp_up' is built in, installed, or "
-    ):
+    with pytest.raises(MapFileError, match="no terrain 'ramp_up' is built in, installed, or "):
         TerrainMap.load(path)
 
 
