@@ -19,8 +19,8 @@ from terrainkit.terrain import Terrain
 class Maze(Terrain):
     """A maze with a clearing at its center and an exit on each side.
 
-    The robot is spawned in the clearing. The goals lead along the shortest path to the exit at high x.
-    The walls are solids; the ground is flat.
+    The robot is spawned in the clearing. The goals lead along the shortest path to the exit at high
+    x. The walls are solids; the ground is flat.
     """
 
     has_column_layout: ClassVar[bool] = True
