@@ -1,7 +1,7 @@
 """Patch: one terrain, built on the grid of its place in a map."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,9 +12,11 @@ from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.layout import assign_patch, patch_rng, terrain_columns
+from terrainkit.overlay import Overlay
 from terrainkit.parameter import Realized, Value, parameters_of
+from terrainkit.patch_geometry import PatchGeometry
 from terrainkit.solids import Solids
-from terrainkit.sub_terrain import SubTerrain
+from terrainkit.sub_terrain import SubTerrain, overlay_path
 from terrainkit.terrain import Terrain
 
 if TYPE_CHECKING:
@@ -53,6 +55,9 @@ class Patch:
 
     heights: NDArray[np.float32]
     """Heights [m], shape `grid.shape`."""
+
+    friction: NDArray[np.float32]
+    """Friction of the ground in each cell, shape `grid.shape`."""
 
     solids: Solids
     """Solids of the patch, in the frame of the map."""
@@ -96,26 +101,100 @@ def build_patch(
         ConfigError: if the terrain does not fit in the patch, or has no place to spawn.
     """
     terrain = sub_terrain.at(difficulty)
+    overlays = [overlay.at(difficulty) for overlay in sub_terrain.overlays]
     _check_slopes(terrain, config)
-    grid = config.patch_grid(row, col)
-    heights = terrain.build(grid, patch_rng(config, terrain, row, col))
-    solids, goals = _solids_and_goals(terrain, grid, heights, config, (row, col))
-    preferred = terrain.spawn(grid)
-    # The first child draws the solids and the goals.
-    rng = patch_rng(config, terrain, row, col).spawn(2)[1]
-    spawns = place_spawns(config, sub_terrain.name, grid, heights, solids, preferred, rng)
+    grid, name = config.patch_grid(row, col), sub_terrain.name
+    # The first child draws the solids and the goals, the second one the spawn positions.
+    _, spawn_rng, *rngs = patch_rng(config, terrain, row, col).spawn(2 + len(overlays))
+    geometry = _terrain_geometry(config, sub_terrain, terrain, difficulty, row, col)
+    preferred, spawn_offset = geometry.spawn, 0.0
+    if overlays:
+        geometry, spawn_offset = _overlaid(config, name, geometry, overlays, rngs)
+        preferred = geometry.spawn
+    heights, solids = geometry.heights, geometry.solids
+    goals = _finished_goals(config, name, geometry)
+    solids = dataclasses.replace(solids, patch=np.full((len(solids), 2), (row, col), np.int32))
+    spawns = place_spawns(config, name, grid, heights, solids, preferred, spawn_rng)
     origin = spawns[0]
+    requested, realized = terrain.requested(), terrain.realized(grid)
+    for k, overlay in enumerate(overlays):
+        requested |= {overlay_path(k, n): v for n, v in overlay.requested().items()}
+        realized |= {overlay_path(k, n): v for n, v in overlay.realized(grid).items()}
     return Patch(
-        terrain=sub_terrain.name,
+        terrain=name,
         difficulty=difficulty,
-        parameters=Parameters(requested=terrain.requested(), realized=terrain.realized(grid)),
+        parameters=Parameters(requested=requested, realized=realized),
         grid=grid,
         heights=heights,
+        friction=geometry.friction,
         solids=solids,
         goals=goals,
-        spawns=with_headings(spawns, goals),
-        spawn_offset=max(abs(origin[0] - preferred[0]), abs(origin[1] - preferred[1])),
+        spawns=with_headings(spawns, goals, geometry.heading),
+        spawn_offset=spawn_offset
+        + max(abs(origin[0] - preferred[0]), abs(origin[1] - preferred[1])),
     )
+
+
+def _terrain_geometry(
+    config: MapConfig,
+    sub_terrain: SubTerrain,
+    terrain: Terrain,
+    difficulty: float,
+    row: int,
+    col: int,
+) -> PatchGeometry:
+    """Return what the terrain puts on patch (row, col), without overlays."""
+    grid = config.patch_grid(row, col)
+    heights = terrain.build(grid, patch_rng(config, terrain, row, col))
+    solids, goals = Solids.empty(), np.empty((0, 4))
+    # Solids and goals start with the same random numbers, so that both can sample one layout.
+    if type(terrain).solids is not Terrain.solids:
+        rng = patch_rng(config, terrain, row, col).spawn(1)[0]
+        solids = terrain.solids(grid, heights, rng)
+    if type(terrain).goals is not Terrain.goals:
+        rng = patch_rng(config, terrain, row, col).spawn(1)[0]
+        goals = np.array(terrain.goals(grid, heights, rng), dtype=float).reshape(-1, 4)
+    friction = sub_terrain.friction_at(difficulty)
+    if friction is not None:
+        own = np.where(np.isnan(solids.friction), friction, solids.friction).astype(np.float32)
+        solids = dataclasses.replace(solids, friction=own)
+    else:
+        friction = config.static_friction
+    return PatchGeometry(
+        grid=grid,
+        heights=heights,
+        friction=np.broadcast_to(np.float32(friction), grid.shape),
+        solids=solids,
+        goals=goals,
+        spawn=terrain.spawn(grid),
+        spawn_radius=config.spawn_radius,
+    )
+
+
+def _overlaid(
+    config: MapConfig,
+    name: str,
+    geometry: PatchGeometry,
+    overlays: Sequence[Overlay],
+    rngs: Sequence["np.random.Generator"],
+) -> tuple[PatchGeometry, float]:
+    """Return the geometry with overlays, and the spawn offset of the terrain without them [m].
+
+    The overlays keep the ground level at the spawn origin of the terrain without overlays.
+    """
+    grid, preferred = geometry.grid, geometry.spawn
+    x, y, _ = _find_origin(config, name, grid, geometry.heights, geometry.solids, preferred)
+    geometry = dataclasses.replace(geometry, spawn=(x, y))
+    for overlay, rng in zip(overlays, rngs, strict=True):
+        geometry = overlay.apply(geometry, rng)
+        heights = np.asarray(geometry.heights, dtype=np.float32) + np.float32(0)
+        if heights.shape != grid.shape or not np.isfinite(heights).all():
+            raise ConfigError(
+                f"{overlay.kind()}: apply(): got heights of shape {heights.shape}; expected "
+                f"{grid.shape} with finite values"
+            )
+        geometry = dataclasses.replace(geometry, heights=heights)
+    return geometry, max(abs(x - preferred[0]), abs(y - preferred[1]))
 
 
 def place_spawns(
@@ -141,7 +220,24 @@ def place_spawns(
     Raises:
         ConfigError: if the patch has no place to spawn.
     """
-    from terrainkit.spawn import find_spawn, sample_spawns
+    from terrainkit.spawn import sample_spawns
+
+    origin = _find_origin(config, name, grid, heights, solids, preferred)
+    return sample_spawns(
+        heights, grid, origin, spawn_disc(config), config.spawns_per_patch, solids=solids, rng=rng
+    )
+
+
+def _find_origin(
+    config: MapConfig,
+    name: str,
+    grid: Grid,
+    heights: NDArray[np.float32],
+    solids: Solids,
+    preferred: tuple[float, float],
+) -> tuple[float, float, float]:
+    """Return the spawn origin of a patch [m]; see :func:`place_spawns`."""
+    from terrainkit.spawn import find_spawn
 
     disc = spawn_disc(config)
     origin = find_spawn(
@@ -154,9 +250,7 @@ def place_spawns(
             f"a patch of {grid.size[0]:g} m x {grid.size[1]:g} m; increase the platform or "
             "spawn_tolerance, or reduce spawn_radius or spawn_headroom"
         )
-    return sample_spawns(
-        heights, grid, origin, disc, config.spawns_per_patch, solids=solids, rng=rng
-    )
+    return origin
 
 
 def spawn_disc(config: MapConfig) -> "Disc":
@@ -170,52 +264,37 @@ def spawn_disc(config: MapConfig) -> "Disc":
     )
 
 
-def _solids_and_goals(
-    terrain: Terrain,
-    grid: Grid,
-    heights: NDArray[np.float32],
-    config: MapConfig,
-    patch: tuple[int, int],
-) -> tuple[Solids, NDArray[np.float32]]:
-    """Return the solids and the goals of a terrain on a patch.
+def _finished_goals(config: MapConfig, name: str, geometry: PatchGeometry) -> NDArray[np.float32]:
+    """Return the goals with the height of the ground where none is given.
 
     Raises:
         ConfigError: if a solid extends beyond the patch, or a goal is not on it.
     """
     from terrainkit.surface import surface_at
 
-    def rng() -> np.random.Generator:
-        """Return the child of the generator of the heights, in its initial state."""
-        return patch_rng(config, terrain, *patch).spawn(1)[0]
-
-    solids = Solids.empty()
-    if type(terrain).solids is not Terrain.solids:
-        solids = terrain.solids(grid, heights, rng())
-        lower, upper = (corner[:, :2] for corner in solids.bounds())
-        outside = np.maximum(grid.lower - lower, upper - grid.upper).max(initial=0.0)
+    grid, goals = geometry.grid, geometry.goals.copy()
+    if len(geometry.solids):
+        lower, upper = (corner[:, :2] for corner in geometry.solids.bounds())
+        outside = np.maximum(grid.lower - lower, upper - grid.upper).max()
         if outside > EDGE_TOLERANCE:
             raise ConfigError(
-                f"{terrain.kind()}: solids(): got a solid {outside:.3f} m beyond its patch; "
-                "expected solids within it"
+                f"{name}: solids(): got a solid {outside:.3f} m beyond its patch; expected solids "
+                "within it"
             )
-        numbers = np.tile(np.array(patch, np.int32), (len(solids), 1))
-        solids = dataclasses.replace(solids, patch=numbers)
-    goals = np.empty((0, 4))
-    if type(terrain).goals is not Terrain.goals:
-        goals = np.array(terrain.goals(grid, heights, rng()), dtype=float).reshape(-1, 4)
+    if len(goals):
         index = (goals[:, :2] - grid.lower) / grid.cell - 0.5
         if not ((index >= -0.5) & (index <= np.array(grid.shape) - 0.5)).all():
-            raise ConfigError(f"{terrain.kind()}: goals(): got a goal outside of the patch")
-        ground = surface_at(heights, index, threshold=config.wall_threshold).height
+            raise ConfigError(f"{name}: goals(): got a goal outside of the patch")
+        ground = surface_at(geometry.heights, index, threshold=config.wall_threshold).height
         goals[:, 2] = np.where(np.isnan(goals[:, 2]), ground, goals[:, 2])
-    return solids, goals.astype(np.float32)
+    return goals.astype(np.float32)
 
 
 def with_headings(
-    positions: NDArray[np.float64], goals: NDArray[np.float32]
+    positions: NDArray[np.float64], goals: NDArray[np.float32], default: float = 0.0
 ) -> NDArray[np.float32]:
-    """Return spawn positions with headings, shape (k, 4): toward the first goal, else along x."""
-    heading = np.zeros(len(positions))
+    """Return spawn positions with headings, shape (k, 4): toward the first goal, else `default`."""
+    heading = np.full(len(positions), default)
     if len(goals):
         dx, dy = (goals[0, :2] - positions[:, :2]).T
         heading = np.arctan2(dy, dx)
