@@ -92,7 +92,7 @@ def flat_cells(heights: NDArray[np.float32], grid: Grid, threshold: float) -> ND
     numbers = np.flatnonzero(node_grid.has_wall)
     i, j = np.divmod(numbers, node_grid.has_wall.shape[1])
     corners = node_grid.z.ravel()[node_grid.corners(i, j)]
-    at_walls = flat_corners(corners, node_grid.walls(i, j))
+    at_walls = flat_corners(corners.T, node_grid.walls(i, j).T)
     corner = node_grid.flat_x & node_grid.flat_y
 
     flat = np.ones(node_grid.z.shape, dtype=bool)

@@ -80,8 +80,12 @@ class MapConfig(Config):
     slope_threshold: Size | None = 0.75
     """Slope between two samples above which the ground becomes a vertical wall; none: no walls."""
 
+    spawns_per_patch: Count = 1
+    """Number of spawn positions of a patch, including the origin; fewer where the level ground
+    around the origin is too small. They are at least two spawn radii apart."""
+
     spawn_radius: Size = 0.5
-    """Radius of the flat disc without obstacles around each spawn origin [m]."""
+    """Radius of the flat disc without obstacles around each spawn position [m]."""
 
     spawn_tolerance: NonNegative = 0.01
     """Largest height difference within that disc [m]."""

@@ -17,13 +17,16 @@ class Assignment:
     """Row of the map of each environment, shape (n,)."""
 
     columns: NDArray[np.int64]
-    """Column of the map of each environment, shape (n,). It never changes."""
+    """Column of the map of each environment, shape (n,)."""
 
     terrain_types: NDArray[np.int32]
     """Terrain of each environment as an index into `terrain_names`, shape (n,)."""
 
     env_origins: NDArray[np.float32]
-    """Spawn origin of each environment [m], shape (n, 3)."""
+    """Spawn position of each environment [m], shape (n, 3)."""
+
+    headings: NDArray[np.float32]
+    """Heading of each environment at its spawn position [rad], shape (n,)."""
 
 
 def assign_levels(
@@ -56,6 +59,67 @@ def assign_levels(
     levels = np.random.default_rng(seed).integers(0, highest + 1, size=num_envs)
     columns = np.arange(num_envs) * cols // max(num_envs, 1)
     return levels, columns
+
+
+def assign_spawns(
+    spawns: NDArray[np.float32], levels: ArrayLike, columns: ArrayLike
+) -> tuple[NDArray[np.float32], int]:
+    """Distribute the environments of each patch over its spawn positions.
+
+    Args:
+        spawns: Spawn positions x, y, z [m] and headings [rad] of each patch, shape
+            (rows, cols, k, 4), padded with NaN.
+        levels: Row of each environment, shape (n,).
+        columns: Column of each environment, shape (n,).
+
+    Returns:
+        Spawn position and heading of each environment, shape (n, 4), and the number of
+        environments for which none was left, so that they share one.
+    """
+    rows, cols = np.asarray(levels, dtype=np.int64), np.asarray(columns, dtype=np.int64)
+    patch = rows * spawns.shape[1] + cols
+    order = np.argsort(patch, kind="stable")
+    rank = np.empty_like(patch)
+    rank[order] = np.arange(len(patch)) - np.searchsorted(patch[order], patch[order])
+    number = (~np.isnan(spawns).all(axis=-1)).sum(axis=-1)[rows, cols]
+    return spawns[rows, cols, rank % number], int((rank >= number).sum())
+
+
+def resample_columns(
+    levels: ArrayLike,
+    columns: ArrayLike,
+    terrain_types: NDArray[np.int32],
+    *,
+    seed: int | Sequence[int],
+) -> NDArray[np.int64]:
+    """Return a random column with the same terrain type in the same row for each environment.
+
+    The patches of a row with the same terrain type are variants: they have one difficulty, and
+    different random numbers. Sampling one of them at each reset changes the terrain during
+    training, without a change of the map.
+
+    Args:
+        levels: Row of each environment, shape (n,).
+        columns: Column of each environment, shape (n,).
+        terrain_types: Terrain type of each patch, shape (rows, cols).
+        seed: Seed of the random columns. Pass a new one at each call, such as (seed, iteration).
+
+    Returns:
+        Columns, shape (n,): each variant with the same probability, the current one included.
+
+    Raises:
+        ConfigError: if an environment is not on the map.
+    """
+    rows, before = np.asarray(levels, dtype=np.int64), np.asarray(columns, dtype=np.int64)
+    for name, values, size in zip(
+        ("levels", "columns"), (rows, before), terrain_types.shape, strict=True
+    ):
+        if values.size and not (values.min() >= 0 and values.max() < size):
+            got = f"{values.min()} to {values.max()}"
+            raise ConfigError(f"{name}: got {got}; expected 0 to {size - 1}")
+    is_variant = terrain_types[rows] == terrain_types[rows, before][:, None]
+    rank = np.random.default_rng(seed).integers(is_variant.sum(axis=1))
+    return np.argmax(np.cumsum(is_variant, axis=1) > rank[:, None], axis=1)
 
 
 def update_levels(

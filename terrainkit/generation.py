@@ -2,7 +2,10 @@
 
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
+from contextlib import closing
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +21,9 @@ from terrainkit.seams import Seams, cliffs_text
 from terrainkit.solids import Solids
 from terrainkit.terrain_map import TerrainMap
 
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
 Progress = Callable[[Iterator[tuple[int, int]], int], Iterator[tuple[int, int]]]
 """Wraps the iterator over the patches, given their number, to show a progress bar."""
 
@@ -25,12 +31,20 @@ _BYTES_PER_PATCH = 2000
 """Memory of the parameters, origin and difficulty of a patch [bytes]."""
 
 
-def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainMap:
+_MAX_TASKS = 64
+"""Largest number of tasks of an executor. A task of many patches has less overhead per patch."""
+
+
+def generate(
+    config: MapConfig, *, progress: Progress | None = None, executor: "Executor | None" = None
+) -> TerrainMap:
     """Generate the map of `config`.
 
     Args:
         config: The configuration. The same config gives the same bytes on every machine.
         progress: Wraps the iterator over the patches, for a progress bar.
+        executor: Builds the patches, such as a `ProcessPoolExecutor` or dask.distributed's
+            `Client.get_executor()`; None for this process. The map does not depend on it.
 
     Returns:
         The map.
@@ -52,7 +66,7 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
     )
     columns = terrain_columns(config)
     heights = np.zeros(grid.shape, dtype=np.float32)
-    origins = np.empty((*size, 3), dtype=np.float32)
+    spawns = np.empty(size, dtype=object)
     terrain_types = np.empty(size, dtype=np.int32)
     difficulty = np.empty(size, dtype=np.float32)
     parameters = np.empty(size, dtype=object)
@@ -61,44 +75,72 @@ def generate(config: MapConfig, *, progress: Progress | None = None) -> TerrainM
     deviations: Counter[str] = Counter()
     moved_spawns: Counter[str] = Counter()
     indices: Iterator[tuple[int, int]] = iter(np.ndindex(size))
-    for row, col in progress(indices, config.rows * config.cols) if progress else indices:
-        terrain_type, level = assign_patch(config, columns, row, col)
-        sub_terrain = config.sub_terrains[terrain_type]
-        patch = build_patch(config, sub_terrain, level, row, col)
-        i, j = config.patch_start(row, col)
-        heights[i : i + patch.grid.shape[0], j : j + patch.grid.shape[1]] = patch.heights
-        origins[row, col] = patch.origin
-        terrain_types[row, col] = terrain_type
-        difficulty[row, col] = level
-        parameters[row, col] = patch.parameters
-        solids.append(patch.solids)
-        goals[row, col] = patch.goals
-        for name in _deviations(patch, sub_terrain.terrain, config.cell):
-            deviations[name] += 1
-        moved_spawns[sub_terrain.name] += patch.spawn_offset > config.cell
+    with closing(_build_patches(config, columns, executor)) as patches:
+        for row, col in progress(indices, config.rows * config.cols) if progress else indices:
+            terrain_type, patch = next(patches)
+            sub_terrain = config.sub_terrains[terrain_type]
+            i, j = config.patch_start(row, col)
+            heights[i : i + patch.grid.shape[0], j : j + patch.grid.shape[1]] = patch.heights
+            spawns[row, col] = patch.spawns
+            terrain_types[row, col] = terrain_type
+            difficulty[row, col] = patch.difficulty
+            parameters[row, col] = patch.parameters
+            solids.append(patch.solids)
+            goals[row, col] = patch.goals
+            for name in _deviations(patch, sub_terrain.terrain, config.cell):
+                deviations[name] += 1
+            moved_spawns[sub_terrain.name] += patch.spawn_offset > config.cell
     _warn(config, deviations, +moved_spawns)
     terrain_map = TerrainMap(
         config=config,
         grid=grid,
         heights=heights,
-        env_origins=origins,
+        spawns=_pad(spawns),
         terrain_types=terrain_types,
         terrain_names=tuple(sub_terrain.name for sub_terrain in config.sub_terrains),
         difficulty=difficulty,
         parameters=parameters,
         solids=Solids.concatenate(solids),
-        goals=_pad_goals(goals),
+        goals=_pad(goals),
     )
     _warn_about_map(terrain_map)
     return terrain_map
 
 
-def _pad_goals(goals: NDArray[np.object_]) -> NDArray[np.float32]:
-    """Return the goals of all patches, shape (rows, cols, k, 4), padded with NaN."""
-    number = max(len(each) for each in goals.ravel().tolist())
-    padded = np.full((*goals.shape, number, 4), np.nan, dtype=np.float32)
-    for row, col in np.ndindex(goals.shape):
-        padded[row, col, : len(goals[row, col])] = goals[row, col]
+def _build_patches(
+    config: MapConfig, columns: list[int], executor: "Executor | None"
+) -> Generator[tuple[int, Patch], None, None]:
+    """Yield terrain type and patch of each (row, col), row by row."""
+    indices = list(np.ndindex(config.rows, config.cols))
+    build = partial(_build_task, config, columns)
+    if executor is None:
+        for index in indices:
+            yield from build([index])
+        return
+    length = -(-len(indices) // _MAX_TASKS)
+    tasks = [indices[start : start + length] for start in range(0, len(indices), length)]
+    for patches in executor.map(build, tasks):
+        yield from patches
+
+
+def _build_task(
+    config: MapConfig, columns: list[int], indices: list[tuple[int, int]]
+) -> list[tuple[int, Patch]]:
+    """Return terrain type and patch of each (row, col) in `indices`."""
+    patches = []
+    for row, col in indices:
+        terrain_type, level = assign_patch(config, columns, row, col)
+        patch = build_patch(config, config.sub_terrains[terrain_type], level, row, col)
+        patches.append((terrain_type, patch))
+    return patches
+
+
+def _pad(poses: NDArray[np.object_]) -> NDArray[np.float32]:
+    """Return the poses (k, 4) of all patches, shape (rows, cols, k, 4), padded with NaN."""
+    number = max(len(each) for each in poses.ravel().tolist())
+    padded = np.full((*poses.shape, number, 4), np.nan, dtype=np.float32)
+    for row, col in np.ndindex(poses.shape):
+        padded[row, col, : len(poses[row, col])] = poses[row, col]
     return padded
 
 

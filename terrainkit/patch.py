@@ -56,11 +56,16 @@ class Patch:
     goals: NDArray[np.float32]
     """Goals in their order: x, y, z [m] and heading [rad], shape (k, 4)."""
 
-    origin: NDArray[np.float32]
-    """Spawn origin (x, y, z) [m], shape (3,)."""
+    spawns: NDArray[np.float32]
+    """Spawn positions x, y, z [m] and headings [rad], shape (k, 4); the origin comes first."""
 
     spawn_offset: float = 0.0
     """Largest offset along x or y of the origin from the spawn that the terrain prefers [m]."""
+
+    @property
+    def origin(self) -> NDArray[np.float32]:
+        """Spawn origin (x, y, z) [m], shape (3,)."""
+        return self.spawns[0, :3]
 
 
 def make_patch(config: MapConfig, row: int, col: int) -> Patch:
@@ -86,7 +91,7 @@ def build_patch(
     Raises:
         ConfigError: if the terrain does not fit in the patch, or has no place to spawn.
     """
-    from terrainkit.spawn import Disc, find_spawn
+    from terrainkit.spawn import Disc, find_spawn, sample_spawns
 
     terrain = sub_terrain.at(difficulty)
     _check_slopes(terrain, config)
@@ -109,6 +114,11 @@ def build_patch(
             f"a patch of {grid.size[0]:g} m x {grid.size[1]:g} m; increase the platform or reduce "
             "spawn_radius or spawn_headroom"
         )
+    # The first child draws the solids and the goals.
+    rng = patch_rng(config, terrain, row, col).spawn(2)[1]
+    spawns = sample_spawns(
+        heights, grid, origin, disc, config.spawns_per_patch, solids=solids, rng=rng
+    )
     return Patch(
         terrain=sub_terrain.name,
         difficulty=difficulty,
@@ -117,7 +127,7 @@ def build_patch(
         heights=heights,
         solids=solids,
         goals=goals,
-        origin=np.array(origin, dtype=np.float32),
+        spawns=_with_headings(spawns, goals),
         spawn_offset=max(abs(origin[0] - preferred[0]), abs(origin[1] - preferred[1])),
     )
 
@@ -161,6 +171,17 @@ def _solids_and_goals(
         ground = surface_at(heights, index, threshold=config.wall_threshold).height
         goals[:, 2] = np.where(np.isnan(goals[:, 2]), ground, goals[:, 2])
     return solids, goals.astype(np.float32)
+
+
+def _with_headings(
+    positions: NDArray[np.float64], goals: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Return spawn positions with headings, shape (k, 4): toward the first goal, else along x."""
+    heading = np.zeros(len(positions))
+    if len(goals):
+        dx, dy = (goals[0, :2] - positions[:, :2]).T
+        heading = np.arctan2(dy, dx)
+    return np.column_stack([positions, heading]).astype(np.float32)
 
 
 def _check_slopes(terrain: Terrain, config: MapConfig) -> None:

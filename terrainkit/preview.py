@@ -1,4 +1,4 @@
-"""Preview: a shaded relief of a map with labels, spawn origins and a height scale."""
+"""Preview: a shaded relief of a map with labels, spawn origins, solids and goals."""
 
 import math
 from functools import partial
@@ -29,6 +29,8 @@ _COLORS = (
 
 _TEXT_COLOR = (40, 40, 46)
 _SPAWN_COLOR = (196, 40, 40)
+_GOAL_COLOR = (40, 90, 160)
+_SOLID_OPACITY = 0.75
 _BACKGROUND = (250, 249, 246)
 _MARGIN = (250, 60, 130, 70)
 """Margin to the left, below, to the right and above the relief [px]."""
@@ -99,9 +101,9 @@ def render_preview(terrain_map: "TerrainMap", width: int = 1600) -> Picture:
     image = np.full((height + above + below, span + left + right, 3), _BACKGROUND, dtype=np.uint8)
     image[above : above + height, left : left + span] = ground
     _draw_color_bar(image[above : above + height, left + span :], heights)
-    _draw_labels(
-        image, terrain_map, scale, (left - crop[0] * scale, above + height + crop[1] * scale)
-    )
+    zero = (left - crop[0] * scale, above + height + crop[1] * scale)
+    _draw_solids(image, terrain_map, scale, zero)
+    _draw_labels(image, terrain_map, scale, zero)
     return image
 
 
@@ -185,6 +187,26 @@ def _write(image: Picture, text: str, at: tuple[int, int], size: float = 0.5) ->
     cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, _TEXT_COLOR, 1, cv2.LINE_AA)
 
 
+def _draw_solids(
+    image: Picture, terrain_map: "TerrainMap", scale: float, zero: tuple[float, float]
+) -> None:
+    """Draw the outline of each solid, filled in the color of its top, the highest one last."""
+    import cv2
+
+    from terrainkit.mesh.solid_mesh import solid_meshes
+
+    for mesh in sorted(solid_meshes(terrain_map.solids), key=lambda m: m.vertices[:, 2].max()):
+        corners = np.array(zero) + mesh.vertices[:, :2] * (scale, -scale)
+        outline = cv2.convexHull(np.rint(corners).astype(np.int32))
+        x, y, width, height = cv2.boundingRect(outline)
+        window = image[y : y + height, x : x + width]
+        top = height_colors(mesh.vertices[:, 2].max())
+        layer = cv2.fillConvexPoly(window.copy(), outline - (x, y), top.tolist(), cv2.LINE_AA)
+        # The ground shows through, since a solid may hang above it.
+        window[:] = cv2.addWeighted(layer, _SOLID_OPACITY, window, 1 - _SOLID_OPACITY, 0)
+        cv2.polylines(image, [outline], True, (top * 0.6).tolist(), 1, cv2.LINE_AA)
+
+
 def _draw_labels(
     image: Picture, terrain_map: "TerrainMap", scale: float, zero: tuple[float, float]
 ) -> None:
@@ -217,3 +239,7 @@ def _draw_labels(
         cv2.circle(image, pixel(*origin[:2]), radius, _BACKGROUND, 3, cv2.LINE_AA)
         cv2.circle(image, pixel(*origin[:2]), radius, _SPAWN_COLOR, 1, cv2.LINE_AA)
         cv2.circle(image, pixel(*origin[:2]), 2, _SPAWN_COLOR, -1, cv2.LINE_AA)
+    goals = terrain_map.goals[~np.isnan(terrain_map.goals[..., 0])].tolist()
+    for x, y, _, heading in goals:
+        tip = x + 0.4 * math.cos(heading), y + 0.4 * math.sin(heading)
+        cv2.arrowedLine(image, pixel(x, y), pixel(*tip), _GOAL_COLOR, 1, cv2.LINE_AA, tipLength=0.4)

@@ -1,4 +1,4 @@
-"""Find spawn origins on flat ground."""
+"""Find spawn positions on flat ground."""
 
 import math
 from dataclasses import dataclass
@@ -64,15 +64,72 @@ def find_spawn(
                 z = float(surface_at(heights, np.array([index]), threshold=threshold).height[0])
             if not len(solids) or _is_free(np.array([[x, y, z]]), obstacles, disc.headroom)[0]:
                 return x, y, z
-    cells = _flat_cells(heights, disc.radius / grid.cell, disc.tolerance)
-    i, j = cells.T
-    origins = np.column_stack([grid.axis(0)[i], grid.axis(1)[j], heights[i, j]])
-    is_free = _is_free(origins, obstacles, disc.headroom)
-    cells, origins = cells[is_free], origins[is_free]
+    cells, origins = _free_discs(heights, grid, disc, obstacles)
     if not len(cells):
         return None
     x, y, z = origins[np.argmin(((cells - index) ** 2).sum(axis=1))].tolist()
     return x, y, z
+
+
+def sample_spawns(
+    heights: NDArray[np.float32],
+    grid: Grid,
+    origin: tuple[float, float, float],
+    disc: Disc,
+    number: int,
+    *,
+    solids: Solids,
+    rng: np.random.Generator,
+) -> NDArray[np.float64]:
+    """Return up to `number` spawn positions on the level ground around the origin.
+
+    The positions are a Poisson-disc sample: random, and at least two disc radii apart, so that the
+    discs do not overlap. Each is the center of a flat and free disc, and a path over the centers
+    of such discs leads to it from the origin. No position is therefore beyond an obstacle.
+
+    Args:
+        heights: See :func:`find_spawn`.
+        grid: See :func:`find_spawn`.
+        origin: Spawn origin of the patch [m], the first position.
+        disc: See :func:`find_spawn`.
+        number: Largest number of positions.
+        solids: See :func:`find_spawn`.
+        rng: Random number generator.
+
+    Returns:
+        Positions (x, y, z) [m], shape (n, 3) with 1 <= n <= `number`.
+    """
+    if number == 1:
+        return np.array([origin])
+    from scipy.ndimage import label
+
+    chosen = [np.array(origin)]
+    cells, places = _free_discs(heights, grid, disc, SolidIndex(solids, radius=disc.radius))
+    is_free = np.zeros(grid.shape, dtype=bool)
+    is_free[tuple(cells.T)] = True
+    regions, _ = label(is_free)
+    region = regions[tuple(cells.T)]
+    # The ground is level between the origin and the center of a flat disc that contains it.
+    contains_origin = np.hypot(*(places[:, :2] - chosen[0][:2]).T) <= disc.radius
+    places = rng.permutation(places[np.isin(region, region[contains_origin])])
+    while len(chosen) < number:
+        distance = np.hypot(*(places[:, :2] - chosen[-1][:2]).T)
+        places = places[distance >= 2 * disc.radius]
+        if not len(places):
+            break
+        chosen.append(places[0])
+    return np.array(chosen)
+
+
+def _free_discs(
+    heights: NDArray[np.float32], grid: Grid, disc: Disc, obstacles: SolidIndex
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return the cells with a flat and free disc, shape (n, 2), and their centers, (n, 3)."""
+    cells = _flat_cells(heights, disc.radius / grid.cell, disc.tolerance)
+    i, j = cells.T
+    places = np.column_stack([grid.axis(0)[i], grid.axis(1)[j], heights[i, j]])
+    is_free = _is_free(places, obstacles, disc.headroom)
+    return cells[is_free], places[is_free]
 
 
 def _is_free(

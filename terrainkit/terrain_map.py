@@ -1,5 +1,6 @@
 """TerrainMap: a generated map and the views of its surface."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,8 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from terrainkit.config import MapConfig
-from terrainkit.curriculum import Assignment, assign_levels, update_levels
-from terrainkit.errors import ConfigError, ExportError
+from terrainkit.curriculum import (
+    Assignment,
+    assign_levels,
+    assign_spawns,
+    resample_columns,
+    update_levels,
+)
+from terrainkit.errors import ConfigError, ExportError, TerrainkitWarning
 from terrainkit.free_space import Direction, clearance, first_surface, free_intervals
 from terrainkit.grid import Grid
 from terrainkit.parameter import MAX_VALUE
@@ -40,8 +47,9 @@ class TerrainMap:
     heights: NDArray[np.float32]
     """Heights [m], shape `grid.shape`: first index x, second y."""
 
-    env_origins: NDArray[np.float32]
-    """Spawn origin of each patch [m], shape (rows, cols, 3)."""
+    spawns: NDArray[np.float32]
+    """Spawn positions of each patch: x, y, z [m] and heading [rad], shape (rows, cols, k, 4), NaN
+    where a patch has fewer than k. The first of each patch is its spawn origin."""
 
     terrain_types: NDArray[np.int32]
     """Terrain type of each patch as an index into `terrain_names`, shape (rows, cols)."""
@@ -66,6 +74,11 @@ class TerrainMap:
         rows, cols = self.difficulty.shape
         names = ", ".join(self.terrain_names)
         return f"<TerrainMap {rows} x {cols} patches, {self.heights.shape} samples: {names}>"
+
+    @cached_property
+    def env_origins(self) -> NDArray[np.float32]:
+        """Spawn origin of each patch [m], shape (rows, cols, 3), a view of `spawns`."""
+        return self.spawns[:, :, 0, :3]
 
     def height(self, xy: ArrayLike) -> NDArray[np.float64]:
         """Return the height of the ground [m] at `xy`.
@@ -239,7 +252,7 @@ class TerrainMap:
         self.config.check_patch(row, col)
         grid = self.config.patch_grid(row, col)
         i, j = self.config.patch_start(row, col)
-        goals = self.goals[row, col]
+        goals, spawns = self.goals[row, col], self.spawns[row, col]
         return Patch(
             terrain=self.terrain_names[self.terrain_types[row, col]],
             difficulty=float(self.difficulty[row, col]),
@@ -248,19 +261,41 @@ class TerrainMap:
             heights=self.heights[i : i + grid.shape[0], j : j + grid.shape[1]],
             solids=self.solids.select((self.solids.patch == (row, col)).all(axis=1)),
             goals=goals[~np.isnan(goals[:, 0])],
-            origin=self.env_origins[row, col],
+            spawns=spawns[~np.isnan(spawns).all(axis=1)],
         )
 
     def assign(self, num_envs: int, max_init_level: int | None = None, seed: int = 0) -> Assignment:
-        """Assign patches to `num_envs` environments; see :mod:`terrainkit.curriculum`."""
+        """Assign patches to `num_envs` environments; see :mod:`terrainkit.curriculum`.
+
+        The environments of a patch are distributed over its spawn positions.
+
+        Warns:
+            TerrainkitWarning: if patches have several spawn positions, but too few for their
+                environments.
+        """
         rows, cols = self.difficulty.shape
         levels, columns = assign_levels(num_envs, rows, cols, max_init_level, seed)
+        spawns, num_shared = assign_spawns(self.spawns, levels, columns)
+        if num_shared and self.config.spawns_per_patch > 1:
+            warnings.warn(
+                f"{num_shared} of {num_envs} environments share a spawn position with another; "
+                "increase spawns_per_patch, rows or cols, or reduce spawn_radius",
+                TerrainkitWarning,
+                stacklevel=2,
+            )
         return Assignment(
             levels=levels,
             columns=columns,
             terrain_types=self.terrain_types[levels, columns],
-            env_origins=self.env_origins[levels, columns],
+            env_origins=spawns[:, :3],
+            headings=spawns[:, 3],
         )
+
+    def resample_columns(
+        self, levels: ArrayLike, columns: ArrayLike, *, seed: int | Sequence[int]
+    ) -> NDArray[np.int64]:
+        """Return other columns at a reset; see :func:`terrainkit.curriculum.resample_columns`."""
+        return resample_columns(levels, columns, self.terrain_types, seed=seed)
 
     def update_levels(
         self,

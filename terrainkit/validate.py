@@ -123,6 +123,10 @@ def _compare(patch: Patch, expected: Patch, location: str) -> Iterator[str]:
         patch.goals, expected.goals, atol=TOLERANCE
     ):
         yield f"{location}: the goals differ from those of its config"
+    if patch.spawns.shape != expected.spawns.shape or not np.allclose(
+        patch.spawns[1:], expected.spawns[1:], atol=TOLERANCE
+    ):
+        yield f"{location}: the spawn positions differ from those of its config"
     moved = float(np.abs(patch.origin[:2] - expected.origin[:2]).max())
     if moved > TOLERANCE:
         yield f"{location}: the spawn origin is {moved:.3f} m from that of its config"
@@ -177,24 +181,34 @@ def _check_spawn(terrain_map: TerrainMap) -> Iterator[str]:
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     disc = (radius[:, None, None] * circle).reshape(-1, 2)
     for row, col in np.ndindex(terrain_map.difficulty.shape):
-        origin = terrain_map.env_origins[row, col].astype(np.float64)
-        subject = f"patch ({row}, {col}): the spawn origin"
-        grid = config.patch_grid(row, col)
-        if (origin[:2] < grid.lower).any() or (origin[:2] > grid.upper).any():
-            yield f"{subject} is outside the patch"
-        ground = terrain_map.height(origin[:2] + disc)
-        free = terrain_map.clearance(origin[:2] + disc).min()
-        if free < config.spawn_headroom - TOLERANCE:
-            yield (f"{subject} has {free:.3f} m of headroom; expected {config.spawn_headroom:g} m")
-        above = float(origin[2] - terrain_map.height(origin[:2]))
-        if abs(above) > TOLERANCE:
-            yield f"{subject} is {abs(above):.3f} m {'above' if above > 0 else 'below'} the ground"
-        spread = float(ground.max() - ground.min())
-        if spread > config.spawn_tolerance + 1e-6:
-            yield (
-                f"{subject} is not on flat ground: heights within {config.spawn_radius:g} m "
-                f"differ by {spread:.3f} m; expected at most {config.spawn_tolerance:g} m"
-            )
+        spawns = terrain_map.patch(row, col).spawns.astype(np.float64)
+        for number, (*xy, z, _) in enumerate(spawns):
+            name = f"spawn {number}" if number else "the spawn origin"
+            subject = f"patch ({row}, {col}): {name}"
+            grid = config.patch_grid(row, col)
+            if (xy < np.array(grid.lower)).any() or (xy > np.array(grid.upper)).any():
+                yield f"{subject} is outside the patch"
+            ground = terrain_map.height(xy + disc)
+            free = terrain_map.clearance(xy + disc).min()
+            if free < config.spawn_headroom - TOLERANCE:
+                headroom = config.spawn_headroom
+                yield f"{subject} has {free:.3f} m of headroom; expected {headroom:g} m"
+            above = float(z - terrain_map.height(xy))
+            if abs(above) > TOLERANCE:
+                side = "above" if above > 0 else "below"
+                yield f"{subject} is {abs(above):.3f} m {side} the ground"
+            spread = float(ground.max() - ground.min())
+            if spread > config.spawn_tolerance + 1e-6:
+                yield (
+                    f"{subject} is not on flat ground: heights within {config.spawn_radius:g} m "
+                    f"differ by {spread:.3f} m; expected at most {config.spawn_tolerance:g} m"
+                )
+            others = np.hypot(*(spawns[:number, :2] - xy).T)
+            if others.min(initial=np.inf) < 2 * config.spawn_radius - TOLERANCE:
+                yield (
+                    f"{subject} is {others.min():.3f} m from spawn {others.argmin()}; expected at "
+                    f"least {2 * config.spawn_radius:g} m, two spawn radii"
+                )
 
 
 def _check_mesh(terrain_map: TerrainMap, mesh: TriMesh) -> Iterator[str]:

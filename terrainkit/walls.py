@@ -72,6 +72,8 @@ def center_heights(corners: NDArray[np.floating], walls: NDArray[np.bool_]) -> N
         corners: Heights of the corners [m], shape (n, 4).
         walls: Whether each edge is a wall, shape (n, 4).
     """
+    # einsum is several times as slow for mixed types or another order in memory.
+    corners = np.ascontiguousarray(corners, dtype=np.float64)
     centers: NDArray[np.float64] = np.einsum("nij,nj->ni", _center_cases()[walls @ _CASE], corners)
     return centers
 

@@ -109,7 +109,8 @@ def test_mjlab_block(m):
     env = MagicMock()
     cfg.events["origins"].func(env, None)
     (origins,), _ = env.scene.terrain.configure_env_origins.call_args
-    assert origins is m.env_origins
+    assert origins.shape == (*m.difficulty.shape, 3)
+    assert np.shares_memory(origins, m.spawns)
     generator = cfg.scene.terrain.terrain_generator
     assert generator.size == m.config.patch_size
     assert tuple(generator.sub_terrains) == m.terrain_names

@@ -48,6 +48,10 @@ class Generate(ConfigCommand):
     set: Annotated[str, tyro.conf.arg(metavar="NAME=VALUE,...", help_behavior_hint="")] = ""
     """Parameters of --terrain: NAME=VALUE, or NAME=EASY:HARD for a range over the difficulty."""
 
+    jobs: Annotated[int, tyro.conf.arg(metavar="N")] = 1
+    """Number of processes that build patches; the map does not depend on it. More than one is
+    faster for maps that take several seconds."""
+
     overwrite: Flag = False
     """Replace an existing file."""
 
@@ -64,12 +68,14 @@ class Generate(ConfigCommand):
         """Generate the map, write it, and print the next commands."""
         from terrainkit import export
         from terrainkit.generation import generate
+        from terrainkit_cli.worker_pool import worker_pool
 
         config = self.changed_config()
         samples = config.grid.shape[0] * config.grid.shape[1]
         # Fail before generating.
         export.check_export(self.output, samples, overwrite=self.overwrite)
-        terrain_map = generate(config, progress=render.progress)
+        with worker_pool(self.jobs) as executor:
+            terrain_map = generate(config, progress=render.progress, executor=executor)
         terrain_map.save(self.output, overwrite=self.overwrite)
         render.result(written(terrain_map, self.output))
         if self.output.suffix == ".npz":

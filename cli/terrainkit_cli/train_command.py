@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.util import find_spec
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated, ClassVar
@@ -71,6 +72,8 @@ class Train(TaskCommand):
 
         run = self._resume_run
         robot, terrain, task = self._robot(run), self._terrain(run), self.changed_config()
+        if task.runner.logger == "wandb" and find_spec("wandb") is None:
+            raise ConfigError("runner.logger: wandb is not installed: pip install wandb")
         with stop_on_signals() as stop_signal, render.training() as show_progress:
             runner = train(
                 robot,

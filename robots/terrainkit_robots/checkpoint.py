@@ -5,14 +5,15 @@ They hold only tensors and plain values, so that they can be read without execut
 
 import io
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal, TypedDict
 
 import msgspec
 
 from terrainkit.atomic_write import atomic_write
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.files import open_regular
 
 
@@ -69,3 +70,40 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
 def policy_state(state: Mapping[str, Any]) -> Checkpoint:
     """Return the part of a checkpoint without which there is no policy or critic."""
     return msgspec.convert(state, Checkpoint)
+
+
+@contextmanager
+def open_checkpoint(
+    path: Path, joints: Sequence[str], observed: Mapping[str, int]
+) -> Iterator[dict[str, Any]]:
+    """Yield the content of a checkpoint after checking that it fits a robot and its observations.
+
+    Errors in the block, such as torch's about weights that do not fit, become ConfigErrors.
+
+    Args:
+        path: The checkpoint.
+        joints: Joints of the robot, in the order of the actions.
+        observed: Number of observations in each group that is used.
+
+    Raises:
+        ConfigError: If the checkpoint cannot be read, or belongs to another robot or task.
+    """
+    state = read_checkpoint(path)
+    if state["joints"] != list(joints):
+        raise ConfigError(
+            f"{path} belongs to another robot, {state['robot']}: got the joints "
+            f"{listing(state['joints'])}; expected {listing(joints)}"
+        )
+    for name, width in observed.items():
+        if (got := state["observed"].get(name)) != width:
+            raise ConfigError(
+                f"{path} belongs to another task: got {got} {name} observations; expected "
+                f"{width}. To continue on a map after a plane, set terrain.measure_heights on both"
+            )
+    try:
+        yield state
+    except ConfigError:
+        raise
+    except (RuntimeError, ValueError, LookupError, TypeError, AttributeError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise ConfigError(f"{path} does not fit the networks of its task: {reason}") from error

@@ -77,6 +77,7 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
         "triangles": mesh.triangles,
         **{key: getattr(terrain_map.solids, name) for key, name in _SOLIDS.items()},
         "goals": terrain_map.goals,
+        "spawns": terrain_map.spawns,
         "config": np.array(config.to_toml()),
         "parameters": np.array(_parameters_text(terrain_map)),
         "friction": np.array([config.static_friction, config.dynamic_friction]),
@@ -116,7 +117,7 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
             config=config,
             grid=grid,
             heights=archive.array("heights", "f4", grid.shape),
-            env_origins=archive.array("env_origins", "f4", (*size, 3)),
+            spawns=_read_spawns(archive, config),
             terrain_types=terrain_types,
             terrain_names=tuple(str(name) for name in names),
             difficulty=archive.array("difficulty", "f4", size),
@@ -201,11 +202,34 @@ def _read_goals(archive: Archive, size: tuple[int, int]) -> NDArray[np.float32]:
     """Return the goals of a map of `size` patches; maps of terrainkit 0.1 have none."""
     if "goals" not in archive.names():
         return np.empty((*size, 0, 4), dtype=np.float32)
-    limit = math.prod(size) * MAX_GOALS * 16
-    goals = archive.array("goals", "f4", (*size, None, 4), limit=limit)
-    if not (np.isnan(goals).all(axis=-1) | (np.abs(goals) <= MAX_VALUE).all(axis=-1)).all():
-        raise MapFileError(f"{archive.path}: goals: got values that are not finite")
-    return goals
+    return _read_poses(archive, "goals", size, MAX_GOALS)
+
+
+def _read_spawns(archive: Archive, config: MapConfig) -> NDArray[np.float32]:
+    """Return the spawn positions; maps of terrainkit 0.1 have one per patch."""
+    size = (config.rows, config.cols)
+    origins = archive.array("env_origins", "f4", (*size, 3))
+    if "spawns" not in archive.names():
+        return np.pad(origins, ((0, 0), (0, 0), (0, 1)))[:, :, None]
+    spawns = _read_poses(archive, "spawns", size, math.prod(config.patch_shape))
+    if not spawns.shape[2]:
+        raise MapFileError(f"{archive.path}: spawns: got none; expected one or more for each patch")
+    spawns[:, :, 0, :3] = origins
+    return spawns
+
+
+def _read_poses(
+    archive: Archive, key: str, size: tuple[int, int], most: int
+) -> NDArray[np.float32]:
+    """Return the poses (x, y, z, heading) of each patch, at most `most`, padded with NaN."""
+    limit = math.prod(size) * most * 16
+    poses = archive.array(key, "f4", (*size, None, 4), limit=limit)
+    is_padding = np.isnan(poses).all(axis=-1)
+    if not (is_padding | (np.abs(poses) <= MAX_VALUE).all(axis=-1)).all():
+        raise MapFileError(f"{archive.path}: {key}: got values that are not finite")
+    if (is_padding[..., :-1] & ~is_padding[..., 1:]).any():
+        raise MapFileError(f"{archive.path}: {key}: got a gap; expected NaN at the end only")
+    return poses
 
 
 def _parameters_text(terrain_map: "TerrainMap") -> str:

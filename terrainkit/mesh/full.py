@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.grid import Grid
-from terrainkit.mesh.node_grid import NodeGrid
+from terrainkit.mesh.node_grid import QUADS_PER_BLOCK, NodeGrid
 from terrainkit.mesh.tri_mesh import TriMesh
 from terrainkit.mesh.wall_quads import wall_quads
 
@@ -24,7 +24,7 @@ def full_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> Tri
     fans, centers = wall_quads(
         node_grid, np.flatnonzero(node_grid.has_wall), node_grid.vertex_count
     )
-    plain = np.flatnonzero(~node_grid.has_wall)
+    plain = node_grid.first_corners(~node_grid.has_wall)
     triangles = np.empty((2 * len(plain) + len(fans), 3), dtype=np.int32)
     split_quads(node_grid, plain, out=triangles[: 2 * len(plain)])
     triangles[2 * len(plain) :] = fans
@@ -38,16 +38,21 @@ def full_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> Tri
     return TriMesh(vertices=vertices, triangles=triangles)
 
 
-def split_quads(node_grid: NodeGrid, numbers: NDArray[np.int64], out: NDArray[np.int32]) -> None:
-    """Write two triangles for each quad in `numbers` to `out`, shape (2 n, 3).
+def split_quads(node_grid: NodeGrid, corners: NDArray[np.int64], out: NDArray[np.int32]) -> None:
+    """Write two triangles for each quad to `out`, shape (2 n, 3).
 
     The diagonal runs from (i, j) to (i + 1, j + 1), as in MuJoCo's heightfields.
+
+    Args:
+        node_grid: Nodes of the mesh.
+        corners: Number of the first corner of each quad, shape (n,).
+        out: Array of the triangles.
     """
     ny = node_grid.z.shape[1]
-    # A row has one quad fewer than nodes, so the first node of a quad is its number plus its row.
-    corner = (numbers + numbers // (ny - 1)).astype(np.int32)
-    pairs = out.reshape(-1, 2, 3)
-    pairs[:, 0, 0] = pairs[:, 1, 0] = corner
-    pairs[:, 0, 2] = pairs[:, 1, 1] = corner + (ny + 1)
-    pairs[:, 0, 1] = corner + ny
-    pairs[:, 1, 2] = corner + 1
+    for start in range(0, len(corners), QUADS_PER_BLOCK):
+        corner = corners[start : start + QUADS_PER_BLOCK].astype(np.int32)
+        pairs = out[2 * start : 2 * (start + QUADS_PER_BLOCK)].reshape(-1, 2, 3)
+        pairs[:, 0, 0] = pairs[:, 1, 0] = corner
+        pairs[:, 0, 2] = pairs[:, 1, 1] = corner + (ny + 1)
+        pairs[:, 0, 1] = corner + ny
+        pairs[:, 1, 2] = corner + 1

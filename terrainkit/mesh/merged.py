@@ -65,17 +65,17 @@ def _assemble(
     node_grid: NodeGrid, single: Mask, polygons: list[Polygons], panels: list[Ids]
 ) -> TriMesh:
     """Return the mesh of single quads, polygons and wall panels."""
-    plain = np.flatnonzero(single & ~node_grid.has_wall)
+    plain = node_grid.first_corners(single & ~node_grid.has_wall)
     pairs = np.empty((2 * len(plain), 3), dtype=np.int32)
     split_quads(node_grid, plain, out=pairs)
     count = node_grid.vertex_count
     faces, added = wall_quads(node_grid, np.flatnonzero(single & node_grid.has_wall), count)
-    triangles = [pairs, *(part.astype(np.int32) for part in (faces, *panels))]
+    triangles = [pairs, faces, *(panel.astype(np.int32) for panel in panels)]
     extra = [node_grid.midpoints(), added]
     count += len(added)
     for loop in polygons:
-        faces, added = loop.triangles(count)
-        triangles.append(faces.astype(np.int32))
+        parts, added = loop.triangles(count)
+        triangles.append(parts.astype(np.int32))
         extra.append(added)
         count += len(added)
     return _compact(node_grid, np.concatenate(triangles), np.concatenate(extra))

@@ -18,6 +18,9 @@ from terrainkit.walls import wall_edges
 BYTES_PER_NODE = 120
 """Peak memory of building a mesh per node [bytes]."""
 
+QUADS_PER_BLOCK = 1 << 14
+"""Quads whose faces are built at a time, so that intermediate arrays stay in the cache."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NodeGrid:
@@ -70,15 +73,21 @@ class NodeGrid:
         return flat
 
     def corners(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the numbers of the four corners of each quad (i, j), counterclockwise, (n, 4)."""
+        """Return the numbers of the four corners of each quad (i, j), counterclockwise, (4, n)."""
         ny = self.z.shape[1]
         first = i * ny + j
-        return np.stack([first, first + ny, first + ny + 1, first + 1], axis=1)
+        return np.stack([first, first + ny, first + ny + 1, first + 1])
+
+    def first_corners(self, quads: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Return the number of corner 0 of each quad in the mask `quads`, shape (n,)."""
+        nodes = np.zeros((quads.shape[0], self.z.shape[1]), dtype=bool)
+        nodes[:, :-1] = quads
+        return np.flatnonzero(nodes)
 
     def walls(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Return whether each of the four edges of each quad (i, j) is a wall, (n, 4)."""
+        """Return whether each of the four edges of each quad (i, j) is a wall, (4, n)."""
         x, y = self.walls_x, self.walls_y
-        return np.stack([x[i, j], y[i + 1, j], x[i, j + 1], y[i, j]], axis=1)
+        return np.stack([x[i, j], y[i + 1, j], x[i, j + 1], y[i, j]])
 
     @cached_property
     def edges_x(self) -> NDArray[np.int64]:
@@ -100,15 +109,21 @@ class NodeGrid:
 
         The vertex on the other side has the next number. Without a wall, the result is undefined.
         """
-        index = np.searchsorted(self.edges_x, i * self.walls_x.shape[1] + j)
-        vertex: NDArray[np.int64] = self.z.size + 2 * index
-        return vertex
+        return self.z.size + 2 * self._order_x[i, j].astype(np.int64)
 
     def midpoint_y(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the vertex at the midpoint of each wall (i, j)-(i, j + 1), like `midpoint_x`."""
-        index = self.edges_x.size + np.searchsorted(self.edges_y, i * self.walls_y.shape[1] + j)
-        vertex: NDArray[np.int64] = self.z.size + 2 * index
-        return vertex
+        return self.z.size + 2 * (self.edges_x.size + self._order_y[i, j].astype(np.int64))
+
+    @cached_property
+    def _order_x(self) -> NDArray[np.int32]:
+        """Index of each wall in `edges_x`, shape of `walls_x`."""
+        return _order(self.walls_x, self.edges_x)
+
+    @cached_property
+    def _order_y(self) -> NDArray[np.int32]:
+        """Index of each wall in `edges_y`, shape of `walls_y`."""
+        return _order(self.walls_y, self.edges_y)
 
     def nodes(self, numbers: NDArray[np.int64]) -> NDArray[np.float32]:
         """Return the positions of the nodes with these numbers [m], shape (n, 3)."""
@@ -126,6 +141,12 @@ class NodeGrid:
         return np.concatenate(
             [np.stack(sides, axis=1).reshape(-1, 3) for sides in (along_x, along_y)]
         )
+
+
+def _order(walls: NDArray[np.bool_], edges: NDArray[np.int64]) -> NDArray[np.int32]:
+    order = np.zeros(walls.shape, dtype=np.int32)
+    order.ravel()[edges] = np.arange(len(edges))
+    return order
 
 
 def _positions(

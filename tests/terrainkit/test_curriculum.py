@@ -1,7 +1,12 @@
 import numpy as np
 import pytest
 
-from terrainkit.curriculum import assign_levels, update_levels
+from terrainkit.curriculum import (
+    assign_levels,
+    assign_spawns,
+    resample_columns,
+    update_levels,
+)
 from terrainkit.errors import ConfigError
 
 
@@ -157,3 +162,70 @@ def test_update_levels_settle_at_walkable_level():
 
 def test_update_levels_standing_robots_end_at_zero():
     assert not careers(lambda levels, _: levels < 0).any()
+
+
+def spawn_sets():
+    """Return the spawns of 2 x 2 patches: patch (r, c) has 2 r + c + 1 of 4, at x = 1, 2, ..."""
+    spawns = np.full((2, 2, 4, 4), np.nan, np.float32)
+    for number, spawn_set in enumerate(spawns.reshape(4, 4, 4), start=1):
+        spawn_set[:number] = [[k + 1, 10 * number, 0.5, 0.25] for k in range(number)]
+    return spawns
+
+
+def test_assign_spawns_takes_positions_in_turn():
+    levels, columns = [1, 0, 1, 1, 0, 1], [0, 1, 0, 1, 1, 0]
+    spawns, num_shared = assign_spawns(spawn_sets(), levels, columns)
+    assert spawns[:, 0].tolist() == [1, 1, 2, 1, 2, 3]
+    assert spawns[:, 1].tolist() == [30, 20, 30, 40, 20, 30]
+    assert spawns[:, 2:].tolist() == [[0.5, 0.25]] * 6
+    assert num_shared == 0
+
+
+def test_assign_spawns_counts_shared_positions():
+    spawns, num_shared = assign_spawns(spawn_sets(), [0] * 5, [1] * 5)
+    assert spawns[:, 0].tolist() == [1, 2, 1, 2, 1]
+    assert num_shared == 3
+
+
+def test_assign_spawns_of_no_environments():
+    spawns, num_shared = assign_spawns(spawn_sets(), [], [])
+    assert spawns.shape == (0, 4)
+    assert num_shared == 0
+
+
+TYPES = np.array([[0, 0, 1, 0, 2], [1, 1, 1, 2, 2]], np.int32)
+"""Terrain types of 2 x 5 patches."""
+
+
+def test_resample_columns_keeps_the_terrain_type():
+    levels, columns = np.repeat([0, 1], 500), np.tile(np.arange(5), 200)
+    after = resample_columns(levels, columns, TYPES, seed=0)
+    assert (TYPES[levels, after] == TYPES[levels, columns]).all()
+
+
+def test_resample_columns_is_uniform_over_variants():
+    after = resample_columns(np.zeros(3000, int), np.ones(3000, int), TYPES, seed=0)
+    assert np.bincount(after, minlength=5)[[2, 4]].tolist() == [0, 0]
+    assert np.bincount(after)[[0, 1, 3]] == pytest.approx([1000] * 3, abs=100)
+
+
+def test_resample_columns_is_seeded():
+    levels, columns = np.zeros(100, int), np.zeros(100, int)
+    one, again, other = (
+        resample_columns(levels, columns, TYPES, seed=(0, reset)) for reset in (1, 1, 2)
+    )
+    assert one.tolist() == again.tolist() != other.tolist()
+
+
+def test_resample_columns_without_variants_changes_nothing():
+    assert resample_columns([0, 0], [2, 4], TYPES, seed=0).tolist() == [2, 4]
+    assert resample_columns([], [], TYPES, seed=0).shape == (0,)
+
+
+@pytest.mark.parametrize(
+    ("level", "column", "message"),
+    [(2, 0, "levels: got 2 to 2; expected 0 to 1"), (0, -1, "columns: got -1 to -1; expected 0 ")],
+)
+def test_resample_columns_rejects_unknown_patches(level, column, message):
+    with pytest.raises(ConfigError, match=message):
+        resample_columns([level], [column], TYPES, seed=0)

@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 import tracemalloc
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import fields, replace
 
 import numpy as np
@@ -78,6 +79,24 @@ def test_make_patch_equals_slice_of_the_map(row, col):
     assert patch.origin.tobytes() == terrain_map.env_origins[row, col].tobytes()
     assert patch.difficulty == terrain_map.difficulty[row, col]
     assert patch.parameters == terrain_map.parameters[row, col]
+
+
+def test_generate_spawns_begin_with_the_origin():
+    one, many = generate(SMALL), generate(replace(SMALL, spawns_per_patch=5, spawn_radius=0.3))
+    assert one.spawns.shape == (3, 4, 1, 4)
+    assert many.spawns.shape == (3, 4, 5, 4)
+    assert many.spawns[:, :, 0].tobytes() == one.spawns[:, :, 0].tobytes()
+    assert many.heights.tobytes() == one.heights.tobytes()
+    assert (many.spawns[0, 0] != many.spawns[1, 0]).any()
+
+
+def test_generate_pads_spawns_with_nan():
+    flat = SubTerrain(terrain="flat")
+    # The platform of 1.5 m has room for one disc with a radius of 0.5 m only.
+    small = SubTerrain(terrain="pyramid_stairs", parameters={"platform": 1.5})
+    config = replace(SMALL, cols=2, spawns_per_patch=6, terrains=(flat, small))
+    number = np.isfinite(generate(config).spawns).sum(axis=2)
+    assert number.tolist() == [[[6] * 4, [1] * 4]] * 3
 
 
 def test_generate_change_of_one_column_is_local():
@@ -186,6 +205,66 @@ def test_generate_progress_wraps_every_patch():
 
     generate(MapConfig(rows=2, cols=2, border=0.0, terrains=(STAIRS,)), progress=watch)
     assert seen == [4, (0, 0), (0, 1), (1, 0), (1, 1)]
+
+
+CRAWL = SubTerrain(terrain="crawl")
+TALL = MapConfig(rows=40, cols=2, border=1.0, spawns_per_patch=3, terrains=(CRAWL, OBSTACLES))
+"""More patches than tasks of an executor."""
+
+
+def same_bytes(one, other):
+    arrays = ("heights", "spawns", "terrain_types", "difficulty", "goals")
+    solids = ("boxes", "friction", "collides", "visible", "patch")
+    return (
+        all(getattr(one, name).tobytes() == getattr(other, name).tobytes() for name in arrays)
+        and all(
+            getattr(one.solids, name).tobytes() == getattr(other.solids, name).tobytes()
+            for name in solids
+        )
+        and one.parameters.tolist() == other.parameters.tolist()
+    )
+
+
+@pytest.mark.parametrize("pool", [ThreadPoolExecutor, ProcessPoolExecutor])
+@pytest.mark.parametrize("config", [SMALL, TALL], ids=["small", "tall"])
+def test_generate_with_an_executor_gives_same_bytes(pool, config):
+    with pool(2) as executor:
+        assert same_bytes(generate(config, executor=executor), generate(config))
+
+
+def test_generate_on_a_dask_cluster_gives_same_bytes(tmp_path):
+    distributed = pytest.importorskip(
+        "distributed", reason="needs the extra distributed: pip install 'terrainkit[distributed]'"
+    )
+    cluster = distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, dashboard_address=None, local_directory=tmp_path
+    )
+    with cluster, distributed.Client(cluster) as client:
+        made = generate(TALL, executor=client.get_executor())
+    assert same_bytes(made, generate(TALL))
+
+
+def test_generate_with_an_executor_wraps_every_patch():
+    seen = []
+
+    def watch(indices, total):
+        for index in indices:
+            seen.append((index, total))
+            yield index
+
+    with ThreadPoolExecutor(2) as executor:
+        generate(TALL, progress=watch, executor=executor)
+    assert seen == [((row, col), 80) for row in range(40) for col in range(2)]
+
+
+def test_generate_with_an_executor_reports_the_first_error():
+    wide = SubTerrain(terrain="pit", parameters={"side": 20.0})
+    config = replace(TALL, terrains=(OBSTACLES, wide))
+    with pytest.raises(ConfigError) as serial:
+        generate(config)
+    with ProcessPoolExecutor(2) as executor, pytest.raises(ConfigError) as caught:
+        generate(config, executor=executor)
+    assert str(caught.value) == str(serial.value)
 
 
 def test_generate_warns_of_step_above_amplitude():

@@ -35,6 +35,16 @@ def test_make_patch_origin_of_a_pit():
     assert patch.origin == pytest.approx((4.0, 12.0, -1.0))
 
 
+def test_make_patch_heads_to_the_first_goal():
+    terrain = SubTerrain(terrain="crawl")
+    patch = make_patch(MapConfig(terrains=(terrain,), spawns_per_patch=3), 0, 0)
+    assert len(patch.spawns) == 3
+    for x, y, _, heading in patch.spawns:
+        gx, gy = patch.goals[0, :2]
+        assert np.hypot(gx - x, gy - y) * np.cos(heading) == pytest.approx(gx - x, abs=1e-4)
+        assert np.hypot(gx - x, gy - y) * np.sin(heading) == pytest.approx(gy - y, abs=1e-4)
+
+
 def test_make_patch_records_requested_and_realized():
     choice = SubTerrain(terrain="gap", parameters={"width": 0.33, "platform": 3.1, "depth": 2.0})
     parameters = make_patch(MapConfig(terrains=(choice,)), 0, 0).parameters

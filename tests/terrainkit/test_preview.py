@@ -1,3 +1,5 @@
+import dataclasses
+
 import cv2
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from terrainkit.preview import (
     shaded_relief,
     write_preview,
 )
+from terrainkit.solids import Solids
 
 PAPER = (250, 249, 246)
 
@@ -133,3 +136,21 @@ def test_preview_of_a_long_map_is_limited():
     height, width, _ = render_preview(tk.generate(config), 1600).shape
     assert height <= 10_000 + 70 + 60
     assert width < 300 + 10_000 / 300 + 130
+
+
+def test_preview_draws_solids_and_goals(solid_map):
+    """The color at the center of the box is mixed from that of its top and of the ground."""
+    bare = dataclasses.replace(
+        solid_map, solids=Solids.empty(), goals=np.full_like(solid_map.goals, np.nan)
+    )
+    with_solids, without = (render_preview(each, 700).astype(int) for each in (solid_map, bare))
+    scale = 100  # 7 m on 700 pixels
+    bottom, left = without.shape[0] - 60, 250
+
+    def pixel(picture, x, y):
+        return picture[bottom - round((y + 0.5) * scale), left + round((x + 0.5) * scale)]
+
+    expected = 0.75 * height_colors(np.array(0.6)) + 0.25 * pixel(without, 1, 6)
+    assert pixel(with_solids, 1, 6) == pytest.approx(expected, abs=2)
+    assert (pixel(with_solids, 3, 1) == pixel(without, 3, 1)).all()
+    assert (pixel(with_solids, 3.1, 6) != pixel(without, 3.1, 6)).any()  # the arrow of a goal

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from terrainkit.grid import Grid
 from terrainkit.solids import Solids, make_boxes
-from terrainkit.spawn import Disc, find_spawn
+from terrainkit.spawn import Disc, find_spawn, sample_spawns
 from terrainkit.surface import surface_at
 
 PLOT = Grid(shape=(40, 40), cell=0.1)
@@ -175,3 +175,80 @@ def test_find_spawn_avoids_solids_within_the_headroom(bottom, expected):
 def test_find_spawn_returns_none_under_a_low_roof():
     roof = make_boxes((2.0, 2.0, 0.6), (4.0, 4.0, 0.1))
     assert spawn(level(), solids=roof) is None
+
+
+def sampled(heights, number, *, origin=(2.0, 2.0, 0.0), radius=0.5, solids=None, seed=0):
+    needed = Disc(radius=radius, tolerance=0.01, headroom=1.0)
+    solids = solids or Solids.empty()
+    rng = np.random.default_rng(seed)
+    return sample_spawns(heights, PLOT, origin, needed, number, solids=solids, rng=rng)
+
+
+def spacing(spawns):
+    """Return the smallest distance between two positions [m]."""
+    offset = spawns[:, None, :2] - spawns[None, :, :2]
+    return np.hypot(*np.moveaxis(offset, -1, 0))[np.triu_indices(len(spawns), 1)].min()
+
+
+@pytest.mark.parametrize("number", [1, 2, 4])
+def test_sample_spawns_begins_with_the_origin(number):
+    spawns = sampled(level(), number)
+    assert spawns.shape == (number, 3)
+    assert spawns[0].tolist() == [2.0, 2.0, 0.0]
+
+
+@pytest.mark.parametrize("radius", [0.2, 0.3, 0.5])
+def test_sample_spawns_fills_the_level_ground(radius):
+    spawns = sampled(level(), 1000, radius=radius)
+    assert spacing(spawns) >= 2 * radius
+    assert spawns[:, :2].min() >= radius
+    assert spawns[:, :2].max() <= 4.0 - radius
+    # No further disc fits: every cell with a disc in the patch is near one of the positions.
+    cells = PLOT.axis(0)
+    cells = cells[(cells >= radius + 0.15) & (cells <= 4.0 - radius - 0.15)]
+    x, y = np.meshgrid(cells, cells)
+    distance = np.hypot(x[..., None] - spawns[:, 0], y[..., None] - spawns[:, 1])
+    assert distance.min(axis=-1).max() < 2 * radius
+
+
+def test_sample_spawns_depends_on_the_generator_only():
+    one, again, other = (sampled(level(), 4, seed=seed) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(one, again)
+    assert (one[1:] != other[1:]).any()
+
+
+def test_sample_spawns_discs_are_level_and_on_the_ground():
+    heights = level()
+    heights[:12] = 0.3
+    heights[30, 28] = -1.0
+    spawns = sampled(heights, 100, radius=0.3)
+    assert len(spawns) > 5
+    for x, y, z in spawns:
+        ground = disc(heights, (x, y), radius=0.3)
+        assert np.ptp(ground) <= 0.01 + 1e-6
+        assert z == 0.0
+
+
+def test_sample_spawns_stays_on_this_side_of_an_obstacle():
+    heights = level()
+    heights[24:27] = 0.4  # a barrier from 2.4 m to 2.7 m, with level ground behind it
+    spawns = sampled(heights, 100, origin=(1.0, 2.0, 0.0), radius=0.3)
+    assert len(spawns) > 5
+    assert spawns[:, 0].max() < 2.1 + 1e-9
+    behind = sampled(heights, 100, origin=(3.2, 2.0, 0.0), radius=0.3)
+    assert behind[:, 0].min() > 3.0 - 1e-9
+
+
+def test_sample_spawns_avoids_low_solids():
+    bar = make_boxes([3.0, 2.0, 0.8], [0.4, 4.0, 0.2])  # from 2.8 m to 3.2 m, 0.7 m above ground
+    spawns = sampled(level(), 100, radius=0.3, solids=bar)
+    assert len(spawns) > 5
+    assert spawns[:, 0].max() <= 2.5 + 1e-6
+
+
+def test_sample_spawns_without_flat_cell_is_the_origin():
+    # The level square of 12 cells has room for a disc at its center only, where no sample is. The
+    # ground around it is level too, but 5 m higher.
+    heights = level(5.0)
+    heights[14:26, 14:26] = 0.0
+    assert sampled(heights, 4).tolist() == [[2.0, 2.0, 0.0]]

@@ -6,7 +6,7 @@ import pytest
 
 import terrainkit
 from terrainkit import MapConfig, SubTerrain, generate
-from terrainkit.errors import ConfigError, ExportError
+from terrainkit.errors import ConfigError, ExportError, TerrainkitWarning
 
 
 @pytest.fixture(scope="module")
@@ -208,6 +208,59 @@ def test_assign_uses_level_and_column(terrain_map):
 
 def test_assign_respects_max_init_level(terrain_map):
     assert terrain_map.assign(50, max_init_level=0).levels.tolist() == [0] * 50
+
+
+def flat_map(**values):
+    flat = SubTerrain(terrain="flat")
+    return generate(MapConfig(rows=1, cols=3, border=0.0, terrains=(flat,), **values))
+
+
+def test_assign_spreads_environments_over_spawns():
+    start = flat_map(spawns_per_patch=16).assign(48)
+    x, y, _ = start.env_origins.T
+    distance = np.hypot(x[:, None] - x, y[:, None] - y)[np.triu_indices(48, 1)]
+    assert distance.min() >= 1.0 - 1e-5
+    assert start.headings.tolist() == [0.0] * 48
+
+
+def test_assign_warns_of_shared_spawns():
+    # On a patch of 6 m x 2 m, one disc of 0.8 m fits on each side of the origin.
+    terrain_map = flat_map(patch_size=(6.0, 2.0), spawns_per_patch=100, spawn_radius=0.8)
+    message = "3 of 12 environments share a spawn position with another; increase spawns_per_patch"
+    with pytest.warns(TerrainkitWarning, match=message):
+        start = terrain_map.assign(12)
+    assert len(np.unique(start.env_origins, axis=0)) == 9
+
+
+def test_assign_shares_single_origins_without_warning():
+    assert len(np.unique(flat_map().assign(12).env_origins, axis=0)) == 3
+
+
+@pytest.fixture(scope="module")
+def bank():
+    """Four variants of each level of two terrains."""
+    terrains = tuple(SubTerrain(terrain=name) for name in ("rough", "obstacles"))
+    return generate(MapConfig(rows=3, cols=8, border=0.0, terrains=terrains))
+
+
+def test_bank_has_variants_of_each_type_and_level(bank):
+    for level in range(1, 3):
+        for columns in (range(4), range(4, 8)):
+            variants = [bank.patch(level, column) for column in columns]
+            assert len({(each.terrain, each.difficulty) for each in variants}) == 1
+            assert len({each.heights.tobytes() for each in variants}) == 4
+
+
+def test_resample_columns_changes_terrain_at_each_reset(bank):
+    start = bank.assign(200, max_init_level=2)
+    columns, visited = start.columns, [start.columns]
+    for reset in range(20):
+        columns = bank.resample_columns(start.levels, columns, seed=(0, reset))
+        assert (bank.terrain_types[start.levels, columns] == start.terrain_types).all()
+        visited.append(columns)
+    assert all(len(set(each)) == 4 for each in np.transpose(visited).tolist())
+    again = bank.resample_columns(start.levels, visited[-2], seed=(0, 19))
+    assert again.tolist() == visited[-1].tolist()
 
 
 def test_env_origins_are_on_the_ground(terrain_map):

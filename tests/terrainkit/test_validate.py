@@ -24,6 +24,10 @@ def changed(terrain_map, name, index, value):
     return dataclasses.replace(terrain_map, **{name: array})
 
 
+def moved_origin(terrain_map, row, col, origin):
+    return changed(terrain_map, "spawns", (row, col, 0, slice(3)), origin)
+
+
 @pytest.mark.parametrize(
     "config",
     [
@@ -32,8 +36,9 @@ def changed(terrain_map, name, index, value):
         tk.MapConfig(rows=2, cols=5, border=1.0, mode="randomized", preset="rough"),
         tk.MapConfig(rows=4, cols=1, border=1.0, difficulty_jitter=1.0, slope_threshold=None),
         tk.MapConfig(rows=1, cols=1, border=0.0, terrains=(tk.SubTerrain(terrain="wave"),)),
+        tk.MapConfig(rows=2, border=1.0, preset="all", cols=16, spawns_per_patch=9),
     ],
-    ids=["legged_gym", "all", "randomized", "jitter", "one patch"],
+    ids=["legged_gym", "all", "randomized", "jitter", "one patch", "spawns"],
 )
 @pytest.mark.filterwarnings("ignore::terrainkit.TerrainkitWarning")
 def test_validate_generated_map_has_no_issues(config):
@@ -65,7 +70,7 @@ def test_validate_finds_non_finite_height(sound):
 
 def test_validate_finds_origin_above_ground(sound):
     origin = sound.env_origins[1, 2] + np.float32([0, 0, 0.5])
-    assert found(changed(sound, "env_origins", (1, 2), origin)) == [
+    assert found(moved_origin(sound, 1, 2, origin)) == [
         ("spawn", "patch (1, 2): the spawn origin is 0.500 m above the ground")
     ]
 
@@ -73,7 +78,7 @@ def test_validate_finds_origin_above_ground(sound):
 def test_validate_finds_origin_on_uneven_ground(sound):
     x, y = sound.config.patch_grid(2, 5).center
     origin = [x + 2.0, y, sound.height([x + 2.0, y])]
-    moved, (check, message) = found(changed(sound, "env_origins", (2, 5), origin))
+    moved, (check, message) = found(moved_origin(sound, 2, 5, origin))
     assert moved == (
         "patches",
         "patch (2, 5): the spawn origin is 2.000 m from that of its config",
@@ -86,7 +91,7 @@ def test_validate_finds_origin_on_uneven_ground(sound):
 
 def test_validate_finds_moved_origin(sound):
     origin = sound.env_origins[0, 3] + np.float32([0.3, 0, 0])
-    assert found(changed(sound, "env_origins", (0, 3), origin)) == [
+    assert found(moved_origin(sound, 0, 3, origin)) == [
         ("patches", "patch (0, 3): the spawn origin is 0.300 m from that of its config")
     ]
 
@@ -103,8 +108,40 @@ def test_validate_finds_origin_outside_pit():
 
 
 def test_validate_finds_origin_outside_patch(sound):
-    findings = found(changed(sound, "env_origins", (0, 0), sound.env_origins[0, 1]))
+    findings = found(moved_origin(sound, 0, 0, sound.env_origins[0, 1]))
     assert ("spawn", "patch (0, 0): the spawn origin is outside the patch") in findings
+
+
+@pytest.fixture(scope="module")
+def with_spawns():
+    flat = tk.SubTerrain(terrain="flat")
+    config = tk.MapConfig(rows=1, cols=1, border=0.0, spawns_per_patch=3, terrains=(flat,))
+    return tk.generate(config)
+
+
+def test_validate_finds_spawns_on_one_another(with_spawns):
+    # The origin is at (4, 4).
+    edited = changed(with_spawns, "spawns", (0, 0, slice(1, 3), 0), [2.0, 2.75])
+    edited = changed(edited, "spawns", (0, 0, slice(1, 3), 1), 4.0)
+    assert found(edited) == [
+        ("patches", "patch (0, 0): the spawn positions differ from those of its config"),
+        (
+            "spawn",
+            "patch (0, 0): spawn 2 is 0.750 m from spawn 1; expected at least 1 m, two spawn radii",
+        ),
+    ]
+
+
+def test_validate_finds_missing_spawn(with_spawns):
+    edited = changed(with_spawns, "spawns", (0, 0, 2), np.nan)
+    assert found(edited) == [
+        ("patches", "patch (0, 0): the spawn positions differ from those of its config")
+    ]
+
+
+def test_validate_finds_spawn_above_ground(with_spawns):
+    edited = changed(with_spawns, "spawns", (0, 0, 1, 2), 0.25)
+    assert ("spawn", "patch (0, 0): spawn 1 is 0.250 m above the ground") in found(edited)
 
 
 def test_validate_finds_edited_patch(sound):

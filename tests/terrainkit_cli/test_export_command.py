@@ -101,7 +101,7 @@ def test_export_overwrites_with_option_only(here, tmp_path):
 def test_export_bundled_policy_by_name(here, trained, tmp_path, monkeypatch):
     bundled = tasks.get_task("quadruped")
     folder = tmp_path / "package"
-    shutil.copytree(bundled.folder, folder, ignore=shutil.ignore_patterns(tasks.TRAINED_FOLDER))
+    shutil.copytree(bundled.folder, folder, ignore=shutil.ignore_patterns("trained"))
     monkeypatch.setitem(tasks._registered, "quadruped", replace(bundled, folder=folder))
     run = here("export", "quadruped")
     assert run.returncode == 2

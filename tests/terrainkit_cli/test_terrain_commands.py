@@ -64,6 +64,21 @@ def test_generate_options_set_the_config(terrainkit, tmp_path):
     )
 
 
+def test_generate_jobs_give_same_bytes(terrainkit, tmp_path):
+    for name, jobs in (("one.npz", 1), ("two.npz", 2)):
+        run = terrainkit("generate", "-o", name, "--rows", 3, "--seed", 4, "--jobs", jobs)
+        assert run.returncode == 0
+        assert run.stderr == ""
+    assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
+
+
+@pytest.mark.parametrize("jobs", [0, -1, 62])
+def test_generate_rejects_invalid_jobs(terrainkit, jobs):
+    run = terrainkit("generate", "-o", "a.npz", "--jobs", jobs)
+    assert run.returncode == 2
+    assert run.stderr == f"terrainkit: error: --jobs: got {jobs}; expected 1 to 61\n"
+
+
 def test_generate_mode_selected(terrainkit, tmp_path):
     terrainkit(
         *("generate", "-o", "a.npz", "--rows", 2, "--cols", 2, "--border", 0),

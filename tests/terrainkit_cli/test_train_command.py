@@ -280,3 +280,11 @@ def test_training_progress_on_terminal_is_table(monkeypatch):
     shown = terminal.getvalue()
     for text in ("iteration 20/400", "1:02:03", "tracking_lin_vel", "+0.500 /s", "75% succeed"):
         assert text in shown
+
+
+def test_train_requires_the_package_of_the_logger(train, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("terrainkit_cli.train_command.find_spec", lambda _: None)
+    folder = tmp_path / "run"
+    assert train("quadruped", "--runner.logger", "wandb", "--log-dir", str(folder)) == 2
+    assert "runner.logger: wandb is not installed: pip install wandb" in capsys.readouterr().err
+    assert not folder.exists()

@@ -19,9 +19,8 @@ def bundle_policy(run: runs.Run, folder: Path) -> runs.Run:
     """
     if run.info.robot not in task_names():
         raise ConfigError(f"robot: got {run.info.robot}; expected one of {listing(task_names())}")
-    is_plane = run.terrain == "plane"
-    names = [runs.TASK_FILE, SPEC_FILE] + [runs.MAP_FILE] * (not is_plane)
-    info = replace(run.info, terrain="plane" if is_plane else runs.MAP_FILE)
+    info = replace(run.info, terrain="plane" if run.terrain == "plane" else runs.MAP_FILE)
+    names = [runs.TASK_FILE, SPEC_FILE] + [runs.MAP_FILE] * (info.terrain != "plane")
     state = policy_state(read_checkpoint(runs.last_checkpoint(run)))
     files = {name: (run.folder / name).read_bytes() for name in names}
     runs.write_run_folder(folder, files | {runs.RUN_FILE: info.to_toml().encode()})

@@ -8,9 +8,10 @@ import torch
 from rsl_rl.models import MLPModel
 
 from terrainkit.errors import TerrainkitWarning
+from terrainkit_robots.checkpoint import open_checkpoint
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import Run, changed_robot_files, last_checkpoint
-from terrainkit_robots.rl.runner import OBS_GROUPS, open_checkpoint, runner_config
+from terrainkit_robots.rl.runner import OBS_GROUPS, runner_config
 from terrainkit_robots.spec.robot import SPEC_FILE
 
 
@@ -23,12 +24,12 @@ def load_policy(run: Run, env: LeggedEnv) -> MLPModel:
     Raises:
         ConfigError: If the run has no checkpoint, or one of another robot or task.
     """
-    path = last_checkpoint(run)
     # The run has its own copy of the spec, so only a change of the model matters.
     if files := [name for name in changed_robot_files(run) if name != SPEC_FILE]:
         message = f"{run.info.robot}: {' and '.join(files)} changed after {run.folder} was trained"
         warnings.warn(message, TerrainkitWarning, stacklevel=2)
-    with open_checkpoint(path, env, OBS_GROUPS["actor"]) as state:
+    num_obs = {"policy": env.num_obs["policy"]}  # the critic's do not matter
+    with open_checkpoint(last_checkpoint(run), env.robot.spec.joint_order, num_obs) as state:
         config = runner_config(run.task)["actor"]
         config.pop("class_name")
         actor = MLPModel(env.get_observations(), OBS_GROUPS, "actor", env.num_actions, **config)

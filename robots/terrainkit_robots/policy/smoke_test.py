@@ -4,7 +4,7 @@ import gc
 import tempfile
 import tracemalloc
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -193,8 +193,7 @@ def random_steps(env: LeggedEnv, steps: int) -> Iterator[State]:
 def random_state(state: State, seed: int) -> State:
     """Return random states, of magnitudes from 0.1 for the first robot to 1000 for the last."""
     rng, random = np.random.default_rng(seed), {}
-    for name in (field.name for field in fields(state)):
-        array = getattr(state, name)
+    for name, array in vars(state).items():
         scale = np.logspace(-1, 3, len(array)).reshape(-1, *[1] * (array.ndim - 1))
         values = scale * rng.normal(size=array.shape)
         random[name] = values > 0 if array.dtype == bool else values.astype(array.dtype)

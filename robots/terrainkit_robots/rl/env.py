@@ -40,31 +40,27 @@ class LeggedEnv(VecEnv):
     def __init__(self, task: Task, robot: Robot, terrain: Terrain, device: str = "cpu") -> None:
         """Build the simulations and reset every environment."""
         self.cfg, self.robot, self.terrain, self.device = task, robot, terrain, device
-        self.num_envs, self.num_actions = task.env.num_envs, len(robot.default_pose)
+        self.num_envs, self.num_actions = n, joints = task.env.num_envs, len(robot.default_pose)
         self.max_episode_length = task.max_episode_length
         self.scene = build_scene(robot, terrain, task)
         scan = uses_height_scan(task, is_flat=terrain.is_flat)
         check_env_memory(task, robot, scan=scan, ngeom=self.scene.model.ngeom)
-        self.sim = Simulation(self.scene, self.num_envs, task.env.num_threads)
+        self.sim = Simulation(self.scene, n, task.env.num_threads)
         self.rng = np.random.default_rng(task.runner.seed)
         self.sensors = Sensors(self.sim, terrain, task, scan=scan)
         heading = task.commands.heading_command
         heading = not terrain.is_flat if heading is None else heading
-        self.velocity_command = VelocityCommand(
-            task.commands, self.num_envs, task.dt, heading_command=heading
-        )
-        self.pushes = Pushes(task.domain_rand, self.num_envs, task.dt)
+        self.velocity_command = VelocityCommand(task.commands, n, task.dt, heading_command=heading)
+        self.pushes = Pushes(task.domain_rand, n, task.dt)
         weight = float(self.scene.model.body_subtreemass[self.scene.base] * 9.81)
         self.obs_groups = {
             "policy": policy_group(robot, task, scan=scan),
             "privileged": privileged_group(robot, task, scan=scan, weight=weight),
         }
-        self.params = sample_params(self.rng, self.num_envs, self.sim, task.domain_rand)
+        self.params = sample_params(self.rng, n, self.sim, task.domain_rand)
         apply_params(self.sim, self.params)
-        self.curriculum = TerrainCurriculum(
-            terrain, self.num_envs, task.terrain.max_init_level, task.runner.seed
-        )
-        n, joints = self.num_envs, self.num_actions
+        max_level, seed = task.terrain.max_init_level, task.runner.seed
+        self.curriculum = TerrainCurriculum(terrain, n, max_level, seed)
         self.episode_length_buf = torch.zeros(n, dtype=torch.int64)  # rsl-rl may replace it
         self.steps_since_reset = np.zeros(n, np.int64)
         self.start_pos = np.zeros((n, 2))  # base position at the last reset
@@ -76,8 +72,7 @@ class LeggedEnv(VecEnv):
 
         # A motor receives offset + scale * action.
         kind, scale = task.control.control_type, task.control.action_scale
-        positions = list(robot.spec.per_joint("action_scale").values())
-        default = {"P": positions, "V": robot.velocity, "T": robot.effort}[kind]
+        default = {"P": robot.action_scale, "V": robot.velocity, "T": robot.effort}[kind]
         self.action_scale = np.full(joints, default if scale is None else scale, np.float32)
         self.is_position_controlled = self.scene.model.actuator_biasprm[:, 1] != 0
         self.action_offset = np.where(self.is_position_controlled, robot.default_pose, 0)
@@ -87,6 +82,11 @@ class LeggedEnv(VecEnv):
     def mirror_maps(self) -> MirrorMaps:
         """Left-right symmetry of observations and actions."""
         return mirror_maps(self)
+
+    @property
+    def num_obs(self) -> dict[str, int]:
+        """Number of observations in each group."""
+        return {name: group.shape[1] for name, group in self._observations.items()}
 
     def get_observations(self) -> TensorDict:
         """Return the current observations; later steps do not modify these tensors."""
@@ -108,8 +108,7 @@ class LeggedEnv(VecEnv):
         self.sensors.last_dof_vel[unstable] = 0  # MuJoCo reset the state: no acceleration
         self.state = state = self._compute_state(np.arange(self.num_envs), unstable)
         rewards = self._compute_rewards(state, unstable)
-        is_last = self.episode_length_buf.numpy() >= self.max_episode_length
-        time_out = is_last & ~state.fallen
+        time_out = (self.episode_length_buf.numpy() >= self.max_episode_length) & ~state.fallen
         done = state.fallen | time_out
         self.curriculum.accumulate_command(self.commands, quat_to_yaw(state.base_quat), self.cfg.dt)
         extras: dict[str, Any] = {"time_outs": torch.from_numpy(time_out).to(self.device)}
@@ -246,9 +245,9 @@ class LeggedEnv(VecEnv):
 
     def _reset_idx(self, env_ids: Ids) -> None:
         """Start new episodes."""
-        env_origins, cfg = self.curriculum.env_origins[env_ids], self.cfg.init_state
+        origins, cfg = self.curriculum.env_origins[env_ids], self.cfg.init_state
         qpos, qvel = sample_reset_state(
-            self.rng, env_origins, self.scene, self.robot, self.terrain, cfg
+            self.rng, origins, self.scene, self.robot, self.terrain, cfg
         )
         self.sim.reset(env_ids, qpos, qvel)
         # Random joint positions may put a foot below the ground: raise the base.

@@ -12,8 +12,9 @@ from datetime import datetime
 from importlib.metadata import version
 from os.path import isdir, isfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
+from terrainkit import MapConfig, TerrainMap
 from terrainkit.atomic_write import atomic_folder, atomic_write
 from terrainkit.errors import ConfigError, ExportError, listing
 from terrainkit.schema import Config
@@ -25,9 +26,6 @@ from terrainkit_robots.rl.config import Task
 from terrainkit_robots.spec.robot import SPEC_FILE, Robot
 from terrainkit_robots.spec.robot_spec import RobotSpec
 from terrainkit_robots.text import free_name
-
-if TYPE_CHECKING:
-    from terrainkit.config import MapConfig
 
 RUN_FILE, TASK_FILE, MAP_FILE = "run.toml", "task.toml", "map.toml"
 
@@ -118,9 +116,8 @@ def write_run_folder(folder: Path, files: Mapping[str, bytes]) -> None:
     """Write a new folder with some files, completely or not at all."""
     with atomic_folder(folder) as new:
         if folder.is_dir() and any(folder.iterdir()):
-            raise ExportError(
-                f"{folder} exists; choose another folder, or continue with --resume {folder}"
-            )
+            hint = f"choose another folder, or continue with --resume {folder}"
+            raise ExportError(f"{folder} exists; {hint}")
         for name, data in files.items():
             (new / name).write_bytes(data)
 
@@ -150,20 +147,18 @@ def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
         used = config if config.is_file() and not file.is_file() else file
         terrain = str(used.resolve())
     saved = checkpoints(folder)
-    if checkpoint is not None:
-        if checkpoint not in saved:
-            iterations = listing(map(str, saved))
-            raise ConfigError(
-                f"{folder}: got checkpoint {checkpoint}; expected one of: {iterations}"
-            )
-        selected = saved[checkpoint]
+    if checkpoint is not None and checkpoint not in saved:
+        expected = f"expected one of: {listing(map(str, saved))}"
+        raise ConfigError(f"{folder}: got checkpoint {checkpoint}; {expected}")
+    if checkpoint is None and selected is None and saved:
+        checkpoint = max(saved)
     return Run(
         folder=folder,
         info=info,
         task=Task.load(folder / TASK_FILE, found.task),
         robot=robot,
         terrain=terrain,
-        checkpoint=selected or (saved[max(saved)] if saved else None),
+        checkpoint=selected if checkpoint is None else saved[checkpoint],
     )
 
 
@@ -183,9 +178,8 @@ def _resolve_run(name: str | Path) -> tuple[Path, Path | None]:
         raise ConfigError(f"run: got {name}; {expected_names(name, robots, runs)}")
     shipped = tasks.get_task(name).trained_run
     if not shipped.is_dir():
-        raise ConfigError(
-            f"no policy is shipped with {name}; terrainkit train {name} writes a run with one"
-        )
+        hint = f"terrainkit train {name} writes a run with one"
+        raise ConfigError(f"no policy is shipped with {name}; {hint}")
     return shipped, None
 
 
@@ -205,36 +199,36 @@ def is_same_terrain(run: Run, terrain: str | Path) -> bool:
     return _map_config(terrain) == _map_config(trained_on)
 
 
-def can_continue(run: Run, robot: str | Path, terrain: str | Path, task: Task) -> bool:
-    """Return whether a run can continue exactly with a robot, terrain and task.
+def parts_to_load(
+    run: Run, robot: str | Path, terrain: str | Path, task: Task
+) -> dict[str, bool] | None:
+    """Return the parts of a run that a new run starts with, as `LeggedRunner.load` takes them.
+
+    None if the run itself can continue exactly with this robot, terrain and task.
 
     Raises:
         ConfigError: If a file of the robot or terrain was modified since.
     """
-    num_envs, num_threads = run.task.env.num_envs, run.task.env.num_threads
-    env = replace(task.env, num_envs=num_envs, num_threads=num_threads)
+    is_same_map = is_same_terrain(run, terrain)
+    env = replace(task.env, num_envs=run.task.env.num_envs, num_threads=run.task.env.num_threads)
     is_same_task = replace(task, env=env, runner=run.task.runner) == run.task
-    if not is_same_task or _sources(robot, terrain) != (run.info.robot, run.terrain):
-        return False
-    changed = [f"{name} of {run.info.robot}" for name in changed_robot_files(run)]
-    changed += [] if is_same_terrain(run, terrain) else [run.terrain]
-    if changed:
-        raise ConfigError(
-            f"{' and '.join(changed)} changed since {run.folder} was trained; with a copy of the "
-            "robot or another --terrain, a new run starts with its networks"
-        )
-    return "processes" in read_checkpoint(last_checkpoint(run))
-
-
-def parts_to_load(run: Run, terrain: str | Path, task: Task) -> dict[str, bool]:
-    """Return which parts of a run a new run starts with; see `LeggedRunner.load`."""
+    if is_same_task and _sources(robot, terrain) == (run.info.robot, run.terrain):
+        changed = [f"{name} of {run.info.robot}" for name in changed_robot_files(run)]
+        changed += [] if is_same_map else [run.terrain]
+        if changed:
+            raise ConfigError(
+                f"{' and '.join(changed)} changed since {run.folder} was trained; with a copy of "
+                "the robot or another --terrain, a new run starts with its networks"
+            )
+        if "processes" in read_checkpoint(last_checkpoint(run)):
+            return None
     rates = [(each.learning_rate, each.schedule) for each in (task.algorithm, run.task.algorithm)]
     is_plane, was_plane = (each.terrain.collision == "plane" for each in (task, run.task))
     return {
         "actor": True,
         "critic": True,
         "optimizer": rates[0] == rates[1],
-        "curriculum": is_plane == was_plane and is_same_terrain(run, terrain),
+        "curriculum": is_plane == was_plane and is_same_map,
     }
 
 
@@ -252,9 +246,8 @@ def run_folder(
     if folder is None and continued is not None:
         saved = checkpoints(continued.folder)
         if saved and saved[max(saved)] == continued.checkpoint:
-            if task != continued.task:
-                with atomic_write(continued.folder / TASK_FILE, overwrite=True) as path:
-                    path.write_text(task.to_toml(), encoding="utf-8")
+            with atomic_write(continued.folder / TASK_FILE, overwrite=True) as path:
+                path.write_text(task.to_toml(), encoding="utf-8")
             return continued.folder
     folder = folder or default_folder(tasks.get_task(robot).name)
     return create_run(folder, task, robot, terrain).folder
@@ -275,10 +268,8 @@ def _sources(robot: str | Path, terrain: str | Path) -> tuple[str, str]:
     )
 
 
-def _map_config(terrain: str | Path) -> "MapConfig | None":
+def _map_config(terrain: str | Path) -> MapConfig | None:
     """Return the config of a map, or None for a plane."""
-    from terrainkit import MapConfig, TerrainMap
-
     if str(terrain) == "plane":
         return None
     is_config = Path(terrain).suffix == ".toml"

@@ -5,8 +5,8 @@ import statistics
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext, redirect_stdout, suppress
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext, redirect_stdout, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ from rsl_rl.runners import OnPolicyRunner
 from rsl_rl.utils.logger import Logger
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit_robots.checkpoint import read_checkpoint, save_checkpoint
+from terrainkit_robots.checkpoint import open_checkpoint, save_checkpoint
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
 
@@ -202,7 +202,9 @@ class LeggedRunner(OnPolicyRunner):
         `load_cfg` selects parts: `actor`, `critic`, `optimizer`, `curriculum` (terrain levels).
         """
         parts = load_cfg or {"actor": True, "critic": True, "optimizer": True}
-        with open_checkpoint(Path(path), self.env, list(self.env.obs_groups)) as state:
+        with open_checkpoint(
+            Path(path), self.env.robot.spec.joint_order, self.env.num_obs
+        ) as state:
             if "processes" not in state:
                 self.alg.load(state, {**parts, "optimizer": False}, strict)
                 return {}
@@ -240,7 +242,7 @@ class LeggedRunner(OnPolicyRunner):
             "iteration": self.current_learning_iteration,
             "robot": self.env.robot.spec.name,
             "joints": list(self.env.robot.spec.joint_order),
-            "observed": {k: v.shape[1] for k, v in self.env.get_observations().items()},
+            "observed": self.env.num_obs,
             **self.alg.save(),
             "processes": processes,
             "logger": self.logger.state_dict(),
@@ -266,7 +268,6 @@ class LeggedRunner(OnPolicyRunner):
         steps = self.cfg["num_steps_per_env"] * self.env.num_envs * self.gpu_world_size
         pace = (time.perf_counter() - self._start_time) / (self._completed - self._first)
         lengths = [self.env.cfg.dt * steps for steps in logger.lenbuffer]
-
         rewards, levels, success = (
             {k.removeprefix(p): mean for k, mean in logger.means.items() if k.startswith(p)}
             for p in ("Episode/rew_", "Curriculum/level_", "Curriculum/success_")
@@ -292,11 +293,9 @@ class LeggedRunner(OnPolicyRunner):
             super()._configure_multi_gpu()
             return
         torch.distributed.init_process_group("gloo")
-        self.is_distributed, self.gpu_world_size = True, torch.distributed.get_world_size()
-        self.gpu_global_rank = torch.distributed.get_rank()
-        self.gpu_local_rank = int(os.environ["LOCAL_RANK"])
-        ranks = {"global_rank": self.gpu_global_rank, "local_rank": self.gpu_local_rank}
-        self.cfg["multi_gpu"] = {**ranks, "world_size": self.gpu_world_size}
+        rank, count = torch.distributed.get_rank(), torch.distributed.get_world_size()
+        self.is_distributed, self.gpu_global_rank, self.gpu_world_size = True, rank, count
+        self.cfg["multi_gpu"] = {"global_rank": rank, "world_size": count}
 
 
 def runner_config(task: Task) -> dict[str, Any]:
@@ -338,36 +337,6 @@ def runner_config(task: Task) -> dict[str, Any]:
     }
 
 
-@contextmanager
-def open_checkpoint(
-    path: Path, env: LeggedEnv, groups: Sequence[str]
-) -> Iterator[Mapping[str, Any]]:
-    """Yield the content of a checkpoint with the joints and observations of an environment.
-
-    Errors in the block, such as torch's about weights that do not fit, become ConfigErrors.
-    """
-    state, joints = read_checkpoint(path), list(env.robot.spec.joint_order)
-    if state["joints"] != joints:
-        raise ConfigError(
-            f"{path} belongs to another robot, {state['robot']}: got the joints "
-            f"{listing(map(str, state['joints']))}; expected {listing(joints)}"
-        )
-    for name in groups:
-        got, width = state["observed"].get(name), env.get_observations()[name].shape[1]
-        if got != width:
-            raise ConfigError(
-                f"{path} belongs to another task: got {got} {name} observations; expected "
-                f"{width}. To continue on a map after a plane, set terrain.measure_heights on both"
-            )
-    try:
-        yield state
-    except ConfigError:
-        raise
-    except (RuntimeError, ValueError, LookupError, TypeError, AttributeError) as error:
-        reason = " ".join(str(error).split())[:200]
-        raise ConfigError(f"{path} does not fit the networks of its task: {reason}") from error
-
-
 def resolve_device(name: str) -> str:
     """Return the device `name`: `cpu`, `cuda` or `cuda:1`; under torchrun, this process's GPU."""
     gpus = [f"cuda:{k}" for k in range(torch.cuda.device_count())]
@@ -383,9 +352,8 @@ def process_share(task: Task) -> Task:
     rank, count = int(os.environ.get("RANK", "0")), int(os.environ.get("WORLD_SIZE", "1"))
     num_envs, local_count = task.env.num_envs, int(os.environ.get("LOCAL_WORLD_SIZE", "1"))
     if num_envs < count:
-        raise ConfigError(
-            f"env.num_envs: got {num_envs}; expected one for each of {count} processes"
-        )
+        expected = f"expected one for each of {count} processes"
+        raise ConfigError(f"env.num_envs: got {num_envs}; {expected}")
     available = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0)
     threads = task.env.num_threads or max(1, len(available) // local_count)
     num_envs = num_envs // count + (rank < num_envs % count)

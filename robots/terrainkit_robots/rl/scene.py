@@ -9,7 +9,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -18,6 +17,7 @@ from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.terrain import Terrain
 from terrainkit_robots.simulation.geoms import collides, lowest_point
 from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.transforms import FloatArray
 
 CONTACT_FORCE_BIT, NET_FORCE = 2, 3
 """`intprm[0]` and `intprm[1]` of a contact sensor: report the force, summed over all contacts."""
@@ -45,8 +45,10 @@ class Scene:
     """Ids of the robot's colliding geoms, shape (g,)."""
     home: Any
     """qpos of the default pose with the base at height 0, shape (nq,)."""
+    foot_pos: Any
+    """Position of each foot's site at `home` [m], shape (f, 3)."""
     sole_depth: Any
-    """Distance from each foot's site down to its lowest point in the default pose [m], (f,)."""
+    """Distance from each foot's site down to its lowest point at `home` [m], shape (f,)."""
     sensors: dict[str, slice]
     """Range in sensordata of `foot_position`, `foot_velocity`, `foot_force`, `penalized_force` and
     `termination_force`, three numbers per body. Forces act on what the robot touches [N]."""
@@ -69,6 +71,7 @@ def build_scene(robot: Robot, terrain: Terrain, task: Task) -> Scene:
     home = model.qpos0.copy()
     home[:7] = (0, 0, 0, 1, 0, 0, 0)
     home[model.jnt_qposadr[joints]] = robot.default_pose
+    foot_pos, sole_depth = _measure_feet(robot, model, home)
     base_id = model.body(robot.spec.base).id
     of_robot = model.body_rootid[model.geom_bodyid] == model.body_rootid[base_id]
     return Scene(
@@ -78,7 +81,8 @@ def build_scene(robot: Robot, terrain: Terrain, task: Task) -> Scene:
         base=base_id,
         geoms=np.flatnonzero(collides(model) & of_robot),
         home=home,
-        sole_depth=_sole_depth(robot, model, home),
+        foot_pos=foot_pos,
+        sole_depth=sole_depth,
         sensors=sensors,
     )
 
@@ -149,7 +153,7 @@ def _set_joints_and_collisions(robot: Robot, base: Any, task: Task) -> None:
 def _add_actuators(robot: Robot, scene: Any, task: Task) -> None:
     """Add a motor for each joint; MuJoCo evaluates its controller in every physics step."""
     spec, control = robot.spec, task.control
-    default = mujoco.MjSpec().default.actuator
+    default, joint = mujoco.MjSpec().default.actuator, mujoco.mjtTrn.mjTRN_JOINT
     stiffness, damping = spec.per_joint("stiffness"), spec.per_joint("damping")
     for name, effort in spec.per_joint("effort").items():
         kp, kd = stiffness[name], damping[name]
@@ -157,9 +161,7 @@ def _add_actuators(robot: Robot, scene: Any, task: Task) -> None:
             kp = control.stiffness
         if control.damping is not None:
             kd = control.damping
-        motor = scene.add_actuator(
-            name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, forcelimited=True
-        )
+        motor = scene.add_actuator(name=name, target=name, trntype=joint, forcelimited=True)
         # A new motor inherits from the defaults in the robot's file.
         for attribute in ("gear", "ctrllimited", "ctrlrange", "actlimited", "actrange"):
             setattr(motor, attribute, getattr(default, attribute))
@@ -200,12 +202,13 @@ def _add_sensors(robot: Robot, scene: Any) -> dict[str, slice]:
     return ranges
 
 
-def _sole_depth(robot: Robot, model: Any, home: Any) -> NDArray[np.float32]:
-    data, depths = mujoco.MjData(model), []
+def _measure_feet(robot: Robot, model: Any, home: Any) -> tuple[FloatArray, FloatArray]:
+    """Return the `foot_pos` and the `sole_depth` of a scene."""
+    data = mujoco.MjData(model)
     data.qpos[:] = home
     mujoco.mj_kinematics(model, data)
-    for foot in robot.spec.feet:
+    foot_pos, depths = np.array([data.site(SOLE + foot).xpos for foot in robot.spec.feet]), []
+    for foot, height in zip(robot.spec.feet, foot_pos[:, 2], strict=True):
         geoms = np.flatnonzero(collides(model) & (model.geom_bodyid == model.body(foot).id))
-        height = data.site(SOLE + foot).xpos[2]
         depths.append(max((height - lowest_point(model, data, int(g)) for g in geoms), default=0.0))
-    return np.array(depths, np.float32)
+    return foot_pos.astype(np.float32), np.array(depths, np.float32)

@@ -10,14 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-import mujoco
 import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
 from tensordict import TensorDict
 
-from terrainkit.errors import ConfigError, listing
-from terrainkit_robots.rl.scene import SOLE
+from terrainkit.errors import ConfigError
+from terrainkit_robots.rl.config import Terrain
 from terrainkit_robots.transforms import FloatArray
 
 if TYPE_CHECKING:
@@ -70,14 +69,11 @@ def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
             width = term.function(env.state).shape[1]
             maps["scalar"] = _map(range(width), np.ones(width))
             if term.symmetry == "scan":
-                terrain = env.cfg.terrain
-                maps["scan"] = _scan_map(terrain.measured_points_x, terrain.measured_points_y)
+                maps["scan"] = _scan_map(env.cfg.terrain)
             part = maps[term.symmetry]
             if len(part.index) != width:
-                raise ConfigError(
-                    f"observation {term.name}: got {width} numbers; the symmetry "
-                    f"{term.symmetry!r} expects {len(part.index)}"
-                )
+                expected = f"the symmetry {term.symmetry!r} expects {len(part.index)}"
+                raise ConfigError(f"observation {term.name}: got {width} numbers; {expected}")
             parts.append((part.index + start, part.sign))
             start += width
         groups[name] = _map(*map(np.concatenate, zip(*parts, strict=True)))
@@ -98,14 +94,8 @@ def augment(
         return torch.cat([values, values[:, index] * sign])
 
     if obs is not None:
-        if unknown := obs.keys() - maps.groups.keys():
-            expected = listing(maps.groups)
-            raise ConfigError(f"observation group: got {min(unknown)!r}; expected: {expected}")
-        obs = TensorDict(
-            {name: doubled(values, maps.groups[name]) for name, values in obs.items()},
-            batch_size=[2 * obs.batch_size[0]],
-            device=obs.device,
-        )
+        groups = {name: doubled(values, maps.groups[name]) for name, values in obs.items()}
+        obs = TensorDict(groups, [2 * obs.batch_size[0]], device=obs.device)
     return obs, None if actions is None else doubled(actions, maps.actions)
 
 
@@ -134,11 +124,7 @@ def _check_control(env: "LeggedEnv", joints: SignedPermutation) -> None:
 
 def _foot_map(env: "LeggedEnv") -> SignedPermutation:
     """Return the map of one vector per foot: feet are paired by position in the default pose."""
-    scene, feet = env.scene, env.robot.spec.feet
-    data = mujoco.MjData(scene.model)
-    data.qpos[:] = scene.home
-    mujoco.mj_kinematics(scene.model, data)
-    position = np.array([data.site(SOLE + foot).xpos for foot in feet])
+    feet, position = env.robot.spec.feet, env.scene.foot_pos
     distance = np.linalg.norm(position[:, None] - position * [1, -1, 1], axis=2)
     index = distance.argmin(axis=1)
     for k in np.flatnonzero(index[index] != np.arange(len(feet))):
@@ -147,14 +133,12 @@ def _foot_map(env: "LeggedEnv") -> SignedPermutation:
     return _map((3 * index[:, None] + range(3)).ravel(), [1, -1, 1] * len(feet))
 
 
-def _scan_map(x: Sequence[float], y: Sequence[float]) -> SignedPermutation:
+def _scan_map(cfg: Terrain) -> SignedPermutation:
     """Return the map of the height scan, whose points are ordered by x, then y."""
-    lateral = np.array(y)
+    lateral = np.array(cfg.measured_points_y)
     error = np.abs(lateral[:, None] + lateral)
     for k in np.flatnonzero(error.min(axis=1) > TOLERANCE):
-        raise ConfigError(
-            f"terrain.measured_points_y: got {lateral[k]:g} without {-lateral[k]:g}; "
-            "symmetry expects the same points on both sides"
-        )
-    index = np.arange(len(x))[:, None] * len(lateral) + error.argmin(axis=1)
+        got = f"terrain.measured_points_y: got {lateral[k]:g} without {-lateral[k]:g}"
+        raise ConfigError(f"{got}; symmetry expects the same points on both sides")
+    index = np.arange(len(cfg.measured_points_x))[:, None] * len(lateral) + error.argmin(axis=1)
     return _map(index.ravel(), np.ones(index.size))

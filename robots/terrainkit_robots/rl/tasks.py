@@ -24,9 +24,6 @@ from terrainkit_robots.spec.robot_spec import RobotSpec
 ENTRY_POINTS = "terrainkit.tasks"
 """Entry point group in which other packages name their tasks."""
 
-TRAINED_FOLDER = "trained"
-"""Folder of a bundled robot with one run per task: its trained policy."""
-
 _registered: dict[str, "TaskSpec"] = {}
 
 
@@ -44,7 +41,7 @@ class TaskSpec:
     @property
     def trained_run(self) -> Path:
         """Folder of the run with the bundled trained policy; it may not exist."""
-        return self.folder / TRAINED_FOLDER / self.name
+        return self.folder / "trained" / self.name
 
 
 def register_task(name: str, folder: str | Path, task: Task | None = None) -> TaskSpec:
@@ -83,10 +80,17 @@ def get_task(name_or_folder: str | Path) -> TaskSpec:
         ConfigError: if there is neither, listing the known names, or it cannot be loaded.
     """
     name, folder = str(name_or_folder), Path(name_or_folder)
-    if name not in _registered:
-        for plugin in metadata.entry_points(group=ENTRY_POINTS, name=name):
-            _load_plugin(plugin)
     if name in _registered:
+        return _registered[name]
+    for plugin in metadata.entry_points(group=ENTRY_POINTS, name=name):
+        what = f"task {name} ({plugin.value})"
+        try:
+            plugin.load()  # it calls `register_task`
+        except Exception as error:  # a module of another package may raise anything
+            reason = " ".join(f"{type(error).__name__}: {error}".split())
+            raise ConfigError(f"{what} cannot be loaded: {reason}") from error
+        if name not in _registered:
+            raise ConfigError(f"{what}: expected a call of register_task({name!r}, ...)")
         return _registered[name]
     if not isdir(name):  # noqa: PTH112 - Path.is_dir raises OSError for long names
         expected = expected_names(name, task_names(), "tasks are")
@@ -95,18 +99,6 @@ def get_task(name_or_folder: str | Path) -> TaskSpec:
         raise ConfigError(f"{folder} has no {SPEC_FILE}; expected a folder of terrainkit onboard")
     spec = RobotSpec.load(folder / SPEC_FILE)
     return TaskSpec(name=spec.name, folder=folder.absolute(), task=Task())
-
-
-def _load_plugin(plugin: metadata.EntryPoint) -> None:
-    """Import the module that registers the task of an entry point."""
-    what = f"task {plugin.name} ({plugin.value})"
-    try:
-        plugin.load()
-    except Exception as error:  # a module of another package may raise anything
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise ConfigError(f"{what} cannot be loaded: {reason}") from error
-    if plugin.name not in _registered:
-        raise ConfigError(f"{what}: expected a call of register_task({plugin.name!r}, ...)")
 
 
 for _path in Path(bundled.__file__).parent.glob("*/tasks/*.toml"):

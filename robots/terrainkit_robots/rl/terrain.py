@@ -3,18 +3,17 @@
 import tempfile
 from abc import ABC, abstractmethod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit import MapConfig, TerrainMap, generate
 from terrainkit.errors import ConfigError
+from terrainkit.export.mjcf import collision_surface
 from terrainkit.text import closest
 from terrainkit_robots.transforms import FloatArray
-
-if TYPE_CHECKING:
-    from terrainkit.terrain_map import TerrainMap
 
 
 class Terrain(ABC):
@@ -68,9 +67,7 @@ class MapTerrain(Terrain):
 
     is_flat = False
 
-    def __init__(self, terrain_map: "TerrainMap", collision: Any = "auto") -> None:
-        from terrainkit.export.mjcf import collision_surface
-
+    def __init__(self, terrain_map: TerrainMap, collision: Any = "auto") -> None:
         self.env_origins = terrain_map.env_origins
         self.terrain_names = np.array(terrain_map.terrain_names)[terrain_map.terrain_types]
         self.patch_length = terrain_map.config.patch_size[0]
@@ -118,8 +115,6 @@ def load_terrain(source: str | Path, collision: str = "auto") -> Terrain:
     if collision == "plane" or str(source) == "plane":
         return Plane()
     if path.suffix in (".npz", ".toml"):
-        from terrainkit import MapConfig, TerrainMap, generate
-
         is_map = path.suffix == ".npz"
         terrain_map = TerrainMap.load(path) if is_map else generate(MapConfig.load(path))
         return MapTerrain(terrain_map, collision)

@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Callable
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -59,28 +58,25 @@ def train(
     from terrainkit_robots.rl.terrain import load_terrain
 
     task = tasks.get_task(robot).task if task is None else task
-    if task.runner.logger == "wandb" and find_spec("wandb") is None:
-        raise ConfigError("runner.logger: wandb is not installed: pip install wandb")
-    continued = resume if resume and runs.can_continue(resume, robot, terrain, task) else None
+    ground = load_terrain(terrain, task.terrain.collision)
+    parts = runs.parts_to_load(resume, robot, terrain, task) if resume else None
+    continued = resume if parts is None else None
     share = runners.process_share(task)
     device = runners.resolve_device(device)
     model = continued.robot if continued else Robot.load(tasks.get_task(robot).folder)
     torch.set_num_threads(share.env.num_threads)
     torch.manual_seed(share.runner.seed)
-    env = LeggedEnv(share, model, load_terrain(terrain, task.terrain.collision), device)
+    env = LeggedEnv(share, model, ground, device)
     runner = runners.LeggedRunner(
         env, device=device, progress_callback=progress_callback, should_stop=should_stop
     )
     try:
         if resume is not None:
-            parts = None if continued else runs.parts_to_load(resume, terrain, task)
             runner.load(runs.last_checkpoint(resume), parts)
         completed, total = runner.current_learning_iteration, task.runner.max_iterations
         if completed >= total:
-            raise ConfigError(
-                f"runner.max_iterations: got {total}; expected more than the {completed} "
-                "iterations that are completed"
-            )
+            expected = f"expected more than the {completed} iterations that are completed"
+            raise ConfigError(f"runner.max_iterations: got {total}; {expected}")
         if runner.is_main_process:
             runner.folder = runs.run_folder(folder, robot, terrain, task, continued)
         # Resets of a new run would otherwise all time out in the same step.

@@ -28,6 +28,8 @@ class Robot:
     """Default joint positions [rad], shape (j,)."""
     wheels: NDArray[np.bool_]
     """Joints with damping but no stiffness, shape (j,)."""
+    action_scale: FloatArray
+    """Change of each joint's position target [rad] for an action of 1, shape (j,)."""
     effort: FloatArray
     """Torque limits [N m], shape (j,)."""
     velocity: FloatArray
@@ -61,6 +63,7 @@ class Robot:
             mjcf=folder / spec.mjcf,
             default_pose=array("default_pose"),
             wheels=(array("stiffness") == 0) & (array("damping") > 0),
+            action_scale=array("action_scale"),
             effort=array("effort"),
             velocity=array("velocity"),
             lower=lower,

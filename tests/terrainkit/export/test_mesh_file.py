@@ -1,11 +1,14 @@
 import dataclasses
 import json
 import struct
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 import trimesh
 
+from terrainkit.export.mesh_file import _FACES_PER_BLOCK
 from terrainkit.solids import Solids
 
 SUFFIXES = (".stl", ".ply", ".obj", ".glb")
@@ -61,6 +64,33 @@ def test_mesh_file_y_up_rotates_about_x(ray_down, terrain_map, tmp_path, suffix)
     xy = points(terrain_map)
     found = ray_down(np.column_stack([x, -toward, up]), mesh.faces, xy)
     np.testing.assert_allclose(found, terrain_map.height(xy), atol=1e-3)
+
+
+def test_mesh_file_ply_is_exact(terrain_map, tmp_path):
+    path = terrain_map.save(tmp_path / "map.ply")
+    read, mesh = trimesh.load_mesh(path, process=False), terrain_map.mesh()
+    assert read.vertices.astype(np.float32).tobytes() == mesh.vertices.tobytes()
+    assert read.faces.astype(np.int32).tobytes() == mesh.triangles.tobytes()
+
+
+def test_mesh_file_stl_is_exact(terrain_map, tmp_path):
+    path = terrain_map.save(tmp_path / "map.stl", full=True)
+    read, mesh = trimesh.load_mesh(path, process=False), terrain_map.mesh(merged=False)
+    assert len(mesh.triangles) > _FACES_PER_BLOCK
+    corners = mesh.vertices[mesh.triangles]
+    assert read.triangles.astype(np.float32).tobytes() == corners.tobytes()
+    # An independent computation of the normals that the file holds.
+    np.testing.assert_allclose(trimesh.triangles.normals(corners)[0], read.face_normals, atol=1e-5)
+
+
+@pytest.mark.parametrize("suffix", [".stl", ".ply"])
+def test_mesh_file_does_not_import_trimesh(tmp_path, suffix):
+    script = (
+        "import sys, terrainkit as t\n"
+        "t.generate(t.MapConfig(rows=1, cols=3, preset='stairs')).save(sys.argv[1])\n"
+        "assert 'trimesh' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", script, str(tmp_path / f"map{suffix}")], check=True)
 
 
 def test_mesh_file_glb_has_friction_extras(terrain_map, tmp_path):

@@ -28,6 +28,10 @@ def arrays(path):
         return dict(archive)
 
 
+NEW_KEYS = ("solid_", "hull_", "cylinders", "goals", "spawns")
+"""Prefixes of the keys that maps of version 0.1 lack."""
+
+
 # ---- what is in it -----------------------------------------------------------------------------
 
 
@@ -41,6 +45,7 @@ def arrays(path):
         ("border", "float64", ()),
         ("patch_size", "float64", (2,)),
         ("env_origins", "float32", (2, 3, 3)),
+        ("spawns", "float32", (2, 3, 1, 4)),
         ("terrain_types", "int32", (2, 3)),
         ("difficulty", "float32", (2, 3)),
         ("boxes", "float32", (0, 10)),
@@ -437,11 +442,44 @@ def test_npz_without_solids_is_readable(good, tmp_path):
     """Maps of version 0.1 have an empty array of boxes, and no other key of solids."""
     old = tmp_path / "old.npz"
     with np.load(good) as archive:
-        keys = [k for k in archive if not k.startswith(("solid_", "hull_", "cylinders", "goals"))]
+        keys = [k for k in archive if not k.startswith(NEW_KEYS)]
         np.savez(old, **{key: archive[key] for key in keys})
     read = TerrainMap.load(old)
     assert len(read.solids) == 0
     assert read.goals.shape == (*read.difficulty.shape, 0, 4)
+    assert read.spawns.shape == (*read.difficulty.shape, 1, 4)
+    assert read.env_origins.tobytes() == TerrainMap.load(good).env_origins.tobytes()
+
+
+def test_npz_spawns_round_trip(tmp_path):
+    terrains = (SubTerrain(terrain="flat"), SubTerrain(terrain="pit"))
+    config = MapConfig(rows=2, cols=2, border=0.0, spawns_per_patch=20, terrains=terrains)
+    terrain_map = generate(config)
+    read = TerrainMap.load(terrain_map.save(tmp_path / "map.npz"))
+    assert np.isnan(read.spawns).any()
+    assert read.spawns.tobytes() == terrain_map.spawns.tobytes()
+
+
+def test_npz_env_origins_are_the_first_spawns(good, bad):
+    with np.load(good) as archive:
+        origins = archive["env_origins"] + np.float32(0.25)
+    repack(good, bad, {"env_origins": npy(origins)})
+    assert TerrainMap.load(bad).spawns[:, :, 0, :3].tolist() == origins.tolist()
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        (np.zeros((2, 1, 0, 4)), "spawns: got none; expected one or more for each patch"),
+        (np.full((2, 1, 1, 4), np.inf), "spawns: got values that are not finite"),
+        (np.array([[[[1, 2, 3, np.nan]]]] * 2), "spawns: got values that are not finite"),
+        (np.array([[[[np.nan] * 4, [0] * 4]]] * 2), "spawns: got a gap; expected NaN at the end"),
+        (np.zeros((1, 2, 1, 4)), "spawns: got shape (1, 2, 1, 4)"),
+    ],
+)
+def test_npz_invalid_spawns_are_rejected(good, bad, value, message):
+    repack(good, bad, {"spawns": npy(value.astype(np.float32))})
+    assert message in refusal(bad)
 
 
 @pytest.mark.parametrize("text", ["{{{", "hello", "rows = ", "a\0b", '"a\nb" = 1'])

@@ -15,13 +15,13 @@ from terrainkit_robots.rl.run import (
     MAP_FILE,
     RUN_FILE,
     TASK_FILE,
-    can_continue,
     changed_robot_files,
     checkpoints,
     create_run,
     default_folder,
     is_same_terrain,
     open_run,
+    parts_to_load,
     run_folder,
 )
 from terrainkit_robots.rl.terrain import load_terrain
@@ -111,7 +111,7 @@ def test_modified_map_is_another_terrain(tmp_path, task, mixed_map):
     generate(other).save(path, overwrite=True)
     assert not is_same_terrain(run, path)
     with pytest.raises(ConfigError, match=r"map\.npz changed since .*run was trained; with a copy"):
-        can_continue(run, "quadruped", path, task)
+        parts_to_load(run, "quadruped", path, task)
 
 
 def test_create_run_rejects_map_of_other_version(tmp_path, task, mixed_map):

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.description import bundled
@@ -227,11 +226,6 @@ class TestAugment:
         assert batch.actions.shape == (16, 12)
         assert batch.values[:, 0].tolist() == 2 * list(range(8))
 
-    def test_unknown_group_is_rejected(self) -> None:
-        env = make_env("quadruped")
-        with pytest.raises(ConfigError, match="group: got 'camera'; expected: policy, privileged"):
-            augment(env, TensorDict({"camera": torch.zeros(8, 3)}, batch_size=[8]), None)
-
 
 class TestNames:
     """The mirror maps of the quadruped, by the names of its joints and feet."""
@@ -300,6 +294,14 @@ class TestErrors:
         robot = replace(robot, spec=replace(robot.spec, **{table: other}))
         with pytest.raises(ConfigError, match=f"{table} differs between left and right: RL_hip"):
             mirror_maps(make_env("", robot=robot))
+
+    def test_feet_without_pairs_are_rejected(self) -> None:
+        env = make_env("quadruped")
+        position = env.scene.foot_pos.copy()
+        position[0] = position[2]  # two feet have the same mirror image
+        env.scene = replace(env.scene, foot_pos=position)
+        with pytest.raises(ConfigError, match=f"symmetry: the foot {env.robot.spec.feet[2]} is"):
+            mirror_maps(env)
 
     def test_asymmetric_scan_is_rejected(self) -> None:
         env = make_env("quadruped", Valley())

@@ -349,9 +349,9 @@ def test_too_many_environments_write_nothing(task, tmp_path):
 
 
 def test_missing_wandb_is_reported(task, tmp_path, monkeypatch):
-    monkeypatch.setattr("terrainkit_robots.rl.train.find_spec", lambda _: None)
+    monkeypatch.setattr("rsl_rl.utils.wandb_log_writer.wandb", None)
     task = replace(task, runner=replace(task.runner, logger="wandb"))
-    with pytest.raises(ConfigError, match="wandb is not installed: pip install wandb"):
+    with pytest.raises(ConfigError, match="wandb does not start: wandb package is required"):
         train("quadruped", "plane", task, folder=tmp_path / "run")
 
 

@@ -30,17 +30,6 @@ class EditError(TerrainkitError):
     """An edit that is not possible, because its element is missing or it overlaps another edit."""
 
 
-def edit_bytes(data: bytes, edits: Sequence[Edit]) -> bytes:
-    """Return `data` with `edits` applied. All other bytes are unchanged.
-
-    Raises:
-        EditError: if an edit is not possible, or two edits overlap.
-    """
-    edited = EditedBytes(data)
-    edited.add(edits)
-    return edited.result()
-
-
 @dataclass(frozen=True, kw_only=True)
 class _Replacement:
     """A replacement of a range of bytes."""

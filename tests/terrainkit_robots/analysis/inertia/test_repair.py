@@ -7,7 +7,7 @@ import pytest
 import terrainkit_robots
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.lint.fixes.edits import edit_bytes
+from terrainkit_robots.lint.fixes.edits import EditedBytes
 from terrainkit_robots.mesh.mesh_cache import Meshes
 
 QUADRUPED = Path(terrainkit_robots.__file__).parent / "description/bundled/quadruped/quadruped.xml"
@@ -37,7 +37,9 @@ def repaired(tmp_path):
         facts = Facts(load_robot(path), Meshes())
         fix = facts.inertia_repair.fix(facts.tree.links[link])
         assert fix is not None
-        data = edit_bytes(path.read_bytes(), fix.edits)
+        edited = EditedBytes(path.read_bytes())
+        edited.add(fix.edits)
+        data = edited.result()
         model = mujoco.MjModel.from_xml_string(data.decode())
         body = model.body(link)
         turn = np.zeros(9)

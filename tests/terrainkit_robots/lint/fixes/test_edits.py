@@ -15,7 +15,7 @@ from terrainkit_robots.description.fix import (
     WriteFile,
 )
 from terrainkit_robots.description.model import Source
-from terrainkit_robots.lint.fixes.edits import EditedBytes, EditError, edit_bytes
+from terrainkit_robots.lint.fixes.edits import EditedBytes, EditError
 
 FILE = Path("robot.urdf")
 
@@ -38,6 +38,12 @@ def without(element, name):
 
 def child(element, xml, *, first=False):
     return InsertChild(source=at(element), xml=xml, first=first)
+
+
+def edit_bytes(data, edits):
+    edited = EditedBytes(data)
+    edited.add(edits)
+    return edited.result()
 
 
 def edited(text, *edits):

@@ -1,0 +1,57 @@
+"""Solids that are given by their corners: axis-aligned blocks and ramps."""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from terrainkit.errors import ConfigError
+from terrainkit.solids import Solids, make_boxes, make_hulls
+
+SINK = 0.05
+"""Depth below the ground at which solids that stand on it begin [m]."""
+
+MAX_PER_AXIS = 200
+"""Largest number of elements along an axis of a patch."""
+
+
+def number_that_fits(name: str, pitch: float, extent: float) -> int:
+    """Return how many elements of length `pitch` fit in `extent` [m].
+
+    Args:
+        name: Name of the element, for the error message.
+        pitch: Length of an element, including the gap to the next one [m].
+        extent: Length that the elements share [m].
+
+    Raises:
+        ConfigError: if there are more than `MAX_PER_AXIS`.
+    """
+    if pitch * MAX_PER_AXIS < extent:
+        raise ConfigError(
+            f"{name}: got {pitch:g} m from one to the next; expected at least "
+            f"{extent / MAX_PER_AXIS:g} m, so that at most {MAX_PER_AXIS} share {extent:g} m"
+        )
+    return max(0, math.floor(extent / pitch + 1e-9))
+
+
+def make_blocks(lower: ArrayLike, upper: ArrayLike) -> Solids:
+    """Return axis-aligned boxes between two corners [m], shapes (n, 3)."""
+    low, high = np.asarray(lower, float), np.asarray(upper, float)
+    return make_boxes((low + high) / 2, high - low)
+
+
+def make_ramps(lower: ArrayLike, upper: ArrayLike, corners: ArrayLike) -> Solids:
+    """Return solids on the ground with a rectangular base and a plane top.
+
+    Args:
+        lower: Corners of the bases with the smallest x and y [m], shape (n, 2).
+        upper: Corners of the bases with the largest x and y [m], shape (n, 2).
+        corners: Heights of the tops, counterclockwise from `lower` [m], shape (n, 4).
+    """
+    (x0, y0), (x1, y1) = np.asarray(lower, float).T, np.asarray(upper, float).T
+    xy = np.stack([np.stack([x0, x1, x1, x0], -1), np.stack([y0, y0, y1, y1], -1)], axis=-1)
+    z = np.asarray(corners, float)[..., None]
+    points: NDArray[np.float64] = np.concatenate(
+        [np.concatenate([xy, z], -1), np.concatenate([xy, 0 * z - SINK], -1)], axis=1
+    )
+    return make_hulls(list(points))

@@ -1,0 +1,36 @@
+"""Rugged natural ground."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.gradient_noise import fractal_noise, unit_relief
+from terrainkit.grid import Grid
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fractal(Terrain):
+    """Rugged natural ground (a sum of Perlin noises) around a flat platform.
+
+    The heights fade to 0 at the platform and at the edges of the patch.
+    """
+
+    amplitude: float = parameter.height(0.05, 0.4)
+    """Height of the highest hill or depth of the deepest hollow, whichever is larger [m]."""
+
+    wavelength: float = parameter.scalar(3.0, allows_zero=False)
+    """Wavelength of the first octave [m]; about the diameter of the largest hills."""
+
+    octaves: int = parameter.count(5)
+    """Number of octaves. Each has half the wavelength and half the amplitude of the one before."""
+
+    platform: float = parameter.platform(2.0, slopes_away=True)
+    """Side of the flat square at the center [m]."""
+
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the noise, scaled to the amplitude."""
+        noise = fractal_noise(grid, self.wavelength, self.octaves, rng)
+        return self.amplitude * unit_relief(grid, noise, self.platform, 1.0)

@@ -1,0 +1,44 @@
+"""A grid of square blocks at random heights."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class RandomGrid(Terrain):
+    """Square blocks at random heights around a flat platform.
+
+    The blocks are centered. The remaining cells at the edges, at least one, are at height 0.
+    """
+
+    height: float = parameter.height(0.0, 0.3)
+    """Largest height of a block above or below 0 [m]."""
+
+    block: float = parameter.length(0.4)
+    """Side of a block [m]."""
+
+    platform: float = parameter.platform(2.0, slopes_away=True)
+    """Side of the flat square at the center [m]."""
+
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the blocks, with the platform cleared."""
+        side = grid.cells(self.block)
+        number = tuple((n - 2) // side for n in grid.shape)
+        if min(number) < 1:
+            raise ConfigError(
+                f"random_grid: no block of {self.block:g} m fits in a rim of {grid.cell:g} m in "
+                f"a patch of {grid.size[0]:g} m x {grid.size[1]:g} m"
+            )
+        blocks = self.height * (2 * rng.random(number) - 1)
+        ground = np.zeros(grid.shape)
+        extent = (number[0] * side, number[1] * side)
+        ground[grid.centered_slices(extent)] = np.kron(blocks, np.ones((side, side)))
+        ground[grid.centered_slices(grid.centered(self.platform))] = 0.0
+        return ground

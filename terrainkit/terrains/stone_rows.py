@@ -1,0 +1,86 @@
+"""Two rows of stones along a lane."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.blocks import SINK, make_blocks, number_that_fits
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+from terrainkit.lane import lane_goals, lane_spawn
+from terrainkit.pit_ground import pit_across, pit_bounds
+from terrainkit.solids import Solids
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class StoneRows(Terrain):
+    """Two rows of square stones across a pit, one for the left feet and one for the right.
+
+    The robot is spawned at low x and walks along x. There is a goal at each pair of stones and one
+    behind the pit. A block behind the last pair takes the rest of the pit.
+    """
+
+    stone: float = parameter.size(0.8, 0.2)
+    """Side of a stone [m]."""
+
+    gap: float = parameter.size(0.1, 0.5)
+    """Gap between two stones of a row [m]."""
+
+    row_gap: float = parameter.size(0.1)
+    """Gap between the two rows [m]."""
+
+    variation: float = parameter.height(0.05)
+    """Largest height of a stone above or below 0 [m]."""
+
+    depth: float = parameter.height(1.0)
+    """Depth of the pit [m]."""
+
+    start: float = parameter.length(2.0)
+    """Length of the flat strip at each end along x [m]."""
+
+    def spawn(self, grid: Grid) -> tuple[float, float]:
+        """Return the center of the flat start."""
+        return lane_spawn(grid, self.start)
+
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the pit between the flat strips."""
+        return pit_across(grid, self.depth, self.start)
+
+    def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
+        """Return the stones, and the block behind the last pair."""
+        x = self._layout(grid)
+        low, high = pit_bounds(grid, self.start)
+        y = grid.center[1] + np.array([-self.row_gap / 2 - self.stone, self.row_gap / 2])
+        top = np.maximum(self.variation * (2 * rng.random((len(x), 2)) - 1), SINK - self.depth)
+        corner = np.stack(np.broadcast_arrays(x[:, None], y, -self.depth - SINK), axis=-1)
+        upper = np.dstack([corner[..., :2] + self.stone, top])
+        block = np.array([x[-1] + self.stone + self.gap, low[1], -self.depth - SINK])
+        lower, upper = (np.reshape(corners, (-1, 3)) for corners in (corner, upper))
+        if block[0] < high[0] - 1e-3:
+            lower, upper = np.vstack([lower, block]), np.vstack([upper, [*high, 0.0]])
+        return make_blocks(lower, upper)
+
+    def goals(
+        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
+    ) -> NDArray[np.floating]:
+        """Return a goal at each pair of stones, and one behind the pit."""
+        behind = grid.upper[0] - grid.length(grid.cells(self.start)) / 2
+        goals = lane_goals(grid, [*(self._layout(grid) + self.stone / 2), behind])
+        goals[:, 2] = 0.0
+        return goals
+
+    def _layout(self, grid: Grid) -> NDArray[np.float64]:
+        """Return the first edge of each pair of stones along x [m]."""
+        low, high = pit_bounds(grid, self.start)
+        pitch, (length, width) = self.stone + self.gap, high - low
+        number = number_that_fits("stone_rows", pitch, length - self.gap)
+        if number < 1 or 2 * self.stone + self.row_gap > width:
+            raise ConfigError(
+                f"stone_rows: got stone {self.stone:g} m, gap {self.gap:g} m and row_gap "
+                f"{self.row_gap:g} m; expected two rows that fit in a pit of {length:g} m x "
+                f"{width:g} m"
+            )
+        return np.asarray(low[0] + self.gap + np.arange(number) * pitch)

@@ -1,0 +1,33 @@
+import numpy as np
+import pytest
+
+from terrainkit.blocks import SINK, make_blocks, make_ramps, number_that_fits
+from terrainkit.errors import ConfigError
+from terrainkit.solid_index import SolidIndex
+
+
+@pytest.mark.parametrize(
+    ("pitch", "extent", "number"), [(0.1, 0.3, 3), (0.5, 1.2, 2), (2.0, 1.0, 0), (1.0, -1.0, 0)]
+)
+def test_number_that_fits_counts_whole_elements(pitch, extent, number):
+    assert number_that_fits("stones", pitch, extent) == number
+
+
+def test_number_that_fits_rejects_too_many():
+    with pytest.raises(ConfigError, match=r"stones: got 0.01 m from .* at least 0.04 m"):
+        number_that_fits("stones", 0.01, 8.0)
+
+
+def test_make_blocks_span_both_corners():
+    lower, upper = make_blocks([[1.0, 2.0, -1.0]], [[1.5, 3.0, 0.25]]).bounds()
+    assert lower.tolist() == [[1.0, 2.0, -1.0]]
+    assert upper.tolist() == [[1.5, 3.0, 0.25]]
+
+
+def test_make_ramps_top_is_the_plane_of_the_corners():
+    # Rises by 0.2 m along x and by 0.1 m along y.
+    ramp = make_ramps([[1.0, 2.0]], [[2.0, 3.0]], [[0.0, 0.2, 0.3, 0.1]])
+    xy = [[1.5, 2.5], [1.9, 2.1], [1.1, 2.8]]
+    (low, high) = SolidIndex(ramp).spans(np.array(xy))[:, 0].T
+    assert high == pytest.approx([0.15, 0.19, 0.1])
+    assert low == pytest.approx(-SINK)
