@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from terrainkit.blocks import MAX_PER_AXIS
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
-from terrainkit.parameter import MAX_COUNT
 
 
 def lane_spawn(grid: Grid, start: float) -> tuple[float, float]:
@@ -55,13 +55,13 @@ def lane_slots(
     low, high = spacing
     first = grid.length(grid.cells(start))
     number = (grid.size[0] - first - end + 1e-9) / ((low + high) / 2)
-    if not (length < low <= high and 1 <= number <= MAX_COUNT):
+    if not (length < low <= high and 1 <= number <= MAX_PER_AXIS):
         raise ConfigError(
             f"{name}: got elements {length:g} m long with a spacing of {low:g} m to {high:g} m "
             f"between a start of {start:g} m and an end of {end:g} m; expected elements shorter "
-            f"than the spacing, and 1 to {MAX_COUNT} of them in a patch {grid.size[0]:g} m long"
+            f"than the spacing, and 1 to {MAX_PER_AXIS} of them in a patch {grid.size[0]:g} m long"
         )
-    return grid.lower[0] + first + np.arange(int(number) + 1) * ((low + high) / 2)
+    return np.float64(grid.lower[0] + first) + np.arange(int(number) + 1) * ((low + high) / 2)
 
 
 def slot_centers(
@@ -79,23 +79,11 @@ def slot_centers(
     return middle + (rng.random(len(middle)) - 0.5) * (high - low) / 2
 
 
-def lane_pit(grid: Grid, first: float, last: float, depth: float) -> NDArray[np.float64]:
-    """Return flat ground with a pit from x = `first` to `last` [m], shape `grid.shape`."""
-    ground = np.zeros(grid.shape)
-    ground[slice_along_x(grid, (first + last) / 2, grid.cells(last - first))] = -depth
-    return ground
-
-
-def slice_along_x(grid: Grid, center: float, cells: int) -> slice:
-    """Return the index of `cells` cells along x around x = `center` [m]."""
-    first = max(0, int(np.floor((center - grid.lower[0]) / grid.cell - cells / 2 + 0.5 + 1e-5)))
-    return slice(first, first + cells)
-
-
 def lane_goals(grid: Grid, x: ArrayLike) -> NDArray[np.float64]:
     """Return goals on the ground at `x` [m], in the middle of the lane and along x, (k, 4).
 
     A goal at the end of the patch is moved into its last cell.
     """
-    x = np.minimum(np.atleast_1d(np.asarray(x, dtype=float)), grid.upper[0] - grid.cell / 2)
-    return np.column_stack([x, np.full(len(x), grid.center[1]), np.full(len(x), np.nan), 0 * x])
+    inside = np.minimum(np.atleast_1d(np.asarray(x, dtype=float)), grid.upper[0] - grid.cell / 2)
+    y, z = np.full(len(inside), grid.center[1]), np.full(len(inside), np.nan)
+    return np.column_stack([inside, y, z, 0 * inside])

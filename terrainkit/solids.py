@@ -13,17 +13,13 @@ from terrainkit.parameter import MAX_VALUE
 MAX_HULL_VERTICES = 1000
 """Largest number of vertices of a convex hull."""
 
-EMBED_DEPTH = 0.05
-"""Distance that a solid on the ground extends below it, so that no gap remains [m]."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Solids:
     """Boxes, cylinders and convex hulls in the frame of the map.
 
     Arrays over all n solids list the boxes first, then the cylinders, then the hulls. Use
-    :func:`make_boxes`, :func:`make_standing_boxes`, :func:`make_cylinders` and :func:`make_hulls`
-    to create solids.
+    :func:`make_boxes`, :func:`make_cylinders` and :func:`make_hulls` to create solids.
     """
 
     boxes: NDArray[np.float32]
@@ -187,36 +183,6 @@ def make_boxes(
         ConfigError: if a value is not finite, or a size is not above 0.
     """
     return _make("boxes", center, np.asarray(size, float) / 2, rpy, friction, collides, visible)
-
-
-def make_standing_boxes(
-    xy: ArrayLike,
-    size: ArrayLike,
-    top: ArrayLike,
-    *,
-    ground: ArrayLike = 0.0,
-    yaw: ArrayLike = 0.0,
-) -> Solids:
-    """Return n boxes that stand on the ground and extend `EMBED_DEPTH` below it.
-
-    Args:
-        xy: Centers [m], shape (n, 2).
-        size: Full sizes along the horizontal axes of the box [m], shape (n, 2) or (2,).
-        top: Heights of the upper sides [m], shape (n,) or ().
-        ground: Heights of the ground [m], shape (n,) or ().
-        yaw: Rotations around z [rad], shape (n,) or ().
-
-    Raises:
-        ConfigError: if a value is not finite, or a size is not above 0.
-    """
-    center = np.asarray(xy, float)
-    columns = (top, np.asarray(ground, float) - EMBED_DEPTH, yaw)
-    top, bottom, yaw = (np.broadcast_to(np.asarray(each, float), len(center)) for each in columns)
-    return make_boxes(
-        np.column_stack([center, (top + bottom) / 2]),
-        np.column_stack([np.broadcast_to(size, center.shape), top - bottom]),
-        rpy=np.column_stack([0 * yaw, 0 * yaw, yaw]),
-    )
 
 
 def make_cylinders(

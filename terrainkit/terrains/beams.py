@@ -7,9 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
+from terrainkit.blocks import make_standing_boxes
 from terrainkit.grid import Grid
-from terrainkit.lane import lane_pit, lane_slots, lane_spawn
-from terrainkit.solids import Solids, make_standing_boxes
+from terrainkit.lane import lane_slots, lane_spawn
+from terrainkit.pit_ground import pit_between
+from terrainkit.solids import Solids
 from terrainkit.terrain import Terrain
 
 
@@ -55,7 +57,7 @@ class Beams(Terrain):
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return 0, and `-depth` in the pit."""
         edges = self._slots(grid)
-        return lane_pit(grid, edges[0], edges[-1] + self.gap, self.depth)
+        return pit_between(grid, self.depth, edges[0], edges[-1] + self.gap)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return a box for each beam, down to the floor of the pit."""
@@ -63,7 +65,7 @@ class Beams(Terrain):
         center = np.column_stack([(first + last) / 2, np.full(len(first), grid.center[1])])
         size = np.column_stack([last - first, np.full(len(first), self.width)])
         yaw = self.yaw * (2 * rng.random(len(first)) - 1)
-        return make_standing_boxes(center, size, 0.0, ground=-self.depth, yaw=yaw)
+        return make_standing_boxes(center, size, 0.0, floor=-self.depth, yaw=yaw)
 
     def goals(
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator

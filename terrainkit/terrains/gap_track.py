@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.grid import Grid
-from terrainkit.lane import lane_goals, lane_slots, lane_spawn, slice_along_x, slot_centers
+from terrainkit.lane import lane_goals, lane_slots, lane_spawn, slot_centers
 from terrainkit.terrain import Terrain
 
 
@@ -46,7 +46,7 @@ class GapTrack(Terrain):
         ground = np.zeros(grid.shape)
         spacing = self.min_spacing, self.max_spacing
         for center in slot_centers(self._slots(grid), spacing, rng):
-            ground[slice_along_x(grid, center, grid.cells(self.length))] = -self.depth
+            ground[grid.slice_along_x(center, grid.cells(self.length))] = -self.depth
         return ground
 
     def goals(

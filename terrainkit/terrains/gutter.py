@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
+from terrainkit.blocks import make_ramps
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.lane import lane_goals, lane_spawn
-from terrainkit.solids import EMBED_DEPTH, Solids, make_hulls
+from terrainkit.solids import Solids
 from terrainkit.terrain import Terrain
 
 
@@ -54,17 +55,11 @@ class Gutter(Terrain):
                 f"{self.width:g} m; expected a roll below 1.5708 rad, and bottom < width within a "
                 f"patch of {grid.size[0]:g} m x {grid.size[1]:g} m between start and end"
             )
-        profile = [
-            (inner, 0.0),
-            (outer, (outer - inner) * np.tan(self.roll)),
-            (inner, -EMBED_DEPTH),
-            (outer, -EMBED_DEPTH),
-        ]
-        return make_hulls(
-            [
-                [(x, grid.center[1] + side * y, z) for x in (first, last) for y, z in profile]
-                for side in (-1, 1)
-            ]
+        height, y = (outer - inner) * np.tan(self.roll), grid.center[1]
+        return make_ramps(
+            [(first, y - outer), (first, y + inner)],
+            [(last, y - inner), (last, y + outer)],
+            [(height, height, 0.0, 0.0), (0.0, 0.0, height, height)],
         )
 
     def goals(

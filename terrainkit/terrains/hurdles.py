@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.grid import Grid
-from terrainkit.lane import lane_goals, lane_slots, lane_spawn, slice_along_x, slot_centers
+from terrainkit.lane import lane_goals, lane_slots, lane_spawn, slot_centers
 from terrainkit.terrain import Terrain
 
 
@@ -52,7 +52,7 @@ class Hurdles(Terrain):
         cells = low + (rng.random(len(centers)) * (max(high - low, 0) + 1)).astype(np.int64)
         ground = np.zeros(grid.shape)
         for center, thickness in zip(centers, cells.tolist(), strict=True):
-            ground[slice_along_x(grid, center, thickness)] = self.height
+            ground[grid.slice_along_x(center, thickness)] = self.height
         return ground
 
     def goals(

@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
+from terrainkit.blocks import make_standing_boxes
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.lane import lane_goals, lane_spawn
 from terrainkit.parameter import MAX_COUNT
-from terrainkit.solids import Solids, make_standing_boxes
+from terrainkit.solids import Solids
 from terrainkit.terrain import Terrain
 
 
@@ -54,7 +55,7 @@ class KRails(Terrain):
         row, column = np.divmod(np.arange(nx * ny), ny)
         x = first + (row + 0.5) * self.panel
         y = grid.center[1] + (column - (ny - 1) / 2) * self.panel
-        yaw = np.pi / 4 * (-1.0) ** column
+        yaw = np.where(column % 2 == 0, np.pi / 4, -np.pi / 4)
         return make_standing_boxes(
             np.column_stack([x, y]), (length, self.height), self.height, yaw=yaw
         )

@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
+from terrainkit.blocks import SINK
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.lane import lane_goals, lane_spawn
 from terrainkit.parameter import MAX_COUNT
-from terrainkit.solids import EMBED_DEPTH, Solids, make_boxes, make_cylinders
+from terrainkit.solids import Solids, make_boxes, make_cylinders
 from terrainkit.terrain import Terrain
 
 RAIL = 0.05
@@ -82,7 +83,7 @@ class Ladder(Terrain):
             self.width,
             rpy=(np.pi / 2, 0.0, 0.0),
         )
-        low, high, side = -EMBED_DEPTH, self.height, (self.width + RAIL) / 2
+        low, high, side = -SINK, self.height, (self.width + RAIL) / 2
         middle = (low + high) / 2
         rails = make_boxes(
             [[foot + middle * slope, grid.center[1] + y, middle] for y in (-side, side)],

@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
+from terrainkit.blocks import SINK
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.scatter import scatter
-from terrainkit.solids import EMBED_DEPTH, Solids, make_boxes
+from terrainkit.solids import Solids, make_boxes
 from terrainkit.terrain import Terrain
 
 FULL, HALF = (1.2, 0.8, 0.144), (0.6, 0.4, 0.116)
@@ -64,7 +65,7 @@ class Pallets(Terrain):
         z = np.concatenate([np.arange(n) for n in layers]) * height
         normal = np.column_stack([-np.sin(yaw), np.cos(yaw)])[stack]
         rpy = np.column_stack([0 * z, 0 * z, yaw[stack]])
-        runner, below = width * RUNNER_WIDTH, np.where(z == 0, EMBED_DEPTH, 0.0)
+        runner, below = width * RUNNER_WIDTH, np.where(z == 0, SINK, 0.0)
         top = z + height * RUNNER_HEIGHT
         parts = [
             make_boxes(

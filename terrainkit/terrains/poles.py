@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
+from terrainkit.blocks import SINK
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.scatter import scatter
-from terrainkit.solids import EMBED_DEPTH, Solids, make_cylinders
+from terrainkit.solids import Solids, make_cylinders
 from terrainkit.terrain import Terrain
 
 
@@ -64,5 +65,5 @@ class Poles(Terrain):
                 f"{grid.size[0]:g} m x {grid.size[1]:g} m"
             )
         height = self.min_height + (self.max_height - self.min_height) * rng.random(len(xy))
-        center = np.column_stack([xy, (height - EMBED_DEPTH) / 2])
-        return make_cylinders(center, r, height + EMBED_DEPTH)
+        center = np.column_stack([xy, (height - SINK) / 2])
+        return make_cylinders(center, r, height + SINK)

@@ -6,10 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
+from terrainkit.blocks import make_ramps
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
-from terrainkit.lane import lane_pit, lane_slots, lane_spawn
-from terrainkit.solids import EMBED_DEPTH, Solids, make_hulls
+from terrainkit.lane import lane_slots, lane_spawn
+from terrainkit.pit_ground import pit_between
+from terrainkit.solids import Solids
 from terrainkit.terrain import Terrain
 
 
@@ -53,29 +55,25 @@ class SideRamps(Terrain):
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return 0, and `-depth` in the pit."""
         edges = self._slots(grid)
-        return lane_pit(grid, edges[0], edges[-1] + self.gap, self.depth)
+        return pit_between(grid, self.depth, edges[0], edges[-1] + self.gap)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
-        """Return a prism for each ramp, down to the floor of the pit."""
+        """Return a solid for each ramp, down to the floor of the pit."""
         rise = self.width / 2 * np.tan(self.roll)
         if not (self.roll < np.pi / 2 and rise <= self.depth):
             raise ConfigError(
                 f"side_ramps: got roll {self.roll:g} rad and width {self.width:g} m; expected a "
                 f"lower side above the floor of the pit, {self.depth:g} m deep"
             )
-        edges, bottom = self._slots(grid), -self.depth - EMBED_DEPTH
-        ramps = []
-        for first, last, side in zip(edges[:-1], edges[1:], self._sides(edges), strict=True):
-            middle = grid.center[1] + side * self.offset
-            ramps.append(
-                [
-                    (x, middle + across * side * self.width / 2, z)
-                    for x in (first + self.gap, last)
-                    for across in (-1, 1)
-                    for z in (bottom, across * rise)
-                ]
-            )
-        return make_hulls(ramps)
+        edges = self._slots(grid)
+        side = self._sides(edges)
+        low, high = (grid.center[1] + side * self.offset + w * self.width / 2 for w in (-1, 1))
+        return make_ramps(
+            np.column_stack([edges[:-1] + self.gap, low]),
+            np.column_stack([edges[1:], high]),
+            rise * side[:, None] * [-1, -1, 1, 1],
+            floor=-self.depth,
+        )
 
     def goals(
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
@@ -89,7 +87,7 @@ class SideRamps(Terrain):
     @staticmethod
     def _sides(edges: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return 1 for each ramp on the left, and -1 for each on the right."""
-        return (-1.0) ** np.arange(len(edges) - 1)
+        return np.where(np.arange(len(edges) - 1) % 2 == 0, 1.0, -1.0)
 
     def _slots(self, grid: Grid) -> NDArray[np.float64]:
         spacing, end = (self.spacing, self.spacing), max(self.end, self.gap + grid.cell)

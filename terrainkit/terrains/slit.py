@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
+from terrainkit.blocks import make_standing_boxes
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.lane import lane_goals, lane_slots, lane_spawn
-from terrainkit.solids import Solids, make_standing_boxes
+from terrainkit.solids import Solids
 from terrainkit.terrain import Terrain
 
 
@@ -58,9 +59,10 @@ class Slit(Terrain):
         edges, y = self._layout(grid, rng)
         x = (edges[:-1] + edges[1:]) / 2
         width = self.opening * self.body_width
-        sides = [(grid.lower[1], y - width / 2), (y + width / 2, grid.upper[1])]
-        center = np.concatenate([np.column_stack([x, (a + b) / 2]) for a, b in sides])
-        size = np.concatenate([np.column_stack([0 * x + self.depth, b - a]) for a, b in sides])
+        low = np.concatenate([0 * y + grid.lower[1], y + width / 2])
+        high = np.concatenate([y - width / 2, 0 * y + grid.upper[1]])
+        center = np.column_stack([np.tile(x, 2), (low + high) / 2])
+        size = np.column_stack([0 * low + self.depth, high - low])
         return make_standing_boxes(center, size, self.height)
 
     def goals(

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
+from terrainkit.blocks import make_standing_boxes
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
-from terrainkit.solids import Solids, make_standing_boxes
+from terrainkit.solids import Solids
 from terrainkit.terrain import Terrain
 
 
@@ -51,7 +52,8 @@ class Star(Terrain):
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return a box for each beam, down to the floor of the pit.
 
-        Both ends of a box are in the ground, by up to half of its width, so that its corners are.
+        Both ends of a box are in the ground, by half of its width: its corners would be over the
+        pit if it met the side of the pit at an angle.
         """
         rim = grid.length(grid.cells(self.rim))
         if not self.width / 2**0.5 <= rim:
@@ -69,4 +71,4 @@ class Star(Terrain):
         first, last = np.maximum(first - self.width / 2, 0), last + self.width / 2
         center = grid.center + direction * ((first + last) / 2)[:, None]
         size = np.column_stack([last - first, np.full(self.number, self.width)])
-        return make_standing_boxes(center, size, 0.0, ground=-self.depth, yaw=yaw)
+        return make_standing_boxes(center, size, 0.0, floor=-self.depth, yaw=yaw)

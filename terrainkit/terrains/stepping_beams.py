@@ -7,10 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
+from terrainkit.blocks import make_standing_boxes
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
-from terrainkit.lane import lane_pit, lane_slots, lane_spawn
-from terrainkit.solids import Solids, make_standing_boxes
+from terrainkit.lane import lane_slots, lane_spawn
+from terrainkit.pit_ground import pit_between
+from terrainkit.solids import Solids
 from terrainkit.terrain import Terrain
 
 
@@ -59,7 +61,7 @@ class SteppingBeams(Terrain):
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return 0, and `-depth` in the pit."""
         edges = self._slots(grid)
-        return lane_pit(grid, edges[0], edges[-1] + self.gap, self.depth)
+        return pit_between(grid, self.depth, edges[0], edges[-1] + self.gap)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return a box for each beam, down to the floor of the pit."""
@@ -76,7 +78,7 @@ class SteppingBeams(Terrain):
             np.column_stack([edges[1:] - self.width / 2, y]),
             np.column_stack([np.full(len(y), self.width), length]),
             0.0,
-            ground=-self.depth,
+            floor=-self.depth,
             yaw=self.yaw * (2 * turn - 1),
         )
 
