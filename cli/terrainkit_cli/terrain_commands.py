@@ -1,4 +1,4 @@
-"""The commands for maps: generate, list, info, preview and check-map."""
+"""The commands for maps: generate, list, info, preview, check-map and diff."""
 
 import sys
 from collections.abc import Sequence
@@ -292,6 +292,39 @@ class CheckMap(Command):
             render.result(f"\n{self.map}: {count(len(issues), 'issue')}")
             return 1
         render.result(f"{self.map}: {terrain_map.difficulty.size} patches, no issues")
+        return 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Diff(Command):
+    """Compare two maps: config, and each patch.
+
+    Exit code 0: the maps are the same. 1: they differ. 2: a file cannot be read.
+    """
+
+    a: MapFile
+    """The first map, a file written by terrainkit generate."""
+
+    b: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OTHER.npz")]
+    """The second map."""
+
+    def run(self) -> int:
+        """Print the differences, and return 1 if there are any."""
+        from terrainkit.map_diff import diff_maps
+
+        a, b = TerrainMap.load(self.a), TerrainMap.load(self.b)
+        diff = diff_maps(a, b)
+        for line in diff.config:
+            render.result(f"config: {line}")
+        for line in diff.grid:
+            render.result(line)
+        for (row, col), lines in diff.patches.items():
+            render.result(f"patch ({row}, {col}): {'; '.join(lines)}")
+        if diff:
+            total = a.difficulty.size
+            render.result(f"\n{self.a} -> {self.b}: {len(diff.patches)} of {total} patches differ")
+            return 1
+        render.result(f"{self.a} and {self.b} are the same")
         return 0
 
 
