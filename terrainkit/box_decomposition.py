@@ -12,12 +12,16 @@ from terrainkit.grid import Grid
 from terrainkit.mesh.closed import THICKNESS
 from terrainkit.mesh.node_grid import NodeGrid
 from terrainkit.rectangle_cover import rectangle_cover
-from terrainkit.walls import flat_corners
+from terrainkit.walls import flat_corners, wall_edges
 
 MAX_HEIGHTS_PER_BLOCK = 50
 """Number of heights in a block above which boxes are searched only around the cells of their
 height, since the time would grow with its square. Below it, a box may extend under higher ground to
 the edge of the block, where it can merge with one in the next block."""
+
+MAX_LENGTH = 24.0
+"""Distance at which a row of merged boxes is divided [m]. Long boxes enlarge many nodes of MuJoCo's
+bounding volume hierarchy, all of which are tested for a robot near such a box."""
 
 _Cell = TypeVar("_Cell", bound=np.generic)
 
@@ -36,8 +40,7 @@ class BoxDecomposition:
     """Half of the size along x, y and z [m], shape (n, 3)."""
 
     covered: NDArray[np.bool_]
-    """Whether the whole cell is the top of a box, shape (nx, ny). The other cells are not flat and
-    need a heightfield."""
+    """Whether the whole cell is the top of a box, shape (nx, ny). The others need a heightfield."""
 
     @property
     def complete(self) -> bool:
@@ -55,7 +58,11 @@ def decompose_boxes(
 
     A cell is flat if its whole square is flat. Within a patch, the boxes of each height are found
     by :func:`~terrainkit.rectangle_cover.rectangle_cover`, and may extend under higher ground.
-    Boxes of different patches that share a whole side are merged.
+    Boxes of different patches that share a whole side are merged, and divided at `MAX_LENGTH`
+    unless that doubles their number. They are sorted by their centers, since MuJoCo's bounding
+    volume hierarchy divides boxes with equal centers along an axis in this order.
+
+    A patch that has slopes and no walls gets no boxes: a heightfield represents it exactly.
 
     Args:
         heights: Samples [m], shape `grid.shape`.
@@ -68,6 +75,7 @@ def decompose_boxes(
     flat = flat_cells(heights, grid, threshold)
     # A lower bound of the ground in each cell.
     low = np.where(flat, heights, cv2.erode(heights, np.ones((3, 3), dtype=np.uint8)))
+    _drop_patches_without_walls(flat, _cells_at_walls(heights, threshold), patch_edges)
     edges = [
         np.unique(np.concatenate([[0], lines, [n]])).tolist()
         for lines, n in zip(patch_edges, heights.shape, strict=True)
@@ -78,7 +86,11 @@ def decompose_boxes(
         for j0, j1 in itertools.pairwise(edges[1])
         for height, (a, b, c, d) in _cover_block(flat[i0:i1, j0:j1], low[i0:i1, j0:j1])
     ]
-    merged = _merge_boxes(np.array(boxes, dtype=np.float64).reshape(-1, 5))
+    table = np.array(boxes, dtype=np.float64).reshape(-1, 5)
+    short, long = merge_boxes(table, MAX_LENGTH // grid.cell), merge_boxes(table)
+    merged = long if 2 * len(long) <= len(short) else short
+    top, i0, i1, j0, j1 = merged.T
+    merged = merged[np.lexsort([i0, top, j0 + j1, i0 + i1])]
     return _make_boxes(merged, grid, float(heights.min()) - THICKNESS, flat)
 
 
@@ -101,6 +113,30 @@ def flat_cells(heights: NDArray[np.float32], grid: Grid, threshold: float) -> ND
         corner[i, j] = at_walls[:, k]
         flat[quads[a], quads[b]] &= corner
     return flat[1:-1, 1:-1]
+
+
+def _cells_at_walls(heights: NDArray[np.float32], threshold: float) -> NDArray[np.bool_]:
+    """Return which cells have a wall on one of their four sides, shape of `heights`."""
+    result = np.zeros(heights.shape, dtype=bool)
+    along_x, along_y = wall_edges(heights, threshold)
+    for side in (slice(None, -1), slice(1, None)):
+        result[side] |= along_x
+        result[:, side] |= along_y
+    return result
+
+
+def _drop_patches_without_walls(
+    flat: NDArray[np.bool_],
+    has_wall: NDArray[np.bool_],
+    patch_edges: tuple[NDArray[np.int64], NDArray[np.int64]],
+) -> None:
+    """Set `flat` to False in each patch that has slopes and no walls."""
+    x, y = patch_edges
+    for i0, i1 in itertools.pairwise(x.tolist()):
+        for j0, j1 in itertools.pairwise(y.tolist()):
+            patch = (slice(i0, i1), slice(j0, j1))
+            if not (flat[patch].all() or has_wall[patch].any()):
+                flat[patch] = False
 
 
 def neighborhood(values: NDArray[_Cell]) -> list[NDArray[_Cell]]:
@@ -139,21 +175,22 @@ def _bounds(mask: NDArray[np.bool_]) -> slice:
     return slice(index[0], index[-1] + 1)
 
 
-def _merge_boxes(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+def merge_boxes(boxes: NDArray[np.float64], max_cells: float = np.inf) -> NDArray[np.float64]:
     """Merge boxes of the same top that share a whole side until none do.
 
     Args:
         boxes: Top [m] and cells i0 to i1 and j0 to j1 of each box, shape (n, 5).
+        max_cells: Cells after which a row of merged boxes is divided.
     """
     before = -1
     while len(boxes) != before:
         before = len(boxes)
         for _ in "xy":
-            boxes = _merge_along_x(boxes)[:, [0, 3, 4, 1, 2]]
+            boxes = _merge_along_x(boxes, max_cells)[:, [0, 3, 4, 1, 2]]
     return boxes
 
 
-def _merge_along_x(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+def _merge_along_x(boxes: NDArray[np.float64], max_cells: float) -> NDArray[np.float64]:
     """Merge boxes of the same top, j0 and j1 that touch, shape (n, 5)."""
     top, i0, i1, j0, j1 = boxes[np.lexsort(boxes.T[[2, 1, 4, 3, 0]])].T
     other = np.ones(len(top), dtype=bool)
@@ -163,6 +200,8 @@ def _merge_along_x(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
     reach = np.maximum.accumulate(i1 + group) - group
     first = other.copy()
     first[1:] |= i0[1:] > reach[:-1]
+    start = i0[np.maximum.accumulate(np.where(first, np.arange(len(i0)), 0))]
+    first[1:] |= np.diff((i0 - start) // max_cells) > 0
     last = np.roll(first, -1)
     return np.column_stack([top[first], i0[first], reach[last], j0[first], j1[first]])
 

@@ -95,13 +95,13 @@ def generate(
         config=config,
         grid=grid,
         heights=heights,
-        spawns=_pad(spawns),
+        spawns=pad_poses(spawns),
         terrain_types=terrain_types,
         terrain_names=tuple(sub_terrain.name for sub_terrain in config.sub_terrains),
         difficulty=difficulty,
         parameters=parameters,
         solids=Solids.concatenate(solids),
-        goals=_pad(goals),
+        goals=pad_poses(goals),
     )
     _warn_about_map(terrain_map)
     return terrain_map
@@ -135,7 +135,7 @@ def _build_task(
     return patches
 
 
-def _pad(poses: NDArray[np.object_]) -> NDArray[np.float32]:
+def pad_poses(poses: NDArray[np.object_]) -> NDArray[np.float32]:
     """Return the poses (k, 4) of all patches, shape (rows, cols, k, 4), padded with NaN."""
     number = max(len(each) for each in poses.ravel().tolist())
     padded = np.full((*poses.shape, number, 4), np.nan, dtype=np.float32)

@@ -1,9 +1,9 @@
 """Write the map as an MJCF model that loads alone or is included in a scene.
 
 Everything is inline, since paths in an included file are resolved in the folders of the including
-model. All geoms belong to one static body: MuJoCo's broad phase pairs bodies, and one body per
-patch was measured to cost four times as much. All geoms have one class that sets every attribute,
-since the robot's defaults would apply otherwise.
+model. All geoms belong to the world body, since in every step MuJoCo computes the bounds of the
+geoms of any other body. All geoms have one class that sets every attribute, since the robot's
+defaults would apply otherwise.
 """
 
 from pathlib import Path
@@ -13,9 +13,10 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.box_decomposition import BoxDecomposition, flat_cells, neighborhood
+from terrainkit.box_decomposition import BoxDecomposition, flat_cells, merge_boxes, neighborhood
 from terrainkit.memory import check_memory
 from terrainkit.mesh.closed import THICKNESS
+from terrainkit.solid_raster import SolidRaster
 from terrainkit.solids import Solids
 from terrainkit.surface import HeightfieldSurface
 from terrainkit.type_hint import convert
@@ -37,9 +38,13 @@ _RINGS = 2
 """Samples around the patches that belong to the heightfield. The ground of the border's first cell
 slopes toward the patch, so the heightfield has to extend beyond that cell."""
 
-MAX_BOXES = 1800
-"""Number of boxes up to which they cost less than a heightfield with cells of 0.1 m. Relative to a
-plane, a step with n boxes was measured to cost 1.07 + 0.00035 n, with a heightfield 1.71."""
+_Part = tuple[slice, slice]
+"""A rectangle of samples, counted on the map with `_RINGS` more samples on each side."""
+
+MAX_BOXES = 100
+"""Number of boxes up to which they cost no more than a heightfield with cells of 0.1 m, on which a
+step of the bundled quadruped takes about 1.75 times that on a plane. Four runs of
+benchmarks/collision.py gave 50 to 130."""
 
 
 def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "auto") -> None:
@@ -49,9 +54,9 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
         terrain_map: The map.
         path: Target.
         collision: hfield: one heightfield, whose walls are slopes over one cell. boxes: boxes with
-            vertical walls for the flat ground, and a heightfield for the rest, if any, whose
-            walls are slopes over one cell. auto: boxes if they cover all of the ground and are
-            few, else hfield.
+            vertical walls for the flat ground of patches with walls, and heightfields for the rest,
+            if any, whose walls are slopes over one cell. auto: boxes if they cover all of the
+            ground and are so few that a step of a robot is faster than on a heightfield.
 
     Raises:
         ConfigError: if `collision` is invalid.
@@ -64,17 +69,20 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
     root = ET.Element("mujoco", model="terrain")
     _add_default_class(root, terrain_map)
     asset = ET.SubElement(root, "asset")
-    body = ET.SubElement(ET.SubElement(root, "worldbody"), "body", name="terrain")
+    world = ET.SubElement(root, "worldbody")
     if cover is None:
-        _add_hfield(asset, body, terrain_map, terrain_map.heights)
+        x, y = _patch_edges(terrain_map)
+        patches = slice(x[0], x[-1]), slice(y[0], y[-1])
+        _add_hfield(asset, world, "terrain", terrain_map, terrain_map.heights, patches)
         for box in _border_boxes(terrain_map):
-            _add_box(body, *box)
+            _add_box(world, *box)
     else:
-        if not cover.complete:
-            _add_hfield(asset, body, terrain_map, without_boxes(terrain_map.heights, cover))
+        heights = without_boxes(terrain_map.heights, cover)
+        for k, part in enumerate(_uncovered_parts(terrain_map, cover)):
+            _add_hfield(asset, world, f"terrain_{k}", terrain_map, heights, part)
         for box in zip(cover.centers, cover.half_sizes, strict=True):
-            _add_box(body, *box)
-    _add_solids(asset, body, terrain_map.solids)
+            _add_box(world, *box)
+    _add_solids(asset, world, terrain_map.solids)
     ET.indent(root)
     ET.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
 
@@ -117,31 +125,69 @@ def _add_default_class(root: ET.Element, terrain_map: "TerrainMap") -> None:
     )
 
 
+def _patch_edges(terrain_map: "TerrainMap") -> list[NDArray[np.int64]]:
+    """Return the samples where patches begin and end, counted as in `_Part`.
+
+    The first and the last patch include `_RINGS` samples of the border.
+    """
+    config, counts = terrain_map.config, terrain_map.difficulty.shape
+    start = config.border_cells + _RINGS
+    edges = [start + n * np.arange(k + 1) for n, k in zip(config.patch_shape, counts, strict=True)]
+    for each in edges:
+        each[0] -= _RINGS
+        each[-1] += _RINGS
+    return edges
+
+
+def _uncovered_parts(terrain_map: "TerrainMap", cover: BoxDecomposition) -> list[_Part]:
+    """Return rectangles of samples around the patches that have cells without boxes.
+
+    A heightfield costs time wherever a robot is above it, even if its ground there is far below.
+    """
+    edges_x, edges_y = _patch_edges(terrain_map)
+    uncovered = np.pad(~cover.covered, _RINGS, mode="edge")[: edges_x[-1], : edges_y[-1]]
+    patches = np.logical_or.reduceat(uncovered, edges_x[:-1], axis=0)
+    patches = np.logical_or.reduceat(patches, edges_y[:-1], axis=1)
+    row, col = np.nonzero(patches)
+    merged = merge_boxes(np.column_stack([0.0 * row, row, row + 1, col, col + 1]))
+    # The surface at the edge of a patch depends on the next sample, too.
+    return [
+        (
+            slice(edges_x[r0] - (r0 > 0), edges_x[r1] + (r1 < len(edges_x) - 1)),
+            slice(edges_y[c0] - (c0 > 0), edges_y[c1] + (c1 < len(edges_y) - 1)),
+        )
+        for _, r0, r1, c0, c1 in merged.astype(int).tolist()
+    ]
+
+
 def _add_hfield(
-    asset: ET.Element, body: ET.Element, terrain_map: "TerrainMap", heights: NDArray[np.float32]
+    asset: ET.Element,
+    world: ET.Element,
+    name: str,
+    terrain_map: "TerrainMap",
+    heights: NDArray[np.float32],
+    part: _Part,
 ) -> None:
-    """Add a heightfield of the patches and `_RINGS` samples around them."""
-    cell, border = terrain_map.config.cell, terrain_map.config.border_cells
-    # Padding provides these samples where there is no border.
-    padded = np.pad(heights, _RINGS, mode="edge")
-    last = [n - border + 2 * _RINGS for n in heights.shape]
-    part = padded[border : last[0], border : last[1]]
-    low = float(part.min())
-    levels = np.rint((part - low) / _QUANTUM).astype(np.int64)
+    cell = terrain_map.config.cell
+    # Padding provides the samples beyond the map where there is no border.
+    samples = np.pad(heights, _RINGS, mode="edge")[part]
+    low = float(samples.min())
+    levels = np.rint((samples - low) / _QUANTUM).astype(np.int64)
     span = max(int(levels.max()), 1) * _QUANTUM  # MuJoCo requires a range above 0
-    half = [(n - 1) * cell / 2 for n in part.shape]
+    half = [(n - 1) * cell / 2 for n in samples.shape]
+    middle = [((s.start + s.stop) / 2 - _RINGS) * cell for s in part]
     ET.SubElement(
         asset,
         "hfield",
-        name="terrain",
-        nrow=str(part.shape[1]),  # MuJoCo's rows are along y, its columns along x
-        ncol=str(part.shape[0]),
+        name=name,
+        nrow=str(samples.shape[1]),  # MuJoCo's rows are along y, its columns along x
+        ncol=str(samples.shape[0]),
         size=_numbers(*half, span, THICKNESS),
         # Inline elevation starts with the row of the largest y.
         elevation="\n".join(" ".join(map(str, row)) for row in levels.T[::-1].tolist()),
     )
-    position = _numbers(*terrain_map.grid.center, low)
-    ET.SubElement(body, "geom", {"class": "terrain"}, type="hfield", hfield="terrain", pos=position)
+    position = _numbers(*np.add(terrain_map.grid.lower, middle), low)
+    ET.SubElement(world, "geom", {"class": "terrain"}, type="hfield", hfield=name, pos=position)
 
 
 def _border_boxes(
@@ -173,8 +219,16 @@ def collision_surface(terrain_map: "TerrainMap", collision: Collision) -> Height
     if cover is not None:
         tops = np.where(cover.covered, heights, np.float32(-np.inf))
         heights = without_boxes(heights, cover)
-    first, cell = terrain_map.first_sample, terrain_map.grid.cell
-    return HeightfieldSurface(heights=heights, first_sample=first, cell=cell, box_tops=tops)
+    solids = terrain_map.solids
+    collides, visible = solids.select(solids.collides), solids.select(solids.visible)
+    return HeightfieldSurface(
+        heights=heights,
+        first_sample=terrain_map.first_sample,
+        cell=terrain_map.grid.cell,
+        box_tops=tops,
+        colliding=SolidRaster(collides) if len(collides) else None,
+        visible=SolidRaster(visible) if len(visible) else None,
+    )
 
 
 def without_boxes(heights: NDArray[np.float32], cover: BoxDecomposition) -> NDArray[np.float32]:
@@ -183,12 +237,14 @@ def without_boxes(heights: NDArray[np.float32], cover: BoxDecomposition) -> NDAr
     return np.where(lowered, heights.min() - np.float32(THICKNESS / 2), heights)
 
 
-def _add_box(body: ET.Element, center: NDArray[np.float64], half_size: NDArray[np.float64]) -> None:
+def _add_box(
+    world: ET.Element, center: NDArray[np.float64], half_size: NDArray[np.float64]
+) -> None:
     position, size = _numbers(*center), _numbers(*half_size)
-    ET.SubElement(body, "geom", {"class": "terrain"}, type="box", pos=position, size=size)
+    ET.SubElement(world, "geom", {"class": "terrain"}, type="box", pos=position, size=size)
 
 
-def _add_solids(asset: ET.Element, body: ET.Element, solids: Solids) -> None:
+def _add_solids(asset: ET.Element, world: ET.Element, solids: Solids) -> None:
     """Add one geom for each solid. Rays of group 3 are off by default, as for hidden geoms."""
     hulls = solids.hulls()
     for k, vertices in enumerate(hulls):
@@ -208,7 +264,7 @@ def _add_solids(asset: ET.Element, body: ET.Element, solids: Solids) -> None:
     attributes += [{"type": "mesh", "mesh": f"solid_{k}"} for k in range(len(hulls))]
     flags = zip(solids.friction, solids.collides, solids.visible, strict=True)
     for given, (friction, collides, visible) in zip(attributes, flags, strict=True):
-        geom = ET.SubElement(body, "geom", {"class": "terrain", **given})
+        geom = ET.SubElement(world, "geom", {"class": "terrain", **given})
         if not np.isnan(friction):
             geom.set("friction", _numbers(friction, 0.005, 0.0001))
         if not collides:

@@ -114,7 +114,8 @@ def test_boxes_of_a_flat_map_are_one():
 @pytest.mark.parametrize("steps", [1, 2, 4])
 def test_boxes_of_pyramid_stairs_are_a_stack(steps):
     # Steps of half a metre on either side of the platform, in a patch of 5 m.
-    pyramid = patch("pyramid_stairs", size=(5.0, 5.0), step_width=0.5, platform=5.0 - steps)
+    sizes = {"step_width": 0.5, "step_height": 0.2, "platform": 5.0 - steps}
+    pyramid = patch("pyramid_stairs", size=(5.0, 5.0), **sizes)
     assert len(pyramid.boxes().centers) == steps + 1
 
 
@@ -124,7 +125,8 @@ def test_boxes_of_a_pit_are_five():
 
 
 def test_boxes_of_inverted_pyramid_are_four_per_step():
-    bowl = patch("pyramid_stairs", size=(5.0, 5.0), step_width=0.5, platform=2.0, inverted=True)
+    sizes = {"step_width": 0.5, "step_height": 0.2, "platform": 2.0}
+    bowl = patch("pyramid_stairs", size=(5.0, 5.0), inverted=True, **sizes)
     assert len(bowl.boxes().centers) == 3 * 4 + 1
 
 
@@ -136,12 +138,51 @@ def test_boxes_of_stairs_are_one_per_height(inverted):
     assert len(stairs.boxes().centers) == (treads if inverted else len(np.unique(stairs.heights)))
 
 
-def test_boxes_of_a_slope_cover_its_flat_ends():
-    cover = patch("slope", grade=0.3, landing=1.5).boxes()
+def test_boxes_of_a_slope_with_walls_cover_its_flat_ends():
+    heights = patch("slope", grade=0.3, landing=1.5).heights.copy()
+    heights[0] = -1.0
+    edges = tuple(np.array([0, n]) for n in heights.shape)
+    cover = decompose_boxes(heights, Grid(shape=heights.shape, cell=0.1), 0.075, edges)
     # Both ends are at height 0, so one box reaches under the slope from one to the other.
-    assert len(cover.centers) == 1
+    tops = cover.centers[:, 2] + cover.half_sizes[:, 2]
+    assert sorted(tops.tolist()) == pytest.approx([-1.0, 0.0])
     # From the last of 15 flat cells, where the slope starts, to the first at the other end.
     assert np.flatnonzero(~cover.covered.all(axis=1)).tolist() == list(range(14, 46))
+
+
+def test_boxes_of_a_patch_without_walls_are_none():
+    cover = patch("slope", grade=0.3, landing=1.5).boxes()
+    assert len(cover.centers) == 0
+    assert not cover.covered.any()
+
+
+def stripes(counts, patch_cells):
+    """Return the boxes of patches along y, each with a wall of its own height across x."""
+    heights = np.zeros((20, sum(counts) * patch_cells), dtype=np.float32)
+    heights[10:] = np.repeat(np.arange(1, len(counts) + 1), np.array(counts) * patch_cells)
+    edges = (np.array([0, 20]), patch_cells * np.arange(sum(counts) + 1))
+    return decompose_boxes(heights, Grid(shape=heights.shape, cell=1.0), 0.5, edges)
+
+
+def test_boxes_are_merged_to_a_limited_length():
+    # Four patches of 10 m: at height 0, a new box begins in the patch at 30 m.
+    cover = stripes([2, 1, 1], 10)
+    sizes = sorted(map(tuple, (2 * cover.half_sizes[:, :2]).tolist()))
+    assert sizes == [(10.0, 10.0), (10.0, 10.0), (10.0, 20.0), (20.0, 10.0), (20.0, 30.0)]
+
+
+def test_boxes_are_longer_where_that_halves_their_number():
+    # Without a limit 2 boxes, with it 4 and more.
+    cover = stripes([9], 10)
+    sizes = sorted(map(tuple, (2 * cover.half_sizes[:, :2]).tolist()))
+    assert sizes == [(10.0, 90.0), (20.0, 90.0)]
+
+
+def test_boxes_are_in_the_order_of_their_centers(level_map):
+    cover = level_map.boxes()
+    tops = cover.centers[:, 2] + cover.half_sizes[:, 2]
+    keys = np.column_stack([cover.centers[:, :2].round(6), tops]).tolist()
+    assert keys == sorted(keys)
 
 
 def test_boxes_of_many_heights_match():

@@ -113,6 +113,29 @@ def test_mjcf_auto_uses_complete_boxes(level_map, terrain_map, tmp_path):
     assert model.ngeom == 1 + 4  # and the border
 
 
+def test_mjcf_hfields_cover_patches_with_slopes(tmp_path):
+    slope = ("pyramid_slope", {"platform": 1.0, "grade": 0.2})
+    parts = [slope, ("pit", {"side": 1.0, "depth": 0.5}), slope, slope]
+    config = MapConfig(
+        rows=1,
+        cols=4,
+        patch_size=(4.0, 3.0),
+        border=1.0,
+        spawn_radius=0.1,
+        terrains=tuple(
+            SubTerrain(terrain=terrain, name=str(k), parameters=given)
+            for k, (terrain, given) in enumerate(parts)
+        ),
+    )
+    model = loaded(generate(config), tmp_path, collision="boxes")
+    assert model.nhfield == 2
+    # Columns 0, and 2 to 3. A part ends one sample beyond its patches, two in the border.
+    assert model.hfield_ncol.tolist() == [40 + 4] * 2
+    assert model.hfield_nrow.tolist() == [2 + 30 + 1, 1 + 60 + 2]
+    y = model.geom_pos[model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD, 1]
+    assert y.tolist() == pytest.approx([(-0.15 + 3.05) / 2, (5.95 + 12.15) / 2])
+
+
 def test_mjcf_flat_map_is_one_box(tmp_path):
     flat = generate(MapConfig(rows=2, cols=1, terrains=(SubTerrain(terrain="flat"),)))
     model = loaded(flat, tmp_path)
@@ -127,10 +150,9 @@ def test_mjcf_flat_map_as_hfield(tmp_path):
 
 
 @every_collision
-def test_mjcf_geoms_share_one_static_body(terrain_map, tmp_path, collision):
+def test_mjcf_geoms_belong_to_the_world(terrain_map, tmp_path, collision):
     model = loaded(terrain_map, tmp_path, collision=collision)
-    assert set(model.geom_bodyid.tolist()) == {model.body("terrain").id}
-    assert model.body_weldid[model.body("terrain").id] == 0
+    assert model.nbody == 1
     assert model.nv == 0
 
 
@@ -199,7 +221,7 @@ def include(scene, terrain_map, folder, collision):
 def test_mjcf_ignores_defaults_of_a_robot(scene_with_ball, terrain_map, tmp_path, collision):
     model = include(scene_with_ball, terrain_map, tmp_path, collision)
     alone = mujoco.MjModel.from_xml_path(str(tmp_path / "terrain.xml"))
-    ground = np.flatnonzero(model.geom_bodyid == model.body("terrain").id)
+    ground = np.flatnonzero(model.geom_bodyid == 0)
     assert len(ground) == alone.ngeom == model.ngeom - 1
     names = "pos size contype conaffinity condim priority friction solmix solref solimp margin gap"
     for name in (*names.split(), "group", "rgba"):
@@ -233,7 +255,6 @@ def test_mjcf_robot_rests_at_spawn_origin(terrain_map, tmp_path, collision):
     scene = f'<mujoco><include file="{GO2.resolve()}"/>{INCLUDE}</mujoco>'
     model = include(scene, terrain_map, tmp_path, collision)
     data = mujoco.MjData(model)
-    terrain = model.body("terrain").id
     for origin in terrain_map.env_origins.reshape(-1, 3).astype(float):
         mujoco.mj_resetDataKeyframe(model, data, 0)
         data.qpos[:3] = origin + 0.3 * UP
@@ -243,7 +264,7 @@ def test_mjcf_robot_rests_at_spawn_origin(terrain_map, tmp_path, collision):
         assert np.abs(data.qvel[:6]).max() < 0.05
         assert np.abs(base[:2]).max() < 0.05
         assert 0.05 < base[2] < 0.15
-        on_ground = (model.geom_bodyid[data.contact.geom] == terrain).any(axis=1)
+        on_ground = (model.geom_bodyid[data.contact.geom] == 0).any(axis=1)
         assert on_ground.sum() >= 3
         assert data.contact.dist[on_ground].min() > -5e-3
 
