@@ -37,7 +37,7 @@ class SolidRaster:
         self._row[tuple(pixels.T)] = np.arange(1, len(pixels) + 1)
 
     def top(
-        self, x: NDArray[np.float32], y: NDArray[np.float32], z: NDArray[np.float32]
+        self, x: NDArray[np.float32], y: NDArray[np.float32], z: NDArray[np.float32] | float
     ) -> NDArray[np.float32]:
         """Return the highest top of the solids whose bottom is at `z` or below.
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.solid_raster import SolidRaster
 from terrainkit.walls import center_heights
 
 
@@ -108,9 +109,35 @@ class HeightfieldSurface:
     """Distance between samples [m]."""
     box_tops: NDArray[np.float32] | None = None
     """Top of the box around each sample, -inf without one [m], shape (nx, ny)."""
+    colliding: SolidRaster | None = None
+    """The solids that collide."""
+    visible: SolidRaster | None = None
+    """The solids that height scans see."""
 
-    def height(self, x: NDArray[np.float32], y: NDArray[np.float32]) -> NDArray[np.float32]:
+    def height(
+        self,
+        x: NDArray[np.float32],
+        y: NDArray[np.float32],
+        z: NDArray[np.float32] | float = np.inf,
+        *,
+        scan: bool = False,
+    ) -> NDArray[np.float32]:
         """Return the height at points [m]; the outermost samples extend outwards.
+
+        Args:
+            x: Points along x [m].
+            y: Points along y [m].
+            z: Height of the robot [m], which passes under solids whose bottom is above `z`.
+            scan: Return what a height scan sees, not what robots collide with.
+        """
+        height = self._height_without_solids(x, y)
+        solids = self.visible if scan else self.colliding
+        return height if solids is None else np.maximum(height, solids.top(x, y, z))
+
+    def _height_without_solids(
+        self, x: NDArray[np.float32], y: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """Return the height without solids.
 
         A cell is two triangles with the diagonal of MuJoCo's heightfield, from (i, j) to
         (i + 1, j + 1). Bilinear interpolation is off by up to 3.6 cm on stairs.

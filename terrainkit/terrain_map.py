@@ -239,8 +239,8 @@ class TerrainMap:
         """Raise ExportError if the map has solids, which `what` cannot represent."""
         if len(self.solids):
             raise ExportError(
-                f"{what} has no solids: got a map with {len(self.solids)}; "
-                "use a mesh (.stl, .ply, .obj, .glb) or MuJoCo (.xml)"
+                f"got a map with {len(self.solids)} solids, which {what} cannot represent; "
+                "expected a mesh (.stl, .ply, .obj, .glb) or MuJoCo model (.xml)"
             )
 
     def patch(self, row: int, col: int) -> Patch:

@@ -190,6 +190,7 @@ def _print_map(terrain_map: TerrainMap) -> None:
         "extent": f"{_size_text(*grid.size)}, from ({grid.lower[0]:g}, {grid.lower[1]:g})",
         "border": f"{config.border:g} m",
         "heights": f"{heights.min():g} to {heights.max():g} m",
+        "solids": _solids_text(terrain_map),
         "mode": f"{config.mode}, seed {config.seed}",
         "friction": f"static {config.static_friction:g}, dynamic {config.dynamic_friction:g}, "
         f"restitution {config.restitution:g}",
@@ -211,6 +212,19 @@ def _print_map(terrain_map: TerrainMap) -> None:
             )
         )
     render.table(rows)
+
+
+def _solids_text(terrain_map: TerrainMap) -> str:
+    solids = terrain_map.solids
+    if not len(solids):
+        return "none"
+    counts = {
+        "boxes": len(solids.boxes),
+        "cylinders": len(solids.cylinders),
+        "hulls": len(solids.hull_counts),
+        "that do not collide": int((~solids.collides).sum()),
+    }
+    return ", ".join(f"{n} {name}" for name, n in counts.items() if n)
 
 
 def _print_patch(terrain_map: TerrainMap, row: int, col: int) -> None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from terrainkit.box_decomposition import BoxDecomposition, flat_cells, merge_boxes, neighborhood
 from terrainkit.memory import check_memory
 from terrainkit.mesh.closed import THICKNESS
+from terrainkit.solid_raster import SolidRaster
 from terrainkit.solids import Solids
 from terrainkit.surface import HeightfieldSurface
 from terrainkit.type_hint import convert
@@ -41,9 +42,9 @@ _Part = tuple[slice, slice]
 """A rectangle of samples, counted on the map with `_RINGS` more samples on each side."""
 
 MAX_BOXES = 100
-"""Number of boxes up to which they cost less than a heightfield with cells of 0.1 m, as measured by
-benchmarks/collision.py: a step of the bundled quadruped then takes 1.75 times as long as on a plane
-on either."""
+"""Number of boxes up to which they cost no more than a heightfield with cells of 0.1 m, on which a
+step of the bundled quadruped takes about 1.75 times that on a plane. Four runs of
+benchmarks/collision.py gave 50 to 130."""
 
 
 def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "auto") -> None:
@@ -218,8 +219,16 @@ def collision_surface(terrain_map: "TerrainMap", collision: Collision) -> Height
     if cover is not None:
         tops = np.where(cover.covered, heights, np.float32(-np.inf))
         heights = without_boxes(heights, cover)
-    first, cell = terrain_map.first_sample, terrain_map.grid.cell
-    return HeightfieldSurface(heights=heights, first_sample=first, cell=cell, box_tops=tops)
+    solids = terrain_map.solids
+    collides, visible = solids.select(solids.collides), solids.select(solids.visible)
+    return HeightfieldSurface(
+        heights=heights,
+        first_sample=terrain_map.first_sample,
+        cell=terrain_map.grid.cell,
+        box_tops=tops,
+        colliding=SolidRaster(collides) if len(collides) else None,
+        visible=SolidRaster(visible) if len(visible) else None,
+    )
 
 
 def without_boxes(heights: NDArray[np.float32], cover: BoxDecomposition) -> NDArray[np.float32]:

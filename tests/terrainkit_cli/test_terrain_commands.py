@@ -225,6 +225,12 @@ def test_info_describes_the_map(terrainkit, small_map):
     assert "rough_slope" in output
 
 
+def test_info_counts_the_solids(terrainkit, solid_map, tmp_path):
+    path = solid_map.save(tmp_path / "solids.npz")
+    expected = "2 boxes, 1 cylinders, 1 hulls, 1 that do not collide"
+    assert expected in terrainkit("info", path).stdout
+
+
 def test_info_patch_shows_requested_and_realized(terrainkit):
     terrainkit("generate", "-o", "a.npz", "--rows", 2, "--cols", 1, "--terrain", "stairs")
     lines = [

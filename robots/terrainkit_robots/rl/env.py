@@ -252,7 +252,7 @@ class LeggedEnv(VecEnv):
         self.sim.reset(env_ids, qpos, qvel)
         # Random joint positions may put a foot below the ground: raise the base.
         x, y, z = np.moveaxis(self.sim.sensor("foot_position", env_ids), 2, 0)
-        depth = (self.terrain.height(x, y) + self.scene.sole_depth - z).max(axis=1)
+        depth = (self.terrain.height(x, y, z) + self.scene.sole_depth - z).max(axis=1)
         if (depth > 0).any():
             self.sim.qpos[env_ids, 2] += np.maximum(depth, 0)
             self.sim.forward(env_ids)

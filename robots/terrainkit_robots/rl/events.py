@@ -138,7 +138,7 @@ def sample_reset_state(
     ring_x, ring_y = rings.real.astype(np.float32), rings.imag.astype(np.float32)
     for factor in (0.5, 0.0, 1.0):  # the last pass checks the origin itself
         x, y = (env_origins[:, :2] + offset).T
-        height = terrain.height(x[:, None] + ring_x, y[:, None] + ring_y)
+        height = terrain.height(x[:, None] + ring_x, y[:, None] + ring_y, env_origins[:, 2:])
         highest = height.max(axis=1)
         uneven = highest - height.min(axis=1) > MAX_RESET_RELIEF
         if not uneven.any():

@@ -133,15 +133,16 @@ class Sensors:
         # The scan points turn with the yaw.
         (x, y), yaw = self._scan_points, quat_to_yaw(quat)[:, None]
         c, s = np.cos(yaw), np.sin(yaw)
-        scan = self._terrain.height(pos[:, :1] + c * x - s * y, pos[:, 1:2] + s * x + c * y)
-        ground_height = self._terrain.height(foot_pos[..., 0], foot_pos[..., 1])
+        x, y = pos[:, :1] + c * x - s * y, pos[:, 1:2] + s * x + c * y
+        scan = self._terrain.height(x, y, pos[:, 2:], scan=True)
+        ground_height = self._terrain.height(*np.moveaxis(foot_pos, -1, 0))
         return {
             "base_pos": pos,
             "base_quat": quat,
             "base_lin_vel": quat_rotate_inverse(quat, qvel[:, :3]),
             "base_ang_vel": qvel[:, 3:6],
             "projected_gravity": gravity,
-            "base_height": pos[:, 2] - self._terrain.height(pos[:, 0], pos[:, 1]),
+            "base_height": pos[:, 2] - self._terrain.height(*pos.T),
             "dof_pos": qpos[:, scene.joint_qpos],
             "dof_vel": dof_vel,
             "dof_acc": dof_acc,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from terrainkit import MapConfig, TerrainMap, generate
 from terrainkit.errors import ConfigError
 from terrainkit.export.mjcf import collision_surface
+from terrainkit.surface import HeightfieldSurface
 from terrainkit.text import closest
 from terrainkit_robots.transforms import FloatArray
 
@@ -29,6 +30,8 @@ class Terrain(ABC):
     """Lower corner, x and y [m]."""
     upper: tuple[float, float]
     """Upper corner, x and y [m]."""
+    surface: HeightfieldSurface | None = None
+    """The collision geometry of the ground and the solids; None for a plane at height 0."""
     is_flat: bool
     """Whether the ground is level everywhere, so that a height scan carries no information."""
 
@@ -36,9 +39,13 @@ class Terrain(ABC):
     def spec(self) -> Any:
         """Return the terrain as an `mujoco.MjSpec`."""
 
-    @abstractmethod
-    def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Return the height at points [m], broadcast over `x` and `y`."""
+    def height(
+        self, x: FloatArray, y: FloatArray, z: FloatArray | float = np.inf, *, scan: bool = False
+    ) -> FloatArray:
+        """Return the height at points [m]; see :meth:`HeightfieldSurface.height`."""
+        if self.surface is None:
+            return np.zeros(np.broadcast_shapes(x.shape, y.shape), np.float32)
+        return self.surface.height(x, y, z, scan=scan)
 
 
 class Plane(Terrain):
@@ -57,10 +64,6 @@ class Plane(Terrain):
         spec.worldbody.add_geom(name="ground", type=plane, size=[0, 0, 0.1], material="ground")
         return spec
 
-    def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Return zeros."""
-        return np.zeros(np.broadcast_shapes(x.shape, y.shape), np.float32)
-
 
 class MapTerrain(Terrain):
     """A terrainkit map."""
@@ -73,11 +76,7 @@ class MapTerrain(Terrain):
         self.patch_length = terrain_map.config.patch_size[0]
         self.lower, self.upper = terrain_map.grid.lower, terrain_map.grid.upper
         self._map, self._collision = terrain_map, collision
-        self._surface = collision_surface(terrain_map, collision)
-
-    def height(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Return the height of the collision geometry."""
-        return self._surface.height(x, y)
+        self.surface = collision_surface(terrain_map, collision)
 
     def spec(self) -> Any:
         """Return the map as terrainkit exports it for MuJoCo."""

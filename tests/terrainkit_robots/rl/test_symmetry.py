@@ -29,7 +29,7 @@ class Valley(Plane):
 
     is_flat = False
 
-    def height(self, x: Any, y: Any) -> Any:
+    def height(self, x: Any, y: Any, *_: Any, **__: Any) -> Any:
         return (0.3 * np.abs(y) + 0.1 * np.sin(3 * x)).astype(np.float32)
 
 

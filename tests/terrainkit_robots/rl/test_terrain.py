@@ -109,6 +109,21 @@ class TestMapTerrain:
         found = ground.height(xy[:, 0], xy[:, 1])
         np.testing.assert_array_equal(found, level_map.heights[nearest[:, 0], nearest[:, 1]])
 
+    @pytest.mark.parametrize("collision", ["hfield", "boxes"])
+    def test_height_of_solids_depends_on_the_robot(self, solid_map, collision):
+        """The box hangs from 0.4 to 0.6 m, one does not collide, and the cylinder is invisible."""
+        terrain = MapTerrain(solid_map, collision)
+        x, y = np.float32([1, 5, 2]), np.float32([6, 6, 6])
+        for z, scan, expected in (
+            (0.3, True, [0, 0, 0]),
+            (0.5, True, [0.6, 0.6, 0]),
+            (0.3, False, [0, 0, 0.7]),
+            (0.5, False, [0.6, 0, 0.7]),
+        ):
+            found = terrain.height(x, y, np.full(3, z, np.float32), scan=scan)
+            assert found == pytest.approx(expected, abs=1e-6)
+        assert terrain.height(x, y) == pytest.approx([0.6, 0, 0.7], abs=1e-6)
+
     def test_height_accepts_any_shape(self, map_ground):
         x = np.linspace(0, 5, 12, dtype=np.float32).reshape(3, 4)
         assert map_ground.height(x, x).shape == (3, 4)
