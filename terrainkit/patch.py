@@ -68,6 +68,10 @@ class Patch:
         return self.spawns[0, :3]
 
 
+_NO_SOLIDS = Solids.empty()
+_NO_GOALS = np.empty((0, 4), dtype=np.float32)
+
+
 def make_patch(config: MapConfig, row: int, col: int) -> Patch:
     """Build patch (row, col) of the map of `config` without generating the rest.
 
@@ -114,11 +118,13 @@ def build_patch(
             f"a patch of {grid.size[0]:g} m x {grid.size[1]:g} m; increase the platform or reduce "
             "spawn_radius or spawn_headroom"
         )
-    # The first child draws the solids and the goals.
-    rng = patch_rng(config, terrain, row, col).spawn(2)[1]
-    spawns = sample_spawns(
-        heights, grid, origin, disc, config.spawns_per_patch, solids=solids, rng=rng
-    )
+    spawns = np.array([origin])
+    if config.spawns_per_patch > 1:
+        # The first child draws the solids and the goals.
+        rng = patch_rng(config, terrain, row, col).spawn(2)[1]
+        spawns = sample_spawns(
+            heights, grid, origin, disc, config.spawns_per_patch, solids=solids, rng=rng
+        )
     return Patch(
         terrain=sub_terrain.name,
         difficulty=difficulty,
@@ -144,6 +150,10 @@ def _solids_and_goals(
     Raises:
         ConfigError: if a solid extends beyond the patch, or a goal is not on it.
     """
+    terrain_type = type(terrain)
+    if terrain_type.solids is Terrain.solids and terrain_type.goals is Terrain.goals:
+        return _NO_SOLIDS, _NO_GOALS
+
     from terrainkit.surface import surface_at
 
     def rng() -> np.random.Generator:
@@ -151,7 +161,7 @@ def _solids_and_goals(
         return patch_rng(config, terrain, *patch).spawn(1)[0]
 
     solids = Solids.empty()
-    if type(terrain).solids is not Terrain.solids:
+    if terrain_type.solids is not Terrain.solids:
         solids = terrain.solids(grid, heights, rng())
         lower, upper = (corner[:, :2] for corner in solids.bounds())
         outside = np.maximum(grid.lower - lower, upper - grid.upper).max(initial=0.0)
@@ -163,7 +173,7 @@ def _solids_and_goals(
         numbers = np.tile(np.array(patch, np.int32), (len(solids), 1))
         solids = dataclasses.replace(solids, patch=numbers)
     goals = np.empty((0, 4))
-    if type(terrain).goals is not Terrain.goals:
+    if terrain_type.goals is not Terrain.goals:
         goals = np.array(terrain.goals(grid, heights, rng()), dtype=float).reshape(-1, 4)
         index = (goals[:, :2] - grid.lower) / grid.cell - 0.5
         if not ((index >= -0.5) & (index <= np.array(grid.shape) - 0.5)).all():
@@ -177,11 +187,12 @@ def _with_headings(
     positions: NDArray[np.float64], goals: NDArray[np.float32]
 ) -> NDArray[np.float32]:
     """Return spawn positions with headings, shape (k, 4): toward the first goal, else along x."""
-    heading = np.zeros(len(positions))
+    spawns = np.zeros((len(positions), 4), dtype=np.float32)
+    spawns[:, :3] = positions
     if len(goals):
         dx, dy = (goals[0, :2] - positions[:, :2]).T
-        heading = np.arctan2(dy, dx)
-    return np.column_stack([positions, heading]).astype(np.float32)
+        spawns[:, 3] = np.arctan2(dy, dx)
+    return spawns
 
 
 def _check_slopes(terrain: Terrain, config: MapConfig) -> None:
