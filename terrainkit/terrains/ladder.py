@@ -71,8 +71,8 @@ class Ladder(Terrain):
         if not (0.5 <= self.angle <= np.pi / 2 and run < landing and 1 <= number <= MAX_COUNT):
             raise ConfigError(
                 f"ladder: got angle {self.angle:g} rad, rung_spacing {self.rung_spacing:g} m and "
-                f"distance {self.distance:g} m; expected an angle of 0.5 rad to 1.57 rad, "
-                f"and a ladder with rungs in front of a deck {self.height:g} m high, on a landing of "
+                f"distance {self.distance:g} m; expected an angle of 0.5 rad to 1.57 rad, and "
+                f"a ladder with rungs in front of a deck {self.height:g} m high, on a landing of "
                 f"{self.landing:g} m"
             )
         foot, slope = grid.lower[0] + landing - run, 1 / np.tan(self.angle)
