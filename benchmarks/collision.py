@@ -19,7 +19,7 @@ from terrainkit_robots.rl.terrain import MapTerrain, Plane, Terrain
 from terrainkit_robots.spec.robot import Robot
 
 _NUM_PLACES = 20
-_NUM_RUNS = 6
+_NUM_RUNS = 12
 _NUM_STEPS = 200
 _NUM_ROWS = (1, 2, 4, 8)
 _FLAT_TERRAINS = ("pyramid_stairs_inverted", "pyramid_stairs", "stairs", "obstacles", "pit", "gap")

@@ -40,8 +40,7 @@ class BoxDecomposition:
     """Half of the size along x, y and z [m], shape (n, 3)."""
 
     covered: NDArray[np.bool_]
-    """Whether the whole cell is the top of a box, shape (nx, ny). The other cells are not flat and
-    need a heightfield."""
+    """Whether the whole cell is the top of a box, shape (nx, ny). The others need a heightfield."""
 
     @property
     def complete(self) -> bool:

@@ -22,7 +22,7 @@ MAX_CELLS = 10**6
 Size = Annotated[float, Meta(ge=1e-4, le=MAX_VALUE)]
 NonNegative = Annotated[float, Meta(ge=0, le=MAX_VALUE)]
 Count = Annotated[int, Meta(ge=1, le=MAX_VALUE)]
-Mode = Literal["curriculum", "selected", "randomized"]
+Mode = Literal["curriculum", "selected", "randomized", "custom"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +56,8 @@ class MapConfig(Config):
 
     mode: Mode = "curriculum"
     """curriculum: difficulty by row, terrain type by column. selected: one terrain type at one
-    difficulty on the whole map. randomized: both sampled for each patch."""
+    difficulty on the whole map. randomized: both sampled for each patch. custom: an imported or
+    edited map, which is not generated."""
 
     difficulty_range: Annotated[tuple[Fraction, Fraction], SORTED] = (0.0, 1.0)
     """Mode curriculum: difficulty of the first and the last row, 0 to 1."""

@@ -43,8 +43,13 @@ def terrain_columns(config: MapConfig) -> list[int]:
         TerrainkitWarning: if a sub-terrain of a preset gets no column.
 
     Raises:
-        ConfigError: if a custom sub-terrain gets no column.
+        ConfigError: if a custom sub-terrain gets no column, or the map is not generated.
     """
+    if config.mode == "custom":
+        raise ConfigError(
+            "mode custom: the map was imported or edited, and cannot be generated from its config; "
+            "expected mode curriculum, selected or randomized"
+        )
     sub_terrains = config.sub_terrains
     counts = allocate_columns([each.proportion for each in sub_terrains], config.cols)
     pairs = zip(sub_terrains, counts, strict=True)

@@ -1,8 +1,9 @@
 """Patch: one terrain, built on the grid of its place in a map."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ from terrainkit.parameter import Realized, Value, parameters_of
 from terrainkit.solids import Solids
 from terrainkit.sub_terrain import SubTerrain
 from terrainkit.terrain import Terrain
+
+if TYPE_CHECKING:
+    from terrainkit.spawn import Disc
 
 EDGE_TOLERANCE = 1e-3
 """Distance by which a solid may extend beyond its patch [m]."""
@@ -68,6 +72,10 @@ class Patch:
         return self.spawns[0, :3]
 
 
+_NO_SOLIDS = Solids.empty()
+_NO_GOALS = np.empty((0, 4), dtype=np.float32)
+
+
 def make_patch(config: MapConfig, row: int, col: int) -> Patch:
     """Build patch (row, col) of the map of `config` without generating the rest.
 
@@ -91,34 +99,19 @@ def build_patch(
     Raises:
         ConfigError: if the terrain does not fit in the patch, or has no place to spawn.
     """
-    from terrainkit.spawn import Disc, find_spawn, sample_spawns
-
     terrain = sub_terrain.at(difficulty)
     _check_slopes(terrain, config)
     grid = config.patch_grid(row, col)
     heights = terrain.build(grid, patch_rng(config, terrain, row, col))
     solids, goals = _solids_and_goals(terrain, grid, heights, config, (row, col))
     preferred = terrain.spawn(grid)
-    disc = Disc(
-        radius=config.spawn_radius,
-        tolerance=config.spawn_tolerance,
-        headroom=config.spawn_headroom,
-    )
-    origin = find_spawn(
-        heights, grid, preferred, disc, solids=solids, threshold=config.wall_threshold
-    )
-    if origin is None:
-        raise ConfigError(
-            f"{sub_terrain.name}: no disc of radius {config.spawn_radius:g} m is flat within "
-            f"{config.spawn_tolerance:g} m and free of solids up to {config.spawn_headroom:g} m in "
-            f"a patch of {grid.size[0]:g} m x {grid.size[1]:g} m; increase the platform or reduce "
-            "spawn_radius or spawn_headroom"
-        )
-    # The first child draws the solids and the goals.
-    rng = patch_rng(config, terrain, row, col).spawn(2)[1]
-    spawns = sample_spawns(
-        heights, grid, origin, disc, config.spawns_per_patch, solids=solids, rng=rng
-    )
+
+    def rng() -> np.random.Generator:
+        # The first child draws the solids and the goals.
+        return patch_rng(config, terrain, row, col).spawn(2)[1]
+
+    spawns = place_spawns(config, sub_terrain.name, grid, heights, solids, preferred, rng)
+    x, y, _ = spawns[0].tolist()
     return Patch(
         terrain=sub_terrain.name,
         difficulty=difficulty,
@@ -127,8 +120,62 @@ def build_patch(
         heights=heights,
         solids=solids,
         goals=goals,
-        spawns=_with_headings(spawns, goals),
-        spawn_offset=max(abs(origin[0] - preferred[0]), abs(origin[1] - preferred[1])),
+        spawns=with_headings(spawns, goals),
+        spawn_offset=max(abs(x - preferred[0]), abs(y - preferred[1])),
+    )
+
+
+def place_spawns(
+    config: MapConfig,
+    name: str,
+    grid: Grid,
+    heights: NDArray[np.float32],
+    solids: Solids,
+    preferred: tuple[float, float],
+    rng: Callable[[], np.random.Generator],
+) -> NDArray[np.float64]:
+    """Return the spawn positions of a patch [m], shape (k, 3); see :mod:`terrainkit.spawn`.
+
+    Args:
+        config: Configuration of the map.
+        name: Name of the patch in the error.
+        grid: Grid of the patch.
+        heights: Heights of the patch [m], shape `grid.shape`.
+        solids: Solids on the patch.
+        preferred: Preferred position of the first, x and y [m].
+        rng: Returns the random number generator of the others; slow, so called only if needed.
+
+    Raises:
+        ConfigError: if the patch has no place to spawn.
+    """
+    from terrainkit.spawn import find_spawn, sample_spawns
+
+    disc = spawn_disc(config)
+    origin = find_spawn(
+        heights, grid, preferred, disc, solids=solids, threshold=config.wall_threshold
+    )
+    if origin is None:
+        raise ConfigError(
+            f"{name}: no disc of radius {config.spawn_radius:g} m is flat within "
+            f"{config.spawn_tolerance:g} m and free of solids up to {config.spawn_headroom:g} m in "
+            f"a patch of {grid.size[0]:g} m x {grid.size[1]:g} m; increase the platform or "
+            "spawn_tolerance, or reduce spawn_radius or spawn_headroom"
+        )
+    if config.spawns_per_patch == 1:
+        return np.array([origin])
+    return sample_spawns(
+        heights, grid, origin, disc, config.spawns_per_patch, solids=solids, rng=rng()
+    )
+
+
+def spawn_disc(config: MapConfig) -> "Disc":
+    """Return the free place that a robot needs on a map."""
+    from terrainkit.spawn import Disc
+
+    return Disc(
+        radius=config.spawn_radius,
+        tolerance=config.spawn_tolerance,
+        headroom=config.spawn_headroom,
     )
 
 
@@ -144,6 +191,10 @@ def _solids_and_goals(
     Raises:
         ConfigError: if a solid extends beyond the patch, or a goal is not on it.
     """
+    terrain_type = type(terrain)
+    if terrain_type.solids is Terrain.solids and terrain_type.goals is Terrain.goals:
+        return _NO_SOLIDS, _NO_GOALS
+
     from terrainkit.surface import surface_at
 
     def rng() -> np.random.Generator:
@@ -151,7 +202,7 @@ def _solids_and_goals(
         return patch_rng(config, terrain, *patch).spawn(1)[0]
 
     solids = Solids.empty()
-    if type(terrain).solids is not Terrain.solids:
+    if terrain_type.solids is not Terrain.solids:
         solids = terrain.solids(grid, heights, rng())
         lower, upper = (corner[:, :2] for corner in solids.bounds())
         outside = np.maximum(grid.lower - lower, upper - grid.upper).max(initial=0.0)
@@ -163,7 +214,7 @@ def _solids_and_goals(
         numbers = np.tile(np.array(patch, np.int32), (len(solids), 1))
         solids = dataclasses.replace(solids, patch=numbers)
     goals = np.empty((0, 4))
-    if type(terrain).goals is not Terrain.goals:
+    if terrain_type.goals is not Terrain.goals:
         goals = np.array(terrain.goals(grid, heights, rng()), dtype=float).reshape(-1, 4)
         index = (goals[:, :2] - grid.lower) / grid.cell - 0.5
         if not ((index >= -0.5) & (index <= np.array(grid.shape) - 0.5)).all():
@@ -173,15 +224,16 @@ def _solids_and_goals(
     return solids, goals.astype(np.float32)
 
 
-def _with_headings(
+def with_headings(
     positions: NDArray[np.float64], goals: NDArray[np.float32]
 ) -> NDArray[np.float32]:
     """Return spawn positions with headings, shape (k, 4): toward the first goal, else along x."""
-    heading = np.zeros(len(positions))
+    spawns = np.zeros((len(positions), 4), dtype=np.float32)
+    spawns[:, :3] = positions
     if len(goals):
         dx, dy = (goals[0, :2] - positions[:, :2]).T
-        heading = np.arctan2(dy, dx)
-    return np.column_stack([positions, heading]).astype(np.float32)
+        spawns[:, 3] = np.arctan2(dy, dx)
+    return spawns
 
 
 def _check_slopes(terrain: Terrain, config: MapConfig) -> None:

@@ -39,7 +39,7 @@ class TerrainMap:
     """A map of rows x cols patches with a border."""
 
     config: MapConfig
-    """The configuration that the map was generated from."""
+    """The configuration that the map was generated from; in mode custom, it was not generated."""
 
     grid: Grid
     """Positions of the samples."""
@@ -239,8 +239,8 @@ class TerrainMap:
         """Raise ExportError if the map has solids, which `what` cannot represent."""
         if len(self.solids):
             raise ExportError(
-                f"{what} has no solids: got a map with {len(self.solids)}; "
-                "use a mesh (.stl, .ply, .obj, .glb) or MuJoCo (.xml)"
+                f"got a map with {len(self.solids)} solids, which {what} cannot represent; "
+                "expected a mesh (.stl, .ply, .obj, .glb) or MuJoCo model (.xml)"
             )
 
     def patch(self, row: int, col: int) -> Patch:
@@ -263,6 +263,27 @@ class TerrainMap:
             goals=goals[~np.isnan(goals[:, 0])],
             spawns=spawns[~np.isnan(spawns).all(axis=1)],
         )
+
+    def edited(self, *, heights: ArrayLike | None = None, solids: Solids | None = None) -> Self:
+        """Return the map with other heights or solids, as a map of mode custom.
+
+        Such a map is not compared with its config by :func:`terrainkit.validate.validate`, and
+        cannot be generated from it. Spawn positions and goals follow the height of the ground.
+        Where a spawn position of a patch is no longer flat and free, those of the patch are placed
+        again.
+
+        Args:
+            heights: Heights [m], shape `grid.shape`; None for those of the map.
+            solids: All solids of the map; None for those of the map. Each belongs to the patch of
+                its center.
+
+        Raises:
+            ConfigError: if the heights have another shape or are not finite, or a patch has no
+                place to spawn.
+        """
+        from terrainkit.edit import edit_map
+
+        return edit_map(self, heights, solids)
 
     def assign(self, num_envs: int, max_init_level: int | None = None, seed: int = 0) -> Assignment:
         """Assign patches to `num_envs` environments; see :mod:`terrainkit.curriculum`.

@@ -2,6 +2,7 @@
 
 Everything is recomputed from the map alone. Spawn discs are sampled on the surface, the mesh is
 checked edge by edge and face by face, and each patch is compared with a second build of it.
+Imported and edited maps (mode custom) are not compared with their config.
 """
 
 import dataclasses
@@ -12,12 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import registry
 from terrainkit.errors import TerrainkitError, TerrainkitWarning
 from terrainkit.layout import assign_patch, terrain_columns
 from terrainkit.mesh.solid_mesh import concatenate_meshes, solid_meshes
 from terrainkit.mesh.tri_mesh import TriMesh
-from terrainkit.parameter import parameters_of
+from terrainkit.parameter import format_value, parameters_of
 from terrainkit.patch import Patch, build_patch
 from terrainkit.solids import Solids
 from terrainkit.terrain_map import TerrainMap
@@ -31,7 +31,7 @@ class Issue:
     """One violated guarantee of a map."""
 
     check: str
-    """Check that found it: finite, difficulty, patches, realized, spawn or mesh."""
+    """Check that found it: finite, difficulty, patches, realized, solids, spawn or mesh."""
 
     message: str
     """What is wrong, where, and by how much."""
@@ -48,12 +48,24 @@ def validate(terrain_map: TerrainMap, mesh: TriMesh | None = None) -> list[Issue
     if issues:
         return issues  # the other checks need finite values
     return [
-        *_issues("difficulty", _check_difficulty(terrain_map)),
-        *_issues("patches", _check_patches(terrain_map)),
-        *_issues("realized", _check_realized(terrain_map)),
+        *(_custom_issues if terrain_map.config.mode == "custom" else _config_issues)(terrain_map),
         *_issues("spawn", _check_spawn(terrain_map)),
         *_issues("mesh", _check_mesh(terrain_map, mesh or terrain_map.mesh())),
     ]
+
+
+def _config_issues(terrain_map: TerrainMap) -> list[Issue]:
+    """Return the differences between a map and its config."""
+    return [
+        *_issues("difficulty", _check_difficulty(terrain_map)),
+        *_issues("patches", _check_patches(terrain_map)),
+        *_issues("realized", _check_realized(terrain_map)),
+    ]
+
+
+def _custom_issues(terrain_map: TerrainMap) -> list[Issue]:
+    """Return the issues of a map that was not generated."""
+    return _issues("solids", _check_solids(terrain_map))
 
 
 def _issues(check: str, messages: Iterator[str]) -> list[Issue]:
@@ -139,7 +151,7 @@ def _compare(patch: Patch, expected: Patch, location: str) -> Iterator[str]:
     if error > TOLERANCE:
         yield (
             f"{location}: heights differ by up to {error:.3f} m from the {expected.terrain} of its "
-            "config: edited, moved, or with axes swapped"
+            "config: edited, moved, or with axes swapped; TerrainMap.edited() makes a custom map"
         )
 
 
@@ -158,16 +170,23 @@ def _check_realized(terrain_map: TerrainMap) -> Iterator[str]:
     cell, sub_terrains = terrain_map.config.cell, terrain_map.config.sub_terrains
     for row, col in np.ndindex(terrain_map.difficulty.shape):
         patch = terrain_map.patch(row, col)
-        parameters = parameters_of(
-            registry.get_terrain(sub_terrains[terrain_map.terrain_types[row, col]].terrain)
-        )
+        sub_terrain = sub_terrains[terrain_map.terrain_types[row, col]]
+        parameters = parameters_of(sub_terrain.terrain_class)
         for name, requested in patch.parameters.requested.items():
             realized = patch.parameters.realized[name]
             if parameters[name].deviates(requested, realized, cell):
                 yield (
                     f"patch ({row}, {col}), {patch.terrain}: {name} is {realized}; "
-                    f"requested {requested:g}"
+                    f"requested {format_value(requested)}"
                 )
+
+
+def _check_solids(terrain_map: TerrainMap) -> Iterator[str]:
+    grid = terrain_map.grid
+    lower, upper = (corner[:, :2] for corner in terrain_map.solids.bounds())
+    beyond = np.maximum(grid.lower - lower, upper - grid.upper).max(axis=1, initial=0.0)
+    for index in np.flatnonzero(beyond > TOLERANCE).tolist():
+        yield f"solid {index} extends {beyond[index]:.3f} m beyond the map"
 
 
 def _check_spawn(terrain_map: TerrainMap) -> Iterator[str]:

@@ -314,8 +314,8 @@ def test_scan_rejects_invalid_input(solid_map, points, direction, message):
 
 
 def test_heightfield_formats_reject_solids(solid_map, tmp_path):
-    with pytest.raises(ExportError, match="a heightfield has no solids: got a map with 4"):
+    with pytest.raises(ExportError, match="got a map with 4 solids, which a heightfield cannot"):
         solid_map.height_field_raw()
-    with pytest.raises(ExportError, match="an image of heights has no solids"):
+    with pytest.raises(ExportError, match="4 solids, which an image of heights cannot represent"):
         solid_map.save(tmp_path / "map.png")
     assert list(tmp_path.iterdir()) == []
