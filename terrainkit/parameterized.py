@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from terrainkit.grid import Grid
@@ -17,7 +18,7 @@ class Parameterized:
     @classmethod
     def kind(cls) -> str:
         """Return the name of the class in snake_case: `pyramid_stairs` for `PyramidStairs`."""
-        return _WORD_START.sub("_", cls.__name__.strip("_")).lower()
+        return _snake_case(cls.__name__)
 
     def requested(self) -> dict[str, Value]:
         """Return the parameters before snapping, by name."""
@@ -29,3 +30,8 @@ class Parameterized:
         kind: Any = type(self)
         parameters = parameters_of(kind).items()
         return {name: p.realized(getattr(self, name), grid) for name, p in parameters}
+
+
+@cache
+def _snake_case(name: str) -> str:
+    return _WORD_START.sub("_", name.strip("_")).lower()

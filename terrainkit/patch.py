@@ -1,8 +1,9 @@
 """Patch: one terrain, built on the grid of its place in a map."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -104,18 +105,16 @@ def build_patch(
     overlays = [overlay.at(difficulty) for overlay in sub_terrain.overlays]
     _check_slopes(terrain, config)
     grid, name = config.patch_grid(row, col), sub_terrain.name
-    # The first child draws the solids and the goals, the second one the spawn positions.
-    _, spawn_rng, *rngs = patch_rng(config, terrain, row, col).spawn(2 + len(overlays))
-    geometry = _terrain_geometry(config, sub_terrain, terrain, difficulty, row, col)
-    preferred, spawn_offset = geometry.spawn, 0.0
+    child_rng = partial(_child_rng, config, terrain, row, col)
+    heights = terrain.build(grid, patch_rng(config, terrain, row, col))
+    geometry = _terrain_geometry(config, sub_terrain, terrain, difficulty, heights, grid, child_rng)
+    spawn_offset = 0.0
     if overlays:
-        geometry, spawn_offset = _overlaid(config, name, geometry, overlays, rngs)
-        preferred = geometry.spawn
-    heights, solids = geometry.heights, geometry.solids
-    goals = _finished_goals(config, name, geometry)
-    solids = dataclasses.replace(solids, patch=np.full((len(solids), 2), (row, col), np.int32))
-    spawns = place_spawns(config, name, grid, heights, solids, preferred, spawn_rng)
-    origin = spawns[0]
+        geometry, spawn_offset = _apply_overlays(config, name, geometry, overlays, child_rng)
+    heights, preferred = geometry.heights, geometry.spawn
+    solids, goals = _finish(config, name, geometry, (row, col))
+    spawns = place_spawns(config, name, grid, heights, solids, preferred, partial(child_rng, 1))
+    x, y, _ = spawns[0].tolist()
     requested, realized = terrain.requested(), terrain.realized(grid)
     for k, overlay in enumerate(overlays):
         requested |= {overlay_path(k, n): v for n, v in overlay.requested().items()}
@@ -130,9 +129,18 @@ def build_patch(
         solids=solids,
         goals=goals,
         spawns=with_headings(spawns, goals, geometry.heading),
-        spawn_offset=spawn_offset
-        + max(abs(origin[0] - preferred[0]), abs(origin[1] - preferred[1])),
+        spawn_offset=spawn_offset + max(abs(x - preferred[0]), abs(y - preferred[1])),
     )
+
+
+def _child_rng(
+    config: MapConfig, terrain: Terrain, row: int, col: int, number: int
+) -> "np.random.Generator":
+    """Return a child of the generator of a patch, in its initial state.
+
+    Child 0 is for solids and goals, 1 for the spawn positions, and 2 + k for overlay k.
+    """
+    return patch_rng(config, terrain, row, col).spawn(number + 1)[number]
 
 
 def _terrain_geometry(
@@ -140,20 +148,17 @@ def _terrain_geometry(
     sub_terrain: SubTerrain,
     terrain: Terrain,
     difficulty: float,
-    row: int,
-    col: int,
+    heights: NDArray[np.float32],
+    grid: Grid,
+    child_rng: Callable[[int], "np.random.Generator"],
 ) -> PatchGeometry:
-    """Return what the terrain puts on patch (row, col), without overlays."""
-    grid = config.patch_grid(row, col)
-    heights = terrain.build(grid, patch_rng(config, terrain, row, col))
-    solids, goals = Solids.empty(), np.empty((0, 4))
+    """Return what a terrain puts on a patch, without overlays."""
+    solids, goals = _NO_SOLIDS, _NO_GOALS
     # Solids and goals start with the same random numbers, so that both can sample one layout.
     if type(terrain).solids is not Terrain.solids:
-        rng = patch_rng(config, terrain, row, col).spawn(1)[0]
-        solids = terrain.solids(grid, heights, rng)
+        solids = terrain.solids(grid, heights, child_rng(0))
     if type(terrain).goals is not Terrain.goals:
-        rng = patch_rng(config, terrain, row, col).spawn(1)[0]
-        goals = np.array(terrain.goals(grid, heights, rng), dtype=float).reshape(-1, 4)
+        goals = np.array(terrain.goals(grid, heights, child_rng(0)), dtype=float).reshape(-1, 4)
     friction = sub_terrain.friction_at(difficulty)
     if friction is not None:
         own = np.where(np.isnan(solids.friction), friction, solids.friction).astype(np.float32)
@@ -171,12 +176,12 @@ def _terrain_geometry(
     )
 
 
-def _overlaid(
+def _apply_overlays(
     config: MapConfig,
     name: str,
     geometry: PatchGeometry,
     overlays: Sequence[Overlay],
-    rngs: Sequence["np.random.Generator"],
+    child_rng: Callable[[int], "np.random.Generator"],
 ) -> tuple[PatchGeometry, float]:
     """Return the geometry with overlays, and the spawn offset of the terrain without them [m].
 
@@ -185,8 +190,8 @@ def _overlaid(
     grid, preferred = geometry.grid, geometry.spawn
     x, y, _ = _find_origin(config, name, grid, geometry.heights, geometry.solids, preferred)
     geometry = dataclasses.replace(geometry, spawn=(x, y))
-    for overlay, rng in zip(overlays, rngs, strict=True):
-        geometry = overlay.apply(geometry, rng)
+    for k, overlay in enumerate(overlays):
+        geometry = overlay.apply(geometry, child_rng(2 + k))
         heights = np.asarray(geometry.heights, dtype=np.float32) + np.float32(0)
         if heights.shape != grid.shape or not np.isfinite(heights).all():
             raise ConfigError(
@@ -204,7 +209,7 @@ def place_spawns(
     heights: NDArray[np.float32],
     solids: Solids,
     preferred: tuple[float, float],
-    rng: np.random.Generator,
+    rng: Callable[[], np.random.Generator],
 ) -> NDArray[np.float64]:
     """Return the spawn positions of a patch [m], shape (k, 3); see :mod:`terrainkit.spawn`.
 
@@ -215,7 +220,7 @@ def place_spawns(
         heights: Heights of the patch [m], shape `grid.shape`.
         solids: Solids on the patch.
         preferred: Preferred position of the first, x and y [m].
-        rng: Random number generator of the others.
+        rng: Returns the random number generator of the others; slow, so called only if needed.
 
     Raises:
         ConfigError: if the patch has no place to spawn.
@@ -223,9 +228,10 @@ def place_spawns(
     from terrainkit.spawn import sample_spawns
 
     origin = _find_origin(config, name, grid, heights, solids, preferred)
-    return sample_spawns(
-        heights, grid, origin, spawn_disc(config), config.spawns_per_patch, solids=solids, rng=rng
-    )
+    if config.spawns_per_patch == 1:
+        return np.array([origin])
+    disc, number = spawn_disc(config), config.spawns_per_patch
+    return sample_spawns(heights, grid, origin, disc, number, solids=solids, rng=rng())
 
 
 def _find_origin(
@@ -264,41 +270,50 @@ def spawn_disc(config: MapConfig) -> "Disc":
     )
 
 
-def _finished_goals(config: MapConfig, name: str, geometry: PatchGeometry) -> NDArray[np.float32]:
-    """Return the goals with the height of the ground where none is given.
+def _finish(
+    config: MapConfig, name: str, geometry: PatchGeometry, patch: tuple[int, int]
+) -> tuple[Solids, NDArray[np.float32]]:
+    """Return the solids with their patch, and the goals with their heights.
 
     Raises:
         ConfigError: if a solid extends beyond the patch, or a goal is not on it.
     """
-    from terrainkit.surface import surface_at
-
-    grid, goals = geometry.grid, geometry.goals.copy()
-    if len(geometry.solids):
-        lower, upper = (corner[:, :2] for corner in geometry.solids.bounds())
+    grid, solids, goals = geometry.grid, geometry.solids, geometry.goals
+    if len(solids):
+        lower, upper = (corner[:, :2] for corner in solids.bounds())
         outside = np.maximum(grid.lower - lower, upper - grid.upper).max()
         if outside > EDGE_TOLERANCE:
             raise ConfigError(
                 f"{name}: solids(): got a solid {outside:.3f} m beyond its patch; expected solids "
                 "within it"
             )
+        solids = dataclasses.replace(solids, patch=np.full((len(solids), 2), patch, np.int32))
     if len(goals):
+        from terrainkit.surface import surface_at
+
         index = (goals[:, :2] - grid.lower) / grid.cell - 0.5
         if not ((index >= -0.5) & (index <= np.array(grid.shape) - 0.5)).all():
             raise ConfigError(f"{name}: goals(): got a goal outside of the patch")
         ground = surface_at(geometry.heights, index, threshold=config.wall_threshold).height
+        goals = goals.copy()
         goals[:, 2] = np.where(np.isnan(goals[:, 2]), ground, goals[:, 2])
-    return goals.astype(np.float32)
+    return solids, goals.astype(np.float32)
+
+
+_NO_SOLIDS = Solids.empty()
+_NO_GOALS = np.empty((0, 4))
 
 
 def with_headings(
     positions: NDArray[np.float64], goals: NDArray[np.float32], default: float = 0.0
 ) -> NDArray[np.float32]:
     """Return spawn positions with headings, shape (k, 4): toward the first goal, else `default`."""
-    heading = np.full(len(positions), default)
+    spawns = np.full((len(positions), 4), default, dtype=np.float32)
+    spawns[:, :3] = positions
     if len(goals):
         dx, dy = (goals[0, :2] - positions[:, :2]).T
-        heading = np.arctan2(dy, dx)
-    return np.column_stack([positions, heading]).astype(np.float32)
+        spawns[:, 3] = np.arctan2(dy, dx)
+    return spawns
 
 
 def _check_slopes(terrain: Terrain, config: MapConfig) -> None:

@@ -326,3 +326,45 @@ def test_generate_avoids_slow_imports(tmp_path):
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
     )
     assert run.stdout.endswith("[]\n")
+
+
+def test_diff_exit_codes(terrainkit, tmp_path):
+    small = ("--rows", 1, "--cols", 2, "--border", 0, "--terrain", "rough")
+    for name, seed in (("a.npz", 0), ("b.npz", 0), ("c.npz", 1)):
+        assert terrainkit("generate", "-o", name, "--seed", seed, *small).returncode == 0
+    run = terrainkit("diff", "a.npz", "b.npz")
+    assert (run.returncode, run.stdout) == (0, "a.npz and b.npz are the same\n")
+    run = terrainkit("diff", "a.npz", "c.npz")
+    assert run.returncode == 1
+    assert "config: seed: 0 -> 1\n" in run.stdout
+    assert "patch (0, 1): heights by up to 0." in run.stdout
+    assert run.stdout.endswith("\na.npz -> c.npz: 2 of 2 patches differ\n")
+    (tmp_path / "d.npz").write_bytes(b"PK")
+    run = terrainkit("diff", "a.npz", "d.npz")
+    assert (run.returncode, run.stdout) == (2, "")
+    assert run.stderr.startswith("terrainkit: error: ")
+
+
+def test_info_budget_prints_costs(terrainkit):
+    flat = ("--rows", 1, "--cols", 2, "--border", 0, "--patch-size", 4, 3, "--terrain", "flat")
+    terrainkit("generate", "-o", "flat.npz", *flat)
+    run = terrainkit("info", "flat.npz", "--budget", "--foot-radius", 0.3)
+    assert (run.returncode, run.stderr) == (0, "")
+    rows = [" ".join(line.split()) for line in run.stdout.splitlines()]
+    assert "triangles 2 merged, 5,002 full" in rows  # 2 x 41 x 61 quads
+    assert rows[1].startswith("contacts at most 98 with a heightfield, of a foot of 0.3 m; MuJoCo")
+    assert "boxes (auto) 1 1 0 about 1.0 x a plane" in rows
+    assert ".stl 0.2 kB" in rows
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--foot-radius", 0), "foot radius: got 0; expected a number above 0 m"),
+        (("--patch", 0, 0), "--budget, --patch: got both; expected one of them"),
+    ],
+)
+def test_info_budget_rejects_invalid_options(terrainkit, small_map, words, message):
+    run = terrainkit("info", small_map, "--budget", *words)
+    assert run.returncode == 2
+    assert run.stderr == f"terrainkit: error: {message}\n"

@@ -23,11 +23,7 @@ def test_side_walls_have_their_probability(geometry):
 
 
 def test_side_walls_reject_invalid_values(geometry):
-    with pytest.raises(
-        ConfigError, match=r"side_walls\.probability: got 1\.5; expected a "
-    ):
+    with pytest.raises(ConfigError, match=r"side_walls\.probability: got 1\.5; expected a "):
         SideWalls(probability=(0.0, 1.5))
-    with pytest.raises(
-        ConfigError, match="got thickness 2 m; expected less than half"
-    ):
+    with pytest.raises(ConfigError, match="got thickness 2 m; expected less than half"):
         SideWalls(thickness=2.0).apply(geometry(), RNG(0))
