@@ -158,14 +158,11 @@ def make_overlay(name: str, parameters: Mapping[str, Any]) -> Overlay:
     return overlay(**parameters)
 
 
-def _load_class(package: ModuleType, name: str, parent: Any) -> Any:
+def _load_class(package: ModuleType, name: str, parent: type[Any]) -> Any:
     """Return the subclass of `parent` in module `name` of a package."""
     module = importlib.import_module(f"{package.__name__}.{name}")
-    classes = [
-        value
-        for value in vars(module).values()
-        if inspect.isclass(value) and issubclass(value, parent) and value.kind() == name
-    ]
+    found: list[Any] = [value for value in vars(module).values() if inspect.isclass(value)]
+    classes = [each for each in found if issubclass(each, parent) and each.kind() == name]
     if len(classes) != 1:
         raise ConfigError(
             f"{module.__file__}: got {len(classes)} subclasses of {parent.__name__} named like the "
