@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from terrainkit.errors import TerrainkitError, TerrainkitWarning
     from terrainkit.generation import generate
     from terrainkit.patch import Patch, make_patch
+    from terrainkit.registry import register_terrain
     from terrainkit.sub_terrain import SubTerrain
     from terrainkit.terrain_map import TerrainMap
 
@@ -26,6 +27,7 @@ __all__ = [
     "TerrainkitWarning",
     "generate",
     "make_patch",
+    "register_terrain",
     "update_levels",
 ]
 __version__ = "0.1.0"
@@ -39,6 +41,7 @@ _MODULES = {
     "TerrainkitWarning": "errors",
     "generate": "generation",
     "make_patch": "patch",
+    "register_terrain": "registry",
     "update_levels": "curriculum",
 }
 """Module of each public name, so that only those in use are imported: a robot needs no terrain."""

@@ -1,4 +1,4 @@
-"""Solids that are given by their corners: axis-aligned blocks and ramps."""
+"""Solids that stand on the ground, or are given by their corners: boxes, blocks and ramps."""
 
 import math
 
@@ -34,24 +34,57 @@ def number_that_fits(name: str, pitch: float, extent: float) -> int:
     return max(0, math.floor(extent / pitch + 1e-9))
 
 
+def make_standing_boxes(
+    xy: ArrayLike,
+    size: ArrayLike,
+    top: ArrayLike,
+    *,
+    floor: ArrayLike = 0.0,
+    yaw: ArrayLike = 0.0,
+) -> Solids:
+    """Return n boxes that stand on the ground and extend `SINK` below it.
+
+    Args:
+        xy: Centers [m], shape (n, 2).
+        size: Full sizes along the horizontal axes of the box [m], shape (n, 2) or (2,).
+        top: Heights of the upper sides [m], shape (n,) or ().
+        floor: Heights of the ground [m], shape (n,) or ().
+        yaw: Rotations around z [rad], shape (n,) or ().
+
+    Raises:
+        ConfigError: if a value is not finite, or a size is not above 0.
+    """
+    center = np.asarray(xy, float)
+    columns = (top, np.asarray(floor, float) - SINK, yaw)
+    top, bottom, yaw = (np.broadcast_to(np.asarray(each, float), len(center)) for each in columns)
+    return make_boxes(
+        np.column_stack([center, (top + bottom) / 2]),
+        np.column_stack([np.broadcast_to(size, center.shape), top - bottom]),
+        rpy=np.column_stack([0 * yaw, 0 * yaw, yaw]),
+    )
+
+
 def make_blocks(lower: ArrayLike, upper: ArrayLike) -> Solids:
     """Return axis-aligned boxes between two corners [m], shapes (n, 3)."""
     low, high = np.asarray(lower, float), np.asarray(upper, float)
     return make_boxes((low + high) / 2, high - low)
 
 
-def make_ramps(lower: ArrayLike, upper: ArrayLike, corners: ArrayLike) -> Solids:
+def make_ramps(
+    lower: ArrayLike, upper: ArrayLike, corners: ArrayLike, *, floor: float = 0.0
+) -> Solids:
     """Return solids on the ground with a rectangular base and a plane top.
 
     Args:
         lower: Corners of the bases with the smallest x and y [m], shape (n, 2).
         upper: Corners of the bases with the largest x and y [m], shape (n, 2).
         corners: Heights of the tops, counterclockwise from `lower` [m], shape (n, 4).
+        floor: Height of the ground [m].
     """
     (x0, y0), (x1, y1) = np.asarray(lower, float).T, np.asarray(upper, float).T
     xy = np.stack([np.stack([x0, x1, x1, x0], -1), np.stack([y0, y0, y1, y1], -1)], axis=-1)
     z = np.asarray(corners, float)[..., None]
     points: NDArray[np.float64] = np.concatenate(
-        [np.concatenate([xy, z], -1), np.concatenate([xy, 0 * z - SINK], -1)], axis=1
+        [np.concatenate([xy, z], -1), np.concatenate([xy, 0 * z + floor - SINK], -1)], axis=1
     )
     return make_hulls(list(points))

@@ -119,7 +119,8 @@ def resample_columns(
             raise ConfigError(f"{name}: got {got}; expected 0 to {size - 1}")
     is_variant = terrain_types[rows] == terrain_types[rows, before][:, None]
     rank = np.random.default_rng(seed).integers(is_variant.sum(axis=1))
-    return np.argmax(np.cumsum(is_variant, axis=1) > rank[:, None], axis=1)
+    after: NDArray[np.int64] = np.argmax(np.cumsum(is_variant, axis=1) > rank[:, None], axis=1)
+    return after
 
 
 def update_levels(

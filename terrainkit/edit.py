@@ -1,6 +1,7 @@
 """Replace the heights or solids of a map."""
 
 from dataclasses import replace
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -95,7 +96,7 @@ def place_patch_spawns(
         positions = np.array(kept)
     else:
         x, y = spawns[0, :2].tolist()
-        rng = np.random.default_rng([config.seed, row, col])
+        rng = partial(np.random.default_rng, [config.seed, row, col])
         name = f"patch ({row}, {col})"
         positions = place_spawns(config, name, grid, block, near, (x, y), rng)
     return with_headings(positions, goals)

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import registry
 from terrainkit.config import MapConfig
 from terrainkit.errors import TerrainkitWarning, listing
 from terrainkit.layout import assign_patch, terrain_columns
@@ -19,6 +18,7 @@ from terrainkit.parameter import parameters_of
 from terrainkit.patch import Patch, build_patch
 from terrainkit.seams import Seams, cliffs_text
 from terrainkit.solids import Solids
+from terrainkit.sub_terrain import SubTerrain
 from terrainkit.terrain_map import TerrainMap
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def generate(
             parameters[row, col] = patch.parameters
             solids.append(patch.solids)
             goals[row, col] = patch.goals
-            for name in _deviations(patch, sub_terrain.terrain, config.cell):
+            for name in _deviations(patch, sub_terrain, config.cell):
                 deviations[name] += 1
             moved_spawns[sub_terrain.name] += patch.spawn_offset > config.cell
     _warn(config, deviations, +moved_spawns)
@@ -144,9 +144,9 @@ def pad_poses(poses: NDArray[np.object_]) -> NDArray[np.float32]:
     return padded
 
 
-def _deviations(patch: Patch, terrain: str, cell: float) -> list[str]:
+def _deviations(patch: Patch, sub_terrain: SubTerrain, cell: float) -> list[str]:
     """Return the parameters that differ from the request by more than the grid requires."""
-    declared, record = parameters_of(registry.get_terrain(terrain)), patch.parameters
+    declared, record = parameters_of(sub_terrain.terrain_class), patch.parameters
     return [
         f"{patch.terrain}.{name}"
         for name, requested in record.requested.items()

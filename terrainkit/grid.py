@@ -94,6 +94,11 @@ class Grid:
         x, y = ((n - b) // 2 for n, b in zip(self.shape, block, strict=True))
         return slice(x, x + block[0]), slice(y, y + block[1])
 
+    def slice_along_x(self, center: float, count: int) -> slice:
+        """Return the index of the `count` cells along x around x = `center` [m]."""
+        first = math.floor((center - self.lower[0]) / self.cell - count / 2 + 0.5 + _CELL_TOLERANCE)
+        return slice(max(0, first), max(0, first) + count)
+
     def fade(self, inner: tuple[int, int], distance: float) -> NDArray[np.float64]:
         """Return weights that rise from 0 on the centered block `inner` to 1 at `distance` [m]."""
         rise = self.rings(inner) * (self.cell / max(distance, self.cell))

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from terrainkit.blocks import MAX_PER_AXIS
+from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 
 
@@ -25,7 +27,63 @@ def lane_positions(grid: Grid, start: float, length: float, gap: float) -> NDArr
     return np.float64(grid.lower[0] + first) + np.arange(number) * (length + gap)
 
 
+def lane_slots(
+    name: str,
+    grid: Grid,
+    start: float,
+    spacing: tuple[float, float],
+    *,
+    length: float,
+    end: float = 0.0,
+) -> NDArray[np.float64]:
+    """Return the edges of as many equal slots as fit behind the start [m], shape (n + 1,).
+
+    A slot is the place of one element. It is as long as the mean of `spacing`, so the slots do not
+    depend on the length of the elements.
+
+    Args:
+        name: Name of the terrain, for the error message.
+        grid: Grid of the patch.
+        start: Length of the flat start [m].
+        spacing: Minimum and maximum distance between two elements, center to center [m].
+        length: Length of the longest element along x [m].
+        end: Minimum length of the flat end [m].
+
+    Raises:
+        ConfigError: if elements could overlap, or none fits.
+    """
+    low, high = spacing
+    first = grid.length(grid.cells(start))
+    number = (grid.size[0] - first - end + 1e-9) / ((low + high) / 2)
+    if not (length < low <= high and 1 <= number <= MAX_PER_AXIS):
+        raise ConfigError(
+            f"{name}: got elements {length:g} m long with a spacing of {low:g} m to {high:g} m "
+            f"between a start of {start:g} m and an end of {end:g} m; expected elements shorter "
+            f"than the spacing, and 1 to {MAX_PER_AXIS} of them in a patch {grid.size[0]:g} m long"
+        )
+    return np.float64(grid.lower[0] + first) + np.arange(int(number) + 1) * ((low + high) / 2)
+
+
+def slot_centers(
+    edges: NDArray[np.float64], spacing: tuple[float, float], rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """Return a random x near the middle of each slot [m], shape (n,).
+
+    Args:
+        edges: Edges of the slots [m], shape (n + 1,); see :func:`lane_slots`.
+        spacing: Minimum and maximum distance between two neighbors of the result [m].
+        rng: Generator of the random numbers.
+    """
+    low, high = spacing
+    middle = (edges[:-1] + edges[1:]) / 2
+    return middle + (rng.random(len(middle)) - 0.5) * (high - low) / 2
+
+
 def lane_goals(grid: Grid, x: ArrayLike) -> NDArray[np.float64]:
-    """Return goals on the ground at `x` [m], in the middle of the lane and along x, (k, 4)."""
-    x = np.atleast_1d(np.asarray(x, dtype=float))
-    return np.column_stack([x, np.full(len(x), grid.center[1]), np.full(len(x), np.nan), 0 * x])
+    """Return goals on the ground at `x` [m], in the middle of the lane and along x, (k, 4).
+
+    A goal at the end of the patch is moved into its last cell.
+    """
+    inside = np.minimum(np.atleast_1d(np.asarray(x, dtype=float)), grid.upper[0] - grid.cell / 2)
+    y, z = np.full(len(inside), grid.center[1]), np.full(len(inside), np.nan)
+    return np.column_stack([inside, y, z, 0 * inside])

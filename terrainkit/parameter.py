@@ -1,26 +1,25 @@
-"""Declare the parameters of a terrain: their range, and how they snap to the cells.
+"""Declare the parameters of a terrain or overlay: their range, and how they snap to the cells.
 
-The fields of a terrain are declared with the functions below. Most take the value at difficulty 0
-and the value at difficulty 1; a single value applies at every difficulty.
+The fields are declared with the functions below. Most take the value at difficulty 0 and the value
+at difficulty 1; a single value applies at every difficulty.
 """
 
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import Annotated, Any, Literal
 
 from msgspec import Meta
 
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
-from terrainkit.type_hint import convert
+from terrainkit.type_hint import convert, show
 
 Snap = Literal["none", "cells", "centered"]
-Value = float | int | bool
+Value = float | int | bool | str | tuple[float, ...]
 Range = tuple[float, float]
-Realized = float | int | bool | tuple[float, float]
-
+Realized = Value
 
 MAX_VALUE = 1_000_000
 """Largest number that a parameter accepts: beyond any terrain, and far below overflow."""
@@ -28,10 +27,13 @@ MAX_VALUE = 1_000_000
 MAX_COUNT = 10_000
 """Largest integer that a parameter accepts, so that building a patch takes bounded time."""
 
+MAX_TEXT_LENGTH = 200
+"""Longest text that a parameter accepts [characters]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
-    """The declaration of one field of a terrain, besides its type and docstring."""
+    """The declaration of one field, besides its type and docstring."""
 
     easy: Value
     """Default at difficulty 0."""
@@ -59,12 +61,32 @@ class Parameter:
     """Deviation that is not reported, in the unit of the parameter, such as the default step of a
     value that is rounded to whole steps."""
 
+    choices: tuple[str | int, ...] = ()
+    """The accepted values; empty if they are not a fixed list."""
+
+    @cached_property
+    def default(self) -> Value | Range:
+        """The default: one value, or a range (easy, hard)."""
+        # Only parameters of numbers have two different ends.
+        return self.easy if self.easy == self.hard else (self.easy, self.hard)  # type: ignore[return-value]
+
+    @property
+    def is_vector(self) -> bool:
+        """Whether the value is a tuple of numbers."""
+        return isinstance(self.easy, tuple)
+
     def at(self, difficulty: float) -> Value:
         """Return the default at `difficulty`, 0 to 1."""
-        return at_difficulty((self.easy, self.hard), difficulty)
+        return self.value_at(self.default, difficulty)
+
+    def value_at(self, value: Value | Range, difficulty: float) -> Value:
+        """Return a value, or a range interpolated at `difficulty`, 0 to 1."""
+        return at_difficulty(value, difficulty) if self.allows_range else value
 
     def realized(self, value: Value, grid: Grid) -> Realized:
         """Return `value` snapped to the cells of `grid`; a pair (x, y) where the axes differ."""
+        if isinstance(value, str | tuple):
+            return value
         if self.snap == "cells":
             count = grid.cells(value, minimum=0 if self.allows_zero else 1)
             return grid.length(count - self.slopes_away / 2)
@@ -82,6 +104,8 @@ class Parameter:
         """
         if realized == requested:
             return False
+        if isinstance(requested, str | tuple) or isinstance(realized, str):
+            return True
         values = realized if isinstance(realized, tuple) else (realized,)
         snapping = {"cells": cell / 2, "centered": cell, "none": 0.05 * requested}[self.snap]
         if self.slopes_away:
@@ -90,7 +114,7 @@ class Parameter:
         return any(abs(value - requested) > allowed + 1e-6 for value in values)
 
 
-def at_difficulty(value: Value | Range, difficulty: float) -> Value:
+def at_difficulty(value: Any, difficulty: float) -> Any:
     """Interpolate a range (easy, hard) at `difficulty`, 0 to 1; exact at both ends.
 
     A range of integers gives the nearest integer. A single value is returned unchanged. All ranges
@@ -150,38 +174,47 @@ def switch(*, default: bool = False) -> Any:
     return _field(default, allows_range=False)
 
 
+def text(default: str = "") -> Any:
+    """Declare a text of at most 200 characters that does not depend on the difficulty."""
+    return _field(default, allows_range=False)
+
+
+def choice(default: str | int, *others: str | int) -> Any:
+    """Declare one of a list of names or integers that does not depend on the difficulty."""
+    return _field(default, allows_range=False, choices=(default, *others))
+
+
+def vector(default: tuple[float, ...]) -> Any:
+    """Declare a tuple of numbers of fixed length that does not depend on the difficulty.
+
+    Unlike other numbers, they may be negative.
+    """
+    return _field(tuple(float(each) for each in default), allows_range=False)
+
+
 def _field(easy: Value, hard: Value | None = None, **options: Any) -> Any:
-    hard = easy if hard is None else hard
-    parameter = Parameter(easy=easy, hard=hard, **options)
-    return dataclasses.field(default=hard, metadata={"parameter": parameter})
+    parameter = Parameter(easy=easy, hard=easy if hard is None else hard, **options)
+    return dataclasses.field(default=parameter.default, metadata={"parameter": parameter})
 
 
 @cache
-def parameters_of(terrain: type) -> Mapping[str, Parameter]:
-    """Return the parameters of a terrain class by name, in the order of its fields."""
-    for field in dataclasses.fields(terrain):
+def parameters_of(owner: type[Any]) -> Mapping[str, Parameter]:
+    """Return the parameters of a class by name, in the order of its fields."""
+    for field in dataclasses.fields(owner):
         if "parameter" not in field.metadata:
             raise ConfigError(
-                f"{terrain.__name__}: {field.name} is a plain field; expected one declared with "
-                "parameter.height, length, size, platform, grade, scalar, count or switch"
+                f"{owner.__name__}: {field.name} is a plain field; expected one declared with "
+                "parameter.height, length, size, platform, grade, scalar, count, switch, text, "
+                "choice or vector"
             )
-    return {f.name: f.metadata["parameter"] for f in dataclasses.fields(terrain)}
+    return {f.name: f.metadata["parameter"] for f in dataclasses.fields(owner)}
 
 
-def _is_plain(value: Value, parameter: Parameter) -> bool:
-    """Return whether `value`, of the type of `parameter`, is in range.
-
-    This is the case that `convert` returns unchanged, thirty times faster.
-    """
-    limit = MAX_VALUE if isinstance(value, float) else MAX_COUNT
-    return 0 < value <= limit or (value == 0 and parameter.allows_zero)
-
-
-def convert_parameter(terrain: str, name: str, value: object, parameter: Parameter) -> Value:
-    """Return `value` as a plain number.
+def convert_parameter(owner: str, name: str, value: object, parameter: Parameter) -> Value:
+    """Return `value` as the type of the parameter.
 
     Args:
-        terrain: Name of the terrain, for the error message.
+        owner: Name of the terrain or overlay, for the error message.
         name: Name of the parameter, for the error message.
         value: The value to convert.
         parameter: The declaration of the parameter.
@@ -189,12 +222,64 @@ def convert_parameter(terrain: str, name: str, value: object, parameter: Paramet
     Raises:
         ConfigError: if the value has another type or is out of range.
     """
-    kind = type(parameter.easy)
-    if type(value) is kind and _is_plain(value, parameter):
+    if type(value) is type(parameter.easy) and _is_plain(value, parameter):
         return value
+    converted: Value = convert(f"{owner}.{name}", value, _hint(parameter))
+    return converted
+
+
+def convert_range(
+    owner: str, name: str, value: object, parameter: Parameter
+) -> Value | tuple[Value, Value]:
+    """Return `value`, which may be a range (easy, hard), as the type of the parameter.
+
+    The arguments are those of :func:`convert_parameter`.
+
+    Raises:
+        ConfigError: if a value has another type or is out of range, or a range is not allowed.
+    """
+    if not isinstance(value, tuple) or parameter.is_vector:
+        return convert_parameter(owner, name, value, parameter)
+    if not parameter.allows_range or len(value) != 2:
+        expected = "one value" + (" or a pair (easy, hard)" if parameter.allows_range else "")
+        raise ConfigError(f"{owner}.{name}: got {show(value)}; expected {expected}")
+    easy, hard = (convert_parameter(owner, name, end, parameter) for end in value)
+    return easy, hard
+
+
+def format_value(value: Value) -> str:
+    """Return a value as it is written on the command line."""
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(format_value, value))}]"
+    if isinstance(value, bool | str):
+        return str(value).lower() if isinstance(value, bool) else value
+    return f"{value:g}"
+
+
+def _is_plain(value: Any, parameter: Parameter) -> bool:
+    """Return whether `value`, of the type of `parameter`, is a number in range.
+
+    This is the case that `convert` returns unchanged, thirty times faster.
+    """
+    if parameter.choices or isinstance(value, str | tuple):
+        return False
+    limit = MAX_VALUE if isinstance(value, float) else MAX_COUNT
+    return 0 < value <= limit or (value == 0 and parameter.allows_zero)
+
+
+def _hint(parameter: Parameter) -> Any:
+    """Return the type hint of the values of a parameter."""
+    kind = type(parameter.easy)
+    if parameter.choices:
+        return Literal[parameter.choices]
+    if isinstance(parameter.easy, tuple):
+        number = Annotated[float, Meta(ge=-MAX_VALUE, le=MAX_VALUE)]
+        return tuple.__class_getitem__((number,) * len(parameter.easy))
+    if kind is str:
+        about = f"a string of at most {MAX_TEXT_LENGTH} characters"
+        return Annotated[str, Meta(max_length=MAX_TEXT_LENGTH, description=about)]
     if kind is bool:
-        return bool(convert(f"{terrain}.{name}", value, bool))
+        return bool
     limit = MAX_VALUE if kind is float else MAX_COUNT
-    least = Meta(ge=0, le=limit) if parameter.allows_zero else Meta(gt=0, le=limit)
-    number: Value = convert(f"{terrain}.{name}", value, Annotated[kind, least])
-    return number
+    bounds = Meta(ge=0, le=limit) if parameter.allows_zero else Meta(gt=0, le=limit)
+    return Annotated[kind, bounds]

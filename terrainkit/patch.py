@@ -1,7 +1,7 @@
 """Patch: one terrain, built on the grid of its place in a map."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -72,6 +72,10 @@ class Patch:
         return self.spawns[0, :3]
 
 
+_NO_SOLIDS = Solids.empty()
+_NO_GOALS = np.empty((0, 4), dtype=np.float32)
+
+
 def make_patch(config: MapConfig, row: int, col: int) -> Patch:
     """Build patch (row, col) of the map of `config` without generating the rest.
 
@@ -101,10 +105,13 @@ def build_patch(
     heights = terrain.build(grid, patch_rng(config, terrain, row, col))
     solids, goals = _solids_and_goals(terrain, grid, heights, config, (row, col))
     preferred = terrain.spawn(grid)
-    # The first child draws the solids and the goals.
-    rng = patch_rng(config, terrain, row, col).spawn(2)[1]
+
+    def rng() -> np.random.Generator:
+        # The first child draws the solids and the goals.
+        return patch_rng(config, terrain, row, col).spawn(2)[1]
+
     spawns = place_spawns(config, sub_terrain.name, grid, heights, solids, preferred, rng)
-    origin = spawns[0]
+    x, y, _ = spawns[0].tolist()
     return Patch(
         terrain=sub_terrain.name,
         difficulty=difficulty,
@@ -114,7 +121,7 @@ def build_patch(
         solids=solids,
         goals=goals,
         spawns=with_headings(spawns, goals),
-        spawn_offset=max(abs(origin[0] - preferred[0]), abs(origin[1] - preferred[1])),
+        spawn_offset=max(abs(x - preferred[0]), abs(y - preferred[1])),
     )
 
 
@@ -125,7 +132,7 @@ def place_spawns(
     heights: NDArray[np.float32],
     solids: Solids,
     preferred: tuple[float, float],
-    rng: np.random.Generator,
+    rng: Callable[[], np.random.Generator],
 ) -> NDArray[np.float64]:
     """Return the spawn positions of a patch [m], shape (k, 3); see :mod:`terrainkit.spawn`.
 
@@ -136,7 +143,7 @@ def place_spawns(
         heights: Heights of the patch [m], shape `grid.shape`.
         solids: Solids on the patch.
         preferred: Preferred position of the first, x and y [m].
-        rng: Random number generator of the others.
+        rng: Returns the random number generator of the others; slow, so called only if needed.
 
     Raises:
         ConfigError: if the patch has no place to spawn.
@@ -154,8 +161,10 @@ def place_spawns(
             f"a patch of {grid.size[0]:g} m x {grid.size[1]:g} m; increase the platform or "
             "spawn_tolerance, or reduce spawn_radius or spawn_headroom"
         )
+    if config.spawns_per_patch == 1:
+        return np.array([origin])
     return sample_spawns(
-        heights, grid, origin, disc, config.spawns_per_patch, solids=solids, rng=rng
+        heights, grid, origin, disc, config.spawns_per_patch, solids=solids, rng=rng()
     )
 
 
@@ -182,6 +191,10 @@ def _solids_and_goals(
     Raises:
         ConfigError: if a solid extends beyond the patch, or a goal is not on it.
     """
+    terrain_type = type(terrain)
+    if terrain_type.solids is Terrain.solids and terrain_type.goals is Terrain.goals:
+        return _NO_SOLIDS, _NO_GOALS
+
     from terrainkit.surface import surface_at
 
     def rng() -> np.random.Generator:
@@ -189,7 +202,7 @@ def _solids_and_goals(
         return patch_rng(config, terrain, *patch).spawn(1)[0]
 
     solids = Solids.empty()
-    if type(terrain).solids is not Terrain.solids:
+    if terrain_type.solids is not Terrain.solids:
         solids = terrain.solids(grid, heights, rng())
         lower, upper = (corner[:, :2] for corner in solids.bounds())
         outside = np.maximum(grid.lower - lower, upper - grid.upper).max(initial=0.0)
@@ -201,7 +214,7 @@ def _solids_and_goals(
         numbers = np.tile(np.array(patch, np.int32), (len(solids), 1))
         solids = dataclasses.replace(solids, patch=numbers)
     goals = np.empty((0, 4))
-    if type(terrain).goals is not Terrain.goals:
+    if terrain_type.goals is not Terrain.goals:
         goals = np.array(terrain.goals(grid, heights, rng()), dtype=float).reshape(-1, 4)
         index = (goals[:, :2] - grid.lower) / grid.cell - 0.5
         if not ((index >= -0.5) & (index <= np.array(grid.shape) - 0.5)).all():
@@ -215,11 +228,12 @@ def with_headings(
     positions: NDArray[np.float64], goals: NDArray[np.float32]
 ) -> NDArray[np.float32]:
     """Return spawn positions with headings, shape (k, 4): toward the first goal, else along x."""
-    heading = np.zeros(len(positions))
+    spawns = np.zeros((len(positions), 4), dtype=np.float32)
+    spawns[:, :3] = positions
     if len(goals):
         dx, dy = (goals[0, :2] - positions[:, :2]).T
-        heading = np.arctan2(dy, dx)
-    return np.column_stack([positions, heading]).astype(np.float32)
+        spawns[:, 3] = np.arctan2(dy, dx)
+    return spawns
 
 
 def _check_slopes(terrain: Terrain, config: MapConfig) -> None:

@@ -27,6 +27,13 @@ def pit_across(grid: Grid, depth: float, start: float) -> NDArray[np.float64]:
     return ground
 
 
+def pit_between(grid: Grid, depth: float, first: float, last: float) -> NDArray[np.float64]:
+    """Return the heights of a pit from x = `first` to `last` [m], shape `grid.shape`."""
+    ground = np.zeros(grid.shape)
+    ground[grid.slice_along_x((first + last) / 2, grid.cells(last - first)), 1:-1] = -depth
+    return ground
+
+
 def pit_bounds(grid: Grid, start: float | None = None) -> tuple[NDArray[np.float64], ...]:
     """Return the lower and upper corners of the pit, x and y [m].
 

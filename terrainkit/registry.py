@@ -1,13 +1,15 @@
 """The registry of terrains.
 
 Each module in `terrainkit/terrains` is one terrain, named after its file. Other packages add
-terrains as entry points of the group `terrainkit.terrains`.
+terrains as entry points of the group `terrainkit.terrains`, and a program or notebook registers its
+own classes.
 """
 
 import importlib
+import inspect
 import pkgutil
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from terrainkit import terrains
 from terrainkit.errors import ConfigError
@@ -23,6 +25,11 @@ ENTRY_POINTS = "terrainkit.terrains"
 INVERTED = "_inverted"
 """Suffix of the name of an inverted terrain in presets and maps."""
 
+_T = TypeVar("_T", bound=type[Terrain])
+
+_registered: dict[str, type[Terrain]] = {}
+"""The classes that this process has registered, by name."""
+
 
 @cache
 def terrain_names() -> tuple[str, ...]:
@@ -37,22 +44,76 @@ def plugin_terrains() -> dict[str, "EntryPoint"]:
     return {point.name: point for point in entry_points(group=ENTRY_POINTS)}
 
 
+def registered_terrains() -> tuple[str, ...]:
+    """Return the names of the terrains that this process has registered."""
+    return tuple(_registered)
+
+
+def register_terrain(terrain: _T) -> _T:
+    """Register a terrain class, so that its name can be used in TOML and in maps.
+
+    The name is that of the class in snake_case, `my_terrain` for `MyTerrain`. A class that is
+    defined again, as in a notebook, replaces the previous one. Use it as a decorator above
+    `@dataclass`, or as a function.
+
+    Args:
+        terrain: The class; a class that exists under this name already is not registered again.
+
+    Returns:
+        `terrain`.
+
+    Raises:
+        ConfigError: if it is not a terrain, or another terrain has the name.
+    """
+    if not (isinstance(terrain, type) and issubclass(terrain, Terrain)):
+        raise ConfigError(f"terrain: got {terrain!r}; expected a subclass of Terrain")
+    name = terrain.kind()
+    if inspect.isabstract(terrain):
+        missing = ", ".join(sorted(terrain.__abstractmethods__))
+        raise ConfigError(f"{terrain.__name__}: got no method {missing}; expected one")
+    if "__dataclass_fields__" not in vars(terrain):
+        raise ConfigError(f"{terrain.__name__} lacks @dataclass(frozen=True, kw_only=True)")
+    parameters_of(terrain)
+    existing = _registered.get(name)
+    if existing is None and (name in terrain_names() or name in plugin_terrains()):
+        existing = get_terrain(name)
+    if existing is None or _path(existing) == _path(terrain):
+        if existing is not terrain:
+            _registered[name] = terrain
+            get_terrain.cache_clear()
+    elif existing is not terrain:
+        raise ConfigError(
+            f"the name {name!r} of {_path(terrain)} is that of {_path(existing)}; expected another "
+            "class name"
+        )
+    return terrain
+
+
+def _path(terrain: type[Terrain]) -> str:
+    return f"{terrain.__module__}.{terrain.__qualname__}"
+
+
 @cache
 def get_terrain(name: str) -> type[Terrain]:
-    """Return the terrain class `name`. Built-in terrains take precedence over plugins.
+    """Return the terrain class `name`: a built-in or registered one, or that of a plugin.
 
     Raises:
         ConfigError: if there is no such terrain, or a plugin cannot be loaded.
     """
     if name in terrain_names():
         return _builtin_terrain(name)
+    if name in _registered:
+        return _registered[name]
     plugins = plugin_terrains()
     if name not in plugins:
         base = name.removesuffix(INVERTED)
         if base in terrain_names() and "inverted" in parameters_of(get_terrain(base)):
             raise ConfigError(f"no terrain {name!r}; use {base} with inverted = true")
-        expected = expected_names(name, [*terrain_names(), *plugins])
-        raise ConfigError(f"no terrain {name!r}; {expected}")
+        expected = expected_names(name, [*terrain_names(), *plugins, *_registered])
+        raise ConfigError(
+            f"no terrain {name!r} is built in, installed, or registered with "
+            f"terrainkit.register_terrain; {expected}"
+        )
     try:
         terrain = plugins[name].load()
     except (ImportError, AttributeError) as error:

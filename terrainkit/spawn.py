@@ -55,16 +55,15 @@ def find_spawn(
     """
     (x, y), (x0, y0) = preferred, grid.lower
     index = (x - x0) / grid.cell - 0.5, (y - y0) / grid.cell - 0.5
-    obstacles = SolidIndex(solids, radius=disc.radius)
     if _is_inside(preferred, grid, disc.radius):
         low, z = _height_range(heights, index, disc.radius / grid.cell)
         if z - low <= disc.tolerance:
             if low != z:
                 # The disc is flat within the tolerance only: evaluate the surface at its center.
                 z = float(surface_at(heights, np.array([index]), threshold=threshold).height[0])
-            if not len(solids) or _is_free(np.array([[x, y, z]]), obstacles, disc.headroom)[0]:
+            if not len(solids) or _is_free(np.array([[x, y, z]]), solids, disc)[0]:
                 return x, y, z
-    cells, origins = _free_discs(heights, grid, disc, obstacles)
+    cells, origins = _free_discs(heights, grid, disc, solids)
     if not len(cells):
         return None
     x, y, z = origins[np.argmin(((cells - index) ** 2).sum(axis=1))].tolist()
@@ -104,7 +103,7 @@ def sample_spawns(
     from scipy.ndimage import label
 
     chosen = [np.array(origin)]
-    cells, places = _free_discs(heights, grid, disc, SolidIndex(solids, radius=disc.radius))
+    cells, places = _free_discs(heights, grid, disc, solids)
     is_free = np.zeros(grid.shape, dtype=bool)
     is_free[tuple(cells.T)] = True
     regions, _ = label(is_free)
@@ -122,23 +121,22 @@ def sample_spawns(
 
 
 def _free_discs(
-    heights: NDArray[np.float32], grid: Grid, disc: Disc, obstacles: SolidIndex
+    heights: NDArray[np.float32], grid: Grid, disc: Disc, solids: Solids
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return the cells with a flat and free disc, shape (n, 2), and their centers, (n, 3)."""
     cells = _flat_cells(heights, disc.radius / grid.cell, disc.tolerance)
     i, j = cells.T
     places = np.column_stack([grid.axis(0)[i], grid.axis(1)[j], heights[i, j]])
-    is_free = _is_free(places, obstacles, disc.headroom)
+    is_free = _is_free(places, solids, disc)
     return cells[is_free], places[is_free]
 
 
-def _is_free(
-    origins: NDArray[np.float64], obstacles: SolidIndex, headroom: float
-) -> NDArray[np.bool_]:
+def _is_free(origins: NDArray[np.float64], solids: Solids, disc: Disc) -> NDArray[np.bool_]:
     """Return whether no solid is above each disc within the headroom, shape (n,)."""
-    bottom, top = np.moveaxis(obstacles.spans(origins[:, :2]), -1, 0)
+    spans = SolidIndex(solids, radius=disc.radius).spans(origins[:, :2])
+    bottom, top = np.moveaxis(spans, -1, 0)
     z = origins[:, 2:]
-    is_blocked: NDArray[np.bool_] = ((top > z + CONTACT) & (bottom < z + headroom)).any(axis=1)
+    is_blocked: NDArray[np.bool_] = ((top > z + CONTACT) & (bottom < z + disc.headroom)).any(axis=1)
     return ~is_blocked
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Annotated, Any, Self
 
 from msgspec import Meta
@@ -11,6 +12,7 @@ from terrainkit.errors import ConfigError
 from terrainkit.parameter import MAX_VALUE
 from terrainkit.schema import Config
 from terrainkit.terrain import Terrain
+from terrainkit.type_hint import convert
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,8 +23,9 @@ class SubTerrain(Config):
         ConfigError: if there is no such terrain, or a parameter is unknown or invalid.
     """
 
-    terrain: str
-    """Name of the terrain; `terrainkit list` prints all of them."""
+    terrain: Annotated[Any, Meta(description="a string")]
+    """Name of the terrain; `terrainkit list` prints all of them. In Python, it may be a subclass of
+    :class:`~terrainkit.terrain.Terrain`, which is registered and replaced by its name."""
 
     proportion: Annotated[float, Meta(ge=0, le=MAX_VALUE)] = 1.0
     """Share of the columns, relative to the sum of all proportions."""
@@ -37,11 +40,13 @@ class SubTerrain(Config):
     of the table itself."""
 
     def __post_init__(self) -> None:
+        if isinstance(self.terrain, type):
+            terrain: type[Terrain] = registry.register_terrain(self.terrain)
+            object.__setattr__(self, "terrain", terrain.kind())
+        convert("terrain", self.terrain, str)
         try:
             super().__post_init__()
         except ConfigError as error:
-            if not isinstance(self.terrain, str):
-                raise
             raise ConfigError(f"{self.terrain}.{error}") from None
         if not self.name:
             object.__setattr__(self, "name", self.terrain)
@@ -65,6 +70,11 @@ class SubTerrain(Config):
         name = {"name": self.name} if self.name != self.terrain else {}
         return {"terrain": self.terrain, "proportion": self.proportion, **name, **self.parameters}
 
+    @cached_property
+    def terrain_class(self) -> type[Terrain]:
+        """The class of the terrain. It is looked up once, and pickled with the instance."""
+        return registry.get_terrain(self.terrain)
+
     def at(self, difficulty: float) -> Terrain:
         """Return the terrain at `difficulty`, 0 to 1."""
-        return registry.get_terrain(self.terrain).at(difficulty, self.parameters)
+        return self.terrain_class.at(difficulty, self.parameters)

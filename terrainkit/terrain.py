@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,21 +11,20 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.parameter import (
-    Parameter,
     Range,
     Realized,
     Value,
-    at_difficulty,
     convert_parameter,
+    convert_range,
     parameters_of,
 )
+from terrainkit.parameterized import Parameterized
 from terrainkit.solids import Solids
 from terrainkit.text import expected_names
-from terrainkit.type_hint import show
 
 
 @dataclass(frozen=True, kw_only=True)
-class Terrain(ABC):
+class Terrain(Parameterized, ABC):
     r"""A type of ground with fixed parameters.
 
     A terrain is a frozen dataclass with the method :meth:`heights`, and :meth:`solids` and
@@ -48,15 +47,11 @@ class Terrain(ABC):
 
     def __post_init__(self) -> None:
         for name, parameter in parameters_of(type(self)).items():
-            given = getattr(self, name)
+            given: Any = getattr(self, name)
+            if given is parameter.default:
+                given = parameter.hard
             value = convert_parameter(self.kind(), name, given, parameter)
-            if value is not given:
-                object.__setattr__(self, name, value)
-
-    @classmethod
-    def kind(cls) -> str:
-        """Return the name of the terrain, which is the name of its module."""
-        return cls.__module__.rpartition(".")[2]
+            object.__setattr__(self, name, value)
 
     @classmethod
     def at(cls, difficulty: float, values: Mapping[str, Value | Range] | None = None) -> Self:
@@ -73,34 +68,15 @@ class Terrain(ABC):
             raise ConfigError(
                 f"{cls.kind()}.difficulty: got {difficulty:g}; expected a number from 0 to 1"
             )
-        values = values or {}
         known = parameters_of(cls)
-        for name in values:
+        fixed = {name: parameter.at(difficulty) for name, parameter in known.items()}
+        for name, value in (values or {}).items():
             if name not in known:
                 expected = expected_names(name, known, "it has")
                 raise ConfigError(f"{cls.kind()} has no parameter {name!r}; {expected}")
-        return cls(**{name: cls._value(name, p, values, difficulty) for name, p in known.items()})
-
-    @classmethod
-    def _value(
-        cls, name: str, parameter: Parameter, values: Mapping[str, Value | Range], difficulty: float
-    ) -> Value:
-        if name not in values:
-            return parameter.at(difficulty)
-        value = values[name]
-        if isinstance(value, tuple):
-            if not parameter.allows_range or len(value) != 2:
-                expected = "one value" + (
-                    " or a pair (easy, hard)" if parameter.allows_range else ""
-                )
-                raise ConfigError(f"{cls.kind()}.{name}: got {show(value)}; expected {expected}")
-            easy, hard = (convert_parameter(cls.kind(), name, end, parameter) for end in value)
-            return at_difficulty((easy, hard), difficulty)
-        return value
-
-    def requested(self) -> dict[str, Value]:
-        """Return the parameters before snapping, by name."""
-        return {name: getattr(self, name) for name in parameters_of(type(self))}
+            converted: Any = convert_range(cls.kind(), name, value, known[name])
+            fixed[name] = known[name].value_at(converted, difficulty)
+        return cls(**fixed)
 
     def realized(self, grid: Grid) -> dict[str, Realized]:
         """Return the parameters after snapping to the cells of `grid`, by name."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from terrainkit import registry
 from terrainkit.field_docs import field_docs
-from terrainkit.parameter import Value, parameters_of
+from terrainkit.parameter import Parameter, format_value, parameters_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,14 +61,17 @@ def terrain_doc(name: str) -> TerrainDoc:
         parameters=tuple(
             ParameterDoc(
                 name=name,
-                easy=_text(parameter.easy),
-                hard=_text(parameter.hard) if parameter.hard != parameter.easy else "",
-                text=texts.get(name, ""),
+                easy=format_value(parameter.easy),
+                hard=format_value(parameter.hard) if parameter.hard != parameter.easy else "",
+                text=_text(texts.get(name, ""), parameter),
             )
             for name, parameter in parameters_of(terrain).items()
         ),
     )
 
 
-def _text(value: Value) -> str:
-    return str(value).lower() if isinstance(value, bool) else f"{value:g}"
+def _text(text: str, parameter: Parameter) -> str:
+    """Return the docstring of a parameter, and its choices if it has any."""
+    if not parameter.choices:
+        return text
+    return f"{text} One of: {', '.join(map(str, parameter.choices))}.".strip()

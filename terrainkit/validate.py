@@ -13,12 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import registry
 from terrainkit.errors import TerrainkitError, TerrainkitWarning
 from terrainkit.layout import assign_patch, terrain_columns
 from terrainkit.mesh.solid_mesh import concatenate_meshes, solid_meshes
 from terrainkit.mesh.tri_mesh import TriMesh
-from terrainkit.parameter import parameters_of
+from terrainkit.parameter import format_value, parameters_of
 from terrainkit.patch import Patch, build_patch
 from terrainkit.solids import Solids
 from terrainkit.terrain_map import TerrainMap
@@ -171,15 +170,14 @@ def _check_realized(terrain_map: TerrainMap) -> Iterator[str]:
     cell, sub_terrains = terrain_map.config.cell, terrain_map.config.sub_terrains
     for row, col in np.ndindex(terrain_map.difficulty.shape):
         patch = terrain_map.patch(row, col)
-        parameters = parameters_of(
-            registry.get_terrain(sub_terrains[terrain_map.terrain_types[row, col]].terrain)
-        )
+        sub_terrain = sub_terrains[terrain_map.terrain_types[row, col]]
+        parameters = parameters_of(sub_terrain.terrain_class)
         for name, requested in patch.parameters.requested.items():
             realized = patch.parameters.realized[name]
             if parameters[name].deviates(requested, realized, cell):
                 yield (
                     f"patch ({row}, {col}), {patch.terrain}: {name} is {realized}; "
-                    f"requested {requested:g}"
+                    f"requested {format_value(requested)}"
                 )
 
 

@@ -54,7 +54,6 @@ RETIRED = {
     "capacity": "memory",
     "careers": "curriculum",
     "carried": "composite_inertia",
-    "choice": "sub_terrain",
     "choose": "select_rules",
     "coarser": "decimate",
     "combined": "merged_inertia",

@@ -17,6 +17,7 @@ COMMAND_GROUPS = {
         "info": "terrain_commands",
         "preview": "terrain_commands",
         "check-map": "terrain_commands",
+        "diff": "terrain_commands",
         "export": "export_command",
     },
     "Robots": {

@@ -1,5 +1,6 @@
-"""The commands for maps: generate, list, info, preview and check-map."""
+"""The commands for maps: generate, list, info, preview, check-map and diff."""
 
+import re
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ import tyro
 from terrainkit import presets, registry
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
-from terrainkit.parameter import Range, Value
+from terrainkit.parameter import Parameter, format_value, parameters_of
 from terrainkit.sub_terrain import SubTerrain
 from terrainkit.terrain_map import TerrainMap
 from terrainkit_cli import render
@@ -46,7 +47,8 @@ class Generate(ConfigCommand):
     """Use only this terrain, not a preset; `terrainkit list` prints the names."""
 
     set: Annotated[str, tyro.conf.arg(metavar="NAME=VALUE,...", help_behavior_hint="")] = ""
-    """Parameters of --terrain: NAME=VALUE, or NAME=EASY:HARD for a range over the difficulty."""
+    """Parameters of --terrain: NAME=VALUE, NAME=EASY:HARD for a range over the difficulty, or
+    NAME=[X,Y,...] for a tuple."""
 
     jobs: Annotated[int, tyro.conf.arg(metavar="N")] = 1
     """Number of processes that build patches; the map does not depend on it. More than one is
@@ -95,7 +97,8 @@ class Generate(ConfigCommand):
         if self.set and not self.terrain:
             raise ConfigError("--set: got parameters without a terrain; expected --terrain")
         if self.terrain:
-            parameters = _parameters(self.set)
+            terrain = registry.get_terrain(self.terrain)
+            parameters = _parameters("--set", self.set, terrain)
             values["terrains"] = (SubTerrain(terrain=self.terrain, parameters=parameters),)
         elif "preset" in values:
             values["terrains"] = ()
@@ -106,17 +109,29 @@ def _load_config(path: str) -> MapConfig:
     return TerrainMap.load(path).config if path.endswith(".npz") else MapConfig.load(path)
 
 
-def _parameters(text: str) -> dict[str, Value | Range]:
+def _parameters(option: str, text: str, owner: Any) -> dict[str, Any]:
+    """Return the values in NAME=VALUE,... of parameters of a terrain or overlay."""
     parameters: dict[str, Any] = {}
-    for word in text.split(",") if text else []:
+    known = parameters_of(owner)
+    for word in re.split(r",(?![^\[]*\])", text) if text else []:  # not in [1, 2]
         name, equals, value = word.partition("=")
-        values = tuple(value_of(part) for part in value.split(":"))
-        if not equals or len(values) > 2:
-            raise ConfigError(f"--set: got {word!r}; expected name=value or name=easy:hard")
-        if name.strip() in parameters:
-            raise ConfigError(f"--set: got {name.strip()} twice; expected it once")
-        parameters[name.strip()] = values if len(values) == 2 else values[0]
+        name = name.strip()
+        if not equals:
+            raise ConfigError(f"{option}: got {word!r}; expected name=value or name=easy:hard")
+        if name in parameters:
+            raise ConfigError(f"{option}: got {name} twice; expected it once")
+        parameters[name] = _parameter_value(value, known.get(name))
     return parameters
+
+
+def _parameter_value(text: str, parameter: Parameter | None) -> Any:
+    """Return the value or range that `text` describes."""
+    if parameter and (text in parameter.choices or isinstance(parameter.easy, str)):
+        return text
+    if text.startswith("[") and text.endswith("]"):
+        return tuple(value_of(part.strip()) for part in text[1:-1].split(","))
+    values = tuple(value_of(part) for part in text.split(":"))
+    return values if len(values) > 1 else values[0]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,6 +149,8 @@ class List(Command):
 
         if not self.terrain:
             render.table(list(terrain_summaries().items()))
+            if names := registry.registered_terrains():
+                render.result(f"\nregistered: {', '.join(names)}")
             if others := registry.plugin_terrains():
                 render.result("\nfrom other packages:")
                 render.table([(f"  {name}", point.value) for name, point in others.items()])
@@ -240,13 +257,12 @@ def _print_patch(terrain_map: TerrainMap, row: int, col: int) -> None:
     rows = [("parameter", "requested", "realized")]
     for name, requested in patch.parameters.requested.items():
         realized = patch.parameters.realized[name]
-        values = realized if isinstance(realized, tuple) else (realized,)
-        rows.append((name, _number(requested), " x ".join(map(_number, values))))
+        if isinstance(realized, tuple) and not isinstance(requested, tuple):
+            text = " x ".join(map(format_value, realized))
+        else:
+            text = format_value(realized)
+        rows.append((name, format_value(requested), text))
     render.table(rows)
-
-
-def _number(value: float) -> str:
-    return str(value).lower() if isinstance(value, bool) else f"{value:g}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -306,6 +322,39 @@ class CheckMap(Command):
             render.result(f"\n{self.map}: {count(len(issues), 'issue')}")
             return 1
         render.result(f"{self.map}: {terrain_map.difficulty.size} patches, no issues")
+        return 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Diff(Command):
+    """Compare two maps: config, and each patch.
+
+    Exit code 0: the maps are the same. 1: they differ. 2: a file cannot be read.
+    """
+
+    a: MapFile
+    """The first map, a file written by terrainkit generate."""
+
+    b: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OTHER.npz")]
+    """The second map."""
+
+    def run(self) -> int:
+        """Print the differences, and return 1 if there are any."""
+        from terrainkit.map_diff import diff_maps
+
+        a, b = TerrainMap.load(self.a), TerrainMap.load(self.b)
+        diff = diff_maps(a, b)
+        for line in diff.config:
+            render.result(f"config: {line}")
+        for line in diff.grid:
+            render.result(line)
+        for (row, col), lines in diff.patches.items():
+            render.result(f"patch ({row}, {col}): {'; '.join(lines)}")
+        if diff:
+            total = a.difficulty.size
+            render.result(f"\n{self.a} -> {self.b}: {len(diff.patches)} of {total} patches differ")
+            return 1
+        render.result(f"{self.a} and {self.b} are the same")
         return 0
 
 

@@ -172,7 +172,7 @@ def _add_hfield(
     # Padding provides the samples beyond the map where there is no border.
     samples = np.pad(heights, _RINGS, mode="edge")[part]
     low = float(samples.min())
-    levels = np.rint((samples - low) / _QUANTUM).astype(np.int64)
+    levels = np.rint((samples - low) / _QUANTUM).astype(np.int32)
     span = max(int(levels.max()), 1) * _QUANTUM  # MuJoCo requires a range above 0
     half = [(n - 1) * cell / 2 for n in samples.shape]
     middle = [((s.start + s.stop) / 2 - _RINGS) * cell for s in part]
@@ -184,7 +184,7 @@ def _add_hfield(
         ncol=str(samples.shape[0]),
         size=_numbers(*half, span, THICKNESS),
         # Inline elevation starts with the row of the largest y.
-        elevation="\n".join(" ".join(map(str, row)) for row in levels.T[::-1].tolist()),
+        elevation="\n".join(" ".join(map(str, row.tolist())) for row in levels.T[::-1]),
     )
     position = _numbers(*np.add(terrain_map.grid.lower, middle), low)
     ET.SubElement(world, "geom", {"class": "terrain"}, type="hfield", hfield=name, pos=position)

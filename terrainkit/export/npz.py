@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import registry
 from terrainkit.archive import MAX_TEXT_BYTES, Archive, open_archive, write_arrays
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError, MapFileError, listing
 from terrainkit.mesh.node_grid import BYTES_PER_NODE
 from terrainkit.mesh.tri_mesh import TriMesh
-from terrainkit.parameter import MAX_VALUE, Realized, Value, parameters_of
+from terrainkit.parameter import MAX_VALUE, Value, parameters_of
 from terrainkit.patch import Parameters
 from terrainkit.solids import Solids
 
@@ -241,10 +240,7 @@ def _all_parameters(
     archive: Archive, config: MapConfig, terrain_types: NDArray[np.int32]
 ) -> NDArray[np.object_]:
     table = np.empty(terrain_types.shape, dtype=object)
-    names = [
-        set(parameters_of(registry.get_terrain(sub_terrain.terrain)))
-        for sub_terrain in config.sub_terrains
-    ]
+    names = [set(parameters_of(each.terrain_class)) for each in config.sub_terrains]
     try:
         rows = json.loads(
             archive.text("parameters", limit=(table.size + 16) * MAX_PATCH_RECORD_BYTES)
@@ -257,21 +253,20 @@ def _all_parameters(
 
 
 def _parameters(record: Mapping[str, Mapping[str, Any]], names: set[str]) -> Parameters:
-    requested = {name: _number(value) for name, value in record["requested"].items()}
-    realized = {name: _realized(value) for name, value in record["realized"].items()}
+    requested = {name: _value(value) for name, value in record["requested"].items()}
+    realized = {name: _value(value) for name, value in record["realized"].items()}
     if not requested.keys() == realized.keys() == names:
         raise ValueError(f"expected {listing(sorted(names))}, requested and realized")
     return Parameters(requested=requested, realized=realized)
 
 
-def _realized(value: Any) -> Realized:
+def _value(value: Any) -> Value:
     if isinstance(value, list):
-        x, y = value
-        return _number(x), _number(y)
-    return _number(value)
+        return tuple(_number(each) for each in value)
+    return value if isinstance(value, str) else _number(value)
 
 
-def _number(value: Any) -> Value:
+def _number(value: Any) -> float:
     if not isinstance(value, int | float) or not abs(value) <= MAX_VALUE:
         raise ValueError("expected numbers in range")
     return value

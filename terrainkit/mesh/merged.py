@@ -6,13 +6,15 @@ vertices that its neighbors use, so large and small faces share all vertices. Th
 that of the full mesh.
 """
 
+import itertools
+
 import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.grid import Grid
 from terrainkit.mesh.full import split_quads
-from terrainkit.mesh.node_grid import NodeGrid
-from terrainkit.mesh.polygons import Ids, Mask, Polygons
+from terrainkit.mesh.node_grid import QUADS_PER_BLOCK, NodeGrid
+from terrainkit.mesh.polygons import Mask
 from terrainkit.mesh.rectangles import Rectangles
 from terrainkit.mesh.tri_mesh import TriMesh
 from terrainkit.mesh.wall_quads import wall_quads
@@ -31,25 +33,75 @@ def merged_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> T
         MemoryLimitError: if the mesh would not fit in memory; nothing was allocated.
     """
     node_grid = NodeGrid.from_heights(heights, grid, threshold)
+    parts, extra_parts = _faces(node_grid, *_merge_quads(node_grid))
+    x, y, z = node_grid.x, node_grid.y, node_grid.z
+    # Arrays that are no longer needed are freed, since they are larger than the mesh.
+    del node_grid
+    triangles, extra = np.concatenate(parts), np.concatenate(extra_parts)
+    del parts, extra_parts
+    used = np.zeros(z.size + len(extra), dtype=bool)
+    used[triangles.ravel()] = True
+    i, j = np.divmod(np.flatnonzero(used[: z.size]), z.shape[1])
+    nodes = np.empty((len(i), 3), dtype=np.float32)
+    nodes[:, 0], nodes[:, 1], nodes[:, 2] = x[i], y[j], z[i, j]
+    vertices = np.concatenate([nodes, extra[used[z.size :]]])
+    del i, j, z, nodes, extra
+    number = np.cumsum(used, dtype=np.int32)
+    for start in range(0, len(triangles), QUADS_PER_BLOCK):
+        part = triangles[start : start + QUADS_PER_BLOCK]
+        part[:] = number[part] - 1
+    return TriMesh(vertices=vertices, triangles=triangles)
+
+
+def _merge_quads(node_grid: NodeGrid) -> tuple[Mask, list[Rectangles], list[WallRuns]]:
+    """Return the quads that are not merged, and those that are."""
     flat_x, flat_y = node_grid.flat_x, node_grid.flat_y
     flat = flat_x & flat_y
+    sloped = ~(flat | node_grid.has_wall)
+    rows_x, rows_y = flat_x & sloped, flat_y & sloped
+    del sloped
     # Where the ground is flat along y, walls on both edges along x are one straight wall.
-    walls_x = flat_y & node_grid.walls_x[:, :-1] & node_grid.walls_x[:, 1:]
-    walls_y = flat_x & node_grid.walls_y[:-1] & node_grid.walls_y[1:]
-    rows_y = flat_y & ~(flat | node_grid.has_wall)
-    rows_x = flat_x & ~(flat | node_grid.has_wall)
-
+    walls_x, walls_y = flat_y, flat_x
+    walls_x &= node_grid.walls_x[:, :-1]
+    walls_x &= node_grid.walls_x[:, 1:]
+    walls_y &= node_grid.walls_y[:-1]
+    walls_y &= node_grid.walls_y[1:]
+    # Each of these clears the mask where there is nothing to merge.
     rectangles = [Rectangles.flat(flat), Rectangles.along_y(rows_y), Rectangles.along_x(rows_x)]
     runs = [WallRuns.normal_x(node_grid, walls_x), WallRuns.normal_y(node_grid, walls_y)]
-    single = ~(flat | rows_x | rows_y | walls_x | walls_y)
+    merged = flat
+    for mask in (rows_x, rows_y, walls_x, walls_y):
+        merged |= mask
+    return ~merged, rectangles, runs
+
+
+def _faces(
+    node_grid: NodeGrid, single: Mask, rectangles: list[Rectangles], runs: list[WallRuns]
+) -> tuple[list[NDArray[np.int32]], list[NDArray[np.float32]]]:
+    """Return the triangles in several parts, and the positions of the vertices after the nodes."""
     kept = _corners(single)
     for rectangle in rectangles:
         rectangle.keep_corners(kept)
     for run in runs:
         run.keep_ends(kept)
-    polygons = [rectangle.polygons(node_grid, kept) for rectangle in rectangles]
-    polygons += [loop for run in runs for loop in run.strips(kept)]
-    return _assemble(node_grid, single, polygons, [run.panels() for run in runs])
+
+    plain = node_grid.first_corners(single & ~node_grid.has_wall)
+    pairs = np.empty((2 * len(plain), 3), dtype=np.int32)
+    split_quads(node_grid, plain, out=pairs)
+    count = node_grid.vertex_count
+    faces, added = wall_quads(node_grid, np.flatnonzero(single & node_grid.has_wall), count)
+    triangles = [pairs, faces, *(run.panels().astype(np.int32) for run in runs)]
+    extra = [added]
+    count += len(added)
+    for polygons in itertools.chain(
+        (part.polygons(node_grid, kept) for each in rectangles for part in each.blocks()),
+        *(run.strips(kept) for run in runs),
+    ):
+        parts, added = polygons.triangles(count)
+        triangles.append(parts.astype(np.int32))
+        extra.append(added)
+        count += len(added)
+    return triangles, [node_grid.midpoints(), *extra]
 
 
 def _corners(quads: Mask) -> Mask:
@@ -59,45 +111,3 @@ def _corners(quads: Mask) -> Mask:
         for j in (slice(None, -1), slice(1, None)):
             nodes[i, j] |= quads
     return nodes
-
-
-def _assemble(
-    node_grid: NodeGrid, single: Mask, polygons: list[Polygons], panels: list[Ids]
-) -> TriMesh:
-    """Return the mesh of single quads, polygons and wall panels."""
-    plain = node_grid.first_corners(single & ~node_grid.has_wall)
-    pairs = np.empty((2 * len(plain), 3), dtype=np.int32)
-    split_quads(node_grid, plain, out=pairs)
-    count = node_grid.vertex_count
-    faces, added = wall_quads(node_grid, np.flatnonzero(single & node_grid.has_wall), count)
-    triangles = [pairs, faces, *(panel.astype(np.int32) for panel in panels)]
-    extra = [node_grid.midpoints(), added]
-    count += len(added)
-    for loop in polygons:
-        parts, added = loop.triangles(count)
-        triangles.append(parts.astype(np.int32))
-        extra.append(added)
-        count += len(added)
-    return _compact(node_grid, np.concatenate(triangles), np.concatenate(extra))
-
-
-def _compact(
-    node_grid: NodeGrid, triangles: NDArray[np.int32], extra: NDArray[np.float32]
-) -> TriMesh:
-    """Return the mesh without unused vertices.
-
-    Args:
-        node_grid: Whose nodes are the first vertices.
-        triangles: Faces, shape (nf, 3).
-        extra: Positions of the vertices after the nodes [m], shape (n, 3).
-    """
-    used = np.zeros(node_grid.z.size + len(extra), dtype=bool)
-    used[triangles.ravel()] = True
-    old = np.flatnonzero(used)
-    number = np.empty(len(used), dtype=np.int32)
-    number[old] = np.arange(len(old), dtype=np.int32)
-    nodes = old[: np.searchsorted(old, node_grid.z.size)]
-    return TriMesh(
-        vertices=np.concatenate([node_grid.nodes(nodes), extra[used[node_grid.z.size :]]]),
-        triangles=number[triangles],
-    )

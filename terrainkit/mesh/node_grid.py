@@ -58,14 +58,14 @@ class NodeGrid:
         either |= self.walls_y[1:]
         return either
 
-    @cached_property
+    @property
     def flat_x(self) -> NDArray[np.bool_]:
         """Whether both edges of each quad along x are flat."""
         same = self.z[:-1] == self.z[1:]
         flat: NDArray[np.bool_] = same[:, :-1] & same[:, 1:]
         return flat
 
-    @cached_property
+    @property
     def flat_y(self) -> NDArray[np.bool_]:
         """Whether both edges of each quad along y are flat."""
         same = self.z[:, :-1] == self.z[:, 1:]
@@ -109,49 +109,28 @@ class NodeGrid:
 
         The vertex on the other side has the next number. Without a wall, the result is undefined.
         """
-        return self.z.size + 2 * self._order_x[i, j].astype(np.int64)
+        index = np.searchsorted(self.edges_x, i * self.walls_x.shape[1] + j)
+        vertex: NDArray[np.int64] = self.z.size + 2 * index
+        return vertex
 
     def midpoint_y(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the vertex at the midpoint of each wall (i, j)-(i, j + 1), like `midpoint_x`."""
-        return self.z.size + 2 * (self.edges_x.size + self._order_y[i, j].astype(np.int64))
-
-    @cached_property
-    def _order_x(self) -> NDArray[np.int32]:
-        """Index of each wall in `edges_x`, shape of `walls_x`."""
-        return _order(self.walls_x, self.edges_x)
-
-    @cached_property
-    def _order_y(self) -> NDArray[np.int32]:
-        """Index of each wall in `edges_y`, shape of `walls_y`."""
-        return _order(self.walls_y, self.edges_y)
-
-    def nodes(self, numbers: NDArray[np.int64]) -> NDArray[np.float32]:
-        """Return the positions of the nodes with these numbers [m], shape (n, 3)."""
-        i, j = np.divmod(numbers, self.z.shape[1])
-        return _positions(self.x[i], self.y[j], self.z.ravel()[numbers])
+        index = self.edges_x.size + np.searchsorted(self.edges_y, i * self.walls_y.shape[1] + j)
+        vertex: NDArray[np.int64] = self.z.size + 2 * index
+        return vertex
 
     def midpoints(self) -> NDArray[np.float32]:
         """Return the positions of all midpoints of walls [m], in the order of their numbers."""
+        num_x = 2 * self.edges_x.size
+        result = np.empty((num_x + 2 * self.edges_y.size, 3), dtype=np.float32)
         i, j = np.divmod(self.edges_x, self.walls_x.shape[1])
-        x = (self.x[i] + self.x[i + 1]) / 2
-        along_x = [_positions(x, self.y[j], self.z[i + side, j]) for side in (0, 1)]
+        for side in (0, 1):
+            part = result[side:num_x:2]
+            part[:, 0], part[:, 1] = (self.x[i] + self.x[i + 1]) / 2, self.y[j]
+            part[:, 2] = self.z[i + side, j]
         i, j = np.divmod(self.edges_y, self.walls_y.shape[1])
-        y = (self.y[j] + self.y[j + 1]) / 2
-        along_y = [_positions(self.x[i], y, self.z[i, j + side]) for side in (0, 1)]
-        return np.concatenate(
-            [np.stack(sides, axis=1).reshape(-1, 3) for sides in (along_x, along_y)]
-        )
-
-
-def _order(walls: NDArray[np.bool_], edges: NDArray[np.int64]) -> NDArray[np.int32]:
-    order = np.zeros(walls.shape, dtype=np.int32)
-    order.ravel()[edges] = np.arange(len(edges))
-    return order
-
-
-def _positions(
-    x: NDArray[np.float64], y: NDArray[np.float64], z: NDArray[np.float32]
-) -> NDArray[np.float32]:
-    positions = np.empty((len(z), 3), dtype=np.float32)
-    positions[:, 0], positions[:, 1], positions[:, 2] = x, y, z
-    return positions
+        for side in (0, 1):
+            part = result[num_x + side :: 2]
+            part[:, 0], part[:, 1] = self.x[i], (self.y[j] + self.y[j + 1]) / 2
+            part[:, 2] = self.z[i, j + side]
+        return result

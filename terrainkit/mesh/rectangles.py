@@ -1,5 +1,6 @@
 """Rectangles of coplanar quads."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Self
 
@@ -7,6 +8,8 @@ import numpy as np
 
 from terrainkit.mesh.node_grid import NodeGrid
 from terrainkit.mesh.polygons import Ids, Mask, Polygons, runs, segment_indices
+
+_BLOCK = 1 << 10
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,6 +55,12 @@ class Rectangles:
         """Mark the nodes at the corners in `kept`."""
         for i in (self.i0, self.i1):
             kept[i, self.j0] = kept[i, self.j1] = True
+
+    def blocks(self) -> Iterator["Rectangles"]:
+        """Yield the rectangles in blocks, whose polygons take little memory."""
+        for start in range(0, len(self.i0), _BLOCK):
+            part = slice(start, start + _BLOCK)
+            yield Rectangles(i0=self.i0[part], i1=self.i1[part], j0=self.j0[part], j1=self.j1[part])
 
     def polygons(self, node_grid: NodeGrid, kept: Mask) -> Polygons:
         """Return the boundaries with the nodes that are `kept`."""

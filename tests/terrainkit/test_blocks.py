@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit.blocks import SINK, make_blocks, make_ramps, number_that_fits
+from terrainkit.blocks import SINK, make_blocks, make_ramps, make_standing_boxes, number_that_fits
 from terrainkit.errors import ConfigError
 from terrainkit.solid_index import SolidIndex
 
@@ -18,6 +18,15 @@ def test_number_that_fits_rejects_too_many():
         number_that_fits("stones", 0.01, 8.0)
 
 
+def test_make_standing_boxes_begin_below_the_ground():
+    boxes = make_standing_boxes(
+        [[1.0, 2.0], [3.0, 4.0]], (2.0, 1.0), [0.5, 1.0], floor=-1.0, yaw=[0.0, np.pi / 2]
+    )
+    lower, upper = boxes.bounds()
+    assert lower == pytest.approx(np.array([[0, 1.5, -1 - SINK], [2.5, 3, -1 - SINK]]))
+    assert upper == pytest.approx(np.array([[2, 2.5, 0.5], [3.5, 5, 1]]))
+
+
 def test_make_blocks_span_both_corners():
     lower, upper = make_blocks([[1.0, 2.0, -1.0]], [[1.5, 3.0, 0.25]]).bounds()
     assert lower.tolist() == [[1.0, 2.0, -1.0]]
@@ -31,3 +40,8 @@ def test_make_ramps_top_is_the_plane_of_the_corners():
     (low, high) = SolidIndex(ramp).spans(np.array(xy))[:, 0].T
     assert high == pytest.approx([0.15, 0.19, 0.1])
     assert low == pytest.approx(-SINK)
+
+
+def test_make_ramps_stand_on_the_ground():
+    ramp = make_ramps([[0.0, 0.0]], [[1.0, 1.0]], [[0.0, 0.0, 0.1, 0.1]], floor=-1.0)
+    assert ramp.bounds()[0][0] == pytest.approx([0.0, 0.0, -1 - SINK])

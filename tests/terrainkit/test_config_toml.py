@@ -33,6 +33,7 @@ NOT_THE_DEFAULT = {
     "slope_threshold": None,
     "spawn_radius": 0.3,
     "spawn_tolerance": 1e-7,
+    "spawns_per_patch": 3,
     "spawn_headroom": 2.5,
     "static_friction": 0.8,
     "dynamic_friction": 0.6,
@@ -135,7 +136,10 @@ def test_handwritten_file_is_read():
     [
         ("row = 3", "config has no key 'row'; did you mean 'rows'. It has: rows, cols, patch_"),
         ("[map]\nrows = 3", "config has no key 'map'; it has: rows, "),
-        ('[[terrains]]\nterrain = "lava"', "no terrain 'lava'; there are: .*flat, .*gap, "),
+        (
+            '[[terrains]]\nterrain = "lava"',
+            "no terrain 'lava' is built in, .*flat, .*gap, ",
+        ),
         (
             '[[terrains]]\nterrain = "gap"\nwidht = 1.0',
             "gap has no parameter 'widht'; did you mean 'width'. It has: width, depth, platform",

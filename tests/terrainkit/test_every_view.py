@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from terrainkit import MapConfig, TerrainMap, generate, presets
+from terrainkit.free_space import CONTACT
 
 POINTS = 1000
 TOLERANCE = 1e-3
@@ -92,7 +93,7 @@ def test_every_view_is_the_same_surface(sub_terrain, patch_size, cell, tmp_path)
     assert len(xy) > POINTS / 2
 
     intervals, ground = terrain_map.intervals(xy), terrain_map.height(xy)
-    is_bare = np.abs(intervals[:, 0, 0] - ground) < TOLERANCE
+    is_bare = intervals[:, 0, 0] - ground < CONTACT
     free = np.where(is_bare, intervals[:, 0, 1] - ground, 0.0)
     assert terrain_map.clearance(xy) == pytest.approx(free, abs=TOLERANCE)
 

@@ -172,3 +172,11 @@ def test_whole_cells_rejects_uncountable_lengths(length):
 
 def test_grid_margins_are_cells_beyond_the_block():
     assert Grid(shape=(80, 41), cell=0.1).margins((30, 31)) == (25, 5)
+
+
+@pytest.mark.parametrize(
+    ("center", "count", "first"), [(1.0, 2, 4), (1.0, 3, 4), (1.1, 3, 4), (-0.5, 2, 0)]
+)
+def test_grid_slice_along_x_is_around_the_center(center, count, first):
+    grid = Grid(shape=(20, 4), cell=0.2)
+    assert grid.slice_along_x(center, count) == slice(first, first + count)

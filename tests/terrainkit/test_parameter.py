@@ -13,7 +13,7 @@ from terrainkit.terrains.flat import Flat
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hurdle:
+class Hurdle(Flat):
     rise: float = parameter.height(0.1, 0.4)
     width: float = parameter.length(0.2)
     gap: float = parameter.length(0.0, 1.0, allows_zero=True)
@@ -152,3 +152,63 @@ def test_realized_length_is_shorter_where_ground_slopes_away():
     assert square.realized(2.0, grid) == (1.9, 2.0)
     assert not square.deviates(2.0, (1.9, 1.8), 0.1)
     assert square.deviates(2.0, (1.9, 1.7), 0.1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ramp(Flat):
+    surface: str = parameter.text("rubber")
+    profile: str = parameter.choice("straight", "curved")
+    turns: int = parameter.choice(1, 2, 4)
+    offset: tuple[float, float, float] = parameter.vector((0, 0, -1))
+
+
+GRID = Grid(shape=(80, 80), cell=0.1)
+RAMP = parameter.parameters_of(Ramp)
+
+
+@pytest.mark.parametrize("difficulty", [0.0, 0.5, 1.0])
+def test_parameter_of_other_type_is_constant(difficulty):
+    ramp = Ramp.at(difficulty)
+    assert ramp.requested() == {
+        "surface": "rubber", "profile": "straight", "turns": 1, "offset": (0.0, 0.0, -1.0),
+    }  # fmt: skip
+    assert ramp.realized(GRID) == ramp.requested()
+    given = {"surface": "a:b, c", "profile": "curved", "turns": 4, "offset": (1, 2, 3)}
+    assert Ramp.at(difficulty, given).requested() == given
+    assert type(Ramp.at(difficulty, given).offset[0]) is float
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"surface": 3}, r"ramp\.surface: got 3; expected a string of at most 200 characters$"),
+        ({"surface": 201 * "x"}, "expected a string of at most 200 characters"),
+        ({"surface": ("a", "b")}, r"ramp\.surface: got \['a', 'b'\]; expected one value$"),
+        ({"profile": "curvd"}, "expected one of: straight, curved; did you mean 'curved'"),
+        ({"turns": 3}, r"ramp\.turns: got 3; expected one of: 1, 2, 4"),
+        ({"turns": True}, r"ramp\.turns: got True; expected one of: 1, 2, 4"),
+        (
+            {"offset": (1, 2)},
+            r"ramp\.offset: got \[1, 2\]; expected 3 values, each a number",
+        ),
+        ({"offset": (1, 2, math.nan)}, "expected 3 values, each a number"),
+        ({"offset": 1}, r"ramp\.offset: got 1; expected 3 values"),
+    ],
+)
+def test_parameter_of_other_type_is_checked(given, message):
+    with pytest.raises(ConfigError, match=message):
+        Ramp.at(0.5, given)
+
+
+def test_parameter_of_other_type_deviates_if_it_differs():
+    assert not RAMP["surface"].deviates("a", "a", 0.1)
+    assert RAMP["surface"].deviates("a", "b", 0.1)
+    assert RAMP["offset"].deviates((1.0, 2.0, 3.0), (1.0, 2.0, 3.5), 0.1)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.31, "0.31"), (3, "3"), (True, "true"), ("a", "a"), ((0.5, -1.0), "[0.5, -1]")],
+)
+def test_format_value_is_command_line_text(value, text):
+    assert parameter.format_value(value) == text

@@ -3,7 +3,7 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
-from terrainkit.pit_ground import pit_across, pit_around, pit_bounds
+from terrainkit.pit_ground import pit_across, pit_around, pit_between, pit_bounds
 
 
 def test_pit_around_leaves_platform_and_rim():
@@ -20,6 +20,12 @@ def test_pit_across_leaves_strips_and_rim():
     assert (ground[3:5, 1:3] == -0.7).all()
     assert (ground != 0).sum() == 4
     assert [*low, *high] == [4.5, -0.5, 5.5, 0.5]
+
+
+def test_pit_between_leaves_rim():
+    ground = pit_between(Grid(shape=(8, 4), cell=0.5, lower=(3.0, 0.0)), 0.7, 4.1, 5.4)
+    assert (ground[2:5, 1:3] == -0.7).all()
+    assert (ground != 0).sum() == 6
 
 
 def test_pit_bounds_rejects_patch_without_pit():

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from terrainkit import MapConfig, SubTerrain, generate, registry, terrains
-from terrainkit.errors import ConfigError
+from terrainkit import MapConfig, SubTerrain, TerrainMap, generate, registry, terrains
+from terrainkit.errors import ConfigError, MapFileError
 from terrainkit.grid import Grid
 from terrainkit.terrain import Terrain
 
@@ -65,7 +65,8 @@ def test_get_terrain_suggests_inverted_option():
 @pytest.mark.parametrize("name", ["flat_inverted", "stair_inverted", "_inverted"])
 def test_get_terrain_without_inverted_is_unknown(name):
     with pytest.raises(
-        ConfigError, match=rf"no terrain '{name}'; there are: .*flat, .*gap, .*wave$"
+        ConfigError,
+        match=rf"no terrain '{name}' is built in, .*there are: .*flat, .*wave$",
     ):
         registry.get_terrain(name)
 
@@ -144,3 +145,90 @@ def test_get_terrain_reports_broken_entry_point(plugin, value):
     plugin(value)
     with pytest.raises(ConfigError, match=rf"dunes \({value}\) cannot be loaded: "):
         registry.get_terrain("dunes")
+
+
+@pytest.fixture
+def registered(monkeypatch):
+    monkeypatch.setattr(registry, "_registered", {})
+    registry.get_terrain.cache_clear()
+    yield
+    registry.get_terrain.cache_clear()
+
+
+def make_ramp(module="__main__", **fields):
+    """Return a terrain class RampUp of a module."""
+    space = {"__module__": module, "heights": lambda _, grid, __: np.zeros(grid.shape)}
+    return dataclass(frozen=True, kw_only=True)(type("RampUp", (Terrain,), space | fields))
+
+
+@pytest.mark.usefixtures("registered")
+def test_register_terrain_uses_the_class_name():
+    ramp = make_ramp()
+    assert registry.register_terrain(ramp) is ramp
+    assert registry.get_terrain("ramp_up") is ramp
+    assert registry.registered_terrains() == ("ramp_up",)
+    assert (
+        MapConfig.from_toml('[[terrains]]\nterrain = "ramp_up"').sub_terrains[0].at(0.5) == ramp()
+    )
+
+
+@pytest.mark.usefixtures("registered")
+def test_register_terrain_replaces_class_defined_again():
+    first, again = make_ramp(), make_ramp()
+    earlier = SubTerrain(terrain=first)
+    later = SubTerrain(terrain=again)
+    assert registry.get_terrain("ramp_up") is later.terrain_class is again
+    assert earlier.terrain_class is first
+
+
+@pytest.mark.usefixtures("registered")
+def test_register_terrain_rejects_name_of_another_class():
+    registry.register_terrain(make_ramp())
+    with pytest.raises(ConfigError, match=r"'ramp_up' of a\.RampUp is that of __main__\.RampUp; "):
+        registry.register_terrain(make_ramp("a"))
+    stairs = type("Stairs", (registry.get_terrain("stairs"),), {"__module__": "a"})
+    with pytest.raises(ConfigError, match=r"'stairs' of a\.Stairs is that of terrainkit\.t"):
+        registry.register_terrain(dataclass(frozen=True, kw_only=True)(stairs))
+
+
+@pytest.mark.usefixtures("registered")
+def test_register_terrain_accepts_built_in():
+    stairs = registry.get_terrain("stairs")
+    assert SubTerrain(terrain=stairs) == SubTerrain(terrain="stairs")
+    assert registry.registered_terrains() == ()
+
+
+@pytest.mark.usefixtures("registered")
+@pytest.mark.parametrize(
+    ("terrain", "message"),
+    [
+        (int, "terrain: got <class 'int'>; expected a subclass of Terrain"),
+        (type("Dunes", (Terrain,), {}), "Dunes: got no method heights; expected one"),
+        (
+            type("Dunes", (Terrain,), {"heights": lambda *_: None}),
+            r"Dunes lacks @dataclass\(frozen=True, kw_only=True\)",
+        ),
+    ],
+)
+def test_register_terrain_rejects_other_class(terrain, message):
+    with pytest.raises(ConfigError, match=message):
+        SubTerrain(terrain=terrain)
+
+
+@pytest.mark.usefixtures("registered")
+def test_map_of_registered_terrain_needs_registration(tmp_path):
+    ramp = make_ramp()
+    config = MapConfig(rows=1, cols=1, border=0.0, terrains=(SubTerrain(terrain=ramp),))
+    path = generate(config).save(tmp_path / "map.npz")
+    assert TerrainMap.load(path).terrain_names == ("ramp_up",)
+    registry._registered.clear()
+    registry.get_terrain.cache_clear()
+    with pytest.raises(MapFileError, match="no terrain 'ramp_up' is built in, installed, or "):
+        TerrainMap.load(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"), [("Wave", "wave"), ("RoughSlope", "rough_slope"), ("KRails", "k_rails")]
+)
+def test_kind_is_class_name_in_snake_case(name, kind):
+    assert type(name, (Terrain,), {}).kind() == kind

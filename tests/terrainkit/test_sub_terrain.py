@@ -28,7 +28,7 @@ def test_parameters_replace_the_default_ranges():
 
 
 def test_unknown_terrain_lists_known_ones():
-    with pytest.raises(ConfigError, match=r"no terrain 'lava'; there are: .*flat, .*gap, "):
+    with pytest.raises(ConfigError, match=r"no terrain 'lava' is built in, .*flat, .*gap, "):
         SubTerrain(terrain="lava")
 
 

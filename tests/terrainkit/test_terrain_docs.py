@@ -12,10 +12,12 @@ def test_terrain_doc_has_text_and_unit(name):
     about = terrain_doc(name)
     assert about.text.partition("\n")[0].endswith(".")
     assert [p.name for p in about.parameters] == list(registry.get_terrain(name).at(0).requested())
-    unitless = {"grade", "number", "inverted", "octaves"}
+    unitless = {"grade", "number", "layers", "octaves", "opening", "opened", "iterations"}
+    unitless |= {"inverted", "half"}
     for each in about.parameters:
         assert each.text.endswith(".")
-        assert ("[m]" in each.text) != (each.name in unitless)
+        has_unit = "[m]" in each.text or "[rad]" in each.text
+        assert has_unit != (each.name in unitless)
 
 
 def test_terrain_doc_range_has_two_ends():
@@ -43,5 +45,5 @@ def test_terrain_summaries_are_one_sentence():
 
 
 def test_terrain_doc_unknown_name_is_rejected():
-    with pytest.raises(ConfigError, match="no terrain 'moon'; there are: "):
+    with pytest.raises(ConfigError, match=r"no terrain 'moon' is built in, .*; there are: "):
         terrain_doc("moon")

@@ -74,7 +74,7 @@ def test_help_describes_command_in_80_columns(terrainkit, name):
         ),
         (
             ("generate", "-o", "a.npz", "--terrain", "moon"),
-            "no terrain 'moon'; there are: ",
+            "no terrain 'moon' is built in, installed, or registered",
         ),
         (
             ("generate", "-o", "a.npz", "--terrain", "pit", "--set", "dept=1"),
@@ -100,7 +100,7 @@ def test_help_describes_command_in_80_columns(terrainkit, name):
         (("generate", "-o", "a"), "no format for 'a name without suffix'"),
         (("generate", "-o", "nowhere/a.npz"), "the folder nowhere does not exist"),
         (("generate", "-o", "/proc/a.npz"), "cannot write /proc/a.npz"),
-        (("list", "moon"), "no terrain 'moon'; there are: "),
+        (("list", "moon"), "no terrain 'moon' is built in, installed, or registered"),
         (("info", "none.npz"), "no file none.npz"),
         (("info", "none.npz", "--patch", 3), "--patch: too few values; expected 2"),
         (("info", "none.npz", "--patch", "x", "y"), "--patch: got 'x', 'y'; expected int, int"),

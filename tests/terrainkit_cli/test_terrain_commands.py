@@ -326,3 +326,20 @@ def test_generate_avoids_slow_imports(tmp_path):
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
     )
     assert run.stdout.endswith("[]\n")
+
+
+def test_diff_exit_codes(terrainkit, tmp_path):
+    small = ("--rows", 1, "--cols", 2, "--border", 0, "--terrain", "rough")
+    for name, seed in (("a.npz", 0), ("b.npz", 0), ("c.npz", 1)):
+        assert terrainkit("generate", "-o", name, "--seed", seed, *small).returncode == 0
+    run = terrainkit("diff", "a.npz", "b.npz")
+    assert (run.returncode, run.stdout) == (0, "a.npz and b.npz are the same\n")
+    run = terrainkit("diff", "a.npz", "c.npz")
+    assert run.returncode == 1
+    assert "config: seed: 0 -> 1\n" in run.stdout
+    assert "patch (0, 1): heights by up to 0." in run.stdout
+    assert run.stdout.endswith("\na.npz -> c.npz: 2 of 2 patches differ\n")
+    (tmp_path / "d.npz").write_bytes(b"PK")
+    run = terrainkit("diff", "a.npz", "d.npz")
+    assert (run.returncode, run.stdout) == (2, "")
+    assert run.stderr.startswith("terrainkit: error: ")

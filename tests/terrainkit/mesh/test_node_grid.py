@@ -24,7 +24,7 @@ def test_node_grid_adds_a_rim_to_the_samples(node_grid):
 
 def test_node_grid_numbers_are_y_first(node_grid):
     # Node 13 is (2, 3) in rows of 5.
-    assert node_grid.nodes(np.array([0, 13])).tolist() == [[10.0, 20.0, 0.0], [11.5, 22.5, 5.0]]
+    assert node_grid.corners(np.array([2]), np.array([3])).ravel().tolist() == [13, 18, 19, 14]
 
 
 def test_node_grid_walls_extend_into_the_rim(node_grid):

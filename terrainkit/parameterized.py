@@ -1,0 +1,24 @@
+"""Parameterized: the parent class of terrains and overlays, which are declared in the same way."""
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from terrainkit.parameter import Value, parameters_of
+
+_WORD_START = re.compile("(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameterized:
+    """A frozen dataclass whose fields are declared with :mod:`terrainkit.parameter`."""
+
+    @classmethod
+    def kind(cls) -> str:
+        """Return the name of the class in snake_case: `pyramid_stairs` for `PyramidStairs`."""
+        return _WORD_START.sub("_", cls.__name__.strip("_")).lower()
+
+    def requested(self) -> dict[str, Value]:
+        """Return the parameters before snapping, by name."""
+        kind: Any = type(self)  # mypy does not take it as hashable
+        return {name: getattr(self, name) for name in parameters_of(kind)}

@@ -1,0 +1,90 @@
+"""Balance beams along a lane."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.blocks import make_standing_boxes
+from terrainkit.grid import Grid
+from terrainkit.lane import lane_slots, lane_spawn
+from terrainkit.pit_ground import pit_between
+from terrainkit.solids import Solids
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class Beams(Terrain):
+    """Narrow beams over a pit, one behind the other along x, with gaps between them.
+
+    The robot is spawned at low x. There is a goal on each beam, and one behind the pit. The beams
+    are solids of random length and direction, and the pit ends at a cell. In mode curriculum, the
+    rows of a column have gaps at the same places.
+    """
+
+    has_column_layout: ClassVar[bool] = True
+
+    width: float = parameter.size(0.5, 0.2)
+    """Width of a beam [m]."""
+
+    gap: float = parameter.scalar(0.15, 0.5)
+    """Distance between two beams along x, if they are straight [m]."""
+
+    yaw: float = parameter.scalar(0.0, 0.262)
+    """Largest angle between a beam and the lane [rad]."""
+
+    min_spacing: float = parameter.size(1.3)
+    """Minimum length of a beam and a gap along x [m]."""
+
+    max_spacing: float = parameter.size(1.75)
+    """Maximum length of a beam and a gap along x [m]."""
+
+    depth: float = parameter.height(1.0)
+    """Depth of the pit [m]."""
+
+    start: float = parameter.length(2.0)
+    """Length of the flat start along x [m]."""
+
+    end: float = parameter.size(1.2)
+    """Minimum length along x behind the last beam, with its gap [m]."""
+
+    def spawn(self, grid: Grid) -> tuple[float, float]:
+        """Return the center of the flat start."""
+        return lane_spawn(grid, self.start)
+
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return 0, and `-depth` in the pit."""
+        edges = self._slots(grid)
+        return pit_between(grid, self.depth, edges[0], edges[-1] + self.gap)
+
+    def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
+        """Return a box for each beam, down to the floor of the pit."""
+        first, last = self._layout(grid, rng)
+        center = np.column_stack([(first + last) / 2, np.full(len(first), grid.center[1])])
+        size = np.column_stack([last - first, np.full(len(first), self.width)])
+        yaw = self.yaw * (2 * rng.random(len(first)) - 1)
+        return make_standing_boxes(center, size, 0.0, floor=-self.depth, yaw=yaw)
+
+    def goals(
+        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
+    ) -> NDArray[np.floating]:
+        """Return a goal in the middle of each beam, and one behind the pit."""
+        first, last = self._layout(grid, rng)
+        x = np.append((first + last) / 2, (last[-1] + self.gap + grid.upper[0]) / 2)
+        return np.column_stack([x, 0 * x + grid.center[1], 0 * x, 0 * x])
+
+    def _layout(
+        self, grid: Grid, rng: np.random.Generator
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the x of both ends of each beam [m]."""
+        edges = self._slots(grid)
+        change = (self.max_spacing - self.min_spacing) / 2
+        edges[1:-1] += change * (rng.random(len(edges) - 2) - 0.5)
+        return edges[:-1] + self.gap, edges[1:]
+
+    def _slots(self, grid: Grid) -> NDArray[np.float64]:
+        spacing = self.min_spacing, self.max_spacing
+        end = max(self.end, self.gap + grid.cell)
+        return lane_slots("beams", grid, self.start, spacing, length=self.gap, end=end)

@@ -1,0 +1,87 @@
+"""Climb boxes."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.blocks import make_standing_boxes
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+from terrainkit.scatter import scatter
+from terrainkit.solids import Solids
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class Boxes(Terrain):
+    """Boxes and pyramids of boxes to climb, at random positions around a flat platform.
+
+    The boxes are solids with random sides and directions; the ground is flat. There is a goal on
+    each. In mode curriculum, the rows of a column differ only in `height`.
+    """
+
+    has_column_layout: ClassVar[bool] = True
+
+    height: float = parameter.height(0.05, 1.0)
+    """Height of a box or a pyramid [m]."""
+
+    number: int = parameter.count(3)
+    """Largest number of boxes and pyramids; fewer if no more fit."""
+
+    layers: int = parameter.count(2)
+    """Largest number of boxes in a pyramid, with equal steps; 1 for no pyramids."""
+
+    min_side: float = parameter.size(1.0)
+    """Minimum side of the lowest box [m]."""
+
+    max_side: float = parameter.size(1.8)
+    """Maximum side of the lowest box [m]."""
+
+    platform: float = parameter.platform(2.0)
+    """Side of the square at the center without boxes [m]."""
+
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return flat ground."""
+        return np.zeros(grid.shape)
+
+    def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
+        """Return the boxes; those of a pyramid are inside each other."""
+        xy, r = self._layout(grid, rng)
+        layers = 1 + (rng.random(len(xy)) * self.layers).astype(np.int64)
+        box = np.repeat(np.arange(len(xy)), layers)
+        layer = np.concatenate([np.arange(n) for n in layers])
+        side = (r * 2**0.5)[box] * (1 - layer / layers[box])
+        return make_standing_boxes(
+            xy[box],
+            np.column_stack([side, side]),
+            self.height * (layer + 1) / layers[box],
+            yaw=np.pi / 2 * rng.random(len(xy))[box],
+        )
+
+    def goals(
+        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
+    ) -> NDArray[np.floating]:
+        """Return a goal on top of each box and pyramid, counterclockwise around the platform."""
+        offset = self._layout(grid, rng)[0] - grid.center
+        angle = np.arctan2(offset[:, 1], offset[:, 0])
+        order = np.argsort(angle, kind="stable")
+        x, y = (grid.center + offset[order]).T
+        return np.column_stack([x, y, np.full(len(x), self.height), 0 * x])
+
+    def _layout(
+        self, grid: Grid, rng: np.random.Generator
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the centers and the radii of the boxes [m]."""
+        radius = self.min_side / 2**0.5, self.max_side / 2**0.5
+        platform = grid.length(max(grid.centered(self.platform)))
+        xy, r = scatter(grid, rng, radius, number=self.number, platform=platform)
+        if not self.min_side <= self.max_side or not len(xy):
+            raise ConfigError(
+                f"boxes: got min_side {self.min_side:g} m and max_side {self.max_side:g} m; "
+                f"expected min_side <= max_side, and a box that fits beside a platform of "
+                f"{self.platform:g} m in a patch of {grid.size[0]:g} m x {grid.size[1]:g} m"
+            )
+        return xy, r

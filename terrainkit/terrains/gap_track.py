@@ -1,0 +1,61 @@
+"""Gaps across a lane."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.grid import Grid
+from terrainkit.lane import lane_goals, lane_slots, lane_spawn, slot_centers
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class GapTrack(Terrain):
+    """Gaps across a lane along x, at random distances.
+
+    The robot is spawned at low x. The gaps span the width of the patch, and there is a goal behind
+    each. In mode curriculum, the rows of a column differ only in `length` and `depth`.
+    """
+
+    has_column_layout: ClassVar[bool] = True
+
+    length: float = parameter.length(0.05, 1.0)
+    """Length of a gap along x [m]."""
+
+    depth: float = parameter.height(0.5, 1.0)
+    """Depth of the floor of the gaps [m]."""
+
+    min_spacing: float = parameter.size(1.6)
+    """Minimum distance between two gaps, center to center [m]."""
+
+    max_spacing: float = parameter.size(2.2)
+    """Maximum distance between two gaps, center to center [m]."""
+
+    start: float = parameter.length(2.0)
+    """Length of the flat start along x [m]."""
+
+    def spawn(self, grid: Grid) -> tuple[float, float]:
+        """Return the center of the flat start."""
+        return lane_spawn(grid, self.start)
+
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return 0, and `-depth` in the gaps."""
+        ground = np.zeros(grid.shape)
+        spacing = self.min_spacing, self.max_spacing
+        for center in slot_centers(self._slots(grid), spacing, rng):
+            ground[grid.slice_along_x(center, grid.cells(self.length))] = -self.depth
+        return ground
+
+    def goals(
+        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
+    ) -> NDArray[np.floating]:
+        """Return a goal at the end of the slot of each gap."""
+        return lane_goals(grid, self._slots(grid)[1:])
+
+    def _slots(self, grid: Grid) -> NDArray[np.float64]:
+        spacing = self.min_spacing, self.max_spacing
+        length = grid.length(grid.cells(self.length))
+        return lane_slots("gap_track", grid, self.start, spacing, length=length)

@@ -1,0 +1,69 @@
+"""A gutter between two slopes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.blocks import make_ramps
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+from terrainkit.lane import lane_goals, lane_spawn
+from terrainkit.solids import Solids
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gutter(Terrain):
+    """A gutter along x between two slopes, in the manner of NIST.
+
+    The robot walks with its feet on both slopes. It is spawned at low x, and there is a goal behind
+    the gutter. The slopes are solids; the ground is flat.
+    """
+
+    roll: float = parameter.scalar(0.175, 0.524, allows_zero=False)
+    """Angle between a slope and the ground [rad]."""
+
+    bottom: float = parameter.scalar(0.2)
+    """Distance between the two slopes at the ground [m]."""
+
+    width: float = parameter.size(2.4)
+    """Width of the gutter with its slopes [m]."""
+
+    start: float = parameter.length(2.0)
+    """Length of the flat start along x [m]."""
+
+    end: float = parameter.size(1.0)
+    """Length of the flat end along x [m]."""
+
+    def spawn(self, grid: Grid) -> tuple[float, float]:
+        """Return the center of the flat start."""
+        return lane_spawn(grid, self.start)
+
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return flat ground."""
+        return np.zeros(grid.shape)
+
+    def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
+        """Return a wedge for each slope."""
+        first, last = grid.lower[0] + grid.length(grid.cells(self.start)), grid.upper[0] - self.end
+        inner, outer = self.bottom / 2, self.width / 2
+        if not (first < last and inner < outer <= grid.size[1] / 2 and self.roll < np.pi / 2):
+            raise ConfigError(
+                f"gutter: got roll {self.roll:g} rad, bottom {self.bottom:g} m and width "
+                f"{self.width:g} m; expected a roll below 1.5708 rad, and bottom < width within a "
+                f"patch of {grid.size[0]:g} m x {grid.size[1]:g} m between start and end"
+            )
+        height, y = (outer - inner) * np.tan(self.roll), grid.center[1]
+        return make_ramps(
+            [(first, y - outer), (first, y + inner)],
+            [(last, y - inner), (last, y + outer)],
+            [(height, height, 0.0, 0.0), (0.0, 0.0, height, height)],
+        )
+
+    def goals(
+        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
+    ) -> NDArray[np.floating]:
+        """Return a goal behind the gutter."""
+        return lane_goals(grid, grid.upper[0] - self.end / 2)

@@ -1,0 +1,45 @@
+"""Nested rings."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.grid import Grid
+from terrainkit.pit_ground import pit_around
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rings(Terrain):
+    """Nested square rings at random heights in a pit around a platform.
+
+    The robot crosses the gaps between them on its way outward. The outermost cells of the patch are
+    at height 0.
+    """
+
+    gap: float = parameter.length(0.1, 0.4)
+    """Width of the gaps [m]."""
+
+    width: float = parameter.length(0.8, 0.4)
+    """Width of the rings [m]."""
+
+    variation: float = parameter.height(0.0, 0.1)
+    """Largest height of a ring above or below 0 [m]."""
+
+    depth: float = parameter.height(1.0)
+    """Depth of the pit [m]."""
+
+    platform: float = parameter.platform(2.0)
+    """Side of the flat square at the center [m]."""
+
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the rings; a ring at the edge is truncated."""
+        gap, width = grid.cells(self.gap), grid.cells(self.width)
+        number, place = np.divmod(grid.rings(grid.centered(self.platform)) - 1, gap + width)
+        tops = self.variation * (2 * rng.random(max(grid.shape)) - 1)
+        ground = pit_around(grid, self.depth, self.platform)
+        is_ring = (ground < 0) & (place >= gap)
+        ground[is_ring] = tops[number[is_ring]]
+        return ground

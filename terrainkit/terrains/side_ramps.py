@@ -1,0 +1,94 @@
+"""Ramps that are tilted sideways."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.blocks import make_ramps
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+from terrainkit.lane import lane_slots, lane_spawn
+from terrainkit.pit_ground import pit_between
+from terrainkit.solids import Solids
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class SideRamps(Terrain):
+    """Ramps over a pit along x, tilted to the left and to the right in turn.
+
+    Each ramp is beside the middle of the lane and leans toward it; its middle is at height 0. The
+    robot is spawned at low x. There is a goal on each ramp, and one behind the pit. The ramps are
+    solids, so that their angles and the gaps are exact, but for the last gap, which ends at a cell.
+    """
+
+    roll: float = parameter.scalar(0.175, 0.524)
+    """Angle between a ramp and the ground [rad]."""
+
+    gap: float = parameter.scalar(0.0, 0.4)
+    """Distance between two ramps along x [m]."""
+
+    width: float = parameter.size(1.0)
+    """Width of a ramp along y [m]."""
+
+    offset: float = parameter.scalar(0.3)
+    """Distance of the middle of a ramp from the middle of the lane [m]."""
+
+    spacing: float = parameter.size(1.6)
+    """Length of a ramp and a gap along x [m]."""
+
+    depth: float = parameter.height(0.6)
+    """Depth of the pit [m]."""
+
+    start: float = parameter.length(2.0)
+    """Length of the flat start along x [m]."""
+
+    end: float = parameter.size(1.2)
+    """Minimum length along x behind the last ramp, with its gap [m]."""
+
+    def spawn(self, grid: Grid) -> tuple[float, float]:
+        """Return the center of the flat start."""
+        return lane_spawn(grid, self.start)
+
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return 0, and `-depth` in the pit."""
+        edges = self._slots(grid)
+        return pit_between(grid, self.depth, edges[0], edges[-1] + self.gap)
+
+    def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
+        """Return a solid for each ramp, down to the floor of the pit."""
+        rise = self.width / 2 * np.tan(self.roll)
+        if not (self.roll < np.pi / 2 and rise <= self.depth):
+            raise ConfigError(
+                f"side_ramps: got roll {self.roll:g} rad and width {self.width:g} m; expected a "
+                f"lower side above the floor of the pit, {self.depth:g} m deep"
+            )
+        edges = self._slots(grid)
+        side = self._sides(edges)
+        low, high = (grid.center[1] + side * self.offset + w * self.width / 2 for w in (-1, 1))
+        return make_ramps(
+            np.column_stack([edges[:-1] + self.gap, low]),
+            np.column_stack([edges[1:], high]),
+            rise * side[:, None] * [-1, -1, 1, 1],
+            floor=-self.depth,
+        )
+
+    def goals(
+        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
+    ) -> NDArray[np.floating]:
+        """Return a goal in the middle of each ramp, and one behind the pit."""
+        edges = self._slots(grid)
+        x = [*(edges[:-1] + self.gap + edges[1:]) / 2, (edges[-1] + self.gap + grid.upper[0]) / 2]
+        y = grid.center[1] + np.append(self._sides(edges), 0.0) * self.offset
+        return np.column_stack([x, y, 0 * y, 0 * y])
+
+    @staticmethod
+    def _sides(edges: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return 1 for each ramp on the left, and -1 for each on the right."""
+        return np.where(np.arange(len(edges) - 1) % 2 == 0, 1.0, -1.0)
+
+    def _slots(self, grid: Grid) -> NDArray[np.float64]:
+        spacing, end = (self.spacing, self.spacing), max(self.end, self.gap + grid.cell)
+        return lane_slots("side_ramps", grid, self.start, spacing, length=self.gap, end=end)

@@ -1,0 +1,88 @@
+"""Fields of square posts."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+from terrainkit.lane import lane_goals, lane_spawn
+from terrainkit.terrain import Terrain
+
+_POSTS = 10
+"""Posts along each side of a field."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stepfield(Terrain):
+    """Fields of 10 x 10 square posts, 1 to 4 units high, along a lane between flat strips.
+
+    Flat fields, hills and diagonal hills alternate, as in the stepfields of response-robot tests.
+    Neighboring posts, and the outermost posts and the ground, differ by at most 2 units. The robot
+    is spawned at low x. There is a goal behind each field.
+    """
+
+    unit: float = parameter.height(0.02, 0.1)
+    """Height of a unit [m]."""
+
+    post: float = parameter.length(0.1)
+    """Side of a post [m]."""
+
+    start: float = parameter.length(2.0)
+    """Length of the flat start along x [m]."""
+
+    end: float = parameter.length(1.0)
+    """Minimum length of the flat strip behind the fields along x [m]."""
+
+    def spawn(self, grid: Grid) -> tuple[float, float]:
+        """Return the center of the flat start."""
+        return lane_spawn(grid, self.start)
+
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the posts, in as many whole fields as fit along x and y."""
+        side = grid.cells(self.post)
+        nx, ny = self._counts(grid)
+        u = np.indices((nx * _POSTS, ny * _POSTS))
+        kind = (u // _POSTS).sum(axis=0) % 3
+        x, y = (u % _POSTS + 0.5) / _POSTS
+        ridge = np.stack([0 * x, 1 - np.abs(2 * x - 1), 1 - np.abs(x - y)])
+        hill = np.rint(2 * np.choose(kind, ridge))
+        levels = 1 + hill + np.floor(rng.random(kind.shape) * np.where(kind == 0, 4, 2))
+        levels = np.minimum(levels, _lowest_neighbor(levels) + 2)
+        ground = np.zeros(grid.shape)
+        first, last = grid.cells(self.start), (grid.shape[1] - ny * _POSTS * side) // 2
+        block = np.kron(levels, np.ones((side, side)))
+        ground[first : first + block.shape[0], last : last + block.shape[1]] = self.unit * block
+        return ground
+
+    def goals(
+        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
+    ) -> NDArray[np.floating]:
+        """Return a goal on the last posts of each field, and one on the flat strip behind them."""
+        field = _POSTS * grid.length(grid.cells(self.post))
+        x = grid.lower[0] + grid.length(grid.cells(self.start))
+        edges = x + np.arange(1, self._counts(grid)[0] + 1) * field
+        return lane_goals(grid, [*edges[:-1], (edges[-1] + grid.upper[0]) / 2])
+
+    def _counts(self, grid: Grid) -> tuple[int, int]:
+        """Return the number of fields along x and y."""
+        field = _POSTS * grid.cells(self.post)
+        strips = grid.cells(self.start) + grid.cells(self.end)
+        nx, ny = (grid.shape[0] - strips) // field, (grid.shape[1] - 2) // field
+        if min(nx, ny) < 1:
+            raise ConfigError(
+                f"stepfield: got post {self.post:g} m, start {self.start:g} m and end "
+                f"{self.end:g} m; expected a field of {_POSTS} x {_POSTS} posts that fits in a "
+                f"patch of {grid.size[0]:g} m x {grid.size[1]:g} m"
+            )
+        return nx, ny
+
+
+def _lowest_neighbor(levels: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the lowest of the eight neighbors of each post; the ground around is at level 0."""
+    padded = np.pad(levels, 1)
+    shifts = [(i, j) for i in range(3) for j in range(3) if (i, j) != (1, 1)]
+    nx, ny = levels.shape
+    return np.asarray(np.min([padded[i : i + nx, j : j + ny] for i, j in shifts], axis=0))

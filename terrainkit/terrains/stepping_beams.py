@@ -1,0 +1,94 @@
+"""Beams across a lane."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.blocks import make_standing_boxes
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+from terrainkit.lane import lane_slots, lane_spawn
+from terrainkit.pit_ground import pit_between
+from terrainkit.solids import Solids
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class SteppingBeams(Terrain):
+    """Narrow beams over a pit across a lane along x, on which the robot steps.
+
+    The robot is spawned at low x, and there is a goal behind the pit. The beams are solids of
+    random length, position and direction, and the pit ends at a cell. In mode curriculum, the rows
+    of a column have the same random numbers.
+    """
+
+    has_column_layout: ClassVar[bool] = True
+
+    width: float = parameter.size(0.5, 0.2)
+    """Width of a beam along x, if it is straight [m]."""
+
+    gap: float = parameter.scalar(0.15, 0.5)
+    """Distance between two beams, if they are straight [m]."""
+
+    yaw: float = parameter.scalar(0.0, 0.262)
+    """Largest angle between a beam and the y axis [rad]."""
+
+    min_length: float = parameter.size(0.8)
+    """Minimum length of a beam [m]."""
+
+    max_length: float = parameter.size(1.6)
+    """Maximum length of a beam [m]."""
+
+    offset: float = parameter.scalar(0.2)
+    """Largest distance of the middle of a beam from the middle of the lane [m]."""
+
+    depth: float = parameter.height(1.0)
+    """Depth of the pit [m]."""
+
+    start: float = parameter.length(2.0)
+    """Length of the flat start along x [m]."""
+
+    end: float = parameter.size(1.0)
+    """Minimum length along x behind the last beam, with its gap [m]."""
+
+    def spawn(self, grid: Grid) -> tuple[float, float]:
+        """Return the center of the flat start."""
+        return lane_spawn(grid, self.start)
+
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return 0, and `-depth` in the pit."""
+        edges = self._slots(grid)
+        return pit_between(grid, self.depth, edges[0], edges[-1] + self.gap)
+
+    def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
+        """Return a box for each beam, down to the floor of the pit."""
+        if not self.min_length <= self.max_length:
+            raise ConfigError(
+                f"stepping_beams.min_length: got {self.min_length:g} m; expected at most "
+                f"max_length, {self.max_length:g} m"
+            )
+        edges = self._slots(grid)
+        share, side, turn = rng.random((3, len(edges) - 1))
+        length = self.min_length + (self.max_length - self.min_length) * share
+        y = grid.center[1] + self.offset * (2 * side - 1)
+        return make_standing_boxes(
+            np.column_stack([edges[1:] - self.width / 2, y]),
+            np.column_stack([np.full(len(y), self.width), length]),
+            0.0,
+            floor=-self.depth,
+            yaw=self.yaw * (2 * turn - 1),
+        )
+
+    def goals(
+        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
+    ) -> NDArray[np.floating]:
+        """Return a goal behind the pit."""
+        x = (self._slots(grid)[-1] + self.gap + grid.upper[0]) / 2
+        return np.array([[x, grid.center[1], 0.0, 0.0]])
+
+    def _slots(self, grid: Grid) -> NDArray[np.float64]:
+        pitch, end = self.width + self.gap, max(self.end, self.gap + grid.cell)
+        return lane_slots("stepping_beams", grid, self.start, (pitch, pitch), length=0, end=end)

@@ -1,0 +1,78 @@
+"""Tunnels."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.blocks import make_standing_boxes
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+from terrainkit.lane import lane_goals, lane_slots, lane_spawn
+from terrainkit.solids import Solids, make_boxes
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tunnel(Terrain):
+    """Tunnels along a lane along x, with walls up to the sides of the patch.
+
+    The robot is spawned at low x, and there is a goal behind each tunnel. The tunnels are solids;
+    the ground is flat.
+    """
+
+    clearance: float = parameter.size(0.5, 0.2)
+    """Height of a tunnel [m]."""
+
+    depth: float = parameter.size(1.2, 2.0)
+    """Length of a tunnel along x [m]."""
+
+    width: float = parameter.size(0.8)
+    """Width of a tunnel [m]."""
+
+    thickness: float = parameter.size(0.2)
+    """Thickness of the roof [m]."""
+
+    spacing: float = parameter.size(3.0)
+    """Distance between two tunnels, center to center [m]."""
+
+    start: float = parameter.length(2.0)
+    """Length of the flat start along x [m]."""
+
+    def spawn(self, grid: Grid) -> tuple[float, float]:
+        """Return the center of the flat start."""
+        return lane_spawn(grid, self.start)
+
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return flat ground."""
+        return np.zeros(grid.shape)
+
+    def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
+        """Return two walls and a roof for each tunnel."""
+        wall = (grid.size[1] - self.width) / 2
+        if not wall > 0:
+            raise ConfigError(
+                f"tunnel: got width {self.width:g} m; expected less than the width of the patch, "
+                f"{grid.size[1]:g} m"
+            )
+        edges = self._slots(grid)
+        x = (edges[:-1] + edges[1:]) / 2
+        walls = [
+            make_standing_boxes(np.column_stack([x, 0 * x + y]), (self.depth, wall), self.clearance)
+            for y in (grid.lower[1] + wall / 2, grid.upper[1] - wall / 2)
+        ]
+        z = self.clearance + self.thickness / 2
+        roof = np.column_stack([x, 0 * x + grid.center[1], 0 * x + z])
+        size = self.depth, grid.size[1], self.thickness
+        return Solids.concatenate([*walls, make_boxes(roof, size)])
+
+    def goals(
+        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
+    ) -> NDArray[np.floating]:
+        """Return a goal behind each tunnel."""
+        return lane_goals(grid, self._slots(grid)[1:])
+
+    def _slots(self, grid: Grid) -> NDArray[np.float64]:
+        spacing = self.spacing, self.spacing
+        return lane_slots("tunnel", grid, self.start, spacing, length=self.depth)

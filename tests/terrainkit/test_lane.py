@@ -1,0 +1,42 @@
+import numpy as np
+import pytest
+
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+from terrainkit.lane import lane_goals, lane_slots, slot_centers
+
+GRID = Grid(shape=(80, 40), cell=0.1, lower=(10.0, -2.0))
+
+
+def test_lane_slots_by_hand():
+    edges = lane_slots("x", GRID, 2.0, (1.0, 2.0), length=0.5)
+    assert edges == pytest.approx([12.0, 13.5, 15.0, 16.5, 18.0])
+    edges = lane_slots("x", GRID, 2.04, (1.5, 1.5), length=0.5, end=0.1)
+    assert edges == pytest.approx([12.0, 13.5, 15.0, 16.5])
+
+
+@pytest.mark.parametrize(
+    ("spacing", "length", "end"),
+    [((1.0, 2.0), 1.0, 0.0), ((2.0, 1.0), 0.5, 0.0), ((3.0, 3.0), 0.5, 3.1), ((1e-3, 1e-3), 0, 0)],
+    ids=["overlap", "unsorted", "none", "many"],
+)
+def test_lane_slots_rejects_elements_that_do_not_fit(spacing, length, end):
+    with pytest.raises(ConfigError, match=r"x: got elements .* expected elements shorter than"):
+        lane_slots("x", GRID, 2.0, spacing, length=length, end=end)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_slot_centers_keep_the_spacing(seed):
+    edges = lane_slots("x", GRID, 2.0, (0.3, 0.7), length=0.2)
+    x = slot_centers(edges, (0.3, 0.7), np.random.default_rng(seed))
+    assert len(x) == 12
+    assert (np.diff(x) >= 0.3).all()
+    assert (np.diff(x) <= 0.7).all()
+    assert np.ptp(np.diff(x)) > 0.1
+    assert ((x - 0.1 > edges[:-1]) & (x + 0.1 < edges[1:])).all()
+
+
+def test_lane_goals_stay_in_the_patch():
+    goals = lane_goals(GRID, [13.0, 18.0])
+    assert goals[:, [0, 1, 3]] == pytest.approx(np.array([[13.0, 0, 0], [17.95, 0, 0]]))
+    assert np.isnan(goals[:, 2]).all()

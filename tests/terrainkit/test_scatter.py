@@ -1,0 +1,46 @@
+import numpy as np
+import pytest
+
+from terrainkit.grid import Grid
+from terrainkit.scatter import scatter
+
+GRIDS = [Grid(shape=(80, 80), cell=0.1, lower=(8.0, -4.0)), Grid(shape=(80, 40), cell=0.1)]
+
+
+def place(grid, gap, seed=0, number=35, platform=2.0):
+    rng = np.random.default_rng(seed)
+    return scatter(grid, rng, (0.1, 0.4), number=number, gap=gap, platform=platform)
+
+
+@pytest.mark.parametrize("grid", GRIDS, ids=["8x8", "8x4"])
+@pytest.mark.parametrize("seed", range(5))
+def test_scatter_keeps_gaps_edge_and_platform(grid, seed):
+    xy, r = place(grid, 0.5, seed)
+    assert len(xy) > 10
+    distance = np.linalg.norm(xy[:, None] - xy, axis=-1) - r[:, None] - r
+    assert distance[~np.eye(len(xy), dtype=bool)].min() >= 0.5
+    assert (xy - r[:, None] - grid.lower).min() >= 0.25
+    assert (grid.upper - xy - r[:, None]).min() >= 0.25
+    nearest = np.clip(xy - grid.center, -1.0, 1.0)
+    assert (np.linalg.norm(xy - grid.center - nearest, axis=1) >= r).all()
+
+
+def test_scatter_smaller_gap_adds_discs_to_the_same():
+    sizes = []
+    for seed in range(5):
+        many = place(GRIDS[0], 0.2, seed)[0].tolist()
+        for gap in (2.0, 1.0, 0.5):
+            few = place(GRIDS[0], gap, seed)[0].tolist()
+            assert few == many[: len(few)]
+            sizes.append(len(few))
+    assert sizes[0] < sizes[1] < sizes[2]
+
+
+def test_scatter_returns_at_most_number():
+    assert len(place(GRIDS[0], 0.2, number=4)[0]) == 4
+
+
+def test_scatter_without_space_is_empty():
+    xy, r = place(Grid(shape=(20, 20), cell=0.1), 0.0, platform=1.9)
+    assert xy.shape == (0, 2)
+    assert r.shape == (0,)

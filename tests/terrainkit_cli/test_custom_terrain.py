@@ -1,0 +1,93 @@
+import re
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+import terrainkit
+from terrainkit import MapConfig, SubTerrain, TerrainMap, parameter, registry
+from terrainkit.terrain import Terrain
+from terrainkit.validate import validate
+
+
+@pytest.fixture
+def banked():
+    """Register a terrain with a parameter of each type."""
+
+    @terrainkit.register_terrain
+    @dataclass(frozen=True, kw_only=True)
+    class BankedTrack(Terrain):
+        """A track with a shoulder."""
+
+        height: float = parameter.height(0.1, 0.4)
+        """Height of the shoulder [m]."""
+
+        label: str = parameter.text("a")
+        """Name of the track."""
+
+        side: str = parameter.choice("left", "right")
+        """Side of the shoulder."""
+
+        color: tuple[float, float, float] = parameter.vector((0.5, 0.5, 0.5))
+        """Color as red, green and blue, 0 to 1."""
+
+        def heights(self, grid, rng):  # noqa: ARG002
+            shoulder = np.zeros(grid.shape)
+            shoulder[:, slice(0, 5) if self.side == "right" else slice(-5, None)] = self.height
+            return shoulder
+
+    yield BankedTrack
+    registry._registered.pop("banked_track")
+    registry.get_terrain.cache_clear()
+
+
+@pytest.mark.usefixtures("banked")
+def test_custom_terrain_through_the_command_line(run_main, tmp_path):
+    path = tmp_path / "map.npz"
+    values = "height=0.1:0.3,label=x:y,side=right,color=[1, 0.5, -1]"
+    size = ("--rows", 2, "--cols", 1, "--border", 0)
+    run = run_main("generate", "-o", path, "--terrain", "banked_track", "--set", values, *size)
+    assert run.returncode == 0, run.stderr
+    assert run_main("check-map", path).returncode == 0
+    output = run_main("info", path, "--patch", 1, 0).stdout
+    rows = [re.split("  +", line)[:2] for line in output.splitlines()]
+    for row in (["height", "0.3"], ["label", "x:y"], ["side", "right"], ["color", "[1, 0.5, -1]"]):
+        assert row in rows
+    terrain_map = TerrainMap.load(path)
+    assert terrain_map.parameters[1, 0].requested == {
+        "height": 0.3, "label": "x:y", "side": "right", "color": (1.0, 0.5, -1.0),
+    }  # fmt: skip
+    assert terrain_map.heights.max(axis=0)[[0, -1]].tolist() == [np.float32(0.3), 0.0]
+
+
+@pytest.mark.usefixtures("banked")
+def test_list_prints_choices_and_registered_terrains(run_main):
+    assert "registered: banked_track" in run_main("list").stdout
+    output = run_main("list", "banked_track").stdout
+    assert "Side of the shoulder. One of: left, right." in output
+    assert "[0.5, 0.5, 0.5]" in output
+
+
+@pytest.mark.usefixtures("banked")
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ("side=up", "banked_track.side: got 'up'; expected one of: left, right"),
+        ("color=[1,2]", "banked_track.color: got [1, 2]; expected 3 values"),
+        ("color=[1,2", "--set: got '2'; expected name=value or name=easy:hard"),
+        ("height=1:2:3", "banked_track.height: got [1, 2, 3]; expected one value or a pair"),
+        ("height", "--set: got 'height'; expected name=value"),
+    ],
+)
+def test_set_rejects_invalid_value(run_main, values, message):
+    run = run_main("generate", "-o", "a.npz", "--terrain", "banked_track", "--set", values)
+    assert (run.returncode, run.stderr.count("\n")) == (2, 1)
+    assert message in run.stderr
+
+
+def test_custom_terrain_config_round_trips_through_toml(banked):
+    given = {"label": 'a "b"\n', "side": "right", "color": (1, 2, 3), "height": (0.1, 0.2)}
+    track = SubTerrain(terrain=banked, parameters=given)
+    config = MapConfig(rows=2, cols=1, border=0.0, terrains=(track,))
+    assert MapConfig.from_toml(config.to_toml()) == config
+    assert validate(terrainkit.generate(config)) == []
