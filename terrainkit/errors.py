@@ -34,12 +34,12 @@ class TerrainkitWarning(UserWarning):
     """Something was omitted or changed; the result is still valid."""
 
 
-MAX_LISTED = 40
+MAX_LISTED = 80
 """Names that an error message lists at most."""
 
 
 def listing(names: Iterable[str]) -> str:
-    """Return `names` separated by commas, the first 40 of them."""
+    """Return `names` separated by commas, at most `MAX_LISTED` of them."""
     listed = list(names)
     more = len(listed) - MAX_LISTED
     shown = listed if more <= 0 else [*listed[:MAX_LISTED], f"and {more} more"]

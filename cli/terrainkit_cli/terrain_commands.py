@@ -186,10 +186,21 @@ class Info(Command):
     )
     """Row and column of a patch, to print its requested and realized parameters."""
 
+    budget: Flag = False
+    """Print what the map costs: triangles, geoms, file sizes, contacts, and the estimated time of
+    a MuJoCo step."""
+
+    foot_radius: Annotated[float, tyro.conf.arg(metavar="M")] = 0.03
+    """With --budget: half of the side of the square that contains a foot [m]."""
+
     def run(self) -> int:
-        """Print the size of the map and its columns, or one patch."""
+        """Print the size of the map and its columns, one patch, or the budget."""
         terrain_map = TerrainMap.load(self.map)
-        if self.patch != _WHOLE_MAP:
+        if self.patch != _WHOLE_MAP and self.budget:
+            raise ConfigError("--budget, --patch: got both; expected one of them")
+        if self.budget:
+            _print_budget(terrain_map, self.foot_radius)
+        elif self.patch != _WHOLE_MAP:
             _print_patch(terrain_map, *self.patch)
         else:
             _print_map(terrain_map)
@@ -242,6 +253,34 @@ def _solids_text(terrain_map: TerrainMap) -> str:
         "that do not collide": int((~solids.collides).sum()),
     }
     return ", ".join(f"{n} {name}" for name, n in counts.items() if n)
+
+
+def _print_budget(terrain_map: TerrainMap, foot_radius: float) -> None:
+    from terrainkit.budget import MAX_CONTACTS, compute_budget
+
+    budget = compute_budget(terrain_map, foot_radius)
+    contacts = f"at most {budget.foot_contacts} with a heightfield, of a foot of {foot_radius:g} m"
+    if budget.foot_contacts > MAX_CONTACTS:
+        contacts += f"; MuJoCo drops those beyond {MAX_CONTACTS}: use larger cells, or boxes"
+    else:
+        contacts += f"; MuJoCo allows {MAX_CONTACTS}"
+    render.table(
+        [
+            ("triangles", f"{budget.merged_triangles:,} merged, {budget.full_triangles:,} full"),
+            ("contacts", contacts),
+        ]
+    )
+    render.result("")
+    rows = [("MuJoCo collision", "geoms", "boxes", "heightfield cells", "time of a step")]
+    for name, cost in budget.collisions.items():
+        geoms, boxes, cells = f"{cost.num_geoms:,}", f"{cost.num_boxes:,}", f"{cost.hfield_cells:,}"
+        label = f"{name} (auto)" if name == budget.auto else name
+        rows.append((label, geoms, boxes, cells, f"about {cost.step_time:.1f} x a plane"))
+    render.table(rows)
+    render.result("")
+    sizes = budget.file_sizes.items()
+    texts = [(name, f"{n / 1e3:,.1f} kB" if isinstance(n, int) else n) for name, n in sizes]
+    render.table([("file", "size"), *texts])
 
 
 def _print_patch(terrain_map: TerrainMap, row: int, col: int) -> None:

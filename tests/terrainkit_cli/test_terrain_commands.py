@@ -343,3 +343,28 @@ def test_diff_exit_codes(terrainkit, tmp_path):
     run = terrainkit("diff", "a.npz", "d.npz")
     assert (run.returncode, run.stdout) == (2, "")
     assert run.stderr.startswith("terrainkit: error: ")
+
+
+def test_info_budget_prints_costs(terrainkit):
+    flat = ("--rows", 1, "--cols", 2, "--border", 0, "--patch-size", 4, 3, "--terrain", "flat")
+    terrainkit("generate", "-o", "flat.npz", *flat)
+    run = terrainkit("info", "flat.npz", "--budget", "--foot-radius", 0.3)
+    assert (run.returncode, run.stderr) == (0, "")
+    rows = [" ".join(line.split()) for line in run.stdout.splitlines()]
+    assert "triangles 2 merged, 5,002 full" in rows  # 2 x 41 x 61 quads
+    assert rows[1].startswith("contacts at most 98 with a heightfield, of a foot of 0.3 m; MuJoCo")
+    assert "boxes (auto) 1 1 0 about 1.0 x a plane" in rows
+    assert ".stl 0.2 kB" in rows
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--foot-radius", 0), "foot radius: got 0; expected a number above 0 m"),
+        (("--patch", 0, 0), "--budget, --patch: got both; expected one of them"),
+    ],
+)
+def test_info_budget_rejects_invalid_options(terrainkit, small_map, words, message):
+    run = terrainkit("info", small_map, "--budget", *words)
+    assert run.returncode == 2
+    assert run.stderr == f"terrainkit: error: {message}\n"

@@ -1,0 +1,118 @@
+"""Islands over a pit, joined by walkways."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.errors import ConfigError
+from terrainkit.grid import Grid
+from terrainkit.pit_ground import pit_around
+from terrainkit.scatter import scatter
+from terrainkit.solids import Solids, make_boxes, make_cylinders
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class FloatingIslands(Terrain):
+    """Round islands that float over a pit around a platform, joined by straight walkways.
+
+    The walkways are the shortest that join all islands. The goals lead over them from the platform
+    to the farthest island. In mode curriculum, each row of a column has the islands of the row
+    before, or fewer.
+    """
+
+    has_column_layout: ClassVar[bool] = True
+
+    walkway: float = parameter.size(0.4, 0.25)
+    """Width of the walkways [m]."""
+
+    number: int = parameter.count(8, 5)
+    """Largest number of islands; fewer if no more fit."""
+
+    radius: float = parameter.size(0.9)
+    """Radius of an island [m]."""
+
+    gap: float = parameter.size(0.3)
+    """Minimum distance between two islands, and between an island and the platform [m]."""
+
+    thickness: float = parameter.size(0.2)
+    """Thickness of the islands and walkways [m]."""
+
+    depth: float = parameter.height(1.0)
+    """Depth of the pit [m]."""
+
+    platform: float = parameter.platform(2.0)
+    """Side of the flat square at the center [m]."""
+
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the pit around the platform."""
+        return pit_around(grid, self.depth, self.platform)
+
+    def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
+        """Return the islands and the walkways, level with the platform."""
+        xy, parent = self._layout(grid, rng)
+        z = np.full((len(xy), 1), -self.thickness / 2)
+        islands = make_cylinders(np.hstack([xy, z])[1:], self.radius, self.thickness)
+        # Walkways end within the islands and the platform, whose half side is at least this far.
+        inside = 0.8 * np.full(len(xy), self.radius)
+        inside[0] = 0.4 * grid.length(min(grid.centered(self.platform)))
+        start, end = xy[parent[1:]], xy[1:]
+        distance = np.sqrt(((end - start) ** 2).sum(axis=1))
+        along = (end - start) / distance[:, None]
+        start = start + along * inside[parent[1:], None]
+        end = end - along * inside[1:, None]
+        length = np.sqrt(((end - start) ** 2).sum(axis=1))
+        size = np.column_stack([length, 0 * length + self.walkway, 0 * length + self.thickness])
+        yaw = np.arctan2(along[:, 1], along[:, 0])
+        walkways = make_boxes(
+            np.hstack([(start + end) / 2, z[1:]]),
+            size,
+            rpy=np.column_stack([0 * yaw, 0 * yaw, yaw]),
+        )
+        return Solids.concatenate([walkways, islands])
+
+    def goals(
+        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
+    ) -> NDArray[np.floating]:
+        """Return a goal on each island from the platform to the farthest one."""
+        xy, parent = self._layout(grid, rng)
+        paths = []
+        for island in range(1, len(xy)):
+            path = [island]
+            while path[-1] != 0:
+                path.append(int(parent[path[-1]]))
+            paths.append(path[::-1])
+        steps = [np.diff(xy[path], axis=0) for path in paths]
+        farthest = int(np.argmax([np.sqrt((step**2).sum(axis=1)).sum() for step in steps]))
+        heading = np.arctan2(steps[farthest][:, 1], steps[farthest][:, 0])
+        return np.column_stack([xy[paths[farthest][1:]], 0 * heading, heading])
+
+    def _layout(
+        self, grid: Grid, rng: np.random.Generator
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Return the centers of the platform and the islands, and the tree that joins them.
+
+        Returns:
+            Centers [m], shape (n + 1, 2), the platform first, and for each the number of the one
+            before it on the way from the platform, shape (n + 1,); -1 for the platform.
+        """
+        from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
+
+        side = grid.length(max(grid.centered(self.platform))) + 2 * self.gap
+        xy, _ = scatter(
+            grid, rng, (self.radius,) * 2, number=self.number, gap=self.gap, platform=side
+        )
+        if not len(xy) or self.walkway > self.radius:
+            raise ConfigError(
+                f"floating_islands: got walkway {self.walkway:g} m, radius {self.radius:g} m and "
+                f"gap {self.gap:g} m; expected walkway <= radius, and an island that fits beside "
+                f"the platform in a patch of {grid.size[0]:g} m x {grid.size[1]:g} m"
+            )
+        xy = np.vstack([grid.center, xy])
+        distance = np.sqrt(((xy[:, None] - xy) ** 2).sum(axis=-1))
+        tree = minimum_spanning_tree(distance)
+        _, parent = breadth_first_order(tree, 0, directed=False)
+        return xy, np.where(np.arange(len(xy)) == 0, -1, parent).astype(np.int64)
