@@ -13,6 +13,7 @@ from terrainkit_cli import parse, render, signals
 COMMAND_GROUPS = {
     "Terrain": {
         "generate": "terrain_commands",
+        "import": "import_command",
         "list": "terrain_commands",
         "info": "terrain_commands",
         "preview": "terrain_commands",

@@ -49,7 +49,7 @@ def _sidecar(path: Path) -> dict[str, Any]:
     if not path.is_file():
         return {}
     try:
-        table = json.loads(read_text(path))
+        table = dict(json.loads(read_text(path)))
         found = {key: float(table[key]) for key in ("scale", "offset", "cell") if key in table}
         if "first_sample" in table:
             x, y = map(float, table["first_sample"])

@@ -186,7 +186,7 @@ def _make_map(config: MapConfig, heights: NDArray[np.float32], solids: Solids) -
         measured[row, col] = measured_difficulty(
             heights[i : i + nx, j : j + ny], config.cell, start
         )
-    rank = np.argsort(np.argsort(measured, axis=None, kind="stable")).reshape(size)
+    rank = np.unique(measured.round(6), return_inverse=True)[1].reshape(size)
     return TerrainMap(
         config=config,
         grid=config.grid,

@@ -11,23 +11,24 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import HeightFileError
 from terrainkit.grid import Grid
-from terrainkit.importing.columns import Columns
+from terrainkit.importing.columns import MIN_GAP, Columns
 from terrainkit.importing.isolated import run_isolated
 from terrainkit.mesh import closed_mesh, merged_mesh
 from terrainkit.solids import MAX_HULL_VERTICES, Solids, make_hulls
 
 PARAMETERS = {
-    "threshold": 0.03,
-    "max_convex_hull": 64,
-    "preprocess_resolution": 50,
+    "threshold": 0.05,
+    "max_convex_hull": 32,
+    "preprocess_resolution": 30,
+    "resolution": 1000,
     "mcts_nodes": 10,
-    "mcts_iterations": 40,
+    "mcts_iterations": 20,
     "mcts_max_depth": 2,
     "decimate": True,
     "max_ch_vertex": 64,
     "seed": 0,
 }
-"""Parameters of CoACD: a finer threshold and a shorter search than its defaults."""
+"""Parameters of CoACD: a shorter search than its defaults, in seconds instead of minutes."""
 
 MIN_VOLUME = 1e-6
 """Volume of the smallest solid [m3]."""
@@ -98,14 +99,29 @@ def _closed_bodies(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> I
 def _space_above(columns: Columns, grid: Grid, threshold: float, highest: float) -> Any:
     """Return the space above the cut as a manifold; elsewhere the cut is above the mesh."""
     import manifold3d
-    from scipy.ndimage import maximum_filter
+    from scipy.ndimage import (
+        binary_dilation,
+        binary_fill_holes,
+        distance_transform_edt,
+        maximum_filter,
+    )
 
     cut = (columns.ceiling + columns.ground) / 2
-    beside = maximum_filter(np.where(np.isnan(cut), -np.inf, cut), size=3)
+    has_ceiling = ~np.isnan(cut)
+    nearest = distance_transform_edt(~has_ceiling, return_distances=False, return_indices=True)
+    # Next to a support, the cut is at the ceiling. Higher up, a sheet of the support would remain,
+    # since its sides are not at the borders of the cells. The top of a table stays whole.
+    beneath = (columns.ceiling - MIN_GAP / 2)[tuple(nearest)]
+    is_support = ~has_ceiling & (columns.top > beneath)
+    is_beside = has_ceiling & binary_dilation(is_support, np.ones((3, 3)))
+    beside = maximum_filter(np.where(has_ceiling, cut, -np.inf), size=3)
+    cut[is_beside] = beneath[is_beside]
     # The samples next to an overhang belong to it if the sky is open there, so that the cut does
     # not shorten it by a part of a cell.
-    is_open = np.isnan(cut) & np.isfinite(beside) & ~(columns.top >= beside)
+    is_open = ~has_ceiling & np.isfinite(beside) & ~(columns.top >= beside)
     cut[is_open] = beside[is_open]
+    is_leg = is_support & binary_fill_holes(has_ceiling)
+    cut[is_leg] = beneath[is_leg]
     cut = np.where(np.isnan(cut), highest + 1.0, cut).astype(np.float32)
     # A closed mesh extends downward, so the space is built upside down.
     mesh = closed_mesh(merged_mesh(-cut, grid, threshold))

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,23 +91,7 @@ def make_raster(
     cell = options.file_cell or cell
     if cell is None:
         raise ConfigError(f"file_cell: missing; {path} does not state the distance of its samples")
-    if options.height_range:
-        if kind != "u":
-            raise ConfigError(
-                f"height_range: got {values.dtype} values in {path}; expected unsigned integers, "
-                "or scale for others"
-            )
-        offset, high = options.height_range
-        scale = (high - offset) / np.iinfo(values.dtype).max  # type: ignore[type-var]
-    elif options.scale:
-        scale = options.scale
-    elif scale is None:
-        if kind != "f":
-            raise ConfigError(
-                f"height_range: missing; {path} has {values.dtype} values of unknown height; "
-                "expected height_range, scale, or a .json beside it"
-            )
-        scale = 1.0
+    scale, offset = _scale_and_offset(path, values.dtype, options, scale, offset)
     heights = values.astype(np.float64) * scale + offset
     for missing in (nodata, options.nodata):
         if missing is not None:
@@ -115,3 +100,25 @@ def make_raster(
     if invalid.any():
         raise HeightFileError(f"{path}: {int(invalid.sum())} heights are infinite")
     return Raster(values=heights.astype(np.float32), cell=cell, lower=lower)
+
+
+def _scale_and_offset(
+    path: Path, dtype: np.dtype[Any], options: ReadOptions, scale: float | None, offset: float
+) -> tuple[float, float]:
+    """Return the height of a unit and of the value 0 [m]: those of the options, or of the file."""
+    if options.height_range:
+        if dtype.kind != "u":
+            raise ConfigError(
+                f"height_range: got {dtype} values in {path}; expected unsigned integers, or scale "
+                "for others"
+            )
+        low, high = options.height_range
+        return (high - low) / np.iinfo(dtype).max, low
+    if options.scale:
+        return options.scale, offset
+    if scale is None and dtype.kind != "f":
+        raise ConfigError(
+            f"height_range: missing; {path} has {dtype} values of unknown height; expected "
+            "height_range, scale, or a .json beside it"
+        )
+    return scale or 1.0, offset
