@@ -33,6 +33,7 @@ def lane_slots(
     start: float,
     spacing: tuple[float, float],
     *,
+    element: str,
     length: float,
     end: float = 0.0,
 ) -> NDArray[np.float64]:
@@ -46,6 +47,7 @@ def lane_slots(
         grid: Grid of the patch.
         start: Length of the flat start [m].
         spacing: Minimum and maximum distance between two elements, center to center [m].
+        element: Name of the elements, for the error message.
         length: Length of the longest element along x [m].
         end: Minimum length of the flat end [m].
 
@@ -57,8 +59,8 @@ def lane_slots(
     number = (grid.size[0] - first - end + 1e-9) / ((low + high) / 2)
     if not (length < low <= high and 1 <= number <= MAX_PER_AXIS):
         raise ConfigError(
-            f"{name}: got elements {length:g} m long with a spacing of {low:g} m to {high:g} m "
-            f"between a start of {start:g} m and an end of {end:g} m; expected elements shorter "
+            f"{name}: got {element} {length:g} m long with a spacing of {low:g} m to {high:g} m "
+            f"between a start of {start:g} m and an end of {end:g} m; expected {element} shorter "
             f"than the spacing, and 1 to {MAX_PER_AXIS} of them in a patch {grid.size[0]:g} m long"
         )
     return np.float64(grid.lower[0] + first) + np.arange(int(number) + 1) * ((low + high) / 2)

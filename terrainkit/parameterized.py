@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from terrainkit.parameter import Value, parameters_of
@@ -16,9 +17,14 @@ class Parameterized:
     @classmethod
     def kind(cls) -> str:
         """Return the name of the class in snake_case: `pyramid_stairs` for `PyramidStairs`."""
-        return _WORD_START.sub("_", cls.__name__.strip("_")).lower()
+        return _snake_case(cls.__name__)
 
     def requested(self) -> dict[str, Value]:
         """Return the parameters before snapping, by name."""
         kind: Any = type(self)  # mypy does not take it as hashable
         return {name: getattr(self, name) for name in parameters_of(kind)}
+
+
+@cache
+def _snake_case(name: str) -> str:
+    return _WORD_START.sub("_", name.strip("_")).lower()

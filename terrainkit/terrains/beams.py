@@ -87,4 +87,6 @@ class Beams(Terrain):
     def _slots(self, grid: Grid) -> NDArray[np.float64]:
         spacing = self.min_spacing, self.max_spacing
         end = max(self.end, self.gap + grid.cell)
-        return lane_slots("beams", grid, self.start, spacing, length=self.gap, end=end)
+        return lane_slots(
+            "beams", grid, self.start, spacing, element="gaps", length=self.gap, end=end
+        )

@@ -58,4 +58,4 @@ class GapTrack(Terrain):
     def _slots(self, grid: Grid) -> NDArray[np.float64]:
         spacing = self.min_spacing, self.max_spacing
         length = grid.length(grid.cells(self.length))
-        return lane_slots("gap_track", grid, self.start, spacing, length=length)
+        return lane_slots("gap_track", grid, self.start, spacing, element="gaps", length=length)

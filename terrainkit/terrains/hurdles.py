@@ -64,4 +64,4 @@ class Hurdles(Terrain):
     def _slots(self, grid: Grid) -> NDArray[np.float64]:
         spacing = self.min_spacing, self.max_spacing
         length = max(self.min_thickness, self.max_thickness)
-        return lane_slots("hurdles", grid, self.start, spacing, length=length)
+        return lane_slots("hurdles", grid, self.start, spacing, element="hurdles", length=length)

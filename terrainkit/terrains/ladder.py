@@ -66,13 +66,13 @@ class Ladder(Terrain):
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the rails and the rungs of both ladders."""
         landing = grid.length(grid.cells(self.landing))
-        run = self.height / np.tan(self.angle) + self.distance
+        run = self.height / np.tan(max(self.angle, 0.5)) + self.distance
         number = self.height / self.rung_spacing
-        if not (self.angle <= np.pi / 2 and run < landing and 1 <= number <= MAX_COUNT):
+        if not (0.5 <= self.angle <= np.pi / 2 and run < landing and 1 <= number <= MAX_COUNT):
             raise ConfigError(
                 f"ladder: got angle {self.angle:g} rad, rung_spacing {self.rung_spacing:g} m and "
-                f"distance {self.distance:g} m; expected an angle up to 1.57 rad, and a ladder "
-                f"with rungs in front of a deck {self.height:g} m high, on a landing of "
+                f"distance {self.distance:g} m; expected an angle of 0.5 rad to 1.57 rad, and "
+                f"a ladder with rungs in front of a deck {self.height:g} m high, on a landing of "
                 f"{self.landing:g} m"
             )
         foot, slope = grid.lower[0] + landing - run, 1 / np.tan(self.angle)

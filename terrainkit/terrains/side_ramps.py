@@ -91,4 +91,6 @@ class SideRamps(Terrain):
 
     def _slots(self, grid: Grid) -> NDArray[np.float64]:
         spacing, end = (self.spacing, self.spacing), max(self.end, self.gap + grid.cell)
-        return lane_slots("side_ramps", grid, self.start, spacing, length=self.gap, end=end)
+        return lane_slots(
+            "side_ramps", grid, self.start, spacing, element="gaps", length=self.gap, end=end
+        )

@@ -79,7 +79,7 @@ class Slit(Terrain):
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the edges of the slots along x, and the y of each opening [m]."""
         spacing = self.spacing, self.spacing
-        edges = lane_slots("slit", grid, self.start, spacing, length=self.depth)
+        edges = lane_slots("slit", grid, self.start, spacing, element="walls", length=self.depth)
         if not 2 * self.offset + self.opening * self.body_width < grid.size[1]:
             raise ConfigError(
                 f"slit: got an opening of {self.opening * self.body_width:g} m with an offset of "

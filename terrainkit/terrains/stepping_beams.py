@@ -30,7 +30,7 @@ class SteppingBeams(Terrain):
     width: float = parameter.size(0.5, 0.2)
     """Width of a beam along x, if it is straight [m]."""
 
-    gap: float = parameter.scalar(0.15, 0.5)
+    gap: float = parameter.size(0.15, 0.5)
     """Distance between two beams, if they are straight [m]."""
 
     yaw: float = parameter.scalar(0.0, 0.262)
@@ -91,4 +91,12 @@ class SteppingBeams(Terrain):
 
     def _slots(self, grid: Grid) -> NDArray[np.float64]:
         pitch, end = self.width + self.gap, max(self.end, self.gap + grid.cell)
-        return lane_slots("stepping_beams", grid, self.start, (pitch, pitch), length=0, end=end)
+        return lane_slots(
+            "stepping_beams",
+            grid,
+            self.start,
+            (pitch, pitch),
+            element="beams",
+            length=self.width,
+            end=end,
+        )

@@ -75,4 +75,4 @@ class Tunnel(Terrain):
 
     def _slots(self, grid: Grid) -> NDArray[np.float64]:
         spacing = self.spacing, self.spacing
-        return lane_slots("tunnel", grid, self.start, spacing, length=self.depth)
+        return lane_slots("tunnel", grid, self.start, spacing, element="tunnels", length=self.depth)

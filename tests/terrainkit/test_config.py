@@ -123,7 +123,8 @@ def test_map_config_is_frozen():
         ({"restitution": 1.2}, r"restitution: got 1\.2; expected a number from 0 to 1"),
         (
             {"mode": "random"},
-            "mode: got 'random'; expected one of: curriculum, selected, randomized; "
+            "mode: got 'random'; expected one of: curriculum, selected, randomized, "
+            "custom; "
             "did you mean 'randomized'",
         ),
         ({"preset": "moon"}, "no preset 'moon'; there are: legged_gym, rough, stairs, all"),

@@ -9,9 +9,9 @@ GRID = Grid(shape=(80, 40), cell=0.1, lower=(10.0, -2.0))
 
 
 def test_lane_slots_by_hand():
-    edges = lane_slots("x", GRID, 2.0, (1.0, 2.0), length=0.5)
+    edges = lane_slots("x", GRID, 2.0, (1.0, 2.0), element="walls", length=0.5)
     assert edges == pytest.approx([12.0, 13.5, 15.0, 16.5, 18.0])
-    edges = lane_slots("x", GRID, 2.04, (1.5, 1.5), length=0.5, end=0.1)
+    edges = lane_slots("x", GRID, 2.04, (1.5, 1.5), element="walls", length=0.5, end=0.1)
     assert edges == pytest.approx([12.0, 13.5, 15.0, 16.5])
 
 
@@ -21,13 +21,13 @@ def test_lane_slots_by_hand():
     ids=["overlap", "unsorted", "none", "many"],
 )
 def test_lane_slots_rejects_elements_that_do_not_fit(spacing, length, end):
-    with pytest.raises(ConfigError, match=r"x: got elements .* expected elements shorter than"):
-        lane_slots("x", GRID, 2.0, spacing, length=length, end=end)
+    with pytest.raises(ConfigError, match=r"x: got walls .* expected walls shorter than"):
+        lane_slots("x", GRID, 2.0, spacing, element="walls", length=length, end=end)
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_slot_centers_keep_the_spacing(seed):
-    edges = lane_slots("x", GRID, 2.0, (0.3, 0.7), length=0.2)
+    edges = lane_slots("x", GRID, 2.0, (0.3, 0.7), element="walls", length=0.2)
     x = slot_centers(edges, (0.3, 0.7), np.random.default_rng(seed))
     assert len(x) == 12
     assert (np.diff(x) >= 0.3).all()

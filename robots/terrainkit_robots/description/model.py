@@ -209,6 +209,38 @@ class Mimic:
     offset: float = 0.0
 
 
+@dataclass(frozen=True, kw_only=True)
+class Dynamics:
+    """Losses of a joint, as declared; None where a number is missing or not a number."""
+
+    source: Source
+
+    damping: float | None = None
+    """Viscous damping [N m s/rad] or [N s/m]."""
+
+    friction: float | None = None
+    """Coulomb friction [N m] or [N]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SafetyController:
+    """The `safety_controller` of a URDF joint; None where a number is missing or not a number."""
+
+    source: Source
+
+    k_position: float | None = None
+    """Gain from the distance to a soft limit to the velocity limit [1/s]."""
+
+    k_velocity: float | None = None
+    """Gain from the velocity error to the effort limit [N m s/rad] or [N s/m]."""
+
+    lower: float | None = None
+    """Lower soft limit [rad] or [m]."""
+
+    upper: float | None = None
+    """Upper soft limit [rad] or [m]."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Joint:
     """Connection of a link to its parent."""
@@ -245,11 +277,8 @@ class Joint:
     limit: Limit | None = None
     mimic: Mimic | None = None
 
-    damping: float = 0.0
-    """Viscous damping [N m s/rad] or [N s/m]."""
-
-    friction: float = 0.0
-    """Coulomb friction [N m] or [N]."""
+    dynamics: Dynamics | None = None
+    """Damping and friction; None if the file declares neither."""
 
     armature: float = 0.0
     """Reflected rotor inertia [kg m2] or [kg]; MJCF only."""
@@ -257,8 +286,17 @@ class Joint:
     dont_collapse: bool = False
     """Whether the URDF tells Isaac Gym not to merge the child of this fixed joint."""
 
-    safety_controller: Source | None = None
-    """The `safety_controller` element that sets a k_position, if there is one."""
+    safety_controller: SafetyController | None = None
+
+    @property
+    def damping(self) -> float:
+        """Return the viscous damping [N m s/rad] or [N s/m]; 0 if it is missing."""
+        return (self.dynamics and self.dynamics.damping) or 0.0
+
+    @property
+    def friction(self) -> float:
+        """Return the Coulomb friction [N m] or [N]; 0 if it is missing."""
+        return (self.dynamics and self.dynamics.friction) or 0.0
 
     @property
     def moves(self) -> bool:

@@ -18,6 +18,7 @@ from terrainkit_robots.analysis.bodies.kinematics import joint_motion
 from terrainkit_robots.analysis.bodies.mimic_joints import mimic_joints
 from terrainkit_robots.description.model import (
     Actuator,
+    Dynamics,
     Inertial,
     Joint,
     Limit,
@@ -279,8 +280,11 @@ def _canonical_joint(facts: "Facts", joint: Joint, body: Body | None, notes: lis
             effort=_positive(facts.effort_limit(joint)),
             velocity=_positive(joint.limit.velocity if joint.limit else None),
         ),
-        damping=_positive(joint.damping) or 0.0,
-        friction=_positive(joint.friction) or 0.0,
+        dynamics=Dynamics(
+            source=joint.dynamics.source if joint.dynamics else joint.source,
+            damping=_positive(joint.damping),
+            friction=_positive(joint.friction),
+        ),
         armature=_positive(joint.armature) or 0.0,
     )
 

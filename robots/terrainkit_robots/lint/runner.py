@@ -94,9 +94,9 @@ MAX_FINDINGS = 50
 _UNREADABLE = ("XML001", "XML002", "XML005", "XML011")
 """Problems after which a file may contain no robot."""
 
-_NEEDS_COMPLETE_TREE = ("LEG", "SYM")
-"""Families that compare limbs. On an incomplete tree they would report consequences of the tree's
-own errors."""
+_NEEDS_COMPLETE_TREE = ("LEG", "SYM", "DYN")
+"""Families that compare limbs or simulate. On an incomplete tree they would report consequences of
+the tree's own errors."""
 
 
 def lint(facts: Facts, selected: Sequence[Rule] | None = None, *, simulate: bool = True) -> Report:

@@ -57,5 +57,5 @@ def test_beams_have_goals_on_the_beams(grid):
 
 
 def test_beams_rejects_gap_longer_than_spacing(grid, rng):
-    with pytest.raises(ConfigError, match=r"beams: got elements 1.3 m long"):
+    with pytest.raises(ConfigError, match=r"beams: got gaps 1.3 m long"):
         Beams.at(1.0, {"gap": 1.3}).build(grid, rng)

@@ -44,5 +44,5 @@ def test_gap_track_goals_lie_behind_the_gaps(grid, rng):
 
 
 def test_gap_track_rejects_gaps_that_touch(grid, rng):
-    with pytest.raises(ConfigError, match=r"gap_track: got elements 1.6 m long"):
+    with pytest.raises(ConfigError, match=r"gap_track: got gaps 1.6 m long"):
         GapTrack.at(0.5, {"length": 1.6}).build(grid, rng)

@@ -42,5 +42,5 @@ def test_hurdles_goals_lie_behind_the_hurdles(grid, seed):
 
 
 def test_hurdles_rejects_hurdles_that_touch(grid, rng):
-    with pytest.raises(ConfigError, match=r"hurdles: got elements 1.3 m long"):
+    with pytest.raises(ConfigError, match=r"hurdles: got hurdles 1.3 m long"):
         Hurdles.at(0.5, {"max_thickness": 1.3}).build(grid, rng)

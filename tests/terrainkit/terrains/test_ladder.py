@@ -49,10 +49,13 @@ def test_ladder_goals_are_on_the_deck_and_behind_it():
 
 
 @pytest.mark.parametrize(
-    "values", [{"angle": 1.6}, {"angle": 0.4}, {"rung_spacing": 1.6}, {"distance": 3.0}]
+    "values",
+    [{"angle": 1.6}, {"angle": 5e-324}, {"angle": 0.4}, {"rung_spacing": 1.6}, {"distance": 3.0}],
 )
 def test_ladder_rejects_ladder_that_does_not_fit(values, grid, rng):
-    with pytest.raises(ConfigError, match=r"ladder: got angle .* expected an angle up to 1.57 rad"):
+    with pytest.raises(
+        ConfigError, match=r"ladder: got angle .* expected an angle of 0.5 rad to 1.57 rad"
+    ):
         Ladder.at(0.0, values).solids(grid, np.zeros(grid.shape, np.float32), rng)
 
 

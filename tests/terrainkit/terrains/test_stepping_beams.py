@@ -48,5 +48,5 @@ def test_stepping_beams_rejects_unsorted_lengths(grid):
 
 
 def test_stepping_beams_rejects_patch_without_beams(grid):
-    with pytest.raises(ConfigError, match="stepping_beams: got elements 0 m long"):
+    with pytest.raises(ConfigError, match=r"stepping_beams: got beams 0.5 m long"):
         beams_of(0.0, grid, start=6.5)

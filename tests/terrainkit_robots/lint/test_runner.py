@@ -118,7 +118,7 @@ def test_leg_rules_need_legs():
     assert len(report(rule([violation()], needs=("legs",)), robot=robot).findings) == 1
 
 
-@pytest.mark.parametrize("family", ["LEG", "SYM"])
+@pytest.mark.parametrize("family", ["LEG", "SYM", "DYN"])
 def test_limb_rules_need_complete_tree(family):
     text = (
         '<robot name="r"><link name="a"/><joint name="j" type="fixed"><parent link="a"/>'

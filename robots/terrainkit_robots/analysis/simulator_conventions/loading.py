@@ -4,10 +4,11 @@ Both open all referenced files, without limits on time and memory. Therefore the
 first, and a file that could take more than seconds is not passed to them.
 """
 
+import copy
 import io
 import logging
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -46,6 +47,20 @@ _UNSAFE_TAGS = frozenset(
 )
 """Elements that generate other elements, or run external code."""
 
+_URDF_TAGS = frozenset({"link", "joint", "material"})
+"""Elements of a URDF that MuJoCo reads besides <mujoco>; it ignores all others."""
+
+_TETRAHEDRON = b"""v 0 0 0
+v 1 0 0
+v 0 1 0
+v 0 0 1
+f 1 3 2
+f 1 2 4
+f 1 4 3
+f 2 3 4
+"""
+"""OBJ file that replaces each mesh file."""
+
 _FOLDER_ATTRIBUTES = frozenset({"meshdir", "texturedir", "assetdir"})
 
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -65,9 +80,17 @@ class LoadError:
     element: str = ""
     """Name of the element that it refers to. Empty without one."""
 
+    line: int = 0
+    """Line of the element, or 0 if it is not known."""
 
-def mujoco_load_error(model: RobotModel) -> LoadError | None:
+
+def mujoco_load_error(model: RobotModel, *, with_meshes: bool = True) -> LoadError | None:
     """Return why MuJoCo does not compile the file; None if it does.
+
+    Args:
+        model: The robot.
+        with_meshes: Whether MuJoCo opens the mesh files. If not, a tetrahedron replaces each mesh,
+            so that an error in a mesh file does not hide the others; URDF only.
 
     Raises:
         NotAttemptedError: if the file is not passed to MuJoCo.
@@ -78,20 +101,49 @@ def mujoco_load_error(model: RobotModel) -> LoadError | None:
         raise NotAttemptedError(
             f"number of bodies: got {len(model.links)}; expected at most {_MAX_BODIES} for MuJoCo"
         )
-    _check_cost(model.sources)
+    if not with_meshes and model.kind != "urdf":
+        raise NotAttemptedError("only URDF is compiled without its mesh files")
+    _check_cost(model.sources, with_files=with_meshes)
     import mujoco
 
     try:
         with quiet_mujoco():
-            mujoco.MjModel.from_xml_path(str(model.file))
+            if with_meshes:
+                mujoco.MjModel.from_xml_path(str(model.file))
+            else:
+                mujoco.MjModel.from_xml_string(*_without_meshes(model))
     except (ValueError, RuntimeError, mujoco.FatalError, mujoco.UnexpectedError) as error:
         text = str(error)
         lines = [re.sub(r"^(XML )?Error:\s*", "", line.strip()) for line in text.splitlines()]
         informative = (line for line in lines if line and not line.startswith("Element "))
         message = " ".join(next(informative, "no reason").split())
         element = re.search(r"Element name '([^']*)'", text)
-        return LoadError(message=truncate(message, 200), element=element[1] if element else "")
+        line = re.search(r"^Element .*\bline (\d+)$", text, re.MULTILINE)
+        return LoadError(
+            message=truncate(message, 200),
+            element=element[1] if element else "",
+            line=int(line[1]) if line and with_meshes and len(model.sources) == 1 else 0,
+        )
     return None
+
+
+def _without_meshes(model: RobotModel) -> tuple[str, Mapping[str, bytes]]:
+    """Return the text of a URDF in which a tetrahedron replaces each mesh, and its assets."""
+    from lxml import etree
+
+    root = parse_xml(model.file, _read(model.file)).root
+    if root is None:
+        raise NotAttemptedError("a file without elements is not passed to MuJoCo")
+    root = copy.deepcopy(root)
+    files: dict[tuple[str, str], str] = {}
+    for mesh in root.iter("mesh"):
+        if "filename" in mesh.attrib:
+            key = mesh.get("filename", ""), mesh.get("scale", "")
+            mesh.set("filename", files.setdefault(key, f"{len(files)}.obj"))
+    for compiler in root.iter("compiler"):
+        for name in _FOLDER_ATTRIBUTES & set(map(str, compiler.keys())):
+            del compiler.attrib[name]
+    return etree.tostring(root, encoding="unicode"), dict.fromkeys(files.values(), _TETRAHEDRON)
 
 
 def yourdfpy_load_error(model: RobotModel, tree: Tree) -> LoadError | None:
@@ -139,7 +191,7 @@ def _read(path: Path) -> bytes:
         raise NotAttemptedError(str(error)) from None
 
 
-def _check_cost(files: tuple[Path, ...]) -> None:
+def _check_cost(files: tuple[Path, ...], *, with_files: bool) -> None:
     """Check all files that MuJoCo would open and all objects that it would generate.
 
     Raises:
@@ -147,10 +199,7 @@ def _check_cost(files: tuple[Path, ...]) -> None:
     """
     elements, directories, names = 0, {Path()}, set[str]()
     for source in files:
-        root = parse_xml(source, _read(source)).root
-        for element in () if root is None else root.iter():
-            if not isinstance(element.tag, str):
-                continue
+        for element in _relevant_elements(parse_xml(source, _read(source)).root):
             elements += 1
             if elements > MAX_ELEMENTS:
                 raise NotAttemptedError(
@@ -159,6 +208,8 @@ def _check_cost(files: tuple[Path, ...]) -> None:
             _check_element(element)
             directories |= {Path(v) for k, v in element.attrib.items() if k in _FOLDER_ATTRIBUTES}
             names |= {v for k, v in element.attrib.items() if k.startswith("file") and v}
+    if not with_files:
+        return
     parents = {source.parent for source in files}
     paths = len(names) * len(parents) * len(directories)
     if paths > _MAX_PATHS:
@@ -166,6 +217,17 @@ def _check_cost(files: tuple[Path, ...]) -> None:
             f"number of files and folders: got {paths} paths; expected at most {_MAX_PATHS}"
         )
     _check_files({path for name in names for path in _candidates(name, parents, directories)})
+
+
+def _relevant_elements(root: "etree._Element | None") -> Iterator["etree._Element"]:
+    """Yield the elements that MuJoCo reads."""
+    if root is None:
+        return
+    is_urdf = root.tag == "robot"
+    yield root
+    for child in root:
+        if not is_urdf or child.tag in _URDF_TAGS or child.tag == "mujoco":
+            yield from (each for each in child.iter() if isinstance(each.tag, str))
 
 
 def _check_element(element: "etree._Element") -> None:

@@ -43,6 +43,7 @@ from terrainkit_robots.description.mjcf.shapes import (
 from terrainkit_robots.description.mjcf.tree import MjcfTree, Node, read_tree
 from terrainkit_robots.description.model import (
     Actuator,
+    Dynamics,
     Geometry,
     Inertial,
     Joint,
@@ -394,8 +395,11 @@ class _Reader:
             reference=float(joint.ref) * unit,
             limit=_limit(node.source, limits, unit, force_limit(joint, actuators, force)),
             mimic=self._mimics.get(joint.name),
-            damping=float(np.ravel(joint.damping)[0]) * rotor,
-            friction=float(joint.frictionloss) * force,
+            dynamics=Dynamics(
+                source=node.source,
+                damping=float(np.ravel(joint.damping)[0]) * rotor,
+                friction=float(joint.frictionloss) * force,
+            ),
             armature=(float(joint.armature) + sum(actuator.armature for actuator in actuators))
             * rotor,
         )

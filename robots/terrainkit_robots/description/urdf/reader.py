@@ -14,6 +14,7 @@ from lxml import etree
 
 from terrainkit.text import truncate
 from terrainkit_robots.description.model import (
+    Dynamics,
     Geometry,
     Inertial,
     Joint,
@@ -23,6 +24,7 @@ from terrainkit_robots.description.model import (
     Mimic,
     Problem,
     RobotModel,
+    SafetyController,
 )
 from terrainkit_robots.description.package_resolver import PackageResolver
 from terrainkit_robots.description.urdf.colors import Color, color_of, named_colors
@@ -273,7 +275,6 @@ class _Reader:
         direction = None if axis is None or blank else self._parse_numbers(axis, "xyz", 3)
         if axis is not None and direction is None:
             direction = np.zeros(3)  # an invalid axis, not a missing one
-        safety = element.find("safety_controller")
         return Joint(
             name=name,
             source=self._document.source(element),
@@ -285,12 +286,29 @@ class _Reader:
             axis_source=None if axis is None else self._document.source(axis),
             limit=self._limit(element.find("limit")),
             mimic=self._mimic(element.find("mimic")),
-            damping=self._parse_number(element.find("dynamics"), "damping") or 0.0,
-            friction=self._parse_number(element.find("dynamics"), "friction") or 0.0,
+            dynamics=self._dynamics(element.find("dynamics")),
             dont_collapse=element.get("dont_collapse", "").lower() == "true",
-            safety_controller=None
-            if safety is None or safety.get("k_position") is None
-            else self._document.source(safety),
+            safety_controller=self._safety_controller(element.find("safety_controller")),
+        )
+
+    def _dynamics(self, element: "etree._Element | None") -> Dynamics | None:
+        if element is None:
+            return None
+        return Dynamics(
+            source=self._document.source(element),
+            damping=self._parse_number(element, "damping"),
+            friction=self._parse_number(element, "friction"),
+        )
+
+    def _safety_controller(self, element: "etree._Element | None") -> SafetyController | None:
+        if element is None:
+            return None
+        return SafetyController(
+            source=self._document.source(element),
+            k_position=self._parse_number(element, "k_position"),
+            k_velocity=self._parse_number(element, "k_velocity"),
+            lower=self._parse_number(element, "soft_lower_limit"),
+            upper=self._parse_number(element, "soft_upper_limit"),
         )
 
     def _limit(self, element: "etree._Element | None") -> Limit | None:

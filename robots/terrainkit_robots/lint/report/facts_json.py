@@ -46,7 +46,7 @@ def facts_json(facts: "Facts", *, simulated: bool = False) -> dict[str, Any]:
         },
         "mirrored_joints": _mirrored_joints(facts),
         **_standing(facts),
-        "suggested_gains": _gains(facts) if simulated else None,
+        "suggested_gains": _gains(facts) if simulated and not facts.tree.rejected else None,
         "action_size": actuated,
         "observation_size": 12 + 3 * actuated,
     }

@@ -556,15 +556,20 @@ def safety_controller(robot: Facts) -> Iterator[Violation]:
     Source:
         Genesis' URDF parser, which uses the value for dofs_kp.
     """
-    joints = [j for j in robot.model.joints if j.safety_controller is not None and j.moves]
-    if joints:
-        assert joints[0].safety_controller is not None
+    controllers = [
+        (joint.name, controller)
+        for joint in robot.model.joints
+        if joint.moves and (controller := joint.safety_controller) is not None
+        if controller.k_position is not None
+    ]
+    if controllers:
+        first, controller = controllers[0]
         yield Violation(
-            subject=joints[0].name,
-            source=joints[0].safety_controller,
-            message=f"safety_controller of {names(joint.name for joint in joints)}: Genesis uses "
+            subject=first,
+            source=controller.source,
+            message=f"safety_controller of {names(name for name, _ in controllers)}: Genesis uses "
             "k_position as the stiffness of a position controller",
-            measured={"joints": len(joints)},
+            measured={"joints": len(controllers)},
         )
 
 

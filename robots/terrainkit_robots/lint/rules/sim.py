@@ -20,7 +20,8 @@ from terrainkit_robots.analysis.simulator_conventions.fixed_joints import (
 from terrainkit_robots.analysis.simulator_conventions.joint_order import (
     SimulatorOrder,
 )
-from terrainkit_robots.lint.rule import Violation, rule
+from terrainkit_robots.description.model import Source
+from terrainkit_robots.lint.rule import Severity, Violation, get_rule, rule
 from terrainkit_robots.text import names
 
 if TYPE_CHECKING:
@@ -30,20 +31,33 @@ _MAX_JOINTS = 40
 """Maximum number of joints for which the message contains the permutation."""
 
 _EXPLAINED_BY: tuple[tuple[str, str], ...] = (
-    (r"mass and inertia of moving bodies", "INR001"),
+    (r"mass and inertia of moving bodies", "INR001 INR002 INR003 XML006"),
     (r"positive eigenvalues", "INR003"),
     (r"A \+ B >= C", "INR004"),
-    (r"package:/", "MSH003"),
-    (r"no decoder found|unknown or unsupported mesh", "MSH005"),
-    (r"number of faces should be between", "MSH008"),
+    (r"axis too small", "JNT004"),
+    (r"invalid joint type", "JNT001"),
+    (r"repeated in equality constraint", "JNT013"),
+    (r"must be positive in geom", "COL004"),
+    (r"no decoder found|unknown or unsupported mesh", "MSH005 MSH013"),
+    (r"_decoder", "MSH006 MSH007 MSH008 MSH010 MSH013"),
     (r"coplanar|mesh volume is too small", "MSH010"),
     (r"repeated element: 'material'", "XML008"),
-    (r"repeated name|repeated joint|repeated body", "TRE001"),
+    (r"repeated URDF name|repeated name|repeated joint|repeated body", "TRE001 XML011"),
+    (r"joint parent or child missing", "TRE002 XML013"),
     (r"multiple parents", "TRE003"),
+    (r"URDF body not found", "TRE004"),
     (r"free joint can only be used on top level", "TRE008"),
-    (r"could not parse|Error=XML_", "XML001"),
+    (r"attribute missing|missing element", "XML013 INR001 INR003 JNT001"),
+    (r"bad format|enough data|too much data", "XML006 XML004"),
+    (r"Schema violation|unrecognized|unknown|not found", "XML011 XML007"),
+    (r"model type", "XML002"),
+    (r"could not parse|XML parse error|Error=XML_", "XML001 XML010"),
+    (r"Error opening file|already included", "MSH001 MSH002 MSH003 MSH004 XML012"),
 )
-"""Patterns of MuJoCo error messages, and the rules that explain them."""
+"""Patterns of MuJoCo error messages, and the rules that may explain them."""
+
+_MESH_ERROR = r"Error opening file|decoder|mesh"
+"""Pattern of MuJoCo error messages about mesh files. More errors may follow without them."""
 
 
 @rule("SIM001", "joint-order", "info")
@@ -164,32 +178,51 @@ def genesis_armature(robot: Facts) -> Iterator[Violation]:
     )
 
 
-@rule("SIM004", "mujoco-load-failure", "info", needs=("simulation",))
+@rule("SIM004", "mujoco-load-failure", "error", needs=("simulation",))
 def mujoco_load_failure(robot: Facts) -> Iterator[Violation]:
     """MuJoCo cannot load the unmodified file.
 
     MuJoCo stops at the first error, so there may be more. mjlab and Genesis load robots with MuJoCo
-    as well.
+    as well. This is only a note if an error of another rule has the same cause, or if MuJoCo does
+    not find a mesh because its path starts with `package://`.
 
     Fix:
         Correct the reported element; the rule in the help explains how. If MuJoCo does not find an
-        existing mesh, check meshdir and strippath of <compiler>.
+        existing mesh, check meshdir and strippath of <compiler>. If another file includes this one,
+        check that file instead.
 
     Source:
-        The file is compiled with the installed version of MuJoCo. Nothing is simulated.
+        The file is compiled with the installed version of MuJoCo. If MuJoCo stops at a mesh file of
+        a URDF, the file is compiled again with other meshes. Nothing is simulated.
     """
     from terrainkit_robots.analysis.simulator_conventions.loading import (
+        LoadError,
         NotAttemptedError,
         mujoco_load_error,
     )
 
     _require_saved(robot)
+    refusals: list[LoadError | None] = []
+    reason = ""
     try:
-        refusal = mujoco_load_error(robot.model)
-    except NotAttemptedError as reason:
-        raise CannotCheckError(str(reason)) from None
-    if refusal is not None:
-        yield _load_failure(robot, "MuJoCo", refusal, _explaining_rule(robot, refusal.message))
+        refusals.append(mujoco_load_error(robot.model))
+    except NotAttemptedError as error:
+        reason = str(error)
+    is_mesh_error = any(each and re.search(_MESH_ERROR, each.message) for each in refusals)
+    if (reason or is_mesh_error) and robot.model.kind == "urdf":
+        try:
+            refusals.append(mujoco_load_error(robot.model, with_meshes=False))
+        except NotAttemptedError as error:
+            reason = reason or str(error)
+    if not refusals:
+        raise CannotCheckError(reason)
+    for refusal in refusals:
+        if refusal is not None:
+            code, severity = _explaining_rule(robot, refusal.message)
+            is_explained = severity == "error" or code == "MSH003"
+            yield _load_failure(
+                robot, "MuJoCo", refusal, code, severity="info" if is_explained else "error"
+            )
 
 
 @rule("SIM005", "yourdfpy-load-failure", "info", needs=("simulation",))
@@ -217,7 +250,7 @@ def yourdfpy_load_failure(robot: Facts) -> Iterator[Violation]:
     except NotAttemptedError as reason:
         raise CannotCheckError(str(reason)) from None
     if refusal is not None:
-        yield _load_failure(robot, "yourdfpy", refusal, "")
+        yield _load_failure(robot, "yourdfpy", refusal, "", severity="info")
 
 
 def _require_saved(robot: Facts) -> None:
@@ -226,35 +259,40 @@ def _require_saved(robot: Facts) -> None:
         raise CannotCheckError("the file has fixes that are not written yet")
 
 
-def _explaining_rule(robot: Facts, error: str) -> str:
-    """Return the code of the rule that explains an error of MuJoCo, or an empty text."""
-    for pattern, code in _EXPLAINED_BY:
-        if re.search(pattern, error):
-            return code
-    missing = re.search(r"Error opening file '([^']*)'", error)
-    if missing is None:
-        return ""
-    name = re.split(r"[/\\]", missing[1])[-1]
-    meshes = [
-        shape.mesh
-        for link in robot.model.links
-        for shape in (*link.collisions, *link.visuals)
-        if shape.mesh is not None and re.split(r"[/\\]", shape.mesh.filename)[-1] == name
-    ]
-    found = [mesh for mesh in meshes if robot.meshes.exists(mesh.path)]
-    if len(found) < len(meshes):
-        return "MSH001"
-    return "" if all(mesh.found_by == "path" for mesh in found) else "MSH002"
+def _explaining_rule(robot: Facts, message: str) -> tuple[str, Severity]:
+    """Return the rule that explains an error of MuJoCo, and the highest severity that it reports.
+
+    Returns:
+        Code and severity; an empty code if no rule with findings explains the error.
+    """
+    order: tuple[Severity, ...] = ("info", "warning", "error")
+    best: tuple[str, Severity] = "", "info"
+    codes = next((each for pattern, each in _EXPLAINED_BY if re.search(pattern, message)), "")
+    for each in map(get_rule, codes.split()):
+        try:
+            found = [violation.severity or each.severity for violation in each.check(robot)]
+        except CannotCheckError:
+            continue
+        if found:
+            severity = max(found, key=order.index)
+            if not best[0] or order.index(severity) > order.index(best[1]):
+                best = each.code, severity
+    return best
 
 
-def _load_failure(robot: Facts, loader: str, refusal: "LoadError", code: str) -> Violation:
+def _load_failure(
+    robot: Facts, loader: str, refusal: "LoadError", code: str, *, severity: Severity
+) -> Violation:
     sources = {link.name: link.source for link in robot.model.links}
     sources = {joint.name: joint.source for joint in robot.model.joints} | sources
     source = sources.get(refusal.element) if refusal.element else None
     element = f" ({names([refusal.element])})" if refusal.element else ""
+    if source is None and refusal.line:
+        source = Source(file=robot.model.file, line=refusal.line)
     return Violation(
-        subject=refusal.element if source is not None else robot.model.title,
+        subject=refusal.element if refusal.element in sources else robot.model.title,
         source=source or robot.model.source,
         message=f"{loader} cannot load the file: {truncate(refusal.message, 200)}{element}",
         hint=f"See rule {code}." if code else "",
+        severity=severity,
     )

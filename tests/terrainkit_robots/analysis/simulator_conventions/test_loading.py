@@ -45,6 +45,31 @@ def test_mujoco_load_error_names_element(tmp_path):
     assert refusal.element == "base"
 
 
+@pytest.mark.parametrize("with_meshes", [True, False])
+def test_mujoco_load_error_has_line_of_urdf(tmp_path, with_meshes):
+    text = (
+        bundled.urdf_path("quadruped").read_text().replace("<inertial>", "<inertial/><inertial>", 1)
+    )
+    text = text.replace("</robot>", '<gazebo><plugin filename="p.so"/></gazebo></robot>')
+    refusal = mujoco_load_error(facts_of(tmp_path, text, "r.urdf").model, with_meshes=with_meshes)
+    assert refusal.message == "repeated element: 'inertial'"
+    line = text[: text.index("<inertial>")].count("\n") + 1
+    assert refusal.line == (line if with_meshes else 0)
+
+
+def test_mujoco_load_error_without_meshes(tmp_path):
+    mesh = '<mesh filename="package://lost/lost.dae" scale="1 1 1"/>'
+    text = (
+        '<robot name="r"><mujoco><compiler meshdir="x"/></mujoco><link name="a"><collision>'
+        f"<geometry>{mesh}</geometry></collision></link></robot>"
+    )
+    model = facts_of(tmp_path, text, "r.urdf").model
+    assert "Error opening file" in mujoco_load_error(model).message
+    assert mujoco_load_error(model, with_meshes=False) is None
+    with pytest.raises(NotAttemptedError, match="only URDF"):
+        mujoco_load_error(facts_of(tmp_path, f"<mujoco>{BODY}</mujoco>").model, with_meshes=False)
+
+
 def test_yourdfpy_load_error_is_one_line(tmp_path):
     text = (
         '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="revolute"/></robot>'

@@ -115,8 +115,8 @@ def test_joint_with_all_elements():
         '<origin xyz="1 2 3" rpy="0 0 1.5707963267948966"/>'
         + PARENTS
         + '<axis xyz="0 0 2"/><limit lower="-1" upper="2" effort="3" velocity="4"/>'
-        '<mimic joint="k" multiplier="-2" offset="0.5"/><dynamics damping="0.1" friction="1"/>'
-        '<safety_controller k_position="100" k_velocity="1"/>',
+        '<mimic joint="k" multiplier="-2" offset="0.5"/>\n<dynamics damping="0.1" friction="1"/>'
+        '\n<safety_controller k_position="100" k_velocity="1"/>',
         'name="j" type="revolute" dont_collapse="true"',
     )
     assert problems == ()
@@ -130,13 +130,23 @@ def test_joint_with_all_elements():
     assert (limit.lower, limit.upper, limit.effort, limit.velocity) == (-1, 2, 3, 4)
     assert (mimic.joint, mimic.multiplier, mimic.offset) == ("k", -2, 0.5)
     assert (read_joint.damping, read_joint.friction) == (0.1, 1)
-    assert read_joint.safety_controller is not None
+    dynamics, safety = read_joint.dynamics, read_joint.safety_controller
+    assert (dynamics.damping, dynamics.friction) == (0.1, 1)
+    assert (safety.k_position, safety.k_velocity, safety.lower, safety.upper) == (
+        100,
+        1,
+        None,
+        None,
+    )
+    line = mimic.source.line
+    assert (dynamics.source.line, safety.source.line) == (line + 1, line + 2)
     assert read_joint.dont_collapse
 
 
 def test_invalid_friction_is_reported():
     read_joint, problems = joint(PARENTS + '<dynamics damping="0.1" friction="much"/>')
-    assert (read_joint.damping, read_joint.friction) == (0.1, 0)
+    assert (read_joint.dynamics.damping, read_joint.dynamics.friction) == (0.1, None)
+    assert read_joint.friction == 0
     assert [problem.code for problem in problems] == ["XML006"]
 
 
@@ -151,8 +161,9 @@ def test_mimic_defaults():
     assert joint(PARENTS + '<mimic joint="k" multiplier="0"/>')[0].mimic.multiplier == 0
 
 
-def test_safety_controller_needs_position_gain():
-    assert joint(PARENTS + '<safety_controller k_velocity="1"/>')[0].safety_controller is None
+def test_safety_controller_without_position_gain():
+    controller = joint(PARENTS + '<safety_controller k_velocity="1"/>')[0].safety_controller
+    assert (controller.k_position, controller.k_velocity) == (None, 1)
 
 
 @pytest.mark.parametrize(
