@@ -115,8 +115,7 @@ def _print_overview() -> None:
         summaries = ((command(name).__doc__ or "").partition("\n")[0] for name in names)
         rows += [(f"{group}:", ""), *zip((f"  {name}" for name in names), summaries, strict=True)]
     render.table(rows)
-    render.result("\nterrainkit COMMAND --help lists the options of a command.")
-    render.result("terrainkit --version prints the version.")
+    render.result("\nterrainkit COMMAND --help lists its options; --version prints the version.")
 
 
 def command(name: str) -> type[parse.Command]:

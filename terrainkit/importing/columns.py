@@ -31,7 +31,7 @@ class Columns:
     top: Array
     """Height of the highest surface [m], shape (nx, ny)."""
 
-    ground: Array
+    floor: Array
     """Height of the surface below the lowest free space, or the highest [m], shape (nx, ny)."""
 
     ceiling: Array
@@ -69,11 +69,11 @@ def make_columns(vertices: Array, faces: NDArray[np.int64], x: Array, y: Array) 
     above = np.flatnonzero(is_gap)
     top, ceiling = np.full((2, len(x) * len(y)), np.nan)
     top[column[is_first]] = z[is_first]
-    ground = top.copy()
+    floor = top.copy()
     # The last of several gaps of a column is the lowest.
-    ceiling[column[above]], ground[column[above]] = z[above], z[above + 1]
-    top, ground, ceiling = (each.reshape(len(x), len(y)) for each in (top, ground, ceiling))
-    return Columns(top=top, ground=ground, ceiling=ceiling)
+    ceiling[column[above]], floor[column[above]] = z[above], z[above + 1]
+    top, floor, ceiling = (each.reshape(len(x), len(y)) for each in (top, floor, ceiling))
+    return Columns(top=top, floor=floor, ceiling=ceiling)
 
 
 def _crossings(

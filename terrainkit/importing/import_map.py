@@ -94,7 +94,7 @@ def import_map(path: str | Path, options: ImportOptions | None = None) -> Import
     solids, columns = Solids.empty(), None
     if isinstance(source, MeshSource):
         columns = source.columns(x, y)
-        found = columns.ground if options.solids else columns.top
+        found = columns.floor if options.solids else columns.top
         if options.solids:
             solids = overhang_solids(
                 path,
@@ -169,7 +169,7 @@ def _make_config(
 
 
 def _moved(columns: Columns, z: float) -> Columns:
-    return Columns(top=columns.top - z, ground=columns.ground - z, ceiling=columns.ceiling - z)
+    return Columns(top=columns.top - z, floor=columns.floor - z, ceiling=columns.ceiling - z)
 
 
 def _make_map(config: MapConfig, heights: NDArray[np.float32], solids: Solids) -> TerrainMap:
@@ -208,7 +208,7 @@ def _report(terrain_map: TerrainMap, columns: Columns, num_missing: int) -> Impo
         return ImportReport(num_missing=num_missing)
     grid = terrain_map.grid
     xy = np.column_stack([grid.axis(0)[i], grid.axis(1)[j]])
-    top, ground, ceiling = columns.top[i, j], columns.ground[i, j], columns.ceiling[i, j]
+    top, ground, ceiling = columns.top[i, j], columns.floor[i, j], columns.ceiling[i, j]
     map_ground = terrain_map.height(xy)
     map_ceiling = map_ground + terrain_map.clearance(xy)
     map_top = terrain_map.scan(np.column_stack([xy, top + 1.0]))

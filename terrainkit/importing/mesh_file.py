@@ -60,9 +60,7 @@ class MeshSource:
         if all(len(a) == len(b) for a, b in zip(inner, (x, y), strict=True)):
             return found
         cells = np.ix_(*number)
-        return Columns(
-            top=found.top[cells], ground=found.ground[cells], ceiling=found.ceiling[cells]
-        )
+        return Columns(top=found.top[cells], floor=found.floor[cells], ceiling=found.ceiling[cells])
 
 
 def read(path: Path, options: ReadOptions) -> MeshSource:

@@ -106,7 +106,7 @@ def _space_above(columns: Columns, grid: Grid, threshold: float, highest: float)
         maximum_filter,
     )
 
-    cut = (columns.ceiling + columns.ground) / 2
+    cut = (columns.ceiling + columns.floor) / 2
     has_ceiling = ~np.isnan(cut)
     nearest = distance_transform_edt(~has_ceiling, return_distances=False, return_indices=True)
     # Next to a support, the cut is at the ceiling. Higher up, a sheet of the support would remain,
@@ -122,9 +122,9 @@ def _space_above(columns: Columns, grid: Grid, threshold: float, highest: float)
     cut[is_open] = beside[is_open]
     is_leg = is_support & binary_fill_holes(has_ceiling)
     cut[is_leg] = beneath[is_leg]
-    cut = np.where(np.isnan(cut), highest + 1.0, cut).astype(np.float32)
+    surface = np.where(np.isnan(cut), highest + 1.0, cut).astype(np.float32)
     # A closed mesh extends downward, so the space is built upside down.
-    mesh = closed_mesh(merged_mesh(-cut, grid, threshold))
+    mesh = closed_mesh(merged_mesh(-surface, grid, threshold))
     return manifold3d.Manifold(
         manifold3d.Mesh64(
             mesh.vertices * np.array([1.0, 1.0, -1.0]), mesh.triangles[:, ::-1].astype(np.uint64)

@@ -48,7 +48,7 @@ class Raster:
         nearest = [np.rint(each) for each in index]
         if all(np.abs(a - b).max() < _ALIGNED for a, b in zip(index, nearest, strict=True)):
             i, j = (each.astype(int) for each in nearest)
-            return self.values[np.ix_(i, j)].astype(float)
+            return np.asarray(self.values[np.ix_(i, j)], dtype=float)
         grid = np.meshgrid(*index, indexing="ij")
         between: Array = map_coordinates(self.values.astype(float), grid, order=1, mode="nearest")
         return between

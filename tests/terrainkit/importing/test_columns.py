@@ -25,7 +25,7 @@ def test_columns_of_bridge():
     found = columns_of(trimesh.util.concatenate([FLOOR, DECK]), X, Y)
     under = (X > 2) & (X < 3)
     np.testing.assert_allclose(found.top, np.where(under, 1.0, 0.0)[:, None] * np.ones(4))
-    np.testing.assert_allclose(found.ground, 0.0, atol=1e-12)
+    np.testing.assert_allclose(found.floor, 0.0, atol=1e-12)
     np.testing.assert_allclose(found.ceiling[under], 0.8)
     assert np.isnan(found.ceiling[~under]).all()
 
@@ -33,7 +33,7 @@ def test_columns_of_bridge():
 def test_columns_of_open_sheet_below_deck():
     sheet = trimesh.Trimesh([[0, 0, 0], [4, 0, 0], [4, 2, 0], [0, 2, 0]], [[0, 1, 2], [0, 2, 3]])
     found = columns_of(trimesh.util.concatenate([sheet, DECK]), X, Y)
-    np.testing.assert_allclose(found.ground, 0.0)
+    np.testing.assert_allclose(found.floor, 0.0)
     assert np.nanmin(found.ceiling) == pytest.approx(0.8)
 
 
@@ -42,7 +42,7 @@ def test_columns_of_touching_bodies_have_no_gap(z):
     # From 0.25 m into the floor to 0.5 mm above it.
     found = columns_of(trimesh.util.concatenate([FLOOR, box((1, 1, 1), (2, 1, z))]), X, Y)
     assert np.isnan(found.ceiling).all()
-    np.testing.assert_allclose(found.ground, found.top)
+    np.testing.assert_allclose(found.floor, found.top)
 
 
 def test_columns_of_two_decks_keep_the_lowest_gap():
@@ -56,7 +56,7 @@ def test_columns_of_mesh_inside_out():
     mesh = trimesh.util.concatenate([FLOOR, DECK])
     mesh.invert()
     found = columns_of(mesh, X, Y)
-    np.testing.assert_allclose(found.ground, 0.0, atol=1e-12)
+    np.testing.assert_allclose(found.floor, 0.0, atol=1e-12)
     assert np.nanmin(found.ceiling) == pytest.approx(0.8)
 
 
