@@ -46,12 +46,14 @@ def run() -> Iterator[tuple[str, float]]:
     # Twenty cells along a patch: nearly all of the time is spent in Python. Every patch needs a
     # random generator of its own.
     coarse = terrainkit.MapConfig(cell=0.4, border=0.0)
-    generators = [np.random.SeedSequence([0, *place]) for place in np.ndindex(10, 10)]
     yield (
         "patch_over_random_generator (at most 16)",
         ratio(
             lambda: terrainkit.generate(coarse),
-            lambda: [np.random.default_rng(seed) for seed in generators],
+            lambda: [
+                np.random.default_rng(np.random.SeedSequence([0, *place]))
+                for place in np.ndindex(10, 10)
+            ],
             25,
         ),
     )

@@ -70,6 +70,32 @@ def make_blocks(lower: ArrayLike, upper: ArrayLike) -> Solids:
     return make_boxes((low + high) / 2, high - low)
 
 
+def make_walls(
+    axis: int,
+    position: ArrayLike,
+    start: ArrayLike,
+    end: ArrayLike,
+    *,
+    thickness: float,
+    height: float,
+) -> Solids:
+    """Return walls across an axis that stand on the ground at height 0.
+
+    Args:
+        axis: Axis across which the walls stand, 0 for x or 1 for y.
+        position: Position of the middle of each wall on this axis [m], shape (n,).
+        start: Lower end of each wall along the other axis [m], shape (n,).
+        end: Upper end of each wall along the other axis [m], shape (n,).
+        thickness: Thickness of the walls [m].
+        height: Height of the walls [m].
+    """
+    low, high = np.asarray(start, float), np.asarray(end, float)
+    order = [axis, 1 - axis]
+    xy = np.column_stack([np.asarray(position, float), (low + high) / 2])
+    size = np.column_stack([np.full(len(low), thickness), high - low])
+    return make_standing_boxes(xy[:, order], size[:, order], height)
+
+
 def make_ramps(
     lower: ArrayLike, upper: ArrayLike, corners: ArrayLike, *, floor: float = 0.0
 ) -> Solids:

@@ -49,7 +49,7 @@ class MapConfig(Config):
     """Width of the flat ground around the patches [m]."""
 
     preset: str = "legged_gym"
-    """Named set of sub-terrains: legged_gym, rough, stairs or all."""
+    """Named set of sub-terrains, such as legged_gym or parkour; `terrainkit list` prints all."""
 
     terrains: tuple[SubTerrain, ...] = ()
     """Custom sub-terrains, which replace the preset."""

@@ -86,7 +86,8 @@ def place_patch_spawns(
     (i, j), (nx, ny) = config.patch_start(row, col), config.patch_shape
     block = heights[i : i + nx, j : j + ny]
     lower, upper = (corner[:, :2] for corner in solids.bounds())
-    near = solids.select(((upper >= grid.lower) & (lower <= grid.upper)).all(axis=1))
+    reaches = np.all((upper >= grid.lower) & (lower <= grid.upper), axis=1)
+    near = solids.select(np.asarray(reaches))
     disc, threshold = spawn_disc(config), config.wall_threshold
     kept = [
         find_spawn(block, grid, (x, y), disc, solids=near, threshold=threshold)

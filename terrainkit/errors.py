@@ -18,6 +18,10 @@ class MapFileError(TerrainkitError):
     """A file is not a map, or is truncated."""
 
 
+class HeightFileError(TerrainkitError):
+    """A file of heights or a mesh cannot be read."""
+
+
 class ExportError(TerrainkitError):
     """A format cannot represent the map, or the target cannot be written."""
 

@@ -2,9 +2,11 @@
 
 import re
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
-from terrainkit.parameter import Value, parameters_of
+from terrainkit.grid import Grid
+from terrainkit.parameter import Realized, Value, parameters_of
 
 _WORD_START = re.compile("(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
@@ -16,9 +18,20 @@ class Parameterized:
     @classmethod
     def kind(cls) -> str:
         """Return the name of the class in snake_case: `pyramid_stairs` for `PyramidStairs`."""
-        return _WORD_START.sub("_", cls.__name__.strip("_")).lower()
+        return _snake_case(cls.__name__)
 
     def requested(self) -> dict[str, Value]:
         """Return the parameters before snapping, by name."""
         kind: Any = type(self)  # mypy does not take it as hashable
         return {name: getattr(self, name) for name in parameters_of(kind)}
+
+    def realized(self, grid: Grid) -> dict[str, Realized]:
+        """Return the parameters after snapping to the cells of `grid`, by name."""
+        kind: Any = type(self)
+        parameters = parameters_of(kind).items()
+        return {name: p.realized(getattr(self, name), grid) for name, p in parameters}
+
+
+@cache
+def _snake_case(name: str) -> str:
+    return _WORD_START.sub("_", name.strip("_")).lower()

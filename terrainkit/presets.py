@@ -1,34 +1,87 @@
 """Presets: named lists of sub-terrains."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from terrainkit import registry
 from terrainkit.errors import ConfigError
 from terrainkit.parameter import parameters_of
 from terrainkit.sub_terrain import SubTerrain
 from terrainkit.text import expected_names
 
-_PROPORTIONS = {
+_PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
     # The columns of legged_gym in its order. Its "stairs up" are climbed from the platform outward,
     # so they are the inverted pyramid here, and its "stairs down" the upright one.
     "legged_gym": {
-        "pyramid_slope_inverted": 1.0,
-        "pyramid_slope": 1.0,
-        "rough_slope": 1.0,
-        "pyramid_stairs_inverted": 2.0,
-        "pyramid_stairs": 1.0,
-        "obstacles": 1.0,
-        "stepping_stones": 1.0,
-        "gap": 1.0,
-        "pit": 1.0,
+        "pyramid_slope_inverted": {},
+        "pyramid_slope": {},
+        "rough_slope": {},
+        "pyramid_stairs_inverted": {"proportion": 2.0},
+        "pyramid_stairs": {},
+        "obstacles": {},
+        "stepping_stones": {},
+        "gap": {},
+        "pit": {},
     },
-    "rough": {"flat": 1.0, "rough": 1.0, "rough_slope": 1.0, "obstacles": 1.0, "wave": 1.0},
-    "stairs": {"stairs": 1.0, "pyramid_stairs": 1.0, "pyramid_stairs_inverted": 1.0},
+    # ROUGH_TERRAINS_CFG of Isaac Lab 2.3. Its rough ground is 0.02 to 0.10 m high at every
+    # difficulty.
+    "isaaclab": {
+        "pyramid_stairs": {"proportion": 2.0, "step_width": 0.3},
+        "pyramid_stairs_inverted": {"proportion": 2.0, "step_width": 0.3},
+        "random_grid": {"proportion": 2.0, "height": (0.05, 0.2), "block": 0.45},
+        "rough": {"proportion": 2.0, "amplitude": 0.04, "step": 0.02, "spacing": 0.1},
+        "pyramid_slope": {"platform": 2.0},
+        "pyramid_slope_inverted": {"platform": 2.0},
+    },
+    # ROUGH_TERRAINS_CFG of mjlab 1.6, with slopes up to 0.7: its slope of 1 is a wall here.
+    "mjlab": {
+        "flat": {"proportion": 2.0},
+        "pyramid_stairs": {"proportion": 2.0, "step_height": (0.0, 0.1), "step_width": 0.3},
+        "pyramid_stairs_inverted": {
+            "proportion": 2.0,
+            "step_height": (0.0, 0.1),
+            "step_width": 0.3,
+        },
+        "pyramid_slope": {"grade": (0.0, 0.7), "platform": 2.0},
+        "pyramid_slope_inverted": {"grade": (0.0, 0.7), "platform": 2.0},
+        "rough": {"amplitude": 0.04, "step": 0.02, "spacing": 0.1},
+        "wave": {},
+    },
 }
-"""Proportion of each sub-terrain, by preset."""
+"""Proportion (1 by default) and parameters of each sub-terrain, by preset."""
+
+_EQUAL_PARTS = {
+    "rough": ("flat", "rough", "rough_slope", "obstacles", "wave"),
+    "stairs": ("stairs", "pyramid_stairs", "pyramid_stairs_inverted"),
+    "parkour": (
+        "boxes",
+        "hurdles",
+        "gap_track",
+        "side_ramps",
+        "stepping_beams",
+        "crawl",
+        "slit",
+    ),
+    "sparse": (
+        "stepping_stones",
+        "stone_rows",
+        "stones_everywhere",
+        "stakes",
+        "beams",
+        "stepping_beams",
+        "star",
+        "rings",
+        "floating_islands",
+    ),
+    "confined": ("crawl", "tunnel", "ceiling", "slit", "poles", "rooms", "maze"),
+    "natural": ("rough", "rough_slope", "perlin", "fractal", "eroded", "contour", "rocks"),
+}
+"""Sub-terrains of the presets whose proportions are 1 and whose parameters are the defaults."""
 
 
 def preset_names() -> tuple[str, ...]:
     """Return the names of the presets."""
-    return (*_PROPORTIONS, "all")
+    return (*_PRESETS, *_EQUAL_PARTS, "all")
 
 
 def get_preset(name: str) -> tuple[SubTerrain, ...]:
@@ -41,16 +94,17 @@ def get_preset(name: str) -> tuple[SubTerrain, ...]:
     """
     if name not in preset_names():
         raise ConfigError(f"no preset {name!r}; {expected_names(name, preset_names())}")
-    proportions = dict.fromkeys(_all_names(), 1.0) if name == "all" else _PROPORTIONS[name]
-    return tuple(
-        SubTerrain(
-            terrain=name.removesuffix(registry.INVERTED),
-            name=name,
-            proportion=proportion,
-            parameters={"inverted": True} if name.endswith(registry.INVERTED) else {},
-        )
-        for name, proportion in proportions.items()
-    )
+    if name in _PRESETS:
+        return tuple(_sub_terrain(each, **values) for each, values in _PRESETS[name].items())
+    names = _all_names() if name == "all" else _EQUAL_PARTS[name]
+    return tuple(_sub_terrain(each) for each in names)
+
+
+def _sub_terrain(name: str, proportion: float = 1.0, **parameters: Any) -> SubTerrain:
+    terrain = name.removesuffix(registry.INVERTED)
+    if terrain != name:
+        parameters["inverted"] = True
+    return SubTerrain(terrain=terrain, name=name, proportion=proportion, parameters=parameters)
 
 
 def _all_names() -> list[str]:

@@ -72,7 +72,7 @@ def _cover_component(required: Mask, allowed: Mask) -> list[Span]:
         covered = run * (first_column & ((1 << (i1 - i0) * width) - 1))
         span = i0, i1, (run & -run).bit_length() - 1, run.bit_length()
         candidates.append(_Rectangle(span, i0 * width, covered & (cells >> (i0 * width))))
-    return [rectangle.span for rectangle in _drop_redundant(_choose(candidates, cells))]
+    return [rectangle.span for rectangle in _drop_redundant(_select_greedily(candidates, cells))]
 
 
 def _row_bits(mask: Mask) -> list[int]:
@@ -101,7 +101,7 @@ def _maximal_rectangles(required: list[int], allowed: list[int]) -> Iterator[tup
         above = allowed[i0]
 
 
-def _choose(candidates: list[_Rectangle], missing: int) -> list[tuple[_Rectangle, int]]:
+def _select_greedily(candidates: list[_Rectangle], missing: int) -> list[tuple[_Rectangle, int]]:
     """Return rectangles in greedy order, each with the cells that it was the first to cover."""
     queue = [(-each.cells.bit_count(), -each.area, k) for k, each in enumerate(candidates)]
     heapq.heapify(queue)

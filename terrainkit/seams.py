@@ -84,7 +84,8 @@ class Seams:
             return 0.0
         (i, j), (nx, ny) = self.config.patch_start(*patch), self.config.patch_shape
         heights = self.heights[i : i + nx, j : j + ny]
-        return max(float(np.abs(np.diff(heights, axis=k)).max(initial=0.0)) for k in (0, 1))
+        steps = heights[1:] - heights[:-1], heights[:, 1:] - heights[:, :-1]
+        return float(max(max(s.max(initial=0.0), -s.min(initial=0.0)) for s in steps))
 
 
 def _line_heights(

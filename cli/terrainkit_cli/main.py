@@ -13,6 +13,7 @@ from terrainkit_cli import parse, render, signals
 COMMAND_GROUPS = {
     "Terrain": {
         "generate": "terrain_commands",
+        "import": "import_command",
         "list": "terrain_commands",
         "info": "terrain_commands",
         "preview": "terrain_commands",
@@ -114,8 +115,7 @@ def _print_overview() -> None:
         summaries = ((command(name).__doc__ or "").partition("\n")[0] for name in names)
         rows += [(f"{group}:", ""), *zip((f"  {name}" for name in names), summaries, strict=True)]
     render.table(rows)
-    render.result("\nterrainkit COMMAND --help lists the options of a command.")
-    render.result("terrainkit --version prints the version.")
+    render.result("\nterrainkit COMMAND --help lists its options; --version prints the version.")
 
 
 def command(name: str) -> type[parse.Command]:

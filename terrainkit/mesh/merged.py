@@ -101,6 +101,7 @@ def _faces(
         triangles.append(parts.astype(np.int32))
         extra.append(added)
         count += len(added)
+    del kept  # as large as the midpoints
     return triangles, [node_grid.midpoints(), *extra]
 
 

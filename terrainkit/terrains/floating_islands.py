@@ -53,7 +53,7 @@ class FloatingIslands(Terrain):
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the islands and the walkways, level with the platform."""
-        xy, parent = self._layout(grid, rng)
+        xy, parent, _ = self._layout(grid, rng)
         z = np.full((len(xy), 1), -self.thickness / 2)
         islands = make_cylinders(np.hstack([xy, z])[1:], self.radius, self.thickness)
         # Walkways end within the islands and the platform, whose half side is at least this far.
@@ -78,28 +78,24 @@ class FloatingIslands(Terrain):
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
         """Return a goal on each island from the platform to the farthest one."""
-        xy, parent = self._layout(grid, rng)
-        paths = []
-        for island in range(1, len(xy)):
-            path = [island]
-            while path[-1] != 0:
-                path.append(int(parent[path[-1]]))
-            paths.append(path[::-1])
-        steps = [np.diff(xy[path], axis=0) for path in paths]
-        farthest = int(np.argmax([np.sqrt((step**2).sum(axis=1)).sum() for step in steps]))
-        heading = np.arctan2(steps[farthest][:, 1], steps[farthest][:, 0])
-        return np.column_stack([xy[paths[farthest][1:]], 0 * heading, heading])
+        xy, parent, distance = self._layout(grid, rng)
+        path = [int(np.argmax(distance))]
+        while path[-1] != 0:
+            path.append(int(parent[path[-1]]))
+        steps = np.diff(xy[path[::-1]], axis=0)
+        heading = np.arctan2(steps[:, 1], steps[:, 0])
+        return np.column_stack([xy[path[-2::-1]], 0 * heading, heading])
 
     def _layout(
         self, grid: Grid, rng: np.random.Generator
-    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Return the centers of the platform and the islands, and the tree that joins them.
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+        """Return the centers of the platform and the islands, and the walkways between them.
 
         Returns:
-            Centers [m], shape (n + 1, 2), the platform first, and for each the number of the one
-            before it on the way from the platform, shape (n + 1,); -1 for the platform.
+            Centers [m], shape (n + 1, 2), the platform first; for each, the index of the one before
+            it on the way from the platform, and the length of this way [m], shapes (n + 1,).
         """
-        from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
+        from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 
         side = grid.length(max(grid.centered(self.platform))) + 2 * self.gap
         xy, _ = scatter(
@@ -112,7 +108,7 @@ class FloatingIslands(Terrain):
                 f"the platform in a patch of {grid.size[0]:g} m x {grid.size[1]:g} m"
             )
         xy = np.vstack([grid.center, xy])
-        distance = np.sqrt(((xy[:, None] - xy) ** 2).sum(axis=-1))
-        tree = minimum_spanning_tree(distance)
-        _, parent = breadth_first_order(tree, 0, directed=False)
-        return xy, np.where(np.arange(len(xy)) == 0, -1, parent).astype(np.int64)
+        apart = np.sqrt(((xy[:, None] - xy) ** 2).sum(axis=-1))
+        tree = minimum_spanning_tree(apart)
+        distance, parent = dijkstra(tree, directed=False, indices=0, return_predecessors=True)
+        return xy, parent, distance

@@ -1,5 +1,6 @@
 """Diagonal rails."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,17 +20,21 @@ from terrainkit.terrain import Terrain
 class KRails(Terrain):
     """A field of rails at 45 degrees to a lane along x, in the manner of NIST.
 
-    Two square panels side by side have rails in opposite directions. The robot is spawned at low x,
-    and there is a goal behind the field. The rails are solids; the ground is flat.
+    Two square panels side by side have rails in opposite directions, and the second half of the
+    field mirrors the first. The field may rise to a ridge in the middle. The robot is spawned at
+    low x, and there is a goal behind the field. The rails are solids.
     """
 
     height: float = parameter.size(0.1, 0.2)
     """Height and width of a rail [m]."""
 
+    grade: float = parameter.grade(0.0, 0.0)
+    """Rise over run of both halves of the field, up and down; 0.268 is 15 degrees."""
+
     panel: float = parameter.size(1.2)
     """Side of a panel [m]."""
 
-    start: float = parameter.length(2.0)
+    start: float = parameter.length(2.0, slopes_away=True)
     """Length of the flat start along x [m]."""
 
     end: float = parameter.size(1.0)
@@ -40,42 +45,48 @@ class KRails(Terrain):
         return lane_spawn(grid, self.start)
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return flat ground."""
-        return np.zeros(grid.shape)
+        """Return the slopes below the rails, which are constant along y."""
+        first, ridge, _, _ = self._field(grid)
+        rise = self.grade * np.maximum(ridge - first - np.abs(grid.axis(0) - ridge), 0.0)
+        return np.broadcast_to(rise[:, None], grid.shape)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return a box for each panel, which ends at its corners."""
-        first, nx, ny = self._panels(grid)
+        first, ridge, nx, ny = self._field(grid)
         length = self.panel * 2**0.5 - self.height
         if not length > self.height:
             raise ConfigError(
                 f"k_rails: got height {self.height:g} m; expected less than 0.7 of the panel, "
                 f"{self.panel:g} m"
             )
-        row, column = np.divmod(np.arange(nx * ny), ny)
-        x = first + (row + 0.5) * self.panel
-        y = grid.center[1] + (column - (ny - 1) / 2) * self.panel
+        row, column = np.divmod(np.arange(nx // 2 * ny), ny)
+        center = np.column_stack([row + 0.5, column - (ny - 1) / 2]) * self.panel
         yaw = np.where(column % 2 == 0, np.pi / 4, -np.pi / 4)
-        return make_standing_boxes(
-            np.column_stack([x, y]), (length, self.height), self.height, yaw=yaw
-        )
+        rails = make_standing_boxes(center, (length, self.height), self.height, yaw=yaw)
+        slope = np.hypot(1.0, self.grade)
+        axes = np.array([[1.0, 0.0, -self.grade], [0.0, slope, 0.0], [self.grade, 0.0, 1.0]])
+        up = rails.transformed(axes / slope, (first, grid.center[1], 0.0))
+        down = up.transformed(np.diag([-1.0, 1.0, 1.0]), (2 * ridge, 0.0, 0.0))
+        return Solids.concatenate([up, down])
 
     def goals(
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
         """Return a goal behind the field."""
-        first, nx, _ = self._panels(grid)
-        return lane_goals(grid, (first + nx * self.panel + grid.upper[0]) / 2)
+        first, ridge, _, _ = self._field(grid)
+        return lane_goals(grid, (2 * ridge - first + grid.upper[0]) / 2)
 
-    def _panels(self, grid: Grid) -> tuple[float, int, int]:
-        """Return the first edge of the field [m], and its panels along x and y."""
+    def _field(self, grid: Grid) -> tuple[float, float, int, int]:
+        """Return the first edge and the middle of the field [m], and its panels along x and y."""
         first = grid.length(grid.cells(self.start))
-        nx = (grid.size[0] - first - self.end + 1e-9) / self.panel
+        run = max(self.panel / math.hypot(1.0, self.grade), 1e-6)
+        nx = (grid.size[0] - first - self.end + 1e-9) / run
         ny = (grid.size[1] + 1e-9) / self.panel
-        if not (nx >= 1 and ny >= 1 and nx * ny <= MAX_COUNT):
+        if not (nx >= 2 and ny >= 1 and nx * ny <= MAX_COUNT):
             raise ConfigError(
-                f"k_rails: got panel {self.panel:g} m; expected 1 to {MAX_COUNT} panels between a "
+                f"k_rails: got panel {self.panel:g} m; expected 2 to {MAX_COUNT} panels between a "
                 f"start of {self.start:g} m and an end of {self.end:g} m in a patch of "
                 f"{grid.size[0]:g} m x {grid.size[1]:g} m"
             )
-        return grid.lower[0] + first, int(nx), int(ny)
+        nx, ny = int(nx) // 2 * 2, int(ny)
+        return grid.lower[0] + first, grid.lower[0] + first + nx // 2 * run, nx, ny

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
-from terrainkit.blocks import SINK, make_blocks, number_that_fits
+from terrainkit.blocks import make_walls, number_that_fits
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.maze_layout import MazeLayout, sample_maze
@@ -55,16 +55,19 @@ class Maze(Terrain):
         for axis, walls in ((0, maze.walls_x), (1, maze.walls_y.T)):
             edges = np.diff(np.pad(walls.astype(np.int8), ((0, 0), (1, 1))), axis=1)
             (line, first), (_, last) = np.nonzero(edges == 1), np.nonzero(edges == -1)
-            across = (line - (len(walls) - 1) / 2) * pitch
-            along = np.stack([first, last]) * pitch - walls.shape[1] * pitch / 2
-            low, high = np.stack([across, along[0]]) - half, np.stack([across, along[1]]) + half
-            order = [0, 1] if axis == 0 else [1, 0]
-            corners = (grid.center + ends[order].T for ends in (low, high))
-            lower, upper = (
-                np.column_stack([xy, np.full(len(xy), z)])
-                for xy, z in zip(corners, (-SINK, self.height), strict=True)
+            middle, other = grid.center[axis], grid.center[1 - axis]
+            position = middle + (line - (len(walls) - 1) / 2) * pitch
+            start, end = (other + (k - walls.shape[1] / 2) * pitch for k in (first, last))
+            parts.append(
+                make_walls(
+                    axis,
+                    position,
+                    start - half,
+                    end + half,
+                    thickness=self.thickness,
+                    height=self.height,
+                )
             )
-            parts.append(make_blocks(lower, upper))
         return Solids.concatenate(parts)
 
     def goals(

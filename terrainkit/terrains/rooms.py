@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
-from terrainkit.blocks import SINK, make_blocks, number_that_fits
+from terrainkit.blocks import make_walls, number_that_fits
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.solids import Solids
@@ -52,12 +52,17 @@ class Rooms(Terrain):
         parts = []
         for axis, (line, first, door) in enumerate(self._layout(grid, rng)):
             last = first + self.side + 2 * self.thickness
+            middle = (line + self.thickness / 2).ravel()
             for start, end in ((first, door), (door + self.door, last)):
-                low = np.stack([line, start, 0 * line - SINK], axis=-1)
-                high = np.stack([line + self.thickness, end, 0 * line + self.height], axis=-1)
-                order = [0, 1, 2] if axis == 0 else [1, 0, 2]
                 parts.append(
-                    make_blocks(low.reshape(-1, 3)[:, order], high.reshape(-1, 3)[:, order])
+                    make_walls(
+                        axis,
+                        middle,
+                        start.ravel(),
+                        end.ravel(),
+                        thickness=self.thickness,
+                        height=self.height,
+                    )
                 )
         return Solids.concatenate(parts)
 

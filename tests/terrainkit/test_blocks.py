@@ -1,7 +1,14 @@
 import numpy as np
 import pytest
 
-from terrainkit.blocks import SINK, make_blocks, make_ramps, make_standing_boxes, number_that_fits
+from terrainkit.blocks import (
+    SINK,
+    make_blocks,
+    make_ramps,
+    make_standing_boxes,
+    make_walls,
+    number_that_fits,
+)
 from terrainkit.errors import ConfigError
 from terrainkit.solid_index import SolidIndex
 
@@ -31,6 +38,15 @@ def test_make_blocks_span_both_corners():
     lower, upper = make_blocks([[1.0, 2.0, -1.0]], [[1.5, 3.0, 0.25]]).bounds()
     assert lower.tolist() == [[1.0, 2.0, -1.0]]
     assert upper.tolist() == [[1.5, 3.0, 0.25]]
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_make_walls_stand_across_the_axis(axis):
+    walls = make_walls(axis, [2.0, 5.0], [0.0, 1.0], [3.0, 1.5], thickness=0.2, height=0.8)
+    lower, upper = walls.bounds()
+    order = [axis, 1 - axis, 2]
+    assert lower[:, order] == pytest.approx(np.array([[1.9, 0.0, -SINK], [4.9, 1.0, -SINK]]))
+    assert upper[:, order] == pytest.approx(np.array([[2.1, 3.0, 0.8], [5.1, 1.5, 0.8]]))
 
 
 def test_make_ramps_top_is_the_plane_of_the_corners():

@@ -123,10 +123,14 @@ def test_map_config_is_frozen():
         ({"restitution": 1.2}, r"restitution: got 1\.2; expected a number from 0 to 1"),
         (
             {"mode": "random"},
-            "mode: got 'random'; expected one of: curriculum, selected, randomized; "
+            "mode: got 'random'; expected one of: curriculum, selected, randomized, custom; "
             "did you mean 'randomized'",
         ),
-        ({"preset": "moon"}, "no preset 'moon'; there are: legged_gym, rough, stairs, all"),
+        (
+            {"preset": "moon"},
+            "no preset 'moon'; there are: legged_gym, isaaclab, mjlab, rough, stairs, parkour, "
+            "sparse, confined, natural, all",
+        ),
         ({"preset": "stair"}, "no preset 'stair'; did you mean 'stairs'"),
         ({"terrains": (FLAT, "gap")}, r"terrains\[1\]: got 'gap'; expected a table \(SubTerrain\)"),
         ({"terrains": (GAP, GAP)}, "terrains: got 2 of name 'gap'; expected unique names"),

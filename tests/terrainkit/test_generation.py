@@ -144,7 +144,7 @@ def test_generate_centered_only_moves_the_map():
     assert np.abs(moved - (-12.0, -12.0, 0.0)).max() < 1e-5
 
 
-@pytest.mark.parametrize("mode", Mode.__args__)
+@pytest.mark.parametrize("mode", sorted({*Mode.__args__} - {"custom"}))
 def test_generate_supports_every_mode(mode):
     terrain_map = generate(MapConfig(rows=2, cols=2, border=0.0, mode=mode, terrains=(STAIRS,)))
     expected = {"curriculum": {0.0, 1.0}, "selected": {1.0}}.get(mode, {0.5, 0.75, 0.9})

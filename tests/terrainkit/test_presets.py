@@ -7,7 +7,8 @@ from terrainkit.parameter import parameters_of
 
 def test_get_preset_unknown_name_lists_presets():
     with pytest.raises(
-        ConfigError, match=r"'leggedgym'; did you mean 'legged_gym'\? There are: legged_gym, rough"
+        ConfigError,
+        match=r"'leggedgym'; did you mean 'legged_gym'\? There are: legged_gym, isaaclab",
     ):
         presets.get_preset("leggedgym")
 
@@ -42,3 +43,18 @@ def test_every_preset_generates_a_map(name):
     cols = max(20, len(presets.get_preset(name)))
     terrain_map = generate(MapConfig(preset=name, rows=2, cols=cols, border=0.0))
     assert set(terrain_map.terrain_types.flat) == set(range(len(terrain_map.terrain_names)))
+
+
+def test_get_preset_isaaclab_has_the_figures_of_its_rough_mix():
+    mix = {each.name: each for each in presets.get_preset("isaaclab")}
+    assert [each.proportion for each in mix.values()] == [2, 2, 2, 2, 1, 1]
+    stairs, grid = mix["pyramid_stairs_inverted"].at(1.0), mix["random_grid"].at(0.0)
+    assert (stairs.step_height, stairs.step_width, stairs.inverted) == (0.23, 0.3, True)
+    assert (grid.height, grid.block, grid.platform) == (0.05, 0.45, 2.0)
+
+
+@pytest.mark.parametrize("name", ["parkour", "sparse", "confined", "natural"])
+def test_get_preset_has_terrains_of_equal_proportion(name):
+    mix = presets.get_preset(name)
+    assert len({each.terrain for each in mix}) == len(mix) >= 7
+    assert {each.proportion for each in mix} == {1.0}

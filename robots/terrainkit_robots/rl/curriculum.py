@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from terrainkit.curriculum import assign_levels
+from terrainkit.curriculum import assign_levels, assign_spawns
 from terrainkit.curriculum import update_levels as next_levels
 from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.simulation import Ids
@@ -38,8 +38,8 @@ class TerrainCurriculum:
 
     @property
     def env_origins(self) -> NDArray[np.float32]:
-        """Spawn origin of each robot [m], shape (n, 3)."""
-        return self._terrain.env_origins[self.levels, self.columns]
+        """Spawn position of each robot [m], shape (n, 3); patches may have several."""
+        return assign_spawns(self._terrain.spawns, self.levels, self.columns)[0][:, :3]
 
     def accumulate_command(
         self, commands: NDArray[np.float32], yaw: NDArray[np.float32], dt: float

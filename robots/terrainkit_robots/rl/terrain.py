@@ -20,8 +20,10 @@ from terrainkit_robots.transforms import FloatArray
 class Terrain(ABC):
     """A terrain to train on."""
 
-    env_origins: FloatArray
+    env_origins: FloatArray = np.zeros((1, 1, 3), np.float32)
     """Spawn origins [m], shape (rows, cols, 3); rows are curriculum levels."""
+    spawns: FloatArray = np.zeros((1, 1, 1, 4), np.float32)
+    """Spawn positions [m] and headings [rad], shape (rows, cols, k, 4), padded with NaN."""
     terrain_names: NDArray[np.str_]
     """Name of each patch's terrain, shape (rows, cols)."""
     patch_length: float = 8.0
@@ -52,7 +54,6 @@ class Plane(Terrain):
     """An infinite plane at height 0."""
 
     is_flat = True
-    env_origins = np.zeros((1, 1, 3), np.float32)
     terrain_names = np.array([["plane"]])
     lower, upper = (-np.inf, -np.inf), (np.inf, np.inf)
 
@@ -71,7 +72,7 @@ class MapTerrain(Terrain):
     is_flat = False
 
     def __init__(self, terrain_map: TerrainMap, collision: Any = "auto") -> None:
-        self.env_origins = terrain_map.env_origins
+        self.env_origins, self.spawns = terrain_map.env_origins, terrain_map.spawns
         self.terrain_names = np.array(terrain_map.terrain_names)[terrain_map.terrain_types]
         self.patch_length = terrain_map.config.patch_size[0]
         self.lower, self.upper = terrain_map.grid.lower, terrain_map.grid.upper

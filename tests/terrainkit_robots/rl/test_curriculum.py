@@ -29,7 +29,8 @@ class Patches(Plane):
     is_flat = False
 
     def __init__(self, rows: int = 10, names: tuple[str, ...] = ("flat", "rough")) -> None:
-        self.env_origins = np.zeros((rows, len(names), 3), np.float32)
+        self.spawns = np.zeros((rows, len(names), 1, 4), np.float32)
+        self.env_origins = self.spawns[:, :, 0, :3]
         self.env_origins[..., 0] = 8 * np.arange(rows)[:, None] + 4
         self.env_origins[..., 1] = 8 * np.arange(len(names)) + 4
         self.terrain_names = np.tile(np.array(names), (rows, 1))
@@ -138,6 +139,15 @@ class TestConvergence:
         simulate(curriculum, np.full(10, 3.0), 10, Commands(), noise=0.5)
         assert curriculum.columns.tolist() == [0] * 5 + [1] * 5
         np.testing.assert_array_equal(curriculum.env_origins[:, 0], 8 * curriculum.levels + 4)
+
+
+def test_robots_of_a_patch_have_different_spawns() -> None:
+    terrain = Patches(rows=2)
+    terrain.spawns = np.repeat(terrain.spawns, 3, axis=2)
+    terrain.spawns[:, :, :, 0] += [0, 1, 2]
+    curriculum = TerrainCurriculum(terrain, 8, 0, seed=0)
+    assert curriculum.env_origins[:, 0].tolist() == [4, 5, 6, 4, 4, 5, 6, 4]
+    assert curriculum.env_origins[:, 1].tolist() == [4] * 4 + [12] * 4
 
 
 class TestOnEpisodeEnd:

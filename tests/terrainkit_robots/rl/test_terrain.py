@@ -134,6 +134,7 @@ class TestMapTerrain:
     def test_attributes_match_the_map(self, mixed_map):
         ground = MapTerrain(mixed_map)
         assert ground.env_origins.shape == (3, 2, 3)
+        assert ground.spawns.shape == (3, 2, 1, 4)
         assert ground.terrain_names.tolist() == [["stairs", "rough_slope"]] * 3
         assert ground.patch_length == 6.0
         np.testing.assert_allclose(ground.lower, (-1.2, -1.2))

@@ -1,0 +1,59 @@
+"""Read heights from a 16-bit PNG or a TIFF image."""
+
+import json
+import warnings
+from pathlib import Path
+from typing import Any
+
+from terrainkit.errors import HeightFileError, TerrainkitWarning
+from terrainkit.importing.isolated import run_isolated
+from terrainkit.importing.options import ReadOptions
+from terrainkit.importing.raster import Raster, make_raster
+from terrainkit.toml_text import read_text
+
+SUFFIXES = (".png", ".tif", ".tiff")
+
+
+def read(path: Path, options: ReadOptions) -> Raster:
+    """Return the heights of a gray image: column 0 has the lowest x, row 0 the highest y.
+
+    A .json file of the same name may state `scale` and `offset` [m], `cell` [m] and `first_sample`
+    (x, y) [m], as written by the .png exporter.
+    """
+    pixels = run_isolated("read_image", path)["pixels"]
+    stated = _sidecar(path.with_suffix(".json"))
+    cell, (x, y) = stated.get("cell"), stated.get("first_sample", (0.0, 0.0))
+    half = (options.file_cell or cell or 0.0) / 2 if "first_sample" in stated else 0.0
+    raster = make_raster(
+        path,
+        pixels[::-1].T,
+        options,
+        cell=cell,
+        lower=(x - half, y - half),
+        scale=stated.get("scale"),
+        offset=stated.get("offset", 0.0),
+    )
+    if pixels.dtype.itemsize == 1:
+        step = (raster.values.max() - raster.values.min()) / max(1, int(pixels.max()))
+        warnings.warn(
+            f"{path}: an 8-bit image has terraces: heights in steps of about {step:.3g} m; "
+            "use 16 bits",
+            TerrainkitWarning,
+            stacklevel=2,
+        )
+    return raster
+
+
+def _sidecar(path: Path) -> dict[str, Any]:
+    """Return the numbers that the .json file of an image states."""
+    if not path.is_file():
+        return {}
+    try:
+        table = dict(json.loads(read_text(path)))
+        found = {key: float(table[key]) for key in ("scale", "offset", "cell") if key in table}
+        if "first_sample" in table:
+            x, y = map(float, table["first_sample"])
+            return {**found, "first_sample": (x, y)}
+        return found
+    except (ValueError, TypeError, RecursionError) as error:
+        raise HeightFileError(f"{path}: got {error}; expected numbers as in an export") from error

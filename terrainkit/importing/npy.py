@@ -1,0 +1,22 @@
+"""Read heights from an .npy file."""
+
+from pathlib import Path
+
+import numpy as np
+
+from terrainkit.errors import HeightFileError
+from terrainkit.importing.options import ReadOptions
+from terrainkit.importing.raster import Raster, make_raster
+
+SUFFIXES = (".npy",)
+
+
+def read(path: Path, options: ReadOptions) -> Raster:
+    """Return the heights of an array whose first index is along x and second along y."""
+    try:
+        # Mapped: a file that claims a larger array than it holds is an error, not an allocation.
+        values = np.load(path, mmap_mode="r", allow_pickle=False)
+    except (ValueError, OSError, EOFError, OverflowError) as error:
+        reason = " ".join(str(error).split())
+        raise HeightFileError(f"{path}: not an .npy file, or truncated: {reason}") from error
+    return make_raster(path, values, options)

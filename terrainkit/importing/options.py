@@ -1,0 +1,93 @@
+"""ImportOptions: how a file becomes a map."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from terrainkit.config import Count, NonNegative, Size
+from terrainkit.parameter import MAX_VALUE
+from terrainkit.schema import Config
+
+MAX_POSITION = 1e8
+"""Largest coordinate in a file [m]: beyond the northings of all map projections."""
+
+Number = Annotated[float, Meta(ge=-MAX_VALUE, le=MAX_VALUE)]
+Position = Annotated[float, Meta(ge=-MAX_POSITION, le=MAX_POSITION)]
+Missing = Literal["reject", "nearest", "lowest"]
+UpAxis = Literal["z", "y"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReadOptions(Config):
+    """How the values of a file become heights in meters.
+
+    Raises:
+        ConfigError: if a value is invalid; the message names the field.
+    """
+
+    file_cell: Size | None = None
+    """Distance between two samples of an image or array [m]; none: as its .json states."""
+
+    height_range: tuple[Number, Number] | None = None
+    """Heights of the smallest and the largest value of an unsigned integer type, such as 0 and
+    65535 of a 16-bit image [m]; none: as its .json states."""
+
+    scale: Size | None = None
+    """Meters per unit of the file: of its heights, or of all lengths of a mesh; none: as its .json
+    states, or 1 for files with decimal numbers."""
+
+    nodata: float | None = None
+    """Value that marks missing heights, as NaN does; .asc files state it."""
+
+    up: UpAxis = "z"
+    """Axis of a mesh that points up; glTF files of most programs have y."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportOptions(ReadOptions):
+    """How a file becomes a map.
+
+    The map has rows x cols patches from the origin on, so that the origin and the size of the
+    patches crop the file.
+    """
+
+    cell: Size | None = None
+    """Distance between two samples of the map [m]; none: that of the file, 0.1 for meshes."""
+
+    missing: Missing = "reject"
+    """Missing heights: an error, the nearest height, or the lowest height of the map."""
+
+    origin: tuple[Position, Position, Position] | None = None
+    """Point of the file that becomes (0, 0, 0), the lower corner of patch (0, 0) [m]; none: the
+    lower corner of the file, at height 0."""
+
+    rows: Count | None = None
+    """Patches along x; none: as many as fit, 1 without patch_size."""
+
+    cols: Count | None = None
+    """Patches along y; none: as many as fit, 1 without patch_size."""
+
+    patch_size: tuple[Size, Size] | None = None
+    """Size of a patch along x and y [m]; none: as large as fits."""
+
+    border: NonNegative = 0.0
+    """Width of the ground around the patches [m]: that of the file, and its edge beyond."""
+
+    slope_threshold: Size | None = 0.75
+    """Slope between two samples above which the ground becomes a vertical wall; none: no walls."""
+
+    solids: bool = False
+    """Keep overhangs of closed meshes as convex solids; otherwise the ground is their top."""
+
+    spawns_per_patch: Count = 1
+    """Largest number of spawn positions of a patch."""
+
+    spawn_radius: Size = 0.5
+    """Radius of the flat disc without obstacles around each spawn position [m]."""
+
+    spawn_tolerance: NonNegative = 0.01
+    """Largest height difference within that disc [m]; natural ground needs 0.1 or more."""
+
+    spawn_headroom: NonNegative = 1.0
+    """Height above that disc that is free of solids [m]."""

@@ -1,0 +1,102 @@
+"""Source: heights that can be sampled at any position, and the readers of files.
+
+Positions are those of the file: x to the right and y up for images, east and north for grids.
+"""
+
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+from types import ModuleType
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.errors import HeightFileError, listing
+from terrainkit.importing.isolated import check_file
+from terrainkit.importing.options import Missing, ReadOptions
+
+Array = NDArray[np.float64]
+
+
+class Source(Protocol):
+    """The ground that a file describes."""
+
+    @property
+    def cell(self) -> float | None:
+        """Distance between two samples of the file [m]; None if it has no samples."""
+
+    @property
+    def lower(self) -> tuple[float, float]:
+        """Corner with the smallest x and y [m]."""
+
+    @property
+    def upper(self) -> tuple[float, float]:
+        """Corner with the largest x and y [m]."""
+
+    def heights(self, x: Array, y: Array) -> Array:
+        """Return the heights at all x and y [m], shape (nx, ny), NaN where they are missing.
+
+        Positions beyond the corners get the heights of the edge.
+        """
+
+
+def open_source(path: Path, options: ReadOptions) -> Source:
+    """Read a file of heights or a mesh.
+
+    Raises:
+        HeightFileError: if there is no reader for its suffix, or it cannot be read.
+        ConfigError: if an option is missing or does not apply to the file.
+    """
+    readers = readers_by_suffix()
+    if path.suffix.lower() not in readers:
+        raise HeightFileError(
+            f"no reader for {path.suffix or 'a name without suffix'!r} ({path}); "
+            f"there are: {listing(readers)}"
+        )
+    check_file(path)
+    source: Source = readers[path.suffix.lower()].read(path, options)
+    return source
+
+
+@cache
+def readers_by_suffix() -> dict[str, ModuleType]:
+    """Return the modules of this folder that define `SUFFIXES` and `read`, by suffix."""
+    package = __name__.rpartition(".")[0]
+    folder = [str(Path(__file__).parent)]
+    modules = (import_module(f"{package}.{module.name}") for module in iter_modules(folder))
+    return {suffix: module for module in modules for suffix in getattr(module, "SUFFIXES", ())}
+
+
+def fill_missing(path: Path, heights: Array, missing: Missing, x: Array, y: Array) -> Array:
+    """Return the heights without NaN.
+
+    Args:
+        path: The file, for the error.
+        heights: Heights [m], shape (nx, ny), NaN where they are missing.
+        missing: What happens to missing heights.
+        x: Positions along x in the file [m], shape (nx,), for the error.
+        y: Positions along y in the file [m], shape (ny,), for the error.
+
+    Raises:
+        HeightFileError: if heights are missing and may not be, or all are.
+    """
+    is_missing = np.isnan(heights)
+    if not is_missing.any():
+        return heights
+    count = int(is_missing.sum())
+    if missing == "reject" or count == heights.size:
+        i, j = np.argwhere(is_missing)[0].tolist()
+        hint = "" if count == heights.size else "; missing = nearest or lowest fills them"
+        raise HeightFileError(
+            f"{path}: {count} of {heights.size} heights are missing, the first at "
+            f"({x[i]:g}, {y[j]:g}){hint}"
+        )
+    if missing == "lowest":
+        return np.where(is_missing, np.nanmin(heights), heights)
+    from scipy.ndimage import distance_transform_edt
+
+    nearest = distance_transform_edt(is_missing, return_distances=False, return_indices=True)
+    filled: Array = heights[tuple(nearest)]
+    return filled

@@ -1,0 +1,96 @@
+import numpy as np
+import pytest
+import trimesh
+
+from terrainkit.errors import HeightFileError
+from terrainkit.importing.mesh_file import read
+from terrainkit.importing.options import ReadOptions
+
+
+def wedge():
+    """Return a mesh of 4 m x 2 m whose height is x / 4 + 3 m on its left half, y < 1 m."""
+    mesh = trimesh.creation.box((4, 2, 3), trimesh.transformations.translation_matrix((2, 1, 1.5)))
+    mesh.vertices[:, 2] += np.where(mesh.vertices[:, 2] > 1, mesh.vertices[:, 0] / 4, 0)
+    post = trimesh.creation.box(
+        (1, 1, 5), trimesh.transformations.translation_matrix((0.5, 1.5, 2.5))
+    )
+    return trimesh.util.concatenate([mesh, post])
+
+
+@pytest.mark.parametrize("suffix", ["obj", "stl", "ply", "glb"])
+def test_mesh_file_heights_and_axes(tmp_path, suffix):
+    wedge().export(tmp_path / f"a.{suffix}")
+    source = read(tmp_path / f"a.{suffix}", ReadOptions())
+    assert source.lower == pytest.approx((0.0, 0.0), abs=1e-6)
+    assert source.upper == pytest.approx((4.0, 2.0), abs=1e-6)
+    found = source.heights(np.array([0.5, 1.5, 2.5, 3.5]), np.array([0.5, 1.5]))
+    # The post of 5 m is at x < 1 m and y > 1 m.
+    expected = [[3.125, 5.0], [3.375, 3.375], [3.625, 3.625], [3.875, 3.875]]
+    np.testing.assert_allclose(found, expected, atol=1e-3)
+
+
+@pytest.mark.parametrize("suffix", ["obj", "glb"])
+def test_mesh_file_with_y_up(tmp_path, suffix):
+    mesh = wedge()
+    mesh.vertices = mesh.vertices[:, [0, 2, 1]] * [1, 1, -1]  # x stays, z becomes y
+    mesh.export(tmp_path / f"a.{suffix}")
+    source = read(tmp_path / f"a.{suffix}", ReadOptions(up="y"))
+    found = source.heights(np.array([0.5, 1.5]), np.array([0.5, 1.5]))
+    np.testing.assert_allclose(found, [[3.125, 5.0], [3.375, 3.375]], atol=1e-3)
+
+
+def test_mesh_file_scale_is_of_all_lengths(tmp_path):
+    mesh = wedge()
+    mesh.vertices *= 1000.0
+    mesh.export(tmp_path / "a.stl")
+    source = read(tmp_path / "a.stl", ReadOptions(scale=0.001))
+    assert source.upper == pytest.approx((4.0, 2.0))
+    found = source.heights(np.array([1.5, 2.5]), np.array([0.5, 1.5]))
+    np.testing.assert_allclose(found[:, 0], [3.375, 3.625], atol=1e-3)
+
+
+def test_mesh_file_edge_extends_beyond(tmp_path):
+    wedge().export(tmp_path / "a.stl")
+    source = read(tmp_path / "a.stl", ReadOptions())
+    found = source.heights(np.arange(-1.5, 6, 1.0), np.array([0.5, 1.5]))
+    # Before 0 and after 4, the heights half a step inside: 3.125 and 3.875.
+    expected = [3.125, 3.125, 3.125, 3.375, 3.625, 3.875, 3.875, 3.875]
+    np.testing.assert_allclose(found[:, 0], expected, atol=1e-6)
+
+
+def test_mesh_file_scene_is_one_mesh(tmp_path):
+    scene = trimesh.Scene()
+    box = trimesh.creation.box((1, 1, 1))
+    for x in (0.5, 2.5):
+        scene.add_geometry(box, transform=trimesh.transformations.translation_matrix((x, 0, x)))
+    scene.export(tmp_path / "a.glb")
+    source = read(tmp_path / "a.glb", ReadOptions())
+    found = source.heights(np.array([0.5, 1.5, 2.5]), np.array([-0.2, 0.2]))
+    np.testing.assert_allclose(found, [[1.0, 1.0], [np.nan, np.nan], [3.0, 3.0]])
+
+
+@pytest.mark.parametrize("suffix", ["obj", "stl", "ply", "glb"])
+@pytest.mark.parametrize("length", [0, 20, 400])
+def test_mesh_file_truncated_is_rejected(tmp_path, suffix, length):
+    path = tmp_path / f"a.{suffix}"
+    trimesh.creation.icosphere(3).export(path)
+    path.write_bytes(path.read_bytes()[:length])
+    with pytest.raises(HeightFileError, match=str(path)) as caught:
+        read(path, ReadOptions())
+    assert "\n" not in str(caught.value)
+
+
+def test_mesh_file_claiming_many_vertices_is_rejected(tmp_path):
+    path = tmp_path / "a.ply"
+    trimesh.creation.box().export(path)
+    path.write_bytes(path.read_bytes().replace(b"element vertex 8", b"element vertex 900000000000"))
+    with pytest.raises(HeightFileError, match=str(path)):
+        read(path, ReadOptions())
+
+
+@pytest.mark.parametrize("value", ["nan", "1e300"])
+def test_mesh_file_with_invalid_vertex_is_rejected(tmp_path, value):
+    path = tmp_path / "a.obj"
+    path.write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 {value}\nf 1 2 3\n")
+    with pytest.raises(HeightFileError, match="got vertices that are not finite"):
+        read(path, ReadOptions())

@@ -1,0 +1,74 @@
+import numpy as np
+import pytest
+import trimesh
+
+import terrainkit as tk
+
+
+@pytest.fixture
+def bridge(tmp_path):
+    def box(size, center):
+        return trimesh.creation.box(size, trimesh.transformations.translation_matrix(center))
+
+    parts = [box((6, 4, 1), (3, 2, -0.5)), box((1, 4, 0.2), (3, 2, 1.1))]
+    trimesh.util.concatenate(parts).export(tmp_path / "bridge.stl")
+    return "bridge.stl"
+
+
+def test_import_writes_map_and_report(terrainkit, tmp_path, bridge):
+    run = terrainkit("import", bridge, "-o", "a.npz", "--patch-size", 3, 4)
+    assert (run.returncode, run.stderr) == (0, "")
+    assert "wrote a.npz: 2 x 1 patches of 3 m x 4 m, 60 x 40 samples" in run.stdout
+    assert (
+        "overhangs over 4.00 m2, of which 4.00 m2 are lost; largest error 1.200 m at ("
+        in run.stdout
+    )
+    assert tk.TerrainMap.load(tmp_path / "a.npz").config.mode == "custom"
+    run = terrainkit("check-map", "a.npz")
+    assert run.returncode == 0, run.stdout
+
+
+def test_import_solids_and_export(terrainkit, tmp_path, bridge):
+    run = terrainkit("import", bridge, "-o", "a.npz", "--solids", "--cell", 0.2)
+    assert "of which 0.00 m2 are lost" in run.stdout
+    assert len(tk.TerrainMap.load(tmp_path / "a.npz").solids) == 1
+    assert terrainkit("export", "a.npz", "-o", "a.xml").returncode == 0
+    assert terrainkit("preview", "a.npz", "-o", "a.png").returncode == 0
+
+
+def test_import_fills_missing_heights(terrainkit, tmp_path):
+    heights = np.zeros((30, 20))
+    heights[3, 4] = np.nan
+    np.save(tmp_path / "a.npy", heights)
+    words = ("import", "a.npy", "-o", "a.npz", "--file-cell", 0.1)
+    run = terrainkit(*words)
+    assert run.returncode == 2
+    assert run.stderr.startswith("terrainkit: error: a.npy: 1 of 600 heights are missing")
+    assert len(run.stderr.splitlines()) == 1
+    assert not (tmp_path / "a.npz").exists()
+    assert "filled 1 missing heights" in terrainkit(*words, "--missing", "nearest").stdout
+
+
+@pytest.mark.parametrize("name", ["bad.png", "bad.tif", "bad.npy", "bad.asc", "bad.stl", "bad.glb"])
+def test_import_of_bad_file_is_one_line(terrainkit, tmp_path, name):
+    (tmp_path / name).write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(200))
+    run = terrainkit("import", name, "-o", "a.npz", "--file-cell", 1)
+    assert run.returncode == 2
+    assert run.stderr.startswith(f"terrainkit: error: {name}: ")
+    assert len(run.stderr.splitlines()) == 1
+    assert not (tmp_path / "a.npz").exists()
+
+
+def test_import_keeps_existing_file(terrainkit, tmp_path, bridge):
+    (tmp_path / "a.npz").write_text("mine")
+    run = terrainkit("import", bridge, "-o", "a.npz")
+    assert run.returncode == 2
+    assert "a.npz exists" in run.stderr
+    assert (tmp_path / "a.npz").read_text() == "mine"
+
+
+def test_generate_from_imported_map_is_rejected(terrainkit, bridge):
+    terrainkit("import", bridge, "-o", "a.npz")
+    run = terrainkit("generate", "--config", "a.npz", "-o", "b.npz")
+    assert run.returncode == 2
+    assert run.stderr.startswith("terrainkit: error: mode custom: the map was imported or edited")
