@@ -310,15 +310,15 @@ def _make(
     except ValueError:
         shapes = ", ".join(str(each.shape) for each in vectors)
         raise ConfigError(
-            f"{kind}: got center, size and rpy of shapes {shapes}; expected (3,) or the same (n, 3)"
+            f"center, size and rpy of {kind}: got shapes {shapes}; expected (3,) or the same (n, 3)"
         ) from None
     center, half_size, rpy = (np.broadcast_to(each, (n, 3)) for each in vectors)
     for name, values in (("center", center), ("size", half_size), ("rpy", rpy)):
         if not (np.abs(values) <= MAX_VALUE).all():
-            raise ConfigError(f"{kind}: {name}: expected finite values up to {MAX_VALUE:g}")
+            raise ConfigError(f"{name} of {kind}: expected finite values up to {MAX_VALUE:g}")
     if n and not 2 * half_size.min() >= MIN_SIZE:
         raise ConfigError(
-            f"{kind}: size: got {2 * half_size.min():g} m; expected at least {MIN_SIZE:g} m"
+            f"size of {kind}: got {2 * half_size.min():g} m; expected at least {MIN_SIZE:g} m"
         )
     shapes = np.hstack([center, half_size, _rpy_quaternions(rpy)]).astype(np.float32)
     arrays = _flags(n, friction, collides, visible) | {kind: shapes}
@@ -344,8 +344,8 @@ def _flags(
     values = np.asarray(friction, float)
     if ((values < 0) | (values > MAX_VALUE)).any():
         raise ConfigError(
-            f"friction of solids: got {np.nanmin(values):g} to {np.nanmax(values):g}; expected 0 to "
-            f"{MAX_VALUE:g}, or NaN for the friction of the ground"
+            f"friction of solids: got {np.nanmin(values):g} to {np.nanmax(values):g}; expected "
+            f"0 to {MAX_VALUE:g}, or NaN for the friction of the ground"
         )
     return {
         "friction": np.broadcast_to(values, n).astype(np.float32),

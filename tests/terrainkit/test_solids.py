@@ -37,12 +37,18 @@ def test_make_solids_without_centers_is_empty(center):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: make_boxes((0, 0, 0), (1, 0, 1)), "size: got 0 m; expected at least 0.0001 m"),
-        (lambda: make_boxes((0, 0, 0), (1, 1e-60, 1)), "size: got 1e-60 m; expected at least"),
+        (
+            lambda: make_boxes((0, 0, 0), (1, 0, 1)),
+            "size of boxes: got 0 m; expected at least 0.0001 m",
+        ),
+        (
+            lambda: make_boxes((0, 0, 0), (1, 1e-60, 1)),
+            "size of boxes: got 1e-60 m; expected at least",
+        ),
         (lambda: make_boxes((0, 0), (1, 1, 1)), r"shapes \(2,\), \(3,\), \(3,\); expected"),
         (lambda: make_boxes([[0, 0, 0]] * 2, [[1, 1, 1]] * 3), "expected .* or the same"),
-        (lambda: make_boxes((0, np.nan, 0), (1, 1, 1)), "center: expected finite"),
-        (lambda: make_cylinders((0, 0, 0), -1, 1), "size: got -2 m; expected at least"),
+        (lambda: make_boxes((0, np.nan, 0), (1, 1, 1)), "center of boxes: expected finite"),
+        (lambda: make_cylinders((0, 0, 0), -1, 1), "size of cylinders: got -2 m"),
         (lambda: make_boxes((0, 0, 0), (1, 1, 1), friction=-1), "friction of solids: got -1 to -1"),
         (lambda: make_boxes((0, 0, 0), (1, 1, 1), friction=1e40), "friction of solids: got 1e"),
         (lambda: make_hulls([TETRAHEDRON[:3]]), "hull"),
