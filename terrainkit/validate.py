@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.errors import TerrainkitError, TerrainkitWarning
+from terrainkit.errors import TerrainkitError, TerrainkitWarning, listing
 from terrainkit.layout import assign_patch, terrain_columns
 from terrainkit.mesh.solid_mesh import concatenate_meshes, solid_meshes
 from terrainkit.mesh.tri_mesh import TriMesh
 from terrainkit.parameter import format_value, parameters_of
-from terrainkit.patch import Patch, build_patch
+from terrainkit.patch import Parameters, Patch, build_patch
 from terrainkit.solids import Solids
 from terrainkit.terrain_map import TerrainMap
 
@@ -128,7 +128,10 @@ def _compare(patch: Patch, expected: Patch, location: str) -> Iterator[str]:
             "by its config"
         )
     if patch.parameters != expected.parameters:
-        yield f"{location}: the recorded parameters differ from those of its config"
+        yield (
+            f"{location}: the recorded parameters differ from those of its config: "
+            f"{_different(patch.parameters, expected.parameters)}"
+        )
     if not _same_solids(patch.solids, expected.solids):
         yield f"{location}: the solids differ from those of its config"
     if patch.goals.shape != expected.goals.shape or not np.allclose(
@@ -153,6 +156,16 @@ def _compare(patch: Patch, expected: Patch, location: str) -> Iterator[str]:
             f"{location}: heights differ by up to {error:.3f} m from the {expected.terrain} of its "
             "config: edited, moved, or with axes swapped; TerrainMap.edited() makes a custom map"
         )
+
+
+def _different(parameters: Parameters, expected: Parameters) -> str:
+    """Return the names of the parameters that differ."""
+    pairs = (
+        (parameters.requested, expected.requested),
+        (parameters.realized, expected.realized),
+    )
+    names = {n: None for a, b in pairs for n in {**a, **b} if a.get(n) != b.get(n)}
+    return listing(names)
 
 
 def _same_solids(solids: Solids, expected: Solids) -> bool:
