@@ -27,7 +27,7 @@ from terrainkit.field_docs import field_docs
 from terrainkit.preview import write_preview
 from terrainkit.schema import Config, field_keys, field_types, is_required
 from terrainkit.sub_terrain import SubTerrain
-from terrainkit.terrain_docs import TerrainDoc, terrain_doc
+from terrainkit.terrain_docs import TerrainDoc, overlay_doc, terrain_doc
 from terrainkit.toml_text import value_text
 from terrainkit.type_hint import NONE, describe, is_table, parse_hint
 from terrainkit_cli.main import COMMANDS
@@ -56,7 +56,12 @@ def terrains_page() -> str:
         terrain_table("#"),
     ]
     parts += ["", *(terrain_section(terrain_doc(name)) for name in registry.terrain_names())]
-    parts += ["## Presets\n", "| preset | columns |\n|---|---|"]
+    parts += [OVERLAYS, "| overlay | range | description |", "|---|---|---|"]
+    parts += [summary_row(overlay_doc(name), "#") for name in registry.overlay_names()]
+    for name in registry.overlay_names():
+        about = overlay_doc(name)
+        parts.append(f"\n### {name}\n\n{about.text}\n\n" + "\n".join(parameter_rows(about)))
+    parts += ["\n## Presets\n", "| preset | columns |\n|---|---|"]
     for name in presets.preset_names():
         mix = ", ".join(
             f"{c.name} x {c.proportion:g}" if c.proportion != 1 else c.name
@@ -73,11 +78,20 @@ def terrains_page() -> str:
 
 def terrain_table(link: str) -> str:
     rows = ["| terrain | range | description |", "|---|---|---|"]
-    for name in registry.terrain_names():
-        about = terrain_doc(name)
-        ranges = ", ".join(f"{p.name} {p.easy} to {p.hard}" for p in about.parameters if p.hard)
-        rows.append(f"| [{name}]({link}{name}) | {ranges} | {about.text.splitlines()[0]} |")
+    rows += [summary_row(terrain_doc(name), link) for name in registry.terrain_names()]
     return "\n".join(rows)
+
+
+OVERLAYS = """## Overlays
+
+An overlay changes the patches of any terrain. Overlays are applied in the order that is given; see
+[conventions.md](conventions.md#overlays).
+"""
+
+
+def summary_row(about: TerrainDoc, link: str) -> str:
+    ranges = ", ".join(f"{p.name} {p.easy} to {p.hard}" for p in about.parameters if p.hard)
+    return f"| [{about.name}]({link}{about.name}) | {ranges} | {about.text.splitlines()[0]} |"
 
 
 def readme() -> str:
@@ -94,12 +108,13 @@ def terrain_section(about: TerrainDoc) -> str:
         f"![{about.name}](pictures/{about.name}.png)\n",
     ]
     if about.parameters:
-        lines.append("| parameter | easy | hard | |\n|---|---|---|---|")
-        lines += [
-            f"| {p.name} | {p.easy} | {p.hard or p.easy} | {p.text} |" for p in about.parameters
-        ]
-        lines.append("")
+        lines += [*parameter_rows(about), ""]
     return "\n".join(lines)
+
+
+def parameter_rows(about: TerrainDoc) -> list[str]:
+    rows = [f"| {p.name} | {p.easy} | {p.hard or p.easy} | {p.text} |" for p in about.parameters]
+    return ["| parameter | easy | hard | |", "|---|---|---|---|", *rows]
 
 
 def rules_page() -> str:

@@ -14,7 +14,6 @@ from terrainkit.config import MapConfig
 from terrainkit.errors import TerrainkitWarning, listing
 from terrainkit.layout import assign_patch, terrain_columns
 from terrainkit.memory import check_memory
-from terrainkit.parameter import parameters_of
 from terrainkit.patch import Patch, build_patch
 from terrainkit.seams import Seams, cliffs_text
 from terrainkit.solids import Solids
@@ -66,6 +65,8 @@ def generate(
     )
     columns = terrain_columns(config)
     heights = np.zeros(grid.shape, dtype=np.float32)
+    # A view of one number takes no memory, and most maps have one friction.
+    friction = np.broadcast_to(np.float32(config.static_friction), grid.shape)
     spawns = np.empty(size, dtype=object)
     terrain_types = np.empty(size, dtype=np.int32)
     difficulty = np.empty(size, dtype=np.float32)
@@ -80,7 +81,11 @@ def generate(
             terrain_type, patch = next(patches)
             sub_terrain = config.sub_terrains[terrain_type]
             i, j = config.patch_start(row, col)
-            heights[i : i + patch.grid.shape[0], j : j + patch.grid.shape[1]] = patch.heights
+            block = (slice(i, i + patch.grid.shape[0]), slice(j, j + patch.grid.shape[1]))
+            heights[block] = patch.heights
+            if (patch.friction != friction[0, 0]).any():
+                friction = friction if friction.flags.writeable else friction.copy()
+                friction[block] = patch.friction
             spawns[row, col] = patch.spawns
             terrain_types[row, col] = terrain_type
             difficulty[row, col] = patch.difficulty
@@ -95,6 +100,7 @@ def generate(
         config=config,
         grid=grid,
         heights=heights,
+        friction=friction,
         spawns=pad_poses(spawns),
         terrain_types=terrain_types,
         terrain_names=tuple(sub_terrain.name for sub_terrain in config.sub_terrains),
@@ -146,7 +152,7 @@ def pad_poses(poses: NDArray[np.object_]) -> NDArray[np.float32]:
 
 def _deviations(patch: Patch, sub_terrain: SubTerrain, cell: float) -> list[str]:
     """Return the parameters that differ from the request by more than the grid requires."""
-    declared, record = parameters_of(sub_terrain.terrain_class), patch.parameters
+    declared, record = sub_terrain.declarations, patch.parameters
     return [
         f"{patch.terrain}.{name}"
         for name, requested in record.requested.items()

@@ -5,7 +5,7 @@ at difficulty 1; a single value applies at every difficulty.
 """
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Annotated, Any, Literal
@@ -14,6 +14,7 @@ from msgspec import Meta
 
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
+from terrainkit.text import expected_names
 from terrainkit.type_hint import convert, show
 
 Snap = Literal["none", "cells", "centered"]
@@ -233,11 +234,13 @@ def convert_range(
 ) -> Value | tuple[Value, Value]:
     """Return `value`, which may be a range (easy, hard), as the type of the parameter.
 
-    The arguments are those of :func:`convert_parameter`.
+    A list is a tuple. The arguments are those of :func:`convert_parameter`.
 
     Raises:
         ConfigError: if a value has another type or is out of range, or a range is not allowed.
     """
+    if isinstance(value, list):
+        value = tuple(value)
     if not isinstance(value, tuple) or parameter.is_vector:
         return convert_parameter(owner, name, value, parameter)
     if not parameter.allows_range or len(value) != 2:
@@ -245,6 +248,14 @@ def convert_range(
         raise ConfigError(f"{owner}.{name}: got {show(value)}; expected {expected}")
     easy, hard = (convert_parameter(owner, name, end, parameter) for end in value)
     return easy, hard
+
+
+def check_names(owner: str, names: Iterable[str], known: Iterable[str]) -> None:
+    """Raise ConfigError if one of `names` is not among the `known` parameters of `owner`."""
+    for name in names:
+        if name not in known:
+            expected = expected_names(name, known, "it has")
+            raise ConfigError(f"{owner} has no parameter {name!r}; {expected}")
 
 
 def format_value(value: Value) -> str:

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from terrainkit.parameter import Value, parameters_of
+from terrainkit.grid import Grid
+from terrainkit.parameter import Realized, Value, parameters_of
 
 _WORD_START = re.compile("(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
@@ -23,6 +24,12 @@ class Parameterized:
         """Return the parameters before snapping, by name."""
         kind: Any = type(self)  # mypy does not take it as hashable
         return {name: getattr(self, name) for name in parameters_of(kind)}
+
+    def realized(self, grid: Grid) -> dict[str, Realized]:
+        """Return the parameters after snapping to the cells of `grid`, by name."""
+        kind: Any = type(self)
+        parameters = parameters_of(kind).items()
+        return {name: p.realized(getattr(self, name), grid) for name, p in parameters}
 
 
 @cache

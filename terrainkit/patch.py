@@ -1,8 +1,9 @@
 """Patch: one terrain, built on the grid of its place in a map."""
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,9 +13,11 @@ from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.layout import assign_patch, patch_rng, terrain_columns
+from terrainkit.overlay import Overlay
 from terrainkit.parameter import Realized, Value, parameters_of
+from terrainkit.patch_geometry import PatchGeometry
 from terrainkit.solids import Solids
-from terrainkit.sub_terrain import SubTerrain
+from terrainkit.sub_terrain import SubTerrain, overlay_path
 from terrainkit.terrain import Terrain
 
 if TYPE_CHECKING:
@@ -54,6 +57,9 @@ class Patch:
     heights: NDArray[np.float32]
     """Heights [m], shape `grid.shape`."""
 
+    friction: NDArray[np.float32]
+    """Friction of the ground in each cell, shape `grid.shape`."""
+
     solids: Solids
     """Solids of the patch, in the frame of the map."""
 
@@ -70,10 +76,6 @@ class Patch:
     def origin(self) -> NDArray[np.float32]:
         """Spawn origin (x, y, z) [m], shape (3,)."""
         return self.spawns[0, :3]
-
-
-_NO_SOLIDS = Solids.empty()
-_NO_GOALS = np.empty((0, 4), dtype=np.float32)
 
 
 def make_patch(config: MapConfig, row: int, col: int) -> Patch:
@@ -100,29 +102,104 @@ def build_patch(
         ConfigError: if the terrain does not fit in the patch, or has no place to spawn.
     """
     terrain = sub_terrain.at(difficulty)
+    overlays = [overlay.at(difficulty) for overlay in sub_terrain.overlays]
     _check_slopes(terrain, config)
-    grid = config.patch_grid(row, col)
+    grid, name = config.patch_grid(row, col), sub_terrain.name
+    child_rng = partial(_child_rng, config, terrain, row, col)
     heights = terrain.build(grid, patch_rng(config, terrain, row, col))
-    solids, goals = _solids_and_goals(terrain, grid, heights, config, (row, col))
-    preferred = terrain.spawn(grid)
-
-    def rng() -> np.random.Generator:
-        # The first child draws the solids and the goals.
-        return patch_rng(config, terrain, row, col).spawn(2)[1]
-
-    spawns = place_spawns(config, sub_terrain.name, grid, heights, solids, preferred, rng)
+    geometry = _terrain_geometry(config, sub_terrain, terrain, difficulty, heights, grid, child_rng)
+    spawn_offset = 0.0
+    if overlays:
+        geometry, spawn_offset = _apply_overlays(config, name, geometry, overlays, child_rng)
+    heights, preferred = geometry.heights, geometry.spawn
+    solids, goals = _finish(config, name, geometry, (row, col))
+    spawns = place_spawns(config, name, grid, heights, solids, preferred, partial(child_rng, 1))
     x, y, _ = spawns[0].tolist()
+    requested, realized = terrain.requested(), terrain.realized(grid)
+    for k, overlay in enumerate(overlays):
+        requested |= {overlay_path(k, n): v for n, v in overlay.requested().items()}
+        realized |= {overlay_path(k, n): v for n, v in overlay.realized(grid).items()}
     return Patch(
-        terrain=sub_terrain.name,
+        terrain=name,
         difficulty=difficulty,
-        parameters=Parameters(requested=terrain.requested(), realized=terrain.realized(grid)),
+        parameters=Parameters(requested=requested, realized=realized),
         grid=grid,
         heights=heights,
+        friction=geometry.friction,
         solids=solids,
         goals=goals,
-        spawns=with_headings(spawns, goals),
-        spawn_offset=max(abs(x - preferred[0]), abs(y - preferred[1])),
+        spawns=with_headings(spawns, goals, geometry.heading),
+        spawn_offset=spawn_offset + max(abs(x - preferred[0]), abs(y - preferred[1])),
     )
+
+
+def _child_rng(
+    config: MapConfig, terrain: Terrain, row: int, col: int, number: int
+) -> "np.random.Generator":
+    """Return a child of the generator of a patch, in its initial state.
+
+    Child 0 is for solids and goals, 1 for the spawn positions, and 2 + k for overlay k.
+    """
+    return patch_rng(config, terrain, row, col).spawn(number + 1)[number]
+
+
+def _terrain_geometry(
+    config: MapConfig,
+    sub_terrain: SubTerrain,
+    terrain: Terrain,
+    difficulty: float,
+    heights: NDArray[np.float32],
+    grid: Grid,
+    child_rng: Callable[[int], "np.random.Generator"],
+) -> PatchGeometry:
+    """Return what a terrain puts on a patch, without overlays."""
+    solids, goals = _NO_SOLIDS, _NO_GOALS
+    # Solids and goals start with the same random numbers, so that both can sample one layout.
+    if type(terrain).solids is not Terrain.solids:
+        solids = terrain.solids(grid, heights, child_rng(0))
+    if type(terrain).goals is not Terrain.goals:
+        goals = np.array(terrain.goals(grid, heights, child_rng(0)), dtype=float).reshape(-1, 4)
+    friction = sub_terrain.friction_at(difficulty)
+    if friction is not None:
+        own = np.where(np.isnan(solids.friction), friction, solids.friction).astype(np.float32)
+        solids = dataclasses.replace(solids, friction=own)
+    else:
+        friction = config.static_friction
+    return PatchGeometry(
+        grid=grid,
+        heights=heights,
+        friction=np.broadcast_to(np.float32(friction), grid.shape),
+        solids=solids,
+        goals=goals,
+        spawn=terrain.spawn(grid),
+        spawn_radius=config.spawn_radius,
+    )
+
+
+def _apply_overlays(
+    config: MapConfig,
+    name: str,
+    geometry: PatchGeometry,
+    overlays: Sequence[Overlay],
+    child_rng: Callable[[int], "np.random.Generator"],
+) -> tuple[PatchGeometry, float]:
+    """Return the geometry with overlays, and the spawn offset of the terrain without them [m].
+
+    The overlays keep the ground level at the spawn origin of the terrain without overlays.
+    """
+    grid, preferred = geometry.grid, geometry.spawn
+    x, y, _ = _find_origin(config, name, grid, geometry.heights, geometry.solids, preferred)
+    geometry = dataclasses.replace(geometry, spawn=(x, y))
+    for k, overlay in enumerate(overlays):
+        geometry = overlay.apply(geometry, child_rng(2 + k))
+        heights = np.asarray(geometry.heights, dtype=np.float32) + np.float32(0)
+        if heights.shape != grid.shape or not np.isfinite(heights).all():
+            raise ConfigError(
+                f"{overlay.kind()}: apply(): got heights of shape {heights.shape}; expected "
+                f"{grid.shape} with finite values"
+            )
+        geometry = dataclasses.replace(geometry, heights=heights)
+    return geometry, max(abs(x - preferred[0]), abs(y - preferred[1]))
 
 
 def place_spawns(
@@ -148,7 +225,25 @@ def place_spawns(
     Raises:
         ConfigError: if the patch has no place to spawn.
     """
-    from terrainkit.spawn import find_spawn, sample_spawns
+    from terrainkit.spawn import sample_spawns
+
+    origin = _find_origin(config, name, grid, heights, solids, preferred)
+    if config.spawns_per_patch == 1:
+        return np.array([origin])
+    disc, number = spawn_disc(config), config.spawns_per_patch
+    return sample_spawns(heights, grid, origin, disc, number, solids=solids, rng=rng())
+
+
+def _find_origin(
+    config: MapConfig,
+    name: str,
+    grid: Grid,
+    heights: NDArray[np.float32],
+    solids: Solids,
+    preferred: tuple[float, float],
+) -> tuple[float, float, float]:
+    """Return the spawn origin of a patch [m]; see :func:`place_spawns`."""
+    from terrainkit.spawn import find_spawn
 
     disc = spawn_disc(config)
     origin = find_spawn(
@@ -161,11 +256,7 @@ def place_spawns(
             f"a patch of {grid.size[0]:g} m x {grid.size[1]:g} m; increase the platform or "
             "spawn_tolerance, or reduce spawn_radius or spawn_headroom"
         )
-    if config.spawns_per_patch == 1:
-        return np.array([origin])
-    return sample_spawns(
-        heights, grid, origin, disc, config.spawns_per_patch, solids=solids, rng=rng()
-    )
+    return origin
 
 
 def spawn_disc(config: MapConfig) -> "Disc":
@@ -179,56 +270,45 @@ def spawn_disc(config: MapConfig) -> "Disc":
     )
 
 
-def _solids_and_goals(
-    terrain: Terrain,
-    grid: Grid,
-    heights: NDArray[np.float32],
-    config: MapConfig,
-    patch: tuple[int, int],
+def _finish(
+    config: MapConfig, name: str, geometry: PatchGeometry, patch: tuple[int, int]
 ) -> tuple[Solids, NDArray[np.float32]]:
-    """Return the solids and the goals of a terrain on a patch.
+    """Return the solids with their patch, and the goals with their heights.
 
     Raises:
         ConfigError: if a solid extends beyond the patch, or a goal is not on it.
     """
-    terrain_type = type(terrain)
-    if terrain_type.solids is Terrain.solids and terrain_type.goals is Terrain.goals:
-        return _NO_SOLIDS, _NO_GOALS
-
-    from terrainkit.surface import surface_at
-
-    def rng() -> np.random.Generator:
-        """Return the child of the generator of the heights, in its initial state."""
-        return patch_rng(config, terrain, *patch).spawn(1)[0]
-
-    solids = Solids.empty()
-    if terrain_type.solids is not Terrain.solids:
-        solids = terrain.solids(grid, heights, rng())
+    grid, solids, goals = geometry.grid, geometry.solids, geometry.goals
+    if len(solids):
         lower, upper = (corner[:, :2] for corner in solids.bounds())
-        outside = np.maximum(grid.lower - lower, upper - grid.upper).max(initial=0.0)
+        outside = np.maximum(grid.lower - lower, upper - grid.upper).max()
         if outside > EDGE_TOLERANCE:
             raise ConfigError(
-                f"{terrain.kind()}: solids(): got a solid {outside:.3f} m beyond its patch; "
-                "expected solids within it"
+                f"{name}: solids(): got a solid {outside:.3f} m beyond its patch; expected solids "
+                "within it"
             )
-        numbers = np.tile(np.array(patch, np.int32), (len(solids), 1))
-        solids = dataclasses.replace(solids, patch=numbers)
-    goals = np.empty((0, 4))
-    if terrain_type.goals is not Terrain.goals:
-        goals = np.array(terrain.goals(grid, heights, rng()), dtype=float).reshape(-1, 4)
+        solids = dataclasses.replace(solids, patch=np.full((len(solids), 2), patch, np.int32))
+    if len(goals):
+        from terrainkit.surface import surface_at
+
         index = (goals[:, :2] - grid.lower) / grid.cell - 0.5
         if not ((index >= -0.5) & (index <= np.array(grid.shape) - 0.5)).all():
-            raise ConfigError(f"{terrain.kind()}: goals(): got a goal outside of the patch")
-        ground = surface_at(heights, index, threshold=config.wall_threshold).height
+            raise ConfigError(f"{name}: goals(): got a goal outside of the patch")
+        ground = surface_at(geometry.heights, index, threshold=config.wall_threshold).height
+        goals = goals.copy()
         goals[:, 2] = np.where(np.isnan(goals[:, 2]), ground, goals[:, 2])
     return solids, goals.astype(np.float32)
 
 
+_NO_SOLIDS = Solids.empty()
+_NO_GOALS = np.empty((0, 4))
+
+
 def with_headings(
-    positions: NDArray[np.float64], goals: NDArray[np.float32]
+    positions: NDArray[np.float64], goals: NDArray[np.float32], default: float = 0.0
 ) -> NDArray[np.float32]:
-    """Return spawn positions with headings, shape (k, 4): toward the first goal, else along x."""
-    spawns = np.zeros((len(positions), 4), dtype=np.float32)
+    """Return spawn positions with headings, shape (k, 4): toward the first goal, else `default`."""
+    spawns = np.full((len(positions), 4), default, dtype=np.float32)
     spawns[:, :3] = positions
     if len(goals):
         dx, dy = (goals[0, :2] - positions[:, :2]).T

@@ -1,6 +1,7 @@
-"""The registry of terrains.
+"""The registry of terrains and overlays.
 
-Each module in `terrainkit/terrains` is one terrain, named after its file. Other packages add
+Each module in `terrainkit/terrains` is one terrain, named after its file, and each module in
+`terrainkit/overlays` one overlay. Other packages add
 terrains as entry points of the group `terrainkit.terrains`, and a program or notebook registers its
 own classes.
 """
@@ -8,12 +9,15 @@ own classes.
 import importlib
 import inspect
 import pkgutil
+from collections.abc import Mapping
 from functools import cache
-from typing import TYPE_CHECKING, TypeVar
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from terrainkit import terrains
+from terrainkit import overlays, terrains
 from terrainkit.errors import ConfigError
-from terrainkit.parameter import parameters_of
+from terrainkit.overlay import Overlay
+from terrainkit.parameter import check_names, parameters_of
 from terrainkit.terrain import Terrain
 from terrainkit.text import expected_names
 
@@ -101,7 +105,7 @@ def get_terrain(name: str) -> type[Terrain]:
         ConfigError: if there is no such terrain, or a plugin cannot be loaded.
     """
     if name in terrain_names():
-        return _builtin_terrain(name)
+        return _load_class(terrains, name, Terrain)  # type: ignore[no-any-return]
     if name in _registered:
         return _registered[name]
     plugins = plugin_terrains()
@@ -125,15 +129,43 @@ def get_terrain(name: str) -> type[Terrain]:
     return terrain
 
 
-def _builtin_terrain(name: str) -> type[Terrain]:
-    module = importlib.import_module(f"{terrains.__name__}.{name}")
-    classes = [
-        value
-        for value in vars(module).values()
-        if isinstance(value, type) and issubclass(value, Terrain) and value.kind() == name
-    ]
+@cache
+def overlay_names() -> tuple[str, ...]:
+    """Return the names of the overlays in alphabetical order, without importing them."""
+    return tuple(sorted(module.name for module in pkgutil.iter_modules(overlays.__path__)))
+
+
+@cache
+def get_overlay(name: str) -> type[Overlay]:
+    """Return the overlay class `name`.
+
+    Raises:
+        ConfigError: if there is no such overlay.
+    """
+    if name not in overlay_names():
+        raise ConfigError(f"no overlay {name!r}; {expected_names(name, overlay_names())}")
+    return _load_class(overlays, name, Overlay)  # type: ignore[no-any-return]
+
+
+def make_overlay(name: str, parameters: Mapping[str, Any]) -> Overlay:
+    """Return the overlay `name` with these parameters: values, or ranges (easy, hard).
+
+    Raises:
+        ConfigError: if there is no such overlay, or a parameter is unknown or invalid.
+    """
+    overlay = get_overlay(name)
+    check_names(name, parameters, parameters_of(overlay))
+    return overlay(**parameters)
+
+
+def _load_class(package: ModuleType, name: str, parent: type[Any]) -> Any:
+    """Return the subclass of `parent` in module `name` of a package."""
+    module = importlib.import_module(f"{package.__name__}.{name}")
+    found: list[Any] = [value for value in vars(module).values() if inspect.isclass(value)]
+    classes = [each for each in found if issubclass(each, parent) and each.kind() == name]
     if len(classes) != 1:
         raise ConfigError(
-            f"{module.__file__}: got {len(classes)} subclasses of Terrain; expected one"
+            f"{module.__file__}: got {len(classes)} subclasses of {parent.__name__} named like the "
+            "file; expected one"
         )
     return classes[0]

@@ -9,29 +9,40 @@ from msgspec import Meta
 
 from terrainkit import registry
 from terrainkit.errors import ConfigError
-from terrainkit.parameter import MAX_VALUE
+from terrainkit.overlay import Overlay
+from terrainkit.parameter import MAX_VALUE, Parameter, convert_range, parameters_of
 from terrainkit.schema import Config
 from terrainkit.terrain import Terrain
-from terrainkit.type_hint import convert
+from terrainkit.type_hint import convert, show
 
 
 @dataclass(frozen=True, kw_only=True)
 class SubTerrain(Config):
     """A terrain type of a map.
 
+    In Python, `terrain` may be a subclass of :class:`~terrainkit.terrain.Terrain`, which is
+    registered and replaced by its name.
+
     Raises:
         ConfigError: if there is no such terrain, or a parameter is unknown or invalid.
     """
 
     terrain: Annotated[Any, Meta(description="a string")]
-    """Name of the terrain; `terrainkit list` prints all of them. In Python, it may be a subclass of
-    :class:`~terrainkit.terrain.Terrain`, which is registered and replaced by its name."""
+    """Name of the terrain; `terrainkit list` prints all of them."""
 
     proportion: Annotated[float, Meta(ge=0, le=MAX_VALUE)] = 1.0
     """Share of the columns, relative to the sum of all proportions."""
 
     name: str = ""
     """Name in the map; defaults to the name of the terrain."""
+
+    overlays: tuple[Overlay, ...] = ()
+    """Changes to the patches, in their order. In TOML, each is a `[[terrains.overlays]]` table."""
+
+    friction: Annotated[Any, Meta(description="a number >= 0, or a pair (easy, hard)")] | None = (
+        None
+    )
+    """Friction coefficient of the patches; none for `static_friction` of the map."""
 
     parameters: Mapping[str, Annotated[Any, Meta(description="a value or a range")]] = field(
         default_factory=dict
@@ -48,6 +59,14 @@ class SubTerrain(Config):
             super().__post_init__()
         except ConfigError as error:
             raise ConfigError(f"{self.terrain}.{error}") from None
+        if self.friction is not None:
+            friction = convert_range(self.terrain, "friction", self.friction, _FRICTION)
+            object.__setattr__(self, "friction", friction)
+        if reserved := _KEYS & set(parameters_of(self.terrain_class)):
+            raise ConfigError(
+                f"{self.terrain}: got parameters with the names {', '.join(sorted(reserved))}; "
+                "expected others, since they are keys of [[terrains]]"
+            )
         if not self.name:
             object.__setattr__(self, "name", self.terrain)
         for difficulty in (0.0, 1.0):
@@ -58,17 +77,24 @@ class SubTerrain(Config):
         cls, table: Mapping[str, Any], default: Self | None = None, path: str = ""
     ) -> Self:
         """Return the sub-terrain of a `[[terrains]]` table; its other keys are parameters."""
-        own = {key: table[key] for key in ("terrain", "proportion", "name") if key in table}
+        own = {key: table[key] for key in table if key in _KEYS}
         parameters = {key: value for key, value in table.items() if key not in own}
         try:
+            if "overlays" in own:
+                own["overlays"] = _read_overlays(own["overlays"])
             return super().from_table({**own, "parameters": parameters}, default)
         except ConfigError as error:
             raise ConfigError(f"{path.removesuffix('.')}: {error}") from error
 
     def to_table(self) -> dict[str, Any]:
         """Return the keys of a `[[terrains]]` table."""
-        name = {"name": self.name} if self.name != self.terrain else {}
-        return {"terrain": self.terrain, "proportion": self.proportion, **name, **self.parameters}
+        optional = {
+            "name": self.name if self.name != self.terrain else "",
+            "friction": self.friction,
+            "overlays": self.overlays,
+        }
+        given = {key: value for key, value in optional.items() if value not in ("", None, ())}
+        return {"terrain": self.terrain, "proportion": self.proportion, **given, **self.parameters}
 
     @cached_property
     def terrain_class(self) -> type[Terrain]:
@@ -78,3 +104,43 @@ class SubTerrain(Config):
     def at(self, difficulty: float) -> Terrain:
         """Return the terrain at `difficulty`, 0 to 1."""
         return self.terrain_class.at(difficulty, self.parameters)
+
+    def friction_at(self, difficulty: float) -> float | None:
+        """Return the friction of the patches at `difficulty`, 0 to 1; None for the map's."""
+        given: Any = self.friction
+        return _FRICTION.value_at(given, difficulty)  # type: ignore[return-value]
+
+    @cached_property
+    def declarations(self) -> dict[str, Parameter]:
+        """The parameters of the terrain by name, and those of its overlays by path."""
+        declared = dict(parameters_of(self.terrain_class))
+        for k, overlay in enumerate(self.overlays):
+            for name, parameter in parameters_of(type(overlay)).items():
+                declared[overlay_path(k, name)] = parameter
+        return declared
+
+
+_KEYS = {"terrain", "proportion", "name", "overlays", "friction"}
+"""Keys of a `[[terrains]]` table that are not parameters."""
+
+_FRICTION = Parameter(easy=1.0, hard=1.0)
+
+
+def overlay_path(number: int, name: str) -> str:
+    """Return the name of a parameter of overlay `number` among those of a patch."""
+    return f"overlays[{number}].{name}"
+
+
+def _read_overlays(tables: Any) -> tuple[Overlay, ...]:
+    """Return the overlays that `[[terrains.overlays]]` tables describe."""
+    if not isinstance(tables, list) or not all(isinstance(each, Mapping) for each in tables):
+        raise ConfigError(f"overlays: got {show(tables)}; expected [[terrains.overlays]] tables")
+    overlays = []
+    for k, table in enumerate(tables):
+        parameters = dict(table)
+        try:
+            name = convert("overlay", parameters.pop("overlay", None), str)
+            overlays.append(registry.make_overlay(name, parameters))
+        except ConfigError as error:
+            raise ConfigError(f"overlays[{k}]: {error}") from error
+    return tuple(overlays)

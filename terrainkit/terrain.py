@@ -12,15 +12,14 @@ from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.parameter import (
     Range,
-    Realized,
     Value,
+    check_names,
     convert_parameter,
     convert_range,
     parameters_of,
 )
 from terrainkit.parameterized import Parameterized
 from terrainkit.solids import Solids
-from terrainkit.text import expected_names
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,20 +67,13 @@ class Terrain(Parameterized, ABC):
             raise ConfigError(
                 f"{cls.kind()}.difficulty: got {difficulty:g}; expected a number from 0 to 1"
             )
-        known = parameters_of(cls)
+        known, values = parameters_of(cls), values or {}
+        check_names(cls.kind(), values, known)
         fixed = {name: parameter.at(difficulty) for name, parameter in known.items()}
-        for name, value in (values or {}).items():
-            if name not in known:
-                expected = expected_names(name, known, "it has")
-                raise ConfigError(f"{cls.kind()} has no parameter {name!r}; {expected}")
+        for name, value in values.items():
             converted: Any = convert_range(cls.kind(), name, value, known[name])
             fixed[name] = known[name].value_at(converted, difficulty)
         return cls(**fixed)
-
-    def realized(self, grid: Grid) -> dict[str, Realized]:
-        """Return the parameters after snapping to the cells of `grid`, by name."""
-        parameters = parameters_of(type(self)).items()
-        return {name: p.realized(getattr(self, name), grid) for name, p in parameters}
 
     def build(self, grid: Grid, rng: "np.random.Generator") -> NDArray[np.float32]:
         """Return the heights of the patch on `grid` [m], float32, shape `grid.shape`.

@@ -1,7 +1,8 @@
-"""Descriptions of terrains and their parameters, read from their docstrings."""
+"""Descriptions of terrains, overlays and their parameters, read from their docstrings."""
 
 import inspect
 from dataclasses import dataclass
+from typing import Any
 
 from terrainkit import registry
 from terrainkit.field_docs import field_docs
@@ -27,10 +28,10 @@ class ParameterDoc:
 
 @dataclass(frozen=True, kw_only=True)
 class TerrainDoc:
-    """The documentation of one terrain."""
+    """The documentation of one terrain or overlay."""
 
     name: str
-    """Name of the terrain."""
+    """Name of the terrain or overlay."""
 
     text: str
     """Description, one paragraph or more."""
@@ -41,10 +42,12 @@ class TerrainDoc:
 
 def terrain_summaries() -> dict[str, str]:
     """Return the first line of each terrain's description, by name."""
-    return {
-        name: (inspect.getdoc(registry.get_terrain(name)) or "").partition("\n")[0]
-        for name in registry.terrain_names()
-    }
+    return {name: _summary(registry.get_terrain(name)) for name in registry.terrain_names()}
+
+
+def overlay_summaries() -> dict[str, str]:
+    """Return the first line of each overlay's description, by name."""
+    return {name: _summary(registry.get_overlay(name)) for name in registry.overlay_names()}
 
 
 def terrain_doc(name: str) -> TerrainDoc:
@@ -53,11 +56,27 @@ def terrain_doc(name: str) -> TerrainDoc:
     Raises:
         ConfigError: if there is no such terrain.
     """
-    terrain = registry.get_terrain(name)
-    texts = field_docs(terrain)
+    return _class_doc(name, registry.get_terrain(name))
+
+
+def overlay_doc(name: str) -> TerrainDoc:
+    """Return the documentation of the overlay `name`.
+
+    Raises:
+        ConfigError: if there is no such overlay.
+    """
+    return _class_doc(name, registry.get_overlay(name))
+
+
+def _summary(kind: Any) -> str:
+    return (inspect.getdoc(kind) or "").partition("\n")[0]
+
+
+def _class_doc(name: str, kind: Any) -> TerrainDoc:
+    texts = field_docs(kind)
     return TerrainDoc(
         name=name,
-        text=inspect.getdoc(terrain) or "",
+        text=inspect.getdoc(kind) or "",
         parameters=tuple(
             ParameterDoc(
                 name=name,
@@ -65,7 +84,7 @@ def terrain_doc(name: str) -> TerrainDoc:
                 hard=format_value(parameter.hard) if parameter.hard != parameter.easy else "",
                 text=_text(texts.get(name, ""), parameter),
             )
-            for name, parameter in parameters_of(terrain).items()
+            for name, parameter in parameters_of(kind).items()
         ),
     )
 

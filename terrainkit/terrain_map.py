@@ -47,6 +47,10 @@ class TerrainMap:
     heights: NDArray[np.float32]
     """Heights [m], shape `grid.shape`: first index x, second y."""
 
+    friction: NDArray[np.float32]
+    """Friction of the ground in each cell, shape `grid.shape`. Read-only if it is the same in all
+    cells."""
+
     spawns: NDArray[np.float32]
     """Spawn positions of each patch: x, y, z [m] and heading [rad], shape (rows, cols, k, 4), NaN
     where a patch has fewer than k. The first of each patch is its spawn origin."""
@@ -79,6 +83,15 @@ class TerrainMap:
     def env_origins(self) -> NDArray[np.float32]:
         """Spawn origin of each patch [m], shape (rows, cols, 3), a view of `spawns`."""
         return self.spawns[:, :, 0, :3]
+
+    @cached_property
+    def has_one_friction(self) -> bool:
+        """Whether all of the ground and all solids have the friction of the map."""
+        static = np.float32(self.config.static_friction)
+        solids = self.solids.friction
+        return bool(
+            (self.friction == static).all() and (np.isnan(solids) | (solids == static)).all()
+        )
 
     def height(self, xy: ArrayLike) -> NDArray[np.float64]:
         """Return the height of the ground [m] at `xy`.
@@ -243,6 +256,16 @@ class TerrainMap:
                 "expected a mesh (.stl, .ply, .obj, .glb) or MuJoCo model (.xml)"
             )
 
+    def warn_about_friction(self, what: str) -> None:
+        """Warn if the map has several friction coefficients, which `what` cannot represent."""
+        if not self.has_one_friction:
+            warnings.warn(
+                f"{what} has one friction, {self.config.static_friction:g}: the friction of "
+                "sub-terrains, friction patches and solids is not in the file; use .npz or .xml",
+                TerrainkitWarning,
+                stacklevel=5,
+            )
+
     def patch(self, row: int, col: int) -> Patch:
         """Return patch (row, col); :func:`terrainkit.make_patch` builds one without a map.
 
@@ -259,6 +282,7 @@ class TerrainMap:
             parameters=self.parameters[row, col],
             grid=grid,
             heights=self.heights[i : i + grid.shape[0], j : j + grid.shape[1]],
+            friction=self.friction[i : i + grid.shape[0], j : j + grid.shape[1]],
             solids=self.solids.select((self.solids.patch == (row, col)).all(axis=1)),
             goals=goals[~np.isnan(goals[:, 0])],
             spawns=spawns[~np.isnan(spawns).all(axis=1)],

@@ -17,7 +17,7 @@ from terrainkit.errors import TerrainkitError, TerrainkitWarning, listing
 from terrainkit.layout import assign_patch, terrain_columns
 from terrainkit.mesh.solid_mesh import concatenate_meshes, solid_meshes
 from terrainkit.mesh.tri_mesh import TriMesh
-from terrainkit.parameter import format_value, parameters_of
+from terrainkit.parameter import format_value
 from terrainkit.patch import Parameters, Patch, build_patch
 from terrainkit.solids import Solids
 from terrainkit.terrain_map import TerrainMap
@@ -132,16 +132,15 @@ def _compare(patch: Patch, expected: Patch, location: str) -> Iterator[str]:
             f"{location}: the recorded parameters differ from those of its config: "
             f"{_different(patch.parameters, expected.parameters)}"
         )
-    if not _same_solids(patch.solids, expected.solids):
-        yield f"{location}: the solids differ from those of its config"
-    if patch.goals.shape != expected.goals.shape or not np.allclose(
-        patch.goals, expected.goals, atol=TOLERANCE
-    ):
-        yield f"{location}: the goals differ from those of its config"
-    if patch.spawns.shape != expected.spawns.shape or not np.allclose(
-        patch.spawns[1:], expected.spawns[1:], atol=TOLERANCE
-    ):
-        yield f"{location}: the spawn positions differ from those of its config"
+    is_same = {
+        "friction coefficients": np.allclose(patch.friction, expected.friction, atol=1e-6),
+        "solids": _same_solids(patch.solids, expected.solids),
+        "goals": _same_poses(patch.goals, expected.goals),
+        "spawn positions": _same_poses(patch.spawns[1:], expected.spawns[1:]),
+    }
+    for what, same in is_same.items():
+        if not same:
+            yield f"{location}: the {what} differ from those of its config"
     moved = float(np.abs(patch.origin[:2] - expected.origin[:2]).max())
     if moved > TOLERANCE:
         yield f"{location}: the spawn origin is {moved:.3f} m from that of its config"
@@ -168,6 +167,10 @@ def _different(parameters: Parameters, expected: Parameters) -> str:
     return listing(names)
 
 
+def _same_poses(poses: NDArray[np.float32], expected: NDArray[np.float32]) -> bool:
+    return poses.shape == expected.shape and np.allclose(poses, expected, atol=TOLERANCE)
+
+
 def _same_solids(solids: Solids, expected: Solids) -> bool:
     return all(
         values.shape == wanted.shape and np.allclose(values, wanted, atol=TOLERANCE, equal_nan=True)
@@ -184,7 +187,7 @@ def _check_realized(terrain_map: TerrainMap) -> Iterator[str]:
     for row, col in np.ndindex(terrain_map.difficulty.shape):
         patch = terrain_map.patch(row, col)
         sub_terrain = sub_terrains[terrain_map.terrain_types[row, col]]
-        parameters = parameters_of(sub_terrain.terrain_class)
+        parameters = sub_terrain.declarations
         for name, requested in patch.parameters.requested.items():
             realized = patch.parameters.realized[name]
             if parameters[name].deviates(requested, realized, cell):

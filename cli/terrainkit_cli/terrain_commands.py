@@ -3,7 +3,7 @@
 import re
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,6 +13,7 @@ import tyro
 from terrainkit import presets, registry
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
+from terrainkit.overlay import Overlay
 from terrainkit.parameter import Parameter, format_value, parameters_of
 from terrainkit.sub_terrain import SubTerrain
 from terrainkit.terrain_map import TerrainMap
@@ -49,6 +50,13 @@ class Generate(ConfigCommand):
     set: Annotated[str, tyro.conf.arg(metavar="NAME=VALUE,...", help_behavior_hint="")] = ""
     """Parameters of --terrain: NAME=VALUE, NAME=EASY:HARD for a range over the difficulty, or
     NAME=[X,Y,...] for a tuple."""
+
+    overlay: Annotated[
+        tuple[str, ...],
+        tyro.conf.arg(metavar="NAME[:PARAMETER=VALUE,...]", help_behavior_hint=""),
+    ] = ()
+    """Overlays on all terrains, in their order, such as `noise:amplitude=0:0.05 side_walls`;
+    `terrainkit list` prints the names."""
 
     jobs: Annotated[int, tyro.conf.arg(metavar="N")] = 1
     """Number of processes that build patches; the map does not depend on it. More than one is
@@ -104,6 +112,19 @@ class Generate(ConfigCommand):
             values["terrains"] = ()
         return values
 
+    def changed_config(self) -> Any:
+        """Return the config with the values and the overlays on the command line."""
+        config, added = super().changed_config(), tuple(map(_overlay, self.overlay))
+        terrains = [replace(each, overlays=each.overlays + added) for each in config.sub_terrains]
+        return replace(config, terrains=tuple(terrains)) if added else config
+
+
+def _overlay(text: str) -> Overlay:
+    """Return the overlay that NAME:PARAMETER=VALUE,... describes."""
+    name, _, values = text.partition(":")
+    parameters = _parameters("--overlay", values, registry.get_overlay(name))
+    return registry.make_overlay(name, parameters)
+
 
 def _load_config(path: str) -> MapConfig:
     return TerrainMap.load(path).config if path.endswith(".npz") else MapConfig.load(path)
@@ -136,16 +157,21 @@ def _parameter_value(text: str, parameter: Parameter | None) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class List(Command):
-    """List the terrains and presets, or the parameters of a terrain."""
+    """List the terrains, overlays and presets, or the parameters of one."""
 
     terrain: Annotated[
-        str, tyro.conf.Positional, tyro.conf.arg(metavar="[TERRAIN]", help_behavior_hint="")
+        str, tyro.conf.Positional, tyro.conf.arg(metavar="[NAME]", help_behavior_hint="")
     ] = ""
-    """Name of a terrain, to print its parameters."""
+    """Name of a terrain or overlay, to print its parameters."""
 
     def run(self) -> int:
-        """Print the terrains and presets, or the parameters of a terrain."""
-        from terrainkit.terrain_docs import terrain_doc, terrain_summaries
+        """Print the terrains, overlays and presets, or the parameters of one."""
+        from terrainkit.terrain_docs import (
+            overlay_doc,
+            overlay_summaries,
+            terrain_doc,
+            terrain_summaries,
+        )
 
         if not self.terrain:
             render.table(list(terrain_summaries().items()))
@@ -154,15 +180,18 @@ class List(Command):
             if others := registry.plugin_terrains():
                 render.result("\nfrom other packages:")
                 render.table([(f"  {name}", point.value) for name, point in others.items()])
+            render.result("\noverlays, which change any terrain:")
+            render.table([(f"  {name}", text) for name, text in overlay_summaries().items()])
             mixes = (
                 (name, ", ".join(c.name for c in presets.get_preset(name)))
                 for name in presets.preset_names()
             )
             render.result("\npresets:")
             render.table([(f"  {name}", mix) for name, mix in mixes])
-            render.result("\nterrainkit list TERRAIN shows the parameters of one.")
+            render.result("\nterrainkit list NAME shows the parameters of a terrain or overlay.")
             return 0
-        about = terrain_doc(self.terrain)
+        is_overlay = self.terrain in registry.overlay_names()
+        about = (overlay_doc if is_overlay else terrain_doc)(self.terrain)
         render.result(f"{about.name}: {about.text}\n")
         rows = [("parameter", "easy", "hard", "")]
         rows += [(p.name, p.easy, p.hard, p.text) for p in about.parameters]

@@ -38,6 +38,7 @@ def export(
         closed: Add sides and a bottom to make a watertight solid.
         y_up: Rotate the map so that y is up, as glTF viewers expect; by default z is up.
     """
+    terrain_map.warn_about_friction("a mesh file")
     mesh = terrain_map.mesh(merged=not full, closed=closed)
     if y_up:
         vertices = mesh.vertices[:, [0, 2, 1]] * np.array([1, 1, -1], dtype=np.float32)

@@ -15,7 +15,7 @@ from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError, MapFileError, listing
 from terrainkit.mesh.node_grid import BYTES_PER_NODE
 from terrainkit.mesh.tri_mesh import TriMesh
-from terrainkit.parameter import MAX_VALUE, Value, parameters_of
+from terrainkit.parameter import MAX_VALUE, Value
 from terrainkit.patch import Parameters
 from terrainkit.solids import Solids
 
@@ -64,6 +64,7 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
     arrays = {
         "format_version": np.int64(FORMAT_VERSION),
         "heights": terrain_map.heights,
+        "ground_friction": _compact(terrain_map.friction),
         "cell": np.float64(config.cell),
         "lower": np.array(terrain_map.grid.lower),
         "border": np.float64(config.border),
@@ -116,6 +117,7 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
             config=config,
             grid=grid,
             heights=archive.array("heights", "f4", grid.shape),
+            friction=_read_friction(archive, config),
             spawns=_read_spawns(archive, config),
             terrain_types=terrain_types,
             terrain_names=tuple(str(name) for name in names),
@@ -157,6 +159,29 @@ def _config(archive: Archive) -> MapConfig:
         return MapConfig.from_toml(archive.text("config"))
     except ConfigError as error:
         raise MapFileError(f"{archive.path}: config: {error}") from error
+
+
+def _compact(friction: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the friction of all cells, shape (1, 1) if it is the same."""
+    return friction[:1, :1] if (friction == friction[0, 0]).all() else friction
+
+
+def _read_friction(archive: Archive, config: MapConfig) -> NDArray[np.float32]:
+    """Return the friction of all cells; maps of terrainkit 0.1 have one."""
+    shape = config.grid.shape
+    if "ground_friction" not in archive.names():
+        return np.broadcast_to(np.float32(config.static_friction), shape)
+    friction = archive.array("ground_friction", "f4", (None, None), limit=4 * math.prod(shape))
+    if friction.shape not in (shape, (1, 1)):
+        raise MapFileError(
+            f"{archive.path}: ground_friction: got shape {friction.shape}; expected {shape}, or "
+            "(1, 1)"
+        )
+    if not ((friction >= 0) & (friction <= MAX_VALUE)).all():
+        raise MapFileError(
+            f"{archive.path}: ground_friction: got values out of range; expected 0 to {MAX_VALUE}"
+        )
+    return np.broadcast_to(friction, shape)
 
 
 def _read_solids(archive: Archive, size: tuple[int, int]) -> Solids:
@@ -240,7 +265,7 @@ def _all_parameters(
     archive: Archive, config: MapConfig, terrain_types: NDArray[np.int32]
 ) -> NDArray[np.object_]:
     table = np.empty(terrain_types.shape, dtype=object)
-    names = [set(parameters_of(each.terrain_class)) for each in config.sub_terrains]
+    names = [set(each.declarations) for each in config.sub_terrains]
     try:
         rows = json.loads(
             archive.text("parameters", limit=(table.size + 16) * MAX_PATCH_RECORD_BYTES)

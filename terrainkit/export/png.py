@@ -32,6 +32,7 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
     import cv2
 
     terrain_map.require_no_solids("an image of heights")
+    terrain_map.warn_about_friction("an image of heights")
     heights, config = terrain_map.heights, terrain_map.config
     low = float(heights.min())
     scale = (float(heights.max()) - low) / np.iinfo(np.uint16).max

@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 
 from terrainkit import MapConfig, SubTerrain
 from terrainkit.errors import ConfigError
+from terrainkit.overlays.noise import Noise
+from terrainkit.overlays.rotate import Rotate
 
 FLAT = SubTerrain(terrain="flat")
 NOT_THE_DEFAULT = {
@@ -45,6 +47,55 @@ NOT_THE_DEFAULT = {
 def test_toml_round_trip_of_each_field(name):
     config = MapConfig(**{name: NOT_THE_DEFAULT[name]})
     assert config != MapConfig()
+    assert MapConfig.from_toml(config.to_toml()) == config
+
+
+@pytest.mark.parametrize(
+    ("overlays", "message"),
+    [
+        ("overlays = 3", "overlays: got 3; expected"),
+        ("overlays = [3]", r"overlays: got .*; expected \[\[terrains\.overlays\]\] tables"),
+        ("[[terrains.overlays]]", r"overlays\[0\]: overlay: got None; expected a string"),
+        (
+            '[[terrains.overlays]]\noverlay = "nois"',
+            r"overlays\[0\]: no overlay 'nois'; did you",
+        ),
+        (
+            '[[terrains.overlays]]\noverlay = "noise"\namplitud = 1.0',
+            r"overlays\[0\]: noise has no parameter 'amplitud'; did you mean 'amplitude'",
+        ),
+        (
+            '[[terrains.overlays]]\noverlay = "noise"\namplitude = [1.0, 2.0, 3.0]',
+            r"noise\.amplitude: got \[1\.0, 2\.0, 3\.0\]; expected one value or a pair",
+        ),
+        (
+            '[[terrains.overlays]]\noverlay = "rotate"\ndegrees = 45',
+            "expected one of: 90, 180",
+        ),
+    ],
+)
+def test_invalid_overlay_in_toml_is_rejected(overlays, message):
+    with pytest.raises(ConfigError, match=message):
+        MapConfig.from_toml(f'[[terrains]]\nterrain = "gap"\n{overlays}')
+
+
+def test_toml_of_friction_and_overlays():
+    config = MapConfig.from_toml(
+        """
+        [[terrains]]
+        terrain = "gap"
+        friction = [1, 0.5]
+        [[terrains.overlays]]
+        overlay = "noise"
+        amplitude = [0, 0.1]
+        [[terrains.overlays]]
+        overlay = "rotate"
+        degrees = "random"
+        """
+    )
+    (gap,) = config.terrains
+    assert gap.friction == (1.0, 0.5)
+    assert gap.overlays == (Noise(amplitude=(0.0, 0.1)), Rotate(degrees="random"))
     assert MapConfig.from_toml(config.to_toml()) == config
 
 

@@ -105,6 +105,37 @@ def test_difficulty_out_of_range_is_rejected(difficulty):
         SubTerrain(terrain="gap").at(difficulty)
 
 
+@pytest.mark.parametrize(
+    ("friction", "expected"),
+    [
+        (None, [None] * 3),
+        (0.5, [0.5] * 3),
+        ((1, 0.5), [1.0, 0.75, 0.5]),
+        ([1, 0.5], [1, 0.75, 0.5]),
+    ],
+)
+def test_friction_may_be_a_range(friction, expected):
+    ice = SubTerrain(terrain="flat", friction=friction)
+    assert [ice.friction_at(d) for d in (0.0, 0.5, 1.0)] == expected
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"friction": -1}, r"flat\.friction: got -1; expected a number from 0"),
+        ({"friction": (1, 2, 3)}, r"flat\.friction: got \[1, 2, 3\]; expected one value or a pair"),
+        (
+            {"overlays": ("noise",)},
+            r"flat\.overlays\[0\]: got 'noise'; expected a table",
+        ),
+        ({"overlays": 3}, r"flat\.overlays: got 3; expected a list"),
+    ],
+)
+def test_invalid_friction_or_overlay_is_rejected(given, message):
+    with pytest.raises(ConfigError, match=message):
+        SubTerrain(terrain="flat", **given)
+
+
 def test_list_is_converted_to_range():
     gap = SubTerrain(terrain="gap", parameters={"width": [0.2, 0.6]})
     assert gap == SubTerrain(terrain="gap", parameters={"width": (0.2, 0.6)})

@@ -4,7 +4,7 @@ import pytest
 
 from terrainkit import parameter, registry
 from terrainkit.errors import ConfigError
-from terrainkit.terrain_docs import terrain_doc, terrain_summaries
+from terrainkit.terrain_docs import overlay_doc, overlay_summaries, terrain_doc, terrain_summaries
 
 
 @pytest.mark.parametrize("name", registry.terrain_names())
@@ -18,6 +18,15 @@ def test_terrain_doc_has_text_and_unit(name):
         assert each.text.endswith(".")
         has_unit = "[m]" in each.text or "[rad]" in each.text
         assert has_unit != (each.name in unitless)
+
+
+@pytest.mark.parametrize("name", registry.overlay_names())
+def test_overlay_doc_has_text_and_parameters(name):
+    about = overlay_doc(name)
+    assert about.text.partition("\n")[0] == overlay_summaries()[name]
+    assert about.text.partition("\n")[0].endswith(".")
+    assert [p.name for p in about.parameters] == list(registry.get_overlay(name)().requested())
+    assert all(each.text.endswith(".") for each in about.parameters)
 
 
 def test_terrain_doc_range_has_two_ends():

@@ -6,6 +6,9 @@ import pytest
 
 import terrainkit
 from terrainkit import MapConfig, SubTerrain, TerrainMap, parameter, registry
+from terrainkit.overlays.mirror import Mirror
+from terrainkit.overlays.noise import Noise
+from terrainkit.overlays.side_walls import SideWalls
 from terrainkit.terrain import Terrain
 from terrainkit.validate import validate
 
@@ -83,6 +86,40 @@ def test_set_rejects_invalid_value(run_main, values, message):
     run = run_main("generate", "-o", "a.npz", "--terrain", "banked_track", "--set", values)
     assert (run.returncode, run.stderr.count("\n")) == (2, 1)
     assert message in run.stderr
+
+
+def test_generate_adds_overlays_to_all_terrains(run_main, tmp_path):
+    path = tmp_path / "map.npz"
+    overlays = ("--overlay", "side_walls:probability=1,height=2", "noise:amplitude=0:0.1", "mirror")
+    size = ("--rows", 2, "--cols", 9, "--border", 0)
+    run = run_main("generate", "-o", path, *size, *overlays)
+    assert run.returncode == 0, run.stderr
+    config = TerrainMap.load(path).config
+    assert len(config.terrains) == 9
+    expected = (SideWalls(probability=1.0, height=2.0), Noise(amplitude=(0.0, 0.1)), Mirror())
+    assert {each.overlays for each in config.terrains} == {expected}
+
+
+@pytest.mark.parametrize(
+    ("overlay", "message"),
+    [
+        ("nois", "no overlay 'nois'; did you mean 'noise'? There are: friction_patches, "),
+        ("noise:amplitude", "--overlay: got 'amplitude'; expected name=value"),
+        ("noise:pattern=pink", "noise.pattern: got 'pink'; expected one of: uniform, perlin"),
+        ("noise:amplitudes=1", "noise has no parameter 'amplitudes'; did you mean 'amplitude'"),
+    ],
+)
+def test_overlay_rejects_invalid_value(run_main, overlay, message):
+    run = run_main("generate", "-o", "a.npz", "--overlay", overlay)
+    assert (run.returncode, run.stderr.count("\n")) == (2, 1)
+    assert message in run.stderr
+
+
+def test_list_prints_overlays(run_main):
+    assert "  side_walls  " in run_main("list").stdout
+    output = run_main("list", "noise").stdout
+    assert output.startswith("noise: Random heights that are added to the ground.")
+    assert "One of: uniform, perlin." in output
 
 
 def test_custom_terrain_config_round_trips_through_toml(banked):

@@ -115,7 +115,7 @@ def test_export_bundled_policy_by_name(here, trained, tmp_path, monkeypatch):
 
 
 def test_export_map(here, tmp_path):
-    words = ("--rows", 1, "--cols", 1, "--terrain", "stairs", "--patch-size", 4, 4, "--border", 1)
+    words = ("--rows", 1, "--cols", 1, "--terrain", "stairs", "--patch-size", 5, 4, "--border", 1)
     assert here("generate", "-o", "map.npz", *words).returncode == 0
     run = here("export", "map.npz", "-o", "map.stl", "--full")
     assert run.returncode == 0, run.stderr

@@ -241,7 +241,7 @@ def test_check_robot_options_override_settings_file(here, folder):
 
 def test_check_robot_escapes_unencodable_names(terrainkit, folder, monkeypatch):
     monkeypatch.setenv("PYTHONIOENCODING", "ascii")
-    (folder / "good.urdf").write_text(GOOD.replace("box", "b\u00f6x"))
+    (folder / "good.urdf").write_text(GOOD.replace('name="box"', 'name="b\u00f6x"'))
     run = terrainkit("check-robot", "good.urdf")
     assert (run.returncode, run.stderr) == (0, "")
     assert "robot     b\\xf6x (URDF)" in run.stdout

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 import trimesh
 
+from terrainkit.errors import TerrainkitWarning
 from terrainkit.export.mesh_file import _FACES_PER_BLOCK
 from terrainkit.solids import Solids
 
 SUFFIXES = (".stl", ".ply", ".obj", ".glb")
 
+one_friction = pytest.mark.filterwarnings("ignore:a mesh file has one friction")
 every_suffix = pytest.mark.parametrize("suffix", SUFFIXES)
 
 
@@ -102,6 +104,7 @@ def test_mesh_file_glb_has_friction_extras(terrain_map, tmp_path):
     assert contact.items() <= mesh["extras"].items()
 
 
+@one_friction
 @every_suffix
 def test_mesh_file_has_the_solids_that_collide(solid_map, tmp_path, suffix):
     mesh = saved(solid_map, tmp_path, suffix, closed=True)
@@ -115,8 +118,14 @@ def test_mesh_file_has_the_solids_that_collide(solid_map, tmp_path, suffix):
     assert mesh.volume - plain.volume == pytest.approx(box + cylinder + hull, rel=1e-2)
 
 
+@one_friction
 @every_suffix
 def test_mesh_file_open_has_ground_and_solids(solid_map, tmp_path, suffix):
     mesh = saved(solid_map, tmp_path, suffix)
     assert len(mesh.faces) == len(solid_map.mesh().triangles)
     assert mesh.bounds[1, 2] == pytest.approx(0.7, abs=1e-6)
+
+
+def test_mesh_file_warns_about_several_frictions(solid_map, tmp_path):
+    with pytest.warns(TerrainkitWarning, match=r"a mesh file has one friction, 1: .*; use \.npz"):
+        solid_map.save(tmp_path / "map.stl")

@@ -15,6 +15,7 @@ from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
 from terrainkit.errors import MapFileError, MemoryLimitError
 from terrainkit.export.npz import read_mesh
 from terrainkit.solids import Solids
+from terrainkit.validate import validate
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +29,7 @@ def arrays(path):
         return dict(archive)
 
 
-NEW_KEYS = ("solid_", "hull_", "cylinders", "goals", "spawns")
+NEW_KEYS = ("ground_friction", "solid_", "hull_", "cylinders", "goals", "spawns")
 """Prefixes of the keys that maps of version 0.1 lack."""
 
 
@@ -576,3 +577,53 @@ def test_npz_map_beyond_memory_is_not_read(good, bad):
     repack(good, bad, changes)
     with pytest.raises(MemoryLimitError, match=r"heights in .* needs .* GB of memory"):
         TerrainMap.load(bad)
+
+
+# ---- friction ----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def icy_map():
+    ice = SubTerrain(terrain="crawl", friction=(0.8, 0.2))
+    rest = SubTerrain(terrain="flat")
+    return generate(MapConfig(rows=2, cols=2, border=1.0, terrains=(ice, rest)))
+
+
+def test_npz_has_friction_of_each_cell(icy_map, tmp_path):
+    path = icy_map.save(tmp_path / "map.npz")
+    friction = np.load(path)["ground_friction"]
+    expected = np.ones((180, 180), np.float32)
+    expected[10:90, 10:90], expected[90:170, 10:90] = 0.8, 0.2
+    assert friction.tobytes() == expected.tobytes()
+    loaded = TerrainMap.load(path)
+    assert loaded.friction.tobytes() == expected.tobytes()
+    assert set(loaded.solids.friction.tolist()) == {np.float32(0.8), np.float32(0.2)}
+    assert not loaded.has_one_friction
+
+
+def test_npz_has_one_friction_of_a_uniform_map(terrain_map, path, arrays):
+    assert arrays["ground_friction"].tolist() == [[np.float32(0.8)]]
+    loaded = TerrainMap.load(path)
+    assert loaded.has_one_friction
+    assert loaded.friction.shape == loaded.heights.shape == terrain_map.friction.shape
+
+
+@pytest.mark.parametrize(
+    ("friction", "message"),
+    [
+        (np.ones((2, 2), np.float32), r"got shape \(2, 2\); expected \(184, 144\), or \(1, 1\)"),
+        (np.full((1, 1), -1, np.float32), "ground_friction: got values out of range"),
+        (np.full((1, 1), np.nan, np.float32), "ground_friction: got values out of range"),
+    ],
+)
+def test_npz_invalid_friction_is_rejected(arrays, tmp_path, friction, message):
+    np.savez(tmp_path / "map.npz", **arrays | {"ground_friction": friction})
+    with pytest.raises(MapFileError, match=message):
+        TerrainMap.load(tmp_path / "map.npz")
+
+
+def test_validate_reports_edited_friction(icy_map):
+    friction = icy_map.friction.copy()
+    friction[20, 20] = 0.5
+    (issue,) = validate(dataclasses.replace(icy_map, friction=friction))
+    assert issue.message.startswith("patch (0, 0): the friction coefficients differ from")

@@ -7,6 +7,7 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.description.model import Dynamics
 from terrainkit_robots.export.actuator import ActuatorConfig
 from terrainkit_robots.export.canonical import to_canonical
 from terrainkit_robots.export.mjcf import Extras, mjcf_text, scene_text
@@ -202,7 +203,9 @@ def test_contacts_of_massless_foot(quadruped):
 
 def test_joint_friction(quadruped):
     joints = [
-        dataclasses.replace(joint, friction=0.25) if joint.name == "FL_hip_joint" else joint
+        dataclasses.replace(joint, dynamics=Dynamics(source=joint.source, friction=0.25))
+        if joint.name == "FL_hip_joint"
+        else joint
         for joint in quadruped.model.joints
     ]
     model = written(dataclasses.replace(quadruped.model, joints=tuple(joints)))

@@ -14,6 +14,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import (
+    Dynamics,
     Geometry,
     Inertial,
     Joint,
@@ -145,8 +146,7 @@ class TestJoints:
             origin=translated(0, 0.1, 0),
             axis=np.array([0.0, 2, 0]),
             limit=limits(-0.5, 1.5, 20, 30),
-            damping=0.3,
-            friction=0.4,
+            dynamics=Dynamics(source=SOURCE, damping=0.3, friction=0.4),
         )
         mimic = Mimic(source=SOURCE, joint="hip", multiplier=-2.0, offset=0.1)
         follower = joint("knee", "revolute", "leg", "shin", mimic=mimic)

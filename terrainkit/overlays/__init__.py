@@ -1,0 +1,1 @@
+"""The overlays, one per module. The registry lists the modules of this folder."""

@@ -1,0 +1,26 @@
+import numpy as np
+import pytest
+
+from terrainkit.grid import Grid
+from terrainkit.patch_geometry import PatchGeometry
+from terrainkit.solids import Solids
+
+
+@pytest.fixture
+def geometry():
+    """Return a function that makes a flat patch whose lower corner is at (10, 20)."""
+
+    def make(shape=(40, 40), cell=0.1, **values):
+        grid = Grid(shape=shape, cell=cell, lower=(10.0, 20.0))
+        flat = {
+            "grid": grid,
+            "heights": np.zeros(shape, np.float32),
+            "friction": np.ones(shape, np.float32),
+            "solids": Solids.empty(),
+            "goals": np.empty((0, 4)),
+            "spawn": grid.center,
+            "spawn_radius": 0.5,
+        }
+        return PatchGeometry(**flat | values)
+
+    return make

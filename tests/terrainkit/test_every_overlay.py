@@ -1,0 +1,130 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from terrainkit import MapConfig, SubTerrain, TerrainMap, generate, make_patch, registry
+from terrainkit.errors import ConfigError
+from terrainkit.overlays.mirror import Mirror
+from terrainkit.overlays.noise import Noise
+from terrainkit.overlays.rotate import Rotate
+from terrainkit.overlays.side_walls import SideWalls
+from terrainkit.solids import Solids
+from terrainkit.validate import validate
+
+TERRAINS = registry.terrain_names()
+OVERLAYS = {name: (registry.get_overlay(name)(),) for name in registry.overlay_names()} | {
+    "perlin": (Noise(pattern="perlin", spacing=1.0),),
+    "walls everywhere": (SideWalls(probability=1.0),),
+    "rotate 270": (Rotate(degrees=270),),
+    "all": tuple(registry.get_overlay(name)() for name in registry.overlay_names()),
+}
+every_terrain = pytest.mark.parametrize("terrain", TERRAINS)
+every_overlay = pytest.mark.parametrize("overlays", OVERLAYS.values(), ids=OVERLAYS)
+coarse = pytest.mark.filterwarnings("ignore::terrainkit.TerrainkitWarning")
+
+
+def config_of(terrain, overlays=(), difficulty=1.0, **rest):
+    """Return the config of one patch."""
+    sub_terrain = SubTerrain(terrain=terrain, overlays=overlays)
+    size = {"rows": 1, "cols": 1, "border": 1.0, "seed": 4} | rest
+    return MapConfig(
+        mode="selected", selected_difficulty=difficulty, terrains=(sub_terrain,), **size
+    )
+
+
+def patch_of(*args, **rest):
+    return make_patch(config_of(*args, **rest), 0, 0)
+
+
+def assert_same_geometry(patch, other):
+    assert patch.heights.tobytes() == other.heights.tobytes()
+    assert patch.friction.tobytes() == other.friction.tobytes()
+    for field in dataclasses.fields(Solids):
+        values, expected = (getattr(each.solids, field.name) for each in (patch, other))
+        if field.name in ("boxes", "cylinders"):  # q and -q are the same rotation
+            assert values[:, :6] == pytest.approx(expected[:, :6], abs=1e-5)
+            assert np.abs((values[:, 6:] * expected[:, 6:]).sum(axis=1)) == pytest.approx(1.0)
+        else:
+            assert values == pytest.approx(expected, abs=1e-5, nan_ok=True)
+    for poses, expected in ((patch.goals, other.goals), (patch.spawns, other.spawns)):
+        assert poses[:, :3] == pytest.approx(expected[:, :3], abs=1e-5)
+        assert np.cos(poses[:, 3] - expected[:, 3]) == pytest.approx(1.0)
+
+
+@coarse
+@every_overlay
+@every_terrain
+def test_every_overlay_on_every_terrain_is_valid(terrain, overlays):
+    for difficulty in (0.0, 1.0):
+        terrain_map = generate(config_of(terrain, overlays, difficulty))
+        # The mesh, the spawn origin, and a second build of the patch.
+        issues = [issue for issue in validate(terrain_map) if issue.check != "realized"]
+        assert [issue for issue in issues if "no flat disc" not in issue.message] == []
+
+
+@every_terrain
+def test_every_terrain_is_unchanged_below_neutral_overlays(terrain):
+    plain = patch_of(terrain)
+    neutral = (SideWalls(probability=0.0), Noise(amplitude=0.0), Mirror(axis="x"), Mirror(axis="x"))
+    assert_same_geometry(patch_of(terrain, neutral), plain)
+
+
+@every_terrain
+def test_four_quarter_turns_are_identity(terrain):
+    assert_same_geometry(patch_of(terrain, 4 * (Rotate(),)), patch_of(terrain))
+    assert_same_geometry(
+        patch_of(terrain, (Rotate(degrees=270),)), patch_of(terrain, 3 * (Rotate(degrees=90),))
+    )
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+@every_terrain
+def test_two_mirrors_are_identity(terrain, axis):
+    assert_same_geometry(patch_of(terrain, 2 * (Mirror(axis=axis),)), patch_of(terrain))
+
+
+@every_terrain
+def test_two_mirrors_are_half_a_turn(terrain):
+    mirrors = (Mirror(axis="x"), Mirror(axis="y"))
+    assert_same_geometry(patch_of(terrain, mirrors), patch_of(terrain, (Rotate(degrees=180),)))
+
+
+@every_overlay
+def test_every_overlay_is_deterministic(overlays):
+    first, again = (patch_of("crawl", overlays) for _ in "ab")
+    assert_same_geometry(first, again)
+
+
+@pytest.mark.parametrize("name", registry.overlay_names())
+def test_every_overlay_round_trips_through_toml_and_npz(name, tmp_path):
+    config = config_of("crawl", (registry.get_overlay(name)(),))
+    assert MapConfig.from_toml(config.to_toml()) == config
+    loaded = TerrainMap.load(generate(config).save(tmp_path / "map.npz"))
+    assert loaded.config == config
+    assert validate(loaded) == []
+    assert set(loaded.parameters[0, 0].requested) >= {
+        f"overlays[0].{key}" for key in registry.get_overlay(name)().requested()
+    }
+
+
+@pytest.mark.parametrize("name", registry.overlay_names())
+def test_every_overlay_has_name_of_its_module(name):
+    assert registry.get_overlay(name).kind() == name
+    assert name not in TERRAINS
+
+
+def test_overlays_are_applied_in_order():
+    walls, turn = SideWalls(probability=1.0), Rotate(degrees=90)
+    for overlays, axis in (((walls, turn), 1), ((turn, walls), 0)):
+        lower, upper = patch_of("flat", overlays).solids.bounds()
+        assert (upper - lower)[:, axis] == pytest.approx(8.0)
+
+
+def test_overlay_hook_with_wrong_heights_is_rejected():
+    class Careless(Mirror):
+        def apply(self, patch, rng):  # noqa: ARG002
+            return dataclasses.replace(patch, heights=patch.heights[1:])
+
+    with pytest.raises(ConfigError, match=r"careless: apply\(\): got heights of shape \(79"):
+        patch_of("flat", (Careless(),))
