@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.solids import Solids, rotation_matrices
+from terrainkit.solids import Solids, convex_hull, rotation_matrices
 
 _MAX_PAIRS = 2_000_000
 """Candidate pairs of points and solids that are evaluated at once, to bound the memory."""
@@ -177,12 +177,9 @@ def _half_spaces(solids: Solids) -> tuple[NDArray[np.float64], NDArray[np.int64]
         sides = [np.dstack([normals, middle + half]), np.dstack([-normals, half - middle])]
         planes.append(np.concatenate(sides, axis=1).reshape(-1, 4))
     counts = [np.full(len(solids.boxes), 6), np.full(len(solids.cylinders), 2)]
-    if len(solids.hull_counts):
-        from scipy.spatial import ConvexHull
-
-        for vertices in solids.hulls():
-            # Coplanar facets of a hull repeat their plane.
-            equations = np.unique(ConvexHull(vertices.astype(float)).equations.round(9), axis=0)
-            planes.append(equations * [1, 1, 1, -1])
-            counts.append(np.array([len(equations)]))
+    for vertices in solids.hulls():
+        # Coplanar facets of a hull repeat their plane.
+        equations = np.unique(convex_hull(vertices).equations.round(9), axis=0)
+        planes.append(equations * [1, 1, 1, -1])
+        counts.append(np.array([len(equations)]))
     return np.concatenate(planes), np.concatenate(counts)

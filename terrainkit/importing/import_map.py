@@ -214,7 +214,7 @@ def _make_map(config: MapConfig, heights: NDArray[np.float32], solids: Solids) -
         config=config,
         grid=config.grid,
         heights=heights,
-        friction=np.full(heights.shape, config.static_friction, dtype=np.float32),
+        friction=np.broadcast_to(np.float32(config.static_friction), heights.shape),
         spawns=pad_poses(spawns),
         terrain_types=np.zeros(size, dtype=np.int32),
         terrain_names=(config.sub_terrains[0].name,),

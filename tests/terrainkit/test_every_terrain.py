@@ -53,9 +53,9 @@ def at_every_difficulty(terrain, parameters, grid, seed=0):
 
 
 def map_of(terrain, parameters, grid, **rest):
-    """Return a map of one terrain: rows of difficulty 0, 0.5 and 1, and twenty draws of each."""
+    """Return a map of one terrain: rows of difficulty 0, 0.5 and 1, and eight draws of each."""
     choice = SubTerrain(terrain=terrain, parameters=parameters)
-    config = {"rows": 3, "cols": 20, "patch_size": grid.size, "cell": grid.cell, "border": 1.0}
+    config = {"rows": 3, "cols": 8, "patch_size": grid.size, "cell": grid.cell, "border": 1.0}
     return generate(MapConfig(**config | {"terrains": (choice,)} | rest))
 
 

@@ -156,15 +156,15 @@ def missing_leg_joint(robot: Facts) -> Iterator[Violation]:
             )
 
 
-@rule("LEG004", "foot-collapsed", "warning", fixes="safe", needs=("legs",))
+@rule("LEG004", "foot-collapsed", "info", fixes="safe", needs=("legs",))
 def foot_collapsed(robot: Facts) -> Iterator[Violation]:
-    """Isaac Gym merges a foot into its shank.
+    """Isaac Gym merges the feet into their shanks.
 
-    Isaac Gym collapses fixed joints by default. The foot is then not a rigid body: a search for
-    feet by name finds nothing, and their contact forces belong to the shank.
+    Isaac Gym collapses fixed joints by default. A foot is then not a rigid body: a search for feet
+    by name finds nothing, and their contact forces belong to the shank.
 
     Fix:
-        Add dont_collapse="true" to the fixed joint above the foot.
+        Add dont_collapse="true" to the fixed joints above the feet. Other simulators ignore it.
 
     Source:
         Isaac Gym's asset option collapse_fixed_joints; the descriptions of Unitree and ANYbotics
@@ -172,25 +172,33 @@ def foot_collapsed(robot: Facts) -> Iterator[Violation]:
     """
     if robot.model.kind == "mjcf":
         raise CannotCheckError("Isaac Gym's URDF importer does not read MJCF")
+    merged = []
     for leg in robot.legs:
         joint = robot.tree.parent_joint.get(leg.foot)
         has_shapes = bool(robot.tree.links[leg.foot].collisions)
-        if joint is None or joint.kind != "fixed" or joint.dont_collapse or not has_shapes:
-            continue
-        edit = SetAttribute(source=joint.source, name="dont_collapse", value="true")
-        fix = Fix(
-            safety="safe",
-            description=f'Add dont_collapse="true" to joint {joint.name}.',
-            edits=(edit,),
-        )
-        yield Violation(
-            subject=leg.foot,
-            source=joint.source,
-            message=f"fixed joint {joint.name} above foot {leg.foot}: got no dont_collapse; "
-            'expected dont_collapse="true", or Isaac Gym merges the foot into its parent',
-            certainty="likely",
-            fix=None if joint.source.element is None else fix,
-        )
+        if joint is not None and joint.kind == "fixed" and not joint.dont_collapse and has_shapes:
+            merged.append((leg.foot, joint))
+    if not merged:
+        return
+    foot, first = merged[0]
+    joints = names(joint.name for _, joint in merged)
+    sources = [joint.source for _, joint in merged]
+    fix = Fix(
+        safety="safe",
+        description=f'Add dont_collapse="true" to {joints}.',
+        edits=tuple(
+            SetAttribute(source=source, name="dont_collapse", value="true") for source in sources
+        ),
+    )
+    yield Violation(
+        subject=foot,
+        source=first.source,
+        message=f"fixed joints above the feet ({joints}): got no dont_collapse; expected "
+        'dont_collapse="true", or Isaac Gym merges the feet into their parents',
+        certainty="likely",
+        measured={"feet": len(merged)},
+        fix=None if any(source.element is None for source in sources) else fix,
+    )
 
 
 @rule("LEG005", "forward-axis", "warning", needs=("legs",))

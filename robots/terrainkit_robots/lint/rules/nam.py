@@ -10,8 +10,8 @@ from functools import cached_property
 from terrainkit.text import truncate
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint, Link
-from terrainkit_robots.lint.rule import Violation, rule
-from terrainkit_robots.text import names
+from terrainkit_robots.lint.rule import Severity, Violation, rule
+from terrainkit_robots.text import count, names
 
 _MIN_PAIRS = 4
 """Minimum number of mirrored pairs from which a naming pattern is derived."""
@@ -251,7 +251,8 @@ def invalid_name(robot: Facts) -> Iterator[Violation]:
 
     USD, which Isaac Sim and Isaac Lab use, supports letters, digits and underscores. It replaces
     all other characters by underscores. Patterns in a configuration that was written for the URDF
-    then match nothing, and two names may become the same, which is an error.
+    then match nothing, and two names may become the same, which is an error. On fixed joints and in
+    MJCF, other characters are only a note.
 
     Fix:
         Use letters, digits and underscores, and start with a letter.
@@ -263,7 +264,8 @@ def invalid_name(robot: Facts) -> Iterator[Violation]:
     joints = [joint for joint in robot.model.joints if joint.name and joint.kind != "fixed"]
     if robot.model.kind != "mjcf":
         joints = [joint for joint in robot.model.joints if joint.name]
-    renamed: dict[str, Link | Joint] = {}
+    fixed = {id(joint) for joint in joints if joint.kind == "fixed"}
+    renamed: dict[Severity, dict[str, Link | Joint]] = {"warning": {}, "info": {}}
     kinds: tuple[tuple[str, Sequence[Link | Joint]], ...] = (("links", links), ("joints", joints))
     for kind, items in kinds:
         conflicts = _conflicts(items)
@@ -272,17 +274,20 @@ def invalid_name(robot: Facts) -> Iterator[Violation]:
         reported = {item.name for same in conflicts.values() for item in same}
         for item in items:
             if item.name not in reported and not _IDENTIFIER.fullmatch(item.name):
-                renamed.setdefault(item.name, item)
-    if renamed:
-        first = next(iter(renamed.values()))
-        count = f"{len(renamed)} names" if len(renamed) > 1 else "1 name"
+                is_note = robot.model.kind == "mjcf" or id(item) in fixed
+                renamed["info" if is_note else "warning"].setdefault(item.name, item)
+    for severity, found in renamed.items():
+        if not found:
+            continue
+        first = next(iter(found.values()))
         yield Violation(
             subject=first.name,
             source=first.source,
-            message=f"{count} with other characters than letters, digits and underscores: "
-            f"{names(renamed)}; USD renames {truncate(first.name)} to "
+            severity=severity,
+            message=f"{count(len(found), 'name')} with other characters than letters, digits and "
+            f"underscores: {names(found)}; USD renames {truncate(first.name)} to "
             f"{truncate(_valid(first.name))}",
-            measured={"names": len(renamed)},
+            measured={"names": len(found)},
         )
 
 

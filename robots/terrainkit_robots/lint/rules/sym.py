@@ -321,12 +321,11 @@ def limit_asymmetry(robot: Facts) -> Iterator[Violation]:
         own, mirror = (a, b) if odd is left else (b, a)
         expected = mirror if pair.sign > 0 else (-mirror[1], -mirror[0])
         unit, name = odd.joint.unit, other.joint.name
-        kind = "" if pair.sign > 0 else "negated "
         yield _report(
             odd.joint.name,
             name,
             f"limits of joint {odd.joint.name}: got {_format_limits(own)} {unit}; expected "
-            f"{_format_limits(expected)} {unit}, the {kind}limits of its mirror image {name}, "
+            f"{_format_limits(expected)} {unit}, mirrored from those of {name}, "
             f"within {MAX_LIMIT_ERROR:g} {unit} plus {MAX_RELATIVE_LIMIT_ERROR:.0%} of the range",
             {"lower": own[0], "upper": own[1], "other_lower": mirror[0], "other_upper": mirror[1]},
             _limit_source(odd.joint),
@@ -362,31 +361,40 @@ def effort_asymmetry(robot: Facts) -> Iterator[Violation]:
     other_checks = _OtherChecks(robot, placeholder_limit)
     for pair in robot.mirror_pairs:
         left, right = pair.left, pair.right
+        differences: dict[str, tuple[float, float, float, _LimitOf]] = {}
         for name, limit_of in (("effort", Facts.effort_limit), ("velocity", _velocity_of)):
             a, b = limit_of(robot, left.joint), limit_of(robot, right.joint)
             if a is None or b is None or min(a, b) <= 0:
                 continue
             difference = _relative_difference(a, b)
-            if difference <= _MAX_LIMIT_DIFFERENCE or other_checks.report(left, right):
-                continue
+            if difference > _MAX_LIMIT_DIFFERENCE:
+                differences[name] = (a, b, difference, limit_of)
+        if not differences or other_checks.report(left, right):
+            continue
 
-            def value(body: Body, limit_of: _LimitOf = limit_of) -> Matrix | None:
-                limit = limit_of(robot, body.joint) if body.joint else None
-                return None if limit is None else np.array([limit])
+        _, _, _, first = next(iter(differences.values()))
 
-            odd, other = robot.outlier_first(left, right, value)
+        def value(body: Body, limit_of: _LimitOf = first) -> Matrix | None:
+            limit = limit_of(robot, body.joint) if body.joint else None
+            return None if limit is None else np.array([limit])
+
+        odd, other = robot.outlier_first(left, right, value)
+        joint, parts = odd.joint, list[str]()
+        measured: dict[str, float | int | str] = {}
+        for name, (a, b, difference, _) in differences.items():
             own, mirror = (b, a) if odd is right else (a, b)
-            joint = odd.joint
             unit = joint.effort_unit if name == "effort" else joint.speed_unit
-            yield _report(
-                joint.name,
-                other.joint.name,
-                f"{name} limit of joint {joint.name}: got {own:g} {unit}, {difference:.1%} from "
-                f"the {mirror:g} {unit} of its mirror image {other.joint.name}; expected at most "
-                f"{_MAX_LIMIT_DIFFERENCE:.0%}",
-                {name: own, "other": mirror},
-                _limit_source(joint),
-            )
+            parts.append(f"{own:g} {unit}, {difference:.1%} from the {mirror:g} {unit}")
+            measured[name], measured[f"other_{name}"] = own, mirror
+        yield _report(
+            joint.name,
+            other.joint.name,
+            f"{' and '.join(differences)} limit of joint {joint.name}: got {' and '.join(parts)} "
+            f"of its mirror image {other.joint.name}; expected at most "
+            f"{_MAX_LIMIT_DIFFERENCE:.0%}",
+            measured,
+            _limit_source(joint),
+        )
 
 
 _LimitOf = Callable[[Facts, Joint], float | None]
