@@ -15,8 +15,8 @@ are less accurate than this."""
 def with_negligible_repairs(report: Report) -> Report:
     """Return a report in which the fixes of negligible inertias are safe.
 
-    A sensor frame with a placeholder inertia prevents MuJoCo from loading a robot, but has no effect
-    on the motion of the body that it is fixed to.
+    A sensor frame with a placeholder inertia prevents MuJoCo from loading a robot, but has no
+    effect on the motion of the body that it is fixed to.
     """
     findings = tuple(_with_safe_fix(report, finding) for finding in report.findings)
     return replace(report, findings=findings)
