@@ -30,9 +30,7 @@ _BLOCKING_RULES = ("XML", "MSH", "TRE", "INR", "JNT001", "JNT004", "JNT007", "JN
 """Codes, or starts of codes, of rules whose errors change the robot that would be written. For
 example, a joint of an unknown type would become fixed."""
 
-_FIXED_BY_EXPORT = frozenset(
-    {"INR011", "MSH002", "MSH004", "MSH005", "MSH007", "MSH008", "XML014"}
-)
+_FIXED_BY_EXPORT = frozenset({"INR011", "MSH002", "MSH004", "MSH005", "MSH007", "MSH008", "XML014"})
 """Rules whose errors cannot occur in the written files: each link has an <inertial>, meshes are
 converted and renamed, and rotations are written as roll, pitch and yaw."""
 
