@@ -1,3 +1,5 @@
+import hashlib
+
 import cv2
 import numpy as np
 import pytest
@@ -35,6 +37,16 @@ def test_import_whole_file_is_one_patch(tmp_path):
     assert terrain_map.height([4.55, 0.55]) == pytest.approx(0.2)
     assert terrain_map.height([0.55, 3.55]) == pytest.approx(0.1)
     assert validate(terrain_map) == []
+
+
+def test_import_records_the_file(tmp_path):
+    terrain_map = import_array(tmp_path, steps()).terrain_map
+    digest = hashlib.sha256((tmp_path / "a.npy").read_bytes()).hexdigest()
+    loaded = tk.TerrainMap.load(terrain_map.save(tmp_path / "map.npz"))
+    parameters = loaded.patch(0, 0).parameters.requested
+    assert (parameters["file"], parameters["sha256"]) == ("a.npy", digest)
+    assert parameters["file_cell"] == 0.1
+    assert loaded.config.terrains[0].terrain == "imported"
 
 
 def test_import_split_into_patches(tmp_path):
