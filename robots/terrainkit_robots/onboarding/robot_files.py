@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.bodies.shapes import min_height
@@ -201,7 +203,8 @@ def _mjcf_text(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[st
         if link not in bodies
     ]
     imu = imu_site(facts)
-    if imu.name in spec.feet:
+    other_frames = [f for f in frames if f.name == imu.name and not _is_same_site(f, imu)]
+    if imu.name in spec.feet or other_frames:
         imu = replace(imu, name=f"{imu.name}_site")
     height = _base_height(facts)
     extras = Extras(
@@ -215,6 +218,10 @@ def _mjcf_text(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[st
         height_at_zero=max(height, _clearance(facts, {})) if facts.stance else None,
     )
     return mjcf_text(merged.model, extras)
+
+
+def _is_same_site(first: Site, second: Site) -> bool:
+    return first.body == second.body and np.allclose(first.pose, second.pose)
 
 
 def _excluded_contacts(facts: Facts) -> tuple[frozenset[frozenset[str]], tuple[str, ...]]:
