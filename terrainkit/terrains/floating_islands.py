@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
+from terrainkit.features.pit_ground import pit_around
+from terrainkit.features.scatter import scatter
 from terrainkit.grid import Grid
-from terrainkit.pit_ground import pit_around
-from terrainkit.scatter import scatter
 from terrainkit.solids import Solids, make_boxes, make_cylinders
 from terrainkit.terrain import Terrain
 
