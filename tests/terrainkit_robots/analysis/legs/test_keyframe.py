@@ -24,7 +24,7 @@ def quadruped(bundled, **changes):
     ("changes", "defect"),
     [
         ({}, ""),
-        ({"thigh": 2.6, "calf": -2.6}, "trunk lies on the ground"),
+        ({"thigh": 2.6, "calf": -2.6}, "base lies on the ground"),
         ({"FL_thigh": 1.2, "FL_calf": -2.5}, "FL_foot is 0.1"),
     ],
 )
