@@ -308,9 +308,9 @@ def _make(
     try:
         n, _ = np.broadcast_shapes((1, 3), *(each.shape for each in vectors), *flags)
     except ValueError:
-        shapes = ", ".join(str(each.shape) for each in vectors)
+        given = ", ".join(str(each.shape) for each in vectors)
         raise ConfigError(
-            f"center, size and rpy of {kind}: got shapes {shapes}; expected (3,) or the same (n, 3)"
+            f"center, size and rpy of {kind}: got shapes {given}; expected (3,) or the same (n, 3)"
         ) from None
     center, half_size, rpy = (np.broadcast_to(each, (n, 3)) for each in vectors)
     for name, values in (("center", center), ("size", half_size), ("rpy", rpy)):

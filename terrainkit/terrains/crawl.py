@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
+from terrainkit.features.lane import lane_goals, lane_positions, lane_spawn
 from terrainkit.grid import Grid
-from terrainkit.lane import lane_goals, lane_positions, lane_spawn
 from terrainkit.solids import Solids, make_boxes
 from terrainkit.terrain import Terrain
 

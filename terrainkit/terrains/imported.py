@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
-from terrainkit.gradient_noise import faded_relief
+from terrainkit.features.gradient_noise import faded_relief
 from terrainkit.grid import Grid
 from terrainkit.importing.isolated import check_file
 from terrainkit.importing.options import ReadOptions

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
+from terrainkit.features.lane import lane_goals, lane_spawn
 from terrainkit.grid import Grid
-from terrainkit.lane import lane_goals, lane_spawn
 from terrainkit.terrain import Terrain
 
 _POSTS = 10

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
-from terrainkit.blocks import SINK, make_blocks, number_that_fits
 from terrainkit.errors import ConfigError
+from terrainkit.features.blocks import SINK, make_blocks, number_that_fits
+from terrainkit.features.lane import lane_goals, lane_spawn
+from terrainkit.features.pit_ground import pit_across, pit_bounds
 from terrainkit.grid import Grid
-from terrainkit.lane import lane_goals, lane_spawn
-from terrainkit.pit_ground import pit_across, pit_bounds
 from terrainkit.solids import Solids
 from terrainkit.terrain import Terrain
 

@@ -367,6 +367,13 @@ def test_mjcf_boxes_have_exact_friction_edges(tmp_path):
     assert friction_below(model, xy) == pytest.approx(expected, abs=1e-6)
 
 
+def test_mjcf_auto_uses_boxes_for_level_friction_patches(tmp_path):
+    terrain_map = friction_map("flat", (FrictionPatches(side=0.3),), cols=9)
+    model = loaded(terrain_map, tmp_path)
+    assert model.nhfield == 0
+    assert model.ngeom > 200
+
+
 def test_mjcf_one_friction_per_patch_splits_the_heightfield(tmp_path):
     model = loaded(friction_map("rough", rows=1, seed=0), tmp_path, collision="hfield")
     # Border and two plain columns: four rectangles around the icy patch and the patch itself.

@@ -243,6 +243,24 @@ def test_import_table_has_legs_and_solids(tmp_path):
     assert validate(terrain_map) == []
 
 
+def test_import_arch_is_decomposed(tmp_path):
+    ring = trimesh.creation.annulus(1.0, 1.4, 2.0)
+    ring.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, (1, 0, 0)))
+    ring.apply_translation((3, 2, 0))
+    trimesh.util.concatenate([box((6, 4, 1), (3, 2, -0.5)), ring]).export(tmp_path / "a.stl")
+    imported = import_map(tmp_path / "a.stl", ImportOptions(solids=True))
+    terrain_map, report = imported.terrain_map, imported.report
+    # The opening is 2 m wide and 2 m deep.
+    assert report.overhang_area == pytest.approx(4.0)
+    assert report.lost_area == 0.0
+    assert report.largest_error < 0.02
+    assert len(terrain_map.solids) > 3
+    assert terrain_map.clearance([3.0, 2.0]) == pytest.approx(1.0, abs=0.02)
+    assert terrain_map.clearance([3.6, 2.0]) == pytest.approx(0.8, abs=0.02)
+    assert terrain_map.scan([3.0, 2.0, 5.0]) == pytest.approx(1.4, abs=0.02)
+    assert validate(terrain_map) == []
+
+
 def test_import_one_body_with_tunnel(tmp_path):
     block = trimesh.creation.box((4, 3, 2), trimesh.transformations.translation_matrix((2, 1.5, 0)))
     hole = trimesh.creation.box(

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from terrainkit.blocks import MAX_PER_AXIS, number_that_fits
 from terrainkit.errors import ConfigError
+from terrainkit.features.blocks import MAX_PER_AXIS, number_that_fits
 from terrainkit.grid import Grid
 
 

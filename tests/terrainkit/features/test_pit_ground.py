@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from terrainkit.errors import ConfigError
+from terrainkit.features.pit_ground import pit_across, pit_around, pit_between, pit_bounds
 from terrainkit.grid import Grid
-from terrainkit.pit_ground import pit_across, pit_around, pit_between, pit_bounds
 
 
 def test_pit_around_leaves_platform_and_rim():
