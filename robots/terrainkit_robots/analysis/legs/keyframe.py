@@ -39,9 +39,7 @@ def keyframe_defect(robot: LegModel) -> str:
         if body.collisions
     }
     feet = {
-        leg.foot: lowest[leg.limb.chain[-1]]
-        for leg in robot.legs
-        if leg.limb.chain[-1] in lowest
+        leg.foot: lowest[leg.limb.chain[-1]] for leg in robot.legs if leg.limb.chain[-1] in lowest
     }
     if not feet:
         return ""
