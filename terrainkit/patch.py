@@ -15,7 +15,7 @@ from terrainkit.grid import Grid
 from terrainkit.layout import assign_patch, patch_rng, terrain_columns
 from terrainkit.overlay import Overlay
 from terrainkit.parameter import Realized, Value, parameters_of
-from terrainkit.patch_geometry import PatchGeometry
+from terrainkit.patch_geometry import PatchGeometry, uniform_friction
 from terrainkit.solids import Solids
 from terrainkit.sub_terrain import SubTerrain, overlay_path
 from terrainkit.terrain import Terrain
@@ -168,7 +168,7 @@ def _terrain_geometry(
     return PatchGeometry(
         grid=grid,
         heights=heights,
-        friction=np.broadcast_to(np.float32(friction), grid.shape),
+        friction=uniform_friction(friction, grid.shape),
         solids=solids,
         goals=goals,
         spawn=terrain.spawn(grid),
