@@ -12,6 +12,7 @@ from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.bodies.shapes import min_height
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.legs.keyframe import keyframe_defect
 from terrainkit_robots.export.actuator import ActuatorConfig
 from terrainkit_robots.export.canonical import to_canonical
 from terrainkit_robots.export.fixed_joint_merge import merge_fixed_joints
@@ -123,6 +124,7 @@ def make_robot_files(
             *exported.notes,
             *contact_notes,
             *imu_notes(facts),
+            *(_keyframe_notes(facts) if user_spec is None else ()),
         ),
     )
 
@@ -218,6 +220,17 @@ def _mjcf_text(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[st
         height_at_zero=max(height, _clearance(facts, {})) if facts.stance else None,
     )
     return mjcf_text(merged.model, extras)
+
+
+def _keyframe_notes(facts: Facts) -> tuple[str, ...]:
+    """Return a note if the first keyframe is not the default pose."""
+    defect = keyframe_defect(facts.leg_model)
+    if not defect:
+        return ()
+    return (
+        f"the first keyframe is not the default pose: its feet do not carry the robot ({defect}); "
+        "a standing pose was solved instead",
+    )
 
 
 def _is_same_site(first: Site, second: Site) -> bool:

@@ -332,6 +332,16 @@ def test_onboard_converts_quaternion_to_rpy(tmp_path, suffix):
     np.testing.assert_allclose(quat[-1], [0.5**0.5, 0, 0, 0.5**0.5], atol=1e-9)
 
 
+def test_onboard_replaces_crouching_keyframe(tmp_path):
+    text = QUADRUPED.with_suffix(".xml").read_text()
+    file = tmp_path / "quadruped.xml"
+    file.write_text(text.replace("0 0.9 -1.8", "0 2.6 -2.6"))
+    result = onboard(file, tmp_path / "robot", options())
+    assert result.robot.spec.provenance["default_pose"].origin == "solved"
+    assert result.verification.is_stable
+    assert any("keyframe is not the default pose" in note for note in result.robot.notes)
+
+
 def test_onboard_keeps_existing_folder(tmp_path):
     spec = tmp_path / "robot/robot.toml"
     spec.parent.mkdir()
