@@ -31,11 +31,11 @@ def render_robot(file: Path, size: tuple[int, int] = DEFAULT_SIZE) -> dict[str, 
     Raises:
         RenderError: if MuJoCo cannot render on this machine, or cannot render this robot.
     """
-    images = stream_frames(partial(robot_images, file.absolute(), size))
+    images = stream_frames(partial(render_views, file.absolute(), size))
     return {name: image.tobytes() for name, image in zip(VIEWS, images, strict=True)}
 
 
-def robot_images(file: Path, size: tuple[int, int]) -> Iterator[NDArray[np.uint8]]:
+def render_views(file: Path, size: tuple[int, int]) -> Iterator[NDArray[np.uint8]]:
     """Yield the bytes of a PNG of each view; raise a RenderError if the robot is invalid."""
     import cv2
     import mujoco

@@ -15,7 +15,7 @@ from terrainkit_robots.rendering.robot_images import (
     box_corners,
     fit_camera,
     render_robot,
-    robot_images,
+    render_views,
     show_robot_geoms,
 )
 from tests.robots import QUADRUPED
@@ -87,7 +87,7 @@ def world(content):
 def test_robot_images_rejects_model(tmp_path, text, message):
     (tmp_path / "robot.xml").write_text(text)
     with pytest.raises(RenderError, match=message):
-        next(robot_images(tmp_path / "robot.xml", SIZE))
+        next(render_views(tmp_path / "robot.xml", SIZE))
 
 
 def test_render_robot_does_not_retry_after_rejected_model(tmp_path, monkeypatch):
