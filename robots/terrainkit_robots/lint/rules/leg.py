@@ -17,7 +17,7 @@ from terrainkit_robots.description.fix import Fix, SetAttribute
 from terrainkit_robots.lint.rule import Severity, Violation, rule
 from terrainkit_robots.spec.per_joint import match_joints
 from terrainkit_robots.spec.robot_spec import RobotSpec
-from terrainkit_robots.text import names
+from terrainkit_robots.text import contrast, names
 
 _LEG_COUNTS = (2, 4, 6, 8)
 
@@ -280,12 +280,13 @@ def com_outside_support(robot: Facts) -> Iterator[Violation]:
         return
     trunk = robot.bodies[0]
     outside = stance.margin < 0
+    got, expected = contrast(1000 * abs(stance.margin), 1000 * limit, ".0f")
     yield Violation(
         subject=trunk.name,
         source=robot.tree.links[trunk.name].source,
         message="distance of the center of mass from the edge of the support polygon at the "
-        f"standing pose: got {1000 * abs(stance.margin):.0f} mm "
-        f"{'outside' if outside else 'inside'}; expected at least {1000 * limit:.0f} mm inside",
+        f"standing pose: got {got} mm {'outside' if outside else 'inside'}; expected at least "
+        f"{expected} mm inside",
         severity="error" if outside else "warning",
         certainty="likely",
         measured={"margin": round(stance.margin, 5)},

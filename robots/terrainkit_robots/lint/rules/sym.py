@@ -45,6 +45,7 @@ from terrainkit_robots.lint.rules.jnt import (
     wide_range,
     zero_axis,
 )
+from terrainkit_robots.text import contrast
 from terrainkit_robots.transforms import Matrix
 
 _MAX_MASS_DIFFERENCE = 0.02
@@ -87,7 +88,8 @@ def mass_asymmetry(robot: Facts) -> Iterator[Violation]:
         yield _report(
             odd.body.name,
             other.body.name,
-            f"mass of body {odd.body.name}: got {odd.body.mass:.4g} kg, {difference:.1%} from the "
+            f"mass of body {odd.body.name}: got {odd.body.mass:.4g} kg, "
+            f"{contrast(difference, _MAX_MASS_DIFFERENCE, '.1%')[0]} from the "
             f"{other.body.mass:.4g} kg of its mirror image {other.body.name}; expected at most "
             f"{_MAX_MASS_DIFFERENCE:.0%}",
             {"mass": odd.body.mass, "other": other.body.mass},
@@ -150,13 +152,13 @@ def com_asymmetry(robot: Facts) -> Iterator[Violation]:
         if _is_same_part(robot, left.body, right.body):
             continue
         odd, other = robot.outlier_first(left, right, lambda body: body.center)
+        got, expected = contrast(1000 * error, 1000 * limit, ".3g")
         yield _report(
             odd.body.name,
             other.body.name,
             f"center of mass of body {odd.body.name}: got {_format_point(odd.body.center)} mm, and "
             f"{_format_point(other.body.center)} mm for its mirror image {other.body.name}, each "
-            f"in its own frame: {1000 * error:.3g} mm from mirrored; expected at most "
-            f"{1000 * limit:.2g} mm",
+            f"in its own frame: {got} mm from mirrored; expected at most {expected} mm",
             {"gap": error, "allowed": limit},
             mass_source(odd.body.main_link),
         )
@@ -258,8 +260,8 @@ def inertia_asymmetry(robot: Facts) -> Iterator[Violation]:
             other.body.name,
             f"principal moments of body {odd.body.name}: got {_format(odd.body.principal)} kg m2, "
             f"and {_format(other.body.principal)} kg m2 for its mirror image {other.body.name}: "
-            f"{difference:.1%} of the largest apart; expected at most "
-            f"{_MAX_MOMENT_DIFFERENCE:.0%}",
+            f"{contrast(difference, _MAX_MOMENT_DIFFERENCE, '.1%')[0]} of the largest apart; "
+            f"expected at most {_MAX_MOMENT_DIFFERENCE:.0%}",
             {"gap": difference},
             inertia_source(odd.body.main_link),
         )
@@ -384,7 +386,7 @@ def effort_asymmetry(robot: Facts) -> Iterator[Violation]:
         for name, (a, b, difference, _) in differences.items():
             own, mirror = (b, a) if odd is right else (a, b)
             unit = joint.effort_unit if name == "effort" else joint.speed_unit
-            parts.append(f"{own:g} {unit}, {difference:.1%} from the {mirror:g} {unit}")
+            parts.append(f"{own:g} {unit}, {_percent(difference)} from the {mirror:g} {unit}")
             measured[name], measured[f"other_{name}"] = own, mirror
         yield _report(
             joint.name,
@@ -395,6 +397,10 @@ def effort_asymmetry(robot: Facts) -> Iterator[Violation]:
             measured,
             _limit_source(joint),
         )
+
+
+def _percent(difference: float) -> str:
+    return contrast(difference, _MAX_LIMIT_DIFFERENCE, ".1%")[0]
 
 
 _LimitOf = Callable[[Facts, Joint], float | None]
