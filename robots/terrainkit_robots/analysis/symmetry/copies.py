@@ -1,5 +1,6 @@
 """Detect assemblies that are mounted twice as they are, instead of mirrored."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair
 from terrainkit_robots.description.model import Geometry, Joint
+from terrainkit_robots.transforms import Matrix
 
 _MIN_PAIRS = 2
 """Number of moving bodies from which two chains are assemblies."""
@@ -48,7 +50,7 @@ def _is_copy(pair: MirrorPair) -> bool:
     left, right = pair.left.body, pair.right.body
     a, b = pair.left.joint, pair.right.joint
     return (
-        np.isclose(left.mass, right.mass, rtol=_RELATIVE_TOLERANCE)
+        math.isclose(left.mass, right.mass, rel_tol=_RELATIVE_TOLERANCE)
         and _same(left.center, right.center)
         and np.allclose(
             left.inertia,
@@ -62,7 +64,7 @@ def _is_copy(pair: MirrorPair) -> bool:
     )
 
 
-def _same(one: np.ndarray, other: np.ndarray) -> bool:
+def _same(one: Matrix, other: Matrix) -> bool:
     return bool(np.allclose(one, other, rtol=0, atol=_ABSOLUTE_TOLERANCE))
 
 

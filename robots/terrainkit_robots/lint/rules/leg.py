@@ -160,8 +160,8 @@ def _uncounted_legs(robot: Facts) -> list[str]:
 def _is_equal_limb(robot: Facts, limb: Limb, leg: Limb) -> bool:
     if _joint_types(limb) != _joint_types(leg) or len(limb.chain) != len(leg.chain):
         return False
-    masses = [[robot.bodies[index].mass for index in each.chain] for each in (limb, leg)]
-    return bool(np.allclose(*masses, rtol=_MAX_MASS_DIFFERENCE) and min(masses[0]) > 0)
+    own, other = ([robot.bodies[index].mass for index in each.chain] for each in (limb, leg))
+    return min(own) > 0 and bool(np.allclose(own, other, rtol=_MAX_MASS_DIFFERENCE))
 
 
 @rule("LEG003", "missing-leg-joint", "warning", needs=("legs",))
