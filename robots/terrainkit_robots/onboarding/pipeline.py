@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from terrainkit.errors import TerrainkitError
+from terrainkit.errors import ConfigError, TerrainkitError
 from terrainkit_robots.export.canonical import plain_name
 from terrainkit_robots.lint.check import check_robot
 from terrainkit_robots.lint.runner import Finding, Report
@@ -18,6 +18,7 @@ from terrainkit_robots.onboarding.folder import (
     write_files,
 )
 from terrainkit_robots.onboarding.frameworks.frameworks import config_file_name, robot_config_text
+from terrainkit_robots.onboarding.negligible_repairs import with_negligible_repairs
 from terrainkit_robots.onboarding.report_md import report_markdown
 from terrainkit_robots.onboarding.result import OnboardResult
 from terrainkit_robots.onboarding.robot_files import MJCF, SpecOverride, make_robot_files
@@ -29,9 +30,9 @@ _BLOCKING_RULES = ("XML", "MSH", "TRE", "INR", "JNT001", "JNT004", "JNT007", "JN
 """Codes, or starts of codes, of rules whose errors change the robot that would be written. For
 example, a joint of an unknown type would become fixed."""
 
-_FIXED_BY_EXPORT = frozenset({"MSH002", "MSH004", "MSH005", "MSH007", "MSH008", "XML014"})
-"""Rules whose errors cannot occur in the written files: meshes are converted and renamed, and
-rotations are written as roll, pitch and yaw."""
+_FIXED_BY_EXPORT = frozenset({"INR011", "MSH002", "MSH004", "MSH005", "MSH007", "MSH008", "XML014"})
+"""Rules whose errors cannot occur in the written files: each link has an <inertial>, meshes are
+converted and renamed, and rotations are written as roll, pitch and yaw."""
 
 
 def _no_progress(items: Any, _total: int) -> Any:
@@ -134,10 +135,13 @@ def onboard(
         cache_dir=options.cache_dir,
         progress=options.progress,
     )
-    configs = {
-        file: robot_config_text(name, robot.facts, robot.spec).encode()
-        for name, file in config_names.items()
-    }
+    configs: dict[str, bytes] = {}
+    skipped_configs: dict[str, str] = {}
+    for name, file in config_names.items():
+        try:
+            configs[file] = robot_config_text(name, robot.facts, robot.spec).encode()
+        except ConfigError as error:
+            skipped_configs[name] = str(error)
     edits = find_edits(target, {**robot.files, **configs})
     with new_folder(target, overwrite=options.overwrite) as folder:
         options.on_step("simulating the standing pose")
@@ -156,6 +160,7 @@ def onboard(
             robot=robot,
             verification=verification,
             configs=tuple(configs),
+            skipped_configs=skipped_configs,
             images=tuple(images),
             images_error=images_error,
             edits=tuple(edits),
@@ -171,12 +176,12 @@ def _fix_in_memory(path: Path, options: OnboardOptions) -> tuple[Report, tuple[F
     settings = options.settings.over(read_settings(path.parent))
     # All rules are needed to find blocking errors. The written files are simulated, not this one.
     settings = replace(settings, select=(), simulate=False)
-    report = check_robot(path, settings)
+    report = with_negligible_repairs(check_robot(path, settings))
     fixed: tuple[Finding, ...] = ()
     if report.facts.model.kind != "xacro" and any(f.fix is not None for f in report.findings):
 
         def check(contents: Mapping[Path, bytes]) -> Report:
-            return check_robot(path, settings, contents=contents)
+            return with_negligible_repairs(check_robot(path, settings, contents=contents))
 
         result = fix_robot(path, check, report=report, unsafe=options.unsafe_fixes)
         report, fixed = result.report, result.fixed

@@ -5,11 +5,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.bodies.shapes import min_height
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.legs.keyframe import keyframe_defect
 from terrainkit_robots.export.actuator import ActuatorConfig
 from terrainkit_robots.export.canonical import to_canonical
 from terrainkit_robots.export.fixed_joint_merge import merge_fixed_joints
@@ -121,6 +124,7 @@ def make_robot_files(
             *exported.notes,
             *contact_notes,
             *imu_notes(facts),
+            *(_keyframe_notes(facts) if user_spec is None else ()),
         ),
     )
 
@@ -201,7 +205,8 @@ def _mjcf_text(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[st
         if link not in bodies
     ]
     imu = imu_site(facts)
-    if imu.name in spec.feet:
+    other_frames = [f for f in frames if f.name == imu.name and not _is_same_site(f, imu)]
+    if imu.name in spec.feet or other_frames:
         imu = replace(imu, name=f"{imu.name}_site")
     height = _base_height(facts)
     extras = Extras(
@@ -215,6 +220,21 @@ def _mjcf_text(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[st
         height_at_zero=max(height, _clearance(facts, {})) if facts.stance else None,
     )
     return mjcf_text(merged.model, extras)
+
+
+def _keyframe_notes(facts: Facts) -> tuple[str, ...]:
+    """Return a note if the first keyframe is not the default pose."""
+    defect = keyframe_defect(facts.leg_model)
+    if not defect:
+        return ()
+    return (
+        f"the first keyframe is not the default pose: its feet do not carry the robot ({defect}); "
+        "a standing pose was solved instead",
+    )
+
+
+def _is_same_site(first: Site, second: Site) -> bool:
+    return first.body == second.body and np.allclose(first.pose, second.pose)
 
 
 def _excluded_contacts(facts: Facts) -> tuple[frozenset[frozenset[str]], tuple[str, ...]]:

@@ -1,7 +1,7 @@
 """A summary of the onboarding of a robot: one line per step."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.lint.report.summary import summarize_findings
@@ -9,6 +9,7 @@ from terrainkit_robots.onboarding.equivalence import NUM_POSES
 from terrainkit_robots.text import count, names
 
 if TYPE_CHECKING:
+    from terrainkit_robots.lint.runner import Finding
     from terrainkit_robots.onboarding.result import OnboardResult
     from terrainkit_robots.onboarding.robot_files import RobotFiles
     from terrainkit_robots.onboarding.verify import Verification
@@ -20,6 +21,7 @@ def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
     if result.fixed:
         codes = dict.fromkeys(finding.code for finding in result.fixed)
         yield "fixed", f"{count(len(result.fixed), 'finding')}: {names(codes)}"
+        yield from _repairs(result.fixed)
     if result.robot is None or result.verification is None:
         return
     yield "wrote", _list_files(result.robot)
@@ -27,6 +29,8 @@ def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
     yield "standing", _standing_text(result.verification, result.robot)
     if result.configs:
         yield "configs", names(result.configs)
+    for framework, reason in result.skipped_configs.items():
+        yield "skipped", f"{framework}: {reason}"
     pictures = f"{count(len(result.images), 'picture')} in report.md"
     yield "pictures", pictures if result.images else f"none: {result.images_error}"
     if result.edits:
@@ -43,6 +47,14 @@ def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
         )
     if result.robot.notes:
         yield "notes", f"{count(len(result.robot.notes), 'change')} listed in report.md"
+
+
+def _repairs(fixed: "Sequence[Finding]") -> Iterator[tuple[str, str]]:
+    """Yield the repairs of inertias, which change a number of the robot."""
+    links = [finding.subject for finding in fixed if finding.code in ("INR003", "INR004")]
+    if links:
+        noun = "inertia" if len(links) == 1 else "inertias"
+        yield "repaired", f"the {noun} of {names(links, max_count=3)}; see report.md"
 
 
 def _list_files(robot: "RobotFiles") -> str:

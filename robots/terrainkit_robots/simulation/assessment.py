@@ -75,12 +75,19 @@ def _failed_checks(result: StandResult) -> Iterator[tuple[int, str]]:
     if result.drift > _MAX_DRIFT * length:
         got, expected = contrast(result.drift, _MAX_DRIFT * length, ".3f")
         yield 1, f"it drifts by {got} m (expected at most {expected} m)"
-    if result.other_contacts:
-        verb = "touches" if len(result.other_contacts) == 1 else "touch"
-        yield 1, f"{_join(result.other_contacts)} {verb} the ground (expected only feet)"
-    if result.lifted_feet:
-        verb = "does" if len(result.lifted_feet) == 1 else "do"
-        yield 1, f"{_join(result.lifted_feet)} {verb} not touch the ground (expected all feet)"
+    # A foot without its own link touches the ground beside its tip, such as with the whole shank.
+    beside = tuple(foot for foot in result.lifted_feet if foot in result.other_contacts)
+    others = tuple(body for body in result.other_contacts if body not in beside)
+    lifted = tuple(foot for foot in result.lifted_feet if foot not in beside)
+    if beside:
+        verb, tip = ("rests", "its tip") if len(beside) == 1 else ("rest", "their tips")
+        yield 1, f"{_join(beside)} {verb} on the ground beside {tip} (expected only tips)"
+    if others:
+        verb = "touches" if len(others) == 1 else "touch"
+        yield 1, f"{_join(others)} {verb} the ground (expected only feet)"
+    if lifted:
+        verb = "does" if len(lifted) == 1 else "do"
+        yield 1, f"{_join(lifted)} {verb} not touch the ground (expected all feet)"
     if result.saturation > _MAX_SATURATION:
         got, expected = contrast(result.saturation, _MAX_SATURATION, ".0%")
         effort = f"{got} of its effort limit (expected at most {expected})"

@@ -8,6 +8,7 @@ import numpy as np
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.legs.keyframe import is_standing_keyframe
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.onboarding.derive_spec import named_bodies
 from terrainkit_robots.onboarding.derive_spec.actuator_limits import (
@@ -123,14 +124,16 @@ def _columns(facts: Facts, gains: "Mapping[str, Gain]") -> dict[str, Column]:
 
 
 def _pose_provenance(facts: Facts) -> Provenance:
-    home = facts.model.home
-    joints = [joint for leg in facts.legs for joint in leg.joints] or facts.actuated
-    if home and all(joint.name in home for joint in joints):
-        return _provenance("declared", f"first keyframe of {facts.model.file.name}")
+    declared = _provenance("declared", f"first keyframe of {facts.model.file.name}")
     if facts.legs:
+        if is_standing_keyframe(facts.leg_model):
+            return declared
         return Provenance(
             origin="solved", reason="legs bent, feet below the center of mass, other joints near 0"
         )
+    home = facts.model.home
+    if home and all(joint.name in home for joint in facts.actuated):
+        return declared
     return _provenance("suggested", "closest to 0 within the limits")
 
 
