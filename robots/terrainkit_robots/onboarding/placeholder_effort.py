@@ -1,12 +1,12 @@
 """Remove placeholder efforts of leg joints, so that they are estimated."""
 
-from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.text import names
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
     from terrainkit_robots.analysis.facts import Facts
     from terrainkit_robots.description.model import RobotModel
     from terrainkit_robots.lint.runner import Finding
