@@ -7,6 +7,7 @@ from terrainkit_robots.text import names
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
     from terrainkit_robots.analysis.facts import Facts
     from terrainkit_robots.description.model import RobotModel
     from terrainkit_robots.lint.runner import Finding
@@ -31,11 +32,13 @@ def without_efforts(
     """Return a model in which the efforts of some joints are unknown, and a note on them."""
     if not joints:
         return model, ()
-    efforts = sorted({
-        joint.limit.effort
-        for joint in model.joints
-        if joint.name in joints and joint.limit is not None and joint.limit.effort is not None
-    })
+    efforts = sorted(
+        {
+            joint.limit.effort
+            for joint in model.joints
+            if joint.name in joints and joint.limit is not None and joint.limit.effort is not None
+        }
+    )
     changed = replace(
         model,
         joints=tuple(

@@ -137,9 +137,7 @@ def make_robot_files(
     )
 
 
-def _make_spec(
-    facts: Facts, user_spec: SpecOverride | None, gain_set: "GainSet"
-) -> "RobotSpec":
+def _make_spec(facts: Facts, user_spec: SpecOverride | None, gain_set: "GainSet") -> "RobotSpec":
     """Return the derived spec, with the values of the overriding spec.
 
     Raises:

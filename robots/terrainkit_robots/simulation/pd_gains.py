@@ -91,9 +91,7 @@ def _compute_gains(facts: Facts, gain_set: GainSet) -> Mapping[str, Gain]:
     return {name: found[name] for name in sim.actuated}
 
 
-def _make_gain(
-    target: GainTarget, inertia: float, min_ratio: float = _MIN_STIFFNESS_RATIO
-) -> Gain:
+def _make_gain(target: GainTarget, inertia: float, min_ratio: float = _MIN_STIFFNESS_RATIO) -> Gain:
     stiffness = _round(target.stiffness)
     critical = 2 * math.sqrt(target.stiffness * inertia)
     limit = target.stiffness / min_ratio

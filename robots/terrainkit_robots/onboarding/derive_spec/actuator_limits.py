@@ -143,9 +143,7 @@ def action_scale_column(
             largest = _by_kind(max_scale, joint)
             scales = {
                 largest: f"{largest:g} {joint.unit}, the largest suggested scale",
-                share * effort.values[joint.name] / stiffness: (
-                    f"{share:g} * effort / stiffness"
-                ),
+                share * effort.values[joint.name] / stiffness: (f"{share:g} * effort / stiffness"),
             }
             lower, upper = joint.range or (-math.inf, math.inf)
             if math.isfinite(upper - lower):
