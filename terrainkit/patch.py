@@ -70,7 +70,8 @@ class Patch:
     """Spawn positions x, y, z [m] and headings [rad], shape (k, 4); the origin comes first."""
 
     spawn_offset: float = 0.0
-    """Largest offset along x or y of the origin from the spawn that the terrain prefers [m]."""
+    """Largest offset along x or y of the origin from the spawn that the terrain prefers [m]. It is
+    known for a patch that has just been built; :meth:`TerrainMap.patch` returns 0."""
 
     @property
     def origin(self) -> NDArray[np.float32]:

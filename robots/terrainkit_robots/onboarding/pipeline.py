@@ -19,12 +19,14 @@ from terrainkit_robots.onboarding.folder import (
 )
 from terrainkit_robots.onboarding.frameworks.frameworks import config_file_name, robot_config_text
 from terrainkit_robots.onboarding.negligible_repairs import with_negligible_repairs
+from terrainkit_robots.onboarding.placeholder_effort import placeholder_efforts
 from terrainkit_robots.onboarding.report_md import report_markdown
 from terrainkit_robots.onboarding.result import OnboardResult
 from terrainkit_robots.onboarding.robot_files import MJCF, SpecOverride, make_robot_files
 
 if TYPE_CHECKING:
     from terrainkit_robots.export.collision_simplification.simplify import CollisionMethod, Progress
+    from terrainkit_robots.simulation.gain import GainSet
 
 _BLOCKING_RULES = ("XML", "MSH", "TRE", "INR", "JNT001", "JNT004", "JNT007", "JNT013")
 """Codes, or starts of codes, of rules whose errors change the robot that would be written. For
@@ -58,6 +60,10 @@ class OnboardOptions:
 
     spec: Path | None = None
     """A robot.toml whose values override the derived ones."""
+
+    gains: "GainSet" = "stand"
+    """PD gains to suggest: `stand` holds the default pose without a policy; `train` is as soft as
+    published training configurations, with action scales of about 0.25 rad."""
 
     unsafe_fixes: bool = False
     """Whether to apply fixes that change a number, a shape or a mesh."""
@@ -132,6 +138,8 @@ def onboard(
         collision=options.collision,
         floating=options.floating,
         user_spec=user_spec,
+        gain_set=options.gains,
+        unknown_efforts=placeholder_efforts(report.facts, report.findings),
         cache_dir=options.cache_dir,
         progress=options.progress,
     )
@@ -149,7 +157,8 @@ def onboard(
         # The pictures are rendered by another process at the same time.
         with ThreadPoolExecutor(1) as executor:
             images_job = executor.submit(_render_images, folder, options.render_images)
-            verification = verify(report.facts, robot, folder)
+            is_soft = options.gains == "train" and user_spec is None
+            verification = verify(report.facts, robot, folder, soft_gains=is_soft)
             options.on_step("rendering pictures")
         images, images_error = images_job.result()
         write_files(folder, {**images, **edits})

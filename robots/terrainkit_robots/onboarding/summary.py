@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from terrainkit_robots.lint.report.summary import summarize_findings
 from terrainkit_robots.onboarding.equivalence import NUM_POSES
+from terrainkit_robots.simulation.assessment import assess
 from terrainkit_robots.text import count, names
 
 if TYPE_CHECKING:
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from terrainkit_robots.onboarding.result import OnboardResult
     from terrainkit_robots.onboarding.robot_files import RobotFiles
     from terrainkit_robots.onboarding.verify import Verification
+    from terrainkit_robots.simulation.standing import StandResult
 
 
 def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
@@ -27,6 +29,8 @@ def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
     yield "wrote", _list_files(result.robot)
     yield "compared", _compare_files(result.verification)
     yield "standing", _standing_text(result.verification, result.robot)
+    if result.verification.free_standing is not None:
+        yield "free", _free_standing_text(result.verification.free_standing)
     if result.configs:
         yield "configs", names(result.configs)
     for framework, reason in result.skipped_configs.items():
@@ -84,7 +88,17 @@ def _standing_text(checks: "Verification", robot: "RobotFiles") -> str:
         return f"not simulated: the robot has {'a fixed base' if robot.facts.legs else 'no legs'}"
     locked = "with locked joints, since bipeds need a controller to balance"
     how = locked if checks.joints_locked else "with the gains of robot.toml"
+    if checks.stand_gains:
+        how = "with the gains of --gains stand, which hold the pose without a policy"
     if checks.failures:
         return f"NO: {standing.seconds:g} s {how}; {'; '.join(checks.failures)}"
     tilt = f"tilt {math.degrees(standing.tilt):.1f} degrees"
     return f"yes: {standing.seconds:g} s {how}, {tilt}, only the feet touch the ground"
+
+
+def _free_standing_text(standing: "StandResult") -> str:
+    failures = assess(standing).failures
+    how = "with the gains of robot.toml and without a policy"
+    if failures:
+        return f"no, a policy has to balance it: {standing.seconds:g} s {how}; {failures[0]}"
+    return f"yes: {standing.seconds:g} s {how}"

@@ -342,6 +342,43 @@ def test_onboard_replaces_crouching_keyframe(tmp_path):
     assert any("keyframe is not the default pose" in note for note in result.robot.notes)
 
 
+def test_onboard_training_gains(onboarded, tmp_path):
+    stiff = onboarded(QUADRUPED)
+    result = onboard(QUADRUPED, tmp_path / "robot", options(gains="train"))
+    assert result.robot.spec.stiffness["FL_calf_joint"] == 20.0
+    assert result.robot.spec.action_scale["FL_calf_joint"] == 0.25
+    checks = result.verification
+    assert checks.is_stable
+    assert checks.stand_gains
+    assert checks.standing == stiff.verification.standing
+    assert checks.free_standing != checks.standing
+    summary = dict(summarize(result))
+    assert "--gains stand" in summary["standing"]
+    assert "with the gains of robot.toml and without a policy" in summary["free"]
+    assert "gain set `stand`" in (result.folder / "report.md").read_text()
+
+
+def test_onboard_biped_reports_free_standing(onboarded):
+    result = onboarded(bundled.urdf_path("biped"))
+    summary = dict(summarize(result))
+    assert summary["standing"].startswith("yes: 5 s with locked joints")
+    assert summary["free"].startswith("no, a policy has to balance it: ")
+    assert "without a policy, it does not stand" in (result.folder / "report.md").read_text()
+
+
+def test_onboard_replaces_placeholder_efforts(tmp_path):
+    file = tmp_path / "quadruped.urdf"
+    file.write_text(QUADRUPED.read_text().replace('effort="23.7"', 'effort="1000"'))
+    result = onboard(file, tmp_path / "robot", options())
+    effort = result.robot.spec.effort
+    assert effort["FL_hip_joint"] == 33.0
+    assert effort["FL_calf_joint"] == 45.43
+    assert "x weight x leg length" in str(result.robot.spec.provenance)
+    assert any("is a placeholder (1000 N m)" in note for note in result.robot.notes)
+    model = mujoco.MjModel.from_xml_path(str(result.folder / "robot.xml"))
+    assert model.actuator_forcerange[0, 1] == 33.0
+
+
 def test_onboard_keeps_existing_folder(tmp_path):
     spec = tmp_path / "robot/robot.toml"
     spec.parent.mkdir()

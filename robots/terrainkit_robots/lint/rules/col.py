@@ -15,7 +15,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.analysis.legs.standing_pose import joint_range
 from terrainkit_robots.lint.rule import Severity, Violation, rule
-from terrainkit_robots.text import count
+from terrainkit_robots.text import contrast, count
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.bodies.overlap import Overlap
@@ -208,6 +208,7 @@ def overlap(robot: Facts) -> Iterator[Violation]:
     for pair, deepest in _group_by_pair(robot, robot.overlap_scene.detect(robot.positions)).items():
         if deepest.depth <= _MAX_OVERLAP:
             continue
+        got, expected = contrast(1000 * deepest.depth, 1000 * _MAX_OVERLAP, ".1f")
         # Fixed-base arms often disable contacts of pairs that always touch, so no error for them.
         levels: tuple[Severity, ...] = ("info", "warning", "error" if robot.legs else "warning")
         level = 1 + (deepest.depth > _MAX_OVERLAP_ERROR) - deepest.has_mesh
@@ -218,7 +219,7 @@ def overlap(robot: Facts) -> Iterator[Violation]:
             source=deepest.second.geometry.source,
             message=f"overlap of {'the convex hulls of ' if deepest.has_mesh else ''}"
             f"{deepest.first.link} and {deepest.second.link} at the default pose: got "
-            f"{1000 * deepest.depth:.1f} mm; expected at most {1000 * _MAX_OVERLAP:.0f} mm",
+            f"{got} mm; expected at most {expected} mm",
             severity=levels[level],
             certainty="likely" if deepest.has_mesh else "proven",
             measured={"depth": round(deepest.depth, 5)},
@@ -280,11 +281,12 @@ def overlap_in_range(robot: Facts) -> Iterator[Violation]:
     for pair, number in counts.items():
         share = number / _NUM_SAMPLES
         if share > _MAX_OVERLAP_SHARE:
+            got, expected = contrast(share, _MAX_OVERLAP_SHARE, ".0%")
             yield Violation(
                 subject=" and ".join(pair),
                 source=robot.tree.links[pair[0]].source,
                 message=f"part of the joint range in which {pair[0]} and {pair[1]} overlap: got "
-                f"{share:.0%}; expected at most {_MAX_OVERLAP_SHARE:.0%}",
+                f"{got}; expected at most {expected}",
                 certainty="likely",
                 measured={"share": share},
             )

@@ -19,7 +19,7 @@ from terrainkit_robots.lint.rules.inr import (
     implausible_density,
     negative_mass,
 )
-from terrainkit_robots.text import count, names
+from terrainkit_robots.text import contrast, count, names
 from terrainkit_robots.transforms import Matrix
 
 _MIN_AXIS_LENGTH = 1e-6
@@ -324,10 +324,11 @@ def wide_range(robot: Facts) -> Iterator[Violation]:
             continue
         lower, upper = _limits(joint.limit)
         if upper - lower > _MAX_RANGE:
+            turns, _ = contrast((upper - lower) / (2 * math.pi), 2.0, ".3g")
             yield Violation(
                 subject=joint.name,
                 source=joint.limit.source,
-                message=f"range of joint {joint.name}: got {(upper - lower) / (2 * math.pi):.3g} "
+                message=f"range of joint {joint.name}: got {turns} "
                 f"turns ({lower:g} to {upper:g} rad); expected at most 2 turns",
                 measured={"lower": lower, "upper": upper},
             )
@@ -608,14 +609,15 @@ def insufficient_torque(robot: Facts) -> Iterator[Violation]:
     named = any(leg.limb.has_leg_names for leg in robot.legs)
     for joint, torque, effort in overloaded:
         share, unit = torque / effort, joint.effort_unit
+        got, expected = contrast(share, _MAX_LOAD, ".0%")
         yield Violation(
             subject=joint.name,
             source=joint.limit.source if joint.limit else joint.source,
             severity="error" if share > _MAX_LOAD_ERROR and named else "warning",
             certainty="likely",
             message=f"static load of joint {joint.name} at the standing pose: got {torque:.3g} "
-            f"{unit}, {share:.0%} of its effort limit of {effort:.4g} {unit}; expected at most "
-            f"{_MAX_LOAD:.0%}",
+            f"{unit}, {got} of its effort limit of {effort:.4g} {unit}; expected at most "
+            f"{expected}",
             measured={"torque": torque, "effort": effort, "share": share},
         )
 

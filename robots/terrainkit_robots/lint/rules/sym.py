@@ -25,7 +25,7 @@ from terrainkit_robots.analysis.symmetry.asymmetry import (
     has_flipped_axes,
     limits_match,
 )
-from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorSide
+from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair, MirrorSide
 from terrainkit_robots.description.model import Joint, Source
 from terrainkit_robots.lint.rule import Check, Measured, Violation, rule
 from terrainkit_robots.lint.rules.inr import (
@@ -45,6 +45,7 @@ from terrainkit_robots.lint.rules.jnt import (
     wide_range,
     zero_axis,
 )
+from terrainkit_robots.text import contrast
 from terrainkit_robots.transforms import Matrix
 
 _MAX_MASS_DIFFERENCE = 0.02
@@ -76,7 +77,7 @@ def mass_asymmetry(robot: Facts) -> Iterator[Violation]:
     """
     _check_joint_types(robot)
     other_checks = _OtherChecks(robot, implausible_density, mass_ratio, massless_body)
-    for pair in robot.mirror_pairs:
+    for pair in _mirrored(robot):
         left, right = pair.left, pair.right
         difference = _relative_difference(left.body.mass, right.body.mass)
         if not _has_mass(left, right) or difference <= _MAX_MASS_DIFFERENCE:
@@ -87,12 +88,19 @@ def mass_asymmetry(robot: Facts) -> Iterator[Violation]:
         yield _report(
             odd.body.name,
             other.body.name,
-            f"mass of body {odd.body.name}: got {odd.body.mass:.4g} kg, {difference:.1%} from the "
+            f"mass of body {odd.body.name}: got {odd.body.mass:.4g} kg, "
+            f"{contrast(difference, _MAX_MASS_DIFFERENCE, '.1%')[0]} from the "
             f"{other.body.mass:.4g} kg of its mirror image {other.body.name}; expected at most "
             f"{_MAX_MASS_DIFFERENCE:.0%}",
             {"mass": odd.body.mass, "other": other.body.mass},
             mass_source(odd.body.main_link),
         )
+
+
+def _mirrored(robot: Facts) -> list[MirrorPair]:
+    """Return the pairs of mirrored joints without those of copied assemblies."""
+    copied = {pair.left.body.index for pair in robot.copied_pairs}
+    return [pair for pair in robot.mirror_pairs if pair.left.body.index not in copied]
 
 
 def _has_mass(left: MirrorSide, right: MirrorSide) -> bool:
@@ -135,9 +143,9 @@ def com_asymmetry(robot: Facts) -> Iterator[Violation]:
         plus 10 % of the radius of gyration.
     """
     _check_joint_types(robot)
-    _, displaced = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
+    _, displaced = find_misalignments(robot.mirror, _mirrored(robot), robot.leg_bodies)
     other_checks = _OtherChecks(robot, com_outside_body)
-    for pair in robot.mirror_pairs:
+    for pair in _mirrored(robot):
         left, right = pair.left, pair.right
         if pair.indices & displaced or not _has_mass(left, right):
             continue
@@ -150,13 +158,13 @@ def com_asymmetry(robot: Facts) -> Iterator[Violation]:
         if _is_same_part(robot, left.body, right.body):
             continue
         odd, other = robot.outlier_first(left, right, lambda body: body.center)
+        got, expected = contrast(1000 * error, 1000 * limit, ".3g")
         yield _report(
             odd.body.name,
             other.body.name,
             f"center of mass of body {odd.body.name}: got {_format_point(odd.body.center)} mm, and "
             f"{_format_point(other.body.center)} mm for its mirror image {other.body.name}, each "
-            f"in its own frame: {1000 * error:.3g} mm from mirrored; expected at most "
-            f"{1000 * limit:.2g} mm",
+            f"in its own frame: {got} mm from mirrored; expected at most {expected} mm",
             {"gap": error, "allowed": limit},
             mass_source(odd.body.main_link),
         )
@@ -240,7 +248,7 @@ def inertia_asymmetry(robot: Facts) -> Iterator[Violation]:
     """
     _check_joint_types(robot)
     other_checks = _OtherChecks(robot, *_INERTIA_RULES)
-    for pair in robot.mirror_pairs:
+    for pair in _mirrored(robot):
         left, right = pair.left, pair.right
         if not _has_mass(left, right) or not _has_same_parts(robot, left, right):
             continue
@@ -258,8 +266,8 @@ def inertia_asymmetry(robot: Facts) -> Iterator[Violation]:
             other.body.name,
             f"principal moments of body {odd.body.name}: got {_format(odd.body.principal)} kg m2, "
             f"and {_format(other.body.principal)} kg m2 for its mirror image {other.body.name}: "
-            f"{difference:.1%} of the largest apart; expected at most "
-            f"{_MAX_MOMENT_DIFFERENCE:.0%}",
+            f"{contrast(difference, _MAX_MOMENT_DIFFERENCE, '.1%')[0]} of the largest apart; "
+            f"expected at most {_MAX_MOMENT_DIFFERENCE:.0%}",
             {"gap": difference},
             inertia_source(odd.body.main_link),
         )
@@ -308,7 +316,7 @@ def limit_asymmetry(robot: Facts) -> Iterator[Violation]:
         The limits of tested robots without defects agree exactly.
     """
     other_checks = _OtherChecks(robot, wide_range)
-    for pair in robot.mirror_pairs:
+    for pair in _mirrored(robot):
         left, right = pair.left, pair.right
         a, b = left.joint.range, right.joint.range
         if pair.sign == 0 or a is None or b is None or limits_match(a, b, pair.sign):
@@ -359,7 +367,7 @@ def effort_asymmetry(robot: Facts) -> Iterator[Violation]:
         The limits of tested robots without defects agree exactly.
     """
     other_checks = _OtherChecks(robot, placeholder_limit)
-    for pair in robot.mirror_pairs:
+    for pair in _mirrored(robot):
         left, right = pair.left, pair.right
         differences: dict[str, tuple[float, float, float, _LimitOf]] = {}
         for name, limit_of in (("effort", Facts.effort_limit), ("velocity", _velocity_of)):
@@ -384,7 +392,7 @@ def effort_asymmetry(robot: Facts) -> Iterator[Violation]:
         for name, (a, b, difference, _) in differences.items():
             own, mirror = (b, a) if odd is right else (a, b)
             unit = joint.effort_unit if name == "effort" else joint.speed_unit
-            parts.append(f"{own:g} {unit}, {difference:.1%} from the {mirror:g} {unit}")
+            parts.append(f"{own:g} {unit}, {_percent(difference)} from the {mirror:g} {unit}")
             measured[name], measured[f"other_{name}"] = own, mirror
         yield _report(
             joint.name,
@@ -395,6 +403,10 @@ def effort_asymmetry(robot: Facts) -> Iterator[Violation]:
             measured,
             _limit_source(joint),
         )
+
+
+def _percent(difference: float) -> str:
+    return contrast(difference, _MAX_LIMIT_DIFFERENCE, ".1%")[0]
 
 
 _LimitOf = Callable[[Facts, Joint], float | None]
@@ -418,7 +430,7 @@ def joint_origin_asymmetry(robot: Facts) -> Iterator[Violation]:
         The joint origins of tested robots without defects agree to 0.1 mm.
     """
     _check_joint_types(robot)
-    errors, _ = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
+    errors, _ = find_misalignments(robot.mirror, _mirrored(robot), robot.leg_bodies)
     for error in errors:
         if not error.is_axis:
             yield _report_pair(robot, error)
@@ -439,7 +451,7 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
         Tested robots have either the same axis on all legs, or mirrored axes on all legs.
     """
     _check_joint_types(robot)
-    errors, _ = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
+    errors, _ = find_misalignments(robot.mirror, _mirrored(robot), robot.leg_bodies)
     for error in errors:
         if error.is_axis:
             yield _report_pair(robot, error)
@@ -464,7 +476,7 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
 
 def _opposite_axes(robot: Facts, reported: set[str]) -> Iterator[Violation]:
     """Yield joints whose axis is opposite to that of the mirror image, but should not be."""
-    for pair in robot.mirror_pairs:
+    for pair in _mirrored(robot):
         left, right = pair.left, pair.right
         a, b = left.joint.range, right.joint.range
         if pair.sign == 0 or a is None or b is None:
@@ -482,9 +494,7 @@ def _opposite_axes(robot: Facts, reported: set[str]) -> Iterator[Violation]:
                 "expected the negated axis or the negated limits",
                 {"lower": b[0], "upper": b[1], "other_lower": a[0], "other_upper": a[1]},
             )
-    opposed_pairs = find_flipped_pairs(
-        robot.legs, robot.mirror, robot.mirror_pairs, robot.leg_bodies
-    )
+    opposed_pairs = find_flipped_pairs(robot.legs, robot.mirror, _mirrored(robot), robot.leg_bodies)
     for pair, others in opposed_pairs:
         left, right = pair.left, pair.right
         if right.joint.name not in reported:
@@ -545,6 +555,50 @@ def _report_pair(robot: Facts, error: Misalignment) -> Violation:
         )
     source = (odd.joint.axis_source if error.is_axis else None) or odd.joint.source
     return _report(name, mirror, message, {"gap": error.distance, "angle": error.angle}, source)
+
+
+@rule("SYM008", "copied-assembly", "info")
+def copied_assembly(robot: Facts) -> Iterator[Violation]:
+    """The left and the right side are the same assembly, mounted twice.
+
+    Two arms of one product are equal in their own frames, and are not mirror images of each other.
+    The other rules on symmetry do not apply to them, and a policy cannot be mirrored by swapping
+    joints with a sign.
+
+    Fix:
+        No action if the real robot is built like this. Otherwise mirror one side: centers of mass,
+        products of inertia, origins and limits.
+
+    Source:
+        Both sides have the same meshes, inertials, joint axes, origins and limits, and at least one
+        center of mass or range is not mirrored.
+    """
+    copied = robot.copied_pairs
+    differing = [
+        pair
+        for pair in copied
+        if (
+            _has_mass(pair.left, pair.right)
+            and _com_error(robot, pair.left, pair.right) > _max_com_error(pair.left, pair.right)
+        )
+        or (
+            pair.sign != 0
+            and (a := pair.left.joint.range) is not None
+            and (b := pair.right.joint.range) is not None
+            and not limits_match(a, b, pair.sign)
+        )
+    ]
+    if differing:
+        first = copied[0]
+        yield _report(
+            first.left.body.name,
+            first.right.body.name,
+            f"assemblies on both sides: got {len(copied)} equal pairs of bodies, from "
+            f"{first.left.body.name} and {first.right.body.name} on; {len(differing)} of them are "
+            "not mirror images",
+            {"pairs": len(copied), "differing": len(differing)},
+            first.left.body.top.source,
+        )
 
 
 def _check_joint_types(robot: Facts) -> None:
